@@ -1,0 +1,42 @@
+PYTHON ?= python3
+BIN := .venv/bin
+# pyNastran's metadata asks for numpy < 2; the tests use its bulk-data reader, which runs with numpy 2.
+NASTRAN := pyNastran==1.4.1 cpylog docopt-ng
+
+.PHONY: demo test lint types layers wheel results clean
+
+demo: .venv/core
+	$(BIN)/jointbench demo --out out/demo
+
+test: .venv/full lint types layers
+	$(BIN)/python -m pytest -n 2 --dist loadfile tests
+
+lint: .venv/full
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+types: .venv/full
+	$(BIN)/pyright
+
+layers: .venv/full
+	$(BIN)/lint-imports
+
+results: .venv/full
+	$(BIN)/python scripts/results.py
+
+.venv/bin/python:
+	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "jointbench needs Python 3.11 or newer; set PYTHON=… to one")'
+	$(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --upgrade pip
+
+.venv/core: pyproject.toml constraints.txt | .venv/bin/python
+	$(BIN)/python -m pip install --quiet -c constraints.txt -e .
+	touch $@
+
+.venv/full: pyproject.toml constraints.txt | .venv/bin/python
+	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[rl,scale,io,peers,test]'
+	$(BIN)/python -m pip install --quiet --no-deps $(NASTRAN)
+	touch $@ .venv/core
+
+clean:
+	rm -rf .venv out build dist

@@ -1,0 +1,193 @@
+"""The command `jointbench`: parse, call, print, save."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import tyro
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from bench.errors import BenchError
+
+Command = Callable[[], None]
+
+
+@contextlib.contextmanager
+def progress_bar(quiet: bool) -> Iterator[Callable[[str, float], None]]:
+    """A progress bar on standard error; call what is given with a label and the share done."""
+    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), disable=quiet) as bar:
+        task = bar.add_task("starting", total=1.0)
+        yield lambda label, share: bar.update(task, description=label, completed=share)
+
+
+def emit(document: Any) -> None:
+    """Print JSON to standard output."""
+    print(json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False))
+
+
+@dataclass
+class Demo:
+    """Identify a real friction damper and the deck's joint, swap the models in, compare on unseen tests.
+
+    Writes index.html, a rerun recording and Parquet records.
+    """
+
+    out: Path = Path("out/demo")
+    """Folder for the results."""
+    json: bool = False
+    """Print the figures as JSON instead of a table."""
+
+    def __call__(self) -> None:
+        from bench import demo
+        from bench.demo_report import summary, write
+
+        with progress_bar(quiet=self.json) as progress:
+            result = demo.compute(progress)
+            files = write(result, self.out, progress)
+        if self.json:
+            emit(result.to_dict() | {"files": [str(path) for path in files]})
+            return
+        console = Console()
+        for table in summary(result):
+            console.print(table)
+        console.print(f"{result.seconds:.0f} s. Open {files[0]} in a browser, and {files[1]} with `rerun`.")
+
+
+@dataclass
+class Laws:
+    """List the force laws, or describe one."""
+
+    name: tyro.conf.Positional[str] = ""
+    """A law to describe in full."""
+    json: bool = False
+    """Print JSON."""
+
+    def __call__(self) -> None:
+        from bench.laws import LAWS, describe, find_law
+
+        laws = [find_law(self.name)] if self.name else list(LAWS.values())
+        if self.json:
+            emit([describe(law) for law in laws])
+            return
+        console = Console()
+        if not self.name:
+            table = Table("law", "equation", "parameters", "states", title="Force laws")
+            for law in laws:
+                table.add_row(law.name, law.equation, ", ".join(law.parameter_names), ", ".join(law.states))
+            console.print(table)
+            return
+        law = laws[0]
+        console.print(f"[bold]{law.name}[/bold]   {law.equation}\n{law.reference}", highlight=False)
+        table = Table("parameter", "unit", "default", "bounds", "meaning")
+        for p in law.parameters:
+            unit = p.unit if p.rotational in {None, p.unit} else f"{p.unit} or {p.rotational}"
+            table.add_row(p.name, unit, f"{p.default:g}", f"{p.bounds[0]:g} … {p.bounds[1]:g}", p.description)
+        console.print(table)
+        console.print(describe(law)["documentation"], markup=False, highlight=False)
+
+
+@dataclass
+class Simulate:
+    """Simulate a rig described by a TOML or JSON file and write its record."""
+
+    configuration: tyro.conf.Positional[Path]
+    """Rig, elements and excitation (see docs/configuration.md)."""
+    out: Annotated[Path, tyro.conf.arg(aliases=["-o"])] = Path("record.parquet")
+    """The record to write."""
+    seed: int = 0
+    """Seed of the excitation."""
+    json: bool = False
+    """Print JSON."""
+
+    def __call__(self) -> None:
+        import numpy as np
+
+        from bench.record_files import write_recording
+        from bench.rig import simulate
+
+        rig, excitation = _configured(self.configuration)
+        record = simulate(rig, excitation, rng=np.random.default_rng(self.seed))
+        write_recording(self.out, record)
+        rows = [
+            {"channel": c.name, "unit": c.unit, "min": float(record[c.name].min()), "max": float(record[c.name].max())}
+            for c in record.channels
+        ]
+        if self.json:
+            emit({"file": str(self.out), "samples": len(record.time), "channels": rows})
+            return
+        table = Table("channel", "unit", "min", "max", title=f"{self.out}: {len(record.time)} samples")
+        for row in rows:
+            table.add_row(row["channel"], row["unit"], f"{row['min']:.5g}", f"{row['max']:.5g}")
+        Console().print(table)
+
+
+@dataclass
+class View:
+    """Log rigs moving in 3-D, their channels, loops and contact bands, side by side, to rerun."""
+
+    configurations: tyro.conf.Positional[tuple[Path, ...]]
+    """One rig, or several to be compared (the first is the truth); the first one's excitation drives all."""
+    out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
+    """File to save (.rrd); opens the viewer where not given."""
+    seed: int = 0
+    """Seed of the excitation."""
+
+    def __call__(self) -> None:
+        import numpy as np
+
+        from bench.errors import ParameterError
+        from bench.rerun_log import log_comparison
+        from bench.rig import simulate
+
+        if not self.configurations:
+            raise ParameterError("give at least one rig configuration (a TOML or JSON file; see docs/configuration.md)")
+        _, excitation = _configured(self.configurations[0])
+        rigs = {path.stem: _configured(path, need_excitation=False)[0] for path in self.configurations}
+        records = {name: simulate(rig, excitation, rng=np.random.default_rng(self.seed)) for name, rig in rigs.items()}
+        log_comparison(self.out, rigs, records)
+        if self.out is not None:
+            print(f"{self.out}: open it with `rerun {self.out}`")
+
+
+def _configured(path: Path, *, need_excitation: bool = True) -> tuple[Any, Any]:
+    from bench.errors import ParameterError
+    from bench.rig.configuration import read_document, rig_from_configuration
+    from bench.signals import Excitation
+
+    document = read_document(path)
+    rig = rig_from_configuration(document, folder=path.parent)
+    if "excitation" not in document and need_excitation:
+        raise ParameterError(f"{path} has no [excitation]; say what drives the rig (see docs/configuration.md)")
+    return rig, Excitation.from_dict(document["excitation"]) if "excitation" in document else None
+
+
+COMMANDS: dict[str, type] = {"demo": Demo, "laws": Laws, "simulate": Simulate, "view": View}
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run the command line; returns the exit status."""
+    try:
+        command: Command = tyro.extras.subcommand_cli_from_dict(
+            COMMANDS, prog="jointbench", description="A MuJoCo virtual test bench for nonlinear joints.", args=argv
+        )
+        command()
+    except BenchError as error:
+        Console(stderr=True, soft_wrap=True).print(f"jointbench: {error}", style="red", markup=False, highlight=False)
+        return 2
+    except KeyboardInterrupt:
+        print("jointbench: stopped", file=sys.stderr)
+        return 130
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,519 @@
+"""The catalogue of effects: everything that the diagnosis knows may be missing from a nominal model.
+
+The names and families of the first part are those of the blind trials; the rest are the usual suspects of a test
+laboratory. Priors are broad and the same for all rigs; `log_prior` makes the latter a little less likely beforehand.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from bench.discrepancy import friction_limits as limits
+from bench.discrepancy import signal_effects as signals
+from bench.discrepancy.effect import Effect, FreeParameter, Scales, Values
+from bench.errors import UnknownNameError
+from bench.laws.bouc_wen import BOUC_WEN
+from bench.laws.constant_force import CONSTANT_FORCE
+from bench.laws.coulomb import COULOMB
+from bench.laws.coupling import CROSS_STIFFNESS, GAP_COUPLING
+from bench.laws.damping import POWER_LAW_DAMPING, QUADRATIC_DAMPING
+from bench.laws.gap import GAP, ONE_SIDED_STOP
+from bench.laws.lugre import LUGRE
+from bench.laws.maxwell import MAXWELL
+from bench.laws.normal_force_friction import LOAD_DEPENDENT_FRICTION, TIME_VARYING_FRICTION
+from bench.laws.stiffness import CUBIC_STIFFNESS, QUADRATIC_STIFFNESS, STIFFNESS_DRIFT
+from bench.laws.stribeck import STRIBECK
+
+AMPLITUDE = {"mean": math.log(0.2), "std": 1.5, "bounds": (-9.0, 5.0)}
+SIGNED = {"signed": True, "mean": 0.0, "std": 0.6, "bounds": (-30.0, 30.0)}
+
+
+SLOW = 1e-3
+"""Regularising velocity of friction that goes back into a rig, as a part of the largest velocity of the records."""
+
+
+def _log_grid(*values: float) -> tuple[float, ...]:
+    return tuple(math.log(v) for v in values)
+
+
+def _lugre_theta(values: Values, scales: Scales) -> Values:
+    level, preslide, ratio = values
+    return np.array([level, level / preslide, level * ratio, 0.0, scales.velocity, 0.0])
+
+
+def _bouc_wen_theta(values: Values, scales: Scales) -> Values:
+    stiffness, beta, ratio, n = values
+    b = beta * scales.position ** (1.0 - n)
+    return np.array([stiffness, b * stiffness ** (1.0 - n), ratio * b * stiffness ** (1.0 - n), n])
+
+
+FRICTION = FreeParameter("friction_force", "force", **AMPLITUDE)
+
+CATALOGUE: tuple[Effect, ...] = (
+    Effect(
+        "coulomb_friction",
+        "friction",
+        "joint",
+        (FRICTION,),
+        "f = Fc sgn(v), set-valued at rest",
+        law=COULOMB,
+        limit=limits.coulomb_limit,
+        theta=lambda values, scales: np.array([values[0], SLOW * scales.velocity]),
+    ),
+    Effect(
+        "stribeck_friction",
+        "friction",
+        "joint",
+        (
+            FRICTION,
+            FreeParameter(
+                "static_excess", mean=math.log(0.7), std=0.7, bounds=(-3.0, 2.5), grid=_log_grid(0.7)
+            ),
+            FreeParameter(
+                "stribeck_velocity",
+                "velocity",
+                mean=math.log(0.15),
+                std=1.0,
+                bounds=(-6.0, 0.5),
+                grid=_log_grid(0.03, 0.1, 0.3),
+            ),
+        ),
+        "f = Fc (1 + s exp(-(v/vs)^2)) sgn(v)",
+        law=STRIBECK,
+        affine=True,
+        limit=limits.stribeck_limit,
+        theta=lambda values, scales: np.append(values, SLOW * scales.velocity),
+    ),
+    Effect(
+        "presliding_friction",
+        "hysteresis",
+        "joint",
+        (
+            FRICTION,
+            FreeParameter(
+                "presliding_displacement",
+                "position",
+                mean=math.log(0.07),
+                std=1.2,
+                bounds=(-7.0, 1.5),
+                grid=_log_grid(0.01, 0.03, 0.1, 0.3),
+            ),
+            FreeParameter(
+                "bristle_damping_per_force",
+                "1/velocity",
+                mean=math.log(0.3),
+                std=1.5,
+                bounds=(-7.0, 3.0),
+                grid=_log_grid(0.1),
+            ),
+        ),
+        "f = s0 z + s1 z', z' = v - s0 |v| z / Fc (LuGre; Dahl for s1 = 0)",
+        law=LUGRE,
+        theta=_lugre_theta,
+        rate_bound=lambda values, scales: scales.velocity / values[1],
+    ),
+    Effect(
+        "bouc_wen_hysteresis",
+        "hysteresis",
+        "joint",
+        (
+            FreeParameter("A", "stiffness", mean=math.log(0.2), std=1.5, bounds=(-7.0, 4.0)),
+            FreeParameter(
+                "beta",
+                "1/position",
+                mean=math.log(3.0),
+                std=1.2,
+                bounds=(-5.0, 6.0),
+                grid=_log_grid(0.5, 2.0, 6.0, 20.0),
+            ),
+            FreeParameter(
+                "gamma_over_beta", signed=True, mean=0.0, std=1.0, bounds=(-3.0, 5.0), grid=(-0.5, 0.6)
+            ),
+            FreeParameter("n", std=0.5, mean=0.35, bounds=(0.0, 1.6), grid=_log_grid(1.0, 2.0)),
+        ),
+        "f = z, z' = A v - beta |v| |z|^(n-1) z - gamma v |z|^n",
+        law=BOUC_WEN,
+        theta=_bouc_wen_theta,
+        rate_bound=lambda values, scales: scales.velocity * values[1] * (1.0 + abs(values[2])),
+    ),
+    Effect(
+        "gap",
+        "stiffness",
+        "joint",
+        (
+            FreeParameter("stiffness", "stiffness", mean=math.log(0.3), std=1.5, bounds=(-6.0, 6.0)),
+            FreeParameter(
+                "clearance",
+                "position",
+                mean=math.log(0.4),
+                std=0.8,
+                bounds=(-5.0, 0.1),
+                grid=_log_grid(0.03, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9),
+            ),
+        ),
+        "f = k (q - d) beyond d, k (q + d) below -d",
+        law=GAP,
+        theta=lambda values, scales: np.append(values, [0.0, 0.0]),
+    ),
+    Effect(
+        "one_sided_stop",
+        "stiffness",
+        "joint",
+        (
+            FreeParameter("stiffness", "stiffness", mean=math.log(0.3), std=1.5, bounds=(-6.0, 6.0)),
+            FreeParameter(
+                "position",
+                "position",
+                signed=True,
+                mean=0.0,
+                std=0.6,
+                bounds=(-1.0, 1.0),
+                grid=(-0.8, -0.6, -0.4, -0.2, -0.05, 0.05, 0.2, 0.4, 0.6, 0.8),
+            ),
+            FreeParameter("side", signed=True, grid=(-1.0, 1.0), fixed=True),
+        ),
+        "f = k (q - p) beyond p on one side",
+        law=ONE_SIDED_STOP,
+        theta=lambda values, scales: np.array([values[0], values[1], 0.0, values[2]]),
+    ),
+    Effect(
+        "cubic_stiffness",
+        "stiffness",
+        "joint",
+        (FreeParameter("k3", "stiffness/position/position", **SIGNED),),
+        "f = k3 q^3",
+        law=CUBIC_STIFFNESS,
+    ),
+    Effect(
+        "quadratic_stiffness",
+        "stiffness",
+        "joint",
+        (FreeParameter("k2", "stiffness/position", **SIGNED),),
+        "f = k2 q^2",
+        law=QUADRATIC_STIFFNESS,
+    ),
+    Effect(
+        "quadratic_damping",
+        "damping",
+        "joint",
+        (FreeParameter("c2", "force/velocity/velocity", **AMPLITUDE),),
+        "f = c2 v |v|",
+        law=QUADRATIC_DAMPING,
+    ),
+    Effect(
+        "power_law_damping",
+        "damping",
+        "joint",
+        (
+            FreeParameter("C", "force", **AMPLITUDE),
+            FreeParameter(
+                "n",
+                mean=math.log(0.45),
+                std=0.5,
+                bounds=(math.log(0.05), math.log(0.98)),
+                grid=_log_grid(0.3, 0.6),
+            ),
+        ),
+        "f = C sgn(v) |v|^n",
+        law=POWER_LAW_DAMPING,
+        theta=lambda values, scales: np.array(
+            [values[0] * scales.velocity ** -values[1], values[1], 1e-3 * SLOW * scales.velocity]
+        ),
+    ),
+    Effect(
+        "viscoelastic_relaxation",
+        "stiffness",
+        "joint",
+        (
+            FreeParameter("stiffness", "stiffness", mean=math.log(0.1), std=1.5, bounds=(-7.0, 4.0)),
+            FreeParameter(
+                "relaxation_time",
+                mean=math.log(0.05),
+                std=1.3,
+                bounds=(math.log(1e-3), math.log(20.0)),
+                grid=_log_grid(0.01, 0.03, 0.1, 0.3, 1.0),
+            ),
+        ),
+        "f = k z, z' = v - z / tau",
+        law=MAXWELL,
+        rate_bound=lambda values, scales: 1.0 / values[1],
+    ),
+    Effect(
+        "load_dependent_friction",
+        "friction",
+        "joint",
+        (FreeParameter("friction_per_displacement", "force/position", **AMPLITUDE),),
+        "f = mu |q| sgn(v), set-valued at rest",
+        law=LOAD_DEPENDENT_FRICTION,
+        limit=limits.load_dependent_limit,
+        theta=lambda values, scales: np.array([values[0], 0.0, SLOW * scales.velocity]),
+    ),
+    Effect(
+        "time_varying_friction",
+        "friction",
+        "joint",
+        (
+            FRICTION,
+            FreeParameter("depth", signed=True, mean=0.5, std=0.5, bounds=(0.0, 1.5), grid=(0.6,)),
+            FreeParameter(
+                "frequency",
+                "1/duration",
+                mean=math.log(2.5),
+                std=0.8,
+                bounds=(-1.5, 4.0),
+                grid=_log_grid(*np.arange(0.5, 9.1, 0.5)),
+            ),
+            FreeParameter("phase", signed=True, mean=0.0, std=1.8, bounds=(-7.0, 7.0), grid=(0.0,)),
+        ),
+        "f = Fc (1 + a sin(2 pi f t + phi)) sgn(v), set-valued at rest",
+        law=TIME_VARYING_FRICTION,
+        limit=limits.time_varying_limit,
+        modulated=True,
+        theta=lambda values, scales: np.append(values, SLOW * scales.velocity),
+    ),
+    Effect(
+        "stiffness_drift",
+        "stiffness",
+        "joint",
+        (FreeParameter("stiffness_change", "stiffness", **SIGNED),),
+        "f = dk (t / T) q",
+        law=STIFFNESS_DRIFT,
+        theta=lambda values, scales: np.array([values[0] / scales.duration, 0.0]),
+    ),
+    Effect(
+        "mass_error",
+        "inertia",
+        "inertia",
+        (FreeParameter("relative_error", signed=True, std=0.3, bounds=(-0.9, 5.0)),),
+        "m = m_nominal (1 + e)",
+        quantity="mass",
+    ),
+    Effect(
+        "stiffness_error",
+        "stiffness",
+        "inertia",
+        (FreeParameter("relative_error", signed=True, std=0.3, bounds=(-0.95, 5.0)),),
+        "k = k_nominal (1 + e)",
+        quantity="stiffness",
+        log_prior=-2.0,
+    ),
+    Effect(
+        "damping_error",
+        "damping",
+        "inertia",
+        (FreeParameter("relative_error", signed=True, std=1.0, bounds=(-0.95, 20.0)),),
+        "c = c_nominal (1 + e)",
+        quantity="damping",
+        log_prior=-2.0,
+    ),
+    Effect(
+        "actuator_delay",
+        "actuator",
+        "actuator",
+        (
+            FreeParameter(
+                "delay",
+                mean=math.log(0.008),
+                std=1.0,
+                bounds=(math.log(1e-4), math.log(1.0)),
+                grid=_log_grid(0.003, 0.01, 0.03),
+            ),
+        ),
+        "F(t - tau)",
+        signal=signals.delay,
+    ),
+    Effect(
+        "actuator_lag",
+        "actuator",
+        "actuator",
+        (
+            FreeParameter(
+                "time_constant",
+                mean=math.log(0.008),
+                std=1.0,
+                bounds=(math.log(1e-4), math.log(1.0)),
+                grid=_log_grid(0.003, 0.01, 0.03),
+            ),
+        ),
+        "tau F' + F = command",
+        signal=signals.lag,
+    ),
+    Effect(
+        "force_gain_error",
+        "actuator",
+        "actuator",
+        (FreeParameter("relative_error", signed=True, std=0.3, bounds=(-3.0, 5.0), grid=(0.0,)),),
+        "F = (1 + e) command",
+        signal=signals.gain,
+    ),
+    Effect(
+        "force_offset",
+        "actuator",
+        "joint",
+        (FreeParameter("offset", "force", **SIGNED),),
+        "f = F0",
+        law=CONSTANT_FORCE,
+        log_prior=-1.0,
+    ),
+    Effect(
+        "actuator_saturation",
+        "actuator",
+        "actuator",
+        (
+            FreeParameter(
+                "level", "force", mean=math.log(1.5), std=0.5, bounds=(-2.0, 2.0), grid=_log_grid(1.0, 1.7)
+            ),
+        ),
+        "F = command, clipped at a level",
+        signal=signals.clip,
+        log_prior=-1.0,
+    ),
+    Effect(
+        "displacement_drift",
+        "sensor",
+        "sensor",
+        (FreeParameter("drift", "position", signed=True, std=0.5),),
+        "x + d t / T",
+        signal=signals.drift,
+        quantity="position",
+    ),
+    Effect(
+        "displacement_delay",
+        "sensor",
+        "sensor",
+        (
+            FreeParameter(
+                "delay",
+                mean=math.log(0.008),
+                std=1.0,
+                bounds=(math.log(1e-4), math.log(1.0)),
+                grid=_log_grid(0.003, 0.01, 0.03),
+            ),
+        ),
+        "x(t - tau)",
+        signal=signals.delay,
+        quantity="position",
+    ),
+    Effect(
+        "displacement_gain_error",
+        "sensor",
+        "sensor",
+        (FreeParameter("relative_error", signed=True, std=0.3, bounds=(-3.0, 5.0)),),
+        "(1 + e) x",
+        signal=signals.gain,
+        quantity="position",
+    ),
+    Effect(
+        "displacement_bias",
+        "sensor",
+        "sensor",
+        (FreeParameter("bias", "position", signed=True, std=0.5),),
+        "x + b",
+        signal=signals.offset,
+        quantity="position",
+        log_prior=-1.0,
+    ),
+    Effect(
+        "displacement_clipping",
+        "sensor",
+        "sensor",
+        (
+            FreeParameter(
+                "level", "position", mean=math.log(0.8), std=0.3, bounds=(-2.0, 0.3), grid=_log_grid(0.6, 0.9)
+            ),
+        ),
+        "x clipped at a level",
+        signal=signals.clip,
+        quantity="position",
+        log_prior=-1.0,
+    ),
+    Effect(
+        "acceleration_gain_error",
+        "sensor",
+        "sensor",
+        (FreeParameter("relative_error", signed=True, std=0.3, bounds=(-3.0, 5.0)),),
+        "(1 + e) a",
+        signal=signals.gain,
+        quantity="acceleration",
+        log_prior=-1.0,
+    ),
+    Effect(
+        "acceleration_delay",
+        "sensor",
+        "sensor",
+        (
+            FreeParameter(
+                "delay",
+                mean=math.log(0.008),
+                std=1.0,
+                bounds=(math.log(1e-4), math.log(1.0)),
+                grid=_log_grid(0.003, 0.01),
+            ),
+        ),
+        "a(t - tau)",
+        signal=signals.delay,
+        quantity="acceleration",
+        log_prior=-1.0,
+    ),
+    Effect(
+        "acceleration_bias",
+        "sensor",
+        "sensor",
+        (FreeParameter("bias", "force", signed=True, std=0.5),),
+        "a + b",
+        signal=signals.offset,
+        quantity="acceleration",
+        log_prior=-1.0,
+    ),
+    Effect(
+        "gap_coupling",
+        "coupling",
+        "joint",
+        (
+            FreeParameter("axial_damping", "force/velocity/position", **AMPLITUDE),
+            FreeParameter("torsional_damping", "force/velocity/position", **AMPLITUDE),
+            FreeParameter(
+                "torsional_clearance",
+                "position",
+                mean=math.log(0.4),
+                std=0.8,
+                bounds=(-5.0, 0.1),
+                grid=_log_grid(0.1, 0.3, 0.5, 0.7),
+            ),
+            FreeParameter(
+                "axial_clearance",
+                "position",
+                mean=math.log(0.4),
+                std=0.8,
+                bounds=(-5.0, 0.1),
+                grid=_log_grid(0.1, 0.3, 0.5, 0.7),
+            ),
+        ),
+        "f1 = c1 x' max(|th| - dth, 0), f2 = c2 th' max(|x| - dx, 0)",
+        law=GAP_COUPLING,
+        n_coordinates=2,
+    ),
+    Effect(
+        "cross_stiffness",
+        "coupling",
+        "joint",
+        (FreeParameter("k_cross", "stiffness", **SIGNED),),
+        "f1 = k th, f2 = k x",
+        law=CROSS_STIFFNESS,
+        n_coordinates=2,
+    ),
+)
+
+
+def effect_named(name: str) -> Effect:
+    """Return the effect called `name`.
+
+    Raises:
+        UnknownNameError: No such effect.
+    """
+    for effect in CATALOGUE:
+        if effect.name == name:
+            return effect
+    raise UnknownNameError("effect", name, (effect.name for effect in CATALOGUE))

@@ -1,0 +1,346 @@
+"""The statistical problem of a case: predictions, residuals in units of their noise, and priors.
+
+Residuals are compared in the frequency domain, up to the frequency where the response sinks into its noise, and are
+whitened there: besides the noise of the response channels, the noise of a measured load drives the free run
+and leaves residuals at the resonance, correlated between channels, which a plain weighting would take for an effect.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from bench.discrepancy.case import Case, CaseRecord
+from bench.discrepancy.effect import Effect, Scales
+from bench.discrepancy.smoothing import smooth_motion
+from bench.discrepancy.structure import Place, Structure
+from bench.discrepancy.system import Elements, LinearStructure, Motion, free_run
+
+Array = NDArray[np.float64]
+ABOVE_NOISE = 1.5
+"""A frequency belongs to the band of a record while a smoothed response spectrum exceeds this many times its noise."""
+MAX_SUBSTEPS = 16
+
+
+@dataclass(frozen=True)
+class Placed:
+    """An effect at a place.
+
+    Attributes:
+        effect: The effect.
+        place: Where it sits.
+        target: Nominal parameter, load channel or response channel of an inertia, actuator or sensor effect.
+    """
+
+    effect: Effect
+    place: Place
+    target: str = ""
+
+    @property
+    def key(self) -> tuple[str, str, str]:
+        """Name, place and target: what tells two placed effects apart."""
+        return (self.effect.name, self.place.name, self.target)
+
+
+Hypothesis = tuple[Placed, ...]
+
+
+class RecordData(NamedTuple):
+    """One record, prepared for fits.
+
+    Attributes:
+        record: The record.
+        loads: (n, n_loads).
+        responses: (n, n_channels).
+        n_bins: Number of frequency bins in the band.
+        whitening: (n_bins, n_channels, n_channels) complex; whitening times the spectrum of the noise is white.
+    """
+
+    record: CaseRecord
+    loads: Array
+    responses: Array
+    n_bins: int
+    whitening: NDArray[np.complex128]
+
+
+@dataclass
+class Problem:
+    """Records, structure and priors on a set of degrees of freedom.
+
+    Attributes:
+        case: The case.
+        structure: Its structure, restricted to the degrees of freedom at hand.
+        records: Records to be explained.
+        bins: Frequency bins of every record, where they have to agree with those of another problem.
+        nominal: (n_nominal,) values of the structure's parameters.
+        spread: (n_nominal,) their one-sigma uncertainties.
+        noise: (n_channels,) noise of the response channels.
+        load_noise: (n_loads,).
+    """
+
+    case: Case
+    structure: Structure
+    records: tuple[CaseRecord, ...]
+    bins: Mapping[str, int] | None = None
+    nominal: Array = field(init=False)
+    spread: Array = field(init=False)
+    noise: Array = field(init=False)
+    load_noise: Array = field(init=False)
+    data: tuple[RecordData, ...] = field(init=False)
+    motions: dict[str, Motion] = field(init=False, default_factory=dict)
+
+    def __post_init__(self) -> None:
+        table = {p.name: p for p in self.case.parameters}
+        self.nominal = np.array([table[name].value for name in self.structure.parameters])
+        self.spread = np.array([table[name].std for name in self.structure.parameters])
+        self.noise = np.array([self._noise_of(name) for name in self.structure.channels])
+        self.load_noise = np.array(
+            [self.case.channel(name).noise_std or 0.0 for name in self.structure.loads]
+        )
+        self.data = tuple(self._prepare(record, self.nominal) for record in self.records)
+
+    def _noise_of(self, name: str) -> float:
+        stated = self.case.channel(name).noise_std
+        if stated is not None and stated > 0:
+            return stated
+        return max(noise_floor(record.values[name]) for record in self.records)
+
+    def _prepare(self, record: CaseRecord, values: Array) -> RecordData:
+        loads = np.column_stack([record.values[name] for name in self.structure.loads])
+        responses = np.column_stack([record.values[name] for name in self.structure.channels])
+        n_bins = self.bins[record.name] if self.bins else band_bins(responses, self.noise)
+        return RecordData(record, loads, responses, n_bins, self.whitening(record, n_bins, values))
+
+    def whitening(self, record: CaseRecord, n_bins: int, values: Array) -> NDArray[np.complex128]:
+        """Return the whitening matrices of a record, the loads' noise passed through the linear structure at `values`."""
+        omega = 2.0 * np.pi * np.arange(n_bins) / (fast_length(len(record)) * record.step)
+        noise = np.broadcast_to(
+            np.diag(self.noise**2).astype(complex), (n_bins, len(self.noise), len(self.noise))
+        )
+        if np.any(self.load_noise > 0):
+            response = self.transfer(self.structure.at(values), omega)
+            scaled = response * self.load_noise
+            noise = noise + scaled @ np.conj(np.swapaxes(scaled, 1, 2))
+        return np.linalg.inv(np.linalg.cholesky(noise))
+
+    def transfer(
+        self, linear: LinearStructure, omega: Array, inputs: Array | None = None
+    ) -> NDArray[np.complex128]:
+        """Frequency responses (n_frequencies, n_channels, n_inputs) from forces on the structure to its channels."""
+        b = linear.inputs if inputs is None else inputs
+        dynamic = (
+            linear.stiffness[None]
+            + 1j * omega[:, None, None] * linear.damping[None]
+            - (omega**2)[:, None, None] * linear.mass[None]
+        )
+        # A free body has no static response; its response at zero frequency is not asked for.
+        dynamic[omega == 0] += 1e-9 * np.abs(linear.mass).max() * np.eye(len(linear.mass))
+        position = np.linalg.solve(dynamic, np.broadcast_to(b, (len(omega), *b.shape)).astype(complex))
+        rows = np.array([o.row for o in self.structure.observers])
+        orders = np.array([o.order for o in self.structure.observers])
+        return (1j * omega[:, None, None]) ** orders[None, :, None] * (rows @ position)
+
+    def motion(self, index: int) -> Motion:
+        """Smoothed measured motion of every degree of freedom in record `index`."""
+        record = self.records[index]
+        if record.name not in self.motions:
+            self.motions[record.name] = self._smoothed(record)
+        return self.motions[record.name]
+
+    def _smoothed(self, record: CaseRecord) -> Motion:
+        n_dof = len(self.structure.dofs)
+        out = np.zeros((3, len(record), n_dof))
+        for i in range(n_dof):
+            own = [
+                c
+                for c, o in enumerate(self.structure.observers)
+                if abs(o.row[i]) == 1.0 and np.abs(o.row).sum() == 1.0
+            ]
+            if not own:
+                continue
+            samples = np.column_stack([record.values[self.structure.channels[c]] for c in own])
+            orders = tuple(self.structure.observers[c].order for c in own)
+            out[:, :, i] = smooth_motion(samples, orders, self.noise[own], record.step).T
+        return Motion(*out)
+
+    def scales(self, place: Place) -> Scales:
+        """Magnitudes along the coordinates of a place, over all records."""
+        position = velocity = 0.0
+        for i in range(len(self.records)):
+            motion = self.motion(i)
+            position = max(position, float(np.abs(motion.position @ place.rows.T).max()))
+            velocity = max(velocity, float(np.abs(motion.velocity @ place.rows.T).max()))
+        force = float(np.sqrt(np.mean([np.mean(d.loads**2) for d in self.data]))) or 1.0
+        position = position or 1.0
+        stiffness = force / position
+        if place.stiffness in self.structure.parameters:
+            stiffness = float(self.nominal[self.structure.parameters.index(place.stiffness)]) or stiffness
+        record = self.records[0]
+        return Scales(force, position, velocity or 1.0, stiffness, len(record) * record.step, record.step)
+
+    def simulate(self, hypothesis: Hypothesis, vector: Array, record: CaseRecord) -> Array:
+        """Free run of a hypothesis.
+
+        Args:
+            hypothesis: Effects.
+            vector: Deviations of the nominal parameters in units of their uncertainty, then the etas of all effects.
+            record: Record whose loads drive the run.
+
+        Returns:
+            (n, n_channels) predicted responses; NaN where it diverged.
+        """
+        values, etas = self.split(hypothesis, vector)
+        loads = np.column_stack([record.values[name] for name in self.structure.loads])
+        for placed, eta in zip(hypothesis, etas, strict=True):
+            effect = placed.effect
+            scales = self.scales_of(placed)
+            if effect.site == "actuator" and effect.signal is not None:
+                j = self.structure.loads.index(placed.target)
+                loads[:, j] = effect.signal(loads[:, j], effect.values(eta, scales), record.step)
+        linear = self.structure.at(values)
+        elements, rate = self.elements(hypothesis, etas, record)
+        fastest = max(rate, np.sqrt(np.max(np.abs(linear.stiffness).sum(1) / np.diag(linear.mass))))
+        # RK4 with h * rate = 0.6 leaves a relative error of 1e-4 over one time constant, below any noise considered
+        substeps = int(np.clip(np.ceil(record.step * fastest / 0.6), 1, MAX_SUBSTEPS))
+        motion = free_run(
+            linear, elements, loads=loads, step=record.step, substeps=substeps, start_time=record.start
+        )
+        return self.observe(hypothesis, etas, motion, record.step)
+
+    def observe(self, hypothesis: Hypothesis, etas: list[Array], motion: Motion, step: float) -> Array:
+        """Channels (n, n_channels) of a motion, sensor effects included."""
+        out = np.column_stack([motion[o.order] @ o.row for o in self.structure.observers])
+        for placed, eta in zip(hypothesis, etas, strict=True):
+            if placed.effect.site == "sensor" and placed.effect.signal is not None:
+                c = self.structure.channels.index(placed.target)
+                out[:, c] = placed.effect.signal(
+                    out[:, c], placed.effect.values(eta, self.scales_of(placed)), step
+                )
+        return out
+
+    def scales_of(self, placed: Placed) -> Scales:
+        """Cached `scales` of the place of an effect."""
+        cache = self.__dict__.setdefault("_scales", {})
+        if placed.place.name not in cache:
+            cache[placed.place.name] = self.scales(placed.place)
+        return cache[placed.place.name]
+
+    def split(self, hypothesis: Hypothesis, vector: Array) -> tuple[Array, list[Array]]:
+        """Nominal parameter values, and the etas of every effect; inertia effects already applied to the values."""
+        n = len(self.nominal)
+        values = self.nominal + self.spread * vector[:n]
+        etas = []
+        for placed in hypothesis:
+            etas.append(vector[n : n + len(placed.effect.parameters)])
+            n += len(placed.effect.parameters)
+            if placed.effect.site == "inertia":
+                i = self.structure.parameters.index(placed.target)
+                values[i] *= 1.0 + placed.effect.values(etas[-1], self.scales_of(placed))[0]
+        return values, etas
+
+    def elements(
+        self, hypothesis: Hypothesis, etas: list[Array], record: CaseRecord
+    ) -> tuple[Elements, float]:
+        """Force laws of a hypothesis, and the fastest rate among them [1/s]."""
+        rows, theta, table = [], [], []
+        n_rows = n_theta = n_states = 0
+        fastest = 0.0
+        for placed, eta in zip(hypothesis, etas, strict=True):
+            effect = placed.effect
+            if effect.site != "joint" or effect.law is None:
+                continue
+            scales = self.scales_of(placed)._replace(duration=len(record) * record.step)
+            parameters = effect.kernel_theta(eta, scales)
+            table.append(
+                [
+                    *effect.addresses, effect.n_coordinates, n_rows, n_theta, n_states, len(effect.law.states),
+                ]
+            )  # fmt: skip
+            fastest = max(fastest, effect.fastest(effect.values(eta, scales), scales))
+            rows.append(placed.place.rows)
+            theta.append(parameters)
+            n_rows += effect.n_coordinates
+            n_theta += len(parameters)
+            n_states += len(effect.law.states)
+        n_dof = len(self.structure.dofs)
+        return (
+            Elements(
+                np.array(table, dtype=np.int64).reshape(-1, 8),
+                np.vstack(rows) if rows else np.zeros((0, n_dof)),
+                np.concatenate([*theta, [0.0]]),
+                np.zeros(n_states),
+            ),
+            fastest,
+        )
+
+    def residual(self, hypothesis: Hypothesis, vector: Array) -> Array:
+        """Whitened residuals of all records, real and imaginary parts stacked; their sum of squares is chi-squared."""
+        parts = []
+        for data in self.data:
+            predicted = self.simulate(hypothesis, vector, data.record)
+            if not np.isfinite(predicted).all():
+                return np.array([np.inf])
+            parts.append(whitened(data.responses - predicted, data))
+        return np.concatenate(parts)
+
+    @property
+    def n_residuals(self) -> int:
+        """Number of real residuals, that is degrees of freedom of chi-squared before the fit."""
+        return sum(2 * d.n_bins * len(self.noise) for d in self.data)
+
+    def prior(self, hypothesis: Hypothesis) -> tuple[Array, Array, Array, Array]:
+        """Mean, standard deviation, lower and upper bound of the vector of a hypothesis."""
+        n = len(self.nominal)
+        mean, std = [np.zeros(n)], [np.ones(n)]
+        low, high = [np.full(n, -np.inf)], [np.full(n, np.inf)]
+        positive = (self.nominal > 0) & (self.spread > 0)
+        low[0][positive] = -0.98 * self.nominal[positive] / self.spread[positive]
+        for placed in hypothesis:
+            p = placed.effect.parameters
+            mean.append(np.array([x.mean for x in p]))
+            std.append(np.array([x.std for x in p]))
+            low.append(np.array([x.bounds[0] for x in p]))
+            high.append(np.array([x.bounds[1] for x in p]))
+        return np.concatenate(mean), np.concatenate(std), np.concatenate(low), np.concatenate(high)
+
+
+def fast_length(n: int) -> int:
+    """FFT length for a record of `n` samples."""
+    return fft.next_fast_len(n, real=True)
+
+
+def noise_floor(x: Array) -> float:
+    """White noise of a channel whose noise is not stated, from the flattest quarter of its spectrum."""
+    spectrum = np.abs(fft.rfft((x - x.mean()) * np.hanning(len(x)))) ** 2 / (len(x) * 0.375)
+    upper = spectrum[len(spectrum) // 2 :]
+    blocks = [np.mean(block) for block in np.array_split(upper, 8)]
+    return float(np.sqrt(max(min(blocks), (1e-6 * np.std(x)) ** 2, 1e-300)))
+
+
+def band_bins(responses: Array, noise: Array) -> int:
+    """Number of frequency bins up to where every response has sunk into its noise."""
+    n = fast_length(len(responses))
+    last = 32
+    for c in range(responses.shape[1]):
+        spectrum = np.abs(fft.rfft(responses[:, c], n)) ** 2 / len(responses)
+        width = max(len(spectrum) // 200, 8)
+        usable = len(spectrum) // width * width
+        smooth = spectrum[:usable].reshape(-1, width).mean(axis=1)
+        above = np.flatnonzero(smooth > ABOVE_NOISE * noise[c] ** 2)
+        if len(above):
+            last = max(last, (above[-1] + 2) * width)
+    return int(min(last, n // 2))
+
+
+def whitened(residual: Array, data: RecordData) -> Array:
+    """Whitened spectrum of time-domain residuals (n, n_channels) over the band, as real numbers."""
+    n = len(residual)
+    spectrum = fft.rfft(residual, fast_length(n), axis=0)[: data.n_bins] / np.sqrt(n / 2.0)
+    white = (data.whitening @ spectrum[:, :, None])[:, :, 0]
+    white[0] /= np.sqrt(2.0)
+    return np.concatenate([white.real.ravel(), white.imag.ravel()])

@@ -1,0 +1,143 @@
+"""Position, velocity and acceleration of one coordinate from what was measured of it.
+
+A Rauch-Tung-Striebel smoother with a random-walk acceleration fuses position, velocity and acceleration channels, whichever
+exist. The intensity of the random walk is chosen by the likelihood of the innovations; gains are stationary, so a
+record of 20 000 samples costs a few milliseconds.
+
+References:
+    H. E. Rauch, F. Tung, C. T. Striebel, AIAA Journal 3 (1965) 1445-1450.
+"""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+CANDIDATES = 10.0 ** np.arange(-2.0, 3.1, 1.0)
+"""Multiples of a first guess of the jerk intensity that are compared by likelihood."""
+
+
+@numba.njit(cache=True, error_model="numpy", nogil=True)
+def _filter(y, h, transition, gain, out, predicted):
+    n = y.shape[0]
+    m = y.shape[1]
+    state = np.zeros(3)
+    for c in range(m):
+        for i in range(3):
+            if h[c, i] == 1.0:
+                state[i] = y[0, c]
+    squares = np.zeros((m, m))
+    innovation = np.zeros(m)
+    for k in range(n):
+        if k > 0:
+            s0 = state[0] * transition[0, 0] + state[1] * transition[0, 1] + state[2] * transition[0, 2]
+            s1 = state[1] + state[2] * transition[1, 2]
+            state[0] = s0
+            state[1] = s1
+        for i in range(3):
+            predicted[k, i] = state[i]
+        for c in range(m):
+            innovation[c] = y[k, c]
+            for i in range(3):
+                innovation[c] -= h[c, i] * state[i]
+        for c in range(m):
+            for i in range(3):
+                state[i] += gain[i, c] * innovation[c]
+            if k > n // 20:
+                for d in range(m):
+                    squares[c, d] += innovation[c] * innovation[d]
+        for i in range(3):
+            out[k, i] = state[i]
+    return squares / (n - 1 - n // 20)
+
+
+@numba.njit(cache=True, error_model="numpy", nogil=True)
+def _smooth(filtered, predicted, back):
+    for k in range(filtered.shape[0] - 2, -1, -1):
+        d0 = filtered[k + 1, 0] - predicted[k + 1, 0]
+        d1 = filtered[k + 1, 1] - predicted[k + 1, 1]
+        d2 = filtered[k + 1, 2] - predicted[k + 1, 2]
+        for i in range(3):
+            filtered[k, i] += back[i, 0] * d0 + back[i, 1] * d1 + back[i, 2] * d2
+
+
+def _stationary(
+    transition: NDArray, process: NDArray, h: NDArray, noise: NDArray
+) -> tuple[NDArray, NDArray, NDArray]:
+    """Return stationary predicted covariance, gain and innovation covariance, by doubling-free iteration."""
+    from scipy.linalg import solve_discrete_are  # noqa: PLC0415
+
+    scale = np.sqrt(np.diag(noise))
+    covariance = solve_discrete_are(transition.T, (h / scale[:, None]).T, process, np.eye(len(h)))
+    innovation = h @ covariance @ h.T + noise
+    gain = covariance @ h.T @ np.linalg.inv(innovation)
+    return covariance, gain, innovation
+
+
+def smooth_motion(
+    samples: NDArray[np.float64], orders: tuple[int, ...], noise_std: NDArray[np.float64], step: float
+) -> NDArray[np.float64]:
+    """Fuse the channels of one coordinate.
+
+    Args:
+        samples: (n, n_channels) measured.
+        orders: Derivative that each channel measures: 0, 1 or 2.
+        noise_std: (n_channels,) white noise.
+        step: Time between samples [s].
+
+    Returns:
+        (n, 3) position, velocity, acceleration. Without a position channel the position is the double integral of
+        what was measured, from zero.
+    """
+    h = np.zeros((len(orders), 3))
+    for c, order in enumerate(orders):
+        h[c, order] = 1.0
+    transition = np.array([[1.0, step, 0.5 * step**2], [0.0, 1.0, step], [0.0, 0.0, 1.0]])
+    # white jerk, integrated over one step
+    shape = np.array(
+        [
+            [step**5 / 20, step**4 / 8, step**3 / 6],
+            [step**4 / 8, step**3 / 3, step**2 / 2],
+            [step**3 / 6, step**2 / 2, step],
+        ]
+    )
+    noise = np.diag(noise_std**2)
+    guess = _jerk_guess(samples, orders, noise_std, step)
+    best: tuple[float, NDArray, NDArray, NDArray, NDArray] | None = None
+    y = np.ascontiguousarray(samples)
+    for multiple in CANDIDATES:
+        process = shape * guess * multiple
+        try:
+            covariance, gain, innovation = _stationary(transition, process, h, noise)
+        except (np.linalg.LinAlgError, ValueError):
+            continue
+        filtered = np.zeros((len(y), 3))
+        predicted = np.zeros((len(y), 3))
+        observed = _filter(y, h, transition, np.ascontiguousarray(gain), filtered, predicted)
+        score = np.linalg.slogdet(innovation)[1] + np.trace(np.linalg.solve(innovation, observed))
+        if best is None or score < best[0]:
+            posterior = covariance - gain @ h @ covariance
+            back = posterior @ transition.T @ np.linalg.inv(covariance)
+            best = (score, filtered, predicted, back, covariance)
+    if best is None:
+        raise np.linalg.LinAlgError("no stationary smoother")
+    _, filtered, predicted, back, _ = best
+    _smooth(filtered, predicted, np.ascontiguousarray(back))
+    return filtered
+
+
+def _jerk_guess(samples: NDArray, orders: tuple[int, ...], noise_std: NDArray, step: float) -> float:
+    """Intensity of the white jerk that the measured signals suggest, over the band in which they stand above the noise."""
+    order = max(orders)
+    c = orders.index(order)
+    x = samples[:, c] - samples[:, c].mean()
+    spectrum = np.abs(np.fft.rfft(x)) ** 2 / len(x)
+    frequency = np.fft.rfftfreq(len(x), step)
+    strong = spectrum > 10.0 * noise_std[c] ** 2
+    band = max(
+        float(np.average(frequency[strong], weights=spectrum[strong])) if strong.any() else 1.0,
+        1.0 / (len(x) * step),
+    )
+    omega = 2.0 * np.pi * band
+    return float(np.var(x) * omega ** (2 * (3 - order)) / omega)

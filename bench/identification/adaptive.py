@@ -1,0 +1,448 @@
+"""Adaptive least squares with forgetting: one sample at a time, or a whole record by the same compiled step.
+
+``estimator = AdaptiveLeastSquares(bouc_wen_model(2)); estimator.update(sample)`` keeps constant memory and does bounded work a
+sample: O(n^2), and O(n^3) twice a window for the persistence monitor. `run` gives the same numbers at the speed of
+the compiled loop. The law and its discretisation are in `bench.identification.stream`, the models in
+`bench.identification.regressors`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from bench.errors import IdentificationError, ParameterError, RecordingError
+from bench.identification import layout, stream
+from bench.identification.persistence import EVENT_KINDS, Event, PersistenceHistory, PersistenceReport
+from bench.identification.regressors import CHANNELS, KINDS, RegressorModel
+
+MAX_EVENTS = 1000
+"""Most events kept; the oldest go first."""
+
+_EVENT_BITS = (1 << len(EVENT_KINDS)) - 1
+_TROUBLE = ~(layout.REPORTED | layout.EXCITATION_BACK | layout.MOVING)
+_KINDS = tuple(EVENT_KINDS)
+
+
+class Sample(NamedTuple):
+    """One instant of a test; channels the model does not read may be NaN or left out.
+
+    Attributes:
+        time: Time stamp [s].
+        force: Applied force F.
+        displacement: x.
+        velocity: x'.
+        acceleration: x''.
+    """
+
+    time: float
+    force: float
+    displacement: float = math.nan
+    velocity: float = math.nan
+    acceleration: float = math.nan
+
+
+class AdaptiveHistory(NamedTuple):
+    """Course of an estimation.
+
+    Attributes:
+        time: Time of the rows kept (m,) [s].
+        theta: Estimates after each of these samples (m, n), in physical units.
+        measured: z (m,); NaN where a sample was not learnt from.
+        predicted: ``theta^T phi`` with the estimate before the sample (m,).
+        regressors: phi (m, n), physical; (0, n) unless asked for.
+        flags: What each sample raised (n_samples,), bits of `bench.identification.layout`.
+        persistence: Reports of the monitor.
+        events: Events of the record.
+    """
+
+    time: NDArray[np.float64]
+    theta: NDArray[np.float64]
+    measured: NDArray[np.float64]
+    predicted: NDArray[np.float64]
+    regressors: NDArray[np.float64]
+    flags: NDArray[np.int16]
+    persistence: PersistenceHistory
+    events: tuple[Event, ...]
+
+    def contributions(self, theta: ArrayLike | None = None) -> NDArray[np.float64]:
+        """Contribution of each term, ``theta_i phi_i`` (m, n), in the unit of z.
+
+        Args:
+            theta: Estimates to use (n,); those of each instant where None.
+
+        Raises:
+            IdentificationError: The regressors were not kept.
+        """
+        if self.regressors.shape[0] == 0:
+            raise IdentificationError(
+                "the history holds no regressors; run the estimator with keep_regressors=True"
+            )
+        return self.regressors * (self.theta if theta is None else np.asarray(theta, dtype=float))
+
+
+def _setting(name: str, value: float, low: float, expected: str, *, strict: bool = False) -> float:
+    if not (math.isfinite(value) and (value > low if strict else value >= low)):
+        raise ParameterError(f"{name} = {value} came; {expected} is expected")
+    return float(value)
+
+
+class AdaptiveLeastSquares:
+    """Continuous-time least squares with forgetting and normalisation on a stream of samples.
+
+    Args:
+        model: What to fit, from `bench.identification.regressors`.
+        sample_rate: Nominal rate [Hz]; taken from the first two samples where None (give it if stamps jitter).
+        forgetting: beta [1/s]; the estimates remember the last 1/beta seconds. 0 remembers all.
+        initial_covariance: P0 of the scaled parameters, times the identity. Data weigh in by their time integral, so 1000
+            (the dissertation's) means that an integral of phi^2 of 1e-3 s counts as much as the start value.
+        bound: R0, bound of trace(P) (and so of its norm); 10 times the start where None.
+        theta0: Start values (n,), physical; zeros where None.
+        normalise: Whether m_s^2 is 1 + phi^T phi, or 1.
+        window: Length of the monitor's window [s]; at least a period of the slowest motion.
+        level_floor: A column is unexcited below this fraction of its highest level so far.
+        min_eigenvalue: Smallest trusted eigenvalue of the regressor's correlation matrix. 1e-8 is what double precision
+            and clean signals bear; noise e (relative to z) makes estimates unreliable below about e^2 / number of
+            samples in the window.
+        jump_ratio: Reset the covariance when the mean square of the recent normalised innovation exceeds its long
+            average this many times; 0 for never. Tracks a sudden change without the noise that forgetting lets in.
+        jump_time: Averaging time of the recent innovation [s].
+        stuck_after: Equal consecutive values after which a channel counts as constant and the estimate is held.
+        gap: A step longer than this many nominal steps counts as dropped samples.
+
+    Attributes:
+        model: The model.
+        events: The last `MAX_EVENTS` events.
+
+    Raises:
+        ParameterError: A setting lies outside its range.
+
+    References:
+        Ioannou and Sun 1996, Robust Adaptive Control, sections 4.3.6-4.3.7; Tasbihgoo 2006, eqs 2.7-2.9, 3.14-3.15.
+    """
+
+    def __init__(
+        self,
+        model: RegressorModel,
+        *,
+        sample_rate: float | None = None,
+        forgetting: float = 0.0,
+        initial_covariance: float = 1e3,
+        bound: float | None = None,
+        theta0: ArrayLike | None = None,
+        normalise: bool = True,
+        window: float = 5.0,
+        level_floor: float = 0.01,
+        min_eigenvalue: float = 1e-8,
+        jump_ratio: float = 0.0,
+        jump_time: float = 0.2,
+        stuck_after: int = 100,
+        gap: float = 1.5,
+    ) -> None:
+        n = model.n_parameters
+        self.model = model
+        self.events: deque[Event] = deque(maxlen=MAX_EVENTS)
+        self._state = state = np.zeros(layout.size(n, model.n_filters))
+        p0 = _setting("initial_covariance", initial_covariance, 0.0, "a positive number", strict=True)
+        limit = 10.0 * p0 * n if bound is None else bound
+        if not limit >= p0 * n:
+            raise ParameterError(
+                f"bound = {limit:g} came; at least n times the initial covariance, {p0 * n:g}, is expected, for P starts there"
+            )
+        step = 0.0
+        if sample_rate is not None:
+            step = 1.0 / _setting("sample_rate", sample_rate, 0.0, "a positive rate", strict=True)
+        settings = {
+            layout.N: n,
+            layout.N_FILTERS: model.n_filters,
+            layout.KIND: KINDS.index(model.kind),
+            layout.ORDER_1: model.orders[0],
+            layout.ORDER_2: model.orders[1],
+            layout.MASS: model.mass,
+            layout.RATE: model.filter_rate,
+            layout.Z_INVERSE: 1.0 / model.force_scale,
+            layout.V_FLOOR: model.floors[0],
+            layout.F_FLOOR: model.floors[1],
+            layout.CROSSOVER: model.crossover,
+            layout.DENOISE_AFTER: model.denoise_after,
+            layout.BETA: _setting("forgetting", forgetting, 0.0, "a rate of at least 0 1/s"),
+            layout.P0: p0,
+            layout.BOUND: limit,
+            layout.STEP: step,
+            layout.GAP: _setting("gap", gap, 1.0, "a factor above 1", strict=True),
+            layout.STUCK: _setting("stuck_after", stuck_after, 1.0, "a count of at least 1"),
+            layout.HALF_WINDOW: 0.5 * _setting("window", window, 0.0, "a positive time", strict=True),
+            layout.LEVEL_FLOOR: _setting("level_floor", level_floor, 0.0, "a fraction of at least 0"),
+            layout.MIN_EIGENVALUE: _setting("min_eigenvalue", min_eigenvalue, 0.0, "a number of at least 0"),
+            layout.JUMP: _setting("jump_ratio", jump_ratio, 0.0, "a ratio of at least 0"),
+            layout.JUMP_TIME: _setting("jump_time", jump_time, 0.0, "a positive time", strict=True),
+            layout.NORMALISE: float(normalise),
+            layout.T_REJECTED: math.inf,
+            layout.T_RESET: -math.inf,
+            layout.TRUSTED: -1.0,
+            layout.SMALLEST: math.nan,
+            layout.CONDITION: math.nan,
+        }  # fmt: skip
+        state[list(settings)] = list(settings.values())
+        state[layout.USES_F : layout.USES_A + 1] = model.uses
+        state[layout.LAST_VALUE : layout.LAST_VALUE + 4] = math.nan
+        views = stream.views.py_func(state)
+        self._header, self._theta, self._d, self._phi = views[:4]
+        views[6][:] = 1.0 / np.array(model.scale)
+        self._level, self._peak = views[7:9]
+        self._u = views[10]
+        self._report_time = math.nan
+        self._last_seen: dict[str, int] = {}
+        self._events_made = 0
+        self.reset_covariance()
+        if theta0 is not None:
+            start = np.asarray(theta0, dtype=float)
+            if start.shape != (n,) or not np.all(np.isfinite(start)):
+                raise ParameterError(
+                    f"theta0 of shape {start.shape} came; {n} finite values are expected: {', '.join(model.names)}"
+                )
+            self._theta[:] = start / model.to_physical
+
+    def update(self, sample: Sample | Sequence[float]) -> bool:
+        """Take one sample.
+
+        Args:
+            sample: (time, force, displacement, velocity, acceleration), as a `Sample` or any sequence of five numbers.
+
+        Returns:
+            True if all went well; False if the sample raised something (see `events`) or held nothing to learn from.
+        """
+        time, force, x, v, a = sample
+        flags = stream.update(self._state, time, force, x, v, a)
+        if flags:
+            self._note(flags, time, int(self._header[layout.SEEN]))
+            return not flags & _TROUBLE
+        return True
+
+    def update_regressor(self, time: float, z: float, phi: NDArray[np.float64]) -> bool:
+        """Take one sample of a `given_model`.
+
+        Args:
+            time: Time stamp [s].
+            z: Measurement.
+            phi: Regressor (n,), float64 and contiguous.
+
+        Returns:
+            As `update`.
+
+        Raises:
+            IdentificationError: phi has another length than the model.
+        """
+        if len(phi) != self._theta.size:
+            raise IdentificationError(
+                f"a regressor of {len(phi)} terms came; the model has {self._theta.size}"
+            )
+        flags = stream.update_given(self._state, time, z, phi)
+        if flags:
+            self._note(flags, time, int(self._header[layout.SEEN]))
+            return not flags & _TROUBLE
+        return True
+
+    def run(
+        self,
+        time: ArrayLike,
+        *,
+        force: ArrayLike,
+        displacement: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
+        acceleration: ArrayLike | None = None,
+        every: int = 1,
+        keep_regressors: bool = False,
+    ) -> AdaptiveHistory:
+        """Take a whole record, or the next part of one, in the compiled loop.
+
+        Args:
+            time: Time stamps (n,) [s].
+            force: F (n,).
+            displacement: x (n,).
+            velocity: x' (n,).
+            acceleration: x'' (n,).
+            every: Keep the estimate of every so many samples.
+            keep_regressors: Keep phi as well, for the contributions of the terms.
+
+        Returns:
+            The course of the estimation; the estimator itself stands at its end.
+
+        Raises:
+            RecordingError: A channel the model reads is missing, or lengths differ.
+        """
+        stamps = np.ascontiguousarray(time, dtype=float)
+        channels = []
+        for name, used, values in zip(
+            CHANNELS, self.model.uses, (force, displacement, velocity, acceleration), strict=True
+        ):
+            if values is None and used:
+                raise RecordingError(f"channel '{name}' is missing; the {self.model.kind} model reads it")
+            array = (
+                np.broadcast_to(np.nan, stamps.shape) if values is None else np.asarray(values, dtype=float)
+            )
+            if array.shape != stamps.shape or stamps.ndim != 1:
+                raise RecordingError(
+                    f"channel '{name}' of shape {array.shape} came; time has {stamps.shape}, one row is expected"
+                )
+            channels.append(np.ascontiguousarray(array))
+        return self._run(stream.run, stamps, channels, every, keep_regressors)
+
+    def run_regressors(
+        self, time: ArrayLike, z: ArrayLike, phi: ArrayLike, *, every: int = 1, keep_regressors: bool = False
+    ) -> AdaptiveHistory:
+        """Take a whole record of a `given_model`.
+
+        Args:
+            time: Time stamps (n,) [s].
+            z: Measurements (n,).
+            phi: Regressors (n, n_parameters).
+            every: Keep the estimate of every so many samples.
+            keep_regressors: Keep phi in the history as well.
+
+        Returns:
+            As `run`.
+
+        Raises:
+            RecordingError: Shapes do not fit.
+        """
+        stamps, measured, rows = (np.ascontiguousarray(values, dtype=float) for values in (time, z, phi))
+        if (
+            stamps.ndim != 1
+            or measured.shape != stamps.shape
+            or rows.shape != (stamps.size, self._theta.size)
+        ):
+            raise RecordingError(
+                f"time {stamps.shape}, z {measured.shape} and phi {rows.shape} came; "
+                f"(n,), (n,) and (n, {self._theta.size}) are expected"
+            )
+        return self._run(stream.run_given, stamps, [measured, rows], every, keep_regressors)
+
+    def _run(self, loop, stamps, channels, every, keep_regressors) -> AdaptiveHistory:
+        every = max(int(every), 1)
+        n = self._theta.size
+        rows = -(-stamps.size // every)
+        theta = np.empty((rows, n))
+        phi = np.empty((rows if keep_regressors else 0, n))
+        z = np.empty((rows, 2))
+        flags = np.empty(stamps.size, dtype=np.int16)
+        steps = np.diff(stamps[np.isfinite(stamps)])
+        span = float(np.sum(steps[steps > 0.0])) if stamps.size else 0.0
+        halves = int(min(span / self._header[layout.HALF_WINDOW], stamps.size)) + 2
+        reports = np.empty((halves, 5 + n))
+        seen, made = int(self._header[layout.SEEN]), self._events_made
+        loop(self._state, stamps, *channels, every, theta, phi, z, flags, reports)
+        for k in np.flatnonzero(flags & _EVENT_BITS):
+            self._note(int(flags[k]), float(stamps[k]), seen + int(k) + 1)
+        reports = reports[: int(self._header[layout.REPORTS])]
+        if reports.shape[0]:
+            self._report_time = float(reports[-1, 0])
+        fresh = min(self._events_made - made, len(self.events))
+        history = AdaptiveHistory(
+            time=stamps[::every].copy(),
+            theta=theta * self.model.to_physical,
+            measured=z[:, 0] * self.model.force_scale,
+            predicted=z[:, 1] * self.model.force_scale,
+            regressors=phi * np.array(self.model.scale),
+            flags=flags,
+            persistence=PersistenceHistory(
+                time=reports[:, 0].copy(),
+                smallest_eigenvalue=reports[:, 1].copy(),
+                condition=reports[:, 2].copy(),
+                level=reports[:, 5:].copy(),
+                n_unexcited=reports[:, 3].astype(np.int64),
+                trusted=reports[:, 4] == 1.0,
+            ),
+            events=tuple(self.events)[len(self.events) - fresh :],
+        )
+        for array in (*history[:6], *history.persistence):
+            array.flags.writeable = False
+        return history
+
+    def _note(self, flags: int, time: float, index: int) -> None:
+        """Turn flags into events; the same kind in the sample before is the same event."""
+        if flags & layout.REPORTED:
+            self._report_time = time
+        for bit, kind in enumerate(_KINDS):
+            if not flags & (1 << bit):
+                continue
+            last = self._last_seen.get(kind)
+            self._last_seen[kind] = index
+            if last == index - 1 and self.events and self.events[-1].kind == kind:
+                self.events[-1] = self.events[-1]._replace(count=self.events[-1].count + 1)
+                continue
+            reason = EVENT_KINDS[kind]
+            if kind == "constant":
+                still = [name for i, name in enumerate(CHANNELS) if flags & (layout.FIRST_CHANNEL << i)]
+                reason = f"{reason}; channel: {', '.join(still)}"
+            self.events.append(Event(time, kind, reason))
+            self._events_made += 1
+
+    def reset_covariance(self) -> None:
+        """Set P back to its start; the estimates stay (Ioannou and Sun 1996, section 4.3.7)."""
+        stream.reset_covariance(self._header, self._d, self._u)
+        self._header[layout.T_RESET] = (
+            self._header[layout.T_LAST] if self._header[layout.STARTED] else -math.inf
+        )
+
+    @property
+    def theta(self) -> NDArray[np.float64]:
+        """Present estimates (n,), physical."""
+        return self._theta * self.model.to_physical
+
+    @property
+    def contributions(self) -> NDArray[np.float64]:
+        """``theta_i phi_i`` of the last sample (n,), in the unit of z."""
+        return self._theta * self._phi * self.model.force_scale
+
+    @property
+    def covariance(self) -> NDArray[np.float64]:
+        """P of the physical parameters (n, n), symmetric and positive definite.
+
+        It is the inverse information of the law; times the spectral density of the noise of z [z^2 s] it estimates the
+        covariance of theta.
+        """
+        n = self._d.size
+        upper = np.triu(self._u.T, 1) + np.eye(n)
+        root = self.model.to_physical[:, None] * upper * np.sqrt(self._d)
+        return root @ root.T
+
+    @property
+    def factors(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """U (n, n), unit upper triangular, and D (n,) of the scaled parameters' ``P = U D U^T``."""
+        return np.triu(self._u.T, 1) + np.eye(self._d.size), self._d.copy()
+
+    @property
+    def persistence(self) -> PersistenceReport:
+        """The last report of the monitor."""
+        silent = ~(self._level > self._header[layout.LEVEL_FLOOR] * self._peak)
+        return PersistenceReport(
+            time=self._report_time,
+            smallest_eigenvalue=float(self._header[layout.SMALLEST]),
+            condition=float(self._header[layout.CONDITION]),
+            level=self._level.copy(),
+            unexcited=tuple(name for name, flag in zip(self.model.names, silent, strict=True) if flag)
+            if math.isfinite(self._report_time)
+            else (),
+            trusted=self.trusted,
+        )
+
+    @property
+    def trusted(self) -> bool:
+        """Whether the estimates may be trusted now: a full window, persistently excited, no channel standing still."""
+        return bool(self._header[layout.TRUSTED] == 1.0 and self._header[layout.HELD] == 0.0)
+
+    @property
+    def used(self) -> int:
+        """Number of samples learnt from."""
+        return int(self._header[layout.USED])
+
+    @property
+    def out_of_phase(self) -> int:
+        """Number of samples the damper model could not hold, force and velocity being opposed."""
+        return int(self._header[layout.OUT_OF_PHASE])

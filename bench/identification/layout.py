@@ -1,0 +1,64 @@
+"""How the adaptive estimator lies in memory: one flat array, a header of named entries, then vectors and matrices.
+
+All that changes is in this array, so that one sample from Python hands over one array and five numbers, nothing is
+allocated in a step, and a copy of the array is a snapshot of the estimator.
+"""
+
+from __future__ import annotations
+
+import numba
+
+jit = numba.njit(cache=True, error_model="numpy", nogil=True)
+# Array arguments are counted references and nine words each: functions that take many of them go into their callers.
+inlined = numba.njit(cache=True, error_model="numpy", nogil=True, inline="always")
+# Sums may be reordered into vector registers; NaN and inf keep their meaning, since samples are checked for them.
+fast = numba.njit(cache=True, error_model="numpy", nogil=True, fastmath={"reassoc", "contract"})
+
+# What the header of the state array holds. Settings first, then what changes from sample to sample.
+(
+    N, N_FILTERS, KIND, ORDER_1, ORDER_2, MASS, RATE, Z_INVERSE, V_FLOOR, F_FLOOR, CROSSOVER, DENOISE_AFTER,
+    USES_F, USES_X, USES_V, USES_A, BETA, BOUND, P0, STEP, GAP, STUCK, HALF_WINDOW, LEVEL_FLOOR, MIN_EIGENVALUE,
+    JUMP, JUMP_TIME, NORMALISE,
+    STARTED, T_LAST, T_REJECTED, T_START, COEF_STEP, COEF_RATE, DECAY, B0, B1, C_DECAY, C_B0, C_B1, MU, GAIN, TRACE,
+    HELD, HALF_TIME, COUNT, COUNT_BEFORE, HALVES, Z, Z_HAT, FAST, SLOW, POWER, T_RESET, USED, OUT_OF_PHASE,
+    SMALLEST, CONDITION, UNEXCITED, TRUSTED, REPORTS, SEEN,
+) = range(62)  # fmt: skip
+CONSTANT_RUN, LAST_VALUE, HEADER = 62, 66, 70
+
+BOUC_WEN, SDOF, DAMPER_LOG, POLYNOMIAL, GIVEN = range(5)
+
+# Flag bits of a sample: the kinds of events in the order of `bench.identification.persistence.EVENT_KINDS`, then the rest.
+NOT_FINITE, BACKWARDS, CLOCK_RESET, DROPPED, CONSTANT, MOVING, EXCITATION_LOST, EXCITATION_BACK, RESET = (
+    1 << bit for bit in range(9)
+)
+UNUSED, REPORTED, FIRST_CHANNEL = (1 << bit for bit in range(9, 12))
+REJECTED = NOT_FINITE | BACKWARDS
+
+
+@jit
+def views(s):
+    """Split the flat state: header, theta, d, phi, b, work, inverse scales, levels, peaks, filters, u, Gramians."""
+    n = int(s[N])
+    m = int(s[N_FILTERS])
+    a = HEADER
+    f = a + 8 * n
+    g = f + 2 * m
+    return (
+        s[:a],
+        s[a : a + n],
+        s[a + n : a + 2 * n],
+        s[a + 2 * n : a + 3 * n],
+        s[a + 3 * n : a + 4 * n],
+        s[a + 4 * n : a + 5 * n],
+        s[a + 5 * n : a + 6 * n],
+        s[a + 6 * n : a + 7 * n],
+        s[a + 7 * n : f],
+        s[f:g].reshape(2, m),
+        s[g : g + n * n].reshape(n, n),
+        s[g + n * n : g + 3 * n * n].reshape(2, n, n),
+    )
+
+
+def size(n: int, n_filters: int) -> int:
+    """Length of the flat state for n parameters and n_filters filters."""
+    return HEADER + 8 * n + 2 * n_filters + 3 * n * n

@@ -1,0 +1,153 @@
+"""Parametric models: the parameters of a force law, hidden states included, fitted to records of motion and force.
+
+The hidden states are integrated along the measured motion by the law's own kernels, so that what is fitted is the
+force response to prescribed motion (an output-error fit of the component, not of a structure around it).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+from scipy.stats import qmc
+
+from bench.errors import IdentificationError, UnknownNameError
+from bench.laws import evaluate
+from bench.laws.base import ForceLaw
+
+
+class Motion(NamedTuple):
+    """A record of a component: motion and force of its coordinates."""
+
+    time: NDArray[np.float64]  # [s] (n,)
+    displacement: NDArray[np.float64]  # (n, n_coordinates)
+    velocity: NDArray[np.float64]  # (n, n_coordinates)
+    force: NDArray[np.float64]  # (n, n_coordinates)
+
+
+@dataclass(frozen=True)
+class ParametricModel:
+    """A law with fitted parameters.
+
+    Attributes:
+        law: The law.
+        theta: Header and parameters (n_theta,).
+        std: Standard deviation of the free parameters by name, from the Jacobian at the optimum, residuals taken as
+            white; too small where they are not.
+        nrmse: rms(residual)/std(force) over the records fitted.
+        evaluations: Number of force responses computed.
+    """
+
+    law: ForceLaw
+    theta: NDArray[np.float64]
+    std: dict[str, float] = field(repr=False)
+    nrmse: float
+    evaluations: int
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Parameters by name."""
+        values = self.theta[len(self.law.header) :]
+        return dict(zip(self.law.parameter_names, values.tolist(), strict=True))
+
+
+def _scaled_residual(
+    law: ForceLaw, motions: Sequence[Motion], theta: NDArray, weights: Sequence[float]
+) -> NDArray[np.float64]:
+    parts = [
+        (evaluate(law, theta, m.time, m.displacement, m.velocity)[0] - m.force).ravel() * weight
+        for m, weight in zip(motions, weights, strict=True)
+    ]
+    return np.nan_to_num(np.concatenate(parts), nan=1e6, posinf=1e6, neginf=-1e6)
+
+
+def fit_law(
+    law: ForceLaw,
+    motions: Sequence[Motion],
+    *,
+    start: dict[str, float],
+    search: dict[str, tuple[float, float]] | None = None,
+    fixed: Sequence[str] = (),
+    starts: int = 8,
+    rng: np.random.Generator | None = None,
+    progress: Callable[[int, float], None] | None = None,
+) -> ParametricModel:
+    """Fit a law's parameters to records of motion and force.
+
+    Args:
+        law: The law.
+        motions: Records, each weighted by its own force level.
+        start: Start values by name; the others start at the law's defaults.
+        search: Ranges (low, high) that further starts are drawn from, log-uniform where both are positive.
+        fixed: Parameters kept at their start.
+        starts: Number of starts in all; the best is kept.
+        rng: Source of the further starts.
+        progress: Called with (start, cost) after each start.
+
+    Returns:
+        The best fit.
+
+    Raises:
+        UnknownNameError: A name is no parameter of the law.
+        IdentificationError: No records, or no force in them.
+    """
+    for name in (*start, *(search or {}), *fixed):
+        if name not in law.parameter_names:
+            raise UnknownNameError(f"parameter of law '{law.name}'", name, law.parameter_names)
+    if not motions:
+        raise IdentificationError("no records came; at least one record of motion and force is expected")
+    spreads = [float(np.std(m.force)) for m in motions]
+    if min(spreads) == 0.0:
+        raise IdentificationError("a record's force is constant; a law cannot be identified from it")
+    weights = [1.0 / (s * np.sqrt(m.force.size * len(motions))) for s, m in zip(spreads, motions, strict=True)]
+    names = [name for name in law.parameter_names if name not in fixed]
+    places = len(law.header) + np.array([law.parameter_names.index(name) for name in names])
+    bounds = np.array([law.parameters[i - len(law.header)].bounds for i in places], dtype=float).T
+    base = law.theta(**start)
+    evaluations = 0
+
+    def residual(x: NDArray) -> NDArray:
+        nonlocal evaluations
+        evaluations += 1
+        theta = base.copy()
+        theta[places] = x
+        return _scaled_residual(law, motions, theta, weights)
+
+    best = None
+    for number, x0 in enumerate(_starts(base[places], names, search or {}, starts, rng)):
+        scale = np.maximum(np.abs(x0), 1e-9)
+        inside = np.clip(x0, bounds[0], bounds[1])
+        result = least_squares(residual, inside, bounds=tuple(bounds), x_scale=scale, diff_step=1e-5, max_nfev=60)
+        if progress is not None:
+            progress(number, float(result.cost))
+        if best is None or result.cost < best.cost:
+            best = result
+    assert best is not None
+    theta = base.copy()
+    theta[places] = best.x
+    samples = sum(m.force.size for m in motions)
+    covariance = np.linalg.pinv(best.jac.T @ best.jac) * 2.0 * best.cost / max(samples - len(names), 1)
+    std = dict(zip(names, np.sqrt(np.diag(covariance)).tolist(), strict=True))
+    return ParametricModel(law, theta, std, float(np.sqrt(2.0 * best.cost)), evaluations)
+
+
+def _starts(
+    first: NDArray, names: Sequence[str], search: dict[str, tuple[float, float]], count: int, rng: np.random.Generator | None
+) -> list[NDArray]:
+    """The given start, then Latin-hypercube starts within the search ranges."""
+    points = [first.copy()]
+    if search and count > 1:
+        columns = [names.index(name) for name in search if name in names]
+        low, high = np.array([search[names[c]] for c in columns], dtype=float).T
+        log = (low > 0.0) & (high > 0.0)
+        a, b = np.where(log, np.log(np.where(log, low, 1.0)), low), np.where(log, np.log(np.where(log, high, 1.0)), high)
+        for draw in qmc.LatinHypercube(len(columns), rng=rng or np.random.default_rng(0)).random(count - 1):
+            value = a + draw * (b - a)
+            point = first.copy()
+            point[columns] = np.where(log, np.exp(value), value)
+            points.append(point)
+    return points

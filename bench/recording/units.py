@@ -1,0 +1,154 @@
+"""Units of channels: known to pint, of the dimension that the quantity asks for, converted at the border.
+
+Angles are kept apart from pure numbers: a rotational speed is measured in rad/s or rpm, never in Hz, because a silent
+factor of 2π is the commonest unit error in this field. Pint alone counts both as 1/s; here two units fit each other
+only when their root units, radians included, are the same.
+
+The SI units of the bench itself are recognised without loading pint, so that a simulation does not pay for it.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+from bench.errors import UnitError, UnknownNameError
+
+SI_UNITS: dict[str, str] = {
+    "displacement": "m",
+    "velocity": "m/s",
+    "acceleration": "m/s^2",
+    "force": "N",
+    "rotation": "rad",
+    "angle": "rad",
+    "angular velocity": "rad/s",
+    "angular acceleration": "rad/s^2",
+    "torque": "N m",
+    "stiffness": "N/m",
+    "damping": "N s/m",
+    "mass": "kg",
+    "pressure": "Pa",
+    "strain": "1",
+    "energy": "J",
+    "power": "W",
+    "voltage": "V",
+    "current": "A",
+    "temperature": "K",
+    "frequency": "Hz",
+    "time": "s",
+}
+"""Quantities a channel may declare, and the SI unit of each."""
+
+_PLAIN = {"1", *SI_UNITS.values()}
+_MEANT = {  # what engineers write, and what they mean by it
+    ("force", "lb"): "lbf",
+    ("force", "lbs"): "lbf",
+    ("force", "kg"): "kgf",
+    ("force", "g"): "gf",
+    ("acceleration", "g"): "g_0",
+    ("angular velocity", "Hz"): "turn/s",
+    ("torque", "lb in"): "lbf in",
+    ("torque", "lb ft"): "lbf ft",
+    ("torque", "ft-lb"): "lbf ft",
+}
+
+
+@cache
+def _registry() -> Any:
+    import pint  # noqa: PLC0415  (0.6 s that a simulation in SI units need not pay)
+
+    return pint.UnitRegistry()
+
+
+@cache
+def _parsed(unit: str) -> tuple[Any, str]:
+    """The pint unit and its root units as text."""
+    import pint  # noqa: PLC0415
+
+    registry = _registry()
+    try:
+        parsed = registry.parse_units(unit)
+        return parsed, str(registry.get_root_units(parsed)[1])
+    except (pint.errors.PintError, AssertionError, TypeError, ValueError, AttributeError, SyntaxError):
+        # pint parses with Python's own tokenizer, so that a typing error surfaces as almost any exception
+        raise UnitError(
+            f"unknown unit '{unit}'; expected a unit such as m, inch, N, lbf, kip, N m, deg, rad/s, m/s^2 or V, "
+            "with products as 'N m', powers as 'm/s^2' and '1' for a pure number"
+        ) from None
+
+
+@cache
+def check_unit(unit: str, quantity: str = "") -> None:
+    """Check that a unit is known and fits a quantity.
+
+    Args:
+        unit: Unit as a pint expression; "1" for a pure number.
+        quantity: One of `SI_UNITS`, or "" for a channel that declares none.
+
+    Raises:
+        UnitError: The unit is unknown, or its dimension is not that of the quantity.
+        UnknownNameError: There is no such quantity.
+    """
+    if quantity and quantity not in SI_UNITS:
+        raise UnknownNameError("quantity", quantity, SI_UNITS)
+    expected = SI_UNITS.get(quantity)
+    if unit == expected or (expected is None and unit in _PLAIN):
+        return
+    hint = f"; did you mean '{_MEANT[quantity, unit]}'?" if (quantity, unit) in _MEANT else ""
+    try:
+        root = _parsed(unit)[1]
+    except UnitError as error:
+        raise UnitError(f"{error}{hint}") from None
+    if expected is not None and root != _parsed(expected)[1]:
+        raise UnitError(
+            f"unit '{unit}' does not fit the quantity '{quantity}', which takes {expected} or a unit of the same "
+            f"dimension{hint}"
+        )
+
+
+@cache
+def conversion(source: str, target: str) -> tuple[float, float]:
+    """Slope and offset of ``x [target] = slope * x [source] + offset``.
+
+    Args:
+        source: Unit that the numbers are in.
+        target: Unit that they are wanted in.
+
+    Raises:
+        UnitError: A unit is unknown, the two differ in dimension, or one of them is logarithmic (dB).
+    """
+    if source == target:
+        return 1.0, 0.0
+    (source_unit, source_root), (target_unit, target_root) = _parsed(source), _parsed(target)
+    if source_root != target_root:
+        raise UnitError(
+            f"'{source}' cannot be converted to '{target}': the dimensions differ ({source_root} against {target_root})"
+        )
+    zero, one, two = (float(_registry().convert(x, source_unit, target_unit)) for x in (0.0, 1.0, 2.0))
+    if abs((two - one) - (one - zero)) > 1e-9 * abs(one - zero):  # rounding of an offset unit is near 1e-15
+        raise UnitError(
+            f"'{source}' to '{target}' is a logarithmic conversion; give the channel in a linear unit"
+        )
+    return (one, 0.0) if zero == 0.0 else (one - zero, zero)
+
+
+@cache
+def si_unit(unit: str, quantity: str = "") -> str:
+    """SI unit of the same dimension as a unit: the one of the quantity where declared, else one named in `SI_UNITS`.
+
+    Args:
+        unit: Unit as a pint expression.
+        quantity: One of `SI_UNITS`, or "".
+
+    Raises:
+        UnitError: The unit is unknown.
+    """
+    if quantity:
+        return SI_UNITS[quantity]
+    if unit in _PLAIN:
+        return unit
+    parsed, root = _parsed(unit)
+    for known in ("1", *SI_UNITS.values()):
+        if _parsed(known)[1] == root:
+            return known
+    return f"{_registry().Quantity(1.0, parsed).to_base_units().units:~C}"

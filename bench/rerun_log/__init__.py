@@ -1,0 +1,10 @@
+"""Rigs and records in the rerun viewer: motion in 3-D, channels, hysteresis loops, contact and slip, errors.
+
+`log_comparison` writes one ``.rrd`` file (or opens the viewer) with everything laid out. Rerun's time line is "time",
+in seconds of the record.
+"""
+
+from bench.rerun_log.comparison import log_comparison
+from bench.rerun_log.kinematics import body_poses, joint_positions
+
+__all__ = ["body_poses", "joint_positions", "log_comparison"]

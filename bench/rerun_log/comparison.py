@@ -1,0 +1,287 @@
+"""One rerun recording that shows rigs side by side: motion, channels, loops, bands and errors, laid out to be read."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import rerun as rr
+from numpy.typing import ArrayLike, NDArray
+
+from bench.errors import ParameterError, RecordingError, UnknownNameError
+from bench.files import replacing
+from bench.recording import Recording, nmse
+from bench.rerun_log.bands import Band, bands_of, changes
+from bench.rerun_log.kinematics import body_poses, joint_positions
+from bench.rerun_log.layout import Loop, Page, blueprint, label_of
+from bench.rerun_log.scene import eye_of, log_scene
+from bench.rerun_log.traces import frame_of, log_frame, log_loop, log_series, style
+from bench.rig import Rig
+
+APPLICATION = "jointbench"
+
+_BAND_COLOURS = {
+    "contact −": (86, 180, 233, 255),
+    "free": (60, 60, 60, 255),
+    "contact +": (240, 150, 30, 255),
+    "stick": (225, 130, 190, 255),
+    "slip": (60, 60, 60, 255),
+}
+
+
+class _Clock(NamedTuple):
+    time: NDArray[np.float64]  # (n,) [s]
+    frames: NDArray[np.int64]  # samples shown as frames
+    series_rate: float  # [Hz]
+
+
+def log_comparison(
+    path: str | Path | None,
+    records: Mapping[str, Recording],
+    *,
+    rigs: Mapping[str, Rig] | None = None,
+    loops: Sequence[tuple[str, str]] | None = None,
+    poses: Mapping[str, ArrayLike] | None = None,
+    camera: str = "",
+    frame_rate: float = 30.0,
+    series_rate: float = 200.0,
+    title: str = "",
+) -> Path | None:
+    """Log rigs and their records side by side, the first being the reference the others are compared with.
+
+    Shown without a click: each rig moving in 3-D, its element's channels over time with all variants overlaid, the
+    loops force over displacement and force over velocity, bands of gap contact and of stick and slip, errors against
+    the reference and their NMSE. Every other channel is a tab away.
+
+    Args:
+        path: The ``.rrd`` file, written whole or not at all; None opens the viewer.
+        records: Records by variant ("true", "network", …), the reference first, on the same clock.
+        rigs: Rigs by variant, as far as there are any; a laboratory record has none.
+        loops: (x channel, y channel) of the loops; by default those of the reference rig's elements.
+        poses: Joint positions (n, nq) by variant, for rigs whose record does not tell them.
+        camera: Camera of the model to look from; its first one where empty.
+        frame_rate: Frames of the 3-D motion and of the loops [1/s]; at most 1800 in all.
+        series_rate: Most samples a second and channel shown over time; extremes are kept (`traces.extremes`).
+        title: Name of the recording.
+
+    Returns:
+        The file written, or None where the viewer was opened.
+
+    Raises:
+        ParameterError: No records, a rate that is not positive, or a rig or pose of an unknown variant.
+        RecordingError: The records have different clocks, or hold no joint position of their rig.
+        UnknownNameError: A loop names a channel that the reference lacks.
+        OutputError: The file cannot be written.
+    """
+    rigs, poses = dict(rigs or {}), dict(poses or {})
+    clock = _clock(records, rigs, poses, frame_rate, series_rate)
+    first, reference = next(iter(records.items()))
+    pairs = _loops(reference, rigs.get(first)) if loops is None else list(loops)
+    for channel in (channel for pair in pairs for channel in pair):
+        if channel not in reference.names:
+            raise UnknownNameError(f"channel of the record '{first}'", channel, reference.names)
+    bands = [
+        band for element in (rigs[first].elements if first in rigs else ()) for band in bands_of(element)
+    ]
+    bands = [band for band in bands if band.of(reference) is not None]
+
+    with replacing(path) if path is not None else nullcontext() as target:
+        stream = rr.RecordingStream(APPLICATION)
+        try:
+            keys = _keys(records)
+            scenes = {keys[variant]: variant for variant in records if variant in rigs}
+            page = Page.of(reference, records, scenes, pairs, lanes=len(bands) * len(records))
+            for rig in list(rigs.values())[:1]:
+                page = page._replace(eye=eye_of(rig.model, camera))
+            if target is None:
+                stream.spawn(default_blueprint=blueprint(page))
+            else:
+                stream.save(target, default_blueprint=blueprint(page))
+            stream.send_recording_name(title or " · ".join(records))
+            for variant, rig in rigs.items():
+                qpos = (
+                    np.asarray(poses[variant]) if variant in poses else joint_positions(rig, records[variant])
+                )
+                _log_rig(stream, keys[variant], rig, clock, qpos)
+            _log_channels(stream, records, clock)
+            _log_errors(stream, records, page.errors, clock)
+            _log_loops(stream, records, pairs, clock)
+            _log_bands(stream, records, bands, clock)
+            stream.log(
+                "scores", rr.TextDocument(_scores(records, clock), media_type="text/markdown"), static=True
+            )
+            stream.flush()
+        finally:
+            stream.disconnect()
+    return None if path is None else Path(path)
+
+
+def _clock(
+    records: Mapping[str, Recording],
+    rigs: Mapping[str, Rig],
+    poses: Mapping[str, ArrayLike],
+    frame_rate: float,
+    series_rate: float,
+) -> _Clock:
+    if not records:
+        raise ParameterError("no records came; at least one is expected")
+    for rate in (frame_rate, series_rate):
+        if not (np.isfinite(rate) and rate > 0.0):
+            raise ParameterError(f"a rate of {rate} Hz came; a positive number is expected")
+    for variant in (*rigs, *poses):
+        if variant not in records:
+            raise UnknownNameError("variant with a record", variant, records)
+    (first, reference), *others = records.items()
+    time = np.asarray(reference.time)
+    if len(time) < 2:
+        raise RecordingError(f"the record '{first}' has {len(time)} sample(s); at least two are expected")
+    for variant, recording in others:
+        if len(recording.time) != len(time) or not np.allclose(recording.time, time, rtol=0.0, atol=1e-9):
+            raise RecordingError(
+                f"the records '{first}' ({len(time)} samples at {reference.sample_rate:g} Hz) and '{variant}' "
+                f"({len(recording.time)} at {recording.sample_rate:g} Hz) have different clocks; resample one of them"
+            )
+    for variant, qpos in poses.items():
+        if len(np.asarray(qpos)) != len(time):
+            raise RecordingError(
+                f"{len(np.asarray(qpos))} poses of '{variant}' came for a record of {len(time)} samples; one each is expected"
+            )
+    duration = float(time[-1] - time[0])
+    count = max(2, min(int(duration * frame_rate) + 1, 1800, len(time)))
+    frames = np.unique(np.round(np.linspace(0, len(time) - 1, count)).astype(int))
+    return _Clock(time, frames, series_rate)
+
+
+def _loops(reference: Recording, rig: Rig | None) -> list[tuple[str, str]]:
+    """Force over displacement and over velocity, for each coordinate of each element."""
+    pairs = []
+    for element in rig.elements if rig is not None else ():
+        stem = f"{element.name}/force"
+        for force in (name for name in reference.names if name == stem or name.startswith(stem + "_")):
+            suffix = force.removeprefix(stem)
+            pairs += [(f"{element.name}/{motion}{suffix}", force) for motion in ("displacement", "velocity")]
+    return [pair for pair in pairs if pair[0] in reference.names]
+
+
+def _log_rig(stream: rr.RecordingStream, variant: str, rig: Rig, clock: _Clock, qpos: NDArray) -> None:
+    shown = body_poses(rig.model, qpos[clock.frames])
+    log_scene(stream, ["rig", variant], rig.model, clock.time[clock.frames], shown)
+
+
+def _keys(records: Mapping[str, Recording]) -> dict[str, str]:
+    """Entity names of the variants; the number keeps rerun, which sorts by name, to their order."""
+    return {variant: f"{number}-{variant}" for number, variant in enumerate(records)}
+
+
+def _log_channels(stream: rr.RecordingStream, records: Mapping[str, Recording], clock: _Clock) -> None:
+    keys = _keys(records)
+    for number, (variant, recording) in enumerate(records.items()):
+        for channel in recording.names:
+            log_series(
+                stream, ["channels", label_of(recording, channel), keys[variant]], clock.time, recording[channel],
+                label=variant, look=style(number), rate=clock.series_rate,
+            )  # fmt: skip
+
+
+def _log_errors(
+    stream: rr.RecordingStream, records: Mapping[str, Recording], labels: Sequence[str], clock: _Clock
+) -> None:
+    (first, reference), *others = records.items()
+    keys = _keys(records)
+    for channel in (name for name in reference.names if label_of(reference, name) in labels):
+        for number, (variant, recording) in enumerate(others, start=1):
+            if channel not in recording.names:
+                continue
+            log_series(
+                stream, ["errors", label_of(reference, channel), keys[variant]], clock.time,
+                recording[channel] - reference[channel],
+                label=f"{variant} − {first}", look=style(number), rate=clock.series_rate,
+            )  # fmt: skip
+
+
+def _compared(reference: Recording, channel: str) -> bool:
+    role = next(item.role for item in reference.channels if item.name == channel)
+    return role != "command" and float(np.ptp(reference[channel])) > 0.0
+
+
+def _log_loops(
+    stream: rr.RecordingStream,
+    records: Mapping[str, Recording],
+    pairs: Sequence[tuple[str, str]],
+    clock: _Clock,
+) -> None:
+    reference = next(iter(records.values()))
+    keys = _keys(records)
+    for x_name, y_name in pairs:
+        holders = {k: r for k, r in records.items() if x_name in r.names and y_name in r.names}
+        frame = frame_of([r[x_name] for r in holders.values()], [r[y_name] for r in holders.values()])
+        loop = Loop.of(reference, x_name, y_name)
+        log_frame(stream, ["loops", loop.name], frame, loop.x_label, loop.y_label)
+        for number, (variant, recording) in enumerate(records.items()):
+            if variant not in holders:
+                continue
+            log_loop(
+                stream, ["loops", loop.name, keys[variant]], clock.time, frame.place(recording[x_name], recording[y_name]),
+                look=style(number), frames=clock.time[clock.frames],
+            )  # fmt: skip
+
+
+def _log_bands(
+    stream: rr.RecordingStream, records: Mapping[str, Recording], bands: Sequence[Band], clock: _Clock
+) -> None:
+    keys = _keys(records)
+    for band in bands:
+        for variant, recording in records.items():
+            states = band.of(recording)
+            if states is None:
+                continue
+            entity = rr.new_entity_path(["bands", band.name, keys[variant]])
+            stream.log(
+                entity,
+                rr.StateConfiguration(
+                    values=list(band.states),
+                    labels=list(band.states),
+                    colors=[_BAND_COLOURS[s] for s in band.states],
+                ),
+                static=True,
+            )
+            at = changes(states)
+            rr.send_columns(
+                entity,
+                [rr.TimeColumn("time", duration=clock.time[at])],
+                rr.StateChange.columns(state=[band.states[i] for i in states[at]]),
+                recording=stream,
+            )
+
+
+def _scores(records: Mapping[str, Recording], clock: _Clock) -> str:
+    """NMSE of every compared channel and variant as a markdown table, element channels first."""
+    (first, reference), *others = records.items()
+    scored = reference.scored
+    lines: list[str] = []
+    if others:
+        lines += [
+            "| channel | rms of " + first + " | " + " | ".join(variant for variant, _ in others) + " |",
+            "|:--|--:|" + "--:|" * len(others),
+        ]
+        names = [name for name in reference.names if _compared(reference, name)]
+        for name in sorted(names, key=lambda name: "/" not in name):
+            y = reference[name][scored]
+            if not float(np.ptp(y)) > 0.0:
+                continue
+            unit = next(item.unit for item in reference.channels if item.name == name)
+            cells = [f"{nmse(y, r[name][scored]):.3g} %" if name in r.names else "–" for _, r in others]
+            rms = float(np.sqrt(np.mean(np.square(y))))
+            lines.append(f"| {name} | {rms:.3g} {unit} | " + " | ".join(cells) + " |")
+    duration = clock.time[-1] - clock.time[0]
+    if others:
+        lines += ["", f"NMSE against “{first}”: 100 Σ(y − ŷ)² / (N var y), settling time left out."]
+    lines += [
+        "",
+        f"{duration:.4g} s at {reference.sample_rate:g} Hz; over time at most {clock.series_rate:g} samples a second "
+        f"are shown, extremes kept; motion in {len(clock.frames)} frames. Scores use every sample.",
+    ]
+    return "\n".join(lines)

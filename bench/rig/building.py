@@ -1,0 +1,190 @@
+"""From a description to a compiled model: elements, hidden states and structural changes put into the MJCF."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+from xml.etree import ElementTree
+
+import mujoco
+import numpy as np
+
+from bench import native
+from bench.errors import ModelError, ParameterError, UnknownNameError
+from bench.native import Coordinate
+from bench.rig.element import Element
+
+if TYPE_CHECKING:
+    from bench.rig.description import Rig
+
+INTEGRATORS = {
+    "RK4": mujoco.mjtIntegrator.mjINT_RK4,
+    "Euler": mujoco.mjtIntegrator.mjINT_EULER,
+    "implicit": mujoco.mjtIntegrator.mjINT_IMPLICIT,
+    "implicitfast": mujoco.mjtIntegrator.mjINT_IMPLICITFAST,
+}
+STRUCTURE = ("mass", "inertia", "stiffness", "damping", "frictionloss", "armature")
+"""Structural quantities that `Rig.with_structure` changes."""
+
+EXACT_SOLREF = (0.002, 1.0)
+EXACT_SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)
+
+
+class Placed(NamedTuple):
+    """An element in a compiled model."""
+
+    element: Element
+    coordinates: tuple[Coordinate, ...]
+    act: int  # address of the first hidden state, −1 for none
+    theta: int  # address of theta[0] in numeric_data
+
+
+class Built(NamedTuple):
+    """A compiled rig."""
+
+    model: mujoco.MjModel
+    placed: tuple[Placed, ...]
+    actuators: tuple[str, ...]  # the rig's own, without those that carry hidden states
+
+
+def parse(text: str, folder: str, label: str) -> mujoco.MjSpec:
+    """Read MJCF text; meshes and includes are looked for in `folder`.
+
+    Raises:
+        ModelError: It is no valid MJCF.
+    """
+    try:
+        spec = mujoco.MjSpec.from_string(text, include=_includes(text, Path(folder)))
+    except (ValueError, ElementTree.ParseError) as error:
+        raise ModelError(f"the MJCF of {label} cannot be read: {error}") from error
+    if folder:
+        spec.modelfiledir = folder
+    return spec
+
+
+def _includes(text: str, folder: Path) -> dict[str, bytes]:
+    """Contents of the files that the MJCF includes, and of those that they include."""
+    found: dict[str, bytes] = {}
+    for node in ElementTree.fromstring(text).iter("include"):
+        name = node.get("file", "")
+        try:
+            found[name] = (folder / name).read_bytes()
+        except OSError as error:
+            raise ModelError(f"cannot read the file '{name}' that the MJCF includes: {error}") from error
+        found |= _includes(found[name].decode("utf-8"), folder)
+    return found
+
+
+def specify(rig: Rig, built: Built | None = None) -> mujoco.MjSpec:
+    """The rig as an MjSpec, its elements' rows empty, or as they are in `built`."""
+    spec = parse(rig.mjcf, rig.folder, f"rig '{rig.name}'")
+    spec.option.timestep = rig.timestep
+    spec.option.integrator = INTEGRATORS[rig.integrator]
+    spec.option.disableflags |= (
+        mujoco.mjtDisableBit.mjDSBL_AUTORESET
+    )  # a divergence is to be reported, not hidden
+    for index, element in enumerate(rig.elements):
+        if element.exact:
+            _set_exact_friction(spec, element)
+            continue
+        data = np.zeros(native.row_size(element.law))
+        if built is not None:
+            numeric = mujoco.mj_name2id(
+                built.model, mujoco.mjtObj.mjOBJ_NUMERIC, native.PREFIX + element.name
+            )
+            start = int(built.model.numeric_adr[numeric])
+            data = built.model.numeric_data[start : start + int(built.model.numeric_size[numeric])].copy()
+            data[1] = -1.0  # the law's number holds in this process only
+        spec.add_numeric(name=native.PREFIX + element.name, data=data, size=len(data))
+        if element.law.states:
+            _add_state_actuator(spec, element, index)
+    return spec
+
+
+def _set_exact_friction(spec: mujoco.MjSpec, element: Element) -> None:
+    target = spec.joint(element.joints[0]) or spec.tendon(element.joints[0])
+    if target is None:
+        raise UnknownNameError("joint or tendon", element.joints[0], [joint.name for joint in spec.joints])
+    target.frictionloss = element.theta[0]
+    target.solref_friction = EXACT_SOLREF
+    target.solimp_friction = EXACT_SOLIMP
+
+
+def _add_state_actuator(spec: mujoco.MjSpec, element: Element, index: int) -> None:
+    """A user actuator without gain whose activations are the element's hidden states."""
+    transmission = mujoco.mjtTrn.mjTRN_JOINT if spec.joint(element.joints[0]) is not None else mujoco.mjtTrn.mjTRN_TENDON
+    actuator = spec.add_actuator(
+        name=native.PREFIX + element.name, target=element.joints[0], trntype=transmission
+    )
+    actuator.dyntype = mujoco.mjtDyn.mjDYN_USER
+    actuator.actdim = len(element.law.states)
+    actuator.gaintype = mujoco.mjtGain.mjGAIN_FIXED
+    actuator.gainprm[0] = 0.0
+    actuator.biastype = mujoco.mjtBias.mjBIAS_NONE
+
+
+def build(rig: Rig) -> Built:
+    """Compile a rig; see `Rig.built` for what it raises."""
+    native.install()
+    spec = specify(rig)
+    own = tuple(actuator.name for actuator in spec.actuators if not actuator.name.startswith(native.PREFIX))
+    for name in own:
+        if not name:
+            raise ModelError(
+                f"rig '{rig.name}' has an actuator without a name; excitations address actuators by name"
+            )
+    for element in rig.elements:  # before compiling: MuJoCo's own message would not name the element
+        _check_targets(spec, rig, element)
+    try:
+        model = spec.compile()
+    except ValueError as error:
+        raise ModelError(f"the MJCF of rig '{rig.name}' does not compile: {error}") from error
+    placed = []
+    for element in rig.elements:
+        coordinates = tuple(native.coordinate(model, joint) for joint in element.joints)
+        coordinates += tuple(native.coordinate(model, name, is_input=True) for name in element.inputs)
+        act = theta = -1
+        if not element.exact:
+            act = native.claim_states(model, element.name) if element.law.states else -1
+            theta = native.write_row(model, element.name, element.law, coordinates, element.theta, act)
+        placed.append(Placed(element, coordinates, act, theta))
+    for kind, name, value in rig.structure:
+        _set_structure(model, kind, name, value)
+    if rig.structure:
+        mujoco.mj_setConst(model, mujoco.MjData(model))
+    return Built(model, tuple(placed), own)
+
+
+def _check_targets(spec: mujoco.MjSpec, rig: Rig, element: Element) -> None:
+    known = [joint.name for joint in spec.joints] + [tendon.name for tendon in spec.tendons]
+    for joint in element.joints:
+        if joint not in known:
+            raise UnknownNameError(
+                f"joint or tendon of rig '{rig.name}' (element '{element.name}')", joint, known
+            )
+
+
+def _set_structure(model: mujoco.MjModel, kind: str, name: str, value: float) -> None:
+    if not np.isfinite(value) or (value < 0.0 and kind != "stiffness") or (value == 0.0 and kind == "mass"):
+        raise ParameterError(f"{kind} of '{name}' is {value}; a finite, positive value is expected")
+    if kind in {"mass", "inertia"}:
+        body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
+        if body < 0:
+            raise UnknownNameError("body", name, [model.body(i).name for i in range(1, model.nbody)])
+        getattr(model, f"body_{kind}")[body] = value
+        return
+    joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name)
+    if joint >= 0:
+        dof = model.jnt_dofadr[joint]
+        if kind == "stiffness":
+            model.jnt_stiffness[joint] = value
+        else:
+            getattr(model, f"dof_{kind}")[dof] = value
+        return
+    tendon = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TENDON, name)
+    if tendon < 0:
+        known = [model.joint(i).name for i in range(model.njnt)] + [
+            model.tendon(i).name for i in range(model.ntendon)
+        ]
+        raise UnknownNameError("joint or tendon", name, known)
+    getattr(model, f"tendon_{kind}")[tendon] = value

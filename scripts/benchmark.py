@@ -1,0 +1,106 @@
+"""Benchmarks of jointbench, every row a ratio against a peer or a limit, run side by side.
+
+    python scripts/benchmark.py native stream --json out.json
+    python scripts/benchmark.py --compare before.json after.json
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import os
+import platform
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import tyro
+from rich.console import Console
+from rich.table import Table
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+from benchmarks.timing import Row  # noqa: E402
+
+GROUPS = tuple(sorted(path.stem for path in (Path(__file__).parent / "benchmarks").glob("[a-z]*.py") if path.stem != "timing"))
+
+
+@dataclass
+class Args:
+    """Run groups of benchmarks.
+
+    Attributes:
+        groups: Groups to run; all where none is named.
+        repeats: Interleaved repeats of each comparison.
+        json: Print JSON instead of a table.
+        save: File the results are written to as JSON.
+        compare: Two saved files to compare instead of running.
+    """
+
+    groups: tyro.conf.Positional[tuple[str, ...]] = ()
+    repeats: int = 15
+    json: bool = False
+    save: Path | None = None
+    compare: Annotated[tuple[Path, Path] | None, tyro.conf.arg(metavar="A B")] = field(default=None)
+
+
+def main() -> int:
+    """Run, print, save; exit status 1 where a limit does not hold."""
+    args = tyro.cli(Args, description=__doc__)
+    if args.compare is not None:
+        _compare(*args.compare)
+        return 0
+    unknown = set(args.groups) - set(GROUPS)
+    if unknown:
+        print(f"unknown group(s) {sorted(unknown)}; known: {', '.join(GROUPS)}", file=sys.stderr)
+        return 2
+    document: dict[str, Any] = {"machine": machine(), "repeats": args.repeats, "groups": {}}
+    console = Console(stderr=args.json)
+    holds = True
+    for group in args.groups or GROUPS:
+        with console.status(f"running {group}"):
+            rows: list[Row] = importlib.import_module(f"benchmarks.{group}").rows(args.repeats)
+        document["groups"][group] = [row.to_dict() for row in rows]
+        holds &= all(row.holds is not False for row in rows)
+        if not args.json:
+            console.print(_table(group, rows))
+    text = json.dumps(document, indent=1, ensure_ascii=False)
+    if args.json:
+        print(text)
+    if args.save is not None:
+        args.save.write_text(text, encoding="utf-8")
+    return 0 if holds else 1
+
+
+def machine() -> dict[str, Any]:
+    """What the figures depend on."""
+    return {"cores": os.cpu_count(), "python": platform.python_version(), "numpy": np.__version__}
+
+
+def _table(group: str, rows: list[Row]) -> Table:
+    table = Table(title=f"benchmark {group}")
+    for column in ("comparison", "ratio", "10–90 %", "limit", "holds", "what the ratio is"):
+        table.add_column(column)
+    for row in rows:
+        mark = {True: "yes", False: "[red]no[/red]", None: ""}[row.holds]
+        table.add_row(row.name, f"{row.ratio:.3g}", f"{row.spread[0]:.3g}–{row.spread[1]:.3g}", row.limit, mark, row.meaning)
+    return table
+
+
+def _compare(before: Path, after: Path) -> None:
+    old, new = (json.loads(path.read_text(encoding="utf-8"))["groups"] for path in (before, after))
+    table = Table(title=f"{before.name} → {after.name}")
+    for column in ("group", "comparison", "before", "after"):
+        table.add_column(column)
+    for group, rows in new.items():
+        past = {row["name"]: row["ratio"] for row in old.get(group, [])}
+        for row in rows:
+            known = f"{past[row['name']]:.3g}" if row["name"] in past else "–"
+            table.add_row(group, row["name"], known, f"{row['ratio']:.3g}")
+    Console().print(table)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

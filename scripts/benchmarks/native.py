@@ -1,0 +1,108 @@
+"""Native callbacks against the same model without callbacks, and against a Python callback."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+from benchmarks.timing import Row, interleave, ratio_row
+from mujoco import rollout
+from mujoco.batch import Batch
+
+from bench import Element, joint_rig, native, sdof_rig
+from bench.rig import Rig
+
+STEPS = 20_000
+N_BATCH = 64
+
+
+def _rig(integrator: str) -> Rig:
+    gap = Element.of("gap", "carriage", stiffness=3000.0, clearance=0.003)
+    hysteresis = Element.of("bouc_wen", "carriage", A=800.0, beta=60.0, gamma=40.0, n=1.0)
+    return sdof_rig(gap, hysteresis, mass=2.0, stiffness=1500.0, damping=4.0, integrator=integrator)
+
+
+def _loop(model: mujoco.MjModel) -> None:
+    data = mujoco.MjData(model)
+    data.qvel[0] = 0.3
+    for _ in range(STEPS):
+        mujoco.mj_step(model, data)
+
+
+def _rollout(model: mujoco.MjModel) -> None:
+    data = [mujoco.MjData(model) for _ in range(2)]
+    size = mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS)
+    rollout.rollout(model, data, np.zeros((8, size)), nstep=STEPS // 4)
+
+
+def _batch(model: mujoco.MjModel) -> None:
+    batch = Batch(model, N_BATCH, 2)
+    batch.bind("qvel")[:] = 0.3
+    batch.step(nstep=STEPS // 16)
+
+
+def _python_callback(law_k: float, clearance: float):
+    def callback(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+        q = data.qpos[0]
+        engaged = abs(q) - clearance
+        if engaged > 0.0:
+            data.qfrc_passive[0] -= law_k * np.copysign(engaged, q)
+
+    return callback
+
+
+def _without(task, model: mujoco.MjModel):
+    def run() -> None:
+        native.uninstall()
+        try:
+            task(model)
+        finally:
+            native.install()
+
+    return run
+
+
+def rows(repeats: int = 15) -> list[Row]:
+    """Rows of the group."""
+    result = []
+    for integrator in ("RK4", "Euler"):
+        for label, task in (("loop", _loop), ("rollout, 2 threads", _rollout), ("Batch, 2 threads", _batch)):
+            for name, rig in (("SDOF gap + Bouc-Wen", _rig(integrator)), ("deck joint", joint_rig(integrator=integrator))):
+                model = rig.model
+                seconds = interleave(
+                    {"with": lambda t=task, m=model: t(m), "without": _without(task, model)}, repeats
+                )
+                result.append(
+                    ratio_row(
+                        f"{name}, {integrator}, {label}",
+                        seconds["with"],
+                        seconds["without"],
+                        limit="≥ 0.95",
+                        meaning="step rate with native callback / without any callback, same model",
+                    )
+                )
+    result.append(_against_python(repeats))
+    return result
+
+
+def _against_python(repeats: int) -> Row:
+    gap = Element.of("gap", "carriage", stiffness=3000.0, clearance=0.003)
+    model = sdof_rig(gap, mass=2.0, stiffness=1500.0, damping=4.0).model
+    callback = _python_callback(3000.0, 0.003)
+
+    def python() -> None:
+        native.uninstall()
+        mujoco.set_mjcb_passive(callback)
+        try:
+            _loop(model)
+        finally:
+            mujoco.set_mjcb_passive(None)
+            native.install()
+
+    seconds = interleave({"native": lambda: _loop(model), "python": python}, max(5, repeats // 3))
+    return ratio_row(
+        "SDOF gap, RK4, loop: native against Python callback",
+        seconds["native"],
+        seconds["python"],
+        limit="≥ 3",
+        meaning="step rate with native callback / with a Python callback",
+    )
