@@ -27,7 +27,7 @@ from bench.signals import BandLimitedNoise, Constant, Excitation
 Progress = Callable[[str, float], None]
 """Called with what is being done and the share of the whole that is done."""
 
-TENSIONS = (20, 25, 35, 80)
+TENSIONS = (20, 35, 70, 80)
 """Band tensions of the shipped friction-damper tests [lbf]."""
 PEAK = 1000.0 * 4.4482216152605
 """The deck's load level, 1000 lbf [N]."""
@@ -103,8 +103,7 @@ def damper_motion(recording: Recording) -> Motion:
 
 def damper_record(frequency: str, tension: int) -> Recording:
     """A shipped friction-damper test in SI units."""
-    record = friction_damper(f"{frequency}Hz{tension}lbtension").select(("displacement", "force"))
-    return record.to_units({"displacement": "m", "force": "N"})
+    return friction_damper(f"{frequency}Hz_{tension}lb").to_si()
 
 
 def identify_damper(record: Recording, rng: np.random.Generator) -> dict[str, Element]:
@@ -123,7 +122,7 @@ def identify_damper(record: Recording, rng: np.random.Generator) -> dict[str, El
             "limit_positive": peak,
             "limit_negative": peak,
         },
-        search={"stiffness": (5.0 * peak / stroke, 50.0 * peak / stroke), "clearance": (0.01 * stroke, 0.1 * stroke), **limits},
+        search={"stiffness": (5.0 * peak / stroke, 50.0 * peak / stroke), "clearance": (0.01 * stroke, 0.1 * stroke), "offset": (-0.1 * peak, 0.1 * peak), **limits},
         starts=4,
         rng=rng,
     )

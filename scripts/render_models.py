@@ -9,6 +9,7 @@ Needs EGL (Debian: `libegl1 libegl-mesa0`); set `MUJOCO_GL` to choose another wa
 from __future__ import annotations
 
 import os
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,7 +17,7 @@ from typing import TYPE_CHECKING
 import tyro
 
 from bench import model_path
-from bench.errors import UnknownNameError
+from bench.errors import BenchError, UnknownNameError
 
 if TYPE_CHECKING:
     import mujoco
@@ -111,9 +112,14 @@ def main(args: Args) -> None:
     """Render what was asked for and print the paths."""
     os.environ.setdefault("MUJOCO_GL", "egl")
     args.out.mkdir(parents=True, exist_ok=True)
-    for name in args.models or tuple(sorted(path.stem for path in model_path("sdof").parent.glob("*.xml"))):
-        for path in render(name, args):
-            print(path)
+    try:
+        for name in args.models or tuple(
+            sorted(path.stem for path in model_path("sdof").parent.glob("*.xml"))
+        ):
+            for path in render(name, args):
+                print(path)
+    except BenchError as error:
+        sys.exit(str(error))
 
 
 if __name__ == "__main__":

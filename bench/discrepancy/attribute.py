@@ -27,6 +27,10 @@ LOG_PRIOR_EFFECT = -3.4
 """Log prior odds of one more effect: about one in the number of effects of the catalogue."""
 SIGNIFICANT = 4.0
 """Standard deviations by which chi-squared may exceed its expectation before a hypothesis counts as refuted."""
+WORTH_A_FIT = 25.0
+"""Screened gain in chi-squared from which one more effect could overcome its prior and its Occam factor."""
+STALLED = 0.7
+"""If one more effect leaves more than this part of the excess of chi-squared, a further one is not tried."""
 MODEL_ERROR = 0.02
 """Relative excess of chi-squared that is laid to the smoothing and integration of the diagnosis itself."""
 
@@ -82,17 +86,18 @@ def placements(case: Case, structure: Structure, catalogue: Iterable[Effect]) ->
                 out.append(Placed(effect, place))
             if len(place.rows) != 1:
                 continue
-            out += [Placed(effect, place, target) for target in _targets(effect, structure, place)]
+            out += [Placed(effect, place, target) for target in _targets(case, effect, structure, place)]
     return out
 
 
-def _targets(effect: Effect, structure: Structure, place) -> list[str]:
+def _targets(case: Case, effect: Effect, structure: Structure, place) -> list[str]:
     if effect.site == "inertia":
         names = {"mass": place.mass, "stiffness": (place.stiffness,), "damping": (place.damping,)}[effect.quantity]
         return [name for name in names if name in structure.parameters]
     dofs = np.abs(place.rows).sum(axis=0) > 0
     if effect.site == "actuator":
-        return [name for j, name in enumerate(structure.loads) if np.abs(structure.inputs[dofs, j]).sum() > 0]
+        commanded = [name for name in structure.loads if case.channel(name).role == "command"]
+        return [name for name in commanded if np.abs(structure.inputs[dofs, structure.loads.index(name)]).sum() > 0]
     if effect.site == "sensor":
         order = {"position": 0, "velocity": 1, "acceleration": 2}[effect.quantity]
         return [o.channel for o in structure.observers if o.order == order and np.abs(o.row[dofs]).sum() > 0]
@@ -124,9 +129,17 @@ def attribute(
             best = search.ranked()[0]
             progress(f"{len(best.hypothesis)} effect(s): {names(best.hypothesis)}, chi-squared {best.reduced:.3g}")
             if consistent(best):
+                points = screen.ranked(best) if len(best.hypothesis) == size else []
+                if not points or points[0].gain < WORTH_A_FIT:
+                    break
+                _extend(search, screen, [best], pool, seconds=6)
+                _reduce(search, pool)
+                continue
+            ranked = search.ranked(size)
+            if ranked[0].reduced - 1.0 > STALLED * (search.ranked(size - 1)[0].reduced - 1.0):
                 break
-            bases = [f for f in search.ranked(size) if np.isfinite(f.cost)][: 4 - size]
-            _extend(search, screen, bases, pool, seconds=6 - size)
+            _extend(search, screen, ranked[: 4 - size], pool, seconds=6 - size)
+            _reduce(search, pool)
     return search
 
 
@@ -149,7 +162,11 @@ def _extend(search: Search, screen: Screen, bases: Sequence[Fit], pool: ThreadPo
         for placed in screen.inertia:
             if placed.key not in own:
                 tasks.append(((*base.hypothesis, placed), np.concatenate([base.vector, [0.0]])))
-    for fitted in pool.map(lambda task: fit(problem, task[0], start=task[1], iterations=QUICK), tasks):
+
+    def quick(task: tuple[Hypothesis, np.ndarray]) -> Fit:
+        return fit(problem, task[0], start=task[1], iterations=QUICK if task[0][-1].effect.site == "joint" else 3 * QUICK)
+
+    for fitted in pool.map(quick, tasks):
         search.add(fitted)
     leading = [f for f in search.ranked(size) if key_of(f.hypothesis) not in search.converged]
     if not leading:
@@ -158,6 +175,21 @@ def _extend(search: Search, screen: Screen, bases: Sequence[Fit], pool: ThreadPo
     for fitted in pool.map(lambda f: fit(problem, f.hypothesis, start=f.vector, iterations=20), carried):
         search.add(fitted)
         search.converged.add(key_of(fitted.hypothesis))
+
+
+def _reduce(search: Search, pool: ThreadPoolExecutor) -> None:
+    """Strike each effect in turn from the best hypothesis, the fit starting from what the others have become."""
+    best = search.ranked()[0]
+    if len(best.hypothesis) < 2:
+        return
+    tasks = []
+    n = len(search.problem.nominal)
+    _, etas = search.problem.split(best.hypothesis, best.vector)
+    for i in range(len(best.hypothesis)):
+        rest = best.hypothesis[:i] + best.hypothesis[i + 1 :]
+        tasks.append((rest, np.concatenate([best.vector[:n], *(eta for j, eta in enumerate(etas) if j != i)])))
+    for fitted in pool.map(lambda task: fit(search.problem, task[0], start=task[1], iterations=20), tasks):
+        search.add(fitted)
 
 
 def _starts(points: Sequence[Point], count: int) -> list[tuple[Placed, list[np.ndarray]]]:

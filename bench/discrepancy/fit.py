@@ -154,9 +154,9 @@ def _step(problem, hypothesis, state, normal, gradient, free, prior):
     for _ in range(7):
         damped = normal + damping * np.diag(np.diag(normal))
         move = -np.linalg.solve(damped, gradient)
-        # No parameter moves by more than two prior widths at once: the linearisation does not reach further.
-        widths = np.maximum(std[free], 1e-12)
-        move *= min(1.0, 2.0 / max(np.max(np.abs(move) / widths), 1e-12))
+        # Further than this the linearisation does not reach; nominal parameters are linear and may go further.
+        reach = np.where(free < len(problem.nominal), 20.0, 2.0) * std[free]
+        move *= min(1.0, 1.0 / max(np.max(np.abs(move) / reach), 1e-12))
         trial = vector.copy()
         trial[free] = np.clip(vector[free] + move, low[free], high[free])
         trial_residual = problem.residual(hypothesis, trial)

@@ -25,6 +25,8 @@ Array = NDArray[np.float64]
 ABOVE_NOISE = 1.5
 """A frequency belongs to the band of a record while a smoothed response spectrum exceeds this many times its noise."""
 MAX_SUBSTEPS = 16
+MAX_BINS = 4000
+"""Most frequency bins of a record; friction rattles an accelerometer up to the Nyquist frequency and one need not follow."""
 
 
 @dataclass(frozen=True)
@@ -102,7 +104,7 @@ class Problem:
         self.load_noise = np.array(
             [self.case.channel(name).noise_std or 0.0 for name in self.structure.loads]
         )
-        self.data = tuple(self._prepare(record, self.nominal) for record in self.records)
+        self.data = tuple(self.prepare(record, self.nominal) for record in self.records)
 
     def _noise_of(self, name: str) -> float:
         stated = self.case.channel(name).noise_std
@@ -110,10 +112,11 @@ class Problem:
             return stated
         return max(noise_floor(record.values[name]) for record in self.records)
 
-    def _prepare(self, record: CaseRecord, values: Array) -> RecordData:
+    def prepare(self, record: CaseRecord, values: Array) -> RecordData:
+        """Prepare a record for comparison, the whitening for the structure at parameter `values`."""
         loads = np.column_stack([record.values[name] for name in self.structure.loads])
         responses = np.column_stack([record.values[name] for name in self.structure.channels])
-        n_bins = self.bins[record.name] if self.bins else band_bins(responses, self.noise)
+        n_bins = self.bins[record.name] if self.bins and record.name in self.bins else band_bins(responses, self.noise)
         return RecordData(record, loads, responses, n_bins, self.whitening(record, n_bins, values))
 
     def whitening(self, record: CaseRecord, n_bins: int, values: Array) -> NDArray[np.complex128]:
@@ -334,7 +337,7 @@ def band_bins(responses: Array, noise: Array) -> int:
         above = np.flatnonzero(smooth > ABOVE_NOISE * noise[c] ** 2)
         if len(above):
             last = max(last, (above[-1] + 2) * width)
-    return int(min(last, n // 2))
+    return int(min(last, n // 2, MAX_BINS))
 
 
 def whitened(residual: Array, data: RecordData) -> Array:

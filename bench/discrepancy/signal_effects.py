@@ -20,14 +20,13 @@ def delay(x: Samples, values: Samples, step: float) -> Samples:
 
 
 def lag(x: Samples, values: Samples, step: float) -> Samples:
-    """Return the response of ``tau y' + y = x`` to piecewise linear `x`, from rest."""
-    ratio = step / values[0]
-    e = np.exp(-ratio)
-    # first-order hold: y[k+1] = e y[k] + b1 x[k+1] + b0 x[k]
-    b1 = 1.0 - (1.0 - e) / ratio
-    b0 = (1.0 - e) / ratio - e
-    y, _ = lfilter([b1, b0], [1.0, -e], x, zi=[-b1 * x[0]])
-    return y
+    """Return `x` through a first-order lag of time constant tau, updated once a sample.
+
+    ``y[k] = y[k-1] + (1 - exp(-h / tau)) (x[k] - y[k-1])``, the recursion of a digital drive. An analogue lag differs
+    from it by half a sample of delay.
+    """
+    share = 1.0 - np.exp(-step / values[0])
+    return np.asarray(lfilter([share], [1.0, share - 1.0], x))
 
 
 def gain(x: Samples, values: Samples, step: float) -> Samples:

@@ -191,7 +191,7 @@ class AdaptiveLeastSquares:
         state[list(settings)] = list(settings.values())
         state[layout.USES_F : layout.USES_A + 1] = model.uses
         state[layout.LAST_VALUE : layout.LAST_VALUE + 4] = math.nan
-        views = stream.views.py_func(state)
+        views = layout.split(state)
         self._header, self._theta, self._d, self._phi = views[:4]
         views[6][:] = 1.0 / np.array(model.scale)
         self._level, self._peak = views[7:9]

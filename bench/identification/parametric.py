@@ -16,8 +16,8 @@ from scipy.optimize import least_squares
 from scipy.stats import qmc
 
 from bench.errors import IdentificationError, UnknownNameError
-from bench.laws import evaluate
 from bench.laws.base import ForceLaw
+from bench.laws.evaluate import evaluate
 
 
 class Motion(NamedTuple):
@@ -82,7 +82,8 @@ def fit_law(
         law: The law.
         motions: Records, each weighted by its own force level.
         start: Start values by name; the others start at the law's defaults.
-        search: Ranges (low, high) that further starts are drawn from, log-uniform where both are positive.
+        search: Ranges (low, high) that further starts are drawn from, log-uniform where both are positive; also the
+            scale of parameters that start at zero.
         fixed: Parameters kept at their start.
         starts: Number of starts in all; the best is kept.
         rng: Source of the further starts.
@@ -108,6 +109,8 @@ def fit_law(
     places = len(law.header) + np.array([law.parameter_names.index(name) for name in names])
     bounds = np.array([law.parameters[i - len(law.header)].bounds for i in places], dtype=float).T
     base = law.theta(**start)
+    ranges = {name: 0.5 * abs(high - low) for name, (low, high) in (search or {}).items()}
+    half_ranges = np.array([ranges.get(name, 1.0) for name in names])  # the scale of what starts at zero
     evaluations = 0
 
     def residual(x: NDArray) -> NDArray:
@@ -119,7 +122,7 @@ def fit_law(
 
     best = None
     for number, x0 in enumerate(_starts(base[places], names, search or {}, starts, rng)):
-        scale = np.maximum(np.abs(x0), 1e-9)
+        scale = np.where(x0 != 0.0, np.abs(x0), half_ranges)
         inside = np.clip(x0, bounds[0], bounds[1])
         result = least_squares(residual, inside, bounds=tuple(bounds), x_scale=scale, diff_step=1e-5, max_nfev=60)
         if progress is not None:

@@ -58,6 +58,7 @@ from bench.identification.layout import (
     NOT_FINITE,
     P0,
     POWER,
+    RATE,
     REJECTED,
     REPORTED,
     REPORTS,
@@ -177,6 +178,8 @@ def admit(h, t, values_finite):
     if h[STARTED] == 0.0:
         h[STARTED] = 1.0
         h[T_LAST] = t
+        if h[T_RESET] == -math.inf:
+            h[T_RESET] = t
         return 0, True, 0.0
     step = t - h[T_LAST]
     if step <= 0.0:
@@ -326,7 +329,11 @@ def sample(h, theta, d, phi, b, work, inverse, level, peak, y, u, gram, t, force
         # Overflow in a power of the input has entered the filters: they begin anew with the next sample.
         h[STARTED] = 0.0
         return flags | NOT_FINITE
-    return flags | advance(h, theta, d, phi, b, level, peak, u, gram, z, usable, step)
+    flags |= advance(h, theta, d, phi, b, level, peak, u, gram, z, usable, step)
+    if flags & RESET and h[RATE] > 0.0:
+        # The filters still hold the system of before the change; a new start knows the new one only.
+        h[STARTED] = 0.0
+    return flags
 
 
 @inlined

@@ -28,6 +28,7 @@ from bench.measurement.gain import Gain
 from bench.measurement.lag import Lag
 from bench.measurement.noise import Noise
 from bench.measurement.quantisation import Quantisation
+from bench.measurement.sensors import measure
 
 STAGES = Stage.registry()
 
@@ -46,4 +47,5 @@ __all__ = [
     "Noise",
     "Quantisation",
     "Stage",
+    "measure",
 ]

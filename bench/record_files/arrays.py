@@ -24,11 +24,12 @@ def read_npz(path: Path) -> dict[str, Variable]:
         FileFormatError: No npz file, truncated, or an array of Python objects.
     """
     try:
-        with np.load(path, allow_pickle=False) as archive:
-            if not isinstance(archive, np.lib.npyio.NpzFile):
-                raise FileFormatError(
-                    f"'{path}' is a single array (npy), not an npz archive; save it with numpy.savez"
-                )
+        archive = np.load(path, allow_pickle=False)
+        if not isinstance(archive, np.lib.npyio.NpzFile):
+            raise FileFormatError(
+                f"'{path}' is a single array (npy), not an npz archive; save it with numpy.savez"
+            )
+        with archive:
             return {name: Variable(archive[name]) for name in archive.files}
     except (zipfile.BadZipFile, zlib.error, EOFError, OSError, ValueError, KeyError) as error:
         if isinstance(error, FileFormatError):

@@ -16,18 +16,19 @@ from bench.files import replacing
 from bench.recording import Recording, nmse
 from bench.rerun_log.bands import Band, bands_of, changes
 from bench.rerun_log.kinematics import body_poses, joint_positions
-from bench.rerun_log.layout import Loop, Page, blueprint, label_of
+from bench.rerun_log.layout import Loop, Page, blueprint, holder_of, label_of
 from bench.rerun_log.scene import eye_of, log_scene
 from bench.rerun_log.traces import frame_of, log_frame, log_loop, log_series, style
 from bench.rig import Rig
 
 APPLICATION = "jointbench"
 
+# Other colours than the variants'; told apart with any colour vision (after IBM's design library palette).
 _BAND_COLOURS = {
-    "contact −": (86, 180, 233, 255),
+    "contact −": (120, 94, 240, 255),
     "free": (60, 60, 60, 255),
-    "contact +": (240, 150, 30, 255),
-    "stick": (225, 130, 190, 255),
+    "contact +": (220, 38, 127, 255),
+    "stick": (64, 176, 166, 255),
     "slip": (60, 60, 60, 255),
 }
 
@@ -40,9 +41,9 @@ class _Clock(NamedTuple):
 
 def log_comparison(
     path: str | Path | None,
+    rigs: Mapping[str, Rig],
     records: Mapping[str, Recording],
     *,
-    rigs: Mapping[str, Rig] | None = None,
     loops: Sequence[tuple[str, str]] | None = None,
     poses: Mapping[str, ArrayLike] | None = None,
     camera: str = "",
@@ -58,9 +59,9 @@ def log_comparison(
 
     Args:
         path: The ``.rrd`` file, written whole or not at all; None opens the viewer.
-        records: Records by variant ("true", "network", …), the reference first, on the same clock.
         rigs: Rigs by variant, as far as there are any; a laboratory record has none.
-        loops: (x channel, y channel) of the loops; by default those of the reference rig's elements.
+        records: Records by variant ("true", "network", …), the reference first, on the same clock.
+        loops: (x channel, y channel) of the loops; by default those of the elements of the first rig.
         poses: Joint positions (n, nq) by variant, for rigs whose record does not tell them.
         camera: Camera of the model to look from; its first one where empty.
         frame_rate: Frames of the 3-D motion and of the loops [1/s]; at most 1800 in all.
@@ -71,31 +72,29 @@ def log_comparison(
         The file written, or None where the viewer was opened.
 
     Raises:
-        ParameterError: No records, a rate that is not positive, or a rig or pose of an unknown variant.
+        ParameterError: No records, or a rate that is not positive.
         RecordingError: The records have different clocks, or hold no joint position of their rig.
-        UnknownNameError: A loop names a channel that the reference lacks.
+        UnknownNameError: A rig or pose of a variant without a record, or a loop over a channel that no record holds.
         OutputError: The file cannot be written.
     """
-    rigs, poses = dict(rigs or {}), dict(poses or {})
+    poses = dict(poses or {})
     clock = _clock(records, rigs, poses, frame_rate, series_rate)
-    first, reference = next(iter(records.items()))
-    pairs = _loops(reference, rigs.get(first)) if loops is None else list(loops)
-    for channel in (channel for pair in pairs for channel in pair):
-        if channel not in reference.names:
-            raise UnknownNameError(f"channel of the record '{first}'", channel, reference.names)
-    bands = [
-        band for element in (rigs[first].elements if first in rigs else ()) for band in bands_of(element)
-    ]
-    bands = [band for band in bands if band.of(reference) is not None]
+    first_rig = next((rigs[variant] for variant in records if variant in rigs), None)
+    pairs = _loops(records, first_rig) if loops is None else list(loops)
+    for pair in pairs:
+        holder_of(records, *pair)
+    bands = [band for element in (first_rig.elements if first_rig else ()) for band in bands_of(element)]
+    bands = [band for band in bands if any(band.of(recording) is not None for recording in records.values())]
 
     with replacing(path) if path is not None else nullcontext() as target:
         stream = rr.RecordingStream(APPLICATION)
         try:
             keys = _keys(records)
             scenes = {keys[variant]: variant for variant in records if variant in rigs}
-            page = Page.of(reference, records, scenes, pairs, lanes=len(bands) * len(records))
-            for rig in list(rigs.values())[:1]:
-                page = page._replace(eye=eye_of(rig.model, camera))
+            lanes = sum(band.of(recording) is not None for band in bands for recording in records.values())
+            page = Page.of(records, scenes, pairs, lanes=lanes)
+            if first_rig is not None:
+                page = page._replace(eye=eye_of(first_rig.model, camera))
             if target is None:
                 stream.spawn(default_blueprint=blueprint(page))
             else:
@@ -155,15 +154,16 @@ def _clock(
     return _Clock(time, frames, series_rate)
 
 
-def _loops(reference: Recording, rig: Rig | None) -> list[tuple[str, str]]:
+def _loops(records: Mapping[str, Recording], rig: Rig | None) -> list[tuple[str, str]]:
     """Force over displacement and over velocity, for each coordinate of each element."""
+    held = {name: None for recording in records.values() for name in recording.names}
     pairs = []
     for element in rig.elements if rig is not None else ():
         stem = f"{element.name}/force"
-        for force in (name for name in reference.names if name == stem or name.startswith(stem + "_")):
+        for force in (name for name in held if name == stem or name.startswith(stem + "_")):
             suffix = force.removeprefix(stem)
             pairs += [(f"{element.name}/{motion}{suffix}", force) for motion in ("displacement", "velocity")]
-    return [pair for pair in pairs if pair[0] in reference.names]
+    return [pair for pair in pairs if pair[0] in held]
 
 
 def _log_rig(stream: rr.RecordingStream, variant: str, rig: Rig, clock: _Clock, qpos: NDArray) -> None:
@@ -213,19 +213,18 @@ def _log_loops(
     pairs: Sequence[tuple[str, str]],
     clock: _Clock,
 ) -> None:
-    reference = next(iter(records.values()))
     keys = _keys(records)
     for x_name, y_name in pairs:
         holders = {k: r for k, r in records.items() if x_name in r.names and y_name in r.names}
         frame = frame_of([r[x_name] for r in holders.values()], [r[y_name] for r in holders.values()])
-        loop = Loop.of(reference, x_name, y_name)
+        loop = Loop.of(holder_of(records, x_name, y_name), x_name, y_name)
         log_frame(stream, ["loops", loop.name], frame, loop.x_label, loop.y_label)
         for number, (variant, recording) in enumerate(records.items()):
             if variant not in holders:
                 continue
             log_loop(
                 stream, ["loops", loop.name, keys[variant]], clock.time, frame.place(recording[x_name], recording[y_name]),
-                look=style(number), frames=clock.time[clock.frames],
+                look=style(number), layer=number, frames=clock.time[clock.frames],
             )  # fmt: skip
 
 
@@ -275,7 +274,7 @@ def _scores(records: Mapping[str, Recording], clock: _Clock) -> str:
             unit = next(item.unit for item in reference.channels if item.name == name)
             cells = [f"{nmse(y, r[name][scored]):.3g} %" if name in r.names else "–" for _, r in others]
             rms = float(np.sqrt(np.mean(np.square(y))))
-            lines.append(f"| {name} | {rms:.3g} {unit} | " + " | ".join(cells) + " |")
+            lines.append(f"| {name} | {rms:.4g} {unit} | " + " | ".join(cells) + " |")
     duration = clock.time[-1] - clock.time[0]
     if others:
         lines += ["", f"NMSE against “{first}”: 100 Σ(y − ŷ)² / (N var y), settling time left out."]

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
+from bench.errors import UnknownNameError
 from bench.recording import Recording
 from bench.rerun_log.scene import Eye
 
@@ -21,6 +22,9 @@ CYCLES_SHOWN = 15
 PLOTS_A_TAB = 4
 LOOPS_A_SHEET = 4
 SCENES_A_COLUMN = 3
+
+HEIGHT, TITLE, LANE = 760.0, 60.0, 42.0
+"""Heights of a page, a view's title with its time axis, and a lane of the state view [points]; only their ratios count."""
 
 
 class Loop(NamedTuple):
@@ -50,7 +54,6 @@ class Page(NamedTuple):
     @classmethod
     def of(
         cls,
-        reference: Recording,
         records: Mapping[str, Recording],
         rigs: Mapping[str, str],
         loops: Sequence[tuple[str, str]],
@@ -66,18 +69,42 @@ class Page(NamedTuple):
                 if label not in groups.setdefault(tab, []):
                     groups[tab].append(label)
         forces = dict.fromkeys(y for _, y in loops)
-        motions = dict.fromkeys(x for x, _ in loops if "velocity" not in x)
-        key = [label_of(reference, name) for name in (*forces, *motions)]
+        motions = _distinct(records, dict.fromkeys(x for x, _ in loops if "velocity" not in x))
+        key = [label_of(holder_of(records, name), name) for name in (*forces, *motions)]
         groups = {"Joint": key, **groups} if key else groups
-        errors = tuple(label_of(reference, name) for name in forces) if len(records) > 1 else ()
+        paced = next(iter(motions), next(iter(records.values())).names[0])
         return cls(
             rigs,
-            tuple(Loop.of(reference, x, y) for x, y in loops),
+            tuple(Loop.of(holder_of(records, x, y), x, y) for x, y in loops),
             {tab: tuple(labels) for tab, labels in groups.items()},
-            errors,
+            tuple(key) if len(records) > 1 else (),
             lanes,
-            _window(reference, next(iter(motions), reference.names[0])),
+            _window(holder_of(records, paced), paced),
         )
+
+
+def _distinct(records: Mapping[str, Recording], channels: Iterable[str]) -> list[str]:
+    """The channels without those that repeat another: elements on the same joint share its motion."""
+    kept: list[str] = []
+    for channel in channels:
+        values = holder_of(records, channel)[channel]
+        if not any(np.array_equal(values, holder_of(records, other)[other]) for other in kept):
+            kept.append(channel)
+    return kept
+
+
+def holder_of(records: Mapping[str, Recording], *channels: str) -> Recording:
+    """The first record that holds all these channels.
+
+    Raises:
+        UnknownNameError: None does.
+    """
+    for recording in records.values():
+        if set(channels) <= set(recording.names):
+            return recording
+    known = {name for recording in records.values() for name in recording.names}
+    missing = next((channel for channel in channels if channel not in known), " and ".join(channels))
+    raise UnknownNameError("channel of the records", missing, known)
 
 
 def label_of(recording: Recording, channel: str) -> str:
@@ -201,17 +228,18 @@ def blueprint(page: Page) -> rrb.Blueprint:
             origin="/bands", name="contact and slip", time_view=_around(page.window)
         )
         middle.append(bands)
+    bands_share = min((TITLE + LANE * page.lanes) / HEIGHT, 0.5)
     columns = [
         rrb.Vertical(*views, row_shares=shares)
         for views, shares in (
             (left, left_shares),
-            (middle, [1.0, min(0.1 + 0.065 * page.lanes, 0.8)][: len(middle)]),
+            (middle, [1.0 - bands_share, bands_share][: len(middle)]),
             (right, right_shares),
         )
         if views
     ]
     return rrb.Blueprint(
         rrb.Horizontal(*columns, column_shares=[1.1, 1.3, 1.2][: len(columns)]),
-        rrb.TimePanel(state="collapsed", timeline="time", play_state="playing", playback_speed=20.0, loop_mode="all"),
+        rrb.TimePanel(state="collapsed", timeline="time", play_state="playing", loop_mode="all"),
         collapse_panels=True,
     )

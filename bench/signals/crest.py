@@ -5,10 +5,11 @@ waveform for p = 4, 8, … 256, each from the last, which closes in on the large
 without its kinks.
 
 Guillaume et al. take Gauss-Newton steps with a Jacobian of (samples, harmonics); here the gradient comes from one
-transform and the steps from L-BFGS, which stays affordable for thousands of harmonics. For flat spectra of 31,
-100 and 345 harmonics it reached crest factors of 1.43, 1.40 and 1.39 (mean of eight random starts), Schroeder's
-phases 1.78, 1.68 and 1.66; narrow bands stay higher (lines 30 to 100: 1.54). Rounds of clipping in front
-(Van der Ouderaa et al.) were tried: they changed these means by less than 0.01, in either direction.
+transform and the steps from conjugate gradients, which stays affordable for thousands of harmonics. For flat spectra of
+31, 100 and 345 harmonics it reached crest factors of 1.42, 1.40 and 1.39 (mean of eight random starts), Schroeder's
+phases 1.78, 1.68 and 1.66; narrow bands stay higher (lines 30 to 100: 1.53). L-BFGS reached the same within 0.01, but
+the threads of its small linear algebra get in each other's way on a busy machine. Rounds of clipping in front (Van der
+Ouderaa et al.) were tried: they changed these means by less than 0.01, in either direction.
 
 References:
     Schroeder 1970, "Synthesis of low-peak-factor signals and binary sequences with low autocorrelation".

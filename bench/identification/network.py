@@ -1,0 +1,494 @@
+"""Network model of a joint: a tanh hidden layer trained by Levenberg-Marquardt with Bayesian regularisation.
+
+The procedure is that of the dissertation's section 4.1.4: inputs and outputs scaled to ±1 over all records, training in
+stages (part of the data to a loose tolerance, then twice the data and half the tolerance, until all is in use), several
+random starts, the scaling folded into the weights at the end (appendix A). What differs, and why:
+
+- The starts are not all trained to the end: after each stage only the better half by validation error goes on.
+- "All" the data means `max_samples` of it, drawn evenly over the states visited rather than over time. Records dwell
+  near rest; a model that has seen few samples of the corners fits as well and then diverges in closed loop, which
+  happened in about one of ten fits on random samples of the same number.
+- Output weights start at their least-squares values, since the cost is linear in them.
+
+The outputs share the hidden layer. With ``g = 1 - h²`` every row of the Jacobian is a scaled part of
+``[g_j x_i, h_j, 1]``, so that one product of this matrix with itself holds ``J'J`` for any number of outputs. It is
+summed over eight parts of the samples in a fixed order, so that results do not depend on the number of threads.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import time
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from threadpoolctl import threadpool_limits
+
+from bench.errors import FileFormatError, IdentificationError, ParameterError
+from bench.identification.levenberg_marquardt import Minimum, NormalEquations, minimise
+from bench.identification.polynomial import ValidityRange, checked_data, frozen, nmse_percent
+from bench.laws.base import ForceLaw
+from bench.laws.network import NetworkWeights, fold_scaling, network_law
+from bench.laws.network import published_network as published_network
+
+Progress = Callable[[str, int, float], None]
+"""Called with the stage ("stage 1/3, start 2/4"), the iteration and the normalised mean-square error [%]."""
+
+_PARTS = 8
+_BLOCK = 512  # samples of the wide matrix in the cache at a time
+_CELLS = 12  # cells a state when samples are drawn evenly over the states visited
+
+
+class HiddenLayerProblem:
+    """Residuals of a network on normalised data, as `minimise` takes them.
+
+    Weights are laid out as ``A`` (n_inputs + 1, n_hidden) with the biases as last row, then ``B`` (n_outputs,
+    n_hidden + 1) with the biases as last column.
+
+    Args:
+        inputs: Normalised inputs (n, n_inputs).
+        outputs: Normalised outputs (n, n_outputs).
+        n_hidden: Number of hidden units.
+        run: Maps a function over the parts of the data, in order; the built-in `map` or an executor's.
+    """
+
+    def __init__(
+        self,
+        inputs: NDArray[np.float64],
+        outputs: NDArray[np.float64],
+        n_hidden: int,
+        *,
+        run: Callable[..., Iterable] = map,
+    ) -> None:
+        self.inputs = np.ascontiguousarray(np.column_stack([inputs, np.ones(len(inputs))]).T)
+        self.outputs = np.ascontiguousarray(outputs.T)
+        self.n_hidden = n_hidden
+        edges = np.linspace(0, len(inputs), _PARTS + 1).astype(int)
+        self._parts = [slice(int(a), int(b)) for a, b in zip(edges[:-1], edges[1:], strict=True) if b > a]
+        self._run = run
+
+    @property
+    def n_residuals(self) -> int:
+        """Number of residuals: samples times outputs."""
+        return self.outputs.size
+
+    @property
+    def n_weights(self) -> int:
+        """Number of weights and biases."""
+        return self.n_hidden * len(self.inputs) + (self.n_hidden + 1) * len(self.outputs)
+
+    def unpack(self, weights: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Views of the weights as A (n_inputs + 1, n_hidden) and B (n_outputs, n_hidden + 1)."""
+        hidden = len(self.inputs) * self.n_hidden
+        return weights[:hidden].reshape(-1, self.n_hidden), weights[hidden:].reshape(-1, self.n_hidden + 1)
+
+    def residuals(self, weights: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Network less data (n_outputs, n)."""
+        return self._residuals(weights, slice(None))
+
+    def sum_of_squares(self, weights: NDArray[np.float64]) -> float:
+        """Sum of the squared residuals."""
+        parts = self._run(lambda part: self._residuals(weights, part), self._parts)
+        return float(sum(np.vdot(residual, residual) for residual in parts))
+
+    def normal_equations(self, weights: NDArray[np.float64]) -> NormalEquations:
+        """``J'J``, ``J'r`` and ``r'r`` from the Gram matrix of ``[g_j x_i, h_j, 1]``."""
+        sums = list(self._run(lambda part: self._gram(weights, part), self._parts))
+        gram = sum(part[0] for part in sums)
+        correlation = sum(part[1] for part in sums)
+        width, count = self.n_hidden, len(self.inputs) * self.n_hidden
+        gains = np.tile(self.unpack(weights)[1][:, :-1], (1, len(self.inputs)))
+        matrix = np.zeros((self.n_weights, self.n_weights))
+        gradient = np.empty(self.n_weights)
+        matrix[:count, :count] = gram[:count, :count] * (gains.T @ gains)
+        gradient[:count] = np.sum(correlation[:count] * gains.T, axis=1)
+        for o, gain in enumerate(gains):
+            own = slice(count + o * (width + 1), count + (o + 1) * (width + 1))
+            matrix[own, own] = gram[count:, count:]
+            matrix[own, :count] = gram[count:, :count] * gain
+            matrix[:count, own] = matrix[own, :count].T
+            gradient[own] = correlation[count:, o]
+        return NormalEquations(matrix, gradient, float(sum(part[2] for part in sums)))
+
+    def curvature_gradient(self, weights: NDArray[np.float64], step: NDArray[np.float64]) -> NDArray[np.float64]:
+        """``J'`` times the second derivative of the residuals along `step`."""
+        return sum(self._run(lambda part: self._curvature(weights, step, part), self._parts))  # type: ignore[return-value]
+
+    def _residuals(self, weights: NDArray[np.float64], part: slice) -> NDArray[np.float64]:
+        A, B = self.unpack(weights)
+        return B[:, :-1] @ np.tanh(A.T @ self.inputs[:, part]) + B[:, -1:] - self.outputs[:, part]
+
+    def _gram(self, weights: NDArray[np.float64], part: slice) -> tuple[NDArray, NDArray, float]:
+        A, B = self.unpack(weights)
+        count = A.size
+        inputs, outputs = self.inputs[:, part], self.outputs[:, part]
+        wide = np.ones((count + self.n_hidden + 1, _BLOCK))
+        gram = np.zeros((len(wide), len(wide)))
+        correlation = np.zeros((len(wide), len(outputs)))
+        squares = 0.0
+        for first in range(0, inputs.shape[1], _BLOCK):
+            x, y = inputs[:, first : first + _BLOCK], outputs[:, first : first + _BLOCK]
+            k = wide[:, : x.shape[1]]
+            hidden = np.tanh(A.T @ x)
+            k[:count] = ((1.0 - hidden * hidden)[None] * x[:, None]).reshape(count, -1)
+            k[count:-1] = hidden
+            residual = B[:, :-1] @ hidden + B[:, -1:] - y
+            gram += k @ k.T
+            correlation += k @ residual.T
+            squares += float(np.vdot(residual, residual))
+        return gram, correlation, squares
+
+    def _curvature(self, weights: NDArray[np.float64], step: NDArray[np.float64], part: slice) -> NDArray[np.float64]:
+        (A, B), (dA, dB) = self.unpack(weights), self.unpack(step)
+        x = self.inputs[:, part]
+        hidden = np.tanh(A.T @ x)
+        slope = 1.0 - hidden * hidden
+        along = dA.T @ x
+        first = slope * along
+        second = 2.0 * dB[:, :-1] @ first - 2.0 * B[:, :-1] @ (hidden * first * along)
+        back_hidden = x @ ((B[:, :-1].T @ second) * slope).T
+        back_output = np.hstack([second @ hidden.T, second.sum(axis=1, keepdims=True)])
+        return np.concatenate([back_hidden.ravel(), back_output.ravel()])
+
+    def random_weights(self, rng: np.random.Generator) -> NDArray[np.float64]:
+        """A random start: hidden units spread over the inputs (Nguyen and Widrow 1990), outputs by least squares."""
+        n_inputs = len(self.inputs) - 1
+        direction = rng.standard_normal((n_inputs, self.n_hidden))
+        direction /= np.linalg.norm(direction, axis=0)
+        size = 0.7 * self.n_hidden ** (1.0 / n_inputs)
+        A = np.vstack([size * direction, size * rng.uniform(-1.0, 1.0, self.n_hidden)])
+        hidden = np.vstack([np.tanh(A.T @ self.inputs), np.ones(self.inputs.shape[1])])
+        # A little ridge: units that saturate alike over the data leave the output weights undetermined.
+        normal = hidden @ hidden.T + 1e-3 * np.eye(len(hidden))
+        B = np.linalg.solve(normal, hidden @ self.outputs.T).T
+        return np.concatenate([A.ravel(), B.ravel()])
+
+
+@dataclass(frozen=True)
+class NetworkReport:
+    """How a training went.
+
+    Attributes:
+        nmse: Normalised mean-square error of each output on all data given [%].
+        nmse_validation: The same on the segments held out [%]; empty without any.
+        n_weights: Number of weights and biases.
+        effective_parameters: Number of them determined by the data (MacKay's gamma).
+        alpha: Precision of the weights' prior, on normalised data.
+        beta: Precision of the residuals, on normalised data.
+        n_samples: Number of samples trained on in the last stage.
+        iterations: Accepted steps of the winning start, all stages together.
+        starts: Validation error of each start after the last stage it took part in, mean of the outputs [%].
+        stopped: Why the last stage ended: "target", "stall", "iterations", "time" or "damping".
+        seconds: Time taken [s].
+    """
+
+    nmse: tuple[float, ...]
+    nmse_validation: tuple[float, ...]
+    n_weights: int
+    effective_parameters: float
+    alpha: float
+    beta: float
+    n_samples: int
+    iterations: int
+    starts: tuple[float, ...]
+    stopped: str
+    seconds: float
+
+
+@dataclass(frozen=True)
+class NetworkModel:
+    """A trained network in physical units, with its range of validity.
+
+    Attributes:
+        weights: Weights on states (and accelerations, where the mass was unknown), in SI units.
+        range: Range of the states it was identified from.
+        report: How the training went.
+        mass: Mean mass matrix (k, k) seen by the network [kg, kg m²], where it was trained on accelerations.
+        mass_std: Standard deviation of it over the samples (k, k) [kg, kg m²]: a network need not be linear in the
+            acceleration, and this says how far it is from it.
+    """
+
+    weights: NetworkWeights = field(repr=False)
+    range: ValidityRange
+    report: NetworkReport
+    mass: NDArray[np.float64] | None = None
+    mass_std: NDArray[np.float64] | None = None
+
+    @cached_property
+    def joint(self) -> NetworkWeights:
+        """Weights on the states alone: the network at zero acceleration."""
+        W1, b1, W2, b2 = self.weights
+        return NetworkWeights(frozen(W1[:, : 2 * len(b2)]), b1, W2, b2)
+
+    @cached_property
+    def law(self) -> ForceLaw:
+        """The law whose parameters are the weights."""
+        return network_law(len(self.weights.b2), len(self.weights.b1))
+
+    @cached_property
+    def theta(self) -> NDArray[np.float64]:
+        """Header and weights, as an element takes them."""
+        return frozen(self.law.theta(self.joint.flat()))
+
+    def predict(self, states: ArrayLike) -> NDArray[np.float64]:
+        """Restoring forces (n, k) [N, N m] at states (n, 2 k) [m, rad, m/s, rad/s]."""
+        return self.joint(np.atleast_2d(np.asarray(states, dtype=float)))
+
+    def to_json(self) -> str:
+        """The model as JSON text; numbers survive to the last bit."""
+        values = {
+            "type": "network",
+            "weights": {name: part.tolist() for name, part in self.weights._asdict().items()},
+            "range": self.range.to_dict(),
+            "report": vars(self.report),
+            "mass": None if self.mass is None else self.mass.tolist(),
+            "mass_std": None if self.mass_std is None else self.mass_std.tolist(),
+        }
+        return json.dumps(values)
+
+    @classmethod
+    def from_json(cls, text: str) -> NetworkModel:
+        """The model from the text of `to_json`.
+
+        Raises:
+            FileFormatError: The text is not that of a network model.
+        """
+        try:
+            values = json.loads(text)
+            if values["type"] != "network":
+                raise FileFormatError(f"a model of type '{values['type']}' came; 'network' is expected")
+            weights = NetworkWeights(*(frozen(values["weights"][name]) for name in NetworkWeights._fields))
+            report = values["report"]
+            lists = {name: tuple(report[name]) for name in ("nmse", "nmse_validation", "starts")}
+            masses = [None if values[name] is None else frozen(values[name]) for name in ("mass", "mass_std")]
+            return cls(weights, ValidityRange.from_dict(values["range"]), NetworkReport(**{**report, **lists}), *masses)
+        except (KeyError, TypeError, ValueError) as error:
+            if isinstance(error, FileFormatError):
+                raise
+            raise FileFormatError(f"this is no network model written by `to_json`: {error}") from error
+
+
+class _Data(NamedTuple):
+    inputs: NDArray[np.float64]  # normalised (n, n_inputs)
+    outputs: NDArray[np.float64]  # normalised (n, n_outputs)
+    order: NDArray[np.int64]  # samples to train on, the first n of which are spread over the states for every n
+    held_out: NDArray[np.int64]  # samples to choose between starts; all of them where none was held out
+
+
+class _Training(NamedTuple):
+    n_hidden: int
+    n_starts: int
+    sizes: tuple[int, ...]  # samples of each stage
+    tolerance: float  # of the last stage [%]
+    max_iterations: int
+    regularise: bool
+    time_limit: float
+    progress: Progress | None
+
+
+@dataclass
+class _Start:
+    number: int
+    weights: NDArray[np.float64]
+    minimum: Minimum | None = None
+    error: float = math.inf
+    iterations: int = 0
+
+
+def fit_network(
+    states: ArrayLike,
+    forces: ArrayLike,
+    *,
+    rng: np.random.Generator,
+    n_hidden: int = 30,
+    n_restarts: int = 4,
+    n_stages: int = 3,
+    max_samples: int | None = 12_000,
+    max_iterations: int = 250,
+    tolerance: float = 0.005,
+    regularise: bool = True,
+    validation_fraction: float = 0.1,
+    accelerations: ArrayLike | None = None,
+    time_limit: float | None = None,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> NetworkModel:
+    """Train a network on states and forces.
+
+    Args:
+        states: Relative states ``(n, 2 k)``, displacements before velocities [m, rad, m/s, rad/s]; records one after
+            the other. Three records (each joint alone, then both) are needed for two coupled joints.
+        forces: Restoring forces ``(n, k)`` [N, N m]; with `accelerations`, applied forces less mounts.
+        rng: Source of the random starts and of the choice of samples.
+        n_hidden: Number of tanh units.
+        n_restarts: Number of random starts.
+        n_stages: Number of stages; each doubles the samples and halves the tolerance.
+        max_samples: Most samples of the last stage; None for all.
+        max_iterations: Most accepted steps of the last stage; the earlier ones have half as many.
+        tolerance: Normalised mean-square error at which the last stage ends [%].
+        regularise: Whether the weights have a prior estimated from the evidence.
+        validation_fraction: Fraction of the samples held out, in twenty segments, to choose between the starts [1].
+        accelerations: Absolute accelerations ``(n, k)`` [m/s², rad/s²] of the body the forces act on, where its mass
+            is unknown: they become inputs, and the joint is the network at zero acceleration.
+        time_limit: Time to stop after [s]; the result then depends on the machine.
+        threads: Number of threads; all cores if None. It does not change the result.
+        progress: Called after each step.
+
+    Returns:
+        The best network by validation error, in physical units.
+
+    Raises:
+        IdentificationError: Arrays do not fit, are not finite, are constant or too short.
+        ParameterError: A setting is out of range.
+
+    References:
+        Tasbihgoo 2006, sections 4.1.4 and 4.5, appendix A; Masri et al. 1992 (stages).
+    """
+    begun = time.monotonic()
+    s, f, a = checked_data(states, forces, accelerations)
+    if min(n_hidden, n_restarts, n_stages, max_iterations) < 1 or not 0.0 <= validation_fraction <= 0.5:
+        raise ParameterError(
+            f"n_hidden {n_hidden}, n_restarts {n_restarts}, n_stages {n_stages}, max_iterations {max_iterations} and "
+            f"validation_fraction {validation_fraction:g} came; at least 1 each, and a fraction in [0, 0.5] are expected"
+        )
+    if len(s) < 100:
+        raise IdentificationError(f"{len(s)} samples came; at least 100 are expected to train and validate a network")
+    if not np.any(np.ptp(f, axis=0) > 0.0):
+        raise IdentificationError("all forces are constant; there is nothing to learn from these records")
+    raw = np.hstack([s, a])
+    in_centre, in_scale = _normalisation(raw)
+    out_centre, out_scale = _normalisation(f)
+    inputs = (raw - in_centre) / in_scale
+    train, held_out = _split(len(s), validation_fraction, rng)
+    order = _spread(inputs, train, rng)
+    data = _Data(inputs, (f - out_centre) / out_scale, order, held_out)
+    most = len(order) if max_samples is None else min(max_samples, len(order))
+    sizes = tuple(max(most >> (n_stages - 1 - stage), min(100, most)) for stage in range(n_stages))
+    limit = math.inf if time_limit is None else time_limit
+    training = _Training(n_hidden, n_restarts, sizes, tolerance, max_iterations, regularise, limit, progress)
+    # One BLAS thread each: OpenBLAS' own threads gain nothing at this size and spin when another process is busy,
+    # which made an iteration ten times slower.
+    with threadpool_limits(1, user_api="blas"), ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
+        starts = _train(data, training, rng, pool.map)
+    best = starts[0]
+    problem = HiddenLayerProblem(inputs[:1], data.outputs[:1], n_hidden)
+    A, B = problem.unpack(best.weights)
+    normalised = NetworkWeights(A[:-1].T, A[-1], B[:, :-1], B[:, -1])
+    folded = fold_scaling(normalised, in_centre, in_scale, output_centre=out_centre, output_scale=out_scale)
+    weights = NetworkWeights(*(frozen(part) for part in folded))
+    estimated = weights(raw)
+    minimum = best.minimum
+    assert minimum is not None
+    report = NetworkReport(
+        nmse_percent(f, estimated),
+        nmse_percent(f[held_out], estimated[held_out]) if len(train) < len(s) else (),
+        len(best.weights),
+        minimum.effective_parameters,
+        minimum.alpha,
+        minimum.beta,
+        sizes[-1],
+        best.iterations,
+        tuple(start.error for start in sorted(starts, key=lambda start: start.number)),
+        minimum.stopped,
+        time.monotonic() - begun,
+    )
+    mass, deviation = _mass(weights, raw[order[:most]]) if a.shape[1] else (None, None)
+    return NetworkModel(weights, ValidityRange.of(s), report, mass, deviation)
+
+
+def _train(data: _Data, training: _Training, rng: np.random.Generator, run: Callable[..., Iterable]) -> list[_Start]:
+    """All stages; the starts with the best first."""
+    clock = time.monotonic()
+    variance = float(np.sum(np.var(data.outputs, axis=0)))
+    judge = HiddenLayerProblem(data.inputs[data.held_out], data.outputs[data.held_out], training.n_hidden, run=run)
+    last = len(training.sizes) - 1
+    starts: list[_Start] = []
+    retired: list[_Start] = []
+    for stage, size in enumerate(training.sizes):
+        chosen = data.order[:size]
+        problem = HiddenLayerProblem(data.inputs[chosen], data.outputs[chosen], training.n_hidden, run=run)
+        if stage == 0:
+            starts = [_Start(i, problem.random_weights(rng)) for i in range(training.n_starts)]
+        percent = 100.0 / (size * variance)
+        remaining = clock + training.time_limit * 0.5 ** (last - stage) - time.monotonic()
+        for turn, start in enumerate(starts):
+            label = f"stage {stage + 1}/{last + 1}, start {start.number + 1}/{training.n_starts}"
+            start.minimum = minimise(
+                problem,
+                start.weights,
+                max_iterations=training.max_iterations if stage == last else max(training.max_iterations // 2, 1),
+                target=training.tolerance * 2.0 ** (last - stage) / percent,
+                regularise=training.regularise,
+                decay=1e-6 if start.minimum is None else start.minimum.alpha / start.minimum.beta,
+                deadline=time.monotonic() + remaining / (len(starts) - turn) if math.isfinite(remaining) else math.inf,
+                on_iteration=_reporter(training.progress, label, percent),
+            )
+            remaining = clock + training.time_limit * 0.5 ** (last - stage) - time.monotonic()
+            start.weights = start.minimum.weights
+            start.iterations += start.minimum.iterations
+            start.error = 100.0 * judge.sum_of_squares(start.weights) / (len(data.held_out) * variance)
+        starts.sort(key=lambda start: start.error)
+        kept = len(starts) if stage == last else (1 if stage == last - 1 else math.ceil(len(starts) / 2))
+        retired = starts[kept:] + retired
+        starts = starts[:kept]
+    return starts + retired
+
+
+def _reporter(progress: Progress | None, label: str, percent: float) -> Callable[[int, float], None] | None:
+    if progress is None:
+        return None
+    return lambda iteration, squares: progress(label, iteration, percent * squares)
+
+
+def _normalisation(columns: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Centre and half-range of each column, over all records; 1 where a column does not vary."""
+    low, high = columns.min(axis=0), columns.max(axis=0)
+    return 0.5 * (low + high), np.where(high > low, 0.5 * (high - low), 1.0)
+
+
+def _split(n: int, fraction: float, rng: np.random.Generator) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Samples to train on, and those held out: one stretch at a random place in each of twenty segments.
+
+    Stretches, because neighbouring samples of a record are nearly the same sample.
+    """
+    everything = np.arange(n)
+    if fraction == 0.0:
+        return everything, everything
+    held_out = np.zeros(n, dtype=bool)
+    edges = np.linspace(0, n, 21).astype(int)
+    for first, end in zip(edges[:-1], edges[1:], strict=True):
+        length = max(round(fraction * (end - first)), 1)
+        begin = first + int(rng.integers(end - first - length + 1))
+        held_out[begin : begin + length] = True
+    return everything[~held_out], everything[held_out]
+
+
+def _spread(inputs: NDArray[np.float64], samples: NDArray[np.int64], rng: np.random.Generator) -> NDArray[np.int64]:
+    """The samples in an order whose every beginning covers the states: extremes first, then a weighted shuffle.
+
+    A sample's weight is the inverse square root of the number of samples in its cell, half-way between evenly in time
+    and evenly over the cells; the latter (and its neighbourhood) trained slower and was no safer.
+    """
+    points = inputs[samples]
+    n_inputs = points.shape[1]
+    cells = max(min(_CELLS, int(2.0 ** (62.0 / n_inputs))), 1)
+    index = np.clip(((points + 1.0) * 0.5 * cells).astype(np.int64), 0, cells - 1)
+    _, member, count = np.unique(index @ (cells ** np.arange(n_inputs)), return_inverse=True, return_counts=True)
+    key = np.log(rng.random(len(points))) * np.sqrt(count[member])  # Efraimidis and Spirakis 2006, in logarithms
+    key[np.concatenate([points.argmin(axis=0), points.argmax(axis=0)])] = 0.0
+    return samples[np.argsort(-key, kind="stable")]
+
+
+def _mass(weights: NetworkWeights, inputs: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Mean and standard deviation over the samples of the derivative by the accelerations, (k, k) each."""
+    k = len(weights.b2)
+    slope = 1.0 - np.tanh(inputs @ weights.W1.T + weights.b1) ** 2
+    derivative = np.einsum("oj,nj,ja->noa", weights.W2, slope, weights.W1[:, 2 * k :], optimize=True)
+    return frozen(derivative.mean(axis=0)), frozen(derivative.std(axis=0))

@@ -1,0 +1,200 @@
+"""Polynomial-basis force law on any number of joints: full tensor or total degree, Chebyshev or power series.
+
+The reduced-order joint of the dissertation's section 4.1.3: each restoring force is a linear combination of products
+of polynomials in the relative states ``s = (q_1 … q_n, v_1 … v_n)``. The states enter scaled,
+``u = (s - centre) / scale``, so that a Chebyshev basis is used on [-1, 1], where it is well conditioned; outside it
+continues as the polynomial it is, and grows as fast. `network_law` is the near-namesake that saturates instead.
+
+Terms are stored as runs: all exponents of the last state from 0 up share one product of the other states, so that a
+tensor of order 3 in four states costs 64 products instead of 256, without a scratch array. (A table of all one-state
+polynomials would save little more and would need memory on the stack; a nested Horner scheme needs a full tensor.)
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from bench.errors import ParameterError, UnknownNameError
+from bench.laws.base import MAX_COORDINATES, ForceLaw, Parameter, kernel
+
+Kind = Literal["tensor", "total"]
+Basis = Literal["chebyshev", "power"]
+
+MAX_TERMS = 20_000
+"""Most terms a force; beyond it a polynomial is no reduced-order model (a 12-state tensor of order 3 has 16.8 million)."""
+
+
+@kernel
+def force(t, q, v, z, theta, f):
+    """``f_o = sum_t a_ot prod_i P_e(t,i)(u_i)``, with ``P_(k+1) = (1 + c) u P_k - c P_(k-1)``, c = 1 Chebyshev, 0 power."""
+    c = theta[0]
+    n = int(theta[1])
+    n_terms = int(theta[2])
+    n_runs = int(theta[3])
+    coefficient = int(theta[4])
+    centre = 5
+    inverse = 5 + 2 * n
+    run = 5 + 4 * n
+    last = (v[n - 1] - theta[centre + 2 * n - 1]) * theta[inverse + 2 * n - 1]
+    for _ in range(n_runs):
+        n_factors = int(theta[run])
+        length = int(theta[run + 1])
+        run += 2
+        product = 1.0
+        for _ in range(n_factors):
+            i = int(theta[run])
+            exponent = int(theta[run + 1])
+            run += 2
+            s = q[i] if i < n else v[i - n]
+            u = (s - theta[centre + i]) * theta[inverse + i]
+            previous = 1.0
+            current = u
+            for _ in range(1, exponent):
+                following = (1.0 + c) * u * current - c * previous
+                previous = current
+                current = following
+            product *= current
+        for o in range(n):
+            a = coefficient + o * n_terms
+            total = theta[a]
+            previous = 1.0
+            current = last
+            for k in range(1, length):
+                total += theta[a + k] * current
+                following = (1.0 + c) * last * current - c * previous
+                previous = current
+                current = following
+            f[o] += product * total
+        coefficient += length
+
+
+def polynomial_exponents(orders: Sequence[int], kind: Kind = "tensor", *, degree: int | None = None) -> NDArray[np.int64]:
+    """Exponents of all terms, in the order of the coefficients (lexicographic, the last state fastest).
+
+    Args:
+        orders: Highest exponent of each state.
+        kind: "tensor" keeps every combination, ``prod(order + 1)`` terms; "total" those whose exponents sum to at most
+            `degree`.
+        degree: Largest sum of exponents for "total"; the largest of `orders` if None.
+
+    Returns:
+        ``(n_terms, n_states)``.
+
+    Raises:
+        UnknownNameError: `kind` is neither "tensor" nor "total".
+        ParameterError: An order is negative, a degree was given for a tensor, or there are more than `MAX_TERMS` terms.
+    """
+    if kind not in ("tensor", "total"):
+        raise UnknownNameError("kind of polynomial", kind, ("tensor", "total"))
+    orders = [int(order) for order in orders]
+    if not orders or min(orders) < 0:
+        raise ParameterError(f"polynomial orders are {tuple(orders)}; one order of 0 or more a state is expected")
+    if kind == "tensor" and degree is not None:
+        raise ParameterError(f"degree {degree} came with kind='tensor'; give kind='total' to bound the sum of exponents")
+    limit = sum(orders) if kind == "tensor" else (max(orders) if degree is None else int(degree))
+    prefixes: list[tuple[int, ...]] = [()]
+    for order in orders:
+        prefixes = [
+            (*prefix, exponent) for prefix in prefixes for exponent in range(min(order, limit - sum(prefix)) + 1)
+        ]
+        if len(prefixes) > MAX_TERMS:
+            raise ParameterError(
+                f"a {kind} polynomial of orders {tuple(orders)} has more than {MAX_TERMS} terms; "
+                "lower the orders or use kind='total' with a small degree"
+            )
+    return np.array(prefixes, dtype=np.int64)
+
+
+def polynomial_law(
+    orders: Sequence[int] = (3, 3, 3, 3),
+    kind: Kind = "tensor",
+    *,
+    degree: int | None = None,
+    basis: Basis = "chebyshev",
+    centre: ArrayLike = 0.0,
+    scale: ArrayLike = 1.0,
+) -> ForceLaw:
+    """Build the polynomial law of one set of orders; the coefficients are its parameters.
+
+    Args:
+        orders: Highest exponent of each state ``(q_1 … q_n, v_1 … v_n)``; their number is twice that of the joints.
+        kind: "tensor" (the dissertation's choice, 256 coefficients a force for order 3 in four states) or "total".
+        degree: Largest sum of exponents for "total"; the largest of `orders` if None.
+        basis: "chebyshev" (default: well conditioned on the scaled range) or "power".
+        centre: Centre of each state's range (2 n,) or one number [m, rad, m/s, rad/s].
+        scale: Half-width of each state's range, above 0, (2 n,) or one number [m, rad, m/s, rad/s].
+
+    Returns:
+        A law on n coordinates. A coefficient ``a<o>[e_1,…]`` multiplies scaled, dimensionless states and so has the unit
+        of force o. The defaults are those of the linear element.
+
+    Raises:
+        ParameterError: An odd number of orders, too many joints or terms, a scale that is not positive.
+        UnknownNameError: Unknown `kind` or `basis`.
+
+    References:
+        Masri and Caughey 1979; Tasbihgoo 2006, eqs. 4.10-4.13.
+    """
+    if basis not in ("chebyshev", "power"):
+        raise UnknownNameError("polynomial basis", basis, ("chebyshev", "power"))
+    n_states = len(orders)
+    if n_states % 2 or not 1 <= n_states // 2 <= MAX_COORDINATES:
+        raise ParameterError(
+            f"{n_states} polynomial orders came; two a joint are expected (displacements, then velocities), "
+            f"for 1 to {MAX_COORDINATES} joints"
+        )
+    n = n_states // 2
+    exponents = polynomial_exponents(orders, kind, degree=degree)
+    middle = np.broadcast_to(np.asarray(centre, dtype=float), (n_states,))
+    width = np.broadcast_to(np.asarray(scale, dtype=float), (n_states,))
+    if not (np.all(np.isfinite(middle)) and np.all(np.isfinite(width)) and np.all(width > 0)):
+        raise ParameterError(f"centre {middle} and scale {width} must be finite, and the scale above 0")
+    runs, n_runs = _runs(exponents)
+    fixed = [float(basis == "chebyshev"), float(n), float(len(exponents)), float(n_runs)]
+    header = [*fixed, float(len(fixed) + 1 + 2 * n_states + len(runs)), *middle, *(1.0 / width), *runs]
+    return ForceLaw(
+        name="polynomial",
+        parameters=_coefficients(exponents, middle, width),
+        force=force,
+        equation="f_o = sum a_o[e] prod P_e_i(u_i), u = (s - centre) / scale, s = (q, v)",
+        reference="Masri and Caughey 1979; Tasbihgoo 2006, eqs. 4.10-4.13",
+        n_coordinates=n,
+        header=tuple(float(entry) for entry in header),
+    )
+
+
+def _runs(exponents: NDArray[np.int64]) -> tuple[list[float], int]:
+    """The terms as runs over the last state: number of factors, length, then (state, exponent) of each factor."""
+    encoded: list[float] = []
+    n_runs = 0
+    for prefix, members in itertools.groupby(exponents.tolist(), key=lambda row: tuple(row[:-1])):
+        factors = [(i, exponent) for i, exponent in enumerate(prefix) if exponent]
+        encoded += [len(factors), len(list(members)), *itertools.chain.from_iterable(factors)]
+        n_runs += 1
+    return encoded, n_runs
+
+
+def _coefficients(
+    exponents: NDArray[np.int64], centre: NDArray[np.float64], scale: NDArray[np.float64]
+) -> tuple[Parameter, ...]:
+    n = exponents.shape[1] // 2
+    linear = {i: gain for i in range(2 * n) for gain in [1000.0 if i < n else 1.0]}
+    parameters = []
+    for o in range(n):
+        own = (o, n + o)
+        reachable = [i for i in own if exponents[:, i].max() >= 1]
+        constant = sum(linear[i] * centre[i] for i in reachable)
+        for row in exponents.tolist():
+            default = 0.0
+            if sum(row) == 0:
+                default = constant
+            elif sum(row) == 1 and row.index(1) in own:
+                default = linear[row.index(1)] * scale[row.index(1)]
+            name = f"a{o + 1}[{','.join(map(str, row))}]"
+            parameters.append(Parameter(name, "N", float(default), description="coefficient", rotational="N m"))
+    return tuple(parameters)
