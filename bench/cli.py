@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import sys
+import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,7 +24,12 @@ Command = Callable[[], None]
 @contextlib.contextmanager
 def progress_bar(quiet: bool) -> Iterator[Callable[[str, float], None]]:
     """A progress bar on standard error; call what is given with a label and the share done."""
-    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"), TimeElapsedColumn())
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.percentage:>3.0f} %"),
+        TimeElapsedColumn(),
+    )
     with Progress(*columns, console=Console(stderr=True), disable=quiet) as bar:
         task = bar.add_task("starting", total=1.0)
         yield lambda label, share: bar.update(task, description=label, completed=share)
@@ -47,8 +53,9 @@ class Demo:
     """Print the figures as JSON instead of a table."""
 
     def __call__(self) -> None:
+        """Run the command."""
         from bench import demo
-        from bench.demo_report import summary, write
+        from bench.demo.report import summary, write
 
         with progress_bar(quiet=self.json) as progress:
             result = demo.compute(progress)
@@ -72,6 +79,7 @@ class Laws:
     """Print JSON."""
 
     def __call__(self) -> None:
+        """Run the command."""
         from bench.laws import LAWS, describe, find_law
 
         laws = [find_law(self.name)] if self.name else list(LAWS.values())
@@ -109,6 +117,7 @@ class Simulate:
     """Print JSON."""
 
     def __call__(self) -> None:
+        """Run the command."""
         import numpy as np
 
         from bench.record_files import write_recording
@@ -118,7 +127,12 @@ class Simulate:
         record = simulate(rig, excitation, rng=np.random.default_rng(self.seed))
         write_recording(self.out, record)
         rows = [
-            {"channel": c.name, "unit": c.unit, "min": float(record[c.name].min()), "max": float(record[c.name].max())}
+            {
+                "channel": c.name,
+                "unit": c.unit,
+                "min": float(record[c.name].min()),
+                "max": float(record[c.name].max()),
+            }
             for c in record.channels
         ]
         if self.json:
@@ -142,6 +156,7 @@ class View:
     """Seed of the excitation."""
 
     def __call__(self) -> None:
+        """Run the command."""
         import numpy as np
 
         from bench.errors import ParameterError
@@ -149,10 +164,15 @@ class View:
         from bench.rig import simulate
 
         if not self.configurations:
-            raise ParameterError("give at least one rig configuration (a TOML or JSON file; see docs/configuration.md)")
+            raise ParameterError(
+                "give at least one rig configuration (a TOML or JSON file; see docs/configuration.md)"
+            )
         _, excitation = _configured(self.configurations[0])
         rigs = {path.stem: _configured(path, need_excitation=False)[0] for path in self.configurations}
-        records = {name: simulate(rig, excitation, rng=np.random.default_rng(self.seed)) for name, rig in rigs.items()}
+        records = {
+            name: simulate(rig, excitation, rng=np.random.default_rng(self.seed))
+            for name, rig in rigs.items()
+        }
         log_comparison(self.out, rigs, records)
         if self.out is not None:
             print(f"{self.out}: open it with `rerun {self.out}`")
@@ -166,22 +186,36 @@ def _configured(path: Path, *, need_excitation: bool = True) -> tuple[Any, Any]:
     document = read_document(path)
     rig = rig_from_configuration(document, folder=path.parent)
     if "excitation" not in document and need_excitation:
-        raise ParameterError(f"{path} has no [excitation]; say what drives the rig (see docs/configuration.md)")
+        raise ParameterError(
+            f"{path} has no [excitation]; say what drives the rig (see docs/configuration.md)"
+        )
     return rig, Excitation.from_dict(document["excitation"]) if "excitation" in document else None
 
 
 COMMANDS: dict[str, type] = {"demo": Demo, "laws": Laws, "simulate": Simulate, "view": View}
 
 
+def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
+    Console(stderr=True, soft_wrap=True).print(
+        f"note: {message}", style="yellow", markup=False, highlight=False
+    )
+
+
 def main(argv: list[str] | None = None) -> int:
-    """Run the command line; returns the exit status."""
+    """Run the command line; returns the exit status: 0 done, 2 refused with a message, 130 stopped by hand."""
+    warnings.showwarning = _show_warning
     try:
         command: Command = tyro.extras.subcommand_cli_from_dict(
-            COMMANDS, prog="jointbench", description="A MuJoCo virtual test bench for nonlinear joints.", args=argv
+            COMMANDS,
+            prog="jointbench",
+            description="A MuJoCo virtual test bench for nonlinear joints.",
+            args=argv,
         )
         command()
     except BenchError as error:
-        Console(stderr=True, soft_wrap=True).print(f"jointbench: {error}", style="red", markup=False, highlight=False)
+        Console(stderr=True, soft_wrap=True).print(
+            f"jointbench: {error}", style="red", markup=False, highlight=False
+        )
         return 2
     except KeyboardInterrupt:
         print("jointbench: stopped", file=sys.stderr)

@@ -1,7 +1,8 @@
 """The reduced-order joint: an identified model takes the true joint's place, and the two systems are compared.
 
-Identification sees what a laboratory sees: `joint_record` recovers the joint's restoring forces from accelerations and
-the known mounts, and `reduce` turns such records into an `Element` that any rig can hold.
+Identification sees what a laboratory sees: `joint_data` (in `bench.identification.restoring_force`) recovers the joint's
+restoring forces from loads, accelerations and the known mounts; `reduce` turns them into an `Element` that any rig can
+hold, and `compare` drives the true and the reduced rig alike.
 """
 
 from __future__ import annotations
@@ -12,9 +13,10 @@ from typing import Literal, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.errors import IdentificationError, UnknownNameError
+from bench.errors import UnknownNameError
 from bench.identification.network import fit_network
 from bench.identification.polynomial import fit_polynomial
+from bench.identification.restoring_force import JointData
 from bench.laws.base import ForceLaw
 from bench.recording import Recording, nmse
 from bench.rig import Drive, Element, Rig, Validity, simulate
@@ -24,18 +26,19 @@ class Identified(Protocol):
     """What every identified model offers: a law, its parameters and the range of its data."""
 
     @property
-    def law(self) -> ForceLaw: ...
+    def law(self) -> ForceLaw:
+        """The force law."""
+        ...
+
     @property
-    def theta(self) -> NDArray[np.float64]: ...
+    def theta(self) -> NDArray[np.float64]:
+        """Header and parameters (n_theta,)."""
+        ...
+
     @property
-    def range(self) -> Validity: ...
-
-
-class JointRecord(NamedTuple):
-    """States and restoring forces of a joint, as identified models are fitted to them."""
-
-    states: NDArray[np.float64]  # (n, 2 k): displacements, then velocities
-    forces: NDArray[np.float64]  # (n, k)
+    def range(self) -> Validity:
+        """The range of states that it was identified on."""
+        ...
 
 
 class Comparison(NamedTuple):
@@ -46,60 +49,13 @@ class Comparison(NamedTuple):
     nmse: dict[str, float]  # [%] by channel, settling time left out; only channels that move
 
 
-def joint_record(
-    recording: Recording,
-    *,
-    displacements: Sequence[str],
-    velocities: Sequence[str],
-    accelerations: Sequence[str],
-    mount_displacements: Sequence[str],
-    mount_velocities: Sequence[str],
-    inertias: Sequence[float],
-    mount_stiffnesses: Sequence[float],
-    mount_dampings: Sequence[float],
-) -> JointRecord:
-    """Restoring forces of a joint from the motion of the unloaded body behind it.
-
-    Per coordinate, ``r = -(m a + c v + k x)`` with the absolute motion of that body: what its inertia and its mount
-    do not account for, the joint must have transmitted.
-
-    Args:
-        recording: A record holding the channels named.
-        displacements: Relative displacements of the joint.
-        velocities: Relative velocities of the joint.
-        accelerations: Absolute accelerations of the body.
-        mount_displacements: Absolute displacements of the body.
-        mount_velocities: Absolute velocities of the body.
-        inertias: Mass [kg] or inertia [kg m^2] per coordinate.
-        mount_stiffnesses: [N/m] or [N m/rad] per coordinate.
-        mount_dampings: [N s/m] or [N m s/rad] per coordinate.
-
-    References:
-        Tasbihgoo 2006, eqs 4.8 and 4.9.
-    """
-    states = np.stack([recording[name] for name in (*displacements, *velocities)], axis=1)
-    columns = []
-    for i, m in enumerate(inertias):
-        force = m * recording[accelerations[i]]
-        force = force + mount_dampings[i] * recording[mount_velocities[i]]
-        columns.append(-(force + mount_stiffnesses[i] * recording[mount_displacements[i]]))
-    return JointRecord(states, np.stack(columns, axis=1))
-
-
-def pool(records: Sequence[JointRecord]) -> JointRecord:
-    """All samples of several records."""
-    if not records:
-        raise IdentificationError("no records came; at least one is expected")
-    return JointRecord(np.concatenate([r.states for r in records]), np.concatenate([r.forces for r in records]))
-
-
 def element_from(model: Identified, joints: Sequence[str], *, name: str = "joint") -> Element:
     """The reduced-order joint of an identified model, ready to be put into a rig."""
     return Element(model.law, tuple(joints), model.theta, name=name, validity=model.range)
 
 
 def reduce(
-    record: JointRecord,
+    data: JointData,
     joints: Sequence[str],
     *,
     kind: Literal["polynomial", "network"] = "network",
@@ -110,8 +66,8 @@ def reduce(
     """Identify a reduced-order joint and return it as an element.
 
     Args:
-        record: States and forces, of several records pooled with `pool`.
-        joints: Joints or fixed tendons that the element will act on, in the order of the record's columns.
+        data: States and restoring forces, of all training records together.
+        joints: Joints or fixed tendons that the element will act on, in the order of the data's columns.
         kind: "polynomial" (settings as of `fit_polynomial`) or "network" (as of `fit_network`).
         name: Name of the element; the true one's, so that channels of both rigs compare.
         rng: Source of the network's random starts.
@@ -122,10 +78,10 @@ def reduce(
         IdentificationError: The data do not determine the model.
     """
     if kind == "polynomial":
-        return element_from(fit_polynomial(record.states, record.forces, **settings), joints, name=name)  # type: ignore[arg-type]
+        return element_from(fit_polynomial(data.states, data.forces, **settings), joints, name=name)  # type: ignore[arg-type]
     if kind == "network":
         generator = rng if rng is not None else np.random.default_rng(0)
-        model = fit_network(record.states, record.forces, rng=generator, **settings)  # type: ignore[arg-type]
+        model = fit_network(data.states, data.forces, rng=generator, **settings)  # type: ignore[arg-type]
         return element_from(model, joints, name=name)
     raise UnknownNameError("kind of reduced-order model", kind, ("polynomial", "network"))
 
@@ -155,7 +111,14 @@ def compare(
         Both records and the NMSE [%] by channel.
     """
     records = [
-        simulate(rig, drive, rng=np.random.default_rng(seed), initial=initial, sample_rate=sample_rate, settle=settle)
+        simulate(
+            rig,
+            drive,
+            rng=np.random.default_rng(seed),
+            initial=initial,
+            sample_rate=sample_rate,
+            settle=settle,
+        )
         for rig in (true, reduced)
     ]
     return Comparison(records[0], records[1], channel_nmse(records[0], records[1]))
@@ -167,5 +130,7 @@ def channel_nmse(measured: Recording, simulated: Recording) -> dict[str, float]:
     return {
         channel.name: nmse(measured[channel.name][scored], simulated[channel.name][scored])
         for channel in measured.channels
-        if channel.role != "command" and channel.name in simulated.names and np.ptp(measured[channel.name][scored]) > 0.0
+        if channel.role != "command"
+        and channel.name in simulated.names
+        and np.ptp(measured[channel.name][scored]) > 0.0
     }

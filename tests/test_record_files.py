@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from bench.errors import FileFormatError, RecordingError, UnitError, UnknownNameError
+from bench.files import OutputError
 from bench.record_files import ColumnMap, read_recording, write_recording
 from bench.recording import Recording
 
@@ -119,8 +120,8 @@ def test_writing_is_atomic(tmp_path, monkeypatch):
         assert [file.name for file in tmp_path.iterdir()] == ["a.parquet"]
     write_recording(path, record(300))
     assert len(read_recording(path)) == 300
-    with pytest.raises(OSError, match="No such file"):
-        write_recording(tmp_path / "missing" / "a.parquet", record())
+    with pytest.raises(OutputError, match="cannot write"):
+        write_recording(tmp_path / "a.parquet" / "b.parquet", record())
 
 
 def test_same_record_same_bytes(tmp_path):

@@ -87,6 +87,9 @@ def test_scores_refuse(measured, simulated, message):
         ("rotation", "deg", math.pi / 180.0),
         ("angular velocity", "rpm", math.pi / 30.0),
         ("velocity", "inch/s", 0.0254),
+        ("acceleration", "inch/s²", 0.0254),
+        ("acceleration", "inch s⁻²", 0.0254),
+        ("acceleration", "inch*s**-2", 0.0254),
     ],
 )
 def test_conversion_to_si(quantity, unit, si):
@@ -139,6 +142,9 @@ def test_si_of_undeclared_quantities():
         ("3 N", "", "unknown unit"),
         ("9^9**9^9", "", "unknown unit"),
         ("m^(9^9)", "", "unknown unit"),
+        ("9^9_9999999", "", "unknown unit"),
+        ("9⁹⁹⁹⁹⁹⁹⁹⁹⁹", "", "unknown unit"),
+        ("9⁹^9", "", "unknown unit"),
         ("m/s^2 2", "", "unknown unit"),
         ("mm", "force", "'mm' does not fit the quantity 'force'.*N"),
         ("lb", "force", "did you mean 'lbf'"),
@@ -154,7 +160,7 @@ def test_wrong_units_are_refused(unit, quantity, message):
 
 
 @given(st.text(max_size=12) | st.text("mNs/^*() 0123456789.-+[]'", max_size=8))
-@settings(max_examples=4000, deadline=None)
+@settings(max_examples=300, deadline=None)
 def test_any_text_is_a_unit_or_a_unit_error(text):
     try:
         channel = Channel("x", text)

@@ -58,6 +58,7 @@ class FreeParameter:
         bounds: Bounds of eta.
         grid: Values of eta for the screening and as starts; the prior mean where empty.
         fixed: A discrete choice, held at its grid value by the fits.
+        unit: Unit, where the scale does not tell it.
     """
 
     name: str
@@ -68,6 +69,7 @@ class FreeParameter:
     bounds: tuple[float, float] = (-math.inf, math.inf)
     grid: tuple[float, ...] = ()
     fixed: bool = False
+    unit: str = ""
 
     def value(self, eta: float, scales: Scales) -> float:
         """Physical value at `eta`."""
@@ -119,6 +121,7 @@ class Effect:
         limit: Limit of set-valued friction; it replaces the regularised force of `law` in the simulator of the fits.
         theta: Parameter values and scales to the theta of `law`; the values themselves where None.
         n_coordinates: Number of coordinates (2: couples the axes of the joint rig).
+        n_linear: Number of leading parameters the force is linear in; one a coordinate where zero.
         modulated: Parameters 1 to 3 are depth, frequency and phase of a modulation of the amplitude.
         affine: The force is affine in parameter 1.
         signal: For actuator and sensor effects, the operation on a channel.
@@ -136,6 +139,7 @@ class Effect:
     limit: Kernel | None = None
     theta: Callable[[Values, Scales], Values] | None = None
     n_coordinates: int = 1
+    n_linear: int = 0
     modulated: bool = False
     affine: bool = False
     signal: Callable[[Values, Values, float], Values] | None = None

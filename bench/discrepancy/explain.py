@@ -13,18 +13,21 @@ from itertools import product
 
 import numpy as np
 
-from bench.discrepancy.attribute import Search, attribute, consistent, placements, posterior
+from bench.discrepancy.attribute import QUICK, Search, attribute, consistent, placements, posterior
 from bench.discrepancy.case import Case, CaseRecord
 from bench.discrepancy.effect import Effect
-from bench.discrepancy.fit import Fit
+from bench.discrepancy.fit import Fit, fit
 from bench.discrepancy.problem import Array, Hypothesis, Placed, Problem, band_bins, whitened
+from bench.discrepancy.screen import Screen
 from bench.discrepancy.structure import Structure, structure_of
 
+HELPFUL = 0.3
+"""A catalogued explanation that leaves less than this part of the excess is kept under a closure; others only disturb it."""
 KEPT = 12
 """Hypotheses of a group that are combined with those of other groups."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Explanation:
     """A hypothesis for the whole rig, fitted.
 
@@ -98,15 +101,42 @@ def explain(
         progress(f"degrees of freedom {', '.join(part.dofs)}")
         searches.append(attribute(problem, placements(case, part, catalogue), most=2, progress=progress))
     found = _combined(searches)
-    coupling = [p for p in placements(case, structure, catalogue) if p.effect.n_coordinates > 1]
-    if coupling and not found[0].consistent:
+    if not found[0].consistent:
         progress("effects that couple the degrees of freedom")
         whole = Problem(case, structure, case.identification, bins)
-        chosen = coupling + _shortlist(searches, structure)
-        search = attribute(whole, chosen, most=most, progress=progress)
-        found += [Explanation(((whole, fitted),)) for fitted in search.ranked()]
+        found += [Explanation(((whole, fitted),)) for fitted in _coupled(whole, searches, catalogue, most)]
         found.sort(key=lambda e: -e.log_posterior)
     return found
+
+
+def _coupled(whole: Problem, searches: Sequence[Search], catalogue: Sequence[Effect], most: int) -> list[Fit]:
+    """Fit the coupling effects, alone and with the best single effects of the groups."""
+    structure = whole.structure
+    coupling = [p for p in placements(whole.case, structure, catalogue) if p.effect.n_coordinates > 1]
+    screen = Screen(whole, coupling)
+    kept = Search(whole)
+    for placed in coupling:
+        points = [point for point in screen.ranked() if point.placed.key == placed.key]
+        if points:
+            start = np.concatenate([np.zeros(len(whole.nominal)), points[0].eta])
+            kept.add(fit(whole, (placed,), start=start))
+    companions = _shortlist(searches, structure)
+    for _ in range(1, most):
+        if not kept.fits or consistent(kept.ranked()[0]):
+            break
+        base = kept.ranked()[0]
+        own = {placed.key for placed in base.hypothesis}
+        trials = []
+        for placed, eta in companions:
+            if placed.key not in own:
+                start = np.concatenate([base.vector, eta])
+                trials.append(fit(whole, (*base.hypothesis, placed), start=start, iterations=QUICK))
+        trials.sort(key=lambda f: -f.log_evidence)
+        for trial in trials[:2]:
+            kept.add(fit(whole, trial.hypothesis, start=trial.vector))
+        if kept.ranked()[0] is base:
+            break
+    return kept.ranked()
 
 
 def _common_bins(case: Case, structure: Structure) -> dict[str, int]:
@@ -119,20 +149,56 @@ def _common_bins(case: Case, structure: Structure) -> dict[str, int]:
 
 
 def _combined(searches: Sequence[Search]) -> list[Explanation]:
-    ranked = [[(s.problem, fitted) for fitted in s.ranked()[:KEPT]] for s in searches]
+    ranked = [
+        [(s.problem, fitted) for fitted in dict.fromkeys((*s.ranked()[:KEPT], s.ranked(0)[0]))] for s in searches
+    ]
     found = [Explanation(tuple(parts)) for parts in product(*ranked)]
     return sorted(found, key=lambda e: -e.log_posterior)
 
 
-def _shortlist(searches: Sequence[Search], structure: Structure, count: int = 8) -> list[Placed]:
-    """Effects on one group that did best there, as effects on the whole structure."""
+def _shortlist(searches: Sequence[Search], structure: Structure, count: int = 3) -> list[tuple[Placed, Array]]:
+    """Single effects that did best in their group, as effects on the whole structure with their fitted parameters."""
     places = {place.name: place for place in structure.places}
-    chosen: dict[tuple[str, str, str], Placed] = {}
+    chosen = []
     for search in searches:
-        best: list[tuple[str, str, str]] = []
-        for fitted in search.ranked():
-            for placed in fitted.hypothesis:
-                if placed.key not in best and len(best) < count:
-                    best.append(placed.key)
-                    chosen[placed.key] = Placed(placed.effect, places[placed.place.name], placed.target)
-    return list(chosen.values())
+        joint = [f for f in search.ranked(1) if f.hypothesis[0].effect.site == "joint"]
+        for fitted in joint[:count]:
+            placed = fitted.hypothesis[0]
+            _, etas = search.problem.split(fitted.hypothesis, fitted.vector)
+            chosen.append((Placed(placed.effect, places[placed.place.name], placed.target), etas[0]))
+    return chosen
+
+
+def close(best: Explanation, closures: Sequence[Effect]) -> tuple[Explanation, str]:
+    """Add nonparametric closures to an explanation while they pay.
+
+    Args:
+        best: The best catalogued explanation.
+        closures: Free models of a missing force.
+
+    Returns:
+        The closed explanation, and the names of the closures used.
+    """
+    parts, used = [], []
+    for problem, fitted in best.parts:
+        current = fitted
+        if not consistent(fitted):
+            candidates = placements(problem.case, problem.structure, closures)
+            screen = Screen(problem, candidates)
+            current = fit(problem, (), start=np.zeros(len(problem.nominal)))
+            if fitted.reduced - 1.0 < HELPFUL * (current.reduced - 1.0):
+                current = fitted
+            for _ in candidates:
+                points = screen.ranked(current)
+                if not points:
+                    break
+                start = np.concatenate([current.vector, points[0].eta])
+                closed = fit(problem, (*current.hypothesis, points[0].placed), start=start, iterations=12)
+                if closed.log_evidence <= current.log_evidence:
+                    break
+                current = closed
+                used.append(points[0].placed.effect.name)
+                if consistent(current):
+                    break
+        parts.append((problem, current))
+    return Explanation(tuple(parts)), " + ".join(dict.fromkeys(used))

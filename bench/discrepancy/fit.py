@@ -25,7 +25,11 @@ DIFFERENCE = 1e-4
 """Step of the finite differences, in units of the prior standard deviation."""
 
 
-@dataclass(frozen=True)
+REFRESH = 3
+"""Iterations for which the columns of the nominal parameters are kept."""
+
+
+@dataclass(frozen=True, eq=False)
 class Fit:
     """A fitted hypothesis.
 
@@ -98,9 +102,15 @@ def fit(
     cost = _cost(residual, vector, mean, std, free)
     damping = 1e-3
     normal = np.diag(1.0 / std**2)
+    jacobian = None
+    gained = np.inf
     if np.isfinite(cost):
-        for _ in range(iterations):
-            jacobian = _jacobian(problem, hypothesis, vector, residual, free, std, high)
+        for iteration in range(iterations):
+            # The response is nearly linear in the nominal parameters: their columns are kept for some iterations.
+            stale = jacobian is None or iteration % REFRESH == 0
+            jacobian = _jacobian(
+                problem, hypothesis, (vector, residual), free, (std, high), None if stale else jacobian
+            )
             if jacobian is None:
                 break
             curvature = jacobian.T @ jacobian
@@ -112,7 +122,9 @@ def fit(
                 free, (mean, std, low, high),
             )  # fmt: skip
             if gained < tolerance:
-                break
+                if stale:
+                    break
+                jacobian = None
     chi2 = float(residual @ residual)
     scaled = std[free, None] * normal[np.ix_(free, free)] * std[None, free]
     log_prior = sum(placed.effect.log_prior for placed in hypothesis)
@@ -127,14 +139,19 @@ def _cost(residual: Array, vector: Array, mean: Array, std: Array, free: NDArray
 def _jacobian(
     problem: Problem,
     hypothesis: Hypothesis,
-    vector: Array,
-    residual: Array,
+    point: tuple[Array, Array],
     free: NDArray[np.int64],
-    std: Array,
-    high: Array,
+    prior: tuple[Array, Array],
+    previous: Array | None,
 ) -> Array | None:
+    """Finite differences of the residual by the free entries; nominal columns from `previous` where it is given."""
+    vector, residual = point
+    std, high = prior
     out = np.empty((len(residual), len(free)))
     for column, i in enumerate(free):
+        if previous is not None and i < len(problem.nominal):
+            out[:, column] = previous[:, column]
+            continue
         delta = DIFFERENCE * std[i]
         if vector[i] + delta > high[i]:
             delta = -delta

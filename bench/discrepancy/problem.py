@@ -19,13 +19,15 @@ from bench.discrepancy.case import Case, CaseRecord
 from bench.discrepancy.effect import Effect, Scales
 from bench.discrepancy.smoothing import smooth_motion
 from bench.discrepancy.structure import Place, Structure
-from bench.discrepancy.system import Elements, LinearStructure, Motion, free_run
+from bench.discrepancy.system import Elements, LinearStructure, Motion, driven_force, free_run
 
 Array = NDArray[np.float64]
 ABOVE_NOISE = 1.5
 """A frequency belongs to the band of a record while a smoothed response spectrum exceeds this many times its noise."""
 MAX_SUBSTEPS = 16
-MAX_BINS = 4000
+COULOMB = "coulomb"
+"""Nominal friction force of a component under prescribed motion."""
+MAX_BINS = 2500
 """Most frequency bins of a record; friction rattles an accelerometer up to the Nyquist frequency and one need not follow."""
 
 
@@ -125,7 +127,7 @@ class Problem:
         noise = np.broadcast_to(
             np.diag(self.noise**2).astype(complex), (n_bins, len(self.noise), len(self.noise))
         )
-        if np.any(self.load_noise > 0):
+        if np.any(self.load_noise > 0) and not self.driven:
             response = self.transfer(self.structure.at(values), omega)
             scaled = response * self.load_noise
             noise = noise + scaled @ np.conj(np.swapaxes(scaled, 1, 2))
@@ -150,10 +152,22 @@ class Problem:
 
     def motion(self, index: int) -> Motion:
         """Smoothed measured motion of every degree of freedom in record `index`."""
-        record = self.records[index]
+        return self.motion_of(self.records[index])
+
+    def motion_of(self, record: CaseRecord) -> Motion:
+        """Smoothed measured motion of any record of the case."""
         if record.name not in self.motions:
-            self.motions[record.name] = self._smoothed(record)
+            self.motions[record.name] = self._prescribed(record) if self.driven else self._smoothed(record)
         return self.motions[record.name]
+
+    def _prescribed(self, record: CaseRecord) -> Motion:
+        """Motion that drives a component: its measured displacement, and velocity where there is one, smoothed."""
+        orders = {name: order for order, name in enumerate(("displacement", "velocity", "acceleration"))}
+        have = [name for name in orders if self.case.has(name) and name in record.values]
+        noise = np.array([self.case.channel(name).noise_std or noise_floor(record.values[name]) for name in have])
+        samples = np.column_stack([record.values[name] for name in have])
+        out = smooth_motion(samples, tuple(orders[name] for name in have), noise, record.step)
+        return Motion(*(out[:, [i]] for i in range(3)))
 
     def _smoothed(self, record: CaseRecord) -> Motion:
         n_dof = len(self.structure.dofs)
@@ -178,7 +192,8 @@ class Problem:
             motion = self.motion(i)
             position = max(position, float(np.abs(motion.position @ place.rows.T).max()))
             velocity = max(velocity, float(np.abs(motion.velocity @ place.rows.T).max()))
-        force = float(np.sqrt(np.mean([np.mean(d.loads**2) for d in self.data]))) or 1.0
+        loading = [d.responses if self.driven else d.loads for d in self.data]
+        force = float(np.sqrt(np.mean([np.mean(x**2) for x in loading]))) or 1.0
         position = position or 1.0
         stiffness = force / position
         if place.stiffness in self.structure.parameters:
@@ -198,6 +213,8 @@ class Problem:
             (n, n_channels) predicted responses; NaN where it diverged.
         """
         values, etas = self.split(hypothesis, vector)
+        if self.driven:
+            return self._driven_response(hypothesis, etas, values, record)
         loads = np.column_stack([record.values[name] for name in self.structure.loads])
         for placed, eta in zip(hypothesis, etas, strict=True):
             effect = placed.effect
@@ -214,6 +231,31 @@ class Problem:
             linear, elements, loads=loads, step=record.step, substeps=substeps, start_time=record.start
         )
         return self.observe(hypothesis, etas, motion, record.step)
+
+    def _driven_response(self, hypothesis: Hypothesis, etas: list[Array], values: Array, record: CaseRecord) -> Array:
+        """Force (n, 1) of the component along the prescribed motion of a record."""
+        motion = self.motion_of(record)
+        linear = self.structure.at(values)
+        force = motion.position @ linear.stiffness + motion.velocity @ linear.damping
+        if COULOMB in self.structure.parameters:
+            force += values[self.structure.parameters.index(COULOMB)] * np.sign(motion.velocity)
+        elements, rate = self.elements(hypothesis, etas, record)
+        if len(elements.table):
+            row = elements.rows.T
+            substeps = int(np.clip(np.ceil(record.step * rate / 0.6), 1, MAX_SUBSTEPS))
+            driven = driven_force(
+                elements,
+                position=motion.position @ row,
+                velocity=motion.velocity @ row,
+                step=record.step,
+                substeps=substeps,
+                start_time=record.start,
+            )
+            force += driven @ elements.rows
+        for placed, eta in zip(hypothesis, etas, strict=True):
+            if placed.effect.site == "sensor" and placed.effect.signal is not None:
+                force[:, 0] = placed.effect.signal(force[:, 0], placed.effect.values(eta, self.scales_of(placed)), record.step)
+        return force
 
     def observe(self, hypothesis: Hypothesis, etas: list[Array], motion: Motion, step: float) -> Array:
         """Channels (n, n_channels) of a motion, sensor effects included."""
@@ -290,6 +332,16 @@ class Problem:
                 return np.array([np.inf])
             parts.append(whitened(data.responses - predicted, data))
         return np.concatenate(parts)
+
+    @property
+    def noise_stated(self) -> bool:
+        """Whether the noise of every response channel is stated, so that chi-squared has an absolute meaning."""
+        return all((self.case.channel(name).noise_std or 0.0) > 0.0 for name in self.structure.channels)
+
+    @property
+    def driven(self) -> bool:
+        """Whether the motion is prescribed and the force is the response."""
+        return self.case.rig == "damper"
 
     @property
     def n_residuals(self) -> int:

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.discrepancy.fit import Fit
-from bench.discrepancy.problem import Array, Hypothesis, Placed, Problem, whitened
+from bench.discrepancy.problem import COULOMB, Array, Hypothesis, Placed, Problem, whitened
 from bench.discrepancy.system import NO_ELEMENTS, Elements, LinearStructure, driven_force, free_run
 
 SIGNAL_STEP = 0.1
@@ -82,6 +82,9 @@ class Screen:
         self.nodes = [node for node in each(lambda task: self._node(*task), tasks) if node is not None]
 
     def _deviation(self, index: int, parameter: int) -> Array:
+        """Force that a deviation of one nominal parameter by its uncertainty takes from the structure."""
+        if self.problem.structure.parameters[parameter] == COULOMB:
+            return -self.problem.spread[parameter] * np.sign(self.problem.motion(index).velocity)
         motion, s = self.problem.motion(index), self.problem.structure
         force = motion.acceleration @ s.mass[parameter].T + motion.velocity @ s.damping[parameter].T
         return -self.problem.spread[parameter] * (force + motion.position @ s.stiffness[parameter].T)
@@ -90,6 +93,9 @@ class Screen:
         """Whitened response of all records to forces on the degrees of freedom, given by record index."""
         parts = []
         for i, data in enumerate(self.problem.data):
+            if self.problem.driven:
+                parts.append(whitened(-force_on_dofs(i), data))
+                continue
             motion = free_run(self.linear, NO_ELEMENTS, loads=force_on_dofs(i), step=data.record.step)
             channels = np.column_stack([motion[o.order] @ o.row for o in self.problem.structure.observers])
             parts.append(whitened(channels, data))
@@ -204,7 +210,8 @@ def force_along(problem: Problem, placed: Placed, eta: Array, index: int) -> Arr
 
 
 def _amplitudes(placed: Placed) -> list[int]:
-    return [i for i, p in enumerate(placed.effect.parameters) if i < placed.effect.n_coordinates and not p.grid]
+    count = placed.effect.n_linear or placed.effect.n_coordinates
+    return [i for i, p in enumerate(placed.effect.parameters) if i < count and not p.grid]
 
 
 def _spanning(placed: Placed, eta: Array) -> list[Array]:

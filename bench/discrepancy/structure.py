@@ -194,16 +194,16 @@ def _sdof(case: Case) -> Structure:
 def _damper(case: Case) -> Structure:
     """A massless component under prescribed motion; the mass only carries the bookkeeping of the coordinate."""
     _require(case, (), ("displacement", "force"))
-    names = tuple(p.name for p in case.parameters if p.name in {"stiffness", "damping"})
-    zeros = np.zeros((len(names), 1, 1))
-    damping = np.array([[[float(name == "damping")]] for name in names]).reshape(-1, 1, 1)
-    stiffness = np.array([[[float(name == "stiffness")]] for name in names]).reshape(-1, 1, 1)
+    names = tuple(p.name for p in case.parameters if p.name in {"stiffness", "damping", "coulomb"})
+    stacks = [np.zeros((len(names), 1, 1)), *(
+        np.array([float(name == kind) for name in names]).reshape(-1, 1, 1) for kind in ("damping", "stiffness")
+    )]
     place = Place(
         "", np.ones((1, 1)), case.channel("displacement").unit or "m", case.channel("force").unit or "N", (),
         "stiffness" if "stiffness" in names else "", "damping" if "damping" in names else "",
     )  # fmt: skip
     return Structure(
-        ("x",), names, zeros, damping, stiffness, np.ones((1, 1)), ("displacement",), (), (place,)
+        ("x",), names, *stacks, np.ones((1, 1)), ("displacement",), (Observer("force", 0, np.ones(1)),), (place,)
     )
 
 

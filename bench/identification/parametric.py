@@ -104,7 +104,9 @@ def fit_law(
     spreads = [float(np.std(m.force)) for m in motions]
     if min(spreads) == 0.0:
         raise IdentificationError("a record's force is constant; a law cannot be identified from it")
-    weights = [1.0 / (s * np.sqrt(m.force.size * len(motions))) for s, m in zip(spreads, motions, strict=True)]
+    weights = [
+        1.0 / (s * np.sqrt(m.force.size * len(motions))) for s, m in zip(spreads, motions, strict=True)
+    ]
     names = [name for name in law.parameter_names if name not in fixed]
     places = len(law.header) + np.array([law.parameter_names.index(name) for name in names])
     bounds = np.array([law.parameters[i - len(law.header)].bounds for i in places], dtype=float).T
@@ -124,7 +126,9 @@ def fit_law(
     for number, x0 in enumerate(_starts(base[places], names, search or {}, starts, rng)):
         scale = np.where(x0 != 0.0, np.abs(x0), half_ranges)
         inside = np.clip(x0, bounds[0], bounds[1])
-        result = least_squares(residual, inside, bounds=tuple(bounds), x_scale=scale, diff_step=1e-5, max_nfev=60)
+        result = least_squares(
+            residual, inside, bounds=tuple(bounds), x_scale=scale, diff_step=1e-5, max_nfev=60
+        )
         if progress is not None:
             progress(number, float(result.cost))
         if best is None or result.cost < best.cost:
@@ -139,7 +143,11 @@ def fit_law(
 
 
 def _starts(
-    first: NDArray, names: Sequence[str], search: dict[str, tuple[float, float]], count: int, rng: np.random.Generator | None
+    first: NDArray,
+    names: Sequence[str],
+    search: dict[str, tuple[float, float]],
+    count: int,
+    rng: np.random.Generator | None,
 ) -> list[NDArray]:
     """The given start, then Latin-hypercube starts within the search ranges."""
     points = [first.copy()]
@@ -147,10 +155,10 @@ def _starts(
         columns = [names.index(name) for name in search if name in names]
         low, high = np.array([search[names[c]] for c in columns], dtype=float).T
         log = (low > 0.0) & (high > 0.0)
-        a, b = np.where(log, np.log(np.where(log, low, 1.0)), low), np.where(log, np.log(np.where(log, high, 1.0)), high)
+        a, b = (np.where(log, np.log(np.where(log, edge, 1.0)), edge) for edge in (low, high))
         for draw in qmc.LatinHypercube(len(columns), rng=rng or np.random.default_rng(0)).random(count - 1):
             value = a + draw * (b - a)
             point = first.copy()
-            point[columns] = np.where(log, np.exp(value), value)
+            point[columns] = np.where(log, np.exp(np.where(log, value, 0.0)), value)
             points.append(point)
     return points

@@ -19,6 +19,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.linalg.lapack import dgeqrf
+from threadpoolctl import threadpool_limits
 
 from bench.errors import FileFormatError, IdentificationError, ParameterError, RangeWarning
 from bench.laws.base import ForceLaw
@@ -362,7 +364,7 @@ def fit_polynomial(
     # Accelerations are divided by their size, so that the condition number speaks of the data and not of its units.
     size = np.maximum(np.sqrt(np.mean(a**2, axis=0)), np.finfo(float).tiny)
     blocks = (np.hstack(parts) for parts in zip(_regressors(s, exponents, basis, centre, scale), _blocks(a / size), strict=True))
-    solution, singular, rank = _solve(blocks, f, unknowns, ridge, rcond, len(s))
+    solution, singular, rank = _solve(blocks, f, unknowns, ridge, rcond)
     coefficients = frozen(solution[:n_terms].T)
     mass = frozen(solution[n_terms:].T / size) if a.shape[1] else None
     limit = (max(powers) if degree is None else degree) if kind == "total" else None
@@ -411,12 +413,16 @@ def _solve(
     unknowns: int,
     ridge: float,
     rcond: float,
-    n_samples: int,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], int]:
     """Least-squares solution (unknowns, n_outputs), singular values and rank, by sequential QR."""
-    triangle = np.zeros((0, unknowns + forces.shape[1]))
-    for regressors, target in zip(blocks, _blocks(forces), strict=True):
-        triangle = np.linalg.qr(np.vstack([triangle, np.hstack([regressors, target])]), mode="r")
+    width = unknowns + forces.shape[1]
+    triangle = np.zeros((0, width))
+    # One BLAS thread: OpenBLAS' own spin when another process is busy, which made this twenty times slower.
+    with threadpool_limits(1, user_api="blas"):
+        for regressors, target in zip(blocks, _blocks(forces), strict=True):
+            stacked = np.vstack([triangle, np.hstack([regressors, target])])
+            factor = dgeqrf(np.asfortranarray(stacked), overwrite_a=1)[0]
+            triangle = np.triu(factor[:width])
     left, singular, right = np.linalg.svd(triangle[:unknowns, :unknowns])
     projected = left.T @ triangle[:unknowns, unknowns:]
     kept = singular > rcond * singular[0]

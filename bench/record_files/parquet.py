@@ -10,7 +10,6 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import secrets
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -18,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from bench.errors import BenchError, FileFormatError
+from bench.files import replacing
 from bench.record_files.column_map import Variable
 from bench.recording import Channel, Recording
 
@@ -42,7 +42,7 @@ def write_recording(path: str | os.PathLike[str], recording: Recording) -> Path:
 
     Raises:
         FileFormatError: Another suffix.
-        OSError: The folder does not exist or cannot be written to.
+        OutputError: The folder cannot be made or written to.
     """
     import pyarrow as pa  # noqa: PLC0415
     import pyarrow.parquet as pq  # noqa: PLC0415
@@ -61,23 +61,16 @@ def write_recording(path: str | os.PathLike[str], recording: Recording) -> Path:
     )
     columns = [pa.array(column) for column in (recording.time, *recording.values.T)]
     table = pa.Table.from_arrays(columns, schema=schema)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.{secrets.token_hex(4)}.tmp")
-    try:
-        with open(temporary, "xb") as file:
-            # measured doubles repeat in their high bytes only: split streams are a fifth smaller than plain pages
-            pq.write_table(
-                table,
-                file,
-                compression="zstd",
-                compression_level=12,
-                use_dictionary=False,
-                use_byte_stream_split=True,
-            )
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
+    with replacing(path) as temporary:
+        # measured doubles repeat in their high bytes only: split streams are a fifth smaller than plain pages
+        pq.write_table(
+            table,
+            temporary,
+            compression="zstd",
+            compression_level=12,
+            use_dictionary=False,
+            use_byte_stream_split=True,
+        )
     return path
 
 

@@ -41,9 +41,9 @@ SI_UNITS: dict[str, str] = {
 """Quantities a channel may declare, and the SI unit of each."""
 
 _PLAIN = {"1", *SI_UNITS.values()}
-_POWER = re.compile(r"(?:\^|\*\*)\s*[-+]?\d(?:\.\d\d?)?(?![\d.]|\s*(?:\^|\*\*))")
-# What is left after single powers: pint would compute 9^9^9^9 for hours.
-_TOWER = re.compile(r"\^|\*\*|[⁰¹²³⁴⁵⁶⁷⁸⁹]{2}")
+_POWER = re.compile(r"(?:\^|\*\*)\s*[-+]?\d(?:\.\d\d?)?(?![\w.]|\s*(?:\^|\*\*))", re.ASCII)
+_SUPERSCRIPT = re.compile(r"[⁻⁺⁰¹²³⁴⁵⁶⁷⁸⁹]+")
+_DIGITS = str.maketrans("⁻⁺⁰¹²³⁴⁵⁶⁷⁸⁹", "-+0123456789")
 _MEANT = {  # what engineers write, and what they mean by it
     ("force", "lb"): "lbf",
     ("force", "lbs"): "lbf",
@@ -69,9 +69,11 @@ def _parsed(unit: str) -> tuple[Any, str]:
     """The pint unit and its root units as text."""
     registry = _registry()
     try:
-        if _TOWER.search(_POWER.sub("", unit)):
+        text = _SUPERSCRIPT.sub(lambda match: "^" + match[0].translate(_DIGITS), unit)
+        rest = _POWER.sub("", text)
+        if "^" in rest or "**" in rest:  # only powers of one digit: pint would compute 9^9^9^9 for hours
             raise ValueError(unit)
-        parsed = registry.parse_units(unit)
+        parsed = registry.parse_units(text)
         return parsed, str(registry.get_root_units(parsed)[1])
     except Exception:
         # pint evaluates the text with Python's tokenizer, so that a typing error surfaces as almost any class

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import sysconfig
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from pathlib import Path
@@ -9,10 +11,11 @@ from typing import NamedTuple
 
 import numpy as np
 import rerun as rr
+import rerun.blueprint as rrb
 from numpy.typing import ArrayLike, NDArray
 
 from bench.errors import ParameterError, RecordingError, UnknownNameError
-from bench.files import replacing
+from bench.files import OutputError, replacing
 from bench.recording import Recording, nmse
 from bench.rerun_log.bands import Band, bands_of, changes
 from bench.rerun_log.kinematics import body_poses, joint_positions
@@ -75,7 +78,7 @@ def log_comparison(
         ParameterError: No records, or a rate that is not positive.
         RecordingError: The records have different clocks, or hold no joint position of their rig.
         UnknownNameError: A rig or pose of a variant without a record, or a loop over a channel that no record holds.
-        OutputError: The file cannot be written.
+        OutputError: The file cannot be written, or the viewer not be opened.
     """
     poses = dict(poses or {})
     clock = _clock(records, rigs, poses, frame_rate, series_rate)
@@ -96,7 +99,7 @@ def log_comparison(
             if first_rig is not None:
                 page = page._replace(eye=eye_of(first_rig.model, camera))
             if target is None:
-                stream.spawn(default_blueprint=blueprint(page))
+                _open_viewer(stream, blueprint(page))
             else:
                 stream.save(target, default_blueprint=blueprint(page))
             stream.send_recording_name(title or " · ".join(records))
@@ -116,6 +119,21 @@ def log_comparison(
         finally:
             stream.disconnect()
     return None if path is None else Path(path)
+
+
+def _open_viewer(stream: rr.RecordingStream, layout: rrb.Blueprint) -> None:
+    """Start rerun's viewer; the one beside this interpreter counts, whether its environment is activated or not."""
+    before = os.environ.get("PATH", "")
+    os.environ["PATH"] = os.pathsep.join((sysconfig.get_path("scripts"), before))
+    try:
+        stream.spawn(default_blueprint=layout)
+    except RuntimeError as error:
+        reason = str(error).partition("\n")[0]
+        raise OutputError(
+            f"the rerun viewer cannot be opened: {reason} Give a file to save instead"
+        ) from error
+    finally:
+        os.environ["PATH"] = before
 
 
 def _clock(

@@ -16,14 +16,14 @@ import pyarrow as pa
 import rerun as rr
 from numpy.typing import NDArray
 
+from bench.errors import UnknownNameError
 from bench.rerun_log.kinematics import BodyPoses
 
 VISIBLE_GROUPS = 3
 """Geometry groups shown: those below it, as in MuJoCo's own viewer."""
 
 SKIN_SLICES = 12
-"""Slices of a skin whose ends turn against each other; a slice of a coil twisted by 1 rad is then off by 0.1 % of
-its radius (the affine map replaces an arc of 1/12 rad by its chord)."""
+"""Slices of a skin whose ends turn against each other: an arc of 1/12 of the angle becomes a chord."""
 
 VIEWER_FIELD_OF_VIEW = np.deg2rad(55.0)
 """Vertical field of view of rerun's 3-D views; MuJoCo's cameras are moved along their axis to match it."""
@@ -112,7 +112,8 @@ _BATCHES = {
 }
 
 
-def _mesh(model: mujoco.MjModel, geom: int) -> rr.Mesh3D:
+def mesh_of(model: mujoco.MjModel, geom: int) -> rr.Mesh3D:
+    """A mesh geometry in the frame of its body."""
     mesh = int(model.geom_dataid[geom])
     vertices, faces = (
         slice(*_span(model.mesh_vertadr, model.mesh_vertnum, mesh)),
@@ -144,14 +145,16 @@ def _normals(vertices: NDArray, triangles: NDArray) -> NDArray[np.float64]:
     return normals / np.where(length > 0.0, length, 1.0)
 
 
-class _Slice(NamedTuple):
+class SkinSlice(NamedTuple):
+    """A part of a skin and where it goes."""
+
     vertices: NDArray[np.float64]  # (n, 3) in the reference position
     triangles: NDArray[np.int64]  # (m, 3) into `vertices`
     normals: NDArray[np.float64]  # (n, 3)
     maps: NDArray[np.float64]  # (n_frames, 3, 4): the affine map of each frame
 
 
-def _skin_slices(model: mujoco.MjModel, skin: int, poses: BodyPoses) -> list[_Slice]:
+def skin_slices(model: mujoco.MjModel, skin: int, poses: BodyPoses) -> list[SkinSlice]:
     """The slices of a skin and their affine maps, by linear-blend skinning in closed form.
 
     A vertex at x goes to ``sum_b w_b(x) (A_b x + c_b)`` with the motions (A_b, c_b) of the bones. Its projection on
@@ -186,7 +189,7 @@ def _skin_slices(model: mujoco.MjModel, skin: int, poses: BodyPoses) -> list[_Sl
             motions[i] @ (project @ (weights[i, used, None] * homogeneous)).T for i in range(len(bones))
         )
         corners = local.reshape(faces.shape)
-        slices.append(_Slice(rest[used], corners, _normals(rest[used], corners), np.asarray(maps)))
+        slices.append(SkinSlice(rest[used], corners, _normals(rest[used], corners), np.asarray(maps)))
     return slices
 
 
@@ -256,7 +259,7 @@ def _log_geometry(
             stream.log(rr.new_entity_path([*path, batch]), build(model, chosen, common), static=True)
     for geom in geoms:
         if int(model.geom_type[geom]) == int(mujoco.mjtGeom.mjGEOM_MESH):
-            stream.log(rr.new_entity_path([*path, *_names(model, [geom])]), _mesh(model, geom), static=True)
+            stream.log(rr.new_entity_path([*path, *_names(model, [geom])]), mesh_of(model, geom), static=True)
 
 
 def _log_skin(
@@ -269,7 +272,7 @@ def _log_skin(
 ) -> None:
     name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_SKIN, skin) or f"skin_{skin}"
     colour = _colour(model, model.skin_rgba[skin], int(model.skin_matid[skin]))
-    for number, part in enumerate(_skin_slices(model, skin, poses)):
+    for number, part in enumerate(skin_slices(model, skin, poses)):
         entity = rr.new_entity_path([*path, name, str(number)])
         mesh = rr.Mesh3D(
             vertex_positions=part.vertices,
@@ -289,10 +292,16 @@ def eye_of(model: mujoco.MjModel, camera: str = "") -> Eye:
 
     Args:
         model: The compiled model.
-        camera: Name of a camera; the first fixed one where empty.
+        camera: Name of a camera; the first one where empty.
+
+    Raises:
+        UnknownNameError: The model has no camera of that name.
     """
     centre, extent = model.stat.center, model.stat.extent
-    found = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_CAMERA, camera) if camera else min(model.ncam, 1) - 1
+    names = [model.camera(i).name for i in range(model.ncam)]
+    if camera and camera not in names:
+        raise UnknownNameError("camera of the model", camera, names)
+    found = names.index(camera) if camera else min(model.ncam, 1) - 1
     if found < 0:
         return Eye(centre + 1.3 * extent * np.array([-0.5, -0.9, 0.55]), np.array(centre))
     data = mujoco.MjData(model)

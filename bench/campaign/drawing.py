@@ -1,0 +1,164 @@
+"""What each record draws: a rig, an excitation, sensors, and a value for each quantity.
+
+All of it is a function of the plan and the number of the record, never of the records drawn before or of who asks, so
+that the bytes of a campaign do not depend on workers, parts or interruptions.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterable, Mapping
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.campaign.distribution import Distribution, Quantity, Shared, Value, pick
+from bench.campaign.plan import Plan
+from bench.errors import ParameterError
+
+CHOICES = 3
+"""Leading coordinates of a point: rig, excitation, sensors."""
+SOBOL_BLOCK = 1 << 14
+"""Points of a Sobol sequence made at a time: it can only be wound forwards, which takes a while far out."""
+LARGEST_HYPERCUBE = 20_000_000
+"""Numbers of a Latin hypercube, which must be held whole: 160 MB."""
+
+_designing = threading.Lock()
+
+
+class Draw(NamedTuple):
+    """One record's draw.
+
+    Attributes:
+        record: Number of the record.
+        rig: Index of its rig.
+        excitation: Index of its excitation.
+        sensors: Index of its sensors; −1 for true values.
+        present: Which elements of the rig it has.
+        values: Value by column of the tables.
+    """
+
+    record: int
+    rig: int
+    excitation: int
+    sensors: int
+    present: tuple[bool, ...]
+    values: Mapping[str, Value]
+
+
+def record_streams(plan: Plan, record: int) -> tuple[np.random.Generator, np.random.Generator, np.random.Generator]:
+    """The record's generators for its draw, its excitation and its sensors, from ``SeedSequence(seed, spawn_key=(record,))``."""
+    draw, excitation, sensors = np.random.SeedSequence(plan.seed, spawn_key=(record,)).spawn(3)
+    return np.random.default_rng(draw), np.random.default_rng(excitation), np.random.default_rng(sensors)
+
+
+def draws(plan: Plan, records: Iterable[int]) -> list[Draw]:
+    """What the records draw."""
+    return [draw_at(plan, record, point_of(plan, record)) for record in records]
+
+
+def dimension(plan: Plan) -> int:
+    """Coordinates of a point: the choices, the shared quantities, then the longest of each of rigs, excitations, sensors."""
+    rigs = max(sum(1 for _ in _rig_slots(plan, i)) for i in range(len(plan.rigs)))
+    excitations = max(_count(quantity for _, quantity in entry.quantities()) for entry in plan.excitations)
+    sensors = max((_count(quantity for _, quantity, _ in entry.quantities()) for entry in plan.sensors), default=0)
+    return CHOICES + len(plan.shared) + rigs + excitations + sensors
+
+
+def point_of(plan: Plan, record: int) -> NDArray[np.float64]:
+    """The record's point ``(dimension,)`` in the unit cube."""
+    if plan.sampling == "random":
+        return record_streams(plan, record)[0].random(dimension(plan))
+    if plan.sampling == "latin_hypercube":
+        return _hypercube(plan.records, dimension(plan), plan.seed)[record]
+    block, place = divmod(record, SOBOL_BLOCK)
+    return _sobol(block, dimension(plan), plan.seed)[place]
+
+
+def draw_at(plan: Plan, record: int, point: NDArray[np.float64]) -> Draw:
+    """What a record draws whose point ``(dimension,)`` is given."""
+    shared = {
+        name: quantity.at(float(u)) for (name, quantity), u in zip(plan.shared.items(), point[CHOICES:], strict=False)
+    }
+    rig = pick(float(point[0]), [entry.weight for entry in plan.rigs])
+    excitation = _fitting(plan, plan.excitations, rig, float(point[1]))
+    sensors = _fitting(plan, plan.sensors, rig, float(point[2])) if plan.fitting(plan.sensors, rig) else -1
+    at = CHOICES + len(plan.shared)
+    rig_length = max(sum(1 for _ in _rig_slots(plan, i)) for i in range(len(plan.rigs)))
+    excitation_length = max(_count(quantity for _, quantity in entry.quantities()) for entry in plan.excitations)
+    values: dict[str, Value] = {}
+    present = []
+    slots = iter(point[at:])
+    for element in plan.rigs[rig].elements:
+        present.append(element.probability == 1.0 or float(next(slots)) < element.probability)
+    for column, quantity, _ in plan.rigs[rig].quantities():
+        values[column] = _value(quantity, slots, shared)
+    slots = iter(point[at + rig_length :])
+    for column, quantity in plan.excitations[excitation].quantities():
+        values[column] = _value(quantity, slots, shared)
+    if sensors >= 0:
+        slots = iter(point[at + rig_length + excitation_length :])
+        for column, quantity, _ in plan.sensors[sensors].quantities():
+            values[column] = _value(quantity, slots, shared)
+    return Draw(record, rig, excitation, sensors, tuple(present), values)
+
+
+def _rig_slots(plan: Plan, rig: int):
+    yield from (element for element in plan.rigs[rig].elements if element.probability < 1.0)
+    yield from (q for _, q, _ in plan.rigs[rig].quantities() if isinstance(q, Distribution))
+
+
+def _count(quantities: Iterable[Quantity]) -> int:
+    return sum(isinstance(quantity, Distribution) for quantity in quantities)
+
+
+def _fitting(plan: Plan, members: tuple, rig: int, u: float) -> int:
+    indices = plan.fitting(members, rig)
+    return indices[pick(u, [members[index].weight for index in indices])]
+
+
+def _value(quantity: Quantity, slots, shared: Mapping[str, Value]) -> Value:
+    if isinstance(quantity, Distribution):
+        return quantity.at(float(next(slots)))
+    if isinstance(quantity, Shared):
+        value = shared[quantity.name]
+        return value if isinstance(value, str) or quantity.times == 1.0 else quantity.times * value
+    return quantity
+
+
+def _hypercube(records: int, size: int, seed: int) -> NDArray[np.float64]:
+    if records * size > LARGEST_HYPERCUBE:
+        raise ParameterError(
+            f"a Latin hypercube of {records} records in {size} quantities must be held whole in memory, and at most "
+            f'{LARGEST_HYPERCUBE // size} records are allowed; use sampling = "sobol", which is made piece by piece'
+        )
+    with _designing:
+        return _hypercube_of(records, size, seed)
+
+
+@lru_cache(maxsize=1)
+def _hypercube_of(records: int, size: int, seed: int) -> NDArray[np.float64]:
+    from scipy.stats import qmc  # noqa: PLC0415  (half a second)
+
+    points = qmc.LatinHypercube(size, rng=np.random.default_rng(seed)).random(records)
+    points.flags.writeable = False
+    return points
+
+
+def _sobol(block: int, size: int, seed: int) -> NDArray[np.float64]:
+    with _designing:
+        return _sobol_of(block, size, seed)
+
+
+@lru_cache(maxsize=4)
+def _sobol_of(block: int, size: int, seed: int) -> NDArray[np.float64]:
+    from scipy.stats import qmc  # noqa: PLC0415
+
+    engine = qmc.Sobol(size, rng=np.random.default_rng(seed))
+    if block:
+        engine.fast_forward(block * SOBOL_BLOCK)
+    points = engine.random(SOBOL_BLOCK)
+    points.flags.writeable = False
+    return points

@@ -1,0 +1,374 @@
+"""What a campaign is: rigs, excitations and sensors to choose from, with distributions over their numbers.
+
+Each record draws one rig, one excitation that fits it and one set of sensors, by weight, and a value for each of their
+quantities. `bench.campaign.reading` makes a plan from TOML; `Plan.to_dict` gives it back.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal, get_args
+
+from bench.campaign.distribution import Distribution, Quantity, Shared, Value, check_weights
+from bench.errors import ParameterError, UnknownNameError
+
+Sampling = Literal["random", "latin_hypercube", "sobol"]
+Precision = Literal["float32", "float64"]
+Compression = Literal["none", "lz4", "zstd"]
+
+ROWS_PER_PART = 500_000
+"""Rows that a part aims at where the plan does not say: 14 MB for seven channels of float32."""
+MIN_PARTS = 64
+"""Parts that a campaign is cut into where it has the records, so that many cores have work."""
+
+Node = Any
+"""A signal's or chain's dictionary in which a distribution may stand for a number."""
+
+
+@dataclass(frozen=True)
+class ElementPlan:
+    """An element of a rig, its parameters drawn.
+
+    Attributes:
+        law: Name of the law.
+        joints: Joints or fixed tendons it acts on.
+        name: Name of the element.
+        parameters: Quantity by parameter; the others at the law's defaults.
+        header: Leading entries of theta that fix sizes.
+        inputs: Actuators that the law reads.
+        exact: As `bench.rig.Element.exact`.
+        withheld: Left out of the public part of the manifest; its parameters stand in the answers.
+        probability: Share of the rig's records that have the element.
+    """
+
+    law: str
+    joints: tuple[str, ...]
+    name: str
+    parameters: Mapping[str, Quantity]
+    header: tuple[float, ...] = ()
+    inputs: tuple[str, ...] = ()
+    exact: bool = False
+    withheld: bool = False
+    probability: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.probability <= 1.0:
+            raise ParameterError(f"probability of element '{self.name}' is {self.probability!r}; a number in (0, 1] is expected")
+
+    def to_dict(self) -> dict[str, Any]:
+        """As in a plan."""
+        entry: dict[str, Any] = {"law": self.law, "joints": list(self.joints), "name": self.name}
+        entry["parameters"] = {key: as_entry(value) for key, value in self.parameters.items()}
+        optional = {"header": list(self.header), "inputs": list(self.inputs), "exact": self.exact, "withheld": self.withheld}
+        entry |= {key: value for key, value in optional.items() if value}
+        return entry | ({"probability": self.probability} if self.probability < 1.0 else {})
+
+
+@dataclass(frozen=True)
+class RigPlan:
+    """A rig to choose from.
+
+    Attributes:
+        name: Name in the tables.
+        rig: Rig of the bench, or path of an MJCF file.
+        elements: Its elements.
+        structure: (kind, body or joint, quantity), as `bench.rig.Rig.with_structure`.
+        structure_withheld: The structure's numbers stand in the answers only.
+        weight: Share of the records.
+        timestep: Integration step [s]; the rig's own where None.
+        integrator: The rig's own where None.
+        folder: Folder that an MJCF path is relative to.
+        model_sha256: Hash of the MJCF file, so that a campaign is not resumed on another model.
+    """
+
+    name: str
+    rig: str
+    elements: tuple[ElementPlan, ...] = ()
+    structure: tuple[tuple[str, str, Quantity], ...] = ()
+    structure_withheld: bool = False
+    weight: float = 1.0
+    timestep: float | None = None
+    integrator: str | None = None
+    folder: str = "."
+    model_sha256: str = ""
+
+    def __post_init__(self) -> None:
+        _unique(f"elements of rig '{self.name}'", [element.name for element in self.elements])
+
+    @property
+    def withheld(self) -> bool:
+        """Whether something of the rig is withheld."""
+        return self.structure_withheld or any(element.withheld for element in self.elements)
+
+    def quantities(self) -> Iterator[tuple[str, Quantity, bool]]:
+        """(column, quantity, withheld) of its structure and elements, as far as the plan names them."""
+        for kind, target, quantity in self.structure:
+            yield f"structure/{kind}/{target}", quantity, self.structure_withheld
+        for element in self.elements:
+            for name, quantity in element.parameters.items():
+                yield f"{element.name}/{name}", quantity, element.withheld
+
+    def to_dict(self, *, public: bool = False) -> dict[str, Any]:
+        """As in a plan; without what is withheld if `public`."""
+        entry: dict[str, Any] = {"name": self.name, "rig": self.rig, "weight": self.weight}
+        optional = {"timestep": self.timestep, "integrator": self.integrator, "model_sha256": self.model_sha256}
+        entry |= {key: value for key, value in optional.items() if value}
+        if not (public and self.structure_withheld):
+            structure: dict[str, dict[str, Any]] = {}
+            for kind, target, quantity in self.structure:
+                structure.setdefault(kind, {})[target] = as_entry(quantity)
+            entry |= {"structure": structure} if structure else {}
+            entry |= {"structure_withheld": True} if self.structure_withheld else {}
+        elements = [element.to_dict() for element in self.elements if not (public and element.withheld)]
+        return entry | ({"elements": elements} if elements else {})
+
+
+@dataclass(frozen=True)
+class ExcitationPlan:
+    """An excitation to choose from.
+
+    Attributes:
+        name: Name in the tables.
+        signals: A signal's dictionary by actuator, with distributions.
+        weight: Share of the records of the rigs it fits.
+        rigs: Names of the rigs it fits; all where empty.
+    """
+
+    name: str
+    signals: Mapping[str, Node]
+    weight: float = 1.0
+    rigs: tuple[str, ...] = ()
+
+    def quantities(self) -> Iterator[tuple[str, Quantity]]:
+        """(column, quantity) of every number and distribution."""
+        for actuator, node in self.signals.items():
+            yield from leaves(node, f"excitation/{actuator}")
+
+    def to_dict(self) -> dict[str, Any]:
+        """As in a plan."""
+        entry: dict[str, Any] = {"name": self.name, "weight": self.weight}
+        entry |= {"rigs": list(self.rigs)} if self.rigs else {}
+        return entry | {"signals": {key: as_entry(node) for key, node in self.signals.items()}}
+
+
+@dataclass(frozen=True)
+class SensorPlan:
+    """A set of sensors to choose from.
+
+    Attributes:
+        name: Name in the tables.
+        chains: Stages by channel: a stage's dictionary by its type, with distributions.
+        weight: Share of the records of the rigs it fits.
+        rigs: Names of the rigs it fits; all where empty.
+        withheld: The stages stand in the answers only.
+    """
+
+    name: str
+    chains: Mapping[str, Mapping[str, Node]]
+    weight: float = 1.0
+    rigs: tuple[str, ...] = ()
+    withheld: bool = False
+
+    def quantities(self) -> Iterator[tuple[str, Quantity, bool]]:
+        """(column, quantity, withheld) of every number and distribution."""
+        for channel, stages in self.chains.items():
+            for stage, node in stages.items():
+                for column, quantity in leaves(node, f"sensors/{channel}/{stage}"):
+                    yield column, quantity, self.withheld
+
+    def to_dict(self, *, public: bool = False) -> dict[str, Any]:
+        """As in a plan; without the stages if `public` and withheld."""
+        entry: dict[str, Any] = {"name": self.name, "weight": self.weight}
+        entry |= {"rigs": list(self.rigs)} if self.rigs else {}
+        entry |= {"withheld": True} if self.withheld and not public else {}
+        if public and self.withheld:
+            return entry
+        stages = {
+            channel: [{"type": kind, **as_entry(node)} for kind, node in named.items()] for channel, named in self.chains.items()
+        }
+        return entry | {"chains": stages}
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A campaign.
+
+    Attributes:
+        name: Name.
+        records: Number of records.
+        duration: Length of a record [s].
+        sample_rate: Rate of the records [Hz]; must divide the rigs' step rates.
+        seed: Entropy of all draws; record k uses ``SeedSequence(seed, spawn_key=(k,))``.
+        rigs: Rigs to choose from.
+        excitations: Excitations to choose from.
+        sensors: Sets of sensors to choose from; true values where empty.
+        shared: Quantities that others may refer to.
+        channels: Channels kept; all commands driven and all sensors of the rigs where empty.
+        sampling: How the quantities cover their distributions: independent random numbers, or a design over all records.
+        drive_rate: Rate of the excitation [Hz], held between samples; `sample_rate` where None.
+        precision: Type of the channels in the data set.
+        compression: Of the data set. Simulated doubles hardly compress: "zstd" saves about a third and takes a tenth of
+            the time of a campaign of one-degree-of-freedom rigs; "none" is fastest.
+        records_per_part: Records of one part (file); part of the plan because the bytes depend on it.
+    """
+
+    name: str
+    records: int
+    duration: float
+    sample_rate: float
+    rigs: tuple[RigPlan, ...]
+    excitations: tuple[ExcitationPlan, ...]
+    sensors: tuple[SensorPlan, ...] = ()
+    shared: Mapping[str, Distribution] = field(default_factory=dict)
+    seed: int = 0
+    channels: tuple[str, ...] = ()
+    sampling: Sampling = "random"
+    drive_rate: float | None = None
+    precision: Precision = "float32"
+    compression: Compression = "lz4"
+    records_per_part: int = 0
+
+    def __post_init__(self) -> None:
+        for name, low in (("records", 1), ("seed", 0), ("records_per_part", 0)):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, int) or value < low:
+                raise ParameterError(f"{name} of the campaign is {value!r}; a whole number of at least {low} is expected")
+        for name in ("duration", "sample_rate", "drive_rate"):
+            value = getattr(self, name)
+            if value is None and name == "drive_rate":
+                continue
+            if isinstance(value, bool | str) or not (math.isfinite(value) and value > 0.0):
+                raise ParameterError(f"{name} of the campaign is {value!r}; a positive number is expected")
+        if abs(self.duration * self.sample_rate - self.n_samples) > 1e-6 * self.n_samples or self.n_samples < 2:
+            raise ParameterError(
+                f"{self.duration:g} s at {self.sample_rate:g} Hz is not a whole number of samples (at least 2); "
+                "change the duration or the sample rate"
+            )
+        for name, options in (("sampling", Sampling), ("precision", Precision), ("compression", Compression)):
+            if getattr(self, name) not in get_args(options):
+                raise UnknownNameError(f"{name} of the campaign", str(getattr(self, name)), get_args(options))
+        self._check_members()
+        if not self.records_per_part:
+            whole = max(1, ROWS_PER_PART // self.n_samples)
+            object.__setattr__(self, "records_per_part", max(1, min(whole, -(-self.records // MIN_PARTS))))
+
+    def _check_members(self) -> None:
+        for what, members in (("rigs", self.rigs), ("excitations", self.excitations)):
+            if not members:
+                raise ParameterError(f"the campaign has no {what}; at least one [[{what}]] is expected")
+        names = [rig.name for rig in self.rigs]
+        for what, members in (("rigs", self.rigs), ("excitations", self.excitations), ("sensors", self.sensors)):
+            _unique(what, [member.name for member in members])
+            if members:
+                check_weights(what, [member.weight for member in members])
+        for member in (*self.excitations, *self.sensors):
+            for rig in member.rigs:
+                if rig not in names:
+                    raise UnknownNameError(f"rig of '{member.name}'", rig, names)
+        for index, rig in enumerate(self.rigs):
+            if not self.fitting(self.excitations, index):
+                raise ParameterError(f"no excitation fits rig '{rig.name}'; leave `rigs` out of one, or name the rig in it")
+        _unique("channels", list(self.channels))
+        for quantity in self.all_quantities():
+            if isinstance(quantity, Shared) and quantity.name not in self.shared:
+                raise UnknownNameError("shared quantity", quantity.name, self.shared)
+
+    def all_quantities(self) -> Iterator[Quantity]:
+        """Every quantity of every rig, excitation and set of sensors."""
+        for rig in self.rigs:
+            yield from (quantity for _, quantity, _ in rig.quantities())
+        for excitation in self.excitations:
+            yield from (quantity for _, quantity in excitation.quantities())
+        for sensors in self.sensors:
+            yield from (quantity for _, quantity, _ in sensors.quantities())
+
+    def fitting(self, members: tuple[Any, ...], rig: int) -> list[int]:
+        """Indices of the excitations or sensors that fit the rig."""
+        name = self.rigs[rig].name
+        return [i for i, member in enumerate(members) if not member.rigs or name in member.rigs]
+
+    @property
+    def n_samples(self) -> int:
+        """Samples a record."""
+        return round(self.duration * self.sample_rate)
+
+    @property
+    def n_parts(self) -> int:
+        """Parts of the data set."""
+        return -(-self.records // self.records_per_part)
+
+    @property
+    def withholds(self) -> bool:
+        """Whether anything is withheld."""
+        return any(rig.withheld for rig in self.rigs) or any(sensors.withheld for sensors in self.sensors)
+
+    def part(self, index: int) -> range:
+        """Records of a part."""
+        return range(index * self.records_per_part, min((index + 1) * self.records_per_part, self.records))
+
+    def to_dict(self, *, public: bool = False) -> dict[str, Any]:
+        """The plan as in its file, all defaults written out; without what is withheld (and the seed) if `public`."""
+        hidden = public and self.withholds
+        entry: dict[str, Any] = {"name": self.name} | ({} if hidden else {"seed": self.seed})
+        for name in (
+            "records", "duration", "sample_rate", "drive_rate", "sampling", "precision", "compression", "records_per_part"
+        ):  # fmt: skip
+            if getattr(self, name) is not None:
+                entry[name] = getattr(self, name)
+        entry["channels"] = list(self.channels)
+        if self.shared and not hidden:
+            entry["shared"] = {name: value.to_dict() for name, value in self.shared.items()}
+        entry["rigs"] = [rig.to_dict(public=public) for rig in self.rigs]
+        entry["excitations"] = [excitation.to_dict() for excitation in self.excitations]
+        entry["sensors"] = [sensors.to_dict(public=public) for sensors in self.sensors]
+        return entry
+
+    @property
+    def sha256(self) -> str:
+        """Hash of the whole plan; together with the versions of the software it stands for the bytes of the data set."""
+        text = json.dumps(self.to_dict(), sort_keys=True, ensure_ascii=False)
+        return hashlib.sha256(text.encode()).hexdigest()
+
+
+def as_entry(node: Node) -> Any:
+    """A quantity, or a nest of them, as in a plan."""
+    if isinstance(node, Distribution | Shared):
+        return node.to_dict()
+    if isinstance(node, Mapping):
+        return {key: as_entry(value) for key, value in node.items()}
+    if isinstance(node, list | tuple):
+        return [as_entry(value) for value in node]
+    return node
+
+
+def leaves(node: Node, path: str) -> Iterator[tuple[str, Quantity]]:
+    """(path, quantity) of the numbers and distributions in a nest; fixed names and lists of plain numbers are none."""
+    if isinstance(node, Distribution | Shared) or (isinstance(node, int | float) and not isinstance(node, bool)):
+        yield path, node
+    elif isinstance(node, Mapping):
+        for key, value in node.items():
+            yield from leaves(value, f"{path}/{key}")
+    elif isinstance(node, list | tuple) and not all(isinstance(value, int | float) for value in node):
+        for index, value in enumerate(node):
+            yield from leaves(value, f"{path}/{index}")
+
+
+def filled(node: Node, path: str, values: Mapping[str, Value]) -> Any:
+    """The nest with the values drawn in the places of its distributions."""
+    if isinstance(node, Distribution | Shared):
+        return values[path]
+    if isinstance(node, Mapping):
+        return {key: filled(value, f"{path}/{key}", values) for key, value in node.items()}
+    if isinstance(node, list | tuple):
+        return [filled(value, f"{path}/{index}", values) for index, value in enumerate(node)]
+    return node
+
+
+def _unique(what: str, names: list[str]) -> None:
+    for name in names:
+        if names.count(name) > 1:
+            raise ParameterError(f"{what}: the name '{name}' comes more than once; give each its own")

@@ -1,0 +1,79 @@
+"""The main job: real friction damper and deck joint, identified, swapped in and compared on unseen tests.
+
+`compute` sees what a laboratory sees: motion and force records; the unseen tests' forces serve the scores and nothing
+else. `bench.demo.report.write` makes a page, a rerun recording and Parquet records of the result.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from bench.demo.damper import TENSIONS, DamperTest, damper_test
+from bench.demo.joint import JointModel, Progress, joint_models, training_records, unseen_record
+from bench.recording import Recording
+
+
+def _by_axis(pair: tuple[float, float] | None) -> dict[str, float] | None:
+    return None if pair is None else {"axial": pair[0], "torsional": pair[1]}
+
+
+@dataclass(frozen=True)
+class DemoResult:
+    """Everything that the demo found.
+
+    Attributes:
+        damper: Unseen damper tests by tension.
+        joint: Reduced-order joints on the unseen excitation.
+        training: Training records of the joint: axial, torsional, both.
+        unseen: The true joint's record of the unseen test.
+        seconds: Wall-clock time [s] of the computation.
+    """
+
+    damper: tuple[DamperTest, ...]
+    joint: tuple[JointModel, ...]
+    training: tuple[Recording, ...] = field(repr=False)
+    unseen: Recording = field(repr=False)
+    seconds: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Figures as JSON values."""
+        return {
+            "damper": [
+                {"tension_lbf": t.tension, "force_nrmse": t.nrmse, "outside": t.outside} for t in self.damper
+            ],
+            "joint": [
+                {
+                    "model": m.label,
+                    "force_nmse_percent": _by_axis(m.force_nmse),
+                    "open_loop_force_nmse_percent": _by_axis(m.open_loop_nmse),
+                    "nmse_percent": m.comparison.nmse if m.comparison else None,
+                    "note": m.note or None,
+                    "fit_seconds": m.seconds,
+                }
+                for m in self.joint
+            ],
+            "seconds": self.seconds,
+        }
+
+
+def compute(progress: Progress = lambda label, share: None) -> DemoResult:
+    """Run both parts of the demo.
+
+    Args:
+        progress: Called with what is being done and the share done.
+    """
+    start = time.perf_counter()
+    damper = []
+    for number, tension in enumerate(TENSIONS):
+        progress(f"damper: identifying at {tension} lbf band tension", 0.3 * number / len(TENSIONS))
+        damper.append(damper_test(tension, np.random.default_rng(tension)))
+    progress("joint: simulating the training records", 0.3)
+    records = training_records()
+    unseen = unseen_record()
+    joint = joint_models(records, unseen, progress, (0.32, 0.98))
+    progress("done", 1.0)
+    return DemoResult(tuple(damper), tuple(joint), records, unseen, time.perf_counter() - start)

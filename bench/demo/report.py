@@ -1,0 +1,187 @@
+"""What the demo leaves behind: tables for the terminal, a page, a rerun recording and the records themselves."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rich.table import Table
+
+from bench.demo import DemoResult
+from bench.demo.damper import DamperTest
+from bench.demo.joint import JointModel, Progress
+from bench.figures import bar_table, loops, time_histories
+from bench.page import Page
+from bench.record_files import write_recording
+from bench.recording import Recording
+from bench.rerun_log import log_comparison
+from bench.rig.library import joint_rig
+
+
+def summary(result: DemoResult) -> list[Table]:
+    """The figures as tables for the terminal."""
+    damper = Table(title="Friction damper, real: force NRMSE at 1 Hz, identified at 0.5 Hz")
+    models = list(result.damper[0].nrmse)
+    for column in ("band tension", *models):
+        damper.add_column(column)
+    for test in result.damper:
+        damper.add_row(f"{test.tension} lbf", *(f"{test.nrmse[model]:.3f}" for model in models))
+    joint = Table(title="Joint rig: force NMSE on unseen excitation, joint swapped in (closed loop)")
+    for column in ("reduced-order joint", "axial", "torsional", "on true states", "fitting"):
+        joint.add_column(column)
+    for row in _joint_rows(result):
+        joint.add_row(*row)
+    return [damper, joint]
+
+
+def _joint_rows(result: DemoResult) -> list[list[str]]:
+    rows = []
+    for model in result.joint:
+        closed = (
+            ["diverged", "diverged"] if model.force_nmse is None else [f"{x:.3f} %" for x in model.force_nmse]
+        )
+        open_loop = " / ".join(f"{x:.3f} %" for x in model.open_loop_nmse)
+        rows.append(
+            [model.label, *closed, open_loop, f"{model.seconds:.1f} s" if model.seconds else "published"]
+        )
+    return rows
+
+
+def write(result: DemoResult, folder: Path, progress: Progress) -> list[Path]:
+    """Write index.html, joint.rrd and the records; returns the files, the page first.
+
+    Args:
+        result: The demo's result.
+        folder: Folder to write into; made where it is missing.
+        progress: Called with what is being done.
+
+    Raises:
+        OutputError: The folder cannot be written to.
+    """
+    progress("writing the page", 1.0)
+    page = folder / "index.html"
+    _page(result).write(page)
+    progress("writing the rerun recording", 1.0)
+    viewer = folder / "joint.rrd"
+    log_joint(result, viewer)
+    progress("writing the records", 1.0)
+    return [page, viewer, *_write_records(result, folder / "records")]
+
+
+def _converged(result: DemoResult) -> list[JointModel]:
+    return [model for model in result.joint if model.comparison is not None]
+
+
+def log_joint(result: DemoResult, path: Path) -> None:
+    """The rig moving in 3-D with the true joint and with the best network side by side, and every channel."""
+    model = min(_converged(result), key=lambda m: sum(m.force_nmse or (0.0, 0.0)))
+    assert model.comparison is not None
+    rig = joint_rig()
+    log_comparison(
+        path,
+        {"true": rig, model.label: rig.with_element(model.element)},
+        {"true": model.comparison.true, model.label: model.comparison.reduced},
+        title="jointbench demo: true and reduced-order joint",
+    )
+
+
+def _write_records(result: DemoResult, folder: Path) -> list[Path]:
+    records = {
+        f"training_{name}": r for name, r in zip(("axial", "torsional", "both"), result.training, strict=True)
+    }
+    records |= {"unseen_true": result.unseen}
+    for model in _converged(result):
+        assert model.comparison is not None
+        records["unseen_" + model.label.replace(" ", "_").replace("(", "").replace(")", "")] = (
+            model.comparison.reduced
+        )
+    paths = []
+    for name, record in records.items():
+        paths.append(folder / f"{name}.parquet")
+        write_recording(paths[-1], record)
+    return paths
+
+
+def _page(result: DemoResult) -> Page:
+    page = Page(
+        "jointbench demo",
+        lead="Two joints are identified from records, each model takes the true joint's place in a MuJoCo rig, and both are "
+        "compared on a test that the identification never saw.",
+        footer="Made by `jointbench demo`. Friction-damper data: ARTS-Laboratory, Dataset-Friction-Damper-with-Backlash, "
+        "CC BY-SA 4.0, excerpt.",
+    )
+    _damper_section(page, result.damper)
+    _joint_section(page, result)
+    return page
+
+
+def _damper_section(page: Page, tests: tuple[DamperTest, ...]) -> None:
+    section = page.section("A real friction damper with backlash")
+    section.text(
+        "Identified on the 0.5 Hz test of each band tension, predicted at 1 Hz from the measured displacement alone. The "
+        "parametric model is a friction slider behind a spring with backlash: it remembers where it slipped. Polynomial and "
+        "network see displacement and velocity only and cannot."
+    )
+    models = list(tests[0].nrmse)
+    rows = [[f"{t.tension} lbf", *(f"{t.nrmse[m]:.3f}" for m in models)] for t in tests]
+    section.table(
+        "NRMSE of the force on the unseen test: rms(error) / std(measured)", ["band tension", *models], rows
+    )
+    far = ", ".join(
+        f"{model} {100.0 * max(t.outside[model] for t in tests):.0f} %"
+        for model in models
+        if tests[0].outside[model]
+    )
+    section.text(
+        f"At twice the frequency the velocities leave the range of the training test: {far} of the samples."
+    )
+    test = tests[-1]
+    records = {"measured": test.measured.select(("displacement", "force"))}
+    for model, record in test.simulated.items():
+        aligned = {"displacement": test.measured["displacement"], "force": record["damper/force"]}
+        records[model] = Recording.from_arrays(
+            test.measured.time, aligned, units={"displacement": "m", "force": "N"}
+        )
+    window = (1.0, 4.0)
+    section.figure(
+        loops(
+            {name: records[name] for name in ("measured", "parametric")},
+            [("displacement", "force")],
+            window=window,
+        ),
+        f"Hysteresis loop at {test.tension} lbf, unseen 1 Hz test: measured, and the parametric model in the damper rig.",
+    )
+    section.figure(
+        time_histories(records, ["force"], window=window),
+        f"Force over time, {test.tension} lbf, unseen 1 Hz test.",
+    )
+
+
+def _joint_section(page: Page, result: DemoResult) -> None:
+    section = page.section("The dissertation's axial-torsional joint")
+    section.text(
+        "Three training records (axial, torsional, both; ±1000 lbf and lbf in, flat to 12 Hz, 30 s). The joint's forces are "
+        "recovered from loads, accelerations and the known mounts. The unseen test has another random seed. Closed loop: the "
+        "rig runs with the model in the joint's place; on true states: the model is fed the true motion."
+    )
+    header = ["reduced-order joint", "axial force", "torque", "on true states", "fitting"]
+    section.table("NMSE of the restoring forces on the unseen test", header, _joint_rows(result))
+    for model in result.joint:
+        if model.note:
+            section.text(f"{model.label}: {model.note}")
+    records = {"true": result.unseen}
+    scores: dict[str, dict[str, float]] = {}
+    channels = ("axial", "torsional", "joint/force_1", "joint/force_2")
+    for model in _converged(result):
+        assert model.comparison is not None
+        records[model.label] = model.comparison.reduced
+        scores[model.label] = {channel: model.comparison.nmse[channel] for channel in channels}
+    section.figure(
+        bar_table(scores), "NMSE of displacement, rotation and both forces, closed loop, unseen test."
+    )
+    window = (10.0, 12.0)
+    section.figure(time_histories(records, channels, window=window), "Two seconds of the unseen test.")
+    pairs = [("axial", "joint/force_1"), ("torsional", "joint/force_2")]
+    section.figure(
+        loops(records, pairs, window=window),
+        "Restoring forces over relative motion: the gaps of 0.2 in and 0.2 rad.",
+    )

@@ -1,0 +1,150 @@
+"""The diagnosis of a case: where the gap lies, which effect causes it, how far it shrinks.
+
+The steps, each in its own module: read the case (`case`), screen and fit the catalogue (`screen`, `fit`, `attribute`,
+`explain`), weigh the explanations (`evidence`), run the judging records with each (`shrink`), and say where the residuals
+of the nominal model gather (`locate`).
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from bench.discrepancy import evidence
+from bench.discrepancy.attribute import names
+from bench.discrepancy.case import Case, read_case
+from bench.discrepancy.catalogue import CATALOGUE
+from bench.discrepancy.closure import CLOSURES
+from bench.discrepancy.effect import Effect
+from bench.discrepancy.explain import Explanation, close, explain
+from bench.discrepancy.locate import locate
+from bench.discrepancy.next_excitation import separate
+from bench.discrepancy.problem import Problem
+from bench.discrepancy.shrink import gaps, nominal_prediction
+from bench.discrepancy.structure import structure_of
+from bench.discrepancy.verdict import Verdict
+from bench.errors import UnknownNameError
+
+SEED = 20060501
+"""Seed of the bootstrap where no generator is given, so that a diagnosis repeats exactly."""
+
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """A diagnosis with everything that its report needs.
+
+    Attributes:
+        case: The case.
+        problem: Records and priors on all degrees of freedom.
+        explanations: All fitted explanations by decreasing posterior.
+        verdict: The verdict.
+        final: The explanation behind `verdict.gap.after`: the best one, or for an unknown effect its closure.
+    """
+
+    case: Case
+    problem: Problem
+    explanations: tuple[Explanation, ...]
+    verdict: Verdict
+    final: Explanation
+
+
+def diagnose(
+    case: Case,
+    *,
+    catalogue: Sequence[Effect] = CATALOGUE,
+    exclude: Collection[str] = (),
+    most: int = 3,
+    rng: np.random.Generator | None = None,
+    progress: Progress = lambda text: None,
+) -> Diagnosis:
+    """Diagnose a case.
+
+    Args:
+        case: Nominal model and records.
+        catalogue: Effects to consider.
+        exclude: Names of effects to leave out of the catalogue.
+        most: Largest number of effects named together.
+        rng: For the bootstrap intervals; a fixed seed where None.
+        progress: Called with a line of text at every stage.
+
+    Raises:
+        UnknownNameError: A name in `exclude` is not in the catalogue.
+        RecordingError: The records cannot be used.
+    """
+    began = time.perf_counter()
+    rng = np.random.default_rng(SEED) if rng is None else rng
+    known = [effect.name for effect in catalogue]
+    for name in exclude:
+        if name not in known:
+            raise UnknownNameError("effect", name, known)
+    catalogue = [effect for effect in catalogue if effect.name not in exclude]
+    explanations = explain(case, catalogue, most=most, progress=progress)
+    problem = Problem(case, structure_of(case), case.identification)
+    best = explanations[0]
+    kind, probabilities = evidence.judge(explanations)
+    final, closure = best, ""
+    if kind == "unknown":
+        progress("nonparametric closure")
+        final, closure = close(best, CLOSURES)
+    nothing = next(e for e in explanations if not e.hypothesis)
+    stages = [("nominal", nominal_prediction(problem)), ("parameters only", nothing.predict)]
+    stages += [(label, e.predict) for label, e in _path(explanations)]
+    stages.append((names(best.hypothesis) + (f" + {closure}" if closure else ""), final.predict))
+    progress("gap on the judging records")
+    found = gaps(case, problem, stages=stages, rng=rng)
+    widest = max(found, key=lambda gap: gap.before / max(gap.noise_floor, 1e-12))
+    verdict = Verdict(
+        verdict=kind,
+        named=evidence.named(explanations) if kind == "effect" else (),
+        ranking=evidence.ranking(explanations),
+        indistinguishable=evidence.indistinguishable(explanations) if kind != "unknown" else (),
+        locations=locate(problem, nothing, best),
+        gap=widest,
+        gaps=found,
+        probabilities=probabilities,
+        explanation=evidence.plain_words(kind, explanations),
+        warnings=_warnings(case, problem),
+        closure=closure,
+        next_excitation=separate(problem, explanations) if kind == "effect" else {},
+        seconds=time.perf_counter() - began,
+    )
+    return Diagnosis(case, problem, tuple(explanations), verdict, final)
+
+
+def diagnose_folder(folder: str | Path, **options) -> Diagnosis:
+    """Diagnose the case in a folder; the options are those of `diagnose`."""
+    return diagnose(read_case(folder), **options)
+
+
+def _path(explanations: Sequence[Explanation]) -> list[tuple[str, Explanation]]:
+    """Explanations that lead to the best one by adding its effects one by one, best first effect first."""
+    target = {p.key for p in explanations[0].hypothesis}
+    steps: list[tuple[str, Explanation]] = []
+    reached: set[tuple[str, str, str]] = set()
+    for size in range(1, len(target)):
+        for e in explanations:
+            keys = {p.key for p in e.hypothesis}
+            if len(keys) == size and reached < keys < target:
+                steps.append((names(e.hypothesis), e))
+                reached = keys
+                break
+    return steps
+
+
+def _warnings(case: Case, problem: Problem) -> tuple[str, ...]:
+    out = []
+    for channel in case.channels:
+        if channel.role == "response" and channel.noise_std is None and channel.name in problem.structure.channels:
+            out.append(f"the noise of '{channel.name}' is not stated; its high-frequency floor is taken instead")
+    for record in (*case.identification, *case.validation):
+        for name, samples in record.values.items():
+            peak = np.max(np.abs(samples))
+            if peak > 0 and np.mean(np.abs(samples) > 0.999 * peak) > 0.01:
+                out.append(f"'{name}' in '{record.name}' stays at its extreme: it may be saturated")
+    return tuple(out)

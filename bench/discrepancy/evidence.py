@@ -1,0 +1,119 @@
+"""From explanations to probabilities: verdict, ranking, and the sets that the records cannot tell apart."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from bench.discrepancy.attribute import names
+from bench.discrepancy.explain import Explanation
+from bench.discrepancy.problem import Placed
+from bench.discrepancy.verdict import Estimate, Kind, NamedEffect, Ranked
+from bench.discrepancy.effect import unit_of
+
+RIVAL = 4.6
+"""Difference in log posterior (odds of 100) within which two explanations count as indistinguishable."""
+OUTSIDE = 0.01
+"""Prior share of effects that no catalogue holds, kept even when a catalogued effect reaches the noise."""
+
+
+def weights(explanations: Sequence[Explanation]) -> np.ndarray:
+    """Posterior probabilities of explanations (n,), as if one of them were true."""
+    logs = np.array([e.log_posterior for e in explanations])
+    shares = np.exp(logs - logs.max())
+    return shares / shares.sum()
+
+
+def judge(explanations: Sequence[Explanation]) -> tuple[Kind, dict[str, float]]:
+    """Verdict, and the probabilities of "effect", "none" and "unknown"."""
+    best = explanations[0]
+    shares = weights(explanations)
+    none = float(sum(w for w, e in zip(shares, explanations, strict=True) if not e.hypothesis))
+    known = 1.0 - OUTSIDE if best.consistent else OUTSIDE
+    probabilities = {"effect": known * (1.0 - none), "none": known * none, "unknown": 1.0 - known}
+    if not best.consistent:
+        return "unknown", probabilities
+    return ("none" if not best.hypothesis else "effect"), probabilities
+
+
+def marginal(explanations: Sequence[Explanation]) -> dict[tuple[str, str], float]:
+    """Probability that each (name, place) belongs to the explanation."""
+    total: dict[tuple[str, str], float] = {}
+    for share, explanation in zip(weights(explanations), explanations, strict=True):
+        for key in {(p.effect.name, p.place.name) for p in explanation.hypothesis}:
+            total[key] = total.get(key, 0.0) + float(share)
+    return total
+
+
+def ranking(explanations: Sequence[Explanation]) -> tuple[Ranked, ...]:
+    """Effects by decreasing probability."""
+    ordered = sorted(marginal(explanations).items(), key=lambda item: -item[1])
+    return tuple(Ranked(name, where, probability) for (name, where), probability in ordered)
+
+
+def indistinguishable(explanations: Sequence[Explanation]) -> tuple[tuple[str, ...], ...]:
+    """Sets of effect names that may stand for one another in the best explanation."""
+    best = explanations[0]
+    own = {p.key: p for p in best.hypothesis}
+    sets: dict[str, set[str]] = {}
+    for other in explanations[1:]:
+        if best.log_posterior - other.log_posterior > RIVAL:
+            break
+        theirs = {p.key: p for p in other.hypothesis}
+        lost = [own[key] for key in own.keys() - theirs.keys()]
+        gained = [theirs[key] for key in theirs.keys() - own.keys()]
+        if len(lost) == 1 and len(gained) == 1 and lost[0].effect.name != gained[0].effect.name:
+            sets.setdefault(lost[0].effect.name, {lost[0].effect.name}).add(gained[0].effect.name)
+    return tuple(tuple(sorted(entry)) for entry in sets.values())
+
+
+def named(explanations: Sequence[Explanation]) -> tuple[NamedEffect, ...]:
+    """Effects of the best explanation with their parameters."""
+    probabilities = marginal(explanations)
+    out = []
+    for problem, fitted in explanations[0].parts:
+        deviations = np.sqrt(np.diag(fitted.covariance))
+        start = len(problem.nominal)
+        for placed in fitted.hypothesis:
+            stop = start + len(placed.effect.parameters)
+            out.append(
+                _named(problem, placed, fitted.vector[start:stop], deviations[start:stop], probabilities)
+            )
+            start = stop
+    return tuple(out)
+
+
+def _named(problem, placed: Placed, eta: np.ndarray, std: np.ndarray, probabilities) -> NamedEffect:
+    effect, place = placed.effect, placed.place
+    scales = problem.scales_of(placed)
+    estimates = {}
+    for parameter, value, deviation in zip(effect.parameters, eta, std, strict=True):
+        unit = parameter.unit or unit_of(parameter.scale, place.position_unit, place.force_unit)
+        spread = 0.0 if parameter.fixed else abs(parameter.slope(value, scales)) * deviation
+        estimates[parameter.name] = Estimate(parameter.value(value, scales), float(spread), unit)
+    theta = tuple(float(x) for x in effect.kernel_theta(eta, scales)) if effect.law is not None else ()
+    return NamedEffect(
+        name=effect.name,
+        where=place.name,
+        probability=probabilities[(effect.name, place.name)],
+        parameters=estimates,
+        channel=placed.target,
+        equation=effect.equation,
+        law=effect.law.name if effect.law else "",
+        theta=theta,
+    )
+
+
+def plain_words(kind: Kind, explanations: Sequence[Explanation]) -> str:
+    """The verdict in a sentence or two."""
+    best = explanations[0]
+    if kind == "none":
+        return "The stated uncertainties and the noise explain the records; nothing is missing from the model."
+    if kind == "unknown":
+        nearest = names(best.hypothesis)
+        return (
+            "Something is missing from the model, and no catalogued effect brings the records down to their noise. "
+            f"The nearest is {nearest}, which leaves {best.reduced:.3g} times the power of the noise."
+        )
+    return f"Missing from the model: {names(best.hypothesis)}. With it the records are explained to within their noise."

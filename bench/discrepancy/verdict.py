@@ -1,0 +1,151 @@
+"""What a diagnosis says: the verdict, its parts, and their JSON form."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass, field
+from typing import Any, Literal
+
+Kind = Literal["effect", "none", "unknown"]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A parameter estimate: value, one-sigma uncertainty, unit."""
+
+    value: float
+    std: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class NamedEffect:
+    """An effect that was named.
+
+    Attributes:
+        name: Name in the catalogue.
+        where: Place; empty on a rig with one joint.
+        probability: Posterior probability that it belongs to the explanation.
+        parameters: Estimates by name.
+        channel: Channel or nominal parameter it acts on, for actuator, sensor and inertia effects.
+        equation: The effect in one line.
+        law: Name of the force law in `bench.laws`, for effects that are one.
+        theta: Parameters of that law, ready for an element.
+    """
+
+    name: str
+    where: str
+    probability: float
+    parameters: dict[str, Estimate]
+    channel: str = ""
+    equation: str = ""
+    law: str = ""
+    theta: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """An effect with its probability."""
+
+    name: str
+    where: str
+    probability: float
+
+
+@dataclass(frozen=True)
+class Location:
+    """Where residuals gather.
+
+    Attributes:
+        channel: Response channel.
+        dof: Degree of freedom.
+        share: Part of the excess residual power of the case that lies in this channel.
+        band_hz: Frequency band that holds most of it.
+        time_s: Interval that holds most of it.
+        state_region: Interval by coordinate ("displacement", "velocity") where the missing force is significant.
+        p_value: Probability of such an excess from noise alone, after correction for the number of cells looked at.
+    """
+
+    channel: str
+    dof: str
+    share: float
+    band_hz: tuple[float, float]
+    time_s: tuple[float, float]
+    state_region: dict[str, tuple[float, float]] = field(default_factory=dict)
+    p_value: float = 1.0
+
+
+@dataclass(frozen=True)
+class Gap:
+    """How far the discrepancy shrinks on one coordinate of the judging records.
+
+    Attributes:
+        metric: What the numbers are.
+        before: Nominal model.
+        parameters_only: Nominal parameters re-estimated within their uncertainty.
+        after: With the named effects; for an unknown effect, with the nonparametric closure.
+        noise_floor: What the stated noise alone leaves.
+        closed: ``(before - after) / (before - noise_floor)``.
+        closed_ci95: Block-bootstrap interval of `closed`.
+        steps: The gap after each effect in turn: (name, gap).
+        dof: Degree of freedom.
+    """
+
+    metric: str
+    before: float
+    parameters_only: float
+    after: float
+    noise_floor: float
+    closed: float
+    closed_ci95: tuple[float, float]
+    steps: tuple[tuple[str, float], ...] = ()
+    dof: str = ""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The outcome of a diagnosis.
+
+    Attributes:
+        verdict: "effect", "none" or "unknown".
+        named: Effects that explain the record; empty unless the verdict is "effect".
+        ranking: Effects by probability.
+        indistinguishable: Sets of names that the records cannot tell apart.
+        locations: Where the residuals gather, by decreasing share.
+        gap: The gap, of the degree of freedom where it is widest.
+        gaps: The gap of every degree of freedom.
+        probabilities: Probability of "effect", "none", "unknown".
+        explanation: The verdict in plain words.
+        warnings: What limits the verdict.
+        closure: Name of the nonparametric closure behind `gap.after` when the verdict is "unknown".
+        next_excitation: Excitation that would separate the rivals; empty where there are none.
+        seconds: Wall time.
+    """
+
+    verdict: Kind
+    named: tuple[NamedEffect, ...]
+    ranking: tuple[Ranked, ...]
+    indistinguishable: tuple[tuple[str, ...], ...]
+    locations: tuple[Location, ...]
+    gap: Gap
+    gaps: tuple[Gap, ...]
+    probabilities: dict[str, float]
+    explanation: str
+    warnings: tuple[str, ...] = ()
+    closure: str = ""
+    next_excitation: dict[str, Any] = field(default_factory=dict)
+    seconds: float = 0.0
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the verdict as JSON values; numbers that are not finite become None."""
+        return _plain(asdict(self))
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _plain(entry) for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(entry) for entry in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

@@ -1,0 +1,73 @@
+"""Reduced-order joints in Nastran: write an identified network as bulk data, read such a deck, integrate what it states.
+
+`write_network` and `read_network` move a network between an `Element` and a deck; `expanded_system` assembles the
+equations that the deck adds to a model (5.16 to 5.46), and `integrate` solves them consistently or as Nastran does.
+"""
+
+from bench.nastran.bulk import Deck, card_lines, deck_text, parse_deck, read_deck, write_deck
+from bench.nastran.cards import (
+    DmigColumn,
+    DmigHeader,
+    Grid,
+    Lseq,
+    Mpc,
+    Nolin1,
+    OtherCard,
+    ScalarPoints,
+    Sload,
+    Tabled1,
+    Tload1,
+)
+from bench.nastran.expanded import ExpandedSystem, expanded_system
+from bench.nastran.integration import LagStudy, Response, integrate, lag_study
+from bench.nastran.network_deck import (
+    INCH_POUND,
+    SI,
+    DeckNetwork,
+    Numbering,
+    Units,
+    network_cards,
+    network_text,
+    network_weights,
+    read_network,
+    write_network,
+)
+from bench.nastran.tanh_table import table_error, tanh_points
+
+__all__ = [
+    "INCH_POUND",
+    "SI",
+    "Deck",
+    "DeckNetwork",
+    "DmigColumn",
+    "DmigHeader",
+    "ExpandedSystem",
+    "Grid",
+    "LagStudy",
+    "Lseq",
+    "Mpc",
+    "Nolin1",
+    "Numbering",
+    "OtherCard",
+    "Response",
+    "ScalarPoints",
+    "Sload",
+    "Tabled1",
+    "Tload1",
+    "Units",
+    "card_lines",
+    "deck_text",
+    "expanded_system",
+    "integrate",
+    "lag_study",
+    "network_cards",
+    "network_text",
+    "network_weights",
+    "parse_deck",
+    "read_deck",
+    "read_network",
+    "tanh_points",
+    "table_error",
+    "write_deck",
+    "write_network",
+]

@@ -1,0 +1,64 @@
+"""A piecewise linear table of tanh, for solvers that know functions only as tables."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from bench.errors import ParameterError
+from bench.nastran.numbers import parse_real, real_text
+
+_END = 10.0
+"""Beyond it tanh is 1 to 4e-9, and the table is constant."""
+
+
+def tanh_points(n: int = 2001, width: int = 16) -> tuple[tuple[float, float], ...]:
+    """Points of a table of tanh, closer together where it bends more.
+
+    The error of a chord is ``h^2 |f''| / 8``; points at equal steps of the integral of ``sqrt|f''|`` make it the same
+    everywhere. Nastran continues a table by its last straight line, so the last two points on each side are ±1.
+
+    Args:
+        n: Number of points, odd and at least 11.
+        width: Characters a number has on the card; each point lies on tanh at the abscissa as it will be written.
+
+    Returns:
+        (x, tanh x) in increasing x.
+
+    Raises:
+        ParameterError: `n` is even or too small, or neighbouring abscissae coincide in this width.
+    """
+    if n < 11 or n % 2 == 0:
+        raise ParameterError(
+            f"a tanh table of {n} points was asked for; an odd number of at least 11 is expected"
+        )
+    x = np.linspace(0.0, _END, 200_001)
+    bend = np.sqrt(2.0 * np.tanh(x)) / np.cosh(x)
+    length = np.concatenate([[0.0], np.cumsum(0.5 * (bend[1:] + bend[:-1]) * np.diff(x))])
+    inner = np.interp(np.linspace(0.0, length[-1], (n - 1) // 2 - 1), length, x)
+    # the negative abscissa has one digit less: round to what both signs can hold
+    rounded = [-parse_real(real_text(-value, width)) for value in [*inner, 2.0 * _END, 2.0 * _END + 1.0]]
+    if not np.all(np.diff(rounded) > 0.0):
+        raise ParameterError(f"{n} points of tanh cannot be told apart in {width} characters; ask for fewer")
+    positive = [(value, 1.0 if value > _END else float(np.tanh(value))) for value in rounded[1:]]
+    return (*((-value, -y) for value, y in reversed(positive)), (0.0, 0.0), *positive)
+
+
+def table_error(points: Sequence[tuple[float, float]]) -> float:
+    """Largest deviation of a table from tanh, over its own range and twice as far."""
+    x, y = np.array(points, dtype=float).T
+    slopes = (y[1] - y[0]) / (x[1] - x[0]), (y[-1] - y[-2]) / (x[-1] - x[-2])
+
+    def deviation(at: float) -> float:
+        value = np.interp(at, x, y)
+        value += slopes[0] * min(at - x[0], 0.0) + slopes[1] * max(at - x[-1], 0.0)
+        return -abs(float(value) - float(np.tanh(at)))
+
+    reach = 2.0 * max(abs(x[0]), abs(x[-1]))
+    at = np.unique(np.concatenate([np.linspace(-reach, reach, 4001), x, 0.5 * (x[1:] + x[:-1])]))
+    worst = at[int(np.argmin([deviation(value) for value in at]))]
+    step = 2.0 * reach / 4000
+    refined = minimize_scalar(deviation, bounds=(worst - step, worst + step), method="bounded")
+    return -min(deviation(worst), float(refined.fun))

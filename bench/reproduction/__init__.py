@@ -1,0 +1,22 @@
+"""The dissertation, figure by figure: every system simulated on the bench's rigs, its tables beside the printed ones.
+
+`reproduce` makes the items asked for and writes them; `ENTRIES` lists them. Each item is one module with a function
+``run(progress) -> Item`` that uses the bench as any user would: rigs, signals, identification, figures.
+"""
+
+from bench.reproduction.item import Item, Picture, Result, Row
+from bench.reproduction.registry import ENTRIES, Entry, find_entries
+from bench.reproduction.running import Reproduction, fingerprint, reproduce
+
+__all__ = [
+    "ENTRIES",
+    "Entry",
+    "Item",
+    "Picture",
+    "Reproduction",
+    "Result",
+    "Row",
+    "find_entries",
+    "fingerprint",
+    "reproduce",
+]
