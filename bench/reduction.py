@@ -8,37 +8,16 @@ hold, and `compare` drives the true and the reduced rig alike.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Literal, NamedTuple, Protocol
+from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bench.errors import UnknownNameError
-from bench.identification.network import fit_network
-from bench.identification.polynomial import fit_polynomial
+from bench.identification.network import NetworkModel, fit_network
+from bench.identification.polynomial import PolynomialModel, fit_polynomial
 from bench.identification.restoring_force import JointData
-from bench.laws.base import ForceLaw
 from bench.recording import Recording, nmse
-from bench.rig import Drive, Element, Rig, Validity, simulate
-
-
-class Identified(Protocol):
-    """What every identified model offers: a law, its parameters and the range of its data."""
-
-    @property
-    def law(self) -> ForceLaw:
-        """The force law."""
-        ...
-
-    @property
-    def theta(self) -> NDArray[np.float64]:
-        """Header and parameters (n_theta,)."""
-        ...
-
-    @property
-    def range(self) -> Validity:
-        """The range of states that it was identified on."""
-        ...
+from bench.rig import Drive, Element, Rig, simulate
 
 
 class Comparison(NamedTuple):
@@ -49,7 +28,7 @@ class Comparison(NamedTuple):
     nmse: dict[str, float]  # [%] by channel, settling time left out; only channels that move
 
 
-def element_from(model: Identified, joints: Sequence[str], *, name: str = "joint") -> Element:
+def element_from(model: PolynomialModel | NetworkModel, joints: Sequence[str], *, name: str = "joint") -> Element:
     """The reduced-order joint of an identified model, ready to be put into a rig."""
     return Element(model.law, tuple(joints), model.theta, name=name, validity=model.range)
 

@@ -26,7 +26,6 @@ from bench.identification.polynomial import fit_polynomial
 from bench.identification.restoring_force import JointData
 from bench.laws.along import force_along
 from bench.recording import Recording, nmse
-from bench.reduction import element_from
 from bench.rig import Element, Rig, simulate, simulate_batch
 from bench.rig.library import six_dof_rig
 from bench.signals import BandLimitedNoise, Excitation
@@ -241,7 +240,7 @@ def _identify(data: JointData, kind: str, settings: dict[str, Any], rng: np.rand
         model = fit_network(data.states, data.forces, rng=rng, **settings)
     else:
         raise UnknownNameError("kind of reduced-order model", kind, ("polynomial", "network"))
-    return element_from(model, COORDINATES)
+    return Element(model.law, COORDINATES, model.theta, name="joint", validity=model.range)
 
 
 def _scores(measured: NDArray[np.float64], simulated: NDArray[np.float64]) -> dict[str, float]:

@@ -56,7 +56,7 @@ def multisine(folder: Path) -> dict[str, float]:
     """NRMSE [%] on the steady period of the test multisine."""
     u = loadmat(folder / "uval_multisine.mat")["uval_multisine"].ravel()
     y = loadmat(folder / "yval_multisine.mat")["yval_multisine"].ravel()
-    fine = np.tile(resample(u, len(u) * UPSAMPLING), 4)
+    fine = np.tile(np.asarray(resample(u, len(u) * UPSAMPLING)), 4)
     return {"multisine": 100.0 * nrmse(y, response(fine)[:: UPSAMPLING][-len(u) :])}
 
 
@@ -71,7 +71,7 @@ def sweep(folder: Path) -> dict[str, float]:
     fine = 40.0 * np.sin(2.0 * np.pi * (18.0 * t + t**2 / 12.0))
     assert np.max(np.abs(fine[::UPSAMPLING] - u)) < 1e-6
     x = response(fine)
-    filtered = np.convolve(x, firwin(31, 1.0 / UPSAMPLING), mode="same")
+    filtered = np.convolve(x, np.asarray(firwin(31, 1.0 / UPSAMPLING)), mode="same")
     return {
         "sweep": 100.0 * nrmse(y, filtered[::UPSAMPLING]),
         "sweep_without_decimation_filter": 100.0 * nrmse(y, x[::UPSAMPLING]),

@@ -71,7 +71,7 @@ def excerpt(source: Path, frequency: float, tension: int) -> Recording:
     rest = original.slice_time(float(original.time[-1]) - 0.5)
     # differences of neighbours, so that a slow creep after the test does not count as noise
     noise = {
-        name: _rounded(np.std(np.diff(rest[name])) / np.sqrt(2.0))
+        name: _rounded(float(np.std(np.diff(rest[name])) / np.sqrt(2.0)))
         for name in ("displacement", "force", "tensioner_1", "tensioner_2")
     }
     part = original.slice_time(0.0, CYCLES / frequency)
@@ -93,8 +93,8 @@ def excerpt(source: Path, frequency: float, tension: int) -> Recording:
             "source": original.meta["source"],
             "frequency_Hz": frequency,
             "band_tension_lbf": tension,
-            "force_at_rest_kip": _rounded(np.mean(rest["force"])),
-            "displacement_at_rest_inch": _rounded(np.mean(rest["displacement"])),
+            "force_at_rest_kip": _rounded(float(np.mean(rest["force"]))),
+            "displacement_at_rest_inch": _rounded(float(np.mean(rest["displacement"]))),
         },
     )
 

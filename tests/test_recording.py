@@ -145,6 +145,7 @@ def test_si_of_undeclared_quantities():
         ("9^9_9999999", "", "unknown unit"),
         ("9⁹⁹⁹⁹⁹⁹⁹⁹⁹", "", "unknown unit"),
         ("9⁹^9", "", "unknown unit"),
+        ("9⁹'⁹", "", "unknown unit"),
         ("m/s^2 2", "", "unknown unit"),
         ("mm", "force", "'mm' does not fit the quantity 'force'.*N"),
         ("lb", "force", "did you mean 'lbf'"),

@@ -7,8 +7,9 @@ that the bytes of a campaign do not depend on workers, parts or interruptions.
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import lru_cache
+from itertools import repeat
 from typing import NamedTuple
 
 import numpy as np
@@ -61,10 +62,7 @@ def draws(plan: Plan, records: Iterable[int]) -> list[Draw]:
 
 def dimension(plan: Plan) -> int:
     """Coordinates of a point: the choices, the shared quantities, then the longest of each of rigs, excitations, sensors."""
-    rigs = max(sum(1 for _ in _rig_slots(plan, i)) for i in range(len(plan.rigs)))
-    excitations = max(_count(quantity for _, quantity in entry.quantities()) for entry in plan.excitations)
-    sensors = max((_count(quantity for _, quantity, _ in entry.quantities()) for entry in plan.sensors), default=0)
-    return CHOICES + len(plan.shared) + rigs + excitations + sensors
+    return CHOICES + len(plan.shared) + sum(_blocks(plan))
 
 
 def point_of(plan: Plan, record: int) -> NDArray[np.float64]:
@@ -86,28 +84,42 @@ def draw_at(plan: Plan, record: int, point: NDArray[np.float64]) -> Draw:
     excitation = _fitting(plan, plan.excitations, rig, float(point[1]))
     sensors = _fitting(plan, plan.sensors, rig, float(point[2])) if plan.fitting(plan.sensors, rig) else -1
     at = CHOICES + len(plan.shared)
-    rig_length = max(sum(1 for _ in _rig_slots(plan, i)) for i in range(len(plan.rigs)))
-    excitation_length = max(_count(quantity for _, quantity in entry.quantities()) for entry in plan.excitations)
-    values: dict[str, Value] = {}
-    present = []
+    rigs, excitations, _ = _blocks(plan)
     slots = iter(point[at:])
-    for element in plan.rigs[rig].elements:
-        present.append(element.probability == 1.0 or float(next(slots)) < element.probability)
-    for column, quantity, _ in plan.rigs[rig].quantities():
-        values[column] = _value(quantity, slots, shared)
-    slots = iter(point[at + rig_length :])
+    present = tuple(
+        element.probability == 1.0 or float(next(slots)) < element.probability for element in plan.rigs[rig].elements
+    )
+    values = {column: _value(quantity, slots, shared) for column, quantity, _ in plan.rigs[rig].quantities()}
+    slots = iter(point[at + rigs :])
     for column, quantity in plan.excitations[excitation].quantities():
         values[column] = _value(quantity, slots, shared)
     if sensors >= 0:
-        slots = iter(point[at + rig_length + excitation_length :])
+        slots = iter(point[at + rigs + excitations :])
         for column, quantity, _ in plan.sensors[sensors].quantities():
             values[column] = _value(quantity, slots, shared)
-    return Draw(record, rig, excitation, sensors, tuple(present), values)
+    return Draw(record, rig, excitation, sensors, present, values)
 
 
-def _rig_slots(plan: Plan, rig: int):
-    yield from (element for element in plan.rigs[rig].elements if element.probability < 1.0)
-    yield from (q for _, q, _ in plan.rigs[rig].quantities() if isinstance(q, Distribution))
+def median_draw(plan: Plan, rig: int, excitation: int, sensors: int) -> Draw:
+    """A draw with all elements of a rig and every quantity at its median, to try a plan with; record 0."""
+    shared = {name: quantity.at(0.5) for name, quantity in plan.shared.items()}
+    named = [(column, quantity) for column, quantity, _ in plan.rigs[rig].quantities()]
+    named += list(plan.excitations[excitation].quantities())
+    if sensors >= 0:
+        named += [(column, quantity) for column, quantity, _ in plan.sensors[sensors].quantities()]
+    values = {column: _value(quantity, repeat(0.5), shared) for column, quantity in named}
+    return Draw(0, rig, excitation, sensors, (True,) * len(plan.rigs[rig].elements), values)
+
+
+def _blocks(plan: Plan) -> tuple[int, int, int]:
+    """Coordinates that the longest of the rigs, excitations and sensors takes."""
+    rigs = max(
+        sum(element.probability < 1.0 for element in entry.elements) + _count(q for _, q, _ in entry.quantities())
+        for entry in plan.rigs
+    )
+    excitations = max(_count(quantity for _, quantity in entry.quantities()) for entry in plan.excitations)
+    sensors = max((_count(quantity for _, quantity, _ in entry.quantities()) for entry in plan.sensors), default=0)
+    return rigs, excitations, sensors
 
 
 def _count(quantities: Iterable[Quantity]) -> int:
@@ -119,7 +131,7 @@ def _fitting(plan: Plan, members: tuple, rig: int, u: float) -> int:
     return indices[pick(u, [members[index].weight for index in indices])]
 
 
-def _value(quantity: Quantity, slots, shared: Mapping[str, Value]) -> Value:
+def _value(quantity: Quantity, slots: Iterator[float], shared: Mapping[str, Value]) -> Value:
     if isinstance(quantity, Distribution):
         return quantity.at(float(next(slots)))
     if isinstance(quantity, Shared):

@@ -211,8 +211,8 @@ class Plan:
         sampling: How the quantities cover their distributions: independent random numbers, or a design over all records.
         drive_rate: Rate of the excitation [Hz], held between samples; `sample_rate` where None.
         precision: Type of the channels in the data set.
-        compression: Of the data set. Simulated doubles hardly compress: "zstd" saves about a third and takes a tenth of
-            the time of a campaign of one-degree-of-freedom rigs; "none" is fastest.
+        compression: Of the data set, byte streams split first. Measured on five channels of a driven gap in float32,
+            "zstd" (level 1) makes the files a fifth smaller and costs no more time than writing without.
         records_per_part: Records of one part (file); part of the plan because the bytes depend on it.
     """
 
@@ -229,7 +229,7 @@ class Plan:
     sampling: Sampling = "random"
     drive_rate: float | None = None
     precision: Precision = "float32"
-    compression: Compression = "lz4"
+    compression: Compression = "zstd"
     records_per_part: int = 0
 
     def __post_init__(self) -> None:

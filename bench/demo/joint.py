@@ -88,7 +88,7 @@ def laboratory_view(records: Sequence[Recording], rig: Rig) -> JointData:
     )
 
 
-def _pair(true: Recording, forces: Sequence[NDArray[np.float64]]) -> tuple[float, float]:
+def _pair(true: Recording, forces: NDArray[np.float64] | Sequence[NDArray[np.float64]]) -> tuple[float, float]:
     return nmse(true["joint/force_1"], forces[0]), nmse(true["joint/force_2"], forces[1])
 
 

@@ -29,6 +29,10 @@ SIGNIFICANT = 4.0
 """Standard deviations by which chi-squared may exceed its expectation before a hypothesis counts as refuted."""
 WORTH_A_FIT = 25.0
 """Screened gain in chi-squared from which one more effect could overcome its prior and its Occam factor."""
+HOPELESS = 3.0
+"""A first fit that leaves more than this many times the excess of the best one is not carried on."""
+SHORT = 0.2
+"""Effects whose screened gain is less than this part of the best one are not fitted."""
 STALLED = 0.7
 """If one more effect leaves more than this part of the excess of chi-squared, a further one is not tried."""
 MODEL_ERROR = 0.02
@@ -124,7 +128,11 @@ def attribute(
         search.add(nothing)
         progress(f"nominal model: chi-squared {nothing.reduced:.3g} of its expectation")
         screen = Screen(problem, candidates, pool.map)
-        _extend(search, screen, [nothing], pool, seconds=9)
+        points = screen.ranked()
+        at_ease = consistent(nothing) and nothing.cost - nothing.chi2 < len(problem.nominal) + WORTH_A_FIT / 2
+        if at_ease and (not points or points[0].gain < WORTH_A_FIT):
+            return search
+        _extend(search, screen, [nothing], pool, seconds=7)
         for size in range(1, most):
             best = search.ranked()[0]
             progress(f"{len(best.hypothesis)} effect(s): {names(best.hypothesis)}, chi-squared {best.reduced:.3g}")
@@ -168,10 +176,12 @@ def _extend(search: Search, screen: Screen, bases: Sequence[Fit], pool: ThreadPo
 
     for fitted in pool.map(quick, tasks):
         search.add(fitted)
-    leading = [f for f in search.ranked(size) if key_of(f.hypothesis) not in search.converged]
-    if not leading:
-        return
-    carried = [f for f in leading[:5] if np.isfinite(f.cost)]
+    ranked = [f for f in search.ranked(size) if np.isfinite(f.cost)]
+    carried = [
+        f
+        for f in ranked[:4]
+        if key_of(f.hypothesis) not in search.converged and f.reduced < 1.5 + HOPELESS * (ranked[0].reduced - 1.0)
+    ]
     for fitted in pool.map(lambda f: fit(problem, f.hypothesis, start=f.vector, iterations=20), carried):
         search.add(fitted)
         search.converged.add(key_of(fitted.hypothesis))
@@ -196,6 +206,8 @@ def _starts(points: Sequence[Point], count: int) -> list[tuple[Placed, list[np.n
     """Best `count` effects of a screening, with their best one or two starts."""
     grouped: dict[tuple[str, str, str], tuple[Placed, list[np.ndarray]]] = {}
     for point in points:
+        if point.gain < SHORT * points[0].gain:
+            break
         _, etas = grouped.setdefault(point.placed.key, (point.placed, []))
         if len(etas) < (1 if point.placed.effect.site != "joint" else 2):
             etas.append(point.eta)

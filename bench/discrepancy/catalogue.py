@@ -20,6 +20,7 @@ from bench.laws.coulomb import COULOMB
 from bench.laws.coupling import CROSS_STIFFNESS, GAP_COUPLING
 from bench.laws.damping import POWER_LAW_DAMPING, QUADRATIC_DAMPING
 from bench.laws.gap import GAP, ONE_SIDED_STOP
+from bench.laws.jenkins_backlash import JENKINS_BACKLASH
 from bench.laws.lugre import LUGRE
 from bench.laws.maxwell import MAXWELL
 from bench.laws.normal_force_friction import LOAD_DEPENDENT_FRICTION, TIME_VARYING_FRICTION
@@ -47,6 +48,14 @@ def _bouc_wen_theta(values: Values, scales: Scales) -> Values:
     stiffness, beta, ratio, n = values
     b = beta * scales.position ** (1.0 - n)
     return np.array([stiffness, b * stiffness ** (1.0 - n), ratio * b * stiffness ** (1.0 - n), n])
+
+
+def _backlash_theta(values: Values, scales: Scales) -> Values:
+    level, slip, clearance, soft, sharpness, asymmetry, offset = values
+    k = level / slip
+    return np.array(
+        [k, soft * k, clearance, level * (1 + asymmetry), level * (1 - asymmetry), sharpness, offset * level]
+    )
 
 
 FRICTION = FreeParameter("friction_force", "force", **AMPLITUDE)
@@ -137,6 +146,25 @@ CATALOGUE: tuple[Effect, ...] = (
         law=BOUC_WEN,
         theta=_bouc_wen_theta,
         rate_bound=lambda values, scales: scales.velocity * values[1] * (1.0 + abs(values[2])),
+    ),
+    Effect(
+        "backlash_friction",
+        "hysteresis",
+        "joint",
+        (
+            FreeParameter("friction_force", "force", **AMPLITUDE),
+            FreeParameter("slip_displacement", "position", mean=math.log(0.1), std=1.0, bounds=(-6.0, 1.0), grid=_log_grid(0.05, 0.2)),
+            FreeParameter("clearance", "position", mean=math.log(0.1), std=1.0, bounds=(-6.0, 0.0), grid=_log_grid(0.03, 0.1, 0.3)),
+            FreeParameter("soft_ratio", mean=math.log(0.1), std=1.0, bounds=(-5.0, 0.0)),
+            FreeParameter("sharpness", mean=math.log(3.0), std=0.7, bounds=(-0.6, 3.5)),
+            FreeParameter("asymmetry", signed=True, std=0.2, bounds=(-0.8, 0.8)),
+            FreeParameter("offset_ratio", signed=True, std=0.2, bounds=(-2.0, 2.0)),
+        ),
+        "slider of limit Fc behind a spring with a dead-space that travels with it",
+        law=JENKINS_BACKLASH,
+        theta=_backlash_theta,
+        rate_bound=lambda values, scales: scales.velocity / values[1],
+        log_prior=-1.0,
     ),
     Effect(
         "gap",

@@ -14,6 +14,10 @@ from bench.discrepancy.effect import unit_of
 
 RIVAL = 4.6
 """Difference in log posterior (odds of 100) within which two explanations count as indistinguishable."""
+INDEPENDENT = 50.0
+"""Independent pieces of evidence in a record whose residuals are model error rather than noise."""
+MOSTLY = 0.5
+"""Part of the residual power an effect has to explain to be named where the noise is not stated."""
 OUTSIDE = 0.01
 """Prior share of effects that no catalogue holds, kept even when a catalogued effect reaches the noise."""
 
@@ -21,6 +25,9 @@ OUTSIDE = 0.01
 def weights(explanations: Sequence[Explanation]) -> np.ndarray:
     """Posterior probabilities of explanations (n,), as if one of them were true."""
     logs = np.array([e.log_posterior for e in explanations])
+    if not _noise_stated(explanations):
+        # The noise is whatever the first explanation leaves, and hardly more independent than the visits to a state.
+        logs = np.array([-0.5 * e.reduced / explanations[0].reduced * INDEPENDENT for e in explanations])
     shares = np.exp(logs - logs.max())
     return shares / shares.sum()
 
@@ -28,6 +35,8 @@ def weights(explanations: Sequence[Explanation]) -> np.ndarray:
 def judge(explanations: Sequence[Explanation]) -> tuple[Kind, dict[str, float]]:
     """Verdict, and the probabilities of "effect", "none" and "unknown"."""
     best = explanations[0]
+    if not _noise_stated(explanations):
+        return _judge_unscaled(explanations)
     shares = weights(explanations)
     none = float(sum(w for w, e in zip(shares, explanations, strict=True) if not e.hypothesis))
     known = 1.0 - OUTSIDE if best.consistent else OUTSIDE
@@ -35,6 +44,21 @@ def judge(explanations: Sequence[Explanation]) -> tuple[Kind, dict[str, float]]:
     if not best.consistent:
         return "unknown", probabilities
     return ("none" if not best.hypothesis else "effect"), probabilities
+
+
+def _noise_stated(explanations: Sequence[Explanation]) -> bool:
+    return all(problem.noise_stated for problem, _ in explanations[0].parts)
+
+
+def _judge_unscaled(explanations: Sequence[Explanation]) -> tuple[Kind, dict[str, float]]:
+    """Verdict where the noise is not stated: by the part of the residual power that the best explanation takes away."""
+    best = explanations[0]
+    nothing = next(e for e in explanations if not e.hypothesis)
+    explained = 1.0 - best.reduced / nothing.reduced
+    if not best.hypothesis:
+        return "none", {"effect": 0.0, "none": 1.0, "unknown": 0.0}
+    probabilities = {"effect": explained, "none": 0.0, "unknown": 1.0 - explained}
+    return ("effect" if explained > MOSTLY else "unknown"), probabilities
 
 
 def marginal(explanations: Sequence[Explanation]) -> dict[tuple[str, str], float]:
@@ -58,14 +82,20 @@ def indistinguishable(explanations: Sequence[Explanation]) -> tuple[tuple[str, .
     own = {p.key: p for p in best.hypothesis}
     sets: dict[str, set[str]] = {}
     for other in explanations[1:]:
-        if best.log_posterior - other.log_posterior > RIVAL:
-            break
+        if _behind(explanations, other) > RIVAL:
+            continue
         theirs = {p.key: p for p in other.hypothesis}
         lost = [own[key] for key in own.keys() - theirs.keys()]
         gained = [theirs[key] for key in theirs.keys() - own.keys()]
         if len(lost) == 1 and len(gained) == 1 and lost[0].effect.name != gained[0].effect.name:
             sets.setdefault(lost[0].effect.name, {lost[0].effect.name}).add(gained[0].effect.name)
     return tuple(tuple(sorted(entry)) for entry in sets.values())
+
+
+def _behind(explanations: Sequence[Explanation], other: Explanation) -> float:
+    """Log odds of the best explanation against another."""
+    shares = weights([explanations[0], other])
+    return float(np.log(max(shares[0], 1e-300)) - np.log(max(shares[1], 1e-300)))
 
 
 def named(explanations: Sequence[Explanation]) -> tuple[NamedEffect, ...]:

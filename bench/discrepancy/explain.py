@@ -13,7 +13,7 @@ from itertools import product
 
 import numpy as np
 
-from bench.discrepancy.attribute import QUICK, Search, attribute, consistent, placements, posterior
+from bench.discrepancy.attribute import QUICK, STALLED, Search, attribute, consistent, placements, posterior
 from bench.discrepancy.case import Case, CaseRecord
 from bench.discrepancy.effect import Effect
 from bench.discrepancy.fit import Fit, fit
@@ -92,7 +92,8 @@ def explain(
     if len(groups) == 1:
         problem = Problem(case, structure, case.identification)
         search = attribute(problem, placements(case, structure, catalogue), most=most, progress=progress)
-        return [Explanation(((problem, fitted),)) for fitted in search.ranked()]
+        found = [Explanation(((problem, fitted),)) for fitted in search.ranked()]
+        return found if problem.noise_stated else _parsimonious(found)
     bins = _common_bins(case, structure)
     searches = []
     for group in groups:
@@ -137,6 +138,23 @@ def _coupled(whole: Problem, searches: Sequence[Search], catalogue: Sequence[Eff
         if kept.ranked()[0] is base:
             break
     return kept.ranked()
+
+
+def _parsimonious(found: list[Explanation]) -> list[Explanation]:
+    """Put first the smallest explanation that one more effect would not improve much.
+
+    Where the noise is not stated, chi-squared has no absolute scale and residuals of a measured component are mostly
+    model error, far from independent: differences in evidence then say little about one more effect.
+    """
+    chosen = found[0]
+    sizes = sorted({len(e.hypothesis) for e in found})
+    for size in sizes:
+        best = min((e for e in found if len(e.hypothesis) == size), key=lambda e: e.reduced)
+        larger = [e.reduced for e in found if len(e.hypothesis) == size + 1]
+        chosen = best
+        if not larger or min(larger) > STALLED * best.reduced:
+            break
+    return [chosen, *(e for e in found if e is not chosen)]
 
 
 def _common_bins(case: Case, structure: Structure) -> dict[str, int]:

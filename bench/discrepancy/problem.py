@@ -81,6 +81,7 @@ class Problem:
         structure: Its structure, restricted to the degrees of freedom at hand.
         records: Records to be explained.
         bins: Frequency bins of every record, where they have to agree with those of another problem.
+        substeps: Integration steps a sample; chosen by the fastest rate where None.
         nominal: (n_nominal,) values of the structure's parameters.
         spread: (n_nominal,) their one-sigma uncertainties.
         noise: (n_channels,) noise of the response channels.
@@ -91,6 +92,7 @@ class Problem:
     structure: Structure
     records: tuple[CaseRecord, ...]
     bins: Mapping[str, int] | None = None
+    substeps: int | None = None
     nominal: Array = field(init=False)
     spread: Array = field(init=False)
     noise: Array = field(init=False)
@@ -226,7 +228,7 @@ class Problem:
         elements, rate = self.elements(hypothesis, etas, record)
         fastest = max(rate, np.sqrt(np.max(np.abs(linear.stiffness).sum(1) / np.diag(linear.mass))))
         # RK4 with h * rate = 0.6 leaves a relative error of 1e-4 over one time constant, below any noise considered
-        substeps = int(np.clip(np.ceil(record.step * fastest / 0.6), 1, MAX_SUBSTEPS))
+        substeps = self.substeps or int(np.clip(np.ceil(record.step * fastest / 0.6), 1, MAX_SUBSTEPS))
         motion = free_run(
             linear, elements, loads=loads, step=record.step, substeps=substeps, start_time=record.start
         )

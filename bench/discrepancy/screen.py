@@ -37,11 +37,13 @@ class Node(NamedTuple):
         placed: The effect.
         eta: Parameters with unit amplitude.
         columns: (n, k) whitened responses that span the effect at this shape.
+        gram: (k, k) their products.
     """
 
     placed: Placed
     eta: Array
     columns: NDArray[np.float32]
+    gram: Array
 
 
 class Point(NamedTuple):
@@ -111,7 +113,7 @@ class Screen:
             columns[:, 1:] -= columns[:, :1]
         if not np.isfinite(columns).all() or not np.any(columns):
             return None
-        return Node(placed, eta, columns.astype(np.float32))
+        return Node(placed, eta, columns.astype(np.float32), columns.T @ columns)
 
     def ranked(self, base: Fit | None = None) -> list[Point]:
         """Solve all grid points, given a base hypothesis; by decreasing gain.
@@ -123,20 +125,17 @@ class Screen:
         vector = np.zeros(len(self.problem.nominal)) if base is None else base.vector
         residual, columns = self._base(hypothesis, vector)
         own = {placed.key for placed in hypothesis}
-        nodes = [node for node in self.nodes if node.placed.key not in own]
         n = columns.shape[1]
         priors = np.zeros((n, n))
         priors[: len(self.problem.nominal), : len(self.problem.nominal)] = np.eye(len(self.problem.nominal))
         basis, _ = np.linalg.qr(np.vstack([columns, priors]))
         head = basis[: len(residual)]
-        fixed = head @ (head.T @ residual)
+        rest = (residual - head @ (head.T @ residual)).astype(np.float32)
+        head = head.astype(np.float32)
         points = []
-        for node in nodes + self._signal_nodes(hypothesis, vector):
-            raw = node.columns.astype(float)
-            inner = head.T @ raw
-            gram = raw.T @ raw - inner.T @ inner
-            right = raw.T @ (residual - fixed)
-            point = _read(node, gram, right)
+        for node in [node for node in self.nodes if node.placed.key not in own] + self._signal_nodes(hypothesis, vector):
+            inner = (head.T @ node.columns).astype(float)
+            point = _read(node, node.gram - inner.T @ inner, (node.columns.T @ rest).astype(float))
             if point is not None:
                 points.append(point)
         points.sort(key=lambda point: -point.gain)
@@ -186,7 +185,8 @@ class Screen:
                     point[0] = SIGNAL_STEP
                 changed = self.problem.residual((*hypothesis, placed), np.concatenate([vector, point]))
                 if changed.shape == base.shape and np.any(changed != base):
-                    nodes.append(Node(placed, point, (base - changed)[:, None].astype(np.float32)))
+                    column = (base - changed)[:, None]
+                    nodes.append(Node(placed, point, column.astype(np.float32), column.T @ column))
         return nodes
 
 
@@ -245,7 +245,8 @@ def _read(node: Node, gram: Array, right: Array) -> Point | None:
     effect = node.placed.effect
     parameters = effect.parameters
     eta = node.eta.copy()
-    if gram.trace() <= 1e-9 * max(float(np.sum(node.columns.astype(float) ** 2)), 1e-300):
+    # single precision leaves a relative error of some 1e-6 in the projected products
+    if gram.trace() <= 1e-5 * max(node.gram.trace(), 1e-300):
         return None
     c = np.linalg.lstsq(gram, right, rcond=1e-10)[0]
     if effect.site in {"actuator", "sensor"}:

@@ -13,9 +13,15 @@ from __future__ import annotations
 import numba
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import solve_discrete_are
+
+from bench.errors import IdentificationError
 
 CANDIDATES = 10.0 ** np.arange(-2.0, 3.1, 1.0)
 """Multiples of a first guess of the jerk intensity that are compared by likelihood."""
+
+LOOSE = 300.0
+"""How poorly the mean position counts as known where none is measured, as a multiple of the motion."""
 
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
@@ -66,8 +72,6 @@ def _stationary(
     transition: NDArray, process: NDArray, h: NDArray, noise: NDArray
 ) -> tuple[NDArray, NDArray, NDArray]:
     """Return stationary predicted covariance, gain and innovation covariance, by doubling-free iteration."""
-    from scipy.linalg import solve_discrete_are  # noqa: PLC0415
-
     scale = np.sqrt(np.diag(noise))
     covariance = solve_discrete_are(transition.T, (h / scale[:, None]).T, process, np.eye(len(h)))
     innovation = h @ covariance @ h.T + noise
@@ -90,22 +94,27 @@ def smooth_motion(
         (n, 3) position, velocity, acceleration. Without a position channel the position is the double integral of
         what was measured, from zero.
     """
+    powers = step ** np.array(orders, dtype=float)
+    y = np.ascontiguousarray(samples * powers)
+    noise_scaled = noise_std * powers
+    guess = _jerk_guess(samples, orders, noise_std, step) * step**5
+    if 0 not in orders:
+        # Nothing fixes the mean position: a position of zero, known very poorly, keeps the integration from drifting.
+        lowest = min(orders)
+        omega = 2.0 * np.pi * _band(samples[:, orders.index(lowest)], noise_std[orders.index(lowest)], step)
+        reach = float(np.std(samples[:, orders.index(lowest)])) / omega**lowest
+        orders = (*orders, 0)
+        y = np.ascontiguousarray(np.column_stack([y, np.zeros(len(y))]))
+        noise_scaled = np.append(noise_scaled, LOOSE * reach)
     h = np.zeros((len(orders), 3))
     for c, order in enumerate(orders):
         h[c, order] = 1.0
-    transition = np.array([[1.0, step, 0.5 * step**2], [0.0, 1.0, step], [0.0, 0.0, 1.0]])
-    # white jerk, integrated over one step
-    shape = np.array(
-        [
-            [step**5 / 20, step**4 / 8, step**3 / 6],
-            [step**4 / 8, step**3 / 3, step**2 / 2],
-            [step**3 / 6, step**2 / 2, step],
-        ]
-    )
-    noise = np.diag(noise_std**2)
-    guess = _jerk_guess(samples, orders, noise_std, step)
-    best: tuple[float, NDArray, NDArray, NDArray, NDArray] | None = None
-    y = np.ascontiguousarray(samples)
+    # In units of the step, position, velocity times step and acceleration times step squared are alike in size: the
+    # Riccati equation is hopeless in SI units.
+    transition = np.array([[1.0, 1.0, 0.5], [0.0, 1.0, 1.0], [0.0, 0.0, 1.0]])
+    shape = np.array([[1 / 20, 1 / 8, 1 / 6], [1 / 8, 1 / 3, 1 / 2], [1 / 6, 1 / 2, 1.0]])
+    noise = np.diag(noise_scaled**2)
+    best: tuple[float, NDArray, NDArray, NDArray] | None = None
     for multiple in CANDIDATES:
         process = shape * guess * multiple
         try:
@@ -116,28 +125,32 @@ def smooth_motion(
         predicted = np.zeros((len(y), 3))
         observed = _filter(y, h, transition, np.ascontiguousarray(gain), filtered, predicted)
         score = np.linalg.slogdet(innovation)[1] + np.trace(np.linalg.solve(innovation, observed))
-        if best is None or score < best[0]:
+        if np.isfinite(score) and (best is None or score < best[0]):
             posterior = covariance - gain @ h @ covariance
-            back = posterior @ transition.T @ np.linalg.inv(covariance)
-            best = (score, filtered, predicted, back, covariance)
+            best = (score, filtered, predicted, posterior @ transition.T @ np.linalg.inv(covariance))
     if best is None:
-        raise np.linalg.LinAlgError("no stationary smoother")
-    _, filtered, predicted, back, _ = best
+        raise IdentificationError(
+            "the channels of one coordinate could not be fused; check the noise stated for them and their units"
+        )
+    _, filtered, predicted, back = best
     _smooth(filtered, predicted, np.ascontiguousarray(back))
-    return filtered
+    return filtered / step ** np.arange(3.0)
 
 
 def _jerk_guess(samples: NDArray, orders: tuple[int, ...], noise_std: NDArray, step: float) -> float:
     """Intensity of the white jerk that the measured signals suggest, over the band in which they stand above the noise."""
     order = max(orders)
     c = orders.index(order)
-    x = samples[:, c] - samples[:, c].mean()
+    omega = 2.0 * np.pi * _band(samples[:, c], noise_std[c], step)
+    return float(np.var(samples[:, c]) * omega ** (2 * (3 - order)) / omega)
+
+
+def _band(samples: NDArray, noise_std: float, step: float) -> float:
+    """Mean frequency [Hz] of the part of a signal that stands above its noise."""
+    x = samples - samples.mean()
     spectrum = np.abs(np.fft.rfft(x)) ** 2 / len(x)
     frequency = np.fft.rfftfreq(len(x), step)
-    strong = spectrum > 10.0 * noise_std[c] ** 2
-    band = max(
-        float(np.average(frequency[strong], weights=spectrum[strong])) if strong.any() else 1.0,
-        1.0 / (len(x) * step),
-    )
-    omega = 2.0 * np.pi * band
-    return float(np.var(x) * omega ** (2 * (3 - order)) / omega)
+    strong = spectrum > 10.0 * noise_std**2
+    if not strong.any():
+        return 1.0
+    return max(float(np.average(frequency[strong], weights=spectrum[strong])), 1.0 / (len(x) * step))

@@ -188,7 +188,9 @@ def _columns(name: str, values: ArrayLike) -> NDArray[np.float64]:
         raise IdentificationError(f"{name} has shape {array.shape}; (n, k) or (n,) is expected")
     if not np.all(np.isfinite(array)):
         row = int(np.argwhere(~np.isfinite(array))[0, 0])
-        raise IdentificationError(f"{name} is not finite at sample {row}; cut the gap out of the record first")
+        raise IdentificationError(
+            f"{name} is not finite at sample {row}; cut the gap out of the record first"
+        )
     return array
 
 
@@ -198,7 +200,9 @@ def _matrix(name: str, values: ArrayLike, size: int) -> NDArray[np.float64]:
         return array
     if array.ndim == 0 or array.shape == (size,):
         return np.diag(np.broadcast_to(array, (size,)))
-    raise ParameterError(f"{name} has shape {array.shape}; one number, ({size},) or ({size}, {size}) is expected")
+    raise ParameterError(
+        f"{name} has shape {array.shape}; one number, ({size},) or ({size}, {size}) is expected"
+    )
 
 
 def _less_mounts(
@@ -211,9 +215,14 @@ def _less_mounts(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Applied forces less those of the mounts, and the accelerations, both (n, k)."""
     remaining, a = _columns("applied", applied), _columns("acceleration", acceleration)
-    motions = (("stiffness", stiffness, "displacement", displacement), ("damping", damping, "velocity", velocity))
+    motions = (
+        ("stiffness", stiffness, "displacement", displacement),
+        ("damping", damping, "velocity", velocity),
+    )
     if a.shape != remaining.shape:
-        raise IdentificationError(f"acceleration has shape {a.shape}; that of the applied forces, {remaining.shape}, is expected")
+        raise IdentificationError(
+            f"acceleration has shape {a.shape}; that of the applied forces, {remaining.shape}, is expected"
+        )
     for coefficient, value, name, motion in motions:
         matrix = _matrix(coefficient, value, remaining.shape[1])
         if not np.any(matrix):
@@ -222,6 +231,8 @@ def _less_mounts(
             raise ParameterError(f"a {coefficient} of the mounts was given without the body's {name}")
         columns = _columns(name, motion)
         if columns.shape != remaining.shape:
-            raise IdentificationError(f"{name} has shape {columns.shape}; that of the applied forces, {remaining.shape}, is expected")
+            raise IdentificationError(
+                f"{name} has shape {columns.shape}; that of the applied forces, {remaining.shape}, is expected"
+            )
         remaining = remaining - columns @ matrix.T
     return remaining, a

@@ -94,7 +94,9 @@ def fold_scaling(
     W1 = weights.W1 / np.asarray(input_scale, dtype=float)
     scale = np.broadcast_to(np.asarray(output_scale, dtype=float), weights.b2.shape)
     b1 = weights.b1 - W1 @ np.broadcast_to(np.asarray(input_centre, dtype=float), (W1.shape[1],))
-    return NetworkWeights(W1, b1, weights.W2 * scale[:, None], weights.b2 * scale + np.asarray(output_centre, dtype=float))
+    return NetworkWeights(
+        W1, b1, weights.W2 * scale[:, None], weights.b2 * scale + np.asarray(output_centre, dtype=float)
+    )
 
 
 def network_law(n_joints: int = 2, n_hidden: int = 30) -> ForceLaw:
@@ -115,7 +117,9 @@ def network_law(n_joints: int = 2, n_hidden: int = 30) -> ForceLaw:
         Tasbihgoo 2006, eqs. 4.14, 4.15, A.13, A.14.
     """
     if not 1 <= n_joints <= MAX_COORDINATES:
-        raise ParameterError(f"a network on {n_joints} joints was asked for; 1 to {MAX_COORDINATES} are possible")
+        raise ParameterError(
+            f"a network on {n_joints} joints was asked for; 1 to {MAX_COORDINATES} are possible"
+        )
     if n_hidden < 1:
         raise ParameterError(f"a network with {n_hidden} hidden units was asked for; at least 1 is expected")
     n, states = n_joints, 2 * n_joints

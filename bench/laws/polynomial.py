@@ -2,7 +2,7 @@
 
 The reduced-order joint of the dissertation's section 4.1.3: each restoring force is a linear combination of products
 of polynomials in the relative states ``s = (q_1 … q_n, v_1 … v_n)``. The states enter scaled,
-``u = (s - centre) / scale``, so that a Chebyshev basis is used on [-1, 1], where it is well conditioned; outside it
+``u = (s - centre) / scale``, so that a Chebyshev basis is used on [-1, 1], where it is bounded by 1; outside it
 continues as the polynomial it is, and grows as fast. `network_law` is the near-namesake that saturates instead.
 
 Terms are stored as runs: all exponents of the last state from 0 up share one product of the other states, so that a
@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -73,7 +74,9 @@ def force(t, q, v, z, theta, f):
         coefficient += length
 
 
-def polynomial_exponents(orders: Sequence[int], kind: Kind = "tensor", *, degree: int | None = None) -> NDArray[np.int64]:
+def polynomial_exponents(
+    orders: Sequence[int], kind: Kind = "tensor", *, degree: int | None = None
+) -> NDArray[np.int64]:
     """Exponents of all terms, in the order of the coefficients (lexicographic, the last state fastest).
 
     Args:
@@ -93,14 +96,20 @@ def polynomial_exponents(orders: Sequence[int], kind: Kind = "tensor", *, degree
         raise UnknownNameError("kind of polynomial", kind, ("tensor", "total"))
     orders = [int(order) for order in orders]
     if not orders or min(orders) < 0:
-        raise ParameterError(f"polynomial orders are {tuple(orders)}; one order of 0 or more a state is expected")
+        raise ParameterError(
+            f"polynomial orders are {tuple(orders)}; one order of 0 or more a state is expected"
+        )
     if kind == "tensor" and degree is not None:
-        raise ParameterError(f"degree {degree} came with kind='tensor'; give kind='total' to bound the sum of exponents")
+        raise ParameterError(
+            f"degree {degree} came with kind='tensor'; give kind='total' to bound the sum of exponents"
+        )
     limit = sum(orders) if kind == "tensor" else (max(orders) if degree is None else int(degree))
     prefixes: list[tuple[int, ...]] = [()]
     for order in orders:
         prefixes = [
-            (*prefix, exponent) for prefix in prefixes for exponent in range(min(order, limit - sum(prefix)) + 1)
+            (*prefix, exponent)
+            for prefix in prefixes
+            for exponent in range(min(order, limit - sum(prefix)) + 1)
         ]
         if len(prefixes) > MAX_TERMS:
             raise ParameterError(
@@ -125,7 +134,7 @@ def polynomial_law(
         orders: Highest exponent of each state ``(q_1 … q_n, v_1 … v_n)``; their number is twice that of the joints.
         kind: "tensor" (the dissertation's choice, 256 coefficients a force for order 3 in four states) or "total".
         degree: Largest sum of exponents for "total"; the largest of `orders` if None.
-        basis: "chebyshev" (default: well conditioned on the scaled range) or "power".
+        basis: "chebyshev" (default: bounded by 1 on the scaled range) or "power".
         centre: Centre of each state's range (2 n,) or one number [m, rad, m/s, rad/s].
         scale: Half-width of each state's range, above 0, (2 n,) or one number [m, rad, m/s, rad/s].
 
@@ -168,6 +177,45 @@ def polynomial_law(
     )
 
 
+def polynomial_law_of(header: Sequence[float]) -> ForceLaw:
+    """The polynomial law that has this header: orders, basis and scaling are read off it.
+
+    Raises:
+        ParameterError: No polynomial law has it.
+    """
+    entries = [float(entry) for entry in header]
+    try:
+        n = int(entries[1])
+        position, exponents = 5 + 4 * n, []
+        for _ in range(int(entries[3])):
+            n_factors, length = int(entries[position]), int(entries[position + 1])
+            row = [0] * (2 * n)
+            for k in range(n_factors):
+                row[int(entries[position + 2 + 2 * k])] = int(entries[position + 3 + 2 * k])
+            exponents += [[*row[:-1], last] for last in range(length)]
+            position += 2 + 2 * n_factors
+        terms = np.array(exponents, dtype=np.int64)
+        orders = [int(order) for order in terms.max(axis=0)]
+        degree = int(terms.sum(axis=1).max())
+        tensor = len(terms) == int(np.prod([order + 1 for order in orders]))
+        law = polynomial_law(
+            orders,
+            "tensor" if tensor else "total",
+            degree=None if tensor else degree,
+            basis="chebyshev" if entries[0] else "power",
+            centre=entries[5 : 5 + 2 * n],
+            scale=1.0 / np.array(entries[5 + 2 * n : 5 + 4 * n]),
+        )
+    except (IndexError, ValueError, ZeroDivisionError) as error:
+        raise ParameterError(
+            f"a header of {len(entries)} numbers is that of no polynomial law: {error}"
+        ) from error
+    # The reciprocal of a reciprocal may be off by one bit; the header that came is the one that was fitted.
+    if not np.allclose(law.header, entries, rtol=1e-15, atol=0.0):
+        raise ParameterError(f"a header of {len(entries)} numbers is that of no polynomial law")
+    return replace(law, header=tuple(entries))
+
+
 def _runs(exponents: NDArray[np.int64]) -> tuple[list[float], int]:
     """The terms as runs over the last state: number of factors, length, then (state, exponent) of each factor."""
     encoded: list[float] = []
@@ -183,7 +231,7 @@ def _coefficients(
     exponents: NDArray[np.int64], centre: NDArray[np.float64], scale: NDArray[np.float64]
 ) -> tuple[Parameter, ...]:
     n = exponents.shape[1] // 2
-    linear = {i: gain for i in range(2 * n) for gain in [1000.0 if i < n else 1.0]}
+    linear = [1000.0] * n + [1.0] * n
     parameters = []
     for o in range(n):
         own = (o, n + o)
@@ -196,5 +244,7 @@ def _coefficients(
             elif sum(row) == 1 and row.index(1) in own:
                 default = linear[row.index(1)] * scale[row.index(1)]
             name = f"a{o + 1}[{','.join(map(str, row))}]"
-            parameters.append(Parameter(name, "N", float(default), description="coefficient", rotational="N m"))
+            parameters.append(
+                Parameter(name, "N", float(default), description="coefficient", rotational="N m")
+            )
     return tuple(parameters)

@@ -33,11 +33,13 @@ from bench.laws.jenkins_backlash import JENKINS_BACKLASH
 from bench.laws.linear import LINEAR
 from bench.laws.lugre import ELASTOPLASTIC_FRICTION, LUGRE
 from bench.laws.maxwell import MAXWELL
+from bench.laws.network import network_law_of
 from bench.laws.normal_force_friction import (
     CONTROLLED_FRICTION,
     LOAD_DEPENDENT_FRICTION,
     TIME_VARYING_FRICTION,
 )
+from bench.laws.polynomial import polynomial_law_of
 from bench.laws.stiffness import COGGING, CUBIC_STIFFNESS, QUADRATIC_STIFFNESS, STIFFNESS_DRIFT
 from bench.laws.stribeck import STRIBECK
 
@@ -87,6 +89,11 @@ _SIZED: Mapping[str, Callable[[int], ForceLaw]] = MappingProxyType(
     {"iwan": iwan_law, "generalised_bouc_wen": generalised_bouc_wen_law}
 )
 
+_MODELS: Mapping[str, Callable[[Sequence[float]], ForceLaw]] = MappingProxyType(
+    {"polynomial": polynomial_law_of, "network": network_law_of}
+)
+"""Laws of identified models: no default size, so not in `LAWS`; found by name and header."""
+
 
 def find_law(name: str, header: Sequence[float] = ()) -> ForceLaw:
     """Return the law of that name, in the size its header asks for.
@@ -99,6 +106,8 @@ def find_law(name: str, header: Sequence[float] = ()) -> ForceLaw:
         UnknownNameError: No law has that name.
         ParameterError: The law has no such header.
     """
+    if name in _MODELS and header:
+        return _MODELS[name](header)
     if name not in LAWS:
         raise UnknownNameError("law", name, LAWS)
     law = LAWS[name]

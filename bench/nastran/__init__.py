@@ -23,15 +23,14 @@ from bench.nastran.integration import LagStudy, Response, integrate, lag_study
 from bench.nastran.network_deck import (
     INCH_POUND,
     SI,
-    DeckNetwork,
     Numbering,
     Units,
     network_cards,
     network_text,
     network_weights,
-    read_network,
     write_network,
 )
+from bench.nastran.network_reading import DeckNetwork, read_network
 from bench.nastran.tanh_table import table_error, tanh_points
 
 __all__ = [
@@ -66,8 +65,8 @@ __all__ = [
     "parse_deck",
     "read_deck",
     "read_network",
-    "tanh_points",
     "table_error",
+    "tanh_points",
     "write_deck",
     "write_network",
 ]

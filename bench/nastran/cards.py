@@ -7,9 +7,10 @@ two lines count as one.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple, Protocol, Self, TypeVar
+from typing import ClassVar, NamedTuple, Self, TypeVar
 
 from bench.errors import FileFormatError
 from bench.nastran.numbers import parse_integer, parse_real
@@ -81,25 +82,32 @@ def _parse_name(text: str) -> str:
     return text.upper()
 
 
-class Card(Protocol):
-    """What every card offers."""
+class Card(ABC):
+    """What every card offers: its name in field 1, and its data fields."""
+
+    NAME: ClassVar[str] = ""
 
     @property
     def name(self) -> str:
         """Name in field 1."""
-        ...
+        return self.NAME
 
+    @abstractmethod
     def fields(self) -> list[Field]:
-        """Data fields in order, 8 to a line of small fields."""
-        ...
+        """Data fields in order, 8 to a line of small fields; None is blank."""
 
 
 @dataclass(frozen=True)
-class OtherCard:
+class OtherCard(Card):
     """A card that this module does not interpret."""
 
-    name: str
+    kind: str
     texts: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        """Name in field 1."""
+        return self.kind
 
     def fields(self) -> list[Field]:
         """The fields as they were read."""
@@ -107,11 +115,16 @@ class OtherCard:
 
 
 @dataclass(frozen=True)
-class ScalarPoints:
+class ScalarPoints(Card):
     """SPOINT or EPOINT: scalar points, which may carry static loads, or extra points, which may not."""
 
     ids: tuple[int, ...]
-    name: str = "SPOINT"
+    kind: str = "SPOINT"
+
+    @property
+    def name(self) -> str:
+        """SPOINT or EPOINT."""
+        return self.kind
 
     def fields(self) -> list[Field]:
         """A range as ``first THRU last``, single points one by one."""
@@ -133,14 +146,14 @@ class ScalarPoints:
 
 
 @dataclass(frozen=True)
-class Grid:
+class Grid(Card):
     """GRID: a point with six components, of which `constrained` are fixed for good."""
 
     id: int
     position: tuple[float, float, float] = (0.0, 0.0, 0.0)
     constrained: str = ""
     coordinates: int = 0
-    name: ClassVar[str] = "GRID"
+    NAME: ClassVar[str] = "GRID"
 
     def fields(self) -> list[Field]:
         """ID, CP, X1, X2, X3, CD, PS."""
@@ -158,12 +171,12 @@ class Grid:
 
 
 @dataclass(frozen=True)
-class Mpc:
+class Mpc(Card):
     """MPC: a linear relation ``sum(coefficient * u(point, component)) = 0``; the first term is the dependent one."""
 
     sid: int
     terms: tuple[tuple[int, int, float], ...]
-    name: ClassVar[str] = "MPC"
+    NAME: ClassVar[str] = "MPC"
 
     def fields(self) -> list[Field]:
         """SID, then two terms a line, with a blank field before and after them."""
@@ -190,12 +203,12 @@ class Mpc:
 
 
 @dataclass(frozen=True)
-class Sload:
+class Sload(Card):
     """SLOAD: static loads on one to three scalar points."""
 
     sid: int
     loads: tuple[tuple[int, float], ...]
-    name: ClassVar[str] = "SLOAD"
+    NAME: ClassVar[str] = "SLOAD"
 
     def fields(self) -> list[Field]:
         """SID, then point and load in turn."""
@@ -213,14 +226,14 @@ class Sload:
 
 
 @dataclass(frozen=True)
-class DmigHeader:
+class DmigHeader(Card):
     """DMIG, header: form 1 square, 2 rectangular, 6 symmetric; types 1 and 2 real, 3 and 4 complex."""
 
     matrix: str
     form: int = 1
     type_in: int = 1
     type_out: int = 0
-    name: ClassVar[str] = "DMIG"
+    NAME: ClassVar[str] = "DMIG"
 
     def fields(self) -> list[Field]:
         """NAME, 0, IFO, TIN, TOUT."""
@@ -236,14 +249,14 @@ class DmigHeader:
 
 
 @dataclass(frozen=True)
-class DmigColumn:
+class DmigColumn(Card):
     """DMIG, column or a part of one: the terms ``(point, component, value)`` in the column of a point's component."""
 
     matrix: str
     point: int
     component: int
     terms: tuple[tuple[int, int, float], ...]
-    name: ClassVar[str] = "DMIG"
+    NAME: ClassVar[str] = "DMIG"
 
     def fields(self) -> list[Field]:
         """NAME, GJ, CJ, blank, then G, C, A, blank for each term."""
@@ -269,7 +282,7 @@ class DmigColumn:
 
 
 @dataclass(frozen=True)
-class Nolin1:
+class Nolin1(Card):
     """NOLIN1: load ``scale * T(u)`` on a point's component, u the displacement of another (component + 10: velocity)."""
 
     sid: int
@@ -279,7 +292,7 @@ class Nolin1:
     read_from: int
     read_component: int
     table: int
-    name: ClassVar[str] = "NOLIN1"
+    NAME: ClassVar[str] = "NOLIN1"
 
     def fields(self) -> list[Field]:
         """SID, GI, CI, S, GJ, CJ, TID."""
@@ -308,12 +321,12 @@ class Nolin1:
 
 
 @dataclass(frozen=True)
-class Tabled1:
+class Tabled1(Card):
     """TABLED1: a piecewise linear function, continued by its first and last straight line."""
 
     id: int
     points: tuple[tuple[float, float], ...]
-    name: ClassVar[str] = "TABLED1"
+    NAME: ClassVar[str] = "TABLED1"
 
     def fields(self) -> list[Field]:
         """TID, seven blanks, then x and y in turn, then ENDT."""
@@ -330,7 +343,7 @@ class Tabled1:
             words = [raw.fields[j].upper() if not raw.blank(j) else "" for j in (i, i + 1)]
             if words[0] == "ENDT":
                 break
-            if "SKIP" not in words:
+            if any(words) and "SKIP" not in words:
                 points.append((raw.real(i, "x"), raw.real(i + 1, "y")))
         else:
             raise raw.fail(len(raw.fields), "end of table", "ENDT")
@@ -340,13 +353,13 @@ class Tabled1:
 
 
 @dataclass(frozen=True)
-class Lseq:
+class Lseq(Card):
     """LSEQ: makes the static load set `load` a dynamic one that TLOAD1 knows by `excitation`."""
 
     sid: int
     excitation: int
     load: int
-    name: ClassVar[str] = "LSEQ"
+    NAME: ClassVar[str] = "LSEQ"
 
     def fields(self) -> list[Field]:
         """SID, DAREA, LID."""
@@ -359,13 +372,13 @@ class Lseq:
 
 
 @dataclass(frozen=True)
-class Tload1:
+class Tload1(Card):
     """TLOAD1: the loads of `excitation` times a table of time."""
 
     sid: int
     excitation: int
     table: int
-    name: ClassVar[str] = "TLOAD1"
+    NAME: ClassVar[str] = "TLOAD1"
 
     def fields(self) -> list[Field]:
         """SID, EXCITEID, DELAY, TYPE, TID."""

@@ -18,8 +18,8 @@ Two forms of the virtual rows exist and both can be assembled:
   ``S1 + S1'`` is again exactly the input. Both forms therefore have the same solution; the printed one has n1 + l more
   states, and a solver that reads tanh's input off S1 alone, as NOLIN1 does, needs the deck's.
 
-Signs follow the deck: ``x_p`` is the second body less the first, S3 opposes it. Eqs. 5.45 and 5.65 print the forces the other way
-round, which would make the joint's stiffness negative.
+Signs follow the deck: ``x_p`` is the second body less the first, S3 opposes it. Eqs. 5.45 and 5.65 print the forces the other
+way round, which would make the joint's stiffness negative.
 
 References:
     Tasbihgoo 2006, eqs. 5.14-5.46 and 5.56-5.65.
@@ -88,11 +88,15 @@ class ExpandedSystem:
     def parts(self) -> tuple[slice, slice, slice, slice, slice]:
         """Where x, x_p, S1, S2 and S3 stand in u."""
         k, n = self.relation.shape
-        ends = np.cumsum([0, n, k, self.weights.b1.size, self.weights.b1.size, k])
-        x, relative, inputs, hidden, forces = (
-            slice(int(a), int(b)) for a, b in zip(ends[:-1], ends[1:], strict=True)
+        width = self.weights.b1.size
+        inputs, hidden, forces = n + k, n + k + width, n + k + 2 * width
+        return (
+            slice(0, n),
+            slice(n, inputs),
+            slice(inputs, hidden),
+            slice(hidden, forces),
+            slice(forces, forces + k),
         )
-        return x, relative, inputs, hidden, forces
 
     def nonlinear_load(self, u: NDArray[np.float64], rate: NDArray[np.float64]) -> NDArray[np.float64]:
         """N(u, u'): tanh on the rows of S2, the joint's forces on the rows of x ``(s,)``."""
@@ -126,7 +130,8 @@ def expanded_system(rig: Rig, element: str | Element = "joint", *, form: Form = 
     others = [present.name for present in rig.elements if present.name != joint.name]
     if others:
         raise ModelError(
-            f"rig '{rig.name}' also holds the elements {others}; the expanded system knows one network joint in a linear structure"
+            f"rig '{rig.name}' also holds the elements {others}; the expanded system knows one network "
+            "joint in a linear structure"
         )
     weights = network_weights(joint)
     bare = rig.with_(elements=())
@@ -188,8 +193,8 @@ def _structure(rig: Rig) -> tuple[NDArray, NDArray, NDArray, NDArray]:
     n, n_inputs = model.nv, len(rig.actuators)
     if model.nq != n or model.na or n_inputs != model.nu:
         raise ModelError(
-            f"rig '{rig.name}' has {model.nq} positions for {n} velocities and {model.na} actuator states; only slide and hinge "
-            "joints and actuators without states can be written as matrices"
+            f"rig '{rig.name}' has {model.nq} positions for {n} velocities and {model.na} actuator states; only "
+            "slide and hinge joints and actuators without states can be written as matrices"
         )
     data = mujoco.MjData(model)
 
@@ -220,8 +225,8 @@ def _structure(rig: Rig) -> tuple[NDArray, NDArray, NDArray, NDArray]:
         np.abs(mass)
     ):
         raise ModelError(
-            f"the structure of rig '{rig.name}' is not linear (its forces or its inertia change with the position); the expanded "
-            "system needs a linear structure around the joint"
+            f"the structure of rig '{rig.name}' is not linear (its forces or its inertia change with the position); the "
+            "expanded system needs a linear structure around the joint"
         )
     return mass, damping, stiffness, inputs
 

@@ -9,12 +9,13 @@
   NOLIN1 loads N come from known steps and are never iterated: ``N = N_n``, or with DIAG 10, as the dissertation's deck has
   it, the mean of the last three, ``N = (N_n + N_(n-1) + N_(n-2))/3``.
 
-What that does to the deck's virtual points, which have no mass. With the mean, the row of S2 reads ``S2_(n+1) = tanh(S1_n)``: one
-step late, and the joint's force, a mean about step n - 1 applied at step n, one step more. The restoring force thus lags
-by two steps and the error is of first order in h; a lagging force feeds energy in like a damper of ``-2 h k``, which sets
-the step (1e-5 s in the deck). Without the mean the row reads ``S2_(n+1) + S2_n + S2_(n-1) = 3 tanh(S1_n)``: its own solutions
-alternate with a period of three steps, undamped, the joint couples them back, and the integration is unstable at
-every step. `averaged=False` shows it.
+What that does to the deck's virtual points, which have no mass: with the mean, the row of S2 reads ``S2_(n+1) =
+tanh(S1_n)``, one step late, and the joint's force, a mean about step n - 1 applied at step n, is late by one step more.
+The restoring force thus lags by two steps and the error is of first order in h; a lagging force feeds energy in like a
+damper of ``-2 h k``, which sets the step (1e-5 s in the deck). Without the mean the row reads
+``S2_(n+1) + S2_n + S2_(n-1) = 3 tanh(S1_n)``: its own solutions alternate with a period of three steps, undamped, and the
+joint couples them back. With the published network that is unstable at every step tried, 1e-6 to 1e-3 s;
+`averaged=False` shows it.
 
 `start="consistent"` begins with the virtual points in equilibrium; a deck without TIC cards begins with them at zero.
 The linear loads at the start are those that hold the initial state, as NASTRAN takes them. Computed from the published
@@ -124,7 +125,8 @@ def integrate(
             f"the {method} integration diverged after t = {last * h:.6g} s with a step of {h:g} s; try a smaller step",
             time=last * h,
         )
-    return Response(np.arange(len(x)) * h, x, v, x @ system.relation.T, force)
+    time = h * np.arange(len(x), dtype=np.float64)
+    return Response(time, x, v, x @ system.relation.T, force)
 
 
 def _initial(system: ExpandedSystem, initial: Mapping[str, tuple[float, float]]) -> tuple[NDArray, NDArray]:
@@ -134,10 +136,6 @@ def _initial(system: ExpandedSystem, initial: Mapping[str, tuple[float, float]])
             raise UnknownNameError("joint of the expanded system", name, system.freedoms)
         x[system.freedoms.index(name)], v[system.freedoms.index(name)] = position, velocity
     return x, v
-
-
-def _blocks(matrix: NDArray, rows: slice, columns: slice) -> NDArray[np.float64]:
-    return np.ascontiguousarray(matrix[rows, columns])
 
 
 def _consistent(
@@ -152,29 +150,24 @@ def _consistent(
         # rows of (x_p, S1): C_bb b' = f - K_bx x - C_bx x' - K_bb b
         solve = np.linalg.inv(c_matrix[inner, inner])
         start = np.concatenate([system.relation @ x0, np.zeros(system.weights.b1.size)])
-        blocks = (
-            solve @ _blocks(k_matrix, inner, x),
-            solve @ _blocks(c_matrix, inner, x),
-            solve @ _blocks(k_matrix, inner, inner),
-            solve @ system.constant[inner],
-        )
+        on_x, on_v = solve @ k_matrix[inner, x], solve @ c_matrix[inner, x]
+        on_b, constant = solve @ k_matrix[inner, inner], solve @ system.constant[inner]
     else:
         # static condensation: x_p = -K_pp^-1 K_px x and its rate, then S1 = K_ss^-1 (b1 - K_sp x_p - C_sp x_p')
         tie = -np.linalg.solve(k_matrix[p, p], k_matrix[p, x])
         solve = np.linalg.inv(k_matrix[s1, s1])
         start = np.zeros(0)
-        blocks = (
-            solve @ k_matrix[s1, p] @ tie,
-            solve @ c_matrix[s1, p] @ tie,
-            np.zeros((0, 0)),
-            solve @ system.constant[s1],
-        )
+        on_x, on_v = solve @ k_matrix[s1, p] @ tie, solve @ c_matrix[s1, p] @ tie
+        on_b, constant = np.zeros((0, 0)), solve @ system.constant[s1]
     hidden = np.linalg.solve(k_matrix[s3, s3], k_matrix[s3, s2]) @ np.linalg.inv(k_matrix[s2, s2])
     bias = np.linalg.solve(k_matrix[s3, s3], system.constant[s3])
     return _runge_kutta(
         printed,
         p.stop - p.start,
-        *(np.ascontiguousarray(block) for block in blocks),
+        np.ascontiguousarray(on_x),
+        np.ascontiguousarray(on_v),
+        np.ascontiguousarray(on_b),
+        constant,
         np.ascontiguousarray(-hidden),
         bias,
         np.ascontiguousarray(mass_inverse @ system.relation.T),
@@ -281,7 +274,10 @@ def _nastran(
         system.nonlinear_load(u, rate) if consistent else np.zeros(system.order),
         averaged,
     )
-    velocity = np.gradient(xs, h, axis=0) if len(xs) > 1 else v0[None]
+    padded = np.concatenate([(x0 - h * v0)[None], xs])
+    velocity = np.empty_like(xs)
+    velocity[:-1] = (padded[2:] - padded[:-2]) / (2.0 * h)
+    velocity[-1] = (padded[-1] - padded[-2]) / h
     return xs, velocity, forces
 
 
@@ -343,7 +339,7 @@ def lag_study(
         )
 
     def run(h: float, method: Method, hold: Hold) -> NDArray[np.float64]:
-        time = np.arange(round(duration / h) + 1) * h
+        time = np.linspace(0.0, round(duration / h) * h, round(duration / h) + 1)
         commands = np.asarray(drive(time), dtype=float)
         response = integrate(
             system,

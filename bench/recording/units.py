@@ -41,7 +41,8 @@ SI_UNITS: dict[str, str] = {
 """Quantities a channel may declare, and the SI unit of each."""
 
 _PLAIN = {"1", *SI_UNITS.values()}
-_POWER = re.compile(r"(?:\^|\*\*)\s*[-+]?\d(?:\.\d\d?)?(?![\w.]|\s*(?:\^|\*\*))", re.ASCII)
+_ALPHABET = re.compile(r"[\w\s*/^().·%°+-]*")
+_POWER = re.compile(r"(?<=[\w)])(?:\^|\*\*)\s*[-+]?[0-9](?:\.[0-9]{1,2})?(?![\w.]|\s*(?:\^|\*\*))")
 _SUPERSCRIPT = re.compile(r"[⁻⁺⁰¹²³⁴⁵⁶⁷⁸⁹]+")
 _DIGITS = str.maketrans("⁻⁺⁰¹²³⁴⁵⁶⁷⁸⁹", "-+0123456789")
 _MEANT = {  # what engineers write, and what they mean by it
@@ -71,7 +72,8 @@ def _parsed(unit: str) -> tuple[Any, str]:
     try:
         text = _SUPERSCRIPT.sub(lambda match: "^" + match[0].translate(_DIGITS), unit)
         rest = _POWER.sub("", text)
-        if "^" in rest or "**" in rest:  # only powers of one digit: pint would compute 9^9^9^9 for hours
+        # only single powers of one digit, with no stray signs that pint passes over: it would compute 9^9^9^9 for hours
+        if "^" in rest or "**" in rest or not _ALPHABET.fullmatch(text):
             raise ValueError(unit)
         parsed = registry.parse_units(text)
         return parsed, str(registry.get_root_units(parsed)[1])

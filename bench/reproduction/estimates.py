@@ -24,6 +24,7 @@ def estimate_histories(
     units: Sequence[str] = (),
     columns: int = 2,
     label: str = "printed",
+    until: float = math.inf,
 ) -> Figure:
     """The course of each estimate, with reference values dashed.
 
@@ -34,35 +35,84 @@ def estimate_histories(
         units: Unit of each parameter; "1" where empty.
         columns: Columns of axes.
         label: What the reference is.
+        until: Last time drawn [s].
     """
+    shown = history.time <= until
+    time = history.time[shown]
     rows = math.ceil(len(names) / columns)
     with style():
         figure, grid = axes_grid(4.2 * columns, 0.4 + 1.35 * rows, nrows=rows, ncols=columns, sharex=True)
         for i, name in enumerate(names):
             axes = grid.flat[i]
-            axes.plot(*thin(history.time, history.theta[:, i]), color="#1a1a1a", linewidth=1.2, label="estimate")
+            theta = history.theta[shown, i]
+            axes.plot(*thin(time, theta), color="#1a1a1a", linewidth=1.2, label="estimate")
             if reference:
                 axes.axhline(reference[i], label=label, **REFERENCE)
             # The first instants overshoot by decades; the axis belongs to what follows.
-            settled = history.theta[history.time > history.time[0] + 0.02 * np.ptp(history.time), i]
-            shown = [*settled[[0, -1]], settled.min(), settled.max(), *reference[i : i + 1]]
-            margin = 0.12 * (max(shown) - min(shown)) or 1.0
-            axes.set_ylim(min(shown) - margin, max(shown) + margin)
+            settled = theta[time > time[0] + 0.02 * np.ptp(time)]
+            span = [settled.min(), settled.max(), *reference[i : i + 1]]
+            margin = 0.12 * (max(span) - min(span)) or 1.0
+            axes.set_ylim(min(span) - margin, max(span) + margin)
             axes.set_ylabel(f"{name} [{units[i] if units else '1'}]")
-            axes.set_xlabel("time [s]")
-            axes.label_outer()
             axes.margins(x=0.0)
-        for axes in list(grid.flat)[len(names) :]:
-            axes.remove()
+        _finish(grid, len(names))
         if reference:
             handles, labels = grid.flat[0].get_legend_handles_labels()
             figure.legend(handles, labels, loc="outside upper right", ncols=2)
     return figure
 
 
-def contribution_parts(history: AdaptiveHistory, names: Sequence[str]) -> dict[str, NDArray[np.float64]]:
-    """What each term contributes over time with the estimates of each instant, by name."""
-    return {f"{name} φ{i + 1}": history.contributions()[:, i] for i, name in enumerate(names)}
+def _finish(grid: NDArray, count: int) -> None:
+    """Remove the axes beyond `count`, and name the time below the lowest of each column."""
+    for axes in list(grid.flat)[count:]:
+        axes.remove()
+    for column in range(grid.shape[1]):
+        lowest = [axes for axes in list(grid.flat)[column : count : grid.shape[1]]][-1]
+        lowest.set_xlabel("time [s]")
+        lowest.tick_params(labelbottom=True)
+
+
+def contribution_histories(
+    history: AdaptiveHistory,
+    names: Sequence[str],
+    *,
+    unit: str = "lbf",
+    window: tuple[float, float] = (0.0, math.inf),
+) -> Figure:
+    """z, what each term contributes with the estimates of each instant, their sum and the error, on one scale.
+
+    Args:
+        history: The estimation, with its regressors.
+        names: Name of each parameter.
+        unit: Unit of z.
+        window: First and last time drawn [s].
+    """
+    shown = (history.time >= window[0]) & (history.time <= window[1])
+    time, z = history.time[shown], learnt(history)[shown]
+    parts = history.contributions()[shown]
+    total = parts.sum(axis=1)
+    rows = {"z": z, **{f"{name} φ{i + 1}": parts[:, i] for i, name in enumerate(names)}, "sum": total, "z − sum": z - total}
+    size = 1.05 * float(np.max(np.abs(z)))
+    count = math.ceil(len(rows) / 2)
+    with style():
+        figure, grid = axes_grid(8.4, 0.4 + 1.2 * count, nrows=count, ncols=2, sharex=True, sharey=True)
+        for axes, (name, values) in zip(grid.flat, rows.items(), strict=False):
+            share = 100.0 * float(np.mean(values * z) / np.mean(z**2))
+            axes.plot(*thin(time, values), color="#1a1a1a", linewidth=0.8)
+            axes.set_ylim(-size, size)
+            axes.set_ylabel(f"{name} [{unit}]")
+            axes.set_title(f"{share:.3g} % of the mean square", fontsize=8)
+            axes.margins(x=0.0)
+        _finish(grid, len(rows))
+    return figure
+
+
+def fine(figure: Figure) -> Figure:
+    """The figure with thinner lines, for records that cross themselves many times."""
+    for axes in figure.axes:
+        for line in axes.lines:
+            line.set_linewidth(min(line.get_linewidth(), 0.8))
+    return figure
 
 
 def learnt(history: AdaptiveHistory) -> NDArray[np.float64]:

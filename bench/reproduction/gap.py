@@ -12,6 +12,7 @@ import numpy as np
 from bench.figures import loops, surface, time_histories
 from bench.identification.surface import fit_surface
 from bench.recording import Recording, nmse
+from bench.reproduction.estimates import fine
 from bench.reproduction.imperial import STIFFNESS, sdof_view
 from bench.reproduction.item import Item, Picture, Progress, fact_row, range_row, value_row
 from bench.rig import Element, simulate
@@ -91,12 +92,12 @@ def run(progress: Progress) -> Item:
         Picture(
             "histories",
             "Displacement, velocity and restoring force: nothing betrays the gap (Fig 2.7).",
-            time_histories(records, ["displacement", "velocity", "restoring_force"], window=WINDOW),
+            fine(time_histories(records, ["displacement", "velocity", "restoring_force"], window=WINDOW)),
         ),
         Picture(
             "phase",
             "Restoring force over displacement shows the gap; over velocity it shows nothing (Fig 2.8 a to c).",
-            loops(records, pairs, window=WINDOW),
+            fine(loops(records, pairs, window=WINDOW)),
         ),
         Picture(
             "surface",

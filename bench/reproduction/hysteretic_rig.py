@@ -8,15 +8,16 @@ printed estimates; the seven-parameter model is then identified from its record 
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Sequence
 
-from bench.errors import SimulationError
-from bench.figures import contributions, loops, time_histories
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from bench.figures import loops, time_histories
 from bench.identification.adaptive import AdaptiveHistory, AdaptiveLeastSquares
 from bench.identification.regressors import Reference, sdof_model
-from bench.laws import find_law
 from bench.recording import Recording, nmse
-from bench.reproduction.estimates import contribution_parts, estimate_histories, learnt
+from bench.reproduction.estimates import contribution_histories, estimate_histories, fine
 from bench.reproduction.imperial import STIFFNESS, sdof_view
 from bench.reproduction.item import Item, Picture, Progress, Row, fact_row, range_row, value_row
 from bench.rig import Element, simulate
@@ -30,7 +31,7 @@ BAND = (0.5, 13.0)  # [Hz]
 PEAK = 15.0  # [lbf]
 DURATION = 120.0
 RATE = 1000.0
-SEED = 1
+SEED = 7
 PRINTED = (48.48, 0.18, -48.61, -0.12, -1.76, -0.00, 0.12)
 UNITS = ("lbf/in", "lbf s/in", "lbf/in^3", "1/in", "1/in", "1/(lbf in)", "1/(lbf in)")
 FILTER_RATE = 5.0  # about a fifth of the natural frequency [rad/s]
@@ -76,19 +77,26 @@ def identify(test: Recording) -> tuple[AdaptiveLeastSquares, AdaptiveHistory]:
     return estimator, history
 
 
-def printed_model_fate() -> str:
-    """What becomes of the printed estimates when they are simulated as the rig."""
-    law = find_law("generalised_bouc_wen", (2,))
+def printed_model_fate(test: Recording) -> str:
+    """What becomes of the printed estimates when they are simulated as a rig, integrated by themselves."""
     k, c, d, *powers = PRINTED
-    # The model's terms are the law's with the opposite sign: theta_4 = -beta_1, theta_5 = -gamma_1, and so on.
-    theta = [k * STIFFNESS, c * STIFFNESS, d * STIFFNESS / INCH**2]
-    theta += [-value / INCH / (1.0 if i < 2 else POUND_FORCE) for i, value in enumerate(powers)]
-    element = Element(law, ("carriage",), law.theta(theta), name="printed")
-    try:
-        simulate(sdof_rig(element, mass=MASS * STIFFNESS), drive(), rng=np.random.default_rng(SEED))
-    except SimulationError as error:
-        return f"runs away after {error.time:.1f} s"
-    return "stays bounded"
+    time, force = test.time, test["force"]
+
+    def slope(t: float, y: Sequence[float]) -> tuple[float, float, float]:
+        x, v, w = y
+        r = k * x + c * v + d * x**3 + w
+        size, speed = abs(r), abs(v)
+        terms = (speed * r, v * size, speed * size * r, v * size * size)
+        hysteretic = sum(theta * term for theta, term in zip(powers, terms, strict=True))
+        return v, (float(np.interp(t, time, force)) - r) / MASS, hysteretic
+
+    def gone(t: float, y: Sequence[float]) -> float:
+        return abs(y[0]) - 10.0 * 0.5  # ten times the printed range
+
+    gone.terminal = True  # type: ignore[attr-defined]
+    # 10 ms: the force, flat to 13 Hz, must not be stepped over; 1e-6 is far below the margin of the event.
+    end = solve_ivp(slope, (0.0, time[-1]), (0.0, 0.0, 0.0), events=gone, rtol=1e-6, atol=1e-6, max_step=0.01)
+    return f"runs away after {end.t[-1]:.0f} s" if end.status == 1 else "stays bounded"
 
 
 def _rows(test: Recording, history: AdaptiveHistory, theta: np.ndarray) -> tuple[Row, ...]:
@@ -118,7 +126,7 @@ def run(progress: Progress) -> Item:
     test = record()
     progress("identifying on line", 0.3)
     estimator, history = identify(test)
-    fate = printed_model_fate()
+    fate = printed_model_fate(test)
     progress("drawing", 0.7)
     window = (20.0, 30.0)
     records = {"rig": test}
@@ -128,9 +136,9 @@ def run(progress: Progress) -> Item:
         Picture(
             "histories",
             "Excitation, displacement, velocity and acceleration (Fig 2.14 a to d).",
-            time_histories(records, ["force", "displacement", "velocity", "acceleration"], window=window),
+            fine(time_histories(records, ["force", "displacement", "velocity", "acceleration"], window=window)),
         ),
-        Picture("phase", "Phase plots (Fig 2.14 e, f).", loops(records, phases, window=window)),
+        Picture("phase", "Phase plots (Fig 2.14 e, f).", fine(loops(records, phases))),
         Picture(
             "estimates",
             "Evolution of the seven estimates, the printed asymptotic values dashed (Fig 2.15).",
@@ -138,14 +146,8 @@ def run(progress: Progress) -> Item:
         ),
         Picture(
             "contributions",
-            "Contribution of each term to z, 60 to 65 s (Fig 2.17).",
-            contributions(
-                history.time,
-                contribution_parts(history, names),
-                total=learnt(history),
-                axis="z [lbf]",
-                window=(60.0, 65.0),
-            ),
+            "z, the contribution of each term, their sum and the error, 55 to 65 s (Fig 2.17).",
+            contribution_histories(history, names, window=(55.0, 65.0)),
         ),
     )
     text = (

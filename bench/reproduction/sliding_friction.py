@@ -14,6 +14,7 @@ import numpy as np
 
 from bench.figures import loops, time_histories
 from bench.recording import Recording
+from bench.reproduction.estimates import fine
 from bench.reproduction.imperial import STIFFNESS, imperial
 from bench.reproduction.item import Item, Picture, Progress, fact_row, range_row, value_row
 from bench.rig import Element, simulate
@@ -114,19 +115,21 @@ def run(progress: Progress) -> Item:
         Picture(
             "histories",
             "Modulated friction: motion, force gauge and normal force; the motion dies where the grip is strong (Fig 2.9).",
-            time_histories(
-                {"rig": test}, ["displacement", "velocity", "acceleration", "force_gauge", "normal_force"]
+            fine(
+                time_histories(
+                    {"rig": test}, ["displacement", "velocity", "acceleration", "force_gauge", "normal_force"]
+                )
             ),
         ),
         Picture(
             "loop_constant",
             "Restoring force over displacement under a constant grip, steady state: one parallelogram (Fig 2.10 a).",
-            loops({"rig": constant}, [("displacement", "restoring_force")], window=(10.0, DURATION)),
+            fine(loops({"rig": constant}, [("displacement", "restoring_force")], window=(10.0, DURATION))),
         ),
         Picture(
             "loop_modulated",
-            "The same under the modulated grip: loops from narrow and long to high and short (Fig 2.10 b).",
-            loops({"rig": test}, [("displacement", "restoring_force")], window=(2.0, DURATION)),
+            "The same while the grip falls from its largest to its smallest value, 7.5 to 15 s: from short loops to long ones (Fig 2.10 b).",
+            fine(loops({"rig": test}, [("displacement", "restoring_force")], window=(7.5, 15.0))),
         ),
     )
     text = (

@@ -26,7 +26,6 @@ INTEGRATORS = {
 STRUCTURE = ("mass", "inertia", "stiffness", "damping", "frictionloss", "armature")
 """Structural quantities that `Rig.with_structure` changes."""
 
-EXACT_SOLREF = (0.002, 1.0)
 EXACT_SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)
 
 
@@ -106,13 +105,15 @@ def _set_exact_friction(spec: mujoco.MjSpec, element: Element) -> None:
     if target is None:
         raise UnknownNameError("joint or tendon", element.joints[0], [joint.name for joint in spec.joints])
     target.frictionloss = element.theta[0]
-    target.solref_friction = EXACT_SOLREF
+    target.solref_friction = (2.0 * spec.option.timestep, 1.0)  # the stiffest that MuJoCo takes at this step
     target.solimp_friction = EXACT_SOLIMP
 
 
 def _add_state_actuator(spec: mujoco.MjSpec, element: Element, index: int) -> None:
     """A user actuator without gain whose activations are the element's hidden states."""
-    transmission = mujoco.mjtTrn.mjTRN_JOINT if spec.joint(element.joints[0]) is not None else mujoco.mjtTrn.mjTRN_TENDON
+    transmission = (
+        mujoco.mjtTrn.mjTRN_JOINT if spec.joint(element.joints[0]) is not None else mujoco.mjtTrn.mjTRN_TENDON
+    )
     actuator = spec.add_actuator(
         name=native.PREFIX + element.name, target=element.joints[0], trntype=transmission
     )

@@ -54,7 +54,9 @@ def read_document(path: str | Path) -> dict[str, Any]:
         text = file.read_text(encoding="utf-8")
         document = json.loads(text) if file.suffix == ".json" else tomllib.loads(text)
     except (OSError, UnicodeDecodeError, ValueError) as error:
-        raise FileFormatError(f"cannot read {file} as a {'JSON' if file.suffix == '.json' else 'TOML'} document: {error}") from error
+        raise FileFormatError(
+            f"cannot read {file} as a {'JSON' if file.suffix == '.json' else 'TOML'} document: {error}"
+        ) from error
     if not isinstance(document, dict):
         raise FileFormatError(f"{file} holds a {type(document).__name__}; a table of entries is expected")
     return document
@@ -73,7 +75,9 @@ def element_from_configuration(entry: Mapping[str, Any]) -> Element:
             raise UnknownNameError("entry of an element", key, known)
     missing = [key for key in ("law", "joints") if key not in entry]
     if missing:
-        raise ParameterError(f"an element needs the entries law and joints; {', '.join(missing)} missing in {dict(entry)}")
+        raise ParameterError(
+            f"an element needs the entries law and joints; {', '.join(missing)} missing in {dict(entry)}"
+        )
     return Element.of(
         find_law(entry["law"], entry.get("header", ())),
         *entry["joints"],
@@ -101,7 +105,9 @@ def rig_from_configuration(document: Mapping[str, Any], *, folder: str | Path = 
         if key not in _ENTRIES:
             raise UnknownNameError("entry of a rig configuration", key, _ENTRIES)
     if "rig" not in document:
-        raise ParameterError(f"a rig configuration needs the entry rig: one of {', '.join(RIGS)}, or the path of an MJCF file")
+        raise ParameterError(
+            f"a rig configuration needs the entry rig: one of {', '.join(RIGS)}, or the path of an MJCF file"
+        )
     elements = [element_from_configuration(entry) for entry in document.get("elements", ())]
     settings = {key: document[key] for key in ("timestep", "integrator") if key in document}
     which = str(document["rig"])

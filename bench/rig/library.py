@@ -28,7 +28,14 @@ PRESCRIBED_ACTUATORS = ("drive_position", "drive_velocity", "drive_feedforward")
 
 def _load(model: str, name: str, elements: Sequence[Element], timestep: float, integrator: str) -> Rig:
     text = model_path(model).read_text(encoding="utf-8")
-    return Rig(name, text, tuple(elements), timestep=timestep, integrator=integrator, folder=str(model_path(model).parent))
+    return Rig(
+        name,
+        text,
+        tuple(elements),
+        timestep=timestep,
+        integrator=integrator,
+        folder=str(model_path(model).parent),
+    )
 
 
 def sdof_rig(
@@ -104,7 +111,9 @@ def six_dof_rig(*elements: Element, timestep: float = 1e-3, integrator: str = "R
     return _load("joint_6dof", "joint_6dof", elements, timestep, integrator)
 
 
-def prescribe(rig: Rig, displacement: ArrayLike, *, joint: str = "piston") -> Mapping[str, NDArray[np.float64]]:
+def prescribe(
+    rig: Rig, displacement: ArrayLike, *, joint: str = "piston"
+) -> Mapping[str, NDArray[np.float64]]:
     """Commands of a displacement-controlled actuator that make `joint` follow a displacement record.
 
     The commands are taken half a step ahead of each sample, since they are held over the step, and carry the
@@ -131,7 +140,9 @@ def prescribe(rig: Rig, displacement: ArrayLike, *, joint: str = "piston") -> Ma
         raise RecordingError("a prescribed motion needs at least eight finite samples")
     missing = [name for name in PRESCRIBED_ACTUATORS if name not in rig.actuators]
     if missing:
-        raise ModelError(f"rig '{rig.name}' cannot follow a prescribed motion: it lacks the actuators {missing}")
+        raise ModelError(
+            f"rig '{rig.name}' cannot follow a prescribed motion: it lacks the actuators {missing}"
+        )
     time = np.arange(len(x)) * rig.timestep
     spline = make_interp_spline(time, x, k=5)
     middle = time + 0.5 * rig.timestep

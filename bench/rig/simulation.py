@@ -219,8 +219,8 @@ def _set_initial(
 
 def _check_finite(rig: Rig, states: NDArray, controls: NDArray) -> None:
     """Raise a `SimulationError` where the clock stopped (MuJoCo found a bad state) or a number is not finite."""
-    bad = ~np.isfinite(states).all(axis=1)
-    bad[1:] |= np.diff(states[:, 0]) <= 0.0
+    stopped = np.diff(states[:, 0], prepend=-np.inf) <= 0.0
+    bad = stopped | ~np.isfinite(states).all(axis=1)
     if not bad.any():
         return
     last = int(np.argmax(bad)) - 1
@@ -271,7 +271,7 @@ def _record(
         columns += [q[:, :moving], v[:, :moving], force[:, :moving], z]
         _warn_outside(rig, item.element, np.concatenate([q[:, :moving], v[:, :moving]], axis=1))
     values = np.concatenate(columns, axis=1)
-    time = np.arange(len(states)) * (stride * rig.timestep)
+    time = np.arange(len(states), dtype=np.float64) * (stride * rig.timestep)
     meta = provenance(
         rig=rig.name,
         timestep=rig.timestep,
