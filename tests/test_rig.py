@@ -10,7 +10,7 @@ import pytest
 from bench import Element, Excitation, Rig, simulate, simulate_batch
 from bench.errors import ModelError, ParameterError, RangeWarning, SimulationError, UnknownNameError
 from bench.laws import LAWS
-from bench.rig.library import INCH, POUND_FORCE, joint_rig, prescribe, sdof_rig, starting, damper_rig
+from bench.rig.library import INCH, POUND_FORCE, damper_rig, joint_rig, prescribe, sdof_rig, starting
 from bench.signals import Harmonic
 
 GAP = Element.of("gap", "carriage", stiffness=3000.0, clearance=0.005)

@@ -31,10 +31,10 @@ GOOD_FIT = 5.0
 MEMORY_LIMIT = 2.0
 """Share of the force variance [%] that displacement and acceleration may explain beyond velocity."""
 
-LOOP_LIMIT = 0.10
+LOOP_LIMIT = 0.15
 """Half width of the force-velocity loop over the rms force that is still a curve."""
 
-OPPOSED_LIMIT = 0.02
+OPPOSED_LIMIT = 0.05
 """Share of moving samples in which the damper may push along its velocity."""
 
 

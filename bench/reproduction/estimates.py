@@ -92,7 +92,7 @@ def contribution_histories(
     parts = history.contributions()[shown]
     total = parts.sum(axis=1)
     rows = {"z": z, **{f"{name} φ{i + 1}": parts[:, i] for i, name in enumerate(names)}, "sum": total, "z − sum": z - total}
-    size = 1.05 * float(np.max(np.abs(z)))
+    size = 1.05 * max(float(np.max(np.abs(values))) for values in rows.values())
     count = math.ceil(len(rows) / 2)
     with style():
         figure, grid = axes_grid(8.4, 0.4 + 1.2 * count, nrows=count, ncols=2, sharex=True, sharey=True)

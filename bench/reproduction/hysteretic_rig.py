@@ -138,7 +138,7 @@ def run(progress: Progress) -> Item:
             "Excitation, displacement, velocity and acceleration (Fig 2.14 a to d).",
             fine(time_histories(records, ["force", "displacement", "velocity", "acceleration"], window=window)),
         ),
-        Picture("phase", "Phase plots (Fig 2.14 e, f).", fine(loops(records, phases))),
+        Picture("phase", "Phase plots (Fig 2.14 e, f).", fine(loops(records, phases, window=window))),
         Picture(
             "estimates",
             "Evolution of the seven estimates, the printed asymptotic values dashed (Fig 2.15).",

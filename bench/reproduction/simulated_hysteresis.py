@@ -31,12 +31,12 @@ NAMES = ("θ1", "θ2", "θ3", "θ4", "θ5")
 UNITS = ("lbf/in", "1/in", "1/in", "1/(lbf in)", "1/(lbf in)")
 PERIOD = 2.0 * math.pi / math.sqrt(5.0)  # of small motion, mass 1 [s]
 PEAK = 10.0  # [lbf]
-CUTOFF = 12.0  # [Hz]
+CUTOFF = 9.0  # [Hz]
 DURATION = 120.0
 RATE = 1000.0
 TIMESTEP = 2e-4
 """A command is held over a step and thus lags by half of one [s]; at 1 ms the estimates would feel it."""
-SEED = 3
+SEED = 6
 
 
 def record(seed: int = SEED) -> Recording:
@@ -142,7 +142,7 @@ def _rows(test: Recording, history: AdaptiveHistory, noisy: float, tracked: floa
     rows += [
         value_row("largest error of an estimate after 30 s", "", None, float(np.abs(history.theta[late] - TRUE).max()), high=0.005),
         value_row("all estimates within 5 % after", "periods", 1.0, settled_after(history, TRUE) / PERIOD, high=1.5),
-        value_row("2 % noise on force and acceleration, three seeds: largest error of θ1, θ4, θ5", "%", None, noisy, high=3.0),
+        value_row("2 % noise on force and acceleration, six seeds: largest error of θ1, θ4, θ5", "%", None, noisy, high=3.0),
         value_row("parameters changed at 30 s: within 5 % after", "periods", None, tracked, high=2.0),
         value_row("rig against an independent integration: largest difference over peak displacement", "1", None, apart, high=1e-6),
     ]
@@ -156,7 +156,7 @@ def run(progress: Progress) -> Item:
     progress("identifying on line", 0.15)
     history = estimate(estimator(quiet=True), test.time, test["force"], test["velocity"], test["acceleration"])
     progress("identifying under noise", 0.35)
-    noisy = _noisy_error(test, (1, 2, 3))
+    noisy = _noisy_error(test, range(1, 7))
     progress("changing a parameter mid-record", 0.5)
     changed, tracked = _tracking(np.array(test["force"]))
     x = test["displacement"]

@@ -1,0 +1,396 @@
+"""Running campaigns: the same bytes however they are run, stopped, killed or resumed."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pyarrow.dataset as ds
+import pyarrow.parquet as pq
+import pytest
+
+from bench.campaign import CampaignError, Progress, plan_from_dict, read_plan, run_campaign, verify
+from bench.campaign.execution import generator_of, payload_of
+from bench.campaign.generation import Generator
+from bench.errors import FileFormatError, ParameterError
+
+SDOF = {
+    "rig": "sdof",
+    "structure": {
+        "mass": {"carriage": {"uniform": [1.0, 3.0]}},
+        "stiffness": {"carriage": {"log_uniform": [500.0, 5000.0]}},
+        "damping": {"carriage": {"uniform": [1.0, 5.0]}},
+    },
+    "elements": [
+        {"law": "gap", "joints": ["carriage"], "parameters": {"clearance": {"uniform": [0.001, 0.004]}}},
+        {
+            "law": "bouc_wen",
+            "joints": ["carriage"],
+            "parameters": {"A": {"uniform": [300.0, 900.0]}, "n": {"choice": [1.0, 2.0]}},
+            "probability": 0.5,
+        },
+    ],
+}
+NOISE = {"signals": {"shaker": {"type": "band_limited_noise", "cutoff": 60.0, "rms": {"uniform": [5.0, 20.0]}}}}
+
+
+def document(**changes) -> dict:
+    return {
+        "name": "test",
+        "seed": 11,
+        "records": 24,
+        "duration": 0.25,
+        "sample_rate": 1000.0,
+        "records_per_part": 3,
+        "rigs": [SDOF],
+        "excitations": [NOISE],
+        "sensors": [{"chains": {"displacement": [{"type": "noise", "std": {"log_uniform": [1e-6, 1e-4]}}]}}],
+    } | changes
+
+
+def hashes(folder: Path) -> dict[str, str]:
+    manifest = json.loads((folder / "manifest.json").read_text())
+    assert manifest["status"] == "complete"
+    assert verify(folder) == []
+    return {f"{kind}/{entry['part']}": file["sha256"] for entry in manifest["parts"] for kind, file in entry["files"].items()}
+
+
+@pytest.fixture(scope="module")
+def reference(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("campaign") / "reference"
+    run_campaign(document(), folder, threads=1)
+    return folder
+
+
+RIGS = {
+    "sdof, every structural number": document(
+        channels=["shaker", "displacement", "carriage.gap/force", "carriage.bouc_wen/z", "carriage.bouc_wen/force"],
+        precision="float64",
+    ),
+    "exact friction, armature, frictionloss": document(
+        precision="float64",
+        rigs=[
+            {
+                "rig": "sdof",
+                "structure": {
+                    "armature": {"carriage": {"uniform": [0.0, 0.5]}},
+                    "inertia": {"carriage": 0.01},
+                    "stiffness": {"carriage": 900.0},
+                },
+                "elements": [{"law": "coulomb", "joints": ["carriage"], "exact": True, "parameters": {"force": {"uniform": [1.0, 4.0]}}}],
+            }
+        ],
+    ),
+    "coupled joint, slower record, held drive": document(
+        sample_rate=250.0,
+        duration=0.4,
+        drive_rate=500.0,
+        precision="float64",
+        channels=["force", "joint/force_1", "joint/displacement_2", "axial"],
+        sensors=[],
+        rigs=[
+            {"rig": "joint", "elements": [{"law": "axial_torsional_joint", "joints": ["axial", "torsional"], "name": "joint"}]},
+            {"rig": "joint", "name": "free", "elements": [{"law": "linear", "joints": ["axial"]}]},
+        ],
+        excitations=[{"signals": {"force": {"type": "harmonic", "frequency": {"uniform": [1.0, 5.0]}, "amplitude": 10.0}}}],
+    ),
+}
+
+
+@pytest.mark.parametrize("name", RIGS)
+def test_records_are_those_of_simulate_and_measure_to_the_last_bit(name: str) -> None:
+    plan = document(channels=RIGS[name].get("channels", [])) | RIGS[name]
+    if name.startswith("coupled"):
+        plan["channels"] = [channel for channel in plan["channels"] if channel != "axial"]
+    generator = Generator(plan_from_dict(plan))
+    part = generator.part(1)
+    assert part.failures == []
+    compared = 0
+    for place, record in enumerate(part.good):
+        alone = generator.rebuild(record)
+        for row, channel in enumerate(generator.channels):
+            assert part.has[row, place] == (channel.name in alone.names)
+            if part.has[row, place]:
+                np.testing.assert_array_equal(part.values[row, place], alone[channel.name])
+                compared += 1
+    assert compared > 5
+
+
+def test_same_bytes_for_any_number_of_threads(reference: Path, tmp_path: Path) -> None:
+    run_campaign(document(), tmp_path / "threads", threads=3)
+    assert hashes(tmp_path / "threads") == hashes(reference)
+    generator = generator_of(payload_of(plan_from_dict(document())))
+    np.testing.assert_array_equal(generator.part(2, threads=1).values, generator.part(2, threads=2).values)
+
+
+def test_records_do_not_depend_on_how_they_are_cut_into_parts(reference: Path, tmp_path: Path) -> None:
+    run_campaign(document(records_per_part=7), tmp_path / "other")
+    for kind in ("samples", "records"):
+        here, there = (ds.dataset(folder / kind).to_table() for folder in (reference, tmp_path / "other"))
+        assert here.equals(there)
+
+
+def test_data_set_reads_as_it_is(reference: Path) -> None:
+    table = ds.dataset(reference / "samples").to_table()
+    assert table.num_rows == 24 * 250
+    np.testing.assert_array_equal(table["record"].to_numpy(), np.repeat(np.arange(24), 250))
+    np.testing.assert_array_equal(table["sample"].to_numpy(), np.tile(np.arange(250), 24))
+    assert table.schema.field("displacement").metadata[b"unit"] == b"m"
+    one = ds.dataset(reference / "samples").to_table(filter=ds.field("record") == 17)
+    alone = Generator(plan_from_dict(document())).rebuild(17)
+    np.testing.assert_array_equal(one["velocity"].to_numpy(), alone["velocity"].astype(np.float32))
+    drawn = ds.dataset(reference / "records").to_table().to_pylist()
+    present = [row["carriage.bouc_wen/present"] for row in drawn]
+    assert 0 < sum(present) < 24
+    assert all((row["carriage.bouc_wen/A"] is None) != has for row, has in zip(drawn, present, strict=True))
+    assert all(1.0 <= row["structure/mass/carriage"] <= 3.0 for row in drawn)
+
+
+def test_one_record_is_one_row_group_of_long_records(tmp_path: Path) -> None:
+    run_campaign(document(records=2, duration=9.0, records_per_part=2), tmp_path / "long")
+    assert pq.ParquetFile(tmp_path / "long/samples/part-000000.parquet").num_row_groups == 2
+
+
+def test_resumes_after_a_stop_without_loss_or_repetition(reference: Path, tmp_path: Path) -> None:
+    def stop(progress: Progress) -> None:
+        if progress.records >= 9:
+            raise KeyboardInterrupt
+
+    folder = tmp_path / "stopped"
+    with pytest.raises(KeyboardInterrupt):
+        run_campaign(document(), folder, threads=1, progress=stop)
+    assert json.loads((folder / "manifest.json").read_text())["status"] == "stopped"
+    before = {path: path.stat().st_mtime_ns for path in (folder / "samples").iterdir()}
+    assert 3 <= len(before) < 8
+    result = run_campaign(document(), folder)
+    assert result.resumed == 3 * len(before)
+    assert hashes(folder) == hashes(reference)
+    assert {path: path.stat().st_mtime_ns for path in before} == before
+    assert run_campaign(document(), folder).resumed == 24
+
+
+def test_what_a_crash_can_leave_behind_is_cleared(reference: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "torn"
+    run_campaign(document(), folder)
+    (folder / "samples/part-000003.parquet").unlink()  # killed between the records and the samples of a part
+    (folder / ".partial/samples-part-000003.parquet.ab12").write_bytes(b"PAR1 half")
+    journal = (folder / "journal.jsonl").read_text().splitlines()
+    (folder / "journal.jsonl").write_text("\n".join(journal[:4]) + '\n{"part": 4, "fir')  # a torn line, and parts not noted
+    result = run_campaign(document(), folder)
+    assert result.resumed == 21
+    assert hashes(folder) == hashes(reference)
+    assert not list((folder / ".partial").iterdir())
+
+
+LONGER = {"records": 120, "records_per_part": 2, "duration": 2.0}
+
+
+def _child(plan: Path, folder: Path, *arguments: str) -> subprocess.Popen:
+    code = f"from bench.campaign import run_campaign; run_campaign({str(plan)!r}, {str(folder)!r}, {', '.join(arguments)})"
+    return subprocess.Popen([sys.executable, "-c", code], cwd=Path(__file__).parents[1])
+
+
+@pytest.mark.slow
+def test_resumes_after_kill_9_without_loss_or_repetition(tmp_path: Path) -> None:
+    plan = tmp_path / "plan.json"
+    plan.write_text(json.dumps(document(**LONGER)))
+    folder = tmp_path / "killed"
+    for least in (3, 12):  # killed twice, at whatever it is doing then
+        child = _child(plan, folder, "threads=2")
+        while len(list((folder / "samples").glob("*.parquet"))) < least:
+            assert child.poll() is None
+            time.sleep(0.002)
+        child.send_signal(signal.SIGKILL)
+        child.wait()
+        done = sorted((folder / "samples").glob("*.parquet"))
+        assert least <= len(done) < 60
+        for path in done:  # whole files only
+            pq.read_table(path)
+    assert json.loads((folder / "manifest.json").read_text())["status"] == "running"
+    result = run_campaign(plan, folder)
+    assert (result.records, result.resumed, result.failed) == (120, 2 * len(done), 0)
+    table = ds.dataset(folder / "samples").to_table(columns=["record"])
+    np.testing.assert_array_equal(table["record"].to_numpy(), np.repeat(np.arange(120), 2000))
+    run_campaign(plan, tmp_path / "whole")
+    assert hashes(folder) == hashes(tmp_path / "whole")
+
+
+@pytest.mark.slow
+def test_same_bytes_from_processes_one_of_which_is_killed(reference: Path, tmp_path: Path) -> None:
+    killed: list[int] = []
+
+    def kill(progress: Progress) -> None:
+        if not killed:
+            import multiprocessing
+
+            child = multiprocessing.active_children()[0]
+            assert child.pid is not None
+            os.kill(child.pid, signal.SIGKILL)
+            killed.append(child.pid)
+
+    result = run_campaign(document(), tmp_path / "processes", workers=2, progress=kill)
+    assert killed
+    assert result.means.startswith("2 processes")
+    assert hashes(tmp_path / "processes") == hashes(reference)
+
+
+def test_failing_records_are_set_aside_and_change_nothing_else(tmp_path: Path) -> None:
+    # a spring of 1e7 N/m on about 2 kg turns at 2.2e3 rad/s: 2.2 a step, and RK4 diverges above 2.8, so that of
+    # 1e6 to 1e8 N/m about half of the records do; a negative clearance never gets as far as the simulation
+    rig = json.loads(json.dumps(SDOF))
+    rig["elements"] = [
+        {
+            "law": "linear",
+            "joints": ["carriage"],
+            "parameters": {"stiffness": {"log_uniform": [1e6, 1e8]}},
+        },
+        {"law": "gap", "joints": ["carriage"], "parameters": {"clearance": {"uniform": [-0.001, 0.004]}}},
+    ]
+    plan = document(rigs=[rig])
+    result = run_campaign(plan, tmp_path / "diverging")
+    rows = ds.dataset(tmp_path / "diverging/records").to_table().to_pylist()
+    failed = [row for row in rows if row["status"] == "failed"]
+    assert 3 < len(failed) == result.failed < 24
+    assert [row["record"] for row in failed] == list(result.failures)
+    diverged = [row for row in failed if row["failed_at"] is not None]
+    assert all("diverged" in row["reason"] and "carriage.linear" in row["reason"] for row in diverged)
+    assert all("clearance" in row["reason"] for row in failed if row["failed_at"] is None)
+    assert 0 < len(diverged) < len(failed)
+    table = ds.dataset(tmp_path / "diverging/samples").to_table()
+    good = [row["record"] for row in rows if row["status"] == "ok"]
+    np.testing.assert_array_equal(table["record"].to_numpy(), np.repeat(good, 250))
+    generator = Generator(plan_from_dict(plan))
+    for record in good[:3]:
+        of_record = table.filter(ds.field("record") == record)
+        np.testing.assert_array_equal(
+            of_record["displacement"].to_numpy(), generator.rebuild(record)["displacement"].astype(np.float32)
+        )
+    resumed = run_campaign(plan, tmp_path / "diverging")
+    assert (resumed.failed, resumed.resumed) == (result.failed, 24)
+
+
+def test_answers_are_withheld_from_everything_else(tmp_path: Path) -> None:
+    rig = json.loads(json.dumps(SDOF))
+    rig["structure_withheld"] = True
+    rig["elements"][1]["withheld"] = True
+    rig["elements"][0]["parameters"]["clearance"] = {"uniform": [-0.001, 0.004]}  # some records fail and say why
+    folder = tmp_path / "blind"
+    result = run_campaign(document(rigs=[rig], seed=987_654_321), folder)
+    assert result.failed > 0
+    public = (folder / "manifest.json").read_text() + (folder / "journal.jsonl").read_text()
+    public += str(ds.dataset(folder / "records").to_table().to_pylist()) + str(ds.dataset(folder / "samples").schema)
+    for secret in ("bouc_wen", "987654321", "structure", "uniform': [1.0, 3.0]", "reason"):
+        assert secret not in public
+    assert "carriage.gap" in public
+    answers = ds.dataset(sorted((folder / "answers").glob("*.parquet"))).to_table().to_pylist()
+    assert {row["carriage.bouc_wen/present"] for row in answers} == {True, False}
+    assert all(1.0 <= row["structure/mass/carriage"] <= 3.0 for row in answers)
+    sealed = json.loads((folder / "answers/answers.json").read_text())
+    again = plan_from_dict(sealed["plan"])
+    assert again.sha256 == json.loads((folder / "manifest.json").read_text())["plan_sha256"]
+    for path in (folder / "answers").iterdir():
+        path.unlink()
+    (folder / "answers").rmdir()  # handed out without the answers
+    assert verify(folder) == []
+
+
+def test_progress_tells_rate_and_time_left(tmp_path: Path) -> None:
+    seen: list[Progress] = []
+    run_campaign(document(), tmp_path / "seen", threads=1, progress=seen.append)
+    assert [state.records for state in seen] == list(range(3, 25, 3))
+    assert all(state.rate == pytest.approx(state.records / state.elapsed) for state in seen)
+    assert seen[0].left > seen[-1].left == 0.0
+
+
+def test_folders_of_others_are_left_alone(reference: Path, tmp_path: Path) -> None:
+    with pytest.raises(CampaignError, match="another plan"):
+        run_campaign(document(seed=12), reference)
+    with pytest.raises(CampaignError, match="already"):
+        run_campaign(document(), reference, resume=False)
+    (tmp_path / "letters.txt").write_text("mine")
+    with pytest.raises(CampaignError, match="other files"):
+        run_campaign(document(), tmp_path)
+    with pytest.raises(ParameterError, match="workers"):
+        run_campaign(document(), tmp_path / "new", workers=0)
+    with pytest.raises(FileFormatError, match="no campaign"):
+        verify(tmp_path)
+
+
+def test_other_versions_do_not_mix_into_a_campaign(reference: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from bench.campaign import store
+
+    monkeypatch.setattr(store, "versions", lambda: {"mujoco": "4.0.99"})
+    with pytest.raises(CampaignError, match=r"4\.0\.99"):
+        run_campaign(document(), reference)
+
+
+def test_two_runs_do_not_work_in_one_folder(tmp_path: Path) -> None:
+    folder = tmp_path / "shared"
+    met: list[CampaignError] = []
+
+    def intrude(progress: Progress) -> None:
+        if not met:
+            with pytest.raises(CampaignError, match="another process") as caught:
+                run_campaign(document(), folder)
+            met.append(caught.value)
+
+    run_campaign(document(), folder, threads=1, progress=intrude)
+    assert met
+
+
+def test_damage_is_found(tmp_path: Path) -> None:
+    folder = tmp_path / "damaged"
+    run_campaign(document(), folder)
+    path = folder / "samples/part-000002.parquet"
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+    (folder / "records/part-000001.parquet").unlink()
+    assert verify(folder) == ["records/part-000001.parquet is missing", "samples/part-000002.parquet differs from what was written"]
+
+
+@pytest.mark.slow
+def test_a_cluster_gives_the_same_bytes_though_a_worker_is_killed(tmp_path: Path) -> None:
+    from distributed import Client, LocalCluster
+
+    plan = read_plan(_written(tmp_path / "plan.json", document(records=60)))
+    killed: list[int] = []
+    with (
+        LocalCluster(n_workers=3, threads_per_worker=1, processes=True, dashboard_address=None) as cluster,
+        Client(cluster) as client,
+    ):
+        workers = list(client.run(os.getpid).values())
+
+        def kill(progress: Progress) -> None:
+            if not killed:
+                os.kill(workers[0], signal.SIGKILL)
+                killed.append(workers[0])
+
+        result = run_campaign(plan, tmp_path / "cluster", scheduler=cluster.scheduler_address, progress=kill)
+    assert len(set(workers)) == 3
+    assert killed
+    assert (result.records, result.failed) == (60, 0)
+    run_campaign(plan, tmp_path / "alone")
+    assert hashes(tmp_path / "cluster") == hashes(tmp_path / "alone")
+
+
+def _written(path: Path, plan: dict) -> Path:
+    path.write_text(json.dumps(plan))
+    return path
+
+
+def test_an_absent_scheduler_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from distributed import Client
+
+    def refuse(address: str, timeout: float) -> Client:
+        raise OSError(f"timed out connecting to {address}")
+
+    monkeypatch.setattr("distributed.Client", refuse)
+    with pytest.raises(CampaignError, match=r"tcp://127\.0\.0\.1:9"):
+        run_campaign(document(), tmp_path / "none", scheduler="tcp://127.0.0.1:9")

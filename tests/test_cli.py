@@ -1,0 +1,118 @@
+"""The command line as a newcomer meets it: results, JSON, and messages without tracebacks."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bench.cli import main
+from bench.record_files import read_recording
+
+CONFIGURATION = """
+rig = "sdof"
+[structure.mass]
+carriage = 2.0
+[structure.stiffness]
+carriage = 1500.0
+[[elements]]
+law = "gap"
+joints = ["carriage"]
+parameters = { stiffness = 3000.0, clearance = 0.005 }
+[excitation]
+duration = 1.0
+sample_rate = 1000.0
+signals.shaker = { type = "harmonic", amplitude = 30.0, frequency = 4.0 }
+"""
+
+
+@pytest.fixture
+def configuration(tmp_path: Path) -> Path:
+    path = tmp_path / "gap.toml"
+    path.write_text(CONFIGURATION)
+    return path
+
+
+def test_simulate_writes_a_record_that_reads_back(configuration, tmp_path, capsys):
+    out = tmp_path / "gap.parquet"
+    assert main(["simulate", str(configuration), "-o", str(out), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    record = read_recording(out)
+    assert told["samples"] == len(record.time) == 1000
+    rows = {row["channel"]: row for row in told["channels"]}
+    assert rows["carriage.gap/force"]["max"] == record["carriage.gap/force"].max() > 0.0
+
+
+def test_view_saves_a_rerun_recording(configuration, tmp_path, capsys):
+    other = tmp_path / "wider.toml"
+    other.write_text(CONFIGURATION.replace("clearance = 0.005", "clearance = 0.01"))
+    out = tmp_path / "both.rrd"
+    assert main(["view", str(configuration), str(other), "-o", str(out)]) == 0
+    assert out.read_bytes()[:4] in {b"RRF2", b"RRIO"}
+    assert "rerun" in capsys.readouterr().out
+
+
+def test_laws_lists_and_describes(capsys):
+    assert main(["laws", "--json"]) == 0
+    names = {law["name"] for law in json.loads(capsys.readouterr().out)}
+    assert {"gap", "bouc_wen", "coulomb", "axial_torsional_joint"} <= names
+    assert main(["laws", "gap"]) == 0
+    assert "clearance" in capsys.readouterr().out
+
+
+def test_own_mjcf_with_an_element(tmp_path, capsys):
+    (tmp_path / "mine.xml").write_text(
+        """<mujoco><option gravity="0 0 0" timestep="0.002"/><worldbody><body><joint name="slider" type="slide"/>
+        <geom size=".1" mass="1"/></body></worldbody><actuator><motor name="motor" joint="slider"/></actuator></mujoco>"""
+    )
+    (tmp_path / "mine.toml").write_text(
+        CONFIGURATION.replace('"sdof"', '"mine.xml"')
+        .replace("[structure.mass]\ncarriage = 2.0\n[structure.stiffness]\ncarriage = 1500.0", "")
+        .replace('["carriage"]', '["slider"]')
+        .replace("signals.shaker", "signals.motor")
+        .replace("1000.0\n", "500.0\n")
+    )
+    out = tmp_path / "mine.parquet"
+    assert main(["simulate", str(tmp_path / "mine.toml"), "-o", str(out), "--json"]) == 0
+    capsys.readouterr()
+    record = read_recording(out)
+    assert record.sample_rate == 500.0
+    assert np.ptp(record["slider.gap/displacement"]) > 0.0
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('law = "gap"', 'law = "gapp"', "unknown law 'gapp'"),
+        ("clearance = 0.005", "clearanc = 0.005", "Did you mean 'clearance'"),
+        ("clearance = 0.005", "clearance = -1.0", "a finite value in [0, inf] is expected"),
+        ('joints = ["carriage"]', 'joints = ["cart"]', "unknown joint or tendon"),
+        ('joints = ["carriage"]', "", "needs the entries law and joints"),
+        ('rig = "sdof"', 'rig = "sdoff"', "Did you mean 'sdof'"),
+        ('rig = "sdof"', 'rig = "nowhere.xml"', "cannot read the model"),
+        ('rig = "sdof"', 'machine = "sdof"', "unknown entry of a rig configuration 'machine'"),
+        ("[excitation]", "[excite]", "unknown entry of a rig configuration 'excite'"),
+        ("signals.shaker", "signals.shakre", "Did you mean 'shaker'"),
+        ('"harmonic"', '"harmonics"', "Did you mean 'harmonic'"),
+        ("rig =", "rig ", "cannot read"),
+        ("sample_rate = 1000.0", "sample_rate = 700.0", "does not divide"),
+    ],
+)
+def test_mistakes_are_answered_in_one_sentence(configuration, tmp_path, capsys, old, new, message):
+    assert old in CONFIGURATION
+    configuration.write_text(CONFIGURATION.replace(old, new))
+    out = tmp_path / "none.parquet"
+    assert main(["simulate", str(configuration), "-o", str(out)]) == 2
+    error = capsys.readouterr().err
+    assert message in error.replace("\n", " ")
+    assert "Traceback" not in error
+    assert not out.exists()
+
+
+def test_missing_and_corrupted_files(tmp_path, capsys):
+    assert main(["simulate", str(tmp_path / "nope.toml")]) == 2
+    assert "cannot read" in capsys.readouterr().err
+    assert main(["view"]) == 2
+    assert "at least one rig configuration" in capsys.readouterr().err

@@ -1,0 +1,73 @@
+"""The wheel: built, installed in an empty environment, and used from there."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import venv
+import zipfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+USE = """
+import json, pathlib, subprocess, sys
+import numpy as np
+import bench
+assert "site-packages" in bench.__file__, bench.__file__
+assert bench.model_path("joint").parent.name == "_models"
+rig = bench.sdof_rig(bench.Element.of("gap", "carriage", stiffness=3000.0, clearance=0.005), mass=2.0)
+record = bench.simulate(rig, {"shaker": np.full(500, 10.0)})
+assert record["carriage.gap/force"].max() > 0.0
+from bench.data import friction_damper_names
+assert len(friction_damper_names()) == 8
+assert "torch" not in sys.modules
+"""
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory) -> Path:
+    out = tmp_path_factory.mktemp("dist")
+    command = [sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", str(out), str(ROOT)]
+    subprocess.run(command, check=True, capture_output=True)
+    return next(out.glob("*.whl"))
+
+
+@pytest.mark.slow
+def test_wheel_holds_code_models_data_and_licences_and_nothing_else(wheel):
+    names = zipfile.ZipFile(wheel).namelist()
+    tops = {name.split("/")[0] for name in names}
+    assert {top for top in tops if not top.endswith(".dist-info")} == {"bench", "envs"}
+    for expected in (
+        "bench/_models/sdof.xml",
+        "bench/_models/assets/apparatus.xml",
+        "bench/_data/friction_damper/ATTRIBUTION.md",
+        "bench/_data/friction_damper/LICENSE-CC-BY-SA-4.0.txt",
+        "bench/_data/friction_damper/1Hz_80lb.parquet",
+        "bench/_data/published_network.json",
+    ):
+        assert expected in names
+    assert not [name for name in names if "__pycache__" in name or name.endswith((".nbi", ".nbc", ".so"))]
+    metadata = zipfile.ZipFile(wheel).read(next(name for name in names if name.endswith("METADATA"))).decode()
+    core = [
+        line for line in metadata.splitlines() if line.startswith("Requires-Dist") and "extra ==" not in line
+    ]
+    assert not [line for line in core if "torch" in line or "stable" in line]
+
+
+@pytest.mark.slow
+def test_wheel_works_in_an_empty_environment(wheel, tmp_path):
+    environment = tmp_path / "venv"
+    venv.create(environment, with_pip=True)
+    python = environment / "bin" / "python"
+    subprocess.run([python, "-m", "pip", "install", "--quiet", str(wheel)], check=True, capture_output=True)
+    subprocess.run([python, "-c", USE], check=True, cwd=tmp_path)
+    laws = subprocess.run(
+        [environment / "bin" / "jointbench", "laws", "--json"],
+        check=True,
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+    )
+    assert '"bouc_wen"' in laws.stdout
