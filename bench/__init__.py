@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 try:
@@ -31,6 +30,7 @@ _HOMES = {
     "Parameter": "bench.laws",
     "Element": "bench.rig",
     "Rig": "bench.rig",
+    "model_path": "bench.mjcf",
     "simulate": "bench.rig",
     "simulate_batch": "bench.rig",
     "sdof_rig": "bench.rig.library",
@@ -46,6 +46,7 @@ _HOMES = {
 if TYPE_CHECKING:
     from bench.errors import BenchError
     from bench.laws import LAWS, ForceLaw, Parameter
+    from bench.mjcf import model_path
     from bench.record_files import read_recording, write_recording
     from bench.recording import Channel, Recording
     from bench.reduction import compare, reduce
@@ -76,25 +77,6 @@ __all__ = [
     "simulate_batch",
     "write_recording",
 ]
-
-
-def model_path(name: str) -> Path:
-    """Path of one of the bench's MJCF models.
-
-    Args:
-        name: Name without suffix: "sdof", "damper", "joint", "joint_laboratory", "chain", "joint_6dof", …
-
-    Raises:
-        UnknownNameError: There is no such model.
-    """
-    here = Path(__file__).resolve().parent
-    folder = here / "_models" if (here / "_models").is_dir() else here.parent / "models"  # wheel, or source tree
-    path = folder / f"{name}.xml"
-    if not path.is_file():
-        from bench.errors import UnknownNameError  # noqa: PLC0415
-
-        raise UnknownNameError("model", name, [file.stem for file in folder.glob("*.xml")])
-    return path
 
 
 def __getattr__(name: str) -> Any:

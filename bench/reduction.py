@@ -37,7 +37,7 @@ def reduce(
     data: JointData,
     joints: Sequence[str],
     *,
-    kind: Literal["polynomial", "network"] = "network",
+    model: Literal["polynomial", "network"] = "network",
     name: str = "joint",
     rng: np.random.Generator | None = None,
     **settings: object,
@@ -47,22 +47,22 @@ def reduce(
     Args:
         data: States and restoring forces, of all training records together.
         joints: Joints or fixed tendons that the element will act on, in the order of the data's columns.
-        kind: "polynomial" (settings as of `fit_polynomial`) or "network" (as of `fit_network`).
+        model: "polynomial" (settings as of `fit_polynomial`) or "network" (as of `fit_network`).
         name: Name of the element; the true one's, so that channels of both rigs compare.
         rng: Source of the network's random starts.
         **settings: Passed on.
 
     Raises:
-        UnknownNameError: `kind` is neither.
+        UnknownNameError: `model` is neither.
         IdentificationError: The data do not determine the model.
     """
-    if kind == "polynomial":
+    if model == "polynomial":
         return element_from(fit_polynomial(data.states, data.forces, **settings), joints, name=name)  # type: ignore[arg-type]
-    if kind == "network":
+    if model == "network":
         generator = rng if rng is not None else np.random.default_rng(0)
-        model = fit_network(data.states, data.forces, rng=generator, **settings)  # type: ignore[arg-type]
-        return element_from(model, joints, name=name)
-    raise UnknownNameError("kind of reduced-order model", kind, ("polynomial", "network"))
+        fitted = fit_network(data.states, data.forces, rng=generator, **settings)  # type: ignore[arg-type]
+        return element_from(fitted, joints, name=name)
+    raise UnknownNameError("reduced-order model", model, ("polynomial", "network"))
 
 
 def compare(

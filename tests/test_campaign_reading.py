@@ -77,11 +77,11 @@ def test_batches_hold_all_windows(campaign: Path) -> None:
 
 def test_memory_does_not_grow_with_the_data_set(tmp_path: Path) -> None:
     peaks = []
-    for records in (16, 64):
+    for records in (4, 16):
         folder = tmp_path / str(records)
         # records of 10 000 samples, so that each is a row group of its own: 120 kB of three channels
-        run_campaign(PLAN | {"records": records, "duration": 50.0, "records_per_part": 4}, folder)
-        windows = Windows(folder, 1000, buffer=4)
+        run_campaign(PLAN | {"records": records, "duration": 50.0, "records_per_part": 2}, folder)
+        windows = Windows(folder, 1000, buffer=2)
         next(iter(windows))  # imports
         tracemalloc.start()
         count = sum(1 for _ in windows)
@@ -90,7 +90,8 @@ def test_memory_does_not_grow_with_the_data_set(tmp_path: Path) -> None:
         assert count == 10 * records
     # four times the records: the same buffer, give or take the list of row groups
     assert peaks[1] < 1.3 * peaks[0]
-    assert peaks[1] < 3_000_000  # twice over four records of 120 kB, the next four being read while the old are let go
+    # two records of 120 kB and the next two being read while the old are let go, with Python's own small change
+    assert peaks[1] < 1_000_000
 
 
 @pytest.mark.slow

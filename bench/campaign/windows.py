@@ -162,20 +162,9 @@ class Windows:
 
     def torch(self) -> Any:
         """The windows as a `torch.utils.data.IterableDataset` of dictionaries, divided among a loader's processes."""
-        import torch.utils.data as data  # noqa: PLC0415
+        from bench.campaign.torch_windows import WindowDataset  # noqa: PLC0415
 
-        windows = self
-
-        class Dataset(data.IterableDataset):
-            def __iter__(self) -> Iterator[dict[str, Any]]:
-                worker = data.get_worker_info()
-                rank, count = (0, 1) if worker is None else (worker.id, worker.num_workers)
-                return (window._asdict() for window in windows.share(rank, count))
-
-            def __len__(self) -> int:
-                return len(windows)
-
-        return Dataset()
+        return WindowDataset(self)
 
     def _read(self, part: int, group: int, count: int) -> tuple[NDArray, NDArray, NDArray]:
         """Records ``(count,)``, values ``(count, n_samples, n_channels)`` and parameters of one row group."""

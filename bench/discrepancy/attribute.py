@@ -109,7 +109,12 @@ def _targets(case: Case, effect: Effect, structure: Structure, place) -> list[st
 
 
 def attribute(
-    problem: Problem, candidates: Sequence[Placed], *, most: int = 3, progress: Callable[[str], None] = lambda text: None
+    problem: Problem,
+    candidates: Sequence[Placed],
+    *,
+    most: int = 3,
+    progress: Callable[[str], None] = lambda text: None,
+    prepared: tuple[Search, Screen, list[Point]] | None = None,
 ) -> Search:
     """Search the hypotheses of up to `most` effects.
 
@@ -118,17 +123,15 @@ def attribute(
         candidates: Effects at their places.
         most: Largest number of effects.
         progress: Called with a line of text at every stage.
+        prepared: What `prepare` returned for the same arguments, where it was called before.
 
     Returns:
         All fits made.
     """
-    search = Search(problem)
     with ThreadPoolExecutor(THREADS) as pool:
-        nothing = fit(problem, (), start=np.zeros(len(problem.nominal)))
-        search.add(nothing)
+        search, screen, points = prepared or prepare(problem, candidates, pool.map)
+        nothing = search.ranked(0)[0]
         progress(f"nominal model: chi-squared {nothing.reduced:.3g} of its expectation")
-        screen = Screen(problem, candidates, pool.map)
-        points = screen.ranked()
         at_ease = consistent(nothing) and nothing.cost - nothing.chi2 < len(problem.nominal) + WORTH_A_FIT / 2
         if at_ease and (not points or points[0].gain < WORTH_A_FIT):
             return search
@@ -144,11 +147,27 @@ def attribute(
                 _reduce(search, pool)
                 continue
             ranked = search.ranked(size)
-            if ranked[0].reduced - 1.0 > STALLED * (search.ranked(size - 1)[0].reduced - 1.0):
+            if not ranked or ranked[0].reduced - 1.0 > STALLED * (search.ranked(size - 1)[0].reduced - 1.0):
                 break
             _extend(search, screen, ranked[: 4 - size], pool, seconds=6 - size)
             _reduce(search, pool)
     return search
+
+
+def prepare(
+    problem: Problem, candidates: Sequence[Placed], each: Callable = map
+) -> tuple[Search, Screen, list[Point]]:
+    """Fit the nominal model and screen the catalogue: the cheap part of an attribution.
+
+    Args:
+        problem: Records and priors.
+        candidates: Effects at their places.
+        each: Maps a function over items, in threads where wanted.
+    """
+    search = Search(problem)
+    search.add(fit(problem, (), start=np.zeros(len(problem.nominal))))
+    screen = Screen(problem, candidates, each)
+    return search, screen, screen.ranked()
 
 
 def names(hypothesis: Hypothesis) -> str:

@@ -8,21 +8,36 @@ the groups alone do not reach the noise. Chi-squared and evidence add over group
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 
-from bench.discrepancy.attribute import QUICK, STALLED, Search, attribute, consistent, placements, posterior
+from bench.discrepancy.attribute import (
+    QUICK,
+    STALLED,
+    THREADS,
+    WORTH_A_FIT,
+    Search,
+    attribute,
+    consistent,
+    names,
+    placements,
+    posterior,
+    prepare,
+)
 from bench.discrepancy.case import Case, CaseRecord
 from bench.discrepancy.effect import Effect
 from bench.discrepancy.fit import Fit, fit
 from bench.discrepancy.problem import Array, Hypothesis, Placed, Problem, band_bins, whitened
-from bench.discrepancy.screen import Screen
+from bench.discrepancy.screen import Point, Screen
 from bench.discrepancy.structure import Structure, structure_of
 
 HELPFUL = 0.3
 """A catalogued explanation that leaves less than this part of the excess is kept under a closure; others only disturb it."""
+PROMISING = 4.0
+"""Reduced chi-squared that a screening must promise in every group, if groups are to be searched before couplings."""
 KEPT = 12
 """Hypotheses of a group that are combined with those of other groups."""
 
@@ -95,48 +110,74 @@ def explain(
         found = [Explanation(((problem, fitted),)) for fitted in search.ranked()]
         return found if problem.noise_stated else _parsimonious(found)
     bins = _common_bins(case, structure)
-    searches = []
+    whole = Problem(case, structure, case.identification, bins)
+    prepared = []
     for group in groups:
         part = structure.restricted(group)
         problem = Problem(case, part, case.identification, bins)
-        progress(f"degrees of freedom {', '.join(part.dofs)}")
-        searches.append(attribute(problem, placements(case, part, catalogue), most=2, progress=progress))
+        progress(f"screening of {', '.join(part.dofs)}")
+        prepared.append(prepare(problem, placements(case, part, catalogue)))
+    odd = [entry for entry in prepared if not consistent(entry[0].ranked(0)[0])]
+    coupled: list[Fit] = []
+    if len(odd) > 1 and max(_promise(entry) for entry in odd) > PROMISING:
+        coupled = _coupled(whole, catalogue, most, progress)
+    searches = [entry[0] for entry in prepared]
+    if not (coupled and consistent(coupled[0])):
+        for entry in prepared:
+            problem = entry[0].problem
+            progress(f"degrees of freedom {', '.join(problem.structure.dofs)}")
+            chosen = placements(case, problem.structure, catalogue)
+            attribute(problem, chosen, most=2, progress=progress, prepared=entry)
     found = _combined(searches)
-    if not found[0].consistent:
-        progress("effects that couple the degrees of freedom")
-        whole = Problem(case, structure, case.identification, bins)
-        found += [Explanation(((whole, fitted),)) for fitted in _coupled(whole, searches, catalogue, most)]
-        found.sort(key=lambda e: -e.log_posterior)
-    return found
+    if odd and not coupled and not found[0].consistent:
+        coupled = _coupled(whole, catalogue, most, progress)
+    found += [Explanation(((whole, fitted),)) for fitted in coupled]
+    return sorted(found, key=lambda e: -e.log_posterior)
 
 
-def _coupled(whole: Problem, searches: Sequence[Search], catalogue: Sequence[Effect], most: int) -> list[Fit]:
-    """Fit the coupling effects, alone and with the best single effects of the groups."""
-    structure = whole.structure
-    coupling = [p for p in placements(whole.case, structure, catalogue) if p.effect.n_coordinates > 1]
-    screen = Screen(whole, coupling)
+def _promise(entry: tuple[Search, Screen, list[Point]]) -> float:
+    """Reduced chi-squared that the best grid point of a screening promises."""
+    search, _, points = entry
+    nothing = search.ranked(0)[0]
+    gain = points[0].gain if points else 0.0
+    return (nothing.chi2 - gain) / nothing.n_residuals
+
+
+def _coupled(whole: Problem, catalogue: Sequence[Effect], most: int, progress: Callable[[str], None]) -> list[Fit]:
+    """Search explanations that hold an effect which couples the groups; by decreasing posterior."""
+    progress("effects that couple the degrees of freedom")
+    candidates = [p for p in placements(whole.case, whole.structure, catalogue) if p.effect.site == "joint"]
     kept = Search(whole)
-    for placed in coupling:
-        points = [point for point in screen.ranked() if point.placed.key == placed.key]
-        if points:
-            start = np.concatenate([np.zeros(len(whole.nominal)), points[0].eta])
-            kept.add(fit(whole, (placed,), start=start))
-    companions = _shortlist(searches, structure)
-    for _ in range(1, most):
-        if not kept.fits or consistent(kept.ranked()[0]):
-            break
-        base = kept.ranked()[0]
-        own = {placed.key for placed in base.hypothesis}
-        trials = []
-        for placed, eta in companions:
-            if placed.key not in own:
-                start = np.concatenate([base.vector, eta])
-                trials.append(fit(whole, (*base.hypothesis, placed), start=start, iterations=QUICK))
-        trials.sort(key=lambda f: -f.log_evidence)
-        for trial in trials[:2]:
-            kept.add(fit(whole, trial.hypothesis, start=trial.vector))
-        if kept.ranked()[0] is base:
-            break
+    with ThreadPoolExecutor(THREADS) as pool:
+        screen = Screen(whole, candidates, pool.map)
+        coupling = {p.key for p in candidates if p.effect.n_coordinates > 1}
+        starts = {}
+        for point in screen.ranked():
+            if point.placed.key in coupling:
+                starts.setdefault(point.placed.key, point)
+        zero = np.zeros(len(whole.nominal))
+        for fitted in pool.map(lambda p: fit(whole, (p.placed,), start=np.append(zero, p.eta)), starts.values()):
+            kept.add(fitted)
+        for _ in range(1, most):
+            if not kept.fits:
+                break
+            base = kept.ranked()[0]
+            progress(f"{names(base.hypothesis)}, chi-squared {base.reduced:.3g}")
+            best_points: dict[tuple[str, str, str], Point] = {}
+            for point in screen.ranked(base):
+                best_points.setdefault(point.placed.key, point)
+            worth = [p for p in list(best_points.values())[:4] if p.gain > WORTH_A_FIT]
+            if not worth:
+                break
+
+            def extended(point: Point, base: Fit = base) -> Fit:
+                start = np.append(base.vector, point.eta)
+                return fit(whole, (*base.hypothesis, point.placed), start=start, iterations=QUICK)
+
+            trials = sorted(pool.map(extended, worth), key=lambda f: -f.log_evidence)
+            kept.add(fit(whole, trials[0].hypothesis, start=trials[0].vector, iterations=20))
+            if kept.ranked()[0] is base:
+                break
     return kept.ranked()
 
 
@@ -172,19 +213,6 @@ def _combined(searches: Sequence[Search]) -> list[Explanation]:
     ]
     found = [Explanation(tuple(parts)) for parts in product(*ranked)]
     return sorted(found, key=lambda e: -e.log_posterior)
-
-
-def _shortlist(searches: Sequence[Search], structure: Structure, count: int = 3) -> list[tuple[Placed, Array]]:
-    """Single effects that did best in their group, as effects on the whole structure with their fitted parameters."""
-    places = {place.name: place for place in structure.places}
-    chosen = []
-    for search in searches:
-        joint = [f for f in search.ranked(1) if f.hypothesis[0].effect.site == "joint"]
-        for fitted in joint[:count]:
-            placed = fitted.hypothesis[0]
-            _, etas = search.problem.split(fitted.hypothesis, fitted.vector)
-            chosen.append((Placed(placed.effect, places[placed.place.name], placed.target), etas[0]))
-    return chosen
 
 
 def close(best: Explanation, closures: Sequence[Effect]) -> tuple[Explanation, str]:

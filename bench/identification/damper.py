@@ -238,9 +238,9 @@ def fit_design_model_online(
     last = t >= t[-1] - 2.0 / frequency
     coefficient, exponent = float(np.mean(coefficients[last])), float(np.mean(exponents[last]))
     final = float(np.mean(log_peak[last]))
-    # log force error at the peak speed and at a fifth of it
+    # log force error at the peak speed and at half of it
     away = np.maximum(
-        np.abs(log_peak - final), np.abs(log_peak - final + (exponents - exponent) * math.log(0.2))
+        np.abs(log_peak - final), np.abs(log_peak - final + (exponents - exponent) * math.log(0.5))
     ) > math.log(1.1)
     outside = np.flatnonzero(away)
     settled = 0.0 if outside.size == 0 else float((t[outside[-1]] - t[0]) * frequency)

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import make_interp_spline
 
-from bench import model_path
 from bench.errors import ModelError, ParameterError, RecordingError
+from bench.mjcf import model_path
 from bench.rig.description import Rig
 from bench.rig.element import Element
 

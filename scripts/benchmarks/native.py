@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import mujoco
 import numpy as np
-from benchmarks.timing import Row, interleave, ratio_row
 from mujoco import rollout
 from mujoco.batch import Batch
 
 from bench import Element, joint_rig, native, sdof_rig
 from bench.rig import Rig
+from benchmarks.timing import Row, interleave, ratio_row
 
 STEPS = 20_000
 N_BATCH = 64

@@ -1,0 +1,180 @@
+"""Regenerate docs/results.md: every capability, the command that shows it, and the figure it gave last.
+
+    python scripts/results.py                 all that the repository can show by itself
+    python scripts/results.py demo native     only these
+    python scripts/results.py --data FOLDER   also those that need measured records which are not shipped
+
+Figures of what is not run are kept from last time (docs/results.json).
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import tyro
+from rich.console import Console
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT / "scripts"))
+
+from benchmark import machine  # noqa: E402
+
+from bench.files import write_text  # noqa: E402
+
+Figures = list[tuple[str, str, str]]
+"""(what, figure, what must hold)"""
+
+
+@dataclass(frozen=True)
+class Capability:
+    """Something the bench can do, shown by one command."""
+
+    name: str
+    title: str
+    command: tuple[str, ...]
+    figures: Callable[[Any], Figures] = field(repr=False)
+    data: str = ""  # folder of measured records that it needs and that is not shipped
+
+    def shown(self) -> str:
+        """The command as a person types it."""
+        return " ".join(part.replace("{data}", "FOLDER") for part in self.command)
+
+
+def _demo(told: Any) -> Figures:
+    rows = []
+    for model in told["joint"]:
+        closed = model["force_nmse_percent"]
+        figure = "diverges" if closed is None else f"{closed['axial']:.3f} % / {closed['torsional']:.3f} %"
+        limits = {
+            "published network (30)": "0.2 to 0.5 %",
+            "network (30)": "no worse than the published one",
+            "network (40)": "≤ 0.10 %",
+        }
+        rows.append((f"deck joint, {model['model']}: force NMSE, closed loop, unseen", figure, limits.get(model["model"], "")))
+        open_loop = model["open_loop_force_nmse_percent"]
+        figure = f"{open_loop['axial']:.3f} % / {open_loop['torsional']:.3f} %"
+        rows.append((f"deck joint, {model['model']}: force NMSE on the true states", figure, ""))
+    for test in told["damper"]:
+        for model, value in test["force_nrmse"].items():
+            limit = "≤ 0.25" if model == "parametric" else ""
+            rows.append((f"real damper, {test['tension_lbf']} lbf, {model}: force NRMSE, unseen", f"{value:.3f}", limit))
+    rows.append(("time of the computation", f"{told['seconds']:.0f} s", "≤ 90 s with the installation left out"))
+    return rows
+
+
+def _benchmark(told: Any) -> Figures:
+    return [
+        (f"{row['name']}: {row['meaning']}", f"{row['ratio']:.3g} ({row['spread'][0]:.3g} to {row['spread'][1]:.3g})", row["limit"])
+        for rows in told["groups"].values()
+        for row in rows
+    ]
+
+
+def _bouc_wen(told: Any) -> Figures:
+    values = told["nrmse_percent"]
+    return [(f"{name.replace('_', ' ')}: NRMSE of the displacement", f"{values[name]:.4f} %", limit) for name, limit in (
+        ("multisine", "≤ 0.05 %"),
+        ("sweep", "≤ 0.05 %"),
+        ("sweep_without_decimation_filter", ""),
+    )]
+
+
+def _benchmark_group(name: str, title: str) -> Capability:
+    return Capability(name, title, ("python", "scripts/benchmark.py", name, "--json"), _benchmark)
+
+
+CAPABILITIES: Sequence[Capability] = (
+    Capability("demo", "The main job", ("jointbench", "demo", "--json"), _demo),
+    _benchmark_group("native", "Native callbacks"),
+    Capability(
+        "bouc_wen",
+        "Published Bouc-Wen benchmark, its own parameters",
+        ("python", "scripts/bouc_wen_benchmark.py", "{data}/bouc_wen_benchmark", "--json"),
+        _bouc_wen,
+        data="bouc_wen_benchmark",
+    ),
+)
+
+
+@dataclass
+class Args:
+    """Regenerate docs/results.md."""
+
+    names: tyro.conf.Positional[tuple[str, ...]] = ()
+    """Capabilities to run; all that can run where none is named."""
+    data: Path | None = None
+    """Folder of the measured records that are not shipped."""
+
+
+def main() -> int:
+    """Run what was asked for, keep the rest, write the page."""
+    args = tyro.cli(Args, description=__doc__)
+    known = {capability.name for capability in CAPABILITIES}
+    unknown = sorted(set(args.names) - known)
+    if unknown:
+        print(f"unknown capability {', '.join(unknown)}; known: {', '.join(sorted(known))}", file=sys.stderr)
+        return 2
+    store = ROOT / "docs" / "results.json"
+    results: dict[str, Any] = json.loads(store.read_text(encoding="utf-8")) if store.exists() else {}
+    console = Console(stderr=True)
+    failed = False
+    for capability in CAPABILITIES:
+        wanted = capability.name in args.names or not args.names
+        if not wanted or (capability.data and (args.data is None or not (args.data / capability.data).is_dir())):
+            continue
+        with console.status(f"running {capability.name}"):
+            told = _run(capability, args.data)
+        if told is None:
+            failed = True
+            continue
+        results[capability.name] = {
+            "figures": capability.figures(told),
+            "date": datetime.now(UTC).date().isoformat(),
+            "machine": machine(),
+        }
+    write_text(store, json.dumps(results, indent=1, ensure_ascii=False) + "\n")
+    write_text(ROOT / "docs" / "results.md", _page(results))
+    return int(failed)
+
+
+def _run(capability: Capability, data: Path | None) -> Any:
+    here = Path(sys.executable).parent
+    command = [part.replace("{data}", str(data)) for part in capability.command]
+    command[0] = str(here / command[0])
+    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    try:
+        return json.loads(result.stdout)  # a benchmark whose limit does not hold exits with 1 and still reports
+    except json.JSONDecodeError:
+        print(f"{capability.name}: {capability.shown()} failed:\n{result.stderr[-2000:]}", file=sys.stderr)
+        return None
+
+
+def _page(results: dict[str, Any]) -> str:
+    lines = [
+        "# Results",
+        "Every capability, the command that shows it, and the figure it gave last. `python scripts/results.py` regenerates this page;",
+        "with `--data FOLDER` also what needs measured records that may not be shipped. Figures of time depend on the machine; ratios",
+        "are medians of interleaved runs, with the 10th and 90th percentile in brackets.",
+        "",
+    ]
+    for capability in CAPABILITIES:
+        entry = results.get(capability.name)
+        lines += [f"## {capability.title}", f"`{capability.shown()}`", ""]
+        if entry is None:
+            lines += ["Not run yet.", ""]
+            continue
+        lines += ["| what | figure | must hold |", "|---|---|---|"]
+        lines += [f"| {what} | {figure} | {limit} |" for what, figure, limit in entry["figures"]]
+        lines += ["", f"{entry['date']}, {entry['machine']['cores']} cores, Python {entry['machine']['python']}.", ""]
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
