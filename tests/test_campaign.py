@@ -37,7 +37,9 @@ SDOF = {
         },
     ],
 }
-NOISE = {"signals": {"shaker": {"type": "band_limited_noise", "cutoff": 60.0, "rms": {"uniform": [5.0, 20.0]}}}}
+NOISE = {
+    "signals": {"shaker": {"type": "band_limited_noise", "cutoff": 60.0, "rms": {"uniform": [5.0, 20.0]}}}
+}
 
 
 def document(**changes) -> dict:
@@ -58,7 +60,11 @@ def hashes(folder: Path) -> dict[str, str]:
     manifest = json.loads((folder / "manifest.json").read_text())
     assert manifest["status"] == "complete"
     assert verify(folder) == []
-    return {f"{kind}/{entry['part']}": file["sha256"] for entry in manifest["parts"] for kind, file in entry["files"].items()}
+    return {
+        f"{kind}/{entry['part']}": file["sha256"]
+        for entry in manifest["parts"]
+        for kind, file in entry["files"].items()
+    }
 
 
 @pytest.fixture(scope="module")
@@ -70,7 +76,13 @@ def reference(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 RIGS = {
     "sdof, every structural number": document(
-        channels=["shaker", "displacement", "carriage.gap/force", "carriage.bouc_wen/z", "carriage.bouc_wen/force"],
+        channels=[
+            "shaker",
+            "displacement",
+            "carriage.gap/force",
+            "carriage.bouc_wen/z",
+            "carriage.bouc_wen/force",
+        ],
         precision="float64",
     ),
     "exact friction, armature, frictionloss": document(
@@ -83,7 +95,14 @@ RIGS = {
                     "inertia": {"carriage": 0.01},
                     "stiffness": {"carriage": 900.0},
                 },
-                "elements": [{"law": "coulomb", "joints": ["carriage"], "exact": True, "parameters": {"limit": {"uniform": [1.0, 4.0]}}}],
+                "elements": [
+                    {
+                        "law": "coulomb",
+                        "joints": ["carriage"],
+                        "exact": True,
+                        "parameters": {"limit": {"uniform": [1.0, 4.0]}},
+                    }
+                ],
             }
         ],
     ),
@@ -95,10 +114,21 @@ RIGS = {
         channels=["force", "joint/force_1", "joint/displacement_2"],
         sensors=[],
         rigs=[
-            {"rig": "joint", "elements": [{"law": "axial_torsional_joint", "joints": ["axial", "torsional"], "name": "joint"}]},
+            {
+                "rig": "joint",
+                "elements": [
+                    {"law": "axial_torsional_joint", "joints": ["axial", "torsional"], "name": "joint"}
+                ],
+            },
             {"rig": "joint", "name": "free", "elements": [{"law": "linear", "joints": ["axial"]}]},
         ],
-        excitations=[{"signals": {"force": {"type": "harmonic", "frequency": {"uniform": [1.0, 5.0]}, "amplitude": 10.0}}}],
+        excitations=[
+            {
+                "signals": {
+                    "force": {"type": "harmonic", "frequency": {"uniform": [1.0, 5.0]}, "amplitude": 10.0}
+                }
+            }
+        ],
     ),
 }
 
@@ -174,11 +204,16 @@ def test_resumes_after_a_stop_without_loss_or_repetition(reference: Path, tmp_pa
 
 def test_what_a_crash_can_leave_behind_is_cleared(reference: Path, tmp_path: Path) -> None:
     folder = tmp_path / "torn"
+    folder.mkdir()
+    (folder / ".manifest.json.ab12.json").write_text("{")  # killed while the first manifest was written
     run_campaign(document(), folder)
+    assert not list(folder.glob(".manifest*"))
     (folder / "samples/part-000003.parquet").unlink()  # killed between the records and the samples of a part
     (folder / ".partial/samples-part-000003.parquet.ab12").write_bytes(b"PAR1 half")
     journal = (folder / "journal.jsonl").read_text().splitlines()
-    (folder / "journal.jsonl").write_text("\n".join(journal[:4]) + '\n{"part": 4, "fir')  # a torn line, and parts not noted
+    (folder / "journal.jsonl").write_text(
+        "\n".join(journal[:4]) + '\n{"part": 4, "fir'
+    )  # a torn line, and parts not noted
     result = run_campaign(document(), folder)
     assert result.resumed == 21
     assert hashes(folder) == hashes(reference)
@@ -272,16 +307,30 @@ def test_failing_records_are_set_aside_and_change_nothing_else(tmp_path: Path) -
     assert (resumed.failed, resumed.resumed) == (result.failed, 24)
 
 
+def test_sensors_that_do_not_fit_a_record_fail_that_record(tmp_path: Path) -> None:
+    filters = [{"type": "anti_alias", "cutoff": {"uniform": [300.0, 650.0]}}]
+    result = run_campaign(document(sensors=[{"chains": {"displacement": filters}}]), tmp_path / "filters")
+    rows = ds.dataset(tmp_path / "filters/records").to_table().to_pylist()
+    above = [row["record"] for row in rows if row["sensors/displacement/anti_alias/cutoff"] >= 500.0]
+    assert 0 < len(above) < 24
+    assert list(result.failures) == above
+    assert all("anti-alias" in rows[record]["reason"] for record in above)
+
+
 def test_answers_are_withheld_from_everything_else(tmp_path: Path) -> None:
     rig = json.loads(json.dumps(SDOF))
     rig["structure_withheld"] = True
     rig["elements"][1]["withheld"] = True
-    rig["elements"][0]["parameters"]["clearance"] = {"uniform": [-0.001, 0.004]}  # some records fail and say why
+    rig["elements"][0]["parameters"]["clearance"] = {
+        "uniform": [-0.001, 0.004]
+    }  # some records fail and say why
     folder = tmp_path / "blind"
     result = run_campaign(document(rigs=[rig], seed=987_654_321), folder)
     assert result.failed > 0
     public = (folder / "manifest.json").read_text() + (folder / "journal.jsonl").read_text()
-    public += str(ds.dataset(folder / "records").to_table().to_pylist()) + str(ds.dataset(folder / "samples").schema)
+    public += str(ds.dataset(folder / "records").to_table().to_pylist()) + str(
+        ds.dataset(folder / "samples").schema
+    )
     for secret in ("bouc_wen", "987654321", "structure", "uniform': [1.0, 3.0]", "reason"):
         assert secret not in public
     assert "carriage.gap" in public
@@ -349,7 +398,10 @@ def test_damage_is_found(tmp_path: Path) -> None:
     content[len(content) // 2] ^= 1
     path.write_bytes(content)
     (folder / "records/part-000001.parquet").unlink()
-    assert verify(folder) == ["records/part-000001.parquet is missing", "samples/part-000002.parquet differs from what was written"]
+    assert verify(folder) == [
+        "records/part-000001.parquet is missing",
+        "samples/part-000002.parquet differs from what was written",
+    ]
 
 
 @pytest.mark.slow

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -33,7 +35,13 @@ def document(**changes) -> dict:
             {
                 "rig": "sdof",
                 "structure": {"mass": {"carriage": {"uniform": [1.0, 3.0]}}},
-                "elements": [{"law": "gap", "joints": ["carriage"], "parameters": {"clearance": {"log_uniform": [1e-4, 1e-2]}}}],
+                "elements": [
+                    {
+                        "law": "gap",
+                        "joints": ["carriage"],
+                        "parameters": {"clearance": {"log_uniform": [1e-4, 1e-2]}},
+                    }
+                ],
             }
         ],
         "excitations": [{"signals": {"shaker": {"type": "harmonic", "frequency": {"uniform": [1.0, 9.0]}}}}],
@@ -45,10 +53,18 @@ def varied() -> dict:
     base = document()
     base["shared"] = {"level": {"log_uniform": [1.0, 4.0]}}
     base["rigs"][0]["elements"][0] |= {"probability": 0.5, "name": "stop"}
-    linear = {"law": "linear", "joints": ["carriage"], "parameters": {"stiffness": {"shared": "level", "times": 100.0}}}
+    linear = {
+        "law": "linear",
+        "joints": ["carriage"],
+        "parameters": {"stiffness": {"shared": "level", "times": 100.0}},
+    }
     base["rigs"].append({"rig": "sdof", "name": "spring", "weight": 3.0, "elements": [linear]})
     base["excitations"].append(
-        {"name": "noise", "rigs": ["spring"], "signals": {"shaker": {"type": "band_limited_noise", "cutoff": 40.0, "rms": {"shared": "level"}}}}
+        {
+            "name": "noise",
+            "rigs": ["spring"],
+            "signals": {"shaker": {"type": "band_limited_noise", "cutoff": 40.0, "rms": {"shared": "level"}}},
+        }
     )
     base["sensors"] = [{"chains": {"displacement": [{"type": "noise", "std": {"choice": [1e-5, 1e-4]}}]}}]
     return base
@@ -128,7 +144,10 @@ def test_parts_hold_every_record_once() -> None:
 
 
 def test_quantities_are_found_wherever_they_stand() -> None:
-    noise = {"type": "sum", "signals": [{"type": "constant", "value": Uniform(0.0, 1.0)}, {"type": "sweep", "band": [1.0, 2.0]}]}
+    noise = {
+        "type": "sum",
+        "signals": [{"type": "constant", "value": Uniform(0.0, 1.0)}, {"type": "sweep", "band": [1.0, 2.0]}],
+    }
     assert [path for path, _ in leaves(noise, "e")] == ["e/signals/0/value"]
 
 
@@ -141,10 +160,26 @@ def test_quantities_are_found_wherever_they_stand() -> None:
         ({"sampling": "grid"}, UnknownNameError, "latin_hypercube"),
         ({"rigs": []}, ParameterError, "no rigs"),
         ({"rigs": [{"name": "a"}]}, ParameterError, "rig missing"),
-        ({"rigs": [{"rig": "sdof", "elements": [{"law": "gpa", "joints": ["carriage"]}]}]}, UnknownNameError, "gap"),
-        ({"rigs": [{"rig": "sdof", "structure": {"mass": {"carriage": {"unifrom": [1, 2]}}}}]}, UnknownNameError, "uniform"),
-        ({"rigs": [{"rig": "sdof", "structure": {"mass": {"carriage": {"uniform": [2, 1]}}}}]}, ParameterError, "empty"),
-        ({"rigs": [{"rig": "sdof", "structure": {"mass": {"carriage": {"shared": "level"}}}}]}, UnknownNameError, "level"),
+        (
+            {"rigs": [{"rig": "sdof", "elements": [{"law": "gpa", "joints": ["carriage"]}]}]},
+            UnknownNameError,
+            "gap",
+        ),
+        (
+            {"rigs": [{"rig": "sdof", "structure": {"mass": {"carriage": {"unifrom": [1, 2]}}}}]},
+            UnknownNameError,
+            "uniform",
+        ),
+        (
+            {"rigs": [{"rig": "sdof", "structure": {"mass": {"carriage": {"uniform": [2, 1]}}}}]},
+            ParameterError,
+            "empty",
+        ),
+        (
+            {"rigs": [{"rig": "sdof", "structure": {"mass": {"carriage": {"shared": "level"}}}}]},
+            UnknownNameError,
+            "level",
+        ),
         ({"excitations": [{"signals": {}}]}, ParameterError, "signals"),
         ({"sensors": [{"chains": {"displacement": {"type": "noise"}}}]}, ParameterError, "list of stages"),
     ],
@@ -193,13 +228,28 @@ def test_unreadable_plans_are_file_errors(tmp_path: Path) -> None:
         read_plan(tmp_path / "torn.toml")
 
 
-@given(st.recursive(st.one_of(st.none(), st.booleans(), st.floats(), st.text()), lambda x: st.dictionaries(st.text(), x)))
+@given(
+    st.recursive(
+        st.one_of(st.none(), st.booleans(), st.floats(), st.text()), lambda x: st.dictionaries(st.text(), x)
+    )
+)
 def test_any_value_is_a_quantity_or_a_named_error(entry) -> None:
     try:
         quantity = read_quantity(entry, "x")
     except BenchError:
         return
     assert isinstance(quantity, bool | int | float | str | Distribution)
+
+
+def test_reading_a_plan_loads_nothing_heavy() -> None:
+    code = (
+        "import sys; from bench.campaign import read_plan; read_plan('examples/campaign.toml'); "
+        "print([name for name in ('mujoco', 'numba', 'pyarrow', 'torch', 'distributed', 'minari') if name in sys.modules])"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=EXAMPLES.parent, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == "[]"
 
 
 def test_plan_is_a_value() -> None:

@@ -22,7 +22,11 @@ PLAN = {
     "sample_rate": 200.0,
     "records_per_part": 5,
     "rigs": [
-        {"rig": "sdof", "timestep": 0.005, "structure": {"mass": {"carriage": {"uniform": [1.0, 3.0]}}, "stiffness": {"carriage": 300.0}}}
+        {
+            "rig": "sdof",
+            "timestep": 0.005,
+            "structure": {"mass": {"carriage": {"uniform": [1.0, 3.0]}}, "stiffness": {"carriage": 300.0}},
+        }
     ],
     "excitations": [{"signals": {"shaker": {"type": "band_limited_noise", "cutoff": 30.0, "rms": 5.0}}}],
     "channels": ["shaker", "displacement", "velocity"],
@@ -42,7 +46,14 @@ def table(campaign: Path):
 
 
 def test_every_window_comes_once_with_its_own_samples(campaign: Path, table) -> None:
-    windows = Windows(campaign, 30, stride=20, channels=["velocity", "shaker"], parameters=["structure/mass/carriage"], buffer=2)
+    windows = Windows(
+        campaign,
+        30,
+        stride=20,
+        channels=["velocity", "shaker"],
+        parameters=["structure/mass/carriage"],
+        buffer=2,
+    )
     seen = list(windows)
     assert len(windows) == len(seen) == 20 * 4
     assert {(w.record, w.start) for w in seen} == {(r, s) for r in range(20) for s in (0, 20, 40, 60)}
@@ -100,9 +111,19 @@ def test_torch_loader_gets_every_window_once(campaign: Path) -> None:
 
     dataset = Windows(campaign, 50, parameters=["structure/mass/carriage"]).torch()
     for workers in (0, 2):
-        batches = list(DataLoader(dataset, batch_size=8, num_workers=workers, multiprocessing_context="spawn" if workers else None))
+        batches = list(
+            DataLoader(
+                dataset,
+                batch_size=8,
+                num_workers=workers,
+                multiprocessing_context="spawn" if workers else None,
+            )
+        )
         assert sum(len(batch["values"]) for batch in batches) == len(dataset) == 40
-        assert len({(int(r), int(s)) for b in batches for r, s in zip(b["record"], b["start"], strict=True)}) == 40
+        assert (
+            len({(int(r), int(s)) for b in batches for r, s in zip(b["record"], b["start"], strict=True)})
+            == 40
+        )
         assert batches[0]["values"].shape[1:] == (50, 3)
 
 
@@ -145,7 +166,9 @@ def test_rollouts_follow_the_environment_and_their_seed() -> None:
     for episode, same in zip(rollouts, again, strict=False):
         np.testing.assert_array_equal(episode.observations, same.observations)
         n = len(episode.actions)
-        expected = episode.observations[:-1] + 0.1 * np.column_stack([episode.observations[:-1, 1], episode.actions[:, 0]])
+        expected = episode.observations[:-1] + 0.1 * np.column_stack(
+            [episode.observations[:-1, 1], episode.actions[:, 0]]
+        )
         np.testing.assert_array_equal(episode.observations[1:], expected)
         assert episode.rewards.shape == episode.terminations.shape == (n,)
         assert episode.terminations[-1] or episode.truncations[-1]

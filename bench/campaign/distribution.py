@@ -1,7 +1,7 @@
 """What a plan may write instead of a number: a distribution, given by its inverse cumulative distribution function.
 
-Everything random in a plan comes from one number ``u`` in [0, 1) a quantity, whether ``u`` is a random number, a coordinate of a
-Latin hypercube or of a Sobol sequence: the design of an experiment and the distributions of its factors stay independent.
+Everything random in a plan comes from one number ``u`` in [0, 1) a quantity, whether ``u`` is a random number, a coordinate
+of a Latin hypercube or of a Sobol sequence: the design of an experiment and the distributions of its factors stay apart.
 
 In a plan file a distribution is a table with its name as the key::
 
@@ -50,7 +50,9 @@ class Distribution(ABC):
 def _finite(kind: str, **values: float) -> None:
     for name, value in values.items():
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            raise ParameterError(f"{name} of the distribution '{kind}' is {value!r}; a finite number is expected")
+            raise ParameterError(
+                f"{name} of the distribution '{kind}' is {value!r}; a finite number is expected"
+            )
 
 
 @dataclass(frozen=True)
@@ -63,7 +65,9 @@ class Uniform(Distribution):
     def __post_init__(self) -> None:
         _finite("uniform", low=self.low, high=self.high)
         if not self.low < self.high:
-            raise ParameterError(f"uniform = [{self.low:g}, {self.high:g}] is empty; give the lower end first")
+            raise ParameterError(
+                f"uniform = [{self.low:g}, {self.high:g}] is empty; give the lower end first"
+            )
 
     def at(self, u: float) -> float:
         """``low + u (high - low)``."""
@@ -108,7 +112,9 @@ class Normal(Distribution):
 
     def __post_init__(self) -> None:
         _finite("normal", mean=self.mean, std=self.std)
-        if not (self.std > 0.0 and self.low < self.high) or self._probability(self.high) <= self._probability(self.low):
+        if not (self.std > 0.0 and self.low < self.high) or self._probability(self.high) <= self._probability(
+            self.low
+        ):
             raise ParameterError(
                 f"normal = [{self.mean:g}, {self.std:g}] between {self.low:g} and {self.high:g} came; std must be positive and "
                 "the interval must hold some probability"
@@ -142,7 +148,9 @@ class Integers(Distribution):
     def __post_init__(self) -> None:
         for value in (self.low, self.high):
             if isinstance(value, bool) or not isinstance(value, int):
-                raise ParameterError(f"integers = [{self.low!r}, {self.high!r}] came; two whole numbers are expected")
+                raise ParameterError(
+                    f"integers = [{self.low!r}, {self.high!r}] came; two whole numbers are expected"
+                )
         if self.low > self.high:
             raise ParameterError(f"integers = [{self.low}, {self.high}] is empty; give the lower end first")
 
@@ -164,9 +172,13 @@ class Choice(Distribution):
 
     def __post_init__(self) -> None:
         if not self.values or len({isinstance(value, str) for value in self.values}) != 1:
-            raise ParameterError(f"choice = {list(self.values)!r} came; a list of numbers, or one of names, is expected")
+            raise ParameterError(
+                f"choice = {list(self.values)!r} came; a list of numbers, or one of names, is expected"
+            )
         if self.weights and len(self.weights) != len(self.values):
-            raise ParameterError(f"choice has {len(self.values)} values and {len(self.weights)} weights; one each is expected")
+            raise ParameterError(
+                f"choice has {len(self.values)} values and {len(self.weights)} weights; one each is expected"
+            )
         if self.weights:
             check_weights("choice", self.weights)
 
@@ -247,7 +259,9 @@ def read_quantity(entry: Any, where: str) -> Quantity:
     if isinstance(entry, bool | int | float | str):
         return entry
     if not isinstance(entry, Mapping):
-        raise ParameterError(f"{where} is {entry!r}; a number or a distribution as {{ uniform = [0.0, 1.0] }} is expected")
+        raise ParameterError(
+            f"{where} is {entry!r}; a number or a distribution as {{ uniform = [0.0, 1.0] }} is expected"
+        )
     forms = [form for form in _FORMS if form in entry]
     if len(forms) != 1:
         raise UnknownNameError(f"distribution of {where}", ", ".join(map(str, entry)) or "{}", _FORMS)
@@ -264,7 +278,9 @@ def read_quantity(entry: Any, where: str) -> Quantity:
 def _made(form: str, argument: Any, options: Mapping[str, Any]) -> Quantity:
     if form == "shared":
         if not isinstance(argument, str):
-            raise ParameterError(f"shared = {argument!r} came; the name of an entry of the plan's table shared is expected")
+            raise ParameterError(
+                f"shared = {argument!r} came; the name of an entry of the plan's table shared is expected"
+            )
         _finite("shared", **options)
         return Shared(argument, **options)
     if not isinstance(argument, list | tuple):

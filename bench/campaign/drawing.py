@@ -49,8 +49,10 @@ class Draw(NamedTuple):
     values: Mapping[str, Value]
 
 
-def record_streams(plan: Plan, record: int) -> tuple[np.random.Generator, np.random.Generator, np.random.Generator]:
-    """The record's generators for its draw, its excitation and its sensors, from ``SeedSequence(seed, spawn_key=(record,))``."""
+def record_streams(
+    plan: Plan, record: int
+) -> tuple[np.random.Generator, np.random.Generator, np.random.Generator]:
+    """The record's generators for draw, excitation and sensors, from ``SeedSequence(seed, spawn_key=(record,))``."""
     draw, excitation, sensors = np.random.SeedSequence(plan.seed, spawn_key=(record,)).spawn(3)
     return np.random.default_rng(draw), np.random.default_rng(excitation), np.random.default_rng(sensors)
 
@@ -78,7 +80,8 @@ def point_of(plan: Plan, record: int) -> NDArray[np.float64]:
 def draw_at(plan: Plan, record: int, point: NDArray[np.float64]) -> Draw:
     """What a record draws whose point ``(dimension,)`` is given."""
     shared = {
-        name: quantity.at(float(u)) for (name, quantity), u in zip(plan.shared.items(), point[CHOICES:], strict=False)
+        name: quantity.at(float(u))
+        for (name, quantity), u in zip(plan.shared.items(), point[CHOICES:], strict=False)
     }
     rig = pick(float(point[0]), [entry.weight for entry in plan.rigs])
     excitation = _fitting(plan, plan.excitations, rig, float(point[1]))
@@ -87,7 +90,8 @@ def draw_at(plan: Plan, record: int, point: NDArray[np.float64]) -> Draw:
     rigs, excitations, _ = _blocks(plan)
     slots = iter(point[at:])
     present = tuple(
-        element.probability == 1.0 or float(next(slots)) < element.probability for element in plan.rigs[rig].elements
+        element.probability == 1.0 or float(next(slots)) < element.probability
+        for element in plan.rigs[rig].elements
     )
     values = {column: _value(quantity, slots, shared) for column, quantity, _ in plan.rigs[rig].quantities()}
     slots = iter(point[at + rigs :])
@@ -114,11 +118,14 @@ def median_draw(plan: Plan, rig: int, excitation: int, sensors: int) -> Draw:
 def _blocks(plan: Plan) -> tuple[int, int, int]:
     """Coordinates that the longest of the rigs, excitations and sensors takes."""
     rigs = max(
-        sum(element.probability < 1.0 for element in entry.elements) + _count(q for _, q, _ in entry.quantities())
+        sum(element.probability < 1.0 for element in entry.elements)
+        + _count(q for _, q, _ in entry.quantities())
         for entry in plan.rigs
     )
     excitations = max(_count(quantity for _, quantity in entry.quantities()) for entry in plan.excitations)
-    sensors = max((_count(quantity for _, quantity, _ in entry.quantities()) for entry in plan.sensors), default=0)
+    sensors = max(
+        (_count(quantity for _, quantity, _ in entry.quantities()) for entry in plan.sensors), default=0
+    )
     return rigs, excitations, sensors
 
 

@@ -13,7 +13,14 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor, wait
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+    ThreadPoolExecutor,
+    wait,
+)
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
@@ -23,7 +30,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from bench.campaign.plan import Plan
 from bench.campaign.reading import plan_from_dict, read_plan
-from bench.campaign.store import CampaignError, Store, counts, versions
+from bench.campaign.store import BYTES_DEPEND_ON, CampaignError, Store, counts, versions
 from bench.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -135,7 +142,9 @@ def run_campaign(
         if value is not None and (isinstance(value, bool) or value < 1):
             raise ParameterError(f"{name} is {value!r}; a whole number of at least 1 is expected")
     if scheduler is not None and workers is not None:
-        raise ParameterError("workers came together with a scheduler, which has workers of its own; give one of them")
+        raise ParameterError(
+            "workers came together with a scheduler, which has workers of its own; give one of them"
+        )
     payload = payload_of(plan)
     generator = generator_of(payload)
     generator.check()
@@ -217,7 +226,9 @@ def run_part(payload: str, folder: str, part: int, threads: int = 1) -> dict[str
 class _Tally:
     """Entries of the finished parts, and the progress that they make."""
 
-    def __init__(self, plan: Plan, entries: dict[int, dict[str, Any]], report: Callable[[Progress], None] | None) -> None:
+    def __init__(
+        self, plan: Plan, entries: dict[int, dict[str, Any]], report: Callable[[Progress], None] | None
+    ) -> None:
         self.plan, self.entries, self.report = plan, entries, report
         done = counts(list(entries.values()))
         self.before = self.records = done["records"]
@@ -239,7 +250,9 @@ class _Tally:
 Submit = Callable[[str, str, int], "Future[dict[str, Any]]"]
 
 
-def _run(parts: list[int], submit: Callable[[int], Future], window: Callable[[], int], store: Store, tally: _Tally) -> None:
+def _run(
+    parts: list[int], submit: Callable[[int], Future], window: Callable[[], int], store: Store, tally: _Tally
+) -> None:
     """Keep a window of parts in flight until all are done; give up those in flight when one raises."""
     queue, pending, crashes = deque(parts), {}, dict.fromkeys(parts, 0)
     try:
@@ -285,12 +298,20 @@ def _means(
     elif workers is None or workers == 1:
         count = threads or cores()
         with ThreadPoolExecutor(count, thread_name_prefix="campaign") as pool:
-            yield (lambda *task: pool.submit(run_part, *task)), (lambda: count), f"{count} thread{'s' * (count > 1)}"
+            yield (
+                (lambda *task: pool.submit(run_part, *task)),
+                (lambda: count),
+                f"{count} thread{'s' * (count > 1)}",
+            )
     else:
         count = threads or max(1, cores() // workers)
         processes = _Processes(workers, count)
         try:
-            yield processes.submit, (lambda: workers + 1), f"{workers} processes of {count} thread{'s' * (count > 1)}"
+            yield (
+                processes.submit,
+                (lambda: workers + 1),
+                f"{workers} processes of {count} thread{'s' * (count > 1)}",
+            )
         finally:
             processes.pool.shutdown(cancel_futures=True)
 
@@ -306,7 +327,9 @@ class _Processes:
         from multiprocessing import get_context  # noqa: PLC0415
 
         # not fork: MuJoCo's and numba's threads would not survive it
-        return ProcessPoolExecutor(self.workers, mp_context=get_context("spawn"), initializer=_leave_with_parent)
+        return ProcessPoolExecutor(
+            self.workers, mp_context=get_context("spawn"), initializer=_leave_with_parent
+        )
 
     def submit(self, payload: str, folder: str, part: int) -> Future:
         try:
@@ -341,7 +364,9 @@ def _cluster(address: str, threads: int, store: Store) -> Iterator[tuple[Submit,
     try:
         client = Client(address, timeout=10)
     except (OSError, TimeoutError, ValueError) as error:
-        raise CampaignError(f"no dask scheduler answers at {address} ({error}); start one with `dask scheduler`") from error
+        raise CampaignError(
+            f"no dask scheduler answers at {address} ({error}); start one with `dask scheduler`"
+        ) from error
     with client:
         _check_workers(client, store)
         executor = client.get_executor(pure=False, retries=2)
@@ -359,9 +384,17 @@ def _check_workers(client: Any, store: Store) -> None:
     """Raise `CampaignError` unless all workers see the folder and hold the same software."""
     for worker, sees in client.run(os.path.exists, str(store.manifest_path)).items():
         if not sees:
-            raise CampaignError(f"worker {worker} does not see {store.folder}; put `out` on a disk that all workers share")
+            raise CampaignError(
+                f"worker {worker} does not see {store.folder}; put `out` on a disk that all workers share"
+            )
     here = versions()
     for worker, there in client.run(versions).items():
-        different = [f"{name} {there.get(name)} (here {here[name]})" for name in here if there.get(name) != here[name]]
+        different = [
+            f"{name} {there.get(name)} (here {here[name]})"
+            for name in BYTES_DEPEND_ON
+            if there.get(name) != here[name]
+        ]
         if different:
-            raise CampaignError(f"worker {worker} has {', '.join(different)}; install the same versions everywhere")
+            raise CampaignError(
+                f"worker {worker} has {', '.join(different)}; install the same versions everywhere"
+            )

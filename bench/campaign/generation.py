@@ -161,7 +161,7 @@ class Generator:
             excitation = excitation_of(self.plan, draw)
             controls = controls_of(variant.rig, excitation, record_streams(self.plan, draw.record)[1])
             chains_of(self.plan, draw)
-        except BenchError as error:
+        except (BenchError, ArithmeticError, ValueError) as error:  # whatever one record's numbers lead to
             return Failure(draw.record, str(error), float("nan"))
         return _Ready(draw, place, thetas, controls)
 
@@ -186,16 +186,22 @@ class Generator:
                 failures.append(self._explained(item.draw.record))
         return failures
 
-    def _roll(self, variant: Variant, ready: Sequence[_Ready], threads: int) -> tuple[Rows, NDArray[np.bool_]]:
+    def _roll(
+        self, variant: Variant, ready: Sequence[_Ready], threads: int
+    ) -> tuple[Rows, NDArray[np.bool_]]:
         model = variant.rig.model
         steps = len(ready[0].controls)
-        controls = np.zeros((len(ready), steps, model.nu))  # the state actuators come last and take no command
+        controls = np.zeros(
+            (len(ready), steps, model.nu)
+        )  # the state actuators come last and take no command
         for index, item in enumerate(ready):
             controls[index, :, : item.controls.shape[1]] = item.controls
         batch = Batch(model, len(ready), threads)
         variant.fill(batch, [item.thetas for item in ready], [item.draw for item in ready])
         inside = any(variant.sources[c.name].item >= 0 for c in self.channels if c.name in variant.sources)
-        start = np.concatenate([batch.bind("time")[:, None], batch.bind("qpos"), batch.bind("qvel"), batch.bind("act")], axis=1)
+        start = np.concatenate(
+            [batch.bind("time")[:, None], batch.bind("qpos"), batch.bind("qvel"), batch.bind("act")], axis=1
+        )
         record: list = ["sensordata", *([STATE] if inside else [])]
         whole = np.ones(len(ready), dtype=bool)
         try:
@@ -225,7 +231,10 @@ class Generator:
                 continue
             column = variant.channel(channel.name, index, rows, item.thetas)
             if channel.name in chains:
-                column = chains[channel.name].apply(column, self.plan.sample_rate, streams[channel.name])
+                try:
+                    column = chains[channel.name].apply(column, self.plan.sample_rate, streams[channel.name])
+                except BenchError:  # found again, and told, by `_explained`
+                    return False
             # the sum of finite numbers of any size a rig can reach is finite; of one NaN or inf it is not
             if not np.isfinite(column.sum()):
                 return False

@@ -57,13 +57,20 @@ class ElementPlan:
 
     def __post_init__(self) -> None:
         if not 0.0 < self.probability <= 1.0:
-            raise ParameterError(f"probability of element '{self.name}' is {self.probability!r}; a number in (0, 1] is expected")
+            raise ParameterError(
+                f"probability of element '{self.name}' is {self.probability!r}; a number in (0, 1] is expected"
+            )
 
     def to_dict(self) -> dict[str, Any]:
         """As in a plan."""
         entry: dict[str, Any] = {"law": self.law, "joints": list(self.joints), "name": self.name}
         entry["parameters"] = {key: as_entry(value) for key, value in self.parameters.items()}
-        optional = {"header": list(self.header), "inputs": list(self.inputs), "exact": self.exact, "withheld": self.withheld}
+        optional = {
+            "header": list(self.header),
+            "inputs": list(self.inputs),
+            "exact": self.exact,
+            "withheld": self.withheld,
+        }
         entry |= {key: value for key, value in optional.items() if value}
         return entry | ({"probability": self.probability} if self.probability < 1.0 else {})
 
@@ -115,7 +122,11 @@ class RigPlan:
     def to_dict(self, *, public: bool = False) -> dict[str, Any]:
         """As in a plan; without what is withheld if `public`."""
         entry: dict[str, Any] = {"name": self.name, "rig": self.rig, "weight": self.weight}
-        optional = {"timestep": self.timestep, "integrator": self.integrator, "model_sha256": self.model_sha256}
+        optional = {
+            "timestep": self.timestep,
+            "integrator": self.integrator,
+            "model_sha256": self.model_sha256,
+        }
         entry |= {key: value for key, value in optional.items() if value}
         if not (public and self.structure_withheld):
             structure: dict[str, dict[str, Any]] = {}
@@ -188,7 +199,8 @@ class SensorPlan:
         if public and self.withheld:
             return entry
         stages = {
-            channel: [{"type": kind, **as_entry(node)} for kind, node in named.items()] for channel, named in self.chains.items()
+            channel: [{"type": kind, **as_entry(node)} for kind, node in named.items()]
+            for channel, named in self.chains.items()
         }
         return entry | {"chains": stages}
 
@@ -236,14 +248,19 @@ class Plan:
         for name, low in (("records", 1), ("seed", 0), ("records_per_part", 0)):
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, int) or value < low:
-                raise ParameterError(f"{name} of the campaign is {value!r}; a whole number of at least {low} is expected")
+                raise ParameterError(
+                    f"{name} of the campaign is {value!r}; a whole number of at least {low} is expected"
+                )
         for name in ("duration", "sample_rate", "drive_rate"):
             value = getattr(self, name)
             if value is None and name == "drive_rate":
                 continue
             if isinstance(value, bool | str) or not (math.isfinite(value) and value > 0.0):
                 raise ParameterError(f"{name} of the campaign is {value!r}; a positive number is expected")
-        if abs(self.duration * self.sample_rate - self.n_samples) > 1e-6 * self.n_samples or self.n_samples < 2:
+        if (
+            abs(self.duration * self.sample_rate - self.n_samples) > 1e-6 * self.n_samples
+            or self.n_samples < 2
+        ):
             raise ParameterError(
                 f"{self.duration:g} s at {self.sample_rate:g} Hz is not a whole number of samples (at least 2); "
                 "change the duration or the sample rate"
@@ -261,7 +278,11 @@ class Plan:
             if not members:
                 raise ParameterError(f"the campaign has no {what}; at least one [[{what}]] is expected")
         names = [rig.name for rig in self.rigs]
-        for what, members in (("rigs", self.rigs), ("excitations", self.excitations), ("sensors", self.sensors)):
+        for what, members in (
+            ("rigs", self.rigs),
+            ("excitations", self.excitations),
+            ("sensors", self.sensors),
+        ):
             _unique(what, [member.name for member in members])
             if members:
                 check_weights(what, [member.weight for member in members])
@@ -271,7 +292,9 @@ class Plan:
                     raise UnknownNameError(f"rig of '{member.name}'", rig, names)
         for index, rig in enumerate(self.rigs):
             if not self.fitting(self.excitations, index):
-                raise ParameterError(f"no excitation fits rig '{rig.name}'; leave `rigs` out of one, or name the rig in it")
+                raise ParameterError(
+                    f"no excitation fits rig '{rig.name}'; leave `rigs` out of one, or name the rig in it"
+                )
         _unique("channels", list(self.channels))
         for quantity in self.all_quantities():
             if isinstance(quantity, Shared) and quantity.name not in self.shared:
@@ -347,7 +370,9 @@ def as_entry(node: Node) -> Any:
 
 def leaves(node: Node, path: str) -> Iterator[tuple[str, Quantity]]:
     """(path, quantity) of the numbers and distributions in a nest; fixed names and lists of plain numbers are none."""
-    if isinstance(node, Distribution | Shared) or (isinstance(node, int | float) and not isinstance(node, bool)):
+    if isinstance(node, Distribution | Shared) or (
+        isinstance(node, int | float) and not isinstance(node, bool)
+    ):
         yield path, node
     elif isinstance(node, Mapping):
         for key, value in node.items():

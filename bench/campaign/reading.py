@@ -84,9 +84,13 @@ def plan_from_dict(document: Mapping[str, Any], *, folder: str | Path = ".") -> 
         name=str(entries.pop("name", "campaign")),
         rigs=tuple(_rig(entry, str(folder)) for entry in _tables("rigs", entries.pop("rigs"))),
         excitations=tuple(
-            _excitation(entry, index) for index, entry in enumerate(_tables("excitations", entries.pop("excitations")))
+            _excitation(entry, index)
+            for index, entry in enumerate(_tables("excitations", entries.pop("excitations")))
         ),
-        sensors=tuple(_sensors(entry, index) for index, entry in enumerate(_tables("sensors", entries.pop("sensors", [])))),
+        sensors=tuple(
+            _sensors(entry, index)
+            for index, entry in enumerate(_tables("sensors", entries.pop("sensors", [])))
+        ),
         shared=shared,
         channels=tuple(entries.pop("channels", ())),
         **entries,
@@ -111,13 +115,27 @@ def _tables(what: str, entries: Any) -> list[Any]:
 
 
 def _rig(entry: Mapping[str, Any], folder: str) -> RigPlan:
-    known = ("rig", "name", "weight", "timestep", "integrator", "structure", "structure_withheld", "elements", "model_sha256")
+    known = (
+        "rig",
+        "name",
+        "weight",
+        "timestep",
+        "integrator",
+        "structure",
+        "structure_withheld",
+        "elements",
+        "model_sha256",
+    )
     _check_entries("rig of a plan", entry, known, ("rig",))
     structure = []
     for kind, named in entry.get("structure", {}).items():
         if not isinstance(named, Mapping):
-            raise ParameterError(f"structure.{kind} is {named!r}; a table by body or joint, as structure.{kind}.carriage = 2.0")
-        structure += [(kind, target, read_quantity(value, f"{kind} of '{target}'")) for target, value in named.items()]
+            raise ParameterError(
+                f"structure.{kind} is {named!r}; a table by body or joint, as structure.{kind}.carriage = 2.0"
+            )
+        structure += [
+            (kind, target, read_quantity(value, f"{kind} of '{target}'")) for target, value in named.items()
+        ]
     which = str(entry["rig"])
     digest = entry.get("model_sha256", "")
     if which.endswith(".xml"):
@@ -154,7 +172,9 @@ def _element(entry: Mapping[str, Any]) -> ElementPlan:
             raise UnknownNameError(f"parameter of law '{law.name}'", str(key), law.parameter_names)
     # all parameters stand in the table of the records, those at their defaults too: a reader can then rebuild the element
     parameters = {
-        parameter.name: read_quantity(given.get(parameter.name, parameter.default), f"{parameter.name} of '{name}'")
+        parameter.name: read_quantity(
+            given.get(parameter.name, parameter.default), f"{parameter.name} of '{name}'"
+        )
         for parameter in law.parameters
     }
     return ElementPlan(
@@ -184,14 +204,19 @@ def _excitation(entry: Mapping[str, Any], index: int) -> ExcitationPlan:
 
 
 def _sensors(entry: Mapping[str, Any], index: int) -> SensorPlan:
-    _check_entries("set of sensors of a plan", entry, ("name", "weight", "rigs", "withheld", "chains"), ("chains",))
+    _check_entries(
+        "set of sensors of a plan", entry, ("name", "weight", "rigs", "withheld", "chains"), ("chains",)
+    )
     chains = {}
     for channel, stages in entry["chains"].items():
         if not isinstance(stages, list | tuple) or any("type" not in stage for stage in stages):
-            raise ParameterError(f"the chain of '{channel}' is {stages!r}; a list of stages with a type each is expected")
+            raise ParameterError(
+                f"the chain of '{channel}' is {stages!r}; a list of stages with a type each is expected"
+            )
         chains[channel] = {
             str(stage["type"]): _nest(
-                {key: value for key, value in stage.items() if key != "type"}, f"{stage['type']} of '{channel}'"
+                {key: value for key, value in stage.items() if key != "type"},
+                f"{stage['type']} of '{channel}'",
             )
             for stage in stages
         }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -38,7 +39,9 @@ class Rollout(NamedTuple):
     truncations: NDArray[np.bool_]
 
 
-def collect(env: Any, policy: Policy, *, episodes: int, seed: int = 0, max_steps: int = 100_000) -> list[Rollout]:
+def collect(
+    env: Any, policy: Policy, *, episodes: int, seed: int = 0, max_steps: int = 100_000
+) -> list[Rollout]:
     """Run a policy for some episodes.
 
     Args:
@@ -55,8 +58,13 @@ def collect(env: Any, policy: Policy, *, episodes: int, seed: int = 0, max_steps
         ParameterError: No episodes.
     """
     if episodes < 1 or max_steps < 1:
-        raise ParameterError(f"{episodes} episodes of at most {max_steps} steps came; at least one of each is expected")
-    return [_episode(env, policy, np.random.SeedSequence(seed, spawn_key=(k,)), max_steps) for k in range(episodes)]
+        raise ParameterError(
+            f"{episodes} episodes of at most {max_steps} steps came; at least one of each is expected"
+        )
+    return [
+        _episode(env, policy, np.random.SeedSequence(seed, spawn_key=(k,)), max_steps)
+        for k in range(episodes)
+    ]
 
 
 def _episode(env: Any, policy: Policy, sequence: np.random.SeedSequence, max_steps: int) -> Rollout:
@@ -72,7 +80,9 @@ def _episode(env: Any, policy: Policy, sequence: np.random.SeedSequence, max_ste
         rewards.append(float(reward))
         ends.append((bool(terminated), bool(truncated) or (len(actions) >= max_steps and not terminated)))
     terminations, truncations = np.array(ends).T
-    return Rollout(reset, np.stack(observations), np.stack(actions), np.array(rewards), terminations, truncations)
+    return Rollout(
+        reset, np.stack(observations), np.stack(actions), np.array(rewards), terminations, truncations
+    )
 
 
 def write_minari(
@@ -82,6 +92,7 @@ def write_minari(
     *,
     folder: str | Path | None = None,
     algorithm: str = "",
+    author: str = "",
     description: str = "",
 ) -> Path:
     """Store rollouts as a Minari data set.
@@ -92,6 +103,7 @@ def write_minari(
         env: The environment they come from, for its spaces and specification.
         folder: Root of the data sets; Minari's own (``~/.minari/datasets``) where None.
         algorithm: What the policy is.
+        author: Who made it.
         description: For whoever finds it.
 
     Returns:
@@ -120,7 +132,10 @@ def write_minari(
         )
         for index, episode in enumerate(rollouts)
     ]
-    with _minari_root(folder) as root:
+    with _minari_root(folder) as root, warnings.catch_warnings():
+        warnings.simplefilter(
+            "ignore", UserWarning
+        )  # one for each field of the description that is not given
         target = root / dataset
         if target.exists():
             raise CampaignError(f"the data set '{dataset}' exists in {root}; give it another version, as -v1")
@@ -132,6 +147,7 @@ def write_minari(
                 observation_space=env.observation_space,
                 action_space=env.action_space,
                 algorithm_name=algorithm or None,
+                author=author or None,
                 description=description or None,
                 data_format="hdf5",
                 jpeg_encoding=False,

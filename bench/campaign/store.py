@@ -80,13 +80,19 @@ class Store:
         try:
             document = json.loads(self.manifest_path.read_text(encoding="utf-8"))
         except (OSError, ValueError) as error:
-            raise FileFormatError(f"'{self.folder}' is no campaign: {self.manifest_path.name} cannot be read ({error})") from error
+            raise FileFormatError(
+                f"'{self.folder}' is no campaign: {self.manifest_path.name} cannot be read ({error})"
+            ) from error
         if not isinstance(document, dict) or document.get("format") != FORMAT:
-            raise FileFormatError(f"'{self.manifest_path}' is no manifest of format {FORMAT}; a folder written by a campaign is expected")
+            raise FileFormatError(
+                f"'{self.manifest_path}' is no manifest of format {FORMAT}; a folder written by a campaign is expected"
+            )
         return document
 
     @contextlib.contextmanager
-    def opened(self, plan: Plan, channels: list[dict[str, str]], *, resume: bool) -> Iterator[dict[int, dict[str, Any]]]:
+    def opened(
+        self, plan: Plan, channels: list[dict[str, str]], *, resume: bool
+    ) -> Iterator[dict[int, dict[str, Any]]]:
         """Make or reopen the folder for a run, alone; gives the entries of the parts that are finished.
 
         Raises:
@@ -97,12 +103,18 @@ class Store:
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise OutputError(f"cannot write {self.folder}: {error.strerror}; choose another place") from error
+            raise OutputError(
+                f"cannot write {self.folder}: {error.strerror}; choose another place"
+            ) from error
         with self._locked():
             if self.manifest_path.exists():
                 self._check_same(plan, resume=resume)
-            elif any(entry.name != ".lock" for entry in self.folder.iterdir()):
+            elif any(not entry.name.startswith(".") for entry in self.folder.iterdir()):
                 raise CampaignError(f"'{self.folder}' holds other files; give a campaign a folder of its own")
+            else:  # before anything else, so that a folder begun is known as a campaign
+                self.write_manifest(plan, channels, {}, status="running")
+            for torn in (*self.folder.glob(".manifest.json.*"), *self.folder.glob(".journal.jsonl.*")):
+                torn.unlink(missing_ok=True)
             for name in FOLDERS if plan.withholds else FOLDERS[:2]:
                 (self.folder / name).mkdir(exist_ok=True)
             partial = self.folder / ".partial"
@@ -111,7 +123,10 @@ class Store:
                 torn.unlink(missing_ok=True)
             if plan.withholds:
                 answers = {"plan": plan.to_dict(), "plan_sha256": plan.sha256}
-                write_text(self.folder / "answers" / "answers.json", json.dumps(answers, indent=1, ensure_ascii=False))
+                write_text(
+                    self.folder / "answers" / "answers.json",
+                    json.dumps(answers, indent=1, ensure_ascii=False),
+                )
             entries = self._finished(plan)
             self.write_manifest(plan, channels, entries, status="running")
             yield entries
@@ -127,13 +142,17 @@ class Store:
             except ImportError:
                 pass
             except OSError as error:
-                raise CampaignError(f"another process is at work in '{self.folder}'; wait for it or stop it") from error
+                raise CampaignError(
+                    f"another process is at work in '{self.folder}'; wait for it or stop it"
+                ) from error
             yield
 
     def _check_same(self, plan: Plan, *, resume: bool) -> None:
         manifest = self.manifest()
         if not resume:
-            raise CampaignError(f"'{self.folder}' holds a campaign already; resume it, or choose another folder")
+            raise CampaignError(
+                f"'{self.folder}' holds a campaign already; resume it, or choose another folder"
+            )
         if manifest["plan_sha256"] != plan.sha256:
             raise CampaignError(
                 f"'{self.folder}' holds a campaign of another plan ('{manifest['plan'].get('name')}'); choose another folder, or "
@@ -160,10 +179,13 @@ class Store:
                 with contextlib.suppress(ValueError):  # the last line of a killed run may be torn
                     entry = json.loads(line)
                     entries[entry["part"]] = entry
-        present = {path.name: path.stat().st_size for path in (self.folder / "samples").glob("part-*.parquet")}
+        present = {
+            path.name: path.stat().st_size for path in (self.folder / "samples").glob("part-*.parquet")
+        }
         for part in range(plan.n_parts):
             size = present.get(part_name(part))
-            if size is None:
+            others = [self.path(kind, part) for kind in (FOLDERS[1:] if plan.withholds else FOLDERS[1:2])]
+            if size is None or not all(path.exists() for path in others):
                 entries.pop(part, None)
             elif part not in entries or entries[part]["files"]["samples"]["bytes"] != size:
                 entries[part] = self.entry_from_files(plan, part)
@@ -175,12 +197,18 @@ class Store:
         """The entry of a finished part, from its files alone."""
         import pyarrow.parquet as pq  # noqa: PLC0415
 
-        table = pq.read_table(self.path("records", part), columns=["record", "status"], partitioning=None).to_pydict()
+        table = pq.read_table(
+            self.path("records", part), columns=["record", "status"], partitioning=None
+        ).to_pydict()
         failed = [r for r, status in zip(table["record"], table["status"], strict=True) if status != "ok"]
-        contents = {kind: self.path(kind, part).read_bytes() for kind in FOLDERS if self.path(kind, part).exists()}
+        contents = {
+            kind: self.path(kind, part).read_bytes() for kind in FOLDERS if self.path(kind, part).exists()
+        }
         return entry_of(plan, part, failed, contents)
 
-    def write_part(self, plan: Plan, part: int, failed: list[int], contents: Mapping[str, bytes]) -> dict[str, Any]:
+    def write_part(
+        self, plan: Plan, part: int, failed: list[int], contents: Mapping[str, bytes]
+    ) -> dict[str, Any]:
         """Put the files of a part in place, the samples last; return its entry."""
         for kind in reversed(FOLDERS):
             if kind in contents:
@@ -198,7 +226,9 @@ class Store:
             os.replace(temporary, path)
         except OSError as error:
             temporary.unlink(missing_ok=True)
-            raise OutputError(f"cannot write {path}: {error.strerror}; free some space and resume the campaign") from error
+            raise OutputError(
+                f"cannot write {path}: {error.strerror}; free some space and resume the campaign"
+            ) from error
         if os.name == "posix":
             folder = os.open(path.parent, os.O_RDONLY)
             try:
@@ -212,7 +242,12 @@ class Store:
             file.write(json.dumps(entry) + "\n")
 
     def write_manifest(
-        self, plan: Plan, channels: list[dict[str, str]], entries: Mapping[int, Mapping[str, Any]], *, status: str
+        self,
+        plan: Plan,
+        channels: list[dict[str, str]],
+        entries: Mapping[int, Mapping[str, Any]],
+        *,
+        status: str,
     ) -> None:
         """Write the manifest whole.
 

@@ -42,12 +42,23 @@ def _samples(generator: Generator, part: Part) -> bytes:
     plan, n = generator.plan, generator.plan.n_samples
     kind = pa.float32() if plan.precision == "float32" else pa.float64()
     fields = [pa.field("record", pa.int64(), nullable=False), pa.field("sample", pa.int32(), nullable=False)]
-    fields += [pa.field(channel.name, kind, metadata={"unit": channel.unit}) for channel in generator.channels]
-    metadata = {"jointbench": json.dumps({"campaign": plan.name, "sample_rate": plan.sample_rate, "plan_sha256": plan.sha256})}
-    columns: list[Any] = [np.repeat(np.array(part.good, dtype=np.int64), n), np.tile(np.arange(n, dtype=np.int32), len(part.good))]
+    fields += [
+        pa.field(channel.name, kind, metadata={"unit": channel.unit}) for channel in generator.channels
+    ]
+    metadata = {
+        "jointbench": json.dumps(
+            {"campaign": plan.name, "sample_rate": plan.sample_rate, "plan_sha256": plan.sha256}
+        )
+    }
+    columns: list[Any] = [
+        np.repeat(np.array(part.good, dtype=np.int64), n),
+        np.tile(np.arange(n, dtype=np.int32), len(part.good)),
+    ]
     for values, has in zip(part.values, part.has, strict=True):
         columns.append(pa.array(values.reshape(-1), mask=None if has.all() else np.repeat(~has, n)))
-    table = pa.Table.from_arrays([pa.array(column) for column in columns], schema=pa.schema(fields, metadata=metadata))
+    table = pa.Table.from_arrays(
+        [pa.array(column) for column in columns], schema=pa.schema(fields, metadata=metadata)
+    )
     # numbers that count up cost next to nothing as differences; the high bytes of a channel compress, the low ones do not
     encoding = {"record": "DELTA_BINARY_PACKED", "sample": "DELTA_BINARY_PACKED"}
     encoding |= {channel.name: "BYTE_STREAM_SPLIT" for channel in generator.channels}
@@ -109,7 +120,8 @@ def _records(plan: Plan, part: Part, columns: Mapping[str, bool], *, told: bool)
         data["rig"] = pa.array([plan.rigs[draw.rig].name for draw in part.draws])
         data["excitation"] = pa.array([plan.excitations[draw.excitation].name for draw in part.draws])
         data["sensors"] = pa.array(
-            [plan.sensors[draw.sensors].name if draw.sensors >= 0 else None for draw in part.draws], pa.string()
+            [plan.sensors[draw.sensors].name if draw.sensors >= 0 else None for draw in part.draws],
+            pa.string(),
         )
     if told is not plan.withholds:  # the message of a diverged record names the elements of its rig
         times = [failures[record].time if record in failures else math.nan for record in numbers]
@@ -124,7 +136,9 @@ def _records(plan: Plan, part: Part, columns: Mapping[str, bool], *, told: bool)
         elif column.endswith("/present"):
             data[column] = pa.array(found, pa.bool_())
         else:
-            data[column] = pa.array([None if value is None else float(value) for value in found], pa.float64())
+            data[column] = pa.array(
+                [None if value is None else float(value) for value in found], pa.float64()
+            )
     return _written(pa.table(data), plan, None, rows=1 << 20)
 
 

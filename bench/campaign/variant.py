@@ -111,10 +111,16 @@ class Variant:
         """Raise `ParameterError` where a structural number cannot be."""
         for _, column in self.structure:
             kind, value = column.split("/")[1], float(values[column])
-            if not np.isfinite(value) or (value < 0.0 and kind != "stiffness") or (value == 0.0 and kind == "mass"):
+            if (
+                not np.isfinite(value)
+                or (value < 0.0 and kind != "stiffness")
+                or (value == 0.0 and kind == "mass")
+            ):
                 raise ParameterError(f"{column} is {value:g}; a finite, positive value is expected")
 
-    def channel(self, name: str, index: int, rows: Rows, theta: list[NDArray[np.float64]]) -> NDArray[np.float64]:
+    def channel(
+        self, name: str, index: int, rows: Rows, theta: list[NDArray[np.float64]]
+    ) -> NDArray[np.float64]:
         """A channel of simulation `index` ``(n,)``."""
         source = self.sources[name]
         if source.kind == "command":
@@ -161,10 +167,16 @@ def structure_address(model: mujoco.MjModel, kind: str, name: str) -> Address:
         return Address(f"body_{kind}", body)
     joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name)
     if joint >= 0:
-        return Address("jnt_stiffness", joint) if kind == "stiffness" else Address(f"dof_{kind}", int(model.jnt_dofadr[joint]))
+        return (
+            Address("jnt_stiffness", joint)
+            if kind == "stiffness"
+            else Address(f"dof_{kind}", int(model.jnt_dofadr[joint]))
+        )
     tendon = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TENDON, name)
     if tendon < 0:
-        known = [model.joint(i).name for i in range(model.njnt)] + [model.tendon(i).name for i in range(model.ntendon)]
+        known = [model.joint(i).name for i in range(model.njnt)] + [
+            model.tendon(i).name for i in range(model.ntendon)
+        ]
         raise UnknownNameError("joint or tendon", name, known)
     return Address(f"tendon_{kind}", tendon)
 
@@ -206,7 +218,9 @@ class Variants:
 
 
 def _compiled(entry: RigPlan, present: tuple[bool, ...]) -> Variant:
-    settings = {key: getattr(entry, key) for key in ("timestep", "integrator") if getattr(entry, key) is not None}
+    settings = {
+        key: getattr(entry, key) for key in ("timestep", "integrator") if getattr(entry, key) is not None
+    }
     base = rig_from_configuration({"rig": entry.rig, **settings}, folder=entry.folder)
     if base.elements and not entry.elements:
         joint = base.elements[0]
@@ -216,11 +230,13 @@ def _compiled(entry: RigPlan, present: tuple[bool, ...]) -> Variant:
         )
     kept = tuple(element for element, has in zip(entry.elements, present, strict=True) if has)
     elements = [
-        Element.of(_law(item), *item.joints, inputs=item.inputs, name=item.name, exact=item.exact) for item in kept
+        Element.of(_law(item), *item.joints, inputs=item.inputs, name=item.name, exact=item.exact)
+        for item in kept
     ]
     rig = base.with_(name=entry.name, elements=elements)
     structure = tuple(
-        (structure_address(rig.model, kind, target), f"structure/{kind}/{target}") for kind, target, _ in entry.structure
+        (structure_address(rig.model, kind, target), f"structure/{kind}/{target}")
+        for kind, target, _ in entry.structure
     )
     return Variant(entry, kept, rig, structure, sources_of(rig))
 
@@ -235,7 +251,8 @@ def excitation_of(plan: Plan, draw: Draw) -> Excitation:
     """The record's excitation."""
     entry = plan.excitations[draw.excitation]
     signals = {
-        actuator: Signal.from_dict(filled(node, f"excitation/{actuator}", draw.values)) for actuator, node in entry.signals.items()
+        actuator: Signal.from_dict(filled(node, f"excitation/{actuator}", draw.values))
+        for actuator, node in entry.signals.items()
     }
     return Excitation(signals, plan.duration, plan.drive_rate or plan.sample_rate)
 
@@ -285,5 +302,7 @@ def kept_channels(plan: Plan, variants: Variants) -> tuple[Channel, ...]:
         if name not in found:
             raise UnknownNameError("channel of the campaign's rigs", name, found)
         if name in secret:
-            raise ParameterError(f"channel '{name}' belongs to a withheld element and would give it away; leave it out of `channels`")
+            raise ParameterError(
+                f"channel '{name}' belongs to a withheld element and would give it away; leave it out of `channels`"
+            )
     return tuple(found[name] for name in names)

@@ -83,7 +83,11 @@ class Windows:
         plan = manifest["plan"]
         self.n_samples = round(plan["duration"] * plan["sample_rate"])
         self.length, self.stride = length, length if stride is None else stride
-        for name, value, most in (("length", length, self.n_samples), ("stride", self.stride, None), ("buffer", buffer, None)):
+        for name, value, most in (
+            ("length", length, self.n_samples),
+            ("stride", self.stride, None),
+            ("buffer", buffer, None),
+        ):
             if isinstance(value, bool) or value < 1 or (most is not None and value > most):
                 raise ParameterError(
                     f"{name} of the windows is {value!r}; a whole number from 1{f' to {most}, a record,' if most else ''} is expected"
@@ -194,7 +198,10 @@ def _parameters(path: str, names: tuple[str, ...]) -> dict[int, NDArray[np.float
             if name not in file.schema_arrow.names:
                 raise UnknownNameError("column of the campaign's records", name, file.schema_arrow.names)
         table = file.read(columns=["record", *names], use_threads=False)
-    columns = [np.array([np.nan if value is None else value for value in table.column(name).to_pylist()], float) for name in names]
+    columns = [
+        np.array([np.nan if value is None else value for value in table.column(name).to_pylist()], float)
+        for name in names
+    ]
     return dict(zip(table.column("record").to_pylist(), np.stack(columns, axis=1), strict=True))
 
 

@@ -88,7 +88,9 @@ def laboratory_view(records: Sequence[Recording], rig: Rig) -> JointData:
     )
 
 
-def _pair(true: Recording, forces: NDArray[np.float64] | Sequence[NDArray[np.float64]]) -> tuple[float, float]:
+def _pair(
+    true: Recording, forces: NDArray[np.float64] | Sequence[NDArray[np.float64]]
+) -> tuple[float, float]:
     return nmse(true["joint/force_1"], forces[0]), nmse(true["joint/force_2"], forces[1])
 
 
@@ -135,6 +137,9 @@ def joint_models(
     fits: Mapping[str, Callable[[], Any]] = {
         "polynomial (order 3)": lambda: fit_polynomial(
             data.states[thin], data.forces[thin], orders=(3, 3, 3, 3)
+        ),
+        "polynomial (total degree 5)": lambda: fit_polynomial(
+            data.states[thin], data.forces[thin], orders=(5, 5, 5, 5), kind="total"
         ),
         "network (30)": lambda: fit_network(
             data.states, data.forces, n_hidden=30, rng=np.random.default_rng(30)

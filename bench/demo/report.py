@@ -150,9 +150,12 @@ def _damper_section(page: Page, tests: tuple[DamperTest, ...]) -> None:
         ),
         f"Hysteresis loop at {test.tension} lbf, unseen 1 Hz test: measured, and the parametric model in the damper rig.",
     )
+    lost = [model for model in models if test.nrmse[model] > 2.0]
+    shown = {name: record for name, record in records.items() if name not in lost}
+    left_out = f" Left out, far off the scale: {', '.join(lost)}." if lost else ""
     section.figure(
-        time_histories(records, ["force"], window=window),
-        f"Force over time, {test.tension} lbf, unseen 1 Hz test.",
+        time_histories(shown, ["force"], window=window),
+        f"Force over time, {test.tension} lbf, unseen 1 Hz test.{left_out}",
     )
 
 

@@ -22,7 +22,7 @@ from scipy.signal import chirp
 from bench.discrepancy.case import Case, CaseChannel, CaseRecord, NominalParameter, record_from_arrays
 from bench.discrepancy.catalogue import CATALOGUE
 from bench.discrepancy.closure import CLOSURES
-from bench.discrepancy.diagnose import diagnose_folder
+from bench.discrepancy.diagnosis import diagnose_folder
 from bench.discrepancy.effect import Effect
 from bench.discrepancy.problem import Array, Hypothesis, Placed, Problem
 from bench.discrepancy.structure import structure_of

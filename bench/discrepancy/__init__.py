@@ -1,0 +1,66 @@
+"""Diagnosis of the sim-to-real gap: where it lies, which effect causes it, how far it shrinks once that is added.
+
+`diagnose_folder` reads a case (nominal parameters with uncertainties, and records) and returns a `Diagnosis`; its
+`verdict` is what it says. The names are imported on first use, so that `import bench.discrepancy` compiles nothing.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from bench.discrepancy.blind import BlindOptions, BlindScore, make_blind, run_blind
+    from bench.discrepancy.case import Case, CaseChannel, CaseRecord, NominalParameter, read_case, record_from_arrays
+    from bench.discrepancy.diagnosis import Diagnosis, diagnose, diagnose_folder
+    from bench.discrepancy.report import write_report
+    from bench.discrepancy.scoring import score_blind
+    from bench.discrepancy.verdict import Verdict
+
+_HOMES = {
+    "BlindOptions": "blind",
+    "BlindScore": "blind",
+    "Case": "case",
+    "CaseChannel": "case",
+    "CaseRecord": "case",
+    "Diagnosis": "diagnosis",
+    "NominalParameter": "case",
+    "Verdict": "verdict",
+    "diagnose": "diagnosis",
+    "diagnose_folder": "diagnosis",
+    "make_blind": "blind",
+    "read_case": "case",
+    "record_from_arrays": "case",
+    "run_blind": "blind",
+    "score_blind": "scoring",
+    "write_report": "report",
+}
+
+__all__ = [
+    "BlindOptions",
+    "BlindScore",
+    "Case",
+    "CaseChannel",
+    "CaseRecord",
+    "Diagnosis",
+    "NominalParameter",
+    "Verdict",
+    "diagnose",
+    "diagnose_folder",
+    "make_blind",
+    "read_case",
+    "record_from_arrays",
+    "run_blind",
+    "score_blind",
+    "write_report",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
+    import importlib  # noqa: PLC0415
+
+    module = importlib.import_module(f"{__name__}.{_HOMES[name]}")
+    value = getattr(module, name)
+    globals()[name] = value
+    return value
