@@ -14,46 +14,12 @@ import numpy as np
 import pyarrow.dataset as ds
 import pyarrow.parquet as pq
 import pytest
+from campaign_plan import document
 
 from bench.campaign import CampaignError, Progress, plan_from_dict, read_plan, run_campaign, verify
 from bench.campaign.execution import generator_of, payload_of
 from bench.campaign.generation import Generator
 from bench.errors import FileFormatError, ParameterError
-
-SDOF = {
-    "rig": "sdof",
-    "structure": {
-        "mass": {"carriage": {"uniform": [1.0, 3.0]}},
-        "stiffness": {"carriage": {"log_uniform": [500.0, 5000.0]}},
-        "damping": {"carriage": {"uniform": [1.0, 5.0]}},
-    },
-    "elements": [
-        {"law": "gap", "joints": ["carriage"], "parameters": {"clearance": {"uniform": [0.001, 0.004]}}},
-        {
-            "law": "bouc_wen",
-            "joints": ["carriage"],
-            "parameters": {"A": {"uniform": [300.0, 900.0]}, "n": {"choice": [1.0, 2.0]}},
-            "probability": 0.5,
-        },
-    ],
-}
-NOISE = {
-    "signals": {"shaker": {"type": "band_limited_noise", "cutoff": 60.0, "rms": {"uniform": [5.0, 20.0]}}}
-}
-
-
-def document(**changes) -> dict:
-    return {
-        "name": "test",
-        "seed": 11,
-        "records": 24,
-        "duration": 0.25,
-        "sample_rate": 1000.0,
-        "records_per_part": 3,
-        "rigs": [SDOF],
-        "excitations": [NOISE],
-        "sensors": [{"chains": {"displacement": [{"type": "noise", "std": {"log_uniform": [1e-6, 1e-4]}}]}}],
-    } | changes
 
 
 def hashes(folder: Path) -> dict[str, str]:
@@ -103,6 +69,33 @@ RIGS = {
                         "parameters": {"limit": {"uniform": [1.0, 4.0]}},
                     }
                 ],
+            }
+        ],
+    ),
+    "damper under prescribed motion": document(
+        sample_rate=1024.0,
+        channels=["displacement", "piston.bouc_wen/force"],
+        precision="float64",
+        sensors=[],
+        rigs=[
+            {
+                "rig": "damper",
+                "elements": [
+                    {"law": "bouc_wen", "joints": ["piston"], "parameters": {"A": {"uniform": [5.0, 9.0]}}}
+                ],
+            }
+        ],
+        excitations=[
+            {
+                "prescribe": "piston",
+                "signals": {
+                    "piston": {
+                        "type": "harmonic",
+                        "frequency": 2.0,
+                        "amplitude": {"uniform": [0.002, 0.01]},
+                        "phase": 1.0,
+                    }
+                },
             }
         ],
     ),
@@ -177,6 +170,44 @@ def test_data_set_reads_as_it_is(reference: Path) -> None:
     assert 0 < sum(present) < 24
     assert all((row["carriage.bouc_wen/A"] is None) != has for row, has in zip(drawn, present, strict=True))
     assert all(1.0 <= row["structure/mass/carriage"] <= 3.0 for row in drawn)
+
+
+def test_tables_and_documented_seeds_are_enough_to_make_a_record_again(reference: Path) -> None:
+    from bench import Element, Excitation, sdof_rig, simulate
+    from bench.measurement import Chain, Noise, measure
+    from bench.signals import BandLimitedNoise
+
+    row = ds.dataset(reference / "records").to_table().to_pylist()[5]
+    gap = {name: row[f"carriage.gap/{name}"] for name in ("stiffness", "clearance", "damping", "offset")}
+    elements = [Element.of("gap", "carriage", **gap)]
+    if row["carriage.bouc_wen/present"]:
+        loop = {name: row[f"carriage.bouc_wen/{name}"] for name in ("A", "beta", "gamma", "n")}
+        elements.append(Element.of("bouc_wen", "carriage", **loop))
+    numbers = {kind: row[f"structure/{kind}/carriage"] for kind in ("mass", "stiffness", "damping")}
+    _, drive, sensors = np.random.SeedSequence(11, spawn_key=(5,)).spawn(3)
+    noise = BandLimitedNoise(60.0, rms=row["excitation/shaker/rms"])
+    true = simulate(
+        sdof_rig(*elements, **numbers),
+        Excitation({"shaker": noise}, 0.25, 1000.0),
+        rng=np.random.default_rng(drive),
+    )
+    chain = Chain(Noise(row["sensors/displacement/noise/std"]))
+    measured = measure(true, {"displacement": chain}, np.random.default_rng(sensors))
+    stored = ds.dataset(reference / "samples").to_table(filter=ds.field("record") == 5)
+    for channel in ("shaker", "displacement", "velocity", "acceleration_x"):
+        np.testing.assert_array_equal(stored[channel].to_numpy(), measured[channel].astype(np.float32))
+
+
+def test_prescribed_motion_is_followed() -> None:
+    generator = Generator(plan_from_dict(RIGS["damper under prescribed motion"]))
+    part = generator.part(0)
+    time_of = np.arange(256) / 1024.0
+    for place, draw in enumerate(part.draws):
+        asked = draw.values["excitation/piston/amplitude"] * np.sin(4.0 * np.pi * time_of + 1.0)
+        # 0.1 % of the amplitude: what the servo of the damper rig leaves, as its own tests measure
+        assert np.max(np.abs(part.values[0, place] - asked)) < 1e-3 * float(
+            draw.values["excitation/piston/amplitude"]
+        )
 
 
 def test_one_record_is_one_row_group_of_long_records(tmp_path: Path) -> None:
@@ -270,80 +301,6 @@ def test_same_bytes_from_processes_one_of_which_is_killed(reference: Path, tmp_p
     assert killed
     assert result.means.startswith("2 processes")
     assert hashes(tmp_path / "processes") == hashes(reference)
-
-
-def test_failing_records_are_set_aside_and_change_nothing_else(tmp_path: Path) -> None:
-    # a spring of 1e7 N/m on about 2 kg turns at 2.2e3 rad/s: 2.2 a step, and RK4 diverges above 2.8, so that of
-    # 1e6 to 1e8 N/m about half of the records do; a negative clearance never gets as far as the simulation
-    rig = json.loads(json.dumps(SDOF))
-    rig["elements"] = [
-        {
-            "law": "linear",
-            "joints": ["carriage"],
-            "parameters": {"stiffness": {"log_uniform": [1e6, 1e8]}},
-        },
-        {"law": "gap", "joints": ["carriage"], "parameters": {"clearance": {"uniform": [-0.001, 0.004]}}},
-    ]
-    plan = document(rigs=[rig])
-    result = run_campaign(plan, tmp_path / "diverging")
-    rows = ds.dataset(tmp_path / "diverging/records").to_table().to_pylist()
-    failed = [row for row in rows if row["status"] == "failed"]
-    assert 3 < len(failed) == result.failed < 24
-    assert [row["record"] for row in failed] == list(result.failures)
-    diverged = [row for row in failed if row["failed_at"] is not None]
-    assert all("diverged" in row["reason"] and "carriage.linear" in row["reason"] for row in diverged)
-    assert all("clearance" in row["reason"] for row in failed if row["failed_at"] is None)
-    assert 0 < len(diverged) < len(failed)
-    table = ds.dataset(tmp_path / "diverging/samples").to_table()
-    good = [row["record"] for row in rows if row["status"] == "ok"]
-    np.testing.assert_array_equal(table["record"].to_numpy(), np.repeat(good, 250))
-    generator = Generator(plan_from_dict(plan))
-    for record in good[:3]:
-        of_record = table.filter(ds.field("record") == record)
-        np.testing.assert_array_equal(
-            of_record["displacement"].to_numpy(), generator.rebuild(record)["displacement"].astype(np.float32)
-        )
-    resumed = run_campaign(plan, tmp_path / "diverging")
-    assert (resumed.failed, resumed.resumed) == (result.failed, 24)
-
-
-def test_sensors_that_do_not_fit_a_record_fail_that_record(tmp_path: Path) -> None:
-    filters = [{"type": "anti_alias", "cutoff": {"uniform": [300.0, 650.0]}}]
-    result = run_campaign(document(sensors=[{"chains": {"displacement": filters}}]), tmp_path / "filters")
-    rows = ds.dataset(tmp_path / "filters/records").to_table().to_pylist()
-    above = [row["record"] for row in rows if row["sensors/displacement/anti_alias/cutoff"] >= 500.0]
-    assert 0 < len(above) < 24
-    assert list(result.failures) == above
-    assert all("anti-alias" in rows[record]["reason"] for record in above)
-
-
-def test_answers_are_withheld_from_everything_else(tmp_path: Path) -> None:
-    rig = json.loads(json.dumps(SDOF))
-    rig["structure_withheld"] = True
-    rig["elements"][1]["withheld"] = True
-    rig["elements"][0]["parameters"]["clearance"] = {
-        "uniform": [-0.001, 0.004]
-    }  # some records fail and say why
-    folder = tmp_path / "blind"
-    result = run_campaign(document(rigs=[rig], seed=987_654_321), folder)
-    assert result.failed > 0
-    public = (folder / "manifest.json").read_text() + (folder / "journal.jsonl").read_text()
-    public += str(ds.dataset(folder / "records").to_table().to_pylist()) + str(
-        ds.dataset(folder / "samples").schema
-    )
-    for secret in ("bouc_wen", "987654321", "structure", "uniform': [1.0, 3.0]", "reason"):
-        assert secret not in public
-    assert "carriage.gap" in public
-    answers = ds.dataset(sorted((folder / "answers").glob("*.parquet"))).to_table().to_pylist()
-    assert {row["carriage.bouc_wen/present"] for row in answers} == {True, False}
-    assert all(1.0 <= row["structure/mass/carriage"] <= 3.0 for row in answers)
-    sealed = json.loads((folder / "answers/answers.json").read_text())
-    again = plan_from_dict(sealed["plan"])
-    assert again.sha256 == json.loads((folder / "manifest.json").read_text())["plan_sha256"]
-    for path in (folder / "answers").iterdir():
-        path.unlink()
-    (folder / "answers").rmdir()  # handed out without the answers
-    assert verify(folder) == []
 
 
 def test_progress_tells_rate_and_time_left(tmp_path: Path) -> None:

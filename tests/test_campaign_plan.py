@@ -182,6 +182,11 @@ def test_quantities_are_found_wherever_they_stand() -> None:
         ),
         ({"excitations": [{"signals": {}}]}, ParameterError, "signals"),
         ({"sensors": [{"chains": {"displacement": {"type": "noise"}}}]}, ParameterError, "list of stages"),
+        (
+            {"excitations": [{"prescribe": "piston", "signals": {"shaker": {"type": "constant"}}}]},
+            ParameterError,
+            "one signal",
+        ),
     ],
 )
 def test_mistakes_in_plans_are_named(change: dict, error: type[BenchError], words: str) -> None:
@@ -199,6 +204,17 @@ def test_mistakes_in_plans_are_named(change: dict, error: type[BenchError], word
         ({"rigs": [{"rig": "sdof", "structure": {"mass": {"carraige": 2.0}}}]}, "carriage"),
         ({"rigs": [{"rig": "sdof", "timestep": 0.0003}]}, "divide"),
         ({"rigs": [{"rig": "joint"}]}, "axial_torsional_joint"),
+        (
+            {
+                "sample_rate": 1024.0,
+                "duration": 0.125,
+                "rigs": [{"rig": "damper", "structure": {"mass": {"piston": 2.0}}}],
+                "excitations": [
+                    {"prescribe": "piston", "signals": {"piston": {"type": "harmonic", "frequency": 2.0}}}
+                ],
+            },
+            "prescribes a motion",
+        ),
     ],
 )
 def test_mistakes_against_the_rigs_are_found_before_anything_runs(change: dict, words: str) -> None:

@@ -97,7 +97,7 @@ def written(case, tmp_path_factory) -> Path:
 
 def test_poses_of_a_slide_and_a_hinge_are_those_of_geometry():
     x, angle = np.array([0.0, 0.1, -0.3]), np.array([0.0, 0.5, -2.0])
-    poses = body_poses(shapes_rig().model, np.stack([x, angle], axis=1))
+    poses = body_poses(shapes_rig().scene, np.stack([x, angle], axis=1))
     arm = 3
     zero = np.zeros(3)
     np.testing.assert_allclose(poses.position[:, arm], np.stack([x, zero, zero + 0.5], axis=1), atol=1e-15)
@@ -154,7 +154,7 @@ def test_joint_positions_of_the_library_reproduce_every_position_sensor(make):
 
 
 def test_a_mesh_lies_where_mujoco_draws_it():
-    model = shapes_rig().model
+    model = shapes_rig().scene
     mesh = mesh_of(model, model.geom("wedge").id)
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
@@ -173,7 +173,7 @@ def test_skins_follow_mujocos_own_skinning_to_a_pixel(rig, pose):
     # The rigs are 1.6 m long: where one fills a screen of 2000 pixels, a pixel is 0.8 mm. The ends move 30 mm and turn
     # 22 mm; what is left is that weights are off a line at a coil's closed ends and that arcs become chords.
     tolerance = 8e-4
-    model = rig.model
+    model = rig.scene
     data = mujoco.MjData(model)
     qpos = np.array(data.qpos)
     for joint, value in pose.items():
@@ -195,10 +195,10 @@ def test_skins_follow_mujocos_own_skinning_to_a_pixel(rig, pose):
 
 
 def test_the_eye_looks_along_the_models_camera():
-    eye = eye_of(shapes_rig().model, "front")
+    eye = eye_of(shapes_rig().scene, "front")
     forward = (eye.target - eye.position) / np.linalg.norm(eye.target - eye.position)
-    data = mujoco.MjData(shapes_rig().model)
-    mujoco.mj_forward(shapes_rig().model, data)
+    data = mujoco.MjData(shapes_rig().scene)
+    mujoco.mj_forward(shapes_rig().scene, data)
     np.testing.assert_allclose(forward, -data.cam_xmat[0].reshape(3, 3)[:, 2], atol=1e-12)
 
 

@@ -190,3 +190,17 @@ def test_element_json_round_trip():
         assert again.law == element.law
         assert np.array_equal(again.theta, element.theta)
         assert (again.joints, again.inputs, again.name) == (element.joints, element.inputs, element.name)
+
+
+@pytest.mark.parametrize("rig", [sdof_rig(GAP, stiffness=500.0), joint_rig(), damper_rig()], ids=lambda rig: rig.name)
+def test_what_is_only_drawn_is_left_out_of_the_simulation_and_changes_no_bit(rig):
+    import mujoco
+
+    assert rig.scene.ngeom > rig.model.ngeom == 0
+    ends = []
+    for model in (rig.model, rig.scene):
+        data = mujoco.MjData(model)
+        data.qvel[:] = np.linspace(0.1, 0.2, model.nv)
+        mujoco.mj_step(model, data, 200)
+        ends.append(np.concatenate([data.qpos, data.qvel, data.sensordata]))
+    assert np.array_equal(*ends)

@@ -368,7 +368,7 @@ def _cluster(address: str, threads: int, store: Store) -> Iterator[tuple[Submit,
             f"no dask scheduler answers at {address} ({error}); start one with `dask scheduler`"
         ) from error
     with client:
-        _check_workers(client, store)
+        workers = _check_workers(client, store)
         executor = client.get_executor(pure=False, retries=2)
 
         def window() -> int:  # workers may join and leave
@@ -377,18 +377,18 @@ def _cluster(address: str, threads: int, store: Store) -> Iterator[tuple[Submit,
         def submit(payload: str, folder: str, part: int) -> Future:
             return executor.submit(run_part, payload, folder, part, threads)
 
-        yield submit, window, f"{len(client.nthreads())} dask workers at {address}"
+        yield submit, window, f"{workers} dask workers at {address}"
 
 
-def _check_workers(client: Any, store: Store) -> None:
-    """Raise `CampaignError` unless all workers see the folder and hold the same software."""
+def _check_workers(client: Any, store: Store) -> int:
+    """Number of the workers; raise `CampaignError` unless all workers see the folder and hold the same software."""
     for worker, sees in client.run(os.path.exists, str(store.manifest_path)).items():
         if not sees:
             raise CampaignError(
                 f"worker {worker} does not see {store.folder}; put `out` on a disk that all workers share"
             )
-    here = versions()
-    for worker, there in client.run(versions).items():
+    here, all_there = versions(), client.run(versions)
+    for worker, there in all_there.items():
         different = [
             f"{name} {there.get(name)} (here {here[name]})"
             for name in BYTES_DEPEND_ON
@@ -398,3 +398,4 @@ def _check_workers(client: Any, store: Store) -> None:
             raise CampaignError(
                 f"worker {worker} has {', '.join(different)}; install the same versions everywhere"
             )
+    return len(all_there)

@@ -7,7 +7,7 @@ aside with its reason, and the others of the part are what they would have been 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from bench.campaign.drawing import Draw, draws, median_draw, record_streams
 from bench.campaign.plan import Plan
-from bench.campaign.variant import STATE, Rows, Variant, Variants, chains_of, excitation_of, kept_channels
+from bench.campaign.variant import STATE, Rows, Variant, Variants, chains_of, drive_of, kept_channels
 from bench.errors import BenchError, ParameterError, SimulationError, UnknownNameError
 from bench.measurement import measure
 from bench.recording import Recording
@@ -62,12 +62,13 @@ class Part(NamedTuple):
 
 @dataclass(frozen=True)
 class _Ready:
-    """A record that is ready to run: its place in the part, theta by element and controls ``(n, n_actuators)``."""
+    """A record that is ready to run: its place in the part, theta by element controls ``(n, n_actuators)``, start."""
 
     draw: Draw
     place: int
     thetas: list[NDArray[np.float64]]
     controls: NDArray[np.float64]
+    start: Mapping[str, tuple[float, float]]
 
 
 class Generator:
@@ -95,7 +96,7 @@ class Generator:
             variant = self.variants.full(rig)
             if _stride(variant, self.plan) < 1:
                 raise ParameterError(
-                    f"a record of {self.plan.sample_rate:g} Hz does not divide the {1.0 / variant.rig.timestep:g} steps a second "
+                    f"{self.plan.sample_rate:g} Hz does not divide the {1.0 / variant.rig.timestep:g} steps a second "
                     f"of rig '{variant.plan.name}'; set its timestep"
                 )
             for excitation in self.plan.fitting(self.plan.excitations, rig):
@@ -146,24 +147,21 @@ class Generator:
         draw = draws(self.plan, [record])[0]
         variant = self.variants.of(draw.rig, draw.present)
         _, excitation, sensors = record_streams(self.plan, record)
-        recording = simulate(
-            variant.with_values(draw.values),
-            excitation_of(self.plan, draw),
-            rng=excitation,
-            sample_rate=self.plan.sample_rate,
-        )
+        drive, start = drive_of(self.plan, variant, draw, excitation)
+        rig = variant.with_values(draw.values)
+        recording = simulate(rig, drive, initial=start, sample_rate=self.plan.sample_rate)
         return measure(recording, chains_of(self.plan, draw), sensors)
 
     def _prepared(self, variant: Variant, draw: Draw, place: int) -> _Ready | Failure:
         try:
             thetas = variant.thetas(draw.values)
             variant.check_structure(draw.values)
-            excitation = excitation_of(self.plan, draw)
-            controls = controls_of(variant.rig, excitation, record_streams(self.plan, draw.record)[1])
+            drive, start = drive_of(self.plan, variant, draw, record_streams(self.plan, draw.record)[1])
+            controls = controls_of(variant.rig, drive)
             chains_of(self.plan, draw)
         except (BenchError, ArithmeticError, ValueError) as error:  # whatever one record's numbers lead to
             return Failure(draw.record, str(error), float("nan"))
-        return _Ready(draw, place, thetas, controls)
+        return _Ready(draw, place, thetas, controls, start)
 
     def _run(
         self,
@@ -177,9 +175,16 @@ class Generator:
         prepared = [self._prepared(variant, draw, place) for place, draw in members]
         failures = [item for item in prepared if isinstance(item, Failure)]
         ready = [item for item in prepared if isinstance(item, _Ready)]
-        if not ready:
+        rows, whole = None, np.empty(0)
+        while rows is None and ready:
+            try:
+                rows, whole = self._roll(variant, ready, threads)
+            except BatchError as error:  # MuJoCo gave up on some; the others run again without them
+                lost = {int(index) for index in error.ids}
+                failures += [self._explained(ready[index].draw.record) for index in sorted(lost)]
+                ready = [item for index, item in enumerate(ready) if index not in lost]
+        if rows is None:
             return failures
-        rows, whole = self._roll(variant, ready, threads)
         for index, item in enumerate(ready):
             fine = bool(whole[index]) and self._measured(variant, index, item, rows, values, has)
             if not fine:
@@ -191,31 +196,25 @@ class Generator:
     ) -> tuple[Rows, NDArray[np.bool_]]:
         model = variant.rig.model
         steps = len(ready[0].controls)
-        controls = np.zeros(
-            (len(ready), steps, model.nu)
-        )  # the state actuators come last and take no command
+        # the state actuators come last and take no command
+        controls = np.zeros((len(ready), steps, model.nu))
         for index, item in enumerate(ready):
             controls[index, :, : item.controls.shape[1]] = item.controls
         batch = Batch(model, len(ready), threads)
-        variant.fill(batch, [item.thetas for item in ready], [item.draw for item in ready])
+        variant.fill(
+            batch,
+            [item.thetas for item in ready],
+            [item.draw for item in ready],
+            [item.start for item in ready],
+        )
         inside = any(variant.sources[c.name].item >= 0 for c in self.channels if c.name in variant.sources)
         start = np.concatenate(
             [batch.bind("time")[:, None], batch.bind("qpos"), batch.bind("qvel"), batch.bind("act")], axis=1
         )
         record: list = ["sensordata", *([STATE] if inside else [])]
-        whole = np.ones(len(ready), dtype=bool)
-        try:
-            result = batch.rollout(steps, controls, mujoco.mjtState.mjSTATE_CTRL, record)
-        except BatchError as error:
-            whole[error.ids] = False
-            kept = np.flatnonzero(whole)
-            if not len(kept):
-                return Rows(controls, controls, controls, 1), whole
-            rows, fine = self._roll(variant, [ready[i] for i in kept], threads)
-            whole[kept] = fine
-            return Rows(*(_spread(part, kept, len(ready)) for part in rows[:3]), rows.stride), whole
+        result = batch.rollout(steps, controls, mujoco.mjtState.mjSTATE_CTRL, record)
         # a simulation in which MuJoCo found a bad state stops, and its clock with it
-        whole &= np.abs(batch.bind("time") - steps * variant.rig.timestep) < 0.5 * variant.rig.timestep
+        whole = np.abs(batch.bind("time") - steps * variant.rig.timestep) < 0.5 * variant.rig.timestep
         states = np.empty((len(ready), 0, 0))
         if inside:
             states = np.concatenate([start[:, None], result[STATE][:, :-1]], axis=1)
@@ -248,7 +247,7 @@ class Generator:
             self.rebuild(record)
         except SimulationError as error:
             return Failure(record, str(error), error.time)
-        except BenchError as error:
+        except (BenchError, RuntimeError) as error:
             return Failure(record, str(error), float("nan"))
         return Failure(record, "a channel is not finite after measurement", float("nan"))
 
@@ -257,9 +256,3 @@ def _stride(variant: Variant, plan: Plan) -> int:
     """Steps a sample; 0 where the record's rate does not divide the step rate."""
     stride = round(1.0 / (plan.sample_rate * variant.rig.timestep))
     return stride if abs(stride * plan.sample_rate * variant.rig.timestep - 1.0) <= 1e-6 else 0
-
-
-def _spread(part: NDArray, kept: NDArray, count: int) -> NDArray:
-    whole = np.zeros((count, *part.shape[1:]))
-    whole[kept] = part
-    return whole

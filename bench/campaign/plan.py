@@ -147,12 +147,21 @@ class ExcitationPlan:
         signals: A signal's dictionary by actuator, with distributions.
         weight: Share of the records of the rigs it fits.
         rigs: Names of the rigs it fits; all where empty.
+        prescribe: Joint that follows the one signal, which is its displacement, as `bench.rig.library.prescribe`.
     """
 
     name: str
     signals: Mapping[str, Node]
     weight: float = 1.0
     rigs: tuple[str, ...] = ()
+    prescribe: str = ""
+
+    def __post_init__(self) -> None:
+        if self.prescribe and tuple(self.signals) != (self.prescribe,):
+            raise ParameterError(
+                f"excitation '{self.name}' prescribes the motion of '{self.prescribe}' and needs one signal of that name; "
+                f"it has {', '.join(self.signals)}"
+            )
 
     def quantities(self) -> Iterator[tuple[str, Quantity]]:
         """(column, quantity) of every number and distribution."""
@@ -163,6 +172,7 @@ class ExcitationPlan:
         """As in a plan."""
         entry: dict[str, Any] = {"name": self.name, "weight": self.weight}
         entry |= {"rigs": list(self.rigs)} if self.rigs else {}
+        entry |= {"prescribe": self.prescribe} if self.prescribe else {}
         return entry | {"signals": {key: as_entry(node) for key, node in self.signals.items()}}
 
 
@@ -254,8 +264,8 @@ class Plan:
         for name in ("duration", "sample_rate", "drive_rate"):
             value = getattr(self, name)
             if value is None and name == "drive_rate":
-                continue
-            if isinstance(value, bool | str) or not (math.isfinite(value) and value > 0.0):
+                value = self.sample_rate
+            if isinstance(value, bool | str | None) or not (math.isfinite(value) and value > 0.0):
                 raise ParameterError(f"{name} of the campaign is {value!r}; a positive number is expected")
         if (
             abs(self.duration * self.sample_rate - self.n_samples) > 1e-6 * self.n_samples

@@ -191,7 +191,9 @@ def _element(entry: Mapping[str, Any]) -> ElementPlan:
 
 
 def _excitation(entry: Mapping[str, Any], index: int) -> ExcitationPlan:
-    _check_entries("excitation of a plan", entry, ("name", "weight", "rigs", "signals"), ("signals",))
+    _check_entries(
+        "excitation of a plan", entry, ("name", "weight", "rigs", "prescribe", "signals"), ("signals",)
+    )
     signals = entry["signals"]
     if not isinstance(signals, Mapping) or not signals:
         raise ParameterError(f"signals of an excitation is {signals!r}; a table by actuator is expected")
@@ -200,6 +202,7 @@ def _excitation(entry: Mapping[str, Any], index: int) -> ExcitationPlan:
         signals={actuator: _nest(node, f"excitation of '{actuator}'") for actuator, node in signals.items()},
         weight=entry.get("weight", 1.0),
         rigs=tuple(entry.get("rigs", ())),
+        prescribe=str(entry.get("prescribe", "")),
     )
 
 

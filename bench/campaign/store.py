@@ -5,7 +5,8 @@
     manifest.json             plan, versions, hashes of every part, status
     samples/part-000123.parquet   record, sample, channels; a row group a record (or a few short ones)
     records/part-000123.parquet   record, status, rig, excitation, sensors and what they drew
-    answers/answers.json, part-000123.parquet   only where the plan withholds something: the whole plan and the rest of what was drawn
+    answers/part-000123.parquet   only where the plan withholds something: the rest of what was drawn
+    answers/answers.json      and the whole plan
     journal.jsonl             one line a finished part, from which the manifest is made
 
 A part is finished when its file in ``samples`` is there: it is written last, elsewhere, flushed to the disk and moved
@@ -155,8 +156,8 @@ class Store:
             )
         if manifest["plan_sha256"] != plan.sha256:
             raise CampaignError(
-                f"'{self.folder}' holds a campaign of another plan ('{manifest['plan'].get('name')}'); choose another folder, or "
-                "resume with the plan it was begun with"
+                f"'{self.folder}' holds a campaign of another plan ('{manifest['plan'].get('name')}'); "
+                "choose another folder, or resume with the plan it was begun with"
             )
         now = versions()
         changed = [
@@ -166,8 +167,8 @@ class Store:
         ]
         if changed:
             raise CampaignError(
-                f"the campaign in '{self.folder}' was begun with {', '.join(changed)}; its records could differ in their last bits: "
-                "resume with the same versions, or choose another folder"
+                f"the campaign in '{self.folder}' was begun with {', '.join(changed)}; its records could differ in their "
+                "last bits: resume with the same versions, or choose another folder"
             )
 
     def _finished(self, plan: Plan) -> dict[int, dict[str, Any]]:
@@ -197,9 +198,7 @@ class Store:
         """The entry of a finished part, from its files alone."""
         import pyarrow.parquet as pq  # noqa: PLC0415
 
-        table = pq.read_table(
-            self.path("records", part), columns=["record", "status"], partitioning=None
-        ).to_pydict()
+        table = pq.ParquetFile(self.path("records", part)).read(columns=["record", "status"]).to_pydict()
         failed = [r for r, status in zip(table["record"], table["status"], strict=True) if status != "ok"]
         contents = {
             kind: self.path(kind, part).read_bytes() for kind in FOLDERS if self.path(kind, part).exists()

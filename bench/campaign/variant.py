@@ -12,6 +12,7 @@ import numpy as np
 from mujoco.batch import Batch
 from numpy.typing import NDArray
 
+from bench import native
 from bench.campaign.distribution import Value
 from bench.campaign.drawing import Draw
 from bench.campaign.plan import ElementPlan, Plan, RigPlan, filled
@@ -22,6 +23,8 @@ from bench.recording import Channel
 from bench.rig import Element, Rig
 from bench.rig.building import STRUCTURE
 from bench.rig.configuration import rig_from_configuration
+from bench.rig.library import PRESCRIBED_ACTUATORS, prescribe, starting
+from bench.rig.simulation import controls_of
 from bench.signals import Excitation, Signal
 
 STATE = (
@@ -85,8 +88,19 @@ class Variant:
             rig = rig.with_structure(**{kind: {target: float(values[f"structure/{kind}/{target}"])}})
         return rig
 
-    def fill(self, batch: Batch, thetas: list[list[NDArray[np.float64]]], draws: list[Draw]) -> None:
-        """Write the values of every simulation into the batch."""
+    def fill(
+        self,
+        batch: Batch,
+        thetas: list[list[NDArray[np.float64]]],
+        draws: list[Draw],
+        starts: list[Mapping[str, tuple[float, float]]],
+    ) -> None:
+        """Write the values of every simulation into the batch, and where it starts."""
+        for simulation, start in enumerate(starts):
+            for joint, (position, velocity) in start.items():
+                at_q, at_v, _ = native.coordinate(self.rig.model, joint).terms[0]
+                batch.bind("qpos")[simulation, at_q] = position
+                batch.bind("qvel")[simulation, at_v] = velocity
         for place, item in enumerate(self.rig.built.placed):
             columns = np.array([theta[place] for theta in thetas])
             if item.theta >= 0:
@@ -247,14 +261,42 @@ def _law(item: ElementPlan):
     return find_law(item.law, item.header)
 
 
-def excitation_of(plan: Plan, draw: Draw) -> Excitation:
-    """The record's excitation."""
+Initial = Mapping[str, tuple[float, float]]
+"""(position, velocity) by joint at the start."""
+
+
+def drive_of(
+    plan: Plan, variant: Variant, draw: Draw, rng: np.random.Generator
+) -> tuple[dict[str, NDArray], Initial]:
+    """The record's commands at the steps ``(n,)`` by actuator, and its start.
+
+    Raises:
+        ParameterError: The excitation does not fit the rig, or prescribes the motion of a mass that is drawn: the commands
+            hold its inertia force.
+    """
+    entry = plan.excitations[draw.excitation]
+    rig = variant.rig
+    if not entry.prescribe:
+        controls = controls_of(rig, excitation_of(plan, draw, plan.drive_rate or plan.sample_rate), rng)
+        return dict(zip(rig.actuators, controls.T, strict=True)), {}
+    if any(kind in {"mass", "inertia", "armature"} for kind, _, _ in variant.plan.structure):
+        raise ParameterError(
+            f"excitation '{entry.name}' prescribes a motion, and rig '{variant.plan.name}' changes the masses it moves; leave "
+            "mass, inertia and armature out of its structure"
+        )
+    displacement = excitation_of(plan, draw, 1.0 / rig.timestep).sample(rng)[:, 0]
+    start = starting(rig, displacement, joint=entry.prescribe)
+    return dict(prescribe(rig, displacement, joint=entry.prescribe)), start
+
+
+def excitation_of(plan: Plan, draw: Draw, rate: float) -> Excitation:
+    """The record's excitation, at a sample rate [Hz]."""
     entry = plan.excitations[draw.excitation]
     signals = {
         actuator: Signal.from_dict(filled(node, f"excitation/{actuator}", draw.values))
         for actuator, node in entry.signals.items()
     }
-    return Excitation(signals, plan.duration, plan.drive_rate or plan.sample_rate)
+    return Excitation(signals, plan.duration, rate)
 
 
 def chains_of(plan: Plan, draw: Draw) -> dict[str, Chain]:
@@ -283,6 +325,7 @@ def kept_channels(plan: Plan, variants: Variants) -> tuple[Channel, ...]:
     default: dict[str, None] = {}
     secret: set[str] = set()
     driven = {actuator for entry in plan.excitations for actuator in entry.signals}
+    driven |= set(PRESCRIBED_ACTUATORS) if any(entry.prescribe for entry in plan.excitations) else set()
     for index in range(len(plan.rigs)):
         variant = variants.full(index)
         withheld = [i for i, entry in enumerate(variant.elements) if entry.withheld]

@@ -90,7 +90,8 @@ class Windows:
         ):
             if isinstance(value, bool) or value < 1 or (most is not None and value > most):
                 raise ParameterError(
-                    f"{name} of the windows is {value!r}; a whole number from 1{f' to {most}, a record,' if most else ''} is expected"
+                    f"{name} of the windows is {value!r}; a whole number of at least 1"
+                    f"{f' and at most {most}, a record,' if most else ''} is expected"
                 )
         known = [channel["name"] for channel in manifest["channels"]]
         self.channels = tuple(known if channels is None else channels)

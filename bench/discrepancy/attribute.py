@@ -27,6 +27,9 @@ LOG_PRIOR_EFFECT = -3.4
 """Log prior odds of one more effect: about one in the number of effects of the catalogue."""
 SIGNIFICANT = 4.0
 """Standard deviations by which chi-squared may exceed its expectation before a hypothesis counts as refuted."""
+IMMATERIAL = 0.002
+"""Relative improvement of chi-squared that one more effect has to pay for, since the smoothing of stick-slip and the
+interpolation of loads are themselves only as good as that; records of extreme signal-to-noise ratio would else name trifles."""
 WORTH_A_FIT = 25.0
 """Screened gain in chi-squared from which one more effect could overcome its prior and its Occam factor."""
 HOPELESS = 3.0
@@ -72,7 +75,8 @@ def key_of(hypothesis: Hypothesis) -> frozenset:
 
 def posterior(fitted: Fit) -> float:
     """Log posterior of a hypothesis up to a constant."""
-    return fitted.log_evidence + LOG_PRIOR_EFFECT * len(fitted.hypothesis)
+    tolerance = 0.5 * IMMATERIAL * fitted.n_residuals
+    return fitted.log_evidence + (LOG_PRIOR_EFFECT - tolerance) * len(fitted.hypothesis)
 
 
 def consistent(fitted: Fit) -> bool:

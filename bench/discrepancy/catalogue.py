@@ -284,7 +284,7 @@ CATALOGUE: tuple[Effect, ...] = (
         "joint",
         (
             FRICTION,
-            FreeParameter("depth", signed=True, mean=0.5, std=0.5, bounds=(0.0, 1.5), grid=(0.6,)),
+            FreeParameter("depth", mean=math.log(0.4), std=0.8, bounds=(math.log(0.02), math.log(1.5)), grid=_log_grid(0.6)),
             FreeParameter(
                 "frequency",
                 "1/duration",
@@ -500,11 +500,11 @@ CATALOGUE: tuple[Effect, ...] = (
         "coupling",
         "joint",
         (
-            FreeParameter("axial_damping", "force/velocity/position", **AMPLITUDE),
-            FreeParameter("torsional_damping", "force/velocity/position", **AMPLITUDE),
+            FreeParameter("axial_damping", "force/velocity/position2", **AMPLITUDE),
+            FreeParameter("torsional_damping", "force2/velocity2/position", **AMPLITUDE),
             FreeParameter(
                 "torsional_clearance",
-                "position",
+                "position2",
                 mean=math.log(0.4),
                 std=0.8,
                 bounds=(-5.0, 0.1),
@@ -527,7 +527,7 @@ CATALOGUE: tuple[Effect, ...] = (
         "cross_stiffness",
         "coupling",
         "joint",
-        (FreeParameter("k_cross", "stiffness", **SIGNED),),
+        (FreeParameter("k_cross", "force/position2", **SIGNED),),
         "f1 = k th, f2 = k x",
         law=CROSS_STIFFNESS,
         n_coordinates=2,

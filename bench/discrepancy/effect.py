@@ -35,6 +35,7 @@ class Scales(NamedTuple):
         stiffness: Nominal stiffness, or force / position where there is none.
         duration: Length of the record [s].
         step: Time between samples [s].
+        force2, position2, velocity2: The same for the last coordinate of the place; equal to the first on one coordinate.
     """
 
     force: float
@@ -43,6 +44,9 @@ class Scales(NamedTuple):
     stiffness: float
     duration: float
     step: float
+    force2: float
+    position2: float
+    velocity2: float
 
 
 @dataclass(frozen=True)
@@ -99,7 +103,7 @@ def unit_of(key: str, position: str, force: str) -> str:
     """Unit of a scale key, for a coordinate of unit `position` and a force of unit `force`."""
     names = {
         "force": force, "position": position, "velocity": f"{position}/s", "stiffness": f"({force}/{position})",
-        "duration": "s", "step": "s", "1": "1",
+        "duration": "s", "step": "s", "1": "1", "force2": "N m", "position2": "rad", "velocity2": "rad/s",
     }  # fmt: skip
     head, *divisors = key.split("/")
     if not divisors:

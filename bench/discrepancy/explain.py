@@ -36,6 +36,8 @@ from bench.discrepancy.structure import Structure, structure_of
 
 HELPFUL = 0.3
 """A catalogued explanation that leaves less than this part of the excess is kept under a closure; others only disturb it."""
+HOPELESS_COUPLING = 50.0
+"""Reduced chi-squared of a coupling effect alone above which no further effect is added to it."""
 PROMISING = 4.0
 """Reduced chi-squared that a screening must promise in every group, if groups are to be searched before couplings."""
 KEPT = 12
@@ -162,6 +164,8 @@ def _coupled(whole: Problem, catalogue: Sequence[Effect], most: int, progress: C
             if not kept.fits:
                 break
             base = kept.ranked()[0]
+            if base.reduced > HOPELESS_COUPLING:
+                break
             progress(f"{names(base.hypothesis)}, chi-squared {base.reduced:.3g}")
             best_points: dict[tuple[str, str, str], Point] = {}
             for point in screen.ranked(base):
@@ -176,7 +180,7 @@ def _coupled(whole: Problem, catalogue: Sequence[Effect], most: int, progress: C
 
             trials = sorted(pool.map(extended, worth), key=lambda f: -f.log_evidence)
             kept.add(fit(whole, trials[0].hypothesis, start=trials[0].vector, iterations=20))
-            if kept.ranked()[0] is base:
+            if kept.ranked()[0] is base or kept.ranked()[0].reduced - 1.0 > STALLED * (base.reduced - 1.0):
                 break
     return kept.ranked()
 

@@ -189,19 +189,33 @@ class Problem:
 
     def scales(self, place: Place) -> Scales:
         """Magnitudes along the coordinates of a place, over all records."""
-        position = velocity = 0.0
+        count = len(place.rows)
+        position, velocity = np.zeros(count), np.zeros(count)
         for i in range(len(self.records)):
             motion = self.motion(i)
-            position = max(position, float(np.abs(motion.position @ place.rows.T).max()))
-            velocity = max(velocity, float(np.abs(motion.velocity @ place.rows.T).max()))
-        loading = [d.responses if self.driven else d.loads for d in self.data]
-        force = float(np.sqrt(np.mean([np.mean(x**2) for x in loading]))) or 1.0
-        position = position or 1.0
-        stiffness = force / position
+            position = np.maximum(position, np.abs(motion.position @ place.rows.T).max(axis=0))
+            velocity = np.maximum(velocity, np.abs(motion.velocity @ place.rows.T).max(axis=0))
+        position[position == 0.0] = 1.0
+        velocity[velocity == 0.0] = 1.0
+        force = np.array([self._loading(row) for row in place.rows])
+        stiffness = force[0] / position[0]
         if place.stiffness in self.structure.parameters:
-            stiffness = float(self.nominal[self.structure.parameters.index(place.stiffness)]) or stiffness
+            stiffness = self.nominal[self.structure.parameters.index(place.stiffness)] or stiffness
         record = self.records[0]
-        return Scales(force, position, velocity or 1.0, stiffness, len(record) * record.step, record.step)
+        return Scales(
+            float(force[0]), float(position[0]), float(velocity[0]), float(stiffness), len(record) * record.step,
+            record.step, float(force[-1]), float(position[-1]), float(velocity[-1]),
+        )  # fmt: skip
+
+    def _loading(self, row: Array) -> float:
+        """RMS load of the group of degrees of freedom that a coordinate belongs to."""
+        if self.driven:
+            return float(np.sqrt(np.mean([np.mean(d.responses**2) for d in self.data]))) or 1.0
+        group = next(g for g in self.structure.groups() if np.any(row[list(g)] != 0.0))
+        acting = np.abs(self.structure.inputs[list(group)]).sum(axis=0) > 0
+        if not acting.any():
+            return 1.0
+        return float(np.sqrt(np.mean([np.mean(d.loads[:, acting] ** 2) for d in self.data]))) or 1.0
 
     def simulate(self, hypothesis: Hypothesis, vector: Array, record: CaseRecord) -> Array:
         """Free run of a hypothesis.

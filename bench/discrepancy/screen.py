@@ -223,7 +223,7 @@ def _spanning(placed: Placed, eta: Array) -> list[Array]:
         unit[i] = 1.0 if effect.parameters[i].signed else 0.0
     if effect.modulated:
         still, sine, cosine = unit.copy(), unit.copy(), unit.copy()
-        still[1], sine[1], cosine[1] = 0.0, 1.0, 1.0
+        still[1], sine[1], cosine[1] = TINY, 0.0, 0.0
         sine[3], cosine[3] = 0.0, 0.5 * np.pi
         return [still, sine, cosine]
     if effect.affine:
@@ -258,7 +258,7 @@ def _read(node: Node, gram: Array, right: Array) -> Point | None:
         if c[0] <= 0:
             return None
         eta[0] = np.log(c[0])
-        eta[1] = np.clip(np.hypot(c[1], c[2]) / c[0], *parameters[1].bounds)
+        eta[1] = np.log(max(np.hypot(c[1], c[2]) / c[0], 1e-6))
         eta[3] = np.arctan2(c[2], c[1])
     elif effect.affine:
         if c[0] <= 0 or c[1] <= 0:

@@ -20,6 +20,8 @@ from bench.errors import IdentificationError
 CANDIDATES = 10.0 ** np.arange(-2.0, 3.1, 1.0)
 """Multiples of a first guess of the jerk intensity that are compared by likelihood."""
 
+START = 12
+"""Samples whose slope through the first one starts the velocity."""
 LOOSE = 300.0
 """How poorly the mean position counts as known where none is measured, as a multiple of the motion."""
 
@@ -33,6 +35,10 @@ def _filter(y, h, transition, gain, out, predicted):
         for i in range(3):
             if h[c, i] == 1.0:
                 state[i] = y[0, c]
+        if h[c, 0] == 1.0:
+            # a record may start in motion: the stationary gains would take long to find its velocity
+            for k in range(1, START + 1):
+                state[1] += (y[k, c] - y[0, c]) * 6.0 * k / (START * (START + 1.0) * (2.0 * START + 1.0))
     squares = np.zeros((m, m))
     innovation = np.zeros(m)
     for k in range(n):

@@ -97,7 +97,7 @@ def log_comparison(
             lanes = sum(band.of(recording) is not None for band in bands for recording in records.values())
             page = Page.of(records, scenes, pairs, lanes=lanes)
             if first_rig is not None:
-                page = page._replace(eye=eye_of(first_rig.model, camera))
+                page = page._replace(eye=eye_of(first_rig.scene, camera))
             if target is None:
                 _open_viewer(stream, blueprint(page))
             else:
@@ -185,8 +185,8 @@ def _loops(records: Mapping[str, Recording], rig: Rig | None) -> list[tuple[str,
 
 
 def _log_rig(stream: rr.RecordingStream, variant: str, rig: Rig, clock: _Clock, qpos: NDArray) -> None:
-    shown = body_poses(rig.model, qpos[clock.frames])
-    log_scene(stream, ["rig", variant], rig.model, clock.time[clock.frames], shown)
+    shown = body_poses(rig.scene, qpos[clock.frames])
+    log_scene(stream, ["rig", variant], rig.scene, clock.time[clock.frames], shown)
 
 
 def _keys(records: Mapping[str, Recording]) -> dict[str, str]:

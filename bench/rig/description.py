@@ -120,8 +120,13 @@ class Rig:
 
     @property
     def model(self) -> mujoco.MjModel:
-        """The compiled model (shared: copy it before changing it)."""
+        """The compiled model that is simulated, without drawings (shared: copy it before changing it)."""
         return self.built.model
+
+    @cached_property
+    def scene(self) -> mujoco.MjModel:
+        """The compiled model with everything that is drawn: same joints, actuators and sensors as `model`."""
+        return build(self, drawings=True).model
 
     @property
     def actuators(self) -> tuple[str, ...]:

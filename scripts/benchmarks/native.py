@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import mujoco
 import numpy as np
 from mujoco import rollout
@@ -40,14 +42,19 @@ def _batch(model: mujoco.MjModel) -> None:
     batch.step(nstep=STEPS // 16)
 
 
-def _python_callback(law_k: float, clearance: float):
-    def callback(model: mujoco.MjModel, data: mujoco.MjData) -> None:
-        q = data.qpos[0]
-        engaged = abs(q) - clearance
-        if engaged > 0.0:
-            data.qfrc_passive[0] -= law_k * np.copysign(engaged, q)
+def _python_passive(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    """The gap and the Bouc-Wen force of `_rig`, as a person would write the callback in Python."""
+    q = data.qpos[0]
+    engaged = abs(q) - 0.003
+    force = data.act[0] if model.na else 0.0
+    if engaged > 0.0:
+        force += math.copysign(3000.0 * engaged, q)
+    data.qfrc_passive[0] -= force
 
-    return callback
+
+def _python_act_dyn(model: mujoco.MjModel, data: mujoco.MjData, actuator: int) -> float:
+    v, z = data.qvel[0], data.act[0]
+    return 800.0 * v - 60.0 * abs(v) * z - 40.0 * v * abs(z)
 
 
 def _without(task, model: mujoco.MjModel):
@@ -66,7 +73,10 @@ def rows(repeats: int = 15) -> list[Row]:
     result = []
     for integrator in ("RK4", "Euler"):
         for label, task in (("loop", _loop), ("rollout, 2 threads", _rollout), ("Batch, 2 threads", _batch)):
-            for name, rig in (("SDOF gap + Bouc-Wen", _rig(integrator)), ("deck joint", joint_rig(integrator=integrator))):
+            for name, rig in (
+                ("SDOF gap + Bouc-Wen", _rig(integrator)),
+                ("deck joint", joint_rig(integrator=integrator)),
+            ):
                 model = rig.model
                 seconds = interleave(
                     {"with": lambda t=task, m=model: t(m), "without": _without(task, model)}, repeats
@@ -80,27 +90,31 @@ def rows(repeats: int = 15) -> list[Row]:
                         meaning="step rate with native callback / without any callback, same model",
                     )
                 )
-    result.append(_against_python(repeats))
+    gap = Element.of("gap", "carriage", stiffness=3000.0, clearance=0.003)
+    result.append(
+        _against_python("SDOF gap", sdof_rig(gap, mass=2.0, stiffness=1500.0, damping=4.0), repeats)
+    )
+    result.append(_against_python("SDOF gap + Bouc-Wen", _rig("RK4"), repeats))
     return result
 
 
-def _against_python(repeats: int) -> Row:
-    gap = Element.of("gap", "carriage", stiffness=3000.0, clearance=0.003)
-    model = sdof_rig(gap, mass=2.0, stiffness=1500.0, damping=4.0).model
-    callback = _python_callback(3000.0, 0.003)
+def _against_python(name: str, rig: Rig, repeats: int) -> Row:
+    model = rig.model
 
     def python() -> None:
         native.uninstall()
-        mujoco.set_mjcb_passive(callback)
+        mujoco.set_mjcb_passive(_python_passive)
+        mujoco.set_mjcb_act_dyn(_python_act_dyn)
         try:
             _loop(model)
         finally:
             mujoco.set_mjcb_passive(None)
+            mujoco.set_mjcb_act_dyn(None)
             native.install()
 
     seconds = interleave({"native": lambda: _loop(model), "python": python}, max(5, repeats // 3))
     return ratio_row(
-        "SDOF gap, RK4, loop: native against Python callback",
+        f"{name}, RK4, loop: native against Python callback",
         seconds["native"],
         seconds["python"],
         limit="≥ 3",

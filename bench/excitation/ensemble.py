@@ -1,0 +1,317 @@
+"""Ensembles: many linear structures with elements, integrated together in compiled code.
+
+The method is MuJoCo's own (classical Runge-Kutta, commands held over a step, sensors read at the start of a step) on the
+structure of `linear_structure`, and the forces are the laws' own kernels, so that a record equals MuJoCo's to rounding (a test
+holds the two equal). An excitation design needs thousands of records of some dozens of rigs, and an environment's step a few
+dozens of short ones; at 4 to 9 µs for a step of MuJoCo that would take minutes and milliseconds.
+
+A member of an ensemble is one rig. `groups` name sets of members; each of several independent runs ("cases": the candidates of
+a population, the environments of a vector environment) drives the members of one group with its own commands.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NamedTuple
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.errors import ModelError, ParameterError
+from bench.excitation.linear_structure import linear_structure
+from bench.laws.base import MAX_COORDINATES
+from bench.laws.calling import advance, call_kernel, load_int, pointer_at
+from bench.rig import Rig
+
+CASES_A_THREAD = 4
+"""Fewest cases for which another thread is worth its start of some 20 µs."""
+
+
+class Packed(NamedTuple):
+    """Members as plain arrays for compiled code; d counts members, k elements, j coordinates of a law."""
+
+    acceleration: NDArray[np.float64]  # (D, nv, 1 + 3 nv + nu)
+    sensors: NDArray[np.float64]  # (D, nc, 1 + 3 nv + nu)
+    kernels: NDArray[np.int64]  # (D, K, 2) force and rate addresses, 0 for none
+    sizes: NDArray[np.int64]  # (D, K, 3) coordinates, states, first state
+    motion: NDArray[np.float64]  # (D, K, J, nv) coefficients of joints in a coordinate
+    inputs: NDArray[np.int64]  # (D, K, J) actuator read by a coordinate, −1 for a motion
+    theta: NDArray[np.float64]  # (D, K, n_theta)
+    start: NDArray[np.float64]  # (D, 2 nv + nz)
+
+
+@numba.njit(error_model="numpy", inline="always")
+def _affine(row, x, nv, u, nu, tau):
+    """An affine function of positions, velocities, commands and forces; `row` holds its coefficients."""
+    total = row[0]
+    for j in range(2 * nv):
+        total += row[1 + j] * x[j]
+    for j in range(nu):
+        total += row[1 + 2 * nv + j] * u[j]
+    for j in range(nv):
+        total += row[1 + 2 * nv + nu + j] * tau[j]
+    return total
+
+
+@numba.njit(error_model="numpy", inline="always")
+def _derivative(t, x, u, nv, nu, n_elements, n_coordinates, n_theta, table, dx, scratch):
+    """Write the derivative of state `x` into `dx` and the elements' generalised forces into ``scratch[:nv]``.
+
+    Everything is a C pointer: arrays passed to a function are counted references, which cost more than the arithmetic here.
+    """
+    acceleration, kernels, sizes, motion, inputs, theta = table
+    lq = advance(scratch, nv)
+    lv = advance(lq, MAX_COORDINATES)
+    lf = advance(lv, MAX_COORDINATES)
+    for i in range(nv):
+        scratch[i] = 0.0
+    for k in range(n_elements):
+        force = load_int(kernels + 16 * k)
+        if force == 0:
+            continue
+        count = load_int(sizes + 24 * k)
+        first = 2 * nv + load_int(sizes + 24 * k + 16)
+        for j in range(count):
+            source = load_int(inputs + 8 * (n_coordinates * k + j))
+            row = advance(motion, nv * (n_coordinates * k + j))
+            position = 0.0
+            velocity = 0.0
+            if source >= 0:
+                position = u[source]
+            else:
+                for i in range(nv):
+                    position += row[i] * x[i]
+                    velocity += row[i] * x[nv + i]
+            lq[j] = position
+            lv[j] = velocity
+            lf[j] = 0.0
+        parameters = advance(theta, n_theta * k)
+        states = advance(x, first)
+        call_kernel(force, t, lq, lv, states, parameters, lf)
+        for j in range(count):
+            if load_int(inputs + 8 * (n_coordinates * k + j)) < 0:
+                row = advance(motion, nv * (n_coordinates * k + j))
+                for i in range(nv):
+                    scratch[i] -= row[i] * lf[j]
+        rate = load_int(kernels + 16 * k + 8)
+        if rate != 0:
+            call_kernel(rate, t, lq, lv, states, parameters, advance(dx, first))
+    for i in range(nv):
+        dx[i] = x[nv + i]
+        dx[nv + i] = _affine(advance(acceleration, i * (1 + 3 * nv + nu)), x, nv, u, nu, scratch)
+
+
+@numba.njit(cache=True, error_model="numpy", nogil=True)
+def _integrate(first, last, h, clock, controls, members, counts, p, states, outputs, work):
+    """Advance the cases ``first … last − 1``; `states` and `outputs` are written, `work` is scratch of 5 nx + nv + 3 J."""
+    nx = states.shape[2]
+    nv = p.acceleration.shape[1]
+    nc = p.sensors.shape[1]
+    nu = controls.shape[2]
+    n_steps = controls.shape[1]
+    n_elements = p.kernels.shape[1]
+    n_coordinates = p.motion.shape[2]
+    n_theta = p.theta.shape[2]
+    columns = 1 + 3 * nv + nu
+    x_now = pointer_at(work.ctypes.data)
+    rates = advance(x_now, nx)
+    scratch = advance(x_now, 5 * nx)
+    for case in range(first, last):
+        for m in range(counts[case]):
+            d = members[case, m]
+            x = pointer_at(states.ctypes.data + 8 * nx * (m + states.shape[1] * case))
+            y = pointer_at(outputs.ctypes.data + 8 * nc * n_steps * (m + outputs.shape[1] * case))
+            sensors = pointer_at(p.sensors.ctypes.data + 8 * columns * nc * d)
+            table = (
+                pointer_at(p.acceleration.ctypes.data + 8 * columns * nv * d),
+                p.kernels.ctypes.data + 16 * n_elements * d,
+                p.sizes.ctypes.data + 24 * n_elements * d,
+                pointer_at(p.motion.ctypes.data + 8 * nv * n_coordinates * n_elements * d),
+                p.inputs.ctypes.data + 8 * n_coordinates * n_elements * d,
+                pointer_at(p.theta.ctypes.data + 8 * n_theta * n_elements * d),
+            )
+            for i in range(5 * nx):
+                x_now[i] = 0.0  # among them rates of states that this member does not have
+            for step in range(n_steps):
+                u = pointer_at(controls.ctypes.data + 8 * nu * (step + n_steps * case))
+                for stage in range(4):
+                    fraction = 0.0 if stage == 0 else (h if stage == 3 else 0.5 * h)
+                    dx = advance(rates, stage * nx)
+                    before = advance(rates, (stage - 1) * nx)
+                    for i in range(nx):
+                        x_now[i] = x[i] + (fraction * before[i] if stage > 0 else 0.0)
+                    t = clock[case] + h * step + fraction
+                    _derivative(
+                        t, x_now, u, nv, nu, n_elements, n_coordinates, n_theta, table, dx, scratch
+                    )  # fmt: skip
+                    if stage == 0:
+                        for c in range(nc):
+                            y[nc * step + c] = _affine(advance(sensors, c * columns), x_now, nv, u, nu, scratch)
+                for i in range(nx):
+                    x[i] += (h / 6.0) * (
+                        rates[i] + 2.0 * (rates[nx + i] + rates[2 * nx + i]) + rates[3 * nx + i]
+                    )
+
+
+def available_threads() -> int:
+    """Number of cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@dataclass(eq=False)
+class Ensemble:
+    """Rigs of one layout with any elements, integrated together.
+
+    Attributes:
+        rigs: The members; the same MJCF, actuators and time step, elements as they like.
+        channels: Names of the measured channels that records hold.
+        threads: Threads to spread cases over.
+
+    Raises:
+        ModelError: The members differ in their structure's layout, or a member is not linear around its elements.
+    """
+
+    rigs: tuple[Rig, ...]
+    channels: tuple[str, ...]
+    threads: int = 1
+    _packed: Packed = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        self.rigs, self.channels = tuple(self.rigs), tuple(self.channels)
+        if not self.rigs:
+            raise ParameterError("an ensemble needs at least one rig; none came")
+        first = self.rigs[0]
+        for rig in self.rigs:
+            if (rig.model.nv, rig.actuators, rig.timestep) != (first.model.nv, first.actuators, first.timestep):
+                raise ModelError(
+                    f"rigs '{first.name}' and '{rig.name}' of one ensemble differ in joints, actuators or timestep"
+                )
+        self._packed = _pack(self.rigs, self.channels)
+
+    @property
+    def timestep(self) -> float:
+        """Integration step, and interval of the records [s]."""
+        return self.rigs[0].timestep
+
+    @property
+    def n_actuators(self) -> int:
+        """Number of commands."""
+        return len(self.rigs[0].actuators)
+
+    def start(self, members: NDArray[np.int64]) -> NDArray[np.float64]:
+        """States at rest of the members ``(…, n_states)`` for indices of shape ``(…)``; −1 gives zeros."""
+        return np.where((members >= 0)[..., None], self._packed.start[members], 0.0)
+
+    def integrate(
+        self,
+        controls: NDArray[np.float64],
+        states: NDArray[np.float64],
+        *,
+        members: NDArray[np.int64],
+        counts: NDArray[np.int64],
+        clock: NDArray[np.float64] | None = None,
+    ) -> NDArray[np.float64]:
+        """Advance cases by as many steps as there are commands.
+
+        Args:
+            controls: Commands by case ``(n_cases, n, n_actuators)``.
+            states: States ``(n_cases, n_members, n_states)``, advanced in place.
+            members: Members of each case ``(n_cases, n_members)``.
+            counts: How many of them are real ``(n_cases,)``.
+            clock: Time at the first command [s] ``(n_cases,)``; zero by default.
+
+        Returns:
+            Channels ``(n_cases, n_members, n, n_channels)`` at the start of each step; zero for members that are not real.
+            They do not depend on the number of threads, to the last bit.
+        """
+        controls = np.ascontiguousarray(controls, dtype=float)
+        n_cases, n_steps, _ = controls.shape
+        outputs = np.zeros((n_cases, members.shape[1], n_steps, len(self.channels)))
+        times = np.zeros(n_cases) if clock is None else np.ascontiguousarray(clock, dtype=float)
+        nx, nv = states.shape[2], self._packed.acceleration.shape[1]
+
+        def run(first: int, last: int) -> None:
+            work = np.zeros(5 * nx + nv + 3 * MAX_COORDINATES)
+            _integrate(
+                first, last, self.timestep, times, controls, members, counts, self._packed, states, outputs, work
+            )  # fmt: skip
+
+        self.spread(run, n_cases)
+        return outputs
+
+    def spread(self, task, n_cases: int) -> None:
+        """Call ``task(first, last)`` for contiguous shares of the cases, over the threads where there are enough cases."""
+        parts = min(self.threads, n_cases // CASES_A_THREAD)
+        if parts <= 1:
+            task(0, n_cases)
+            return
+        edges = np.linspace(0, n_cases, parts + 1).astype(int).tolist()
+        pending = [self._pool.submit(task, a, b) for a, b in zip(edges[1:-1], edges[2:], strict=True)]
+        task(edges[0], edges[1])
+        for future in pending:
+            future.result()
+
+    def record(self, controls: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Records of all members from rest, for one or several drives.
+
+        Args:
+            controls: Commands ``(n_cases, n, n_actuators)``.
+
+        Returns:
+            ``(n_cases, n_members, n, n_channels)``.
+        """
+        members = np.tile(np.arange(len(self.rigs)), (len(controls), 1))
+        counts = np.full(len(controls), len(self.rigs))
+        return self.integrate(controls, self.start(members), members=members, counts=counts)
+
+    @cached_property
+    def _pool(self) -> ThreadPoolExecutor:
+        return ThreadPoolExecutor(self.threads - 1)
+
+    def __reduce__(self) -> tuple:
+        return (Ensemble, (self.rigs, self.channels, self.threads))  # addresses of kernels hold in one process
+
+
+def _pack(rigs: Sequence[Rig], channels: tuple[str, ...]) -> Packed:
+    nv, nu = rigs[0].model.nv, len(rigs[0].actuators)
+    elements = max(1, max(len(rig.elements) for rig in rigs))
+    width = max([1, *(len(element.theta) for rig in rigs for element in rig.elements)])
+    states = max(sum(len(element.law.states) for element in rig.elements) for rig in rigs)
+    coordinates = max([1, *(element.law.n_coordinates for rig in rigs for element in rig.elements)])
+    shape, columns = (len(rigs), elements), 1 + 3 * nv + nu
+    p = Packed(
+        np.zeros((len(rigs), nv, columns)),
+        np.zeros((len(rigs), len(channels), columns)),
+        np.zeros((*shape, 2), dtype=np.int64),
+        np.zeros((*shape, 3), dtype=np.int64),
+        np.zeros((*shape, coordinates, nv)),
+        np.full((*shape, coordinates), -1, dtype=np.int64),
+        np.zeros((*shape, width)),
+        np.zeros((len(rigs), 2 * nv + states)),
+    )
+    known: dict[tuple, tuple[NDArray, NDArray]] = {}
+    for d, rig in enumerate(rigs):
+        key = (rig.mjcf, rig.structure)
+        if key not in known:  # the structure does not depend on the elements' parameters
+            known[key] = linear_structure(rig, channels)
+        p.acceleration[d], p.sensors[d] = known[key]
+        first = 0
+        for k, item in enumerate(rig.built.placed):
+            law = item.element.law
+            p.kernels[d, k] = law.force.address, law.rate.address if law.rate is not None else 0
+            p.sizes[d, k] = law.n_coordinates, len(law.states), first
+            p.theta[d, k, : len(item.element.theta)] = item.element.theta
+            for j, coordinate in enumerate(item.coordinates):
+                if coordinate.is_input:
+                    p.inputs[d, k, j] = coordinate.terms[0][0]
+                else:
+                    for _, dof, coefficient in coordinate.terms:
+                        p.motion[d, k, j, dof] += coefficient
+            p.start[d, 2 * nv + first : 2 * nv + first + len(law.states)] = law.start()
+            first += len(law.states)
+    return p

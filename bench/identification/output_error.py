@@ -1,0 +1,575 @@
+"""Output-error fits: parameters of elements and structure from records of a whole rig.
+
+The rig is simulated under the measured commands and its sensors are held against the measured ones; hidden states,
+nominal masses, stiffnesses and dampings are all fitted at once. `bench.identification.parametric` fits a law to the
+measured motion *and force* of one component; this needs no force channel at the joint, and pays with simulations.
+
+All columns of a finite-difference Jacobian are simulated in one batch over threads, and so are the trial steps for
+two dampings, so that no thread waits. Two engines give the same numbers: `LinearRig`, the compiled loop for rigs of
+linear structure, and `mujoco.batch` for all others.
+
+References:
+    Ljung 1999, System Identification, section 7.4 (output-error structure).
+    More 1978, The Levenberg-Marquardt algorithm, Lecture Notes in Mathematics 630.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor
+from dataclasses import dataclass, field
+from typing import Literal, NamedTuple
+
+import mujoco
+import numpy as np
+from mujoco.batch import Batch
+from numpy.typing import NDArray
+
+from bench.errors import IdentificationError, ModelError, ParameterError, UnknownNameError
+from bench.identification.linear_rig import Address, LinearRig, address, sensor_columns
+from bench.recording import Recording
+from bench.rig import Rig, controls_of
+
+Array = NDArray[np.float64]
+Initial = Mapping[str, tuple[float, float]]
+Engine = Literal["auto", "linear", "mujoco"]
+
+_DIFFERENCE = 1e-6  # of a parameter's scale: truncation and the simulations' rounding of 1e-13 both stay below 1e-6
+_POSITIVE = ("mass", "inertia")
+_COMMAND_SENSORS = (int(mujoco.mjtSensor.mjSENS_ACTUATORFRC), int(mujoco.mjtSensor.mjSENS_JOINTACTFRC))
+
+
+@dataclass(frozen=True, eq=False)
+class OutputErrorModel:
+    """A rig with fitted parameters.
+
+    Attributes:
+        rig: The rig with these parameters in place.
+        parameters: Fitted values by name.
+        std: Their standard deviations, from the Jacobian at the optimum, residuals taken as white; too small where
+            they are not. Infinite for what the records do not determine, 0 for a parameter at a bound.
+        correlation: Correlation of the parameters ``(n_parameters, n_parameters)``.
+        channels: Sensor channels fitted.
+        residuals: Simulated less measured, by record ``(n_samples, n_channels)`` [unit of the channel].
+        nrmse: rms(residual)/std(measured) by channel, over all records.
+        cost: Half the sum of squared weighted residuals, priors included.
+        iterations: Accepted steps.
+        evaluations: Records simulated.
+        stopped: "tolerance", "stall" (no damping lowers the cost), "gradient" or "iterations".
+        engine: "linear" or "mujoco".
+    """
+
+    rig: Rig
+    parameters: Mapping[str, float]
+    std: Mapping[str, float]
+    correlation: Array = field(repr=False)
+    channels: tuple[str, ...]
+    residuals: tuple[Array, ...] = field(repr=False)
+    nrmse: Mapping[str, float]
+    cost: float
+    iterations: int
+    evaluations: int
+    stopped: str
+    engine: str
+
+
+class _Record(NamedTuple):
+    """A record prepared for simulation."""
+
+    controls: Array  # (n_steps, n_actuators)
+    measured: Array  # (n_samples, n_channels)
+    scored: slice
+    initial: Initial
+    stride: int
+    start_time: float
+
+
+class _LinearEngine:
+    """Simulations by the compiled loop."""
+
+    name = "linear"
+
+    def __init__(self, rig: Rig, channels: Sequence[str], free: Sequence[str], pool: Executor) -> None:
+        self.rig = LinearRig.of(rig, channels, free)
+        self.pool = pool
+
+    def simulate(self, record: _Record, vectors: Array) -> Array:
+        """Channels ``(n_vectors, n_samples, n_channels)``, not finite where a simulation diverged."""
+
+        def one(vector: Array) -> Array:
+            return self.rig.simulate(
+                record.controls,
+                vector,
+                initial=record.initial,
+                stride=record.stride,
+                start_time=record.start_time,
+            )
+
+        return np.stack(list(self.pool.map(one, vectors)))
+
+
+class _MujocoEngine:
+    """Simulations by `mujoco.batch`, each with its own numbers in the fields concerned."""
+
+    name = "mujoco"
+
+    def __init__(self, rig: Rig, channels: Sequence[str], free: Sequence[str], threads: int) -> None:
+        self.rig = rig
+        self.columns = sensor_columns(rig, channels)
+        self.addresses = [address(rig, name) for name in free]
+        self.threads = threads
+
+    def simulate(self, record: _Record, vectors: Array) -> Array:
+        """As `_LinearEngine.simulate`."""
+        model = self.rig.model
+        batch = Batch(model, len(vectors), self.threads)
+        for entry, values in zip(self.addresses, vectors.T, strict=True):
+            target = batch.expand(entry.field)[:, entry.index]
+            target[:] = values.reshape((-1,) + (1,) * (target.ndim - 1))
+        if any(entry.field != "numeric_data" for entry in self.addresses):
+            batch.set_const()
+        batch.bind("time")[:] = record.start_time
+        for joint, (position, velocity) in record.initial.items():
+            place = model.joint(joint)
+            batch.bind("qpos")[:, int(place.qposadr[0])] = position
+            batch.bind("qvel")[:, int(place.dofadr[0])] = velocity
+        for item in self.rig.built.placed:
+            if item.act >= 0:
+                start = item.element.law.start()
+                batch.bind("act")[:, item.act : item.act + len(start)] = start
+        steps, own = record.controls.shape
+        padded = np.zeros((len(vectors), steps, model.nu))
+        padded[:, :, :own] = record.controls
+        clock = mujoco.mjtState.mjSTATE_TIME
+        result = batch.rollout(steps, padded, mujoco.mjtState.mjSTATE_CTRL, [clock, "sensordata"])
+        found = result["sensordata"][:, :: record.stride][:, :, self.columns]
+        stopped = np.diff(result[clock][:, :, 0], axis=1, prepend=record.start_time) <= 0.0
+        found[stopped[:, :: record.stride]] = np.nan
+        return found
+
+
+class _Problem:
+    """Residuals of all records, whitened, and the priors, as a function of the scaled parameters."""
+
+    def __init__(
+        self,
+        engine: _LinearEngine | _MujocoEngine,
+        records: Sequence[_Record],
+        weights: Array,
+        scale: Array,
+        prior: tuple[Array, Array],
+    ) -> None:
+        self.engine, self.records, self.weights, self.scale = engine, records, weights, scale
+        self.prior_mean, self.prior_precision = prior  # of the scaled parameters; precision 0 for none
+        self.evaluations = 0
+        self.n_residuals = sum(len(r.measured[r.scored]) for r in records) * len(weights)
+
+    def residuals(self, record: _Record, points: Array) -> Array:
+        """Simulated less measured over standard deviation ``(n_points, n)``."""
+        self.evaluations += len(points)
+        simulated = self.engine.simulate(record, points * self.scale)
+        with np.errstate(invalid="ignore", over="ignore"):
+            difference = (simulated - record.measured)[:, record.scored] * self.weights
+        return difference.reshape(len(points), -1)
+
+    def costs(self, points: Array) -> Array:
+        """Half the sums of squares ``(n_points,)``; infinite where a simulation diverged."""
+        total = np.zeros(len(points))
+        for record in self.records:
+            part = self.residuals(record, points)
+            with np.errstate(invalid="ignore", over="ignore"):
+                total += 0.5 * np.einsum("ij,ij->i", part, part)
+        total += 0.5 * ((points - self.prior_mean) ** 2 @ self.prior_precision)
+        return np.where(np.isfinite(total), total, np.inf)
+
+    def normal_equations(self, point: Array, high: Array) -> tuple[Array, Array]:
+        """Curvature ``J'J`` and gradient ``J'r`` by forward differences, backwards at an upper bound."""
+        steps = np.where(point + _DIFFERENCE > high, -_DIFFERENCE, _DIFFERENCE)
+        points = np.vstack([point, point + np.diag(steps)])
+        curvature = np.diag(self.prior_precision)
+        gradient = self.prior_precision * (point - self.prior_mean)
+        for record in self.records:
+            residual, *shifted = self.residuals(record, points)
+            jacobian = (np.stack(shifted) - residual) / steps[:, None]
+            jacobian[~np.all(np.isfinite(jacobian), axis=1)] = 0.0  # diverged: leave that parameter where it is
+            curvature = curvature + jacobian @ jacobian.T
+            gradient = gradient + jacobian @ residual
+        return curvature, gradient
+
+
+class _Minimum(NamedTuple):
+    point: Array
+    cost: float
+    curvature: Array
+    held: NDArray[np.bool_]
+    iterations: int
+    stopped: str
+
+
+def fit_output_error(
+    rig: Rig,
+    records: Sequence[Recording],
+    *,
+    free: Sequence[str],
+    channels: Sequence[str] | None = None,
+    inputs: Mapping[str, str] | None = None,
+    initial: Initial | Sequence[Initial] | None = None,
+    noise: Mapping[str, float] | None = None,
+    priors: Mapping[str, tuple[float, float]] | None = None,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    search: Mapping[str, tuple[float, float]] | None = None,
+    starts: int = 1,
+    rng: np.random.Generator | None = None,
+    engine: Engine = "auto",
+    threads: int | None = None,
+    max_iterations: int = 60,
+    tolerance: float = 1e-9,
+    progress: Callable[[int, float], None] | None = None,
+) -> OutputErrorModel:
+    """Fit parameters of a rig to records of its sensors.
+
+    Args:
+        rig: The rig; its parameters are the start.
+        records: Records, each with the commands of the rig's actuators and some of its sensors. Samples within a
+            record's `settle` are simulated and not fitted.
+        free: Parameters to fit: "<element>/<parameter>" or "structure/<mass, inertia, stiffness, damping or
+            armature>/<body, joint or tendon>".
+        channels: Sensors to fit; by default all that the first record has, commands and constant ones left out.
+        inputs: Channel of the records that drives an actuator, by actuator name, where it is not called so: a load
+            cell's channel, for example.
+        initial: (position, velocity) by joint at the start, of all records or one mapping a record; at rest by default.
+        noise: Standard deviation of the measurement noise by channel; that of the records' channels by default. Where
+            neither is known for all channels, each is weighted by its spread and the noise estimated from the residuals.
+        priors: (mean, standard deviation) by parameter; need known noise.
+        bounds: (low, high) by parameter; by default those of the law, and masses above zero.
+        search: Ranges that further starts are drawn from, log-uniform where both ends are positive.
+        starts: Starts in all; sixteen candidates are tried for each further one and the best gone on with.
+        rng: Source of the further starts.
+        engine: "linear" for the compiled loop, "mujoco", or "auto": linear where the rig allows it.
+        threads: Number of threads; all cores by default. It does not change the result.
+        max_iterations: Most accepted steps from a start.
+        tolerance: Relative fall of the cost below which a start ends.
+        progress: Called with the iteration and the cost after each step.
+
+    Returns:
+        The best fit.
+
+    Raises:
+        UnknownNameError: A name is no parameter, channel or actuator of the rig or the records.
+        IdentificationError: No records, nothing to fit, a channel that never changes, priors without known noise, or a
+            rig that diverges at every start.
+        ModelError: The linear engine was asked for and the rig is not of linear structure.
+        ParameterError: A setting is out of range.
+    """
+    names = tuple(free)
+    if not records or not names or len(set(names)) != len(names):
+        raise IdentificationError(
+            f"{len(records)} records and the free parameters {list(names)} came; at least one each, all different, is expected"
+        )
+    start = np.array([_current(rig, address(rig, name)) for name in names])
+    chosen = tuple(channels) if channels is not None else _moving_sensors(rig, records[0])
+    prepared = [_prepare(rig, r, chosen, inputs or {}, i) for r, i in _with_initial(records, initial)]
+    weights, known = _weights(records, chosen, prepared, noise)
+    scale = np.where(start != 0.0, np.abs(start), 1.0)
+    for i, name in enumerate(names):
+        if name in (search or {}) and start[i] == 0.0:
+            scale[i] = max(np.abs((search or {})[name]))
+    prior = _priors(names, scale, priors or {}, known)
+    low, high = _bounds(rig, names, bounds or {}) / scale
+    workers = threads or os.cpu_count() or 1
+    with ThreadPoolExecutor(workers) as pool:
+        simulator = _engine(engine, rig, chosen, names, (pool, workers))
+        problem = _Problem(simulator, prepared, weights, scale, prior)
+        points = _starts(problem, names, start / scale, (low, high), search or {}, starts, rng)
+        minima = [_minimise(problem, p, (low, high), max_iterations, tolerance, progress) for p in points]
+        best = min(minima, key=lambda minimum: minimum.cost)
+        if not math.isfinite(best.cost):
+            raise IdentificationError(
+                f"rig '{rig.name}' diverges at every start; start nearer, narrow `search`, or set a smaller timestep"
+            )
+        residuals = tuple(
+            simulator.simulate(record, best.point[None, :] * scale)[0] - record.measured for record in prepared
+        )
+    return _report(rig, names, chosen, problem, best, (prepared, residuals, known))
+
+
+def _report(
+    rig: Rig,
+    names: tuple[str, ...],
+    channels: tuple[str, ...],
+    problem: _Problem,
+    best: _Minimum,
+    data: tuple[Sequence[_Record], tuple[Array, ...], bool],
+) -> OutputErrorModel:
+    prepared, residuals, known = data
+    values = best.point * problem.scale
+    variance = 1.0 if known else 2.0 * best.cost / max(problem.n_residuals - len(names), 1)
+    covariance = np.zeros_like(best.curvature)
+    moving = np.flatnonzero(~best.held)
+    curvature = best.curvature[np.ix_(moving, moving)]
+    determined = np.diag(curvature) > 0.0
+    sure = moving[determined]
+    covariance[np.ix_(sure, sure)] = variance * np.linalg.pinv(curvature[np.ix_(determined, determined)], rcond=1e-15)
+    std = np.sqrt(np.diag(covariance))
+    correlation = np.eye(len(names))
+    correlation[np.ix_(sure, sure)] = covariance[np.ix_(sure, sure)] / np.outer(std[sure], std[sure])
+    std[moving[~determined]] = np.inf
+    error = np.concatenate([part[record.scored] for part, record in zip(residuals, prepared, strict=True)])
+    measured = np.concatenate([record.measured[record.scored] for record in prepared])
+    nrmse = np.sqrt(np.mean(error**2, axis=0)) / np.std(measured, axis=0)
+    return OutputErrorModel(
+        _fitted(rig, names, values),
+        dict(zip(names, values.tolist(), strict=True)),
+        dict(zip(names, (std * problem.scale).tolist(), strict=True)),
+        correlation,
+        channels,
+        residuals,
+        dict(zip(channels, nrmse.tolist(), strict=True)),
+        best.cost,
+        best.iterations,
+        problem.evaluations,
+        best.stopped,
+        problem.engine.name,
+    )
+
+
+def _minimise(
+    problem: _Problem,
+    point: Array,
+    box: tuple[Array, Array],
+    max_iterations: int,
+    tolerance: float,
+    progress: Callable[[int, float], None] | None,
+) -> _Minimum:
+    """Levenberg-Marquardt within bounds; each iteration tries two dampings at once."""
+    low, high = box
+    cost = float(problem.costs(point[None, :])[0])
+    damping, iterations, stopped = 1e-3, 0, "iterations"
+    held = np.zeros(len(point), dtype=bool)
+    curvature = np.zeros((len(point), len(point)))
+    if not math.isfinite(cost):
+        return _Minimum(point, cost, curvature, held, 0, "diverged")
+    while True:
+        curvature, gradient = problem.normal_equations(point, high)
+        held = ((point <= low) & (gradient > 0.0)) | ((point >= high) & (gradient < 0.0))
+        if iterations == max_iterations:
+            break
+        if np.all(np.abs(gradient[~held]) <= 1e-14 * (1.0 + cost)):
+            stopped = "gradient"
+            break
+        fall = -1.0
+        while damping < 1e12 and fall <= 0.0:
+            trials = np.stack(
+                [_trial(point, curvature, gradient, held, box, d) for d in (damping, 0.01 * damping)]
+            )
+            costs = problem.costs(trials)
+            chosen = int(np.argmin(costs))
+            fall = cost - float(costs[chosen])
+            damping *= 100.0 if fall <= 0.0 else (0.5, 0.01)[chosen]
+        if fall <= 0.0:
+            stopped = "stall"
+            break
+        point, cost, iterations = trials[chosen], float(costs[chosen]), iterations + 1
+        damping = max(damping, 1e-14)
+        if progress is not None:
+            progress(iterations, cost)
+        if fall <= tolerance * cost:
+            stopped = "tolerance"
+            max_iterations = iterations  # the curvature at the end is still wanted
+    return _Minimum(point, cost, curvature, held, iterations, stopped)
+
+
+def _trial(
+    point: Array,
+    curvature: Array,
+    gradient: Array,
+    held: NDArray[np.bool_],
+    box: tuple[Array, Array],
+    damping: float,
+) -> Array:
+    trial = point.copy()
+    moving = np.flatnonzero(~held)
+    damped = curvature[np.ix_(moving, moving)].copy()
+    diagonal = np.diag(damped)
+    damped[np.diag_indices_from(damped)] += damping * np.where(diagonal > 0.0, diagonal, 1.0)
+    trial[moving] -= np.linalg.lstsq(damped, gradient[moving], rcond=None)[0]
+    return np.clip(trial, *box)
+
+
+def _starts(
+    problem: _Problem,
+    names: tuple[str, ...],
+    start: Array,
+    box: tuple[Array, Array],
+    search: Mapping[str, tuple[float, float]],
+    starts: int,
+    rng: np.random.Generator | None,
+) -> list[Array]:
+    for name in search:
+        if name not in names:
+            raise UnknownNameError("free parameter", name, names)
+    if starts < 1 or (starts > 1 and (rng is None or not search)):
+        raise ParameterError(
+            f"{starts} starts, search {dict(search)} and rng {rng} came; more than one start needs `search` and `rng`"
+        )
+    first = np.clip(start, *box)
+    if starts == 1 or rng is None:
+        return [first]
+    candidates = np.tile(first, (16 * (starts - 1), 1))
+    for name, (lowest, highest) in search.items():
+        share = rng.random(len(candidates))
+        drawn = (
+            lowest * (highest / lowest) ** share
+            if lowest > 0.0 and highest > 0.0
+            else lowest + (highest - lowest) * share
+        )
+        candidates[:, names.index(name)] = drawn / problem.scale[names.index(name)]
+    order = np.argsort(problem.costs(candidates), kind="stable")
+    return [first, *(np.clip(candidates[i], *box) for i in order[: starts - 1])]
+
+
+def _engine(
+    engine: Engine, rig: Rig, channels: tuple[str, ...], free: tuple[str, ...], workers: tuple[Executor, int]
+) -> _LinearEngine | _MujocoEngine:
+    if engine not in ("auto", "linear", "mujoco"):
+        raise UnknownNameError("engine", engine, ("auto", "linear", "mujoco"))
+    if engine != "mujoco":
+        try:
+            return _LinearEngine(rig, channels, free, workers[0])
+        except ModelError:
+            if engine == "linear":
+                raise
+    return _MujocoEngine(rig, channels, free, workers[1])
+
+
+def _current(rig: Rig, entry: Address) -> float:
+    return float(np.ravel(getattr(rig.model, entry.field)[entry.index])[0])
+
+
+def _moving_sensors(rig: Rig, record: Recording) -> tuple[str, ...]:
+    model = rig.model
+    columns = np.repeat(model.sensor_type, model.sensor_dim)
+    first = len(rig.actuators)
+    sensors = rig.channels[first : first + model.nsensordata]
+    return tuple(
+        channel.name
+        for channel, kind in zip(sensors, columns, strict=True)
+        if channel.name in record
+        and int(kind) not in _COMMAND_SENSORS
+        and np.ptp(record[channel.name][record.scored]) > 0.0
+    )
+
+
+def _with_initial(
+    records: Sequence[Recording], initial: Initial | Sequence[Initial] | None
+) -> list[tuple[Recording, Initial]]:
+    if initial is None or isinstance(initial, Mapping):
+        return [(record, initial or {}) for record in records]
+    if len(initial) != len(records):
+        raise IdentificationError(f"{len(records)} records and {len(initial)} initial states came; one each is expected")
+    return list(zip(records, initial, strict=True))
+
+
+def _prepare(
+    rig: Rig, record: Recording, channels: tuple[str, ...], inputs: Mapping[str, str], initial: Initial
+) -> _Record:
+    if not channels:
+        raise IdentificationError(
+            f"the record has none of the sensors of rig '{rig.name}' in motion; it has {', '.join(record.names)}"
+        )
+    for name in inputs:
+        if name not in rig.actuators:
+            raise UnknownNameError(f"actuator of rig '{rig.name}'", name, rig.actuators)
+    arrays = {actuator: record[channel] for actuator, channel in inputs.items()}
+    arrays |= {name: record[name] for name in rig.actuators if name in record and name not in inputs}
+    if not arrays:
+        raise UnknownNameError(
+            f"channel for the actuators of rig '{rig.name}' in the record", rig.actuators[0], record.names
+        )
+    driven = Recording.from_arrays(
+        None, arrays, units=dict.fromkeys(arrays, "1"), sample_rate=record.sample_rate
+    )
+    for joint in initial:
+        if mujoco.mj_name2id(rig.model, mujoco.mjtObj.mjOBJ_JOINT, joint) < 0:
+            raise UnknownNameError("joint", joint, [rig.model.joint(i).name for i in range(rig.model.njnt)])
+    controls = controls_of(rig, driven)
+    measured = np.stack([record[name] for name in channels], axis=1)
+    return _Record(
+        controls, measured, record.scored, initial, len(controls) // len(record), float(record.time[0])
+    )
+
+
+def _weights(
+    records: Sequence[Recording],
+    channels: tuple[str, ...],
+    prepared: Sequence[_Record],
+    noise: Mapping[str, float] | None,
+) -> tuple[Array, bool]:
+    """One over the standard deviation of each channel, and whether that is its noise."""
+    for name in noise or {}:
+        if name not in channels:
+            raise UnknownNameError("fitted channel", name, channels)
+    stated = {name: records[0].channel(name).noise_std for name in channels} | dict(noise or {})
+    measured = np.concatenate([record.measured[record.scored] for record in prepared])
+    spread = np.std(measured, axis=0)
+    for name, value, size in zip(channels, spread, np.max(np.abs(measured), axis=0), strict=True):
+        if not value > 1e-14 * size:
+            raise IdentificationError(f"channel '{name}' never changes; leave it out of `channels`")
+    values = list(stated.values())
+    if all(value is not None and value > 0.0 for value in values):
+        return 1.0 / np.array(values, dtype=float), True
+    return 1.0 / spread, False
+
+
+def _priors(
+    names: tuple[str, ...], scale: Array, priors: Mapping[str, tuple[float, float]], known: bool
+) -> tuple[Array, Array]:
+    mean, precision = np.zeros(len(names)), np.zeros(len(names))
+    if priors and not known:
+        raise IdentificationError(
+            "priors weigh against measurement noise, which is not known; give `noise`, or channels with noise_std"
+        )
+    for name, (centre, deviation) in priors.items():
+        if name not in names:
+            raise UnknownNameError("free parameter", name, names)
+        if not deviation > 0.0:
+            raise ParameterError(f"prior of '{name}' has the standard deviation {deviation}; a positive one is expected")
+        place = names.index(name)
+        mean[place] = centre / scale[place]
+        precision[place] = (scale[place] / deviation) ** 2
+    return mean, precision
+
+
+def _bounds(rig: Rig, names: tuple[str, ...], bounds: Mapping[str, tuple[float, float]]) -> Array:
+    """Lower and upper bounds ``(2, n_parameters)``."""
+    for name in bounds:
+        if name not in names:
+            raise UnknownNameError("free parameter", name, names)
+    result = []
+    for name in names:
+        first, _, rest = name.partition("/")
+        if first == "structure" and "/" in rest:
+            entry = address(rig, name)
+            kind = rest.split("/", 1)[0]
+            lowest = 1e-6 * _current(rig, entry) if kind in _POSITIVE else -math.inf if kind == "stiffness" else 0.0
+            default = (lowest, math.inf)
+        else:
+            label, _, parameter = name.rpartition("/")
+            law = rig.element(label).law
+            default = law.parameters[law.parameter_names.index(parameter)].bounds
+        result.append(bounds.get(name, default))
+    return np.array(result).T
+
+
+def _fitted(rig: Rig, names: tuple[str, ...], values: Array) -> Rig:
+    for name, value in zip(names, values.tolist(), strict=True):
+        first, _, rest = name.partition("/")
+        if first == "structure" and "/" in rest:
+            kind, target = rest.split("/", 1)
+            rig = rig.with_structure(**{kind: {target: value}})
+        else:
+            label, _, parameter = name.rpartition("/")
+            rig = rig.with_element(rig.element(label).with_(**{parameter: value}))
+    return rig

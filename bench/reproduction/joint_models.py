@@ -1,0 +1,81 @@
+"""The coupled joint's identified models, made once a process: the items of chapters 4 and 5 share them.
+
+Records, excitations and what a laboratory sees of them are those of `bench.demo.joint`.
+"""
+
+from __future__ import annotations
+
+import time
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+
+from bench.demo.joint import excitation, laboratory_view, training_records
+from bench.identification.network import NetworkModel, fit_network
+from bench.identification.polynomial import PolynomialModel, fit_polynomial
+from bench.identification.restoring_force import JointData
+from bench.recording import Recording, nmse
+from bench.rig import simulate
+from bench.rig.library import joint_rig
+
+AXES = ("axial", "torsional")
+HIDDEN = 40
+LOADINGS = {"axial": (True, False), "torsional": (False, True), "both": (True, True)}
+"""Which axes an excitation loads, by the name of the record."""
+UNSEEN_SEEDS = {"axial": 101, "torsional": 102, "both": 2006}
+
+
+class Models(NamedTuple):
+    """Models of the joint from the three training records, and how long each took to fit."""
+
+    polynomial: PolynomialModel
+    network: NetworkModel
+    polynomial_seconds: float
+    network_seconds: float
+
+
+@cache
+def training() -> dict[str, Recording]:
+    """The three training records by loading."""
+    return dict(zip(LOADINGS, training_records(), strict=True))
+
+
+@cache
+def unseen() -> dict[str, Recording]:
+    """Records of the same loadings under excitations of other seeds."""
+    return {
+        name: simulate(joint_rig(), excitation(*loaded), rng=np.random.default_rng(UNSEEN_SEEDS[name]))
+        for name, loaded in LOADINGS.items()
+    }
+
+
+def view(*records: Recording) -> JointData:
+    """States and restoring forces as measured at body 1."""
+    return laboratory_view(records, joint_rig())
+
+
+def train_network(data: JointData, seed: int = HIDDEN) -> NetworkModel:
+    """A network of 40 units."""
+    return fit_network(data.states, data.forces, n_hidden=HIDDEN, rng=np.random.default_rng(seed))
+
+
+@cache
+def models() -> Models:
+    """Polynomial of order 3 and network of 40 units, both fitted to all samples of the three records."""
+    data = view(*training().values())
+    start = time.perf_counter()
+    polynomial = fit_polynomial(data.states, data.forces, orders=3)
+    middle = time.perf_counter()
+    network = train_network(data)
+    return Models(polynomial, network, middle - start, time.perf_counter() - middle)
+
+
+def errors(model: PolynomialModel | NetworkModel, record: Recording) -> tuple[float | None, float | None]:
+    """NMSE of the axial and the torsional force on the true states of a record [%]; None for an axis at rest."""
+    data = view(record)
+    predicted = model.predict(data.states)
+    scores = [
+        nmse(data.forces[:, i], predicted[:, i]) if np.ptp(data.states[:, i]) > 0.0 else None for i in (0, 1)
+    ]
+    return scores[0], scores[1]
