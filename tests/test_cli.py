@@ -116,3 +116,19 @@ def test_missing_and_corrupted_files(tmp_path, capsys):
     assert "cannot read" in capsys.readouterr().err
     assert main(["view"]) == 2
     assert "at least one rig configuration" in capsys.readouterr().err
+
+
+def test_every_command_explains_itself(capsys):
+    from bench.cli import COMMANDS
+
+    for words in ([name] for name in COMMANDS):
+        with pytest.raises(SystemExit) as stop:
+            main([*words, "--help"])
+        assert stop.value.code == 0
+        assert words[0] in capsys.readouterr().out
+
+
+def test_blind_score_of_nothing_says_so(tmp_path, capsys):
+    (tmp_path / "results").mkdir()
+    assert main(["blind", "score", str(tmp_path / "results"), str(tmp_path)]) == 2
+    assert "no result" in capsys.readouterr().err

@@ -28,7 +28,13 @@ from bench.discrepancy.shrink import closed_share, nrmse
 from bench.errors import FileFormatError, ParameterError, RecordingError, UnknownNameError
 
 SCALES = Scales(2.0, 0.01, 0.2, 500.0, 20.0, 1e-3, 2.0, 0.01, 0.2)
-QUIET = {"noise": (0.005, 0.005), "gap": (0.2, 0.3), "duration": 10.0, "sample_rate": 500.0, "sensors": ("both",)}
+QUIET = {
+    "noise": (0.005, 0.005),
+    "gap": (0.2, 0.3),
+    "duration": 10.0,
+    "sample_rate": 500.0,
+    "sensors": ("both",),
+}
 
 
 def single(name: str, seed: int) -> tuple[Case, dict]:
@@ -102,7 +108,8 @@ def test_a_component_under_prescribed_motion_is_diagnosed(tmp_path):
     path = tmp_path / "report.html"
     write_report(diagnosis, path)
     text = path.read_text()
-    assert "http://" not in text and "https://" not in text  # self-contained
+    assert "http://" not in text  # self-contained
+    assert "https://" not in text
     assert "How far the gap shrinks" in text
 
 
@@ -128,7 +135,13 @@ def test_scoring_counts_what_the_protocol_asks(tmp_path):
 
     def write(name, verdict, named, kind, truth, sets=()):
         effects = [{"name": n, "where": w, "probability": 0.9} for n, w in named]
-        result = {"verdict": verdict, "named": effects, "indistinguishable": list(sets), "gap": gap, "gaps": [gap]}
+        result = {
+            "verdict": verdict,
+            "named": effects,
+            "indistinguishable": list(sets),
+            "gap": gap,
+            "gaps": [gap],
+        }
         (tmp_path / "r").mkdir(exist_ok=True)
         (tmp_path / "a").mkdir(exist_ok=True)
         (tmp_path / "r" / f"{name}.json").write_text(json.dumps(result))

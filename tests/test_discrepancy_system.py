@@ -21,7 +21,9 @@ def structure() -> LinearStructure:
 
 
 def element(law=None, theta=(), limit=None) -> Elements:
-    addresses = [0, 0, limit.address] if limit else [law.force.address, law.rate.address if law.rate else 0, 0]
+    addresses = (
+        [0, 0, limit.address] if limit else [law.force.address, law.rate.address if law.rate else 0, 0]
+    )
     states = 0 if limit else len(law.states)
     table = np.array([[*addresses, 1, 0, 0, 0, states]], dtype=np.int64)
     return Elements(table, np.ones((1, 1)), np.append(np.asarray(theta, dtype=float), 0.0), np.zeros(states))
@@ -41,11 +43,15 @@ def test_linear_response_is_the_exact_first_order_hold_solution():
     _, exact, _ = dlsim(system, u)
     motion = free_run(structure(), NO_ELEMENTS, loads=u[:, None], step=step)
     # RK4 at omega h = 0.02: global error about (omega h)^4 / 120 a radian, 1e-9, over the 80 radians of the record
-    np.testing.assert_allclose(motion.position[:, 0], exact[:, 0], rtol=0, atol=1e-7 * np.abs(exact[:, 0]).max())
+    np.testing.assert_allclose(
+        motion.position[:, 0], exact[:, 0], rtol=0, atol=1e-7 * np.abs(exact[:, 0]).max()
+    )
 
 
 @pytest.mark.parametrize(
-    ("law", "theta"), [(BOUC_WEN, (500.0, 40.0, 20.0, 1.0)), (GAP, (2000.0, 0.01, 0.0, 0.0))], ids=["bouc_wen", "gap"]
+    ("law", "theta"),
+    [(BOUC_WEN, (500.0, 40.0, 20.0, 1.0)), (GAP, (2000.0, 0.01, 0.0, 0.0))],
+    ids=["bouc_wen", "gap"],
 )
 def test_nonlinear_response_agrees_with_an_independent_integrator(law, theta):
     step, n = 1e-3, 1500
@@ -65,7 +71,9 @@ def test_nonlinear_response_agrees_with_an_independent_integrator(law, theta):
     reference = solve_ivp(rhs, (0.0, t[-1]), y0, t_eval=t, rtol=1e-8, atol=1e-10, max_step=step)
     motion = free_run(structure(), element(law, theta), loads=u[:, None], step=step)
     # kinks of the force inside a step cost RK4 an error of order h^2 times the jump of the slope
-    np.testing.assert_allclose(motion.position[:, 0], reference.y[0], atol=2e-5 * np.abs(reference.y[0]).max())
+    np.testing.assert_allclose(
+        motion.position[:, 0], reference.y[0], atol=2e-5 * np.abs(reference.y[0]).max()
+    )
 
 
 def test_friction_holds_until_the_load_exceeds_it_and_then_stops_in_finite_time():
@@ -73,7 +81,12 @@ def test_friction_holds_until_the_load_exceeds_it_and_then_stops_in_finite_time(
     step, slope, limit = 1e-3, 4.0, 6.0
     t = step * np.arange(3000)
     block = LinearStructure(np.array([[MASS]]), np.zeros((1, 1)), np.zeros((1, 1)), np.ones((1, 1)))
-    motion = free_run(block, element(theta=(limit,), limit=friction_limits.coulomb_limit), loads=slope * t[:, None], step=step)
+    motion = free_run(
+        block,
+        element(theta=(limit,), limit=friction_limits.coulomb_limit),
+        loads=slope * t[:, None],
+        step=step,
+    )
     start = limit / slope
     assert np.all(motion.position[t < start, 0] == 0.0)
     late = t > start
@@ -93,7 +106,9 @@ def test_friction_stops_a_sliding_block_where_energy_says():
         start=np.array([0.0, speed]),
     )
     assert motion.velocity[-1, 0] == 0.0
-    assert motion.position[-1, 0] == pytest.approx(0.5 * MASS * speed**2 / limit, rel=1e-9)  # exact: constant force
+    assert motion.position[-1, 0] == pytest.approx(
+        0.5 * MASS * speed**2 / limit, rel=1e-9
+    )  # exact: constant force
 
 
 def test_substeps_do_not_change_stick_slip():
@@ -108,7 +123,9 @@ def test_driven_force_of_hysteresis_closes_a_dissipative_loop():
     t = 1e-3 * np.arange(4000)
     q = 0.05 * np.sin(2 * np.pi * t)
     v = 0.05 * 2 * np.pi * np.cos(2 * np.pi * t)
-    force = driven_force(element(BOUC_WEN, (500.0, 40.0, 20.0, 1.0)), position=q[:, None], velocity=v[:, None], step=1e-3)
+    force = driven_force(
+        element(BOUC_WEN, (500.0, 40.0, 20.0, 1.0)), position=q[:, None], velocity=v[:, None], step=1e-3
+    )
     last = slice(3000, 4000)
     assert np.sum(force[last, 0] * v[last]) * 1e-3 > 0.0
     assert np.ptp(force[2000:3000, 0] - force[3000:, 0]) < 1e-3 * np.ptp(force)  # steady after two periods

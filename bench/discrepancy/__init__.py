@@ -10,7 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from bench.discrepancy.blind import BlindOptions, BlindScore, make_blind, run_blind
-    from bench.discrepancy.case import Case, CaseChannel, CaseRecord, NominalParameter, read_case, record_from_arrays
+    from bench.discrepancy.case import (
+        Case,
+        CaseChannel,
+        CaseRecord,
+        NominalParameter,
+        read_case,
+        record_from_arrays,
+    )
     from bench.discrepancy.diagnosis import Diagnosis, diagnose, diagnose_folder
     from bench.discrepancy.report import write_report
     from bench.discrepancy.scoring import score_blind

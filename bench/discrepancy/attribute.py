@@ -100,12 +100,18 @@ def placements(case: Case, structure: Structure, catalogue: Iterable[Effect]) ->
 
 def _targets(case: Case, effect: Effect, structure: Structure, place) -> list[str]:
     if effect.site == "inertia":
-        names = {"mass": place.mass, "stiffness": (place.stiffness,), "damping": (place.damping,)}[effect.quantity]
+        names = {"mass": place.mass, "stiffness": (place.stiffness,), "damping": (place.damping,)}[
+            effect.quantity
+        ]
         return [name for name in names if name in structure.parameters]
     dofs = np.abs(place.rows).sum(axis=0) > 0
     if effect.site == "actuator":
         commanded = [name for name in structure.loads if case.channel(name).role == "command"]
-        return [name for name in commanded if np.abs(structure.inputs[dofs, structure.loads.index(name)]).sum() > 0]
+        return [
+            name
+            for name in commanded
+            if np.abs(structure.inputs[dofs, structure.loads.index(name)]).sum() > 0
+        ]
     if effect.site == "sensor":
         order = {"position": 0, "velocity": 1, "acceleration": 2}[effect.quantity]
         return [o.channel for o in structure.observers if o.order == order and np.abs(o.row[dofs]).sum() > 0]
@@ -142,19 +148,21 @@ def attribute(
         _extend(search, screen, [nothing], pool, seconds=7)
         for size in range(1, most):
             best = search.ranked()[0]
-            progress(f"{len(best.hypothesis)} effect(s): {names(best.hypothesis)}, chi-squared {best.reduced:.3g}")
+            progress(
+                f"{len(best.hypothesis)} effect(s): {names(best.hypothesis)}, chi-squared {best.reduced:.3g}"
+            )
             if consistent(best):
                 points = screen.ranked(best) if len(best.hypothesis) == size else []
                 if not points or points[0].gain < WORTH_A_FIT:
                     break
                 _extend(search, screen, [best], pool, seconds=6)
-                _reduce(search, pool)
+                reduce_best(search, pool)
                 continue
             ranked = search.ranked(size)
             if not ranked or ranked[0].reduced - 1.0 > STALLED * (search.ranked(size - 1)[0].reduced - 1.0):
                 break
             _extend(search, screen, ranked[: 4 - size], pool, seconds=6 - size)
-            _reduce(search, pool)
+            reduce_best(search, pool)
     return search
 
 
@@ -176,10 +184,15 @@ def prepare(
 
 def names(hypothesis: Hypothesis) -> str:
     """Readable names of a hypothesis."""
-    return " + ".join(p.effect.name + (f" ({p.place.name})" if p.place.name else "") for p in hypothesis) or "nothing"
+    return (
+        " + ".join(p.effect.name + (f" ({p.place.name})" if p.place.name else "") for p in hypothesis)
+        or "nothing"
+    )
 
 
-def _extend(search: Search, screen: Screen, bases: Sequence[Fit], pool: ThreadPoolExecutor, *, seconds: int) -> None:
+def _extend(
+    search: Search, screen: Screen, bases: Sequence[Fit], pool: ThreadPoolExecutor, *, seconds: int
+) -> None:
     """Add one effect to every base: screen, fit quickly, carry the best on."""
     problem = search.problem
     tasks: list[tuple[Hypothesis, np.ndarray]] = []
@@ -188,14 +201,21 @@ def _extend(search: Search, screen: Screen, bases: Sequence[Fit], pool: ThreadPo
         points = screen.ranked(base if base.hypothesis else None)
         for placed, etas in _starts(points, seconds):
             for eta in etas:
-                tasks.append(((*base.hypothesis, placed), np.concatenate([base.vector * bool(base.hypothesis), eta])))
+                tasks.append(
+                    ((*base.hypothesis, placed), np.concatenate([base.vector * bool(base.hypothesis), eta]))
+                )
         own = {placed.key for placed in base.hypothesis}
         for placed in screen.inertia:
             if placed.key not in own:
                 tasks.append(((*base.hypothesis, placed), np.concatenate([base.vector, [0.0]])))
 
     def quick(task: tuple[Hypothesis, np.ndarray]) -> Fit:
-        return fit(problem, task[0], start=task[1], iterations=QUICK if task[0][-1].effect.site == "joint" else 3 * QUICK)
+        return fit(
+            problem,
+            task[0],
+            start=task[1],
+            iterations=QUICK if task[0][-1].effect.site == "joint" else 3 * QUICK,
+        )
 
     for fitted in pool.map(quick, tasks):
         search.add(fitted)
@@ -203,14 +223,15 @@ def _extend(search: Search, screen: Screen, bases: Sequence[Fit], pool: ThreadPo
     carried = [
         f
         for f in ranked[:4]
-        if key_of(f.hypothesis) not in search.converged and f.reduced < 1.5 + HOPELESS * (ranked[0].reduced - 1.0)
+        if key_of(f.hypothesis) not in search.converged
+        and f.reduced < 1.5 + HOPELESS * (ranked[0].reduced - 1.0)
     ]
     for fitted in pool.map(lambda f: fit(problem, f.hypothesis, start=f.vector, iterations=20), carried):
         search.add(fitted)
         search.converged.add(key_of(fitted.hypothesis))
 
 
-def _reduce(search: Search, pool: ThreadPoolExecutor) -> None:
+def reduce_best(search: Search, pool: ThreadPoolExecutor) -> None:
     """Strike each effect in turn from the best hypothesis, the fit starting from what the others have become."""
     best = search.ranked()[0]
     if len(best.hypothesis) < 2:
@@ -220,7 +241,9 @@ def _reduce(search: Search, pool: ThreadPoolExecutor) -> None:
     _, etas = search.problem.split(best.hypothesis, best.vector)
     for i in range(len(best.hypothesis)):
         rest = best.hypothesis[:i] + best.hypothesis[i + 1 :]
-        tasks.append((rest, np.concatenate([best.vector[:n], *(eta for j, eta in enumerate(etas) if j != i)])))
+        tasks.append(
+            (rest, np.concatenate([best.vector[:n], *(eta for j, eta in enumerate(etas) if j != i)]))
+        )
     for fitted in pool.map(lambda task: fit(search.problem, task[0], start=task[1], iterations=20), tasks):
         search.add(fitted)
 

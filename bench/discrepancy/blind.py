@@ -89,7 +89,9 @@ def make_blind(
     """
     folder, answers = Path(folder), Path(answers)
     if folder.resolve() == answers.resolve():
-        raise ParameterError(f"cases and answers would both go to '{folder}'; give the answers a folder of their own")
+        raise ParameterError(
+            f"cases and answers would both go to '{folder}'; give the answers a folder of their own"
+        )
     options = options or BlindOptions()
     answers.mkdir(parents=True, exist_ok=True)
     made = []
@@ -129,7 +131,10 @@ def draw_case(name: str, rng: np.random.Generator, options: BlindOptions) -> tup
         for key, value in truth.items()
     )
     exact = tuple(NominalParameter(key, value, 0.0) for key, value in truth.items())
-    channels = (CaseChannel("force", "N", "command" if commanded else "measured"), *(CaseChannel(s) for s in sensors))
+    channels = (
+        CaseChannel("force", "N", "command" if commanded else "measured"),
+        *(CaseChannel(s) for s in sensors),
+    )
     loads = [_load(str(rng.choice(SIGNALS)), frequency, options, rng) for _ in range(2)]
     level = 0.01 * stiffness * float(rng.uniform(0.1, 0.4))
     time = np.arange(len(loads[0])) / options.sample_rate
@@ -155,7 +160,10 @@ def draw_case(name: str, rng: np.random.Generator, options: BlindOptions) -> tup
     case = Case(name, "sdof", nominal, final, (noisy[0],), (noisy[1],))
     scaler = Problem(bare, structure_of(bare), tuple(_filled(records[0], clean[0]) for _ in range(1)))
     effects = [
-        {"name": p.effect.name, "parameters": [float(x) for x in p.effect.values(eta, scaler.scales(p.place))]}
+        {
+            "name": p.effect.name,
+            "parameters": [float(x) for x in p.effect.values(eta, scaler.scales(p.place))],
+        }
         for p, eta in zip(hypothesis, etas, strict=True)
     ]
     return case, {"class": kind, "effects": effects, "noise": noise, "true": truth, "sensors": list(sensors)}
@@ -174,7 +182,9 @@ def _scaled(
     reference = base.simulate((), np.zeros(3), bare.identification[0])
     # the scales of the effects come from the motion, so the linear motion is handed to the problem as if measured
     filled = _filled(bare.identification[0], dict(zip(structure.channels, reference.T, strict=True)))
-    problem = _problem(Case(bare.name, bare.rig, bare.parameters, bare.channels, (filled,), bare.validation), structure)
+    problem = _problem(
+        Case(bare.name, bare.rig, bare.parameters, bare.channels, (filled,), bare.validation), structure
+    )
     place = structure.places[0]
     targets = {"actuator": "force", "sensor": "displacement", "joint": ""}
     hypothesis = tuple(
@@ -191,7 +201,9 @@ def _scaled(
         gap = np.sqrt(np.mean((response - reference) ** 2, axis=0) / np.var(reference, axis=0)).max()
         low, high = (middle, high) if gap < wanted else (low, middle)
     vector = np.concatenate([np.zeros(3), *etas])
-    responses = [problem.simulate(hypothesis, vector, record) for record in (*bare.identification, *bare.validation)]
+    responses = [
+        problem.simulate(hypothesis, vector, record) for record in (*bare.identification, *bare.validation)
+    ]
     return hypothesis, etas, [dict(zip(structure.channels, r.T, strict=True)) for r in responses]
 
 
@@ -247,7 +259,9 @@ def write_case(case: Case, folder: str | Path) -> None:
     for record in (*case.identification, *case.validation):
         table = np.column_stack([record.time, *record.values.values()])
         header = ",".join(["time", *record.values])
-        np.savetxt(folder / f"{record.name}.csv.gz", table, delimiter=",", header=header, comments="", fmt="%.8g")
+        np.savetxt(
+            folder / f"{record.name}.csv.gz", table, delimiter=",", header=header, comments="", fmt="%.8g"
+        )
 
 
 def run_blind(

@@ -84,7 +84,7 @@ class CaseRecord:
     @property
     def time(self) -> NDArray[np.float64]:
         """Sample times (n,) [s]."""
-        return self.start + self.step * np.arange(len(self))
+        return np.asarray(self.start + self.step * np.arange(len(self)), dtype=np.float64)
 
 
 @dataclass(frozen=True)

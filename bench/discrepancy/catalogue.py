@@ -11,8 +11,8 @@ import math
 import numpy as np
 
 from bench.discrepancy import friction_limits as limits
-from bench.discrepancy import signal_effects as signals
-from bench.discrepancy.effect import Effect, FreeParameter, Scales, Values
+from bench.discrepancy.channel_effects import CHANNELS
+from bench.discrepancy.effect import Effect, FreeParameter, Scales, Values, log_grid
 from bench.errors import UnknownNameError
 from bench.laws.bouc_wen import BOUC_WEN
 from bench.laws.constant_force import CONSTANT_FORCE
@@ -33,10 +33,6 @@ SIGNED = {"signed": True, "mean": 0.0, "std": 0.6, "bounds": (-30.0, 30.0)}
 
 SLOW = 1e-3
 """Regularising velocity of friction that goes back into a rig, as a part of the largest velocity of the records."""
-
-
-def _log_grid(*values: float) -> tuple[float, ...]:
-    return tuple(math.log(v) for v in values)
 
 
 def _lugre_theta(values: Values, scales: Scales) -> Values:
@@ -60,7 +56,7 @@ def _backlash_theta(values: Values, scales: Scales) -> Values:
 
 FRICTION = FreeParameter("friction_force", "force", **AMPLITUDE)
 
-CATALOGUE: tuple[Effect, ...] = (
+FORCES: tuple[Effect, ...] = (
     Effect(
         "coulomb_friction",
         "friction",
@@ -78,7 +74,7 @@ CATALOGUE: tuple[Effect, ...] = (
         (
             FRICTION,
             FreeParameter(
-                "static_excess", mean=math.log(0.7), std=0.7, bounds=(-3.0, 2.5), grid=_log_grid(0.7)
+                "static_excess", mean=math.log(0.7), std=0.7, bounds=(-3.0, 2.5), grid=log_grid(0.7)
             ),
             FreeParameter(
                 "stribeck_velocity",
@@ -86,7 +82,7 @@ CATALOGUE: tuple[Effect, ...] = (
                 mean=math.log(0.15),
                 std=1.0,
                 bounds=(-6.0, 0.5),
-                grid=_log_grid(0.03, 0.1, 0.3),
+                grid=log_grid(0.03, 0.1, 0.3),
             ),
         ),
         "f = Fc (1 + s exp(-(v/vs)^2)) sgn(v)",
@@ -107,7 +103,7 @@ CATALOGUE: tuple[Effect, ...] = (
                 mean=math.log(0.07),
                 std=1.2,
                 bounds=(-7.0, 1.5),
-                grid=_log_grid(0.01, 0.03, 0.1, 0.3),
+                grid=log_grid(0.01, 0.03, 0.1, 0.3),
             ),
             FreeParameter(
                 "bristle_damping_per_force",
@@ -115,7 +111,7 @@ CATALOGUE: tuple[Effect, ...] = (
                 mean=math.log(0.3),
                 std=1.5,
                 bounds=(-7.0, 3.0),
-                grid=_log_grid(0.1),
+                grid=log_grid(0.1),
             ),
         ),
         "f = s0 z + s1 z', z' = v - s0 |v| z / Fc (LuGre; Dahl for s1 = 0)",
@@ -135,12 +131,12 @@ CATALOGUE: tuple[Effect, ...] = (
                 mean=math.log(3.0),
                 std=1.2,
                 bounds=(-5.0, 6.0),
-                grid=_log_grid(0.5, 2.0, 6.0, 20.0),
+                grid=log_grid(0.5, 2.0, 6.0, 20.0),
             ),
             FreeParameter(
                 "gamma_over_beta", signed=True, mean=0.0, std=1.0, bounds=(-3.0, 5.0), grid=(-0.5, 0.6)
             ),
-            FreeParameter("n", std=0.5, mean=0.35, bounds=(0.0, 1.6), grid=_log_grid(1.0, 2.0)),
+            FreeParameter("n", std=0.5, mean=0.35, bounds=(0.0, 1.6), grid=log_grid(1.0, 2.0)),
         ),
         "f = z, z' = A v - beta |v| |z|^(n-1) z - gamma v |z|^n",
         law=BOUC_WEN,
@@ -153,8 +149,22 @@ CATALOGUE: tuple[Effect, ...] = (
         "joint",
         (
             FreeParameter("friction_force", "force", **AMPLITUDE),
-            FreeParameter("slip_displacement", "position", mean=math.log(0.1), std=1.0, bounds=(-6.0, 1.0), grid=_log_grid(0.05, 0.2)),
-            FreeParameter("clearance", "position", mean=math.log(0.1), std=1.0, bounds=(-6.0, 0.0), grid=_log_grid(0.03, 0.1, 0.3)),
+            FreeParameter(
+                "slip_displacement",
+                "position",
+                mean=math.log(0.1),
+                std=1.0,
+                bounds=(-6.0, 1.0),
+                grid=log_grid(0.05, 0.2),
+            ),
+            FreeParameter(
+                "clearance",
+                "position",
+                mean=math.log(0.1),
+                std=1.0,
+                bounds=(-6.0, 0.0),
+                grid=log_grid(0.03, 0.1, 0.3),
+            ),
             FreeParameter("soft_ratio", mean=math.log(0.1), std=1.0, bounds=(-5.0, 0.0)),
             FreeParameter("sharpness", mean=math.log(3.0), std=0.7, bounds=(-0.6, 3.5)),
             FreeParameter("asymmetry", signed=True, std=0.2, bounds=(-0.8, 0.8)),
@@ -178,7 +188,7 @@ CATALOGUE: tuple[Effect, ...] = (
                 mean=math.log(0.4),
                 std=0.8,
                 bounds=(-5.0, 0.1),
-                grid=_log_grid(0.03, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9),
+                grid=log_grid(0.03, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9),
             ),
         ),
         "f = k (q - d) beyond d, k (q + d) below -d",
@@ -241,7 +251,7 @@ CATALOGUE: tuple[Effect, ...] = (
                 mean=math.log(0.45),
                 std=0.5,
                 bounds=(math.log(0.05), math.log(0.98)),
-                grid=_log_grid(0.3, 0.6),
+                grid=log_grid(0.3, 0.6),
             ),
         ),
         "f = C sgn(v) |v|^n",
@@ -261,7 +271,7 @@ CATALOGUE: tuple[Effect, ...] = (
                 mean=math.log(0.05),
                 std=1.3,
                 bounds=(math.log(1e-3), math.log(20.0)),
-                grid=_log_grid(0.01, 0.03, 0.1, 0.3, 1.0),
+                grid=log_grid(0.01, 0.03, 0.1, 0.3, 1.0),
             ),
         ),
         "f = k z, z' = v - z / tau",
@@ -284,14 +294,20 @@ CATALOGUE: tuple[Effect, ...] = (
         "joint",
         (
             FRICTION,
-            FreeParameter("depth", mean=math.log(0.4), std=0.8, bounds=(math.log(0.02), math.log(1.5)), grid=_log_grid(0.6)),
+            FreeParameter(
+                "depth",
+                mean=math.log(0.4),
+                std=0.8,
+                bounds=(math.log(0.02), math.log(1.5)),
+                grid=log_grid(0.6),
+            ),
             FreeParameter(
                 "frequency",
                 "1/duration",
                 mean=math.log(2.5),
                 std=0.8,
                 bounds=(-1.5, 4.0),
-                grid=_log_grid(*np.arange(0.5, 9.1, 0.5)),
+                grid=log_grid(*np.arange(0.5, 9.1, 0.5)),
             ),
             FreeParameter("phase", signed=True, mean=0.0, std=1.8, bounds=(-7.0, 7.0), grid=(0.0,)),
         ),
@@ -311,188 +327,12 @@ CATALOGUE: tuple[Effect, ...] = (
         theta=lambda values, scales: np.array([values[0] / scales.duration, 0.0]),
     ),
     Effect(
-        "mass_error",
-        "inertia",
-        "inertia",
-        (FreeParameter("relative_error", signed=True, std=0.3, bounds=(-0.9, 5.0)),),
-        "m = m_nominal (1 + e)",
-        quantity="mass",
-    ),
-    Effect(
-        "stiffness_error",
-        "stiffness",
-        "inertia",
-        (FreeParameter("relative_error", signed=True, std=0.3, bounds=(-0.95, 5.0)),),
-        "k = k_nominal (1 + e)",
-        quantity="stiffness",
-        log_prior=-2.0,
-    ),
-    Effect(
-        "damping_error",
-        "damping",
-        "inertia",
-        (FreeParameter("relative_error", signed=True, std=1.0, bounds=(-0.95, 20.0)),),
-        "c = c_nominal (1 + e)",
-        quantity="damping",
-        log_prior=-2.0,
-    ),
-    Effect(
-        "actuator_delay",
-        "actuator",
-        "actuator",
-        (
-            FreeParameter(
-                "delay",
-                mean=math.log(0.008),
-                std=1.0,
-                bounds=(math.log(1e-4), math.log(1.0)),
-                grid=_log_grid(0.003, 0.01, 0.03),
-            ),
-        ),
-        "F(t - tau)",
-        signal=signals.delay,
-    ),
-    Effect(
-        "actuator_lag",
-        "actuator",
-        "actuator",
-        (
-            FreeParameter(
-                "time_constant",
-                mean=math.log(0.008),
-                std=1.0,
-                bounds=(math.log(1e-4), math.log(1.0)),
-                grid=_log_grid(0.003, 0.01, 0.03),
-            ),
-        ),
-        "tau F' + F = command",
-        signal=signals.lag,
-    ),
-    Effect(
-        "force_gain_error",
-        "actuator",
-        "actuator",
-        (FreeParameter("relative_error", signed=True, std=0.3, bounds=(-3.0, 5.0), grid=(0.0,)),),
-        "F = (1 + e) command",
-        signal=signals.gain,
-    ),
-    Effect(
         "force_offset",
         "actuator",
         "joint",
         (FreeParameter("offset", "force", **SIGNED),),
         "f = F0",
         law=CONSTANT_FORCE,
-        log_prior=-1.0,
-    ),
-    Effect(
-        "actuator_saturation",
-        "actuator",
-        "actuator",
-        (
-            FreeParameter(
-                "level", "force", mean=math.log(1.5), std=0.5, bounds=(-2.0, 2.0), grid=_log_grid(1.0, 1.7)
-            ),
-        ),
-        "F = command, clipped at a level",
-        signal=signals.clip,
-        log_prior=-1.0,
-    ),
-    Effect(
-        "displacement_drift",
-        "sensor",
-        "sensor",
-        (FreeParameter("drift", "position", signed=True, std=0.5),),
-        "x + d t / T",
-        signal=signals.drift,
-        quantity="position",
-    ),
-    Effect(
-        "displacement_delay",
-        "sensor",
-        "sensor",
-        (
-            FreeParameter(
-                "delay",
-                mean=math.log(0.008),
-                std=1.0,
-                bounds=(math.log(1e-4), math.log(1.0)),
-                grid=_log_grid(0.003, 0.01, 0.03),
-            ),
-        ),
-        "x(t - tau)",
-        signal=signals.delay,
-        quantity="position",
-    ),
-    Effect(
-        "displacement_gain_error",
-        "sensor",
-        "sensor",
-        (FreeParameter("relative_error", signed=True, std=0.3, bounds=(-3.0, 5.0)),),
-        "(1 + e) x",
-        signal=signals.gain,
-        quantity="position",
-    ),
-    Effect(
-        "displacement_bias",
-        "sensor",
-        "sensor",
-        (FreeParameter("bias", "position", signed=True, std=0.5),),
-        "x + b",
-        signal=signals.offset,
-        quantity="position",
-        log_prior=-1.0,
-    ),
-    Effect(
-        "displacement_clipping",
-        "sensor",
-        "sensor",
-        (
-            FreeParameter(
-                "level", "position", mean=math.log(0.8), std=0.3, bounds=(-2.0, 0.3), grid=_log_grid(0.6, 0.9)
-            ),
-        ),
-        "x clipped at a level",
-        signal=signals.clip,
-        quantity="position",
-        log_prior=-1.0,
-    ),
-    Effect(
-        "acceleration_gain_error",
-        "sensor",
-        "sensor",
-        (FreeParameter("relative_error", signed=True, std=0.3, bounds=(-3.0, 5.0)),),
-        "(1 + e) a",
-        signal=signals.gain,
-        quantity="acceleration",
-        log_prior=-1.0,
-    ),
-    Effect(
-        "acceleration_delay",
-        "sensor",
-        "sensor",
-        (
-            FreeParameter(
-                "delay",
-                mean=math.log(0.008),
-                std=1.0,
-                bounds=(math.log(1e-4), math.log(1.0)),
-                grid=_log_grid(0.003, 0.01),
-            ),
-        ),
-        "a(t - tau)",
-        signal=signals.delay,
-        quantity="acceleration",
-        log_prior=-1.0,
-    ),
-    Effect(
-        "acceleration_bias",
-        "sensor",
-        "sensor",
-        (FreeParameter("bias", "force", signed=True, std=0.5),),
-        "a + b",
-        signal=signals.offset,
-        quantity="acceleration",
         log_prior=-1.0,
     ),
     Effect(
@@ -508,7 +348,7 @@ CATALOGUE: tuple[Effect, ...] = (
                 mean=math.log(0.4),
                 std=0.8,
                 bounds=(-5.0, 0.1),
-                grid=_log_grid(0.1, 0.3, 0.5, 0.7),
+                grid=log_grid(0.1, 0.3, 0.5, 0.7),
             ),
             FreeParameter(
                 "axial_clearance",
@@ -516,7 +356,7 @@ CATALOGUE: tuple[Effect, ...] = (
                 mean=math.log(0.4),
                 std=0.8,
                 bounds=(-5.0, 0.1),
-                grid=_log_grid(0.1, 0.3, 0.5, 0.7),
+                grid=log_grid(0.1, 0.3, 0.5, 0.7),
             ),
         ),
         "f1 = c1 x' max(|th| - dth, 0), f2 = c2 th' max(|x| - dx, 0)",
@@ -533,6 +373,9 @@ CATALOGUE: tuple[Effect, ...] = (
         n_coordinates=2,
     ),
 )
+
+CATALOGUE: tuple[Effect, ...] = FORCES + CHANNELS
+"""Every effect: forces first, then parameters, actuators and sensors."""
 
 
 def effect_named(name: str) -> Effect:

@@ -97,7 +97,9 @@ CLOSURES = (
         (
             FreeParameter("cosine", "stiffness", signed=True, std=0.5),
             FreeParameter("sine", "stiffness", signed=True, std=0.5),
-            FreeParameter("frequency", "1/duration", mean=math.log(20.0), std=1.5, bounds=(-1.0, 8.0), grid=CYCLES),
+            FreeParameter(
+                "frequency", "1/duration", mean=math.log(20.0), std=1.5, bounds=(-1.0, 8.0), grid=CYCLES
+            ),
         ),
         _MODULATED.equation,
         law=_MODULATED,

@@ -140,8 +140,14 @@ def _path(explanations: Sequence[Explanation]) -> list[tuple[str, Explanation]]:
 def _warnings(case: Case, problem: Problem) -> tuple[str, ...]:
     out = []
     for channel in case.channels:
-        if channel.role == "response" and channel.noise_std is None and channel.name in problem.structure.channels:
-            out.append(f"the noise of '{channel.name}' is not stated; its high-frequency floor is taken instead")
+        if (
+            channel.role == "response"
+            and channel.noise_std is None
+            and channel.name in problem.structure.channels
+        ):
+            out.append(
+                f"the noise of '{channel.name}' is not stated; its high-frequency floor is taken instead"
+            )
     for record in (*case.identification, *case.validation):
         for name, samples in record.values.items():
             peak = np.max(np.abs(samples))

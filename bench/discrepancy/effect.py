@@ -49,6 +49,11 @@ class Scales(NamedTuple):
     velocity2: float
 
 
+def log_grid(*values: float) -> tuple[float, ...]:
+    """Grid of eta for a positive parameter, given as multiples of its scale."""
+    return tuple(math.log(v) for v in values)
+
+
 @dataclass(frozen=True)
 class FreeParameter:
     """A parameter of an effect that a fit may move.

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from bench.discrepancy.attribute import names
+from bench.discrepancy.effect import unit_of
 from bench.discrepancy.explain import Explanation
 from bench.discrepancy.problem import Placed
 from bench.discrepancy.verdict import Estimate, Kind, NamedEffect, Ranked
-from bench.discrepancy.effect import unit_of
 
 RIVAL = 4.6
 """Difference in log posterior (odds of 100) within which two explanations count as indistinguishable."""
@@ -139,7 +139,9 @@ def plain_words(kind: Kind, explanations: Sequence[Explanation]) -> str:
     """The verdict in a sentence or two."""
     best = explanations[0]
     if kind == "none":
-        return "The stated uncertainties and the noise explain the records; nothing is missing from the model."
+        return (
+            "The stated uncertainties and the noise explain the records; nothing is missing from the model."
+        )
     if kind == "unknown":
         nearest = names(best.hypothesis)
         return (

@@ -15,6 +15,7 @@ from itertools import product
 import numpy as np
 
 from bench.discrepancy.attribute import (
+    IMMATERIAL,
     QUICK,
     STALLED,
     THREADS,
@@ -26,11 +27,12 @@ from bench.discrepancy.attribute import (
     placements,
     posterior,
     prepare,
+    reduce_best,
 )
 from bench.discrepancy.case import Case, CaseRecord
 from bench.discrepancy.effect import Effect
 from bench.discrepancy.fit import Fit, fit
-from bench.discrepancy.problem import Array, Hypothesis, Placed, Problem, band_bins, whitened
+from bench.discrepancy.problem import Array, Hypothesis, Problem, band_bins, whitened
 from bench.discrepancy.screen import Point, Screen
 from bench.discrepancy.structure import Structure, structure_of
 
@@ -87,14 +89,20 @@ class Explanation:
         chi2 = count = 0.0
         for problem, fitted in self.parts:
             data = problem.prepare(record, problem.split(fitted.hypothesis, fitted.vector)[0])
-            residual = whitened(data.responses - problem.simulate(fitted.hypothesis, fitted.vector, record), data)
+            residual = whitened(
+                data.responses - problem.simulate(fitted.hypothesis, fitted.vector, record), data
+            )
             chi2 += float(residual @ residual)
             count += len(residual)
         return chi2 / count
 
 
 def explain(
-    case: Case, catalogue: Sequence[Effect], *, most: int = 3, progress: Callable[[str], None] = lambda text: None
+    case: Case,
+    catalogue: Sequence[Effect],
+    *,
+    most: int = 3,
+    progress: Callable[[str], None] = lambda text: None,
 ) -> list[Explanation]:
     """Search the explanations of a case; by decreasing posterior.
 
@@ -145,7 +153,9 @@ def _promise(entry: tuple[Search, Screen, list[Point]]) -> float:
     return (nothing.chi2 - gain) / nothing.n_residuals
 
 
-def _coupled(whole: Problem, catalogue: Sequence[Effect], most: int, progress: Callable[[str], None]) -> list[Fit]:
+def _coupled(
+    whole: Problem, catalogue: Sequence[Effect], most: int, progress: Callable[[str], None]
+) -> list[Fit]:
     """Search explanations that hold an effect which couples the groups; by decreasing posterior."""
     progress("effects that couple the degrees of freedom")
     candidates = [p for p in placements(whole.case, whole.structure, catalogue) if p.effect.site == "joint"]
@@ -158,7 +168,9 @@ def _coupled(whole: Problem, catalogue: Sequence[Effect], most: int, progress: C
             if point.placed.key in coupling:
                 starts.setdefault(point.placed.key, point)
         zero = np.zeros(len(whole.nominal))
-        for fitted in pool.map(lambda p: fit(whole, (p.placed,), start=np.append(zero, p.eta)), starts.values()):
+        for fitted in pool.map(
+            lambda p: fit(whole, (p.placed,), start=np.append(zero, p.eta)), starts.values()
+        ):
             kept.add(fitted)
         for _ in range(1, most):
             if not kept.fits:
@@ -167,10 +179,11 @@ def _coupled(whole: Problem, catalogue: Sequence[Effect], most: int, progress: C
             if base.reduced > HOPELESS_COUPLING:
                 break
             progress(f"{names(base.hypothesis)}, chi-squared {base.reduced:.3g}")
-            best_points: dict[tuple[str, str, str], Point] = {}
-            for point in screen.ranked(base):
-                best_points.setdefault(point.placed.key, point)
-            worth = [p for p in list(best_points.values())[:4] if p.gain > WORTH_A_FIT]
+            points = [
+                p for p in screen.ranked(base) if p.gain > max(WORTH_A_FIT, IMMATERIAL * base.n_residuals)
+            ]
+            leading = list(dict.fromkeys(p.placed.key for p in points))[:3]
+            worth = [p for key in leading for p in [q for q in points if q.placed.key == key][:2]]
             if not worth:
                 break
 
@@ -179,7 +192,9 @@ def _coupled(whole: Problem, catalogue: Sequence[Effect], most: int, progress: C
                 return fit(whole, (*base.hypothesis, point.placed), start=start, iterations=QUICK)
 
             trials = sorted(pool.map(extended, worth), key=lambda f: -f.log_evidence)
-            kept.add(fit(whole, trials[0].hypothesis, start=trials[0].vector, iterations=20))
+            for trial in trials[:2]:
+                kept.add(fit(whole, trial.hypothesis, start=trial.vector, iterations=20))
+            reduce_best(kept, pool)
             if kept.ranked()[0] is base or kept.ranked()[0].reduced - 1.0 > STALLED * (base.reduced - 1.0):
                 break
     return kept.ranked()
@@ -213,7 +228,8 @@ def _common_bins(case: Case, structure: Structure) -> dict[str, int]:
 
 def _combined(searches: Sequence[Search]) -> list[Explanation]:
     ranked = [
-        [(s.problem, fitted) for fitted in dict.fromkeys((*s.ranked()[:KEPT], s.ranked(0)[0]))] for s in searches
+        [(s.problem, fitted) for fitted in dict.fromkeys((*s.ranked()[:KEPT], s.ranked(0)[0]))]
+        for s in searches
     ]
     found = [Explanation(tuple(parts)) for parts in product(*ranked)]
     return sorted(found, key=lambda e: -e.log_posterior)

@@ -59,7 +59,7 @@ class Fit:
     @property
     def covariance(self) -> Array:
         """Posterior covariance of the vector."""
-        return np.linalg.inv(self.precision)
+        return np.asarray(np.linalg.inv(self.precision), dtype=np.float64)
 
 
 def start_vector(problem: Problem, etas: Sequence[Array], deviations: Array | None = None) -> Array:
@@ -96,7 +96,7 @@ def fit(
     held[:n] |= problem.spread == 0
     names = [p for placed in hypothesis for p in placed.effect.parameters]
     held[n:] |= np.array([p.fixed for p in names], dtype=bool)
-    free = np.flatnonzero(~held)
+    free = np.flatnonzero(np.logical_not(held))
     vector = np.clip(start, low, high)
     residual = problem.residual(hypothesis, vector)
     cost = _cost(residual, vector, mean, std, free)

@@ -61,14 +61,20 @@ def locate(problem: Problem, nominal: Explanation, best: Explanation) -> tuple[L
     total = sum(max(entry[0], 0.0) for entry in excess.values())
     if total <= 0.0:
         return ()
-    regions = {place.name: _regions(problem, best, place) for place in problem.structure.places if len(place.rows) == 1}
+    regions = {
+        place.name: _regions(problem, best, place)
+        for place in problem.structure.places
+        if len(place.rows) == 1
+    }
     out = []
     for name, (power, frequency, by_frequency, time, by_time, p_value) in excess.items():
         if power <= 0.0:
             continue
         observer = next(o for o in problem.structure.observers if o.channel == name)
         touched = [
-            p.name for p in problem.structure.places if len(p.rows) == 1 and np.any(p.rows[0] * observer.row != 0)
+            p.name
+            for p in problem.structure.places
+            if len(p.rows) == 1 and np.any(p.rows[0] * observer.row != 0)
         ]
         out.append(
             Location(

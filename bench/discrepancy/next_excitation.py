@@ -88,9 +88,15 @@ def _shapes(problem: Problem, template: CaseRecord) -> list[tuple[str, Array]]:
     return [
         (f"slow sine at {0.2 * centre:.3g} Hz", np.sin(2 * np.pi * 0.2 * centre * t)),
         (f"sine at the resonance, {centre:.3g} Hz, growing from zero", rise * np.sin(2 * np.pi * centre * t)),
-        (f"sweep from {0.3 * centre:.3g} to {2 * centre:.3g} Hz", chirp(t, 0.3 * centre, duration, 2 * centre)),
+        (
+            f"sweep from {0.3 * centre:.3g} to {2 * centre:.3g} Hz",
+            chirp(t, 0.3 * centre, duration, 2 * centre),
+        ),
         (f"random to {3 * centre:.3g} Hz", random / np.abs(random).max()),
-        ("half-sine pulses of either sign", np.sign(np.sin(2 * np.pi * t / 5.0)) * np.maximum(np.sin(2 * np.pi * centre * t), 0)),
+        (
+            "half-sine pulses of either sign",
+            np.sign(np.sin(2 * np.pi * t / 5.0)) * np.maximum(np.sin(2 * np.pi * centre * t), 0),
+        ),
     ]
 
 

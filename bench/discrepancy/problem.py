@@ -120,7 +120,11 @@ class Problem:
         """Prepare a record for comparison, the whitening for the structure at parameter `values`."""
         loads = np.column_stack([record.values[name] for name in self.structure.loads])
         responses = np.column_stack([record.values[name] for name in self.structure.channels])
-        n_bins = self.bins[record.name] if self.bins and record.name in self.bins else band_bins(responses, self.noise)
+        n_bins = (
+            self.bins[record.name]
+            if self.bins and record.name in self.bins
+            else band_bins(responses, self.noise)
+        )
         return RecordData(record, loads, responses, n_bins, self.whitening(record, n_bins, values))
 
     def whitening(self, record: CaseRecord, n_bins: int, values: Array) -> NDArray[np.complex128]:
@@ -130,10 +134,10 @@ class Problem:
             np.diag(self.noise**2).astype(complex), (n_bins, len(self.noise), len(self.noise))
         )
         if np.any(self.load_noise > 0) and not self.driven:
-            response = self.transfer(self.structure.at(values), omega)
+            response = self.transfer(self.structure.at(values), np.asarray(omega, dtype=np.float64))
             scaled = response * self.load_noise
             noise = noise + scaled @ np.conj(np.swapaxes(scaled, 1, 2))
-        return np.linalg.inv(np.linalg.cholesky(noise))
+        return np.asarray(np.linalg.inv(np.linalg.cholesky(noise)), dtype=np.complex128)
 
     def transfer(
         self, linear: LinearStructure, omega: Array, inputs: Array | None = None
@@ -166,7 +170,9 @@ class Problem:
         """Motion that drives a component: its measured displacement, and velocity where there is one, smoothed."""
         orders = {name: order for order, name in enumerate(("displacement", "velocity", "acceleration"))}
         have = [name for name in orders if self.case.has(name) and name in record.values]
-        noise = np.array([self.case.channel(name).noise_std or noise_floor(record.values[name]) for name in have])
+        noise = np.array(
+            [self.case.channel(name).noise_std or noise_floor(record.values[name]) for name in have]
+        )
         samples = np.column_stack([record.values[name] for name in have])
         out = smooth_motion(samples, tuple(orders[name] for name in have), noise, record.step)
         return Motion(*(out[:, [i]] for i in range(3)))
@@ -248,7 +254,9 @@ class Problem:
         )
         return self.observe(hypothesis, etas, motion, record.step)
 
-    def _driven_response(self, hypothesis: Hypothesis, etas: list[Array], values: Array, record: CaseRecord) -> Array:
+    def _driven_response(
+        self, hypothesis: Hypothesis, etas: list[Array], values: Array, record: CaseRecord
+    ) -> Array:
         """Force (n, 1) of the component along the prescribed motion of a record."""
         motion = self.motion_of(record)
         linear = self.structure.at(values)
@@ -267,10 +275,14 @@ class Problem:
                 substeps=substeps,
                 start_time=record.start,
             )
+            if not np.isfinite(driven).all():
+                return np.full_like(force, np.nan)
             force += driven @ elements.rows
         for placed, eta in zip(hypothesis, etas, strict=True):
             if placed.effect.site == "sensor" and placed.effect.signal is not None:
-                force[:, 0] = placed.effect.signal(force[:, 0], placed.effect.values(eta, self.scales_of(placed)), record.step)
+                force[:, 0] = placed.effect.signal(
+                    force[:, 0], placed.effect.values(eta, self.scales_of(placed)), record.step
+                )
         return force
 
     def observe(self, hypothesis: Hypothesis, etas: list[Array], motion: Motion, step: float) -> Array:
@@ -382,12 +394,12 @@ class Problem:
 
 def fast_length(n: int) -> int:
     """FFT length for a record of `n` samples."""
-    return fft.next_fast_len(n, real=True)
+    return int(fft.next_fast_len(n, real=True) or n)
 
 
 def noise_floor(x: Array) -> float:
     """White noise of a channel whose noise is not stated, from the flattest quarter of its spectrum."""
-    spectrum = np.abs(fft.rfft((x - x.mean()) * np.hanning(len(x)))) ** 2 / (len(x) * 0.375)
+    spectrum = np.abs(np.fft.rfft((x - x.mean()) * np.hanning(len(x)))) ** 2 / (len(x) * 0.375)
     upper = spectrum[len(spectrum) // 2 :]
     blocks = [np.mean(block) for block in np.array_split(upper, 8)]
     return float(np.sqrt(max(min(blocks), (1e-6 * np.std(x)) ** 2, 1e-300)))
@@ -398,7 +410,7 @@ def band_bins(responses: Array, noise: Array) -> int:
     n = fast_length(len(responses))
     last = 32
     for c in range(responses.shape[1]):
-        spectrum = np.abs(fft.rfft(responses[:, c], n)) ** 2 / len(responses)
+        spectrum = np.abs(np.fft.rfft(responses[:, c], n)) ** 2 / len(responses)
         width = max(len(spectrum) // 200, 8)
         usable = len(spectrum) // width * width
         smooth = spectrum[:usable].reshape(-1, width).mean(axis=1)

@@ -49,10 +49,14 @@ def simulated(diagnosis: Diagnosis) -> dict[str, Recording]:
 def page(diagnosis: Diagnosis) -> Page:
     """Build the report of a diagnosis."""
     verdict = diagnosis.verdict
-    out = Page(f"Diagnosis of {diagnosis.case.name}", verdict.explanation, f"{verdict.seconds:.1f} s of computation")
+    out = Page(
+        f"Diagnosis of {diagnosis.case.name}", verdict.explanation, f"{verdict.seconds:.1f} s of computation"
+    )
     section = out.section("Verdict")
     section.table(
-        "Probabilities", ("verdict", "probability"), [(k, f"{p:.3f}") for k, p in verdict.probabilities.items()]
+        "Probabilities",
+        ("verdict", "probability"),
+        [(k, f"{p:.3f}") for k, p in verdict.probabilities.items()],
     )
     for effect in verdict.named:
         where = f" ({effect.where})" if effect.where else ""
@@ -69,7 +73,9 @@ def page(diagnosis: Diagnosis) -> Page:
     _location_section(out, diagnosis)
     rows = [(r.name, r.where, f"{r.probability:.4f}") for r in verdict.ranking[:12]]
     if rows:
-        out.section("Ranking").table("Effects by posterior probability", ("effect", "place", "probability"), rows)
+        out.section("Ranking").table(
+            "Effects by posterior probability", ("effect", "place", "probability"), rows
+        )
     _parameter_section(out, diagnosis)
     if verdict.next_excitation:
         proposal = verdict.next_excitation
@@ -97,27 +103,40 @@ def _gap_section(out: Page, diagnosis: Diagnosis) -> None:
             f"{gap.metric}{' (' + gap.dof + ')' if gap.dof else ''}: {100 * gap.closed:.1f} % closed "
             f"(95 % interval {100 * low:.1f} to {100 * high:.1f} %)",
             ("stage", "NRMSE"),
-            [*((label, f"{value:.4f}") for label, value in gap.steps), ("noise floor", f"{gap.noise_floor:.4f}")],
+            [
+                *((label, f"{value:.4f}") for label, value in gap.steps),
+                ("noise floor", f"{gap.noise_floor:.4f}"),
+            ],
         )
     gap = diagnosis.verdict.gap
     values = [value for _, value in gap.steps]
     if np.all(np.isfinite(values)):
-        figure = waterfall([label for label, _ in gap.steps[1:]], values, floor=gap.noise_floor, axis="NRMSE [1]")
+        figure = waterfall(
+            [label for label, _ in gap.steps[1:]], values, floor=gap.noise_floor, axis="NRMSE [1]"
+        )
         section.figure(figure, "The gap after each step, and the floor that the noise sets.")
     runs = simulated(diagnosis)
     channels = [name for _, names in coordinates(diagnosis.problem.structure) for name, _ in names]
     reference = runs["measured"]
     middle = float(reference.time[int(np.argmax(np.abs(reference[channels[0]])))])
-    window = (max(float(reference.time[0]), middle - 0.5 * PERIODS_SHOWN), min(float(reference.time[-1]), middle + 0.5 * PERIODS_SHOWN))
+    window = (
+        max(float(reference.time[0]), middle - 0.5 * PERIODS_SHOWN),
+        min(float(reference.time[-1]), middle + 0.5 * PERIODS_SHOWN),
+    )
     figure = time_histories(runs, channels, window=window)
-    section.figure(figure, "Judging record: measured, nominal model, and final model, around the largest response.")
+    section.figure(
+        figure, "Judging record: measured, nominal model, and final model, around the largest response."
+    )
 
 
 def _location_section(out: Page, diagnosis: Diagnosis) -> None:
     section = out.section("Where the gap lies")
     rows = []
     for location in diagnosis.verdict.locations:
-        region = "; ".join(f"{k} {a:.3g} to {b:.3g}" for k, (a, b) in location.state_region.items()) or "everywhere"
+        region = (
+            "; ".join(f"{k} {a:.3g} to {b:.3g}" for k, (a, b) in location.state_region.items())
+            or "everywhere"
+        )
         band = f"{location.band_hz[0]:.3g} to {location.band_hz[1]:.3g}"
         span = f"{location.time_s[0]:.3g} to {location.time_s[1]:.3g}"
         rows.append((location.channel, location.dof, f"{100 * location.share:.1f} %", band, span, region))
@@ -142,7 +161,10 @@ def state_map(diagnosis: Diagnosis, place: Place) -> Figure:
     with style():
         figure, axes = axes_grid(9.0, 3.2, nrows=1, ncols=2)
         for ax, kind, unit in zip(
-            np.ravel(axes), ("position", "velocity"), (place.position_unit, f"{place.position_unit}/s"), strict=True
+            np.ravel(axes),
+            ("position", "velocity"),
+            (place.position_unit, f"{place.position_unit}/s"),
+            strict=True,
         ):
             samples = [getattr(problem.motion(i), kind) @ place.rows[0] for i in range(len(problem.records))]
             cells = cell_map(np.concatenate(samples), force)
@@ -162,13 +184,24 @@ def _parameter_section(out: Page, diagnosis: Diagnosis) -> None:
         rows = []
         for i, name in enumerate(problem.structure.parameters):
             value = problem.nominal[i] + problem.spread[i] * fitted.vector[i]
-            rows.append((name, f"{problem.nominal[i]:.5g}", f"{value:.5g}", f"{problem.spread[i] * deviations[i]:.2g}", f"{fitted.vector[i]:+.2f}"))
+            rows.append(
+                (
+                    name,
+                    f"{problem.nominal[i]:.5g}",
+                    f"{value:.5g}",
+                    f"{problem.spread[i] * deviations[i]:.2g}",
+                    f"{fitted.vector[i]:+.2f}",
+                )
+            )
         header = ("parameter", "nominal", "estimate", "one-sigma", "moved [stated sigma]")
         section.table("Re-estimated within their stated uncertainty, together with the effects", header, rows)
         covariance = fitted.covariance
         scale = np.sqrt(np.diag(covariance))
         correlation = covariance / np.outer(scale, scale)
-        labels = [*problem.structure.parameters, *(f"{p.effect.name}: {q.name}" for p in fitted.hypothesis for q in p.effect.parameters)]
+        labels = [
+            *problem.structure.parameters,
+            *(f"{p.effect.name}: {q.name}" for p in fitted.hypothesis for q in p.effect.parameters),
+        ]
         strong = [
             (labels[i], labels[j], f"{correlation[i, j]:+.2f}")
             for i in range(len(labels))

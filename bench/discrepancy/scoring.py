@@ -43,14 +43,16 @@ def score_blind(results: str | Path, answers: str | Path, *, cases: str | Path |
         right = _right(result, truth, answer["class"])
         by_class[answer["class"]].append(right)
         if not right:
-            said = ", ".join(f"{e['name']} {e['where']}".strip() for e in result["named"]) or result["verdict"]
+            said = (
+                ", ".join(f"{e['name']} {e['where']}".strip() for e in result["named"]) or result["verdict"]
+            )
             wrong.append(f"{name}: {answer['class']} {sorted(n for n, _ in truth)} diagnosed as {said}")
         if answer["class"] == "single":
             (true_name, _), *_ = truth
             said = result["named"][0]["name"] if result["named"] else result["verdict"]
             confusion[true_name][said] += 1
             families.append(right or FAMILIES.get(said) == FAMILIES.get(true_name))
-        wheres = {n: w for n, w in truth}
+        wheres = dict(truth)
         places += [e["where"] == wheres[e["name"]] for e in result["named"] if wheres.get(e["name"])]
         hits += [(e["probability"], e["name"] in wheres) for e in result["named"]]
         ratios += [g["after"] / g["noise_floor"] for g in result.get("gaps") or [result["gap"]]]
@@ -95,7 +97,11 @@ def calibration_error(hits: list[tuple[float, bool]], bins: int = 10) -> float:
     stated = np.array([p for p, _ in hits])
     true = np.array([h for _, h in hits], dtype=float)
     which = np.minimum((stated * bins).astype(int), bins - 1)
-    return float(sum(abs(stated[which == b].mean() - true[which == b].mean()) * np.mean(which == b) for b in set(which)))
+    return float(
+        sum(
+            abs(stated[which == b].mean() - true[which == b].mean()) * np.mean(which == b) for b in set(which)
+        )
+    )
 
 
 def _share(flags: list[bool]) -> float:
@@ -107,4 +113,6 @@ def _check_seal(text: str, name: str, cases: str | Path | None) -> None:
         return
     seal = Path(cases) / name / "answer.sha256"
     if seal.is_file() and seal.read_text().strip() != hashlib.sha256(text.encode()).hexdigest():
-        raise FileFormatError(f"the answer of '{name}' does not match its published hash; it was changed after sealing")
+        raise FileFormatError(
+            f"the answer of '{name}' does not match its published hash; it was changed after sealing"
+        )

@@ -79,7 +79,9 @@ class Screen:
         for i in range(len(problem.records)):
             problem.motion(i)
         self.zero = problem.residual((), np.zeros(n))
-        self.nominal = np.column_stack([self.response(lambda i, p=p: self._deviation(i, p)) for p in range(n)])
+        self.nominal = np.column_stack(
+            [self.response(lambda i, p=p: self._deviation(i, p)) for p in range(n)]
+        )
         tasks = [(p, eta) for p in candidates if p.effect.site == "joint" for eta in p.effect.grid()]
         self.nodes = [node for node in each(lambda task: self._node(*task), tasks) if node is not None]
 
@@ -133,7 +135,9 @@ class Screen:
         rest = (residual - head @ (head.T @ residual)).astype(np.float32)
         head = head.astype(np.float32)
         points = []
-        for node in [node for node in self.nodes if node.placed.key not in own] + self._signal_nodes(hypothesis, vector):
+        for node in [node for node in self.nodes if node.placed.key not in own] + self._signal_nodes(
+            hypothesis, vector
+        ):
             inner = (head.T @ node.columns).astype(float)
             point = _read(node, node.gram - inner.T @ inner, (node.columns.T @ rest).astype(float))
             if point is not None:
@@ -168,7 +172,9 @@ class Screen:
                 moved = eta.copy()
                 step = SHAPE_STEP * parameter.std
                 moved[k] += step if moved[k] + step <= parameter.bounds[1] else -step
-                columns.append(((self.effect_response(placed, moved) - response) / (moved[k] - eta[k]))[:, None])
+                columns.append(
+                    ((self.effect_response(placed, moved) - response) / (moved[k] - eta[k]))[:, None]
+                )
         return residual, np.hstack(columns)
 
     def _signal_nodes(self, hypothesis: Hypothesis, vector: Array) -> list[Node]:
@@ -240,7 +246,7 @@ def _spanning(placed: Placed, eta: Array) -> list[Array]:
     return points
 
 
-def _read(node: Node, gram: Array, right: Array) -> Point | None:
+def _read(node: Node, gram: Array, right: Array) -> Point | None:  # noqa: PLR0912  (one branch a kind of effect)
     """Best coefficients of a node, and the parameters they stand for; None where their sign makes no sense."""
     effect = node.placed.effect
     parameters = effect.parameters

@@ -30,7 +30,11 @@ def coordinates(structure: Structure) -> list[tuple[str, tuple[tuple[str, float]
     """
     lowest = min((o.order for o in structure.observers), default=0)
     judged: list[tuple[str, tuple[tuple[str, float], ...]]] = []
-    singles = {int(np.flatnonzero(o.row)[0]): o.channel for o in structure.observers if o.order == lowest and np.count_nonzero(o.row) == 1}
+    singles = {
+        int(np.flatnonzero(o.row)[0]): o.channel
+        for o in structure.observers
+        if o.order == lowest and np.count_nonzero(o.row) == 1
+    }
     for place in structure.places:
         if len(place.rows) != 1:
             continue
@@ -44,7 +48,9 @@ def nrmse(measured: Array, simulated: Array) -> float:
     """rms(simulated - measured) / std(measured); `DIVERGED_GAP` where the simulation is not finite."""
     if not np.isfinite(simulated).all():
         return DIVERGED_GAP
-    return float(min(np.sqrt(np.mean((simulated - measured) ** 2)) / max(np.std(measured), 1e-300), DIVERGED_GAP))
+    return float(
+        min(np.sqrt(np.mean((simulated - measured) ** 2)) / max(np.std(measured), 1e-300), DIVERGED_GAP)
+    )
 
 
 def gaps(
@@ -73,7 +79,8 @@ def gaps(
         interval = _bootstrap(measured, simulated[0], simulated[-1], floor * float(np.std(whole)), rng)
         out.append(
             Gap(
-                metric=f"validation {_label(channels)} NRMSE, " + ("prescribed motion" if problem.driven else "free run"),
+                metric=f"validation {_label(channels)} NRMSE, "
+                + ("prescribed motion" if problem.driven else "free run"),
                 before=values[0],
                 parameters_only=values[1],
                 after=values[-1],
@@ -94,7 +101,9 @@ def closed_share(before: float, after: float, floor: float) -> float:
     return (before - after) / (before - floor)
 
 
-def noise_level(problem: Problem, channels: Sequence[tuple[str, float]], records: Sequence[CaseRecord]) -> float:
+def noise_level(
+    problem: Problem, channels: Sequence[tuple[str, float]], records: Sequence[CaseRecord]
+) -> float:
     """RMS that the noise of the channels, and of the measured loads passed through the structure, leaves [channel unit]."""
     index = [problem.structure.channels.index(name) for name, _ in channels]
     signs = np.array([sign for _, sign in channels])
@@ -102,7 +111,7 @@ def noise_level(problem: Problem, channels: Sequence[tuple[str, float]], records
     if problem.driven or not np.any(problem.load_noise > 0):
         return float(np.sqrt(own))
     record = records[0]
-    omega = 2.0 * np.pi * np.fft.rfftfreq(len(record), record.step)[1:]
+    omega = np.asarray(2.0 * np.pi * np.fft.rfftfreq(len(record), record.step)[1:], dtype=np.float64)
     response = problem.transfer(problem.structure.at(problem.nominal), omega)[:, index]
     combined = np.abs(np.einsum("fcu,c->fu", response, signs)) ** 2 @ problem.load_noise**2
     return float(np.sqrt(own + np.mean(combined)))
@@ -122,7 +131,11 @@ def _combine(values: Mapping[str, Array], channels: Sequence[tuple[str, float]])
 
 
 def _bootstrap(
-    measured: Sequence[Array], before: Sequence[Array], after: Sequence[Array], noise: float, rng: np.random.Generator
+    measured: Sequence[Array],
+    before: Sequence[Array],
+    after: Sequence[Array],
+    noise: float,
+    rng: np.random.Generator,
 ) -> tuple[float, float]:
     """95 % interval of the closed share, blocks of the judging records drawn with replacement."""
     rows = []
@@ -131,12 +144,20 @@ def _bootstrap(
             return (0.0, 1.0)
         centred = m - m.mean()
         for block in np.array_split(np.arange(len(m)), BLOCKS):
-            rows.append([np.sum((b - m)[block] ** 2), np.sum((a - m)[block] ** 2), np.sum(centred[block] ** 2), len(block)])
+            rows.append(
+                [
+                    np.sum((b - m)[block] ** 2),
+                    np.sum((a - m)[block] ** 2),
+                    np.sum(centred[block] ** 2),
+                    len(block),
+                ]
+            )
     table = np.array(rows)
     draws = table[rng.integers(len(table), size=(1000, len(table)))].sum(axis=1)
     power = draws[:, 2]
     shares = [
-        closed_share(*np.sqrt([x[0] / p, x[1] / p, noise**2 * x[3] / p])) for x, p in zip(draws, np.maximum(power, 1e-300), strict=True)
+        closed_share(*np.sqrt([x[0] / p, x[1] / p, noise**2 * x[3] / p]))
+        for x, p in zip(draws, np.maximum(power, 1e-300), strict=True)
     ]
     low, high = np.percentile(shares, [2.5, 97.5])
     return float(low), float(high)

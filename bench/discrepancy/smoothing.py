@@ -27,7 +27,7 @@ LOOSE = 300.0
 
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
-def _filter(y, h, transition, gain, out, predicted):
+def _filter(y, h, transition, gain, out, predicted):  # noqa: PLR0912  (one compiled loop)
     n = y.shape[0]
     m = y.shape[1]
     state = np.zeros(3)

@@ -121,7 +121,9 @@ class Structure:
         return Structure(
             tuple(self.dofs[i] for i in keep),
             tuple(self.parameters[i] for i in active),
-            *(stack[np.ix_(active, keep, keep)] for stack in (self.mass, self.damping, self.stiffness)),
+            self.mass[np.ix_(active, keep, keep)],
+            self.damping[np.ix_(active, keep, keep)],
+            self.stiffness[np.ix_(active, keep, keep)],
             self.inputs[np.ix_(keep, loads)],
             tuple(self.loads[i] for i in loads),
             tuple(
@@ -188,22 +190,36 @@ def _sdof(case: Case) -> Structure:
         "", np.ones((1, 1)), length, case.channel("force").unit or "N", ("mass",),
         "stiffness" if "stiffness" in have else "", "damping" if "damping" in have else "",
     )  # fmt: skip
-    return Structure(("x",), have, *stacks, np.ones((1, 1)), ("force",), observers, (place,))
+    return Structure(
+        ("x",), have, stacks[0], stacks[1], stacks[2], np.ones((1, 1)), ("force",), observers, (place,)
+    )
 
 
 def _damper(case: Case) -> Structure:
     """A massless component under prescribed motion; the mass only carries the bookkeeping of the coordinate."""
     _require(case, (), ("displacement", "force"))
     names = tuple(p.name for p in case.parameters if p.name in {"stiffness", "damping", "coulomb"})
-    stacks = [np.zeros((len(names), 1, 1)), *(
-        np.array([float(name == kind) for name in names]).reshape(-1, 1, 1) for kind in ("damping", "stiffness")
-    )]
+    stacks = [
+        np.zeros((len(names), 1, 1)),
+        *(
+            np.array([float(name == kind) for name in names]).reshape(-1, 1, 1)
+            for kind in ("damping", "stiffness")
+        ),
+    ]
     place = Place(
         "", np.ones((1, 1)), case.channel("displacement").unit or "m", case.channel("force").unit or "N", (),
         "stiffness" if "stiffness" in names else "", "damping" if "damping" in names else "",
     )  # fmt: skip
     return Structure(
-        ("x",), names, *stacks, np.ones((1, 1)), ("displacement",), (Observer("force", 0, np.ones(1)),), (place,)
+        ("x",),
+        names,
+        stacks[0],
+        stacks[1],
+        stacks[2],
+        np.ones((1, 1)),
+        ("displacement",),
+        (Observer("force", 0, np.ones(1)),),
+        (place,),
     )
 
 
@@ -237,7 +253,7 @@ def _joint(case: Case) -> Structure:
                 (f"{inertia}_1", f"{inertia}_2"),
                 f"joint_stiffness_{axis}",
                 f"joint_damping_{axis}",
-            )  # fmt: skip
+            )
         )
     places.append(Place("joint", np.vstack([p.rows for p in places]), "m", "N"))
     eye = np.eye(4)

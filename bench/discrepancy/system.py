@@ -314,7 +314,7 @@ def _pass_event(p, u, k, t, dt, event, fraction, first, rest):
 
 
 @_jit
-def _free_run(dt, t0, substeps, u, start, scratch, n_dof, matrices, table, rows, spread, theta, out):
+def _free_run(dt, t0, substeps, u, start, scratch, n_dof, matrices, table, rows, spread, theta, out):  # noqa: PLR0912  (one compiled loop)
     """Integrate over all samples of `u` (n, n_inputs) from `start`; write position, velocity, acceleration to `out`.
 
     `scratch` belongs to the caller: memory reached only through pointers would be freed here after its last mention.

@@ -22,7 +22,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.errors import ModelError, ParameterError
+from bench.errors import ModelError, ParameterError, UnknownNameError
 from bench.excitation.linear_structure import linear_structure
 from bench.laws.base import MAX_COORDINATES
 from bench.laws.calling import advance, call_kernel, load_int, pointer_at
@@ -30,6 +30,9 @@ from bench.rig import Rig
 
 CASES_A_THREAD = 4
 """Fewest cases for which another thread is worth its start of some 20 µs."""
+
+MOTION, UNDRIVEN = -1, -2
+"""Marks of a law's coordinate that is a motion, or an input that gets no command."""
 
 
 class Packed(NamedTuple):
@@ -40,7 +43,7 @@ class Packed(NamedTuple):
     kernels: NDArray[np.int64]  # (D, K, 2) force and rate addresses, 0 for none
     sizes: NDArray[np.int64]  # (D, K, 3) coordinates, states, first state
     motion: NDArray[np.float64]  # (D, K, J, nv) coefficients of joints in a coordinate
-    inputs: NDArray[np.int64]  # (D, K, J) actuator read by a coordinate, −1 for a motion
+    inputs: NDArray[np.int64]  # (D, K, J) command read by a coordinate, or MOTION, or UNDRIVEN
     theta: NDArray[np.float64]  # (D, K, n_theta)
     start: NDArray[np.float64]  # (D, 2 nv + nz)
 
@@ -83,7 +86,7 @@ def _derivative(t, x, u, nv, nu, n_elements, n_coordinates, n_theta, table, dx, 
             velocity = 0.0
             if source >= 0:
                 position = u[source]
-            else:
+            elif source == MOTION:
                 for i in range(nv):
                     position += row[i] * x[i]
                     velocity += row[i] * x[nv + i]
@@ -94,7 +97,7 @@ def _derivative(t, x, u, nv, nu, n_elements, n_coordinates, n_theta, table, dx, 
         states = advance(x, first)
         call_kernel(force, t, lq, lv, states, parameters, lf)
         for j in range(count):
-            if load_int(inputs + 8 * (n_coordinates * k + j)) < 0:
+            if load_int(inputs + 8 * (n_coordinates * k + j)) == MOTION:
                 row = advance(motion, nv * (n_coordinates * k + j))
                 for i in range(nv):
                     scratch[i] -= row[i] * lf[j]
@@ -170,6 +173,7 @@ class Ensemble:
     Attributes:
         rigs: The members; the same MJCF, actuators and time step, elements as they like.
         channels: Names of the measured channels that records hold.
+        actuators: Names of the actuators that are driven; the others get no command. All by default.
         threads: Threads to spread cases over.
 
     Raises:
@@ -178,6 +182,7 @@ class Ensemble:
 
     rigs: tuple[Rig, ...]
     channels: tuple[str, ...]
+    actuators: tuple[str, ...] = ()
     threads: int = 1
     _packed: Packed = field(init=False, repr=False)
 
@@ -186,12 +191,16 @@ class Ensemble:
         if not self.rigs:
             raise ParameterError("an ensemble needs at least one rig; none came")
         first = self.rigs[0]
+        self.actuators = tuple(self.actuators) or first.actuators
+        for name in self.actuators:
+            if name not in first.actuators:
+                raise UnknownNameError(f"actuator of rig '{first.name}'", name, first.actuators)
         for rig in self.rigs:
             if (rig.model.nv, rig.actuators, rig.timestep) != (first.model.nv, first.actuators, first.timestep):
                 raise ModelError(
                     f"rigs '{first.name}' and '{rig.name}' of one ensemble differ in joints, actuators or timestep"
                 )
-        self._packed = _pack(self.rigs, self.channels)
+        self._packed = _pack(self.rigs, self.channels, self.actuators)
 
     @property
     def timestep(self) -> float:
@@ -201,7 +210,7 @@ class Ensemble:
     @property
     def n_actuators(self) -> int:
         """Number of commands."""
-        return len(self.rigs[0].actuators)
+        return len(self.actuators)
 
     def start(self, members: NDArray[np.int64]) -> NDArray[np.float64]:
         """States at rest of the members ``(…, n_states)`` for indices of shape ``(…)``; −1 gives zeros."""
@@ -274,23 +283,24 @@ class Ensemble:
         return ThreadPoolExecutor(self.threads - 1)
 
     def __reduce__(self) -> tuple:
-        return (Ensemble, (self.rigs, self.channels, self.threads))  # addresses of kernels hold in one process
+        return (Ensemble, (self.rigs, self.channels, self.actuators, self.threads))  # addresses of kernels hold in one process
 
 
-def _pack(rigs: Sequence[Rig], channels: tuple[str, ...]) -> Packed:
-    nv, nu = rigs[0].model.nv, len(rigs[0].actuators)
+def _pack(rigs: Sequence[Rig], channels: tuple[str, ...], actuators: tuple[str, ...]) -> Packed:
+    nv = rigs[0].model.nv
+    driven = [rigs[0].actuators.index(name) for name in actuators]
     elements = max(1, max(len(rig.elements) for rig in rigs))
     width = max([1, *(len(element.theta) for rig in rigs for element in rig.elements)])
     states = max(sum(len(element.law.states) for element in rig.elements) for rig in rigs)
     coordinates = max([1, *(element.law.n_coordinates for rig in rigs for element in rig.elements)])
-    shape, columns = (len(rigs), elements), 1 + 3 * nv + nu
+    shape, columns = (len(rigs), elements), 1 + 3 * nv + len(rigs[0].actuators)
     p = Packed(
         np.zeros((len(rigs), nv, columns)),
         np.zeros((len(rigs), len(channels), columns)),
         np.zeros((*shape, 2), dtype=np.int64),
         np.zeros((*shape, 3), dtype=np.int64),
         np.zeros((*shape, coordinates, nv)),
-        np.full((*shape, coordinates), -1, dtype=np.int64),
+        np.full((*shape, coordinates), MOTION, dtype=np.int64),
         np.zeros((*shape, width)),
         np.zeros((len(rigs), 2 * nv + states)),
     )
@@ -308,10 +318,38 @@ def _pack(rigs: Sequence[Rig], channels: tuple[str, ...]) -> Packed:
             p.theta[d, k, : len(item.element.theta)] = item.element.theta
             for j, coordinate in enumerate(item.coordinates):
                 if coordinate.is_input:
-                    p.inputs[d, k, j] = coordinate.terms[0][0]
+                    p.inputs[d, k, j] = _place(driven, coordinate.terms[0][0])
                 else:
                     for _, dof, coefficient in coordinate.terms:
                         p.motion[d, k, j, dof] += coefficient
-            p.start[d, 2 * nv + first : 2 * nv + first + len(law.states)] = law.start()
             first += len(law.states)
-    return p
+    return _reduced(p, rigs, nv, driven)
+
+
+def _place(driven: list[int], actuator: int) -> int:
+    """Place of an input among the driven actuators; `UNDRIVEN` where it gets no command."""
+    return driven.index(actuator) if actuator in driven else UNDRIVEN
+
+
+def _reduced(p: Packed, rigs: Sequence[Rig], nv: int, driven: list[int]) -> Packed:
+    """The members without the degrees of freedom that no command and no element reaches: they stay at rest."""
+    a = np.abs(p.acceleration).max(axis=0)
+    push = np.abs(p.motion).max(axis=(0, 1))  # (J, nv)
+    coupled = a[:, 1 : 1 + nv] + a[:, 1 + nv : 1 + 2 * nv] + a[:, -nv:] + push.T @ push > 0.0
+    reached = push.any(axis=0) | (a[:, 0] > 0.0) | (a[:, [1 + 2 * nv + i for i in driven]] > 0.0).any(axis=1)
+    for _ in range(nv):
+        reached |= (coupled & reached).any(axis=1)
+    kept = np.flatnonzero(reached) if reached.any() else np.arange(nv)
+    columns = np.concatenate(
+        [[0], 1 + kept, 1 + nv + kept, 1 + 2 * nv + np.array(driven), 1 + 2 * nv + len(rigs[0].actuators) + kept]
+    ).astype(int)  # fmt: skip
+    start = np.zeros((len(rigs), 2 * len(kept) + p.start.shape[1] - 2 * nv))
+    for d, rig in enumerate(rigs):
+        states = [value for element in rig.elements for value in element.law.start()]
+        start[d, 2 * len(kept) : 2 * len(kept) + len(states)] = states
+    return p._replace(
+        acceleration=np.ascontiguousarray(p.acceleration[:, kept][:, :, columns]),
+        sensors=np.ascontiguousarray(p.sensors[:, :, columns]),
+        motion=np.ascontiguousarray(p.motion[..., kept]),
+        start=start,
+    )

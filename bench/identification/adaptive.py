@@ -343,12 +343,14 @@ class AdaptiveLeastSquares:
         if reports.shape[0]:
             self._report_time = float(reports[-1, 0])
         fresh = min(self._events_made - made, len(self.events))
+        theta *= self.model.to_physical
+        phi *= np.array(self.model.scale)
         history = AdaptiveHistory(
             time=stamps[::every].copy(),
-            theta=theta * self.model.to_physical,
+            theta=theta,
             measured=z[:, 0] * self.model.force_scale,
             predicted=z[:, 1] * self.model.force_scale,
-            regressors=phi * np.array(self.model.scale),
+            regressors=phi,
             flags=flags,
             persistence=PersistenceHistory(
                 time=reports[:, 0].copy(),

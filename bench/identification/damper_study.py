@@ -38,6 +38,8 @@ from bench.identification.damper import (
     fit_design_model,
     fit_design_model_online,
 )
+from bench.identification.order_study import OrderStudy as OrderStudy  # noqa: PLC0414  (part of the study)
+from bench.identification.order_study import order_study as order_study  # noqa: PLC0414
 from bench.laws.base import ForceLaw, Parameter, kernel
 from bench.recording import nmse
 

@@ -55,6 +55,7 @@ def gain_direction(d, u, phi, b):
 def bierman(d, u, phi, b, rho, growth):
     """Update the factors of ``growth * P`` by one measurement of variance rho; b becomes P phi, returns its variance."""
     alpha = rho
+    inverse = 1.0 / rho
     for j in range(d.size):
         f = phi[j]
         for i in range(j):
@@ -63,8 +64,9 @@ def bierman(d, u, phi, b, rho, growth):
         v = d_j * f
         before = alpha
         alpha += f * v
-        d[j] = d_j * before / alpha
-        ratio = -f / before
+        ratio = -f * inverse
+        inverse = 1.0 / alpha
+        d[j] = d_j * (before * inverse)
         for i in range(j):
             u_ij = u[j, i]
             u[j, i] = u_ij + b[i] * ratio

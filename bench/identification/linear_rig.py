@@ -28,7 +28,9 @@ from bench.rig.building import STRUCTURE
 
 Array = NDArray[np.float64]
 
-_AGREEMENT = 1e-9  # of the largest term: unit probing is exact to some 1e-15, a nonlinearity worth the name far above
+_AGREEMENT = (
+    1e-9  # of the largest term: unit probing is exact to some 1e-15, a nonlinearity worth the name far above
+)
 
 
 class Address(NamedTuple):
@@ -61,6 +63,11 @@ def address(rig: Rig, name: str) -> Address:
     item = next(item for item in rig.built.placed if item.element.name == label)
     place = len(element.law.header) + element.law.parameter_names.index(parameter)
     return Address("numeric_data", item.theta + place)
+
+
+def current(rig: Rig, name: str) -> float:
+    """Value of a free parameter in a rig; raises as `address`."""
+    return _value(rig.model, address(rig, name))
 
 
 def _structural(model: mujoco.MjModel, kind: str, name: str) -> Address:
@@ -144,7 +151,9 @@ class _Probe:
         largest = np.max(np.abs(found), axis=1, initial=0.0, keepdims=True)
         return np.where(np.abs(found) > 1e-12 * largest, found, 0.0)
 
-    def difference(self, at: _Matrices, sensors: Array, columns: Sequence[int], rng: np.random.Generator) -> str:
+    def difference(
+        self, at: _Matrices, sensors: Array, columns: Sequence[int], rng: np.random.Generator
+    ) -> str:
         """What of the model the matrices, and the map of some sensors, miss at random states; empty for nothing."""
         nv, nu = self.model.nv, self.model.nu
         for scale in (1.0, 1e-2):  # a stop or a backlash shows at one of them
@@ -234,7 +243,8 @@ class LinearRig:
             _cut(base, kept),
             tuple(None if slope is None else _cut(slope, kept) for slope in slopes),
             tuple(
-                -1 if free else offsets[entry.index] for entry, free in zip(addresses, structural, strict=True)
+                -1 if free else offsets[entry.index]
+                for entry, free in zip(addresses, structural, strict=True)
             ),
             start,
             np.ascontiguousarray(sensors[:, observed]),
@@ -360,7 +370,9 @@ def _refuse(rig: Rig, model: mujoco.MjModel) -> None:
     }
     for reason, present in reasons.items():
         if present:
-            raise ModelError(f"rig '{rig.name}' is not of linear structure: {reason}; simulate it with MuJoCo")
+            raise ModelError(
+                f"rig '{rig.name}' is not of linear structure: {reason}; simulate it with MuJoCo"
+            )
 
 
 def _moved(model: mujoco.MjModel, entries: Sequence[Address], values: Sequence[float]) -> mujoco.MjModel:
@@ -456,5 +468,7 @@ def _reached(
 
 
 def _cut(matrices: _Matrices, kept: NDArray[np.int64]) -> _Matrices:
-    square = [part[np.ix_(kept, kept)] for part in matrices[:3]]
-    return _Matrices(*square, matrices.inputs[kept])
+    square = np.ix_(kept, kept)
+    return _Matrices(
+        matrices.mass[square], matrices.stiffness[square], matrices.damping[square], matrices.inputs[kept]
+    )

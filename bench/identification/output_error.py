@@ -18,27 +18,35 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Executor, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
-import mujoco
 import numpy as np
-from mujoco.batch import Batch
 from numpy.typing import NDArray
 
-from bench.errors import IdentificationError, ModelError, ParameterError, UnknownNameError
-from bench.identification.linear_rig import Address, LinearRig, address, sensor_columns
+from bench.errors import IdentificationError, ParameterError, UnknownNameError
+from bench.identification.linear_rig import current
+from bench.identification.rig_response import (
+    EngineName,
+    Initial,
+    LinearEngine,
+    MujocoEngine,
+    RigRecord,
+    engine_for,
+    moving_sensors,
+    prepare,
+    with_initial,
+)
 from bench.recording import Recording
-from bench.rig import Rig, controls_of
+from bench.rig import Rig
 
 Array = NDArray[np.float64]
-Initial = Mapping[str, tuple[float, float]]
-Engine = Literal["auto", "linear", "mujoco"]
 
-_DIFFERENCE = 1e-6  # of a parameter's scale: truncation and the simulations' rounding of 1e-13 both stay below 1e-6
+_DIFFERENCE = (
+    1e-6  # of a parameter's scale: truncation and the simulations' rounding of 1e-13 both stay below 1e-6
+)
 _POSITIVE = ("mass", "inertia")
-_COMMAND_SENSORS = (int(mujoco.mjtSensor.mjSENS_ACTUATORFRC), int(mujoco.mjtSensor.mjSENS_JOINTACTFRC))
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,88 +83,13 @@ class OutputErrorModel:
     engine: str
 
 
-class _Record(NamedTuple):
-    """A record prepared for simulation."""
-
-    controls: Array  # (n_steps, n_actuators)
-    measured: Array  # (n_samples, n_channels)
-    scored: slice
-    initial: Initial
-    stride: int
-    start_time: float
-
-
-class _LinearEngine:
-    """Simulations by the compiled loop."""
-
-    name = "linear"
-
-    def __init__(self, rig: Rig, channels: Sequence[str], free: Sequence[str], pool: Executor) -> None:
-        self.rig = LinearRig.of(rig, channels, free)
-        self.pool = pool
-
-    def simulate(self, record: _Record, vectors: Array) -> Array:
-        """Channels ``(n_vectors, n_samples, n_channels)``, not finite where a simulation diverged."""
-
-        def one(vector: Array) -> Array:
-            return self.rig.simulate(
-                record.controls,
-                vector,
-                initial=record.initial,
-                stride=record.stride,
-                start_time=record.start_time,
-            )
-
-        return np.stack(list(self.pool.map(one, vectors)))
-
-
-class _MujocoEngine:
-    """Simulations by `mujoco.batch`, each with its own numbers in the fields concerned."""
-
-    name = "mujoco"
-
-    def __init__(self, rig: Rig, channels: Sequence[str], free: Sequence[str], threads: int) -> None:
-        self.rig = rig
-        self.columns = sensor_columns(rig, channels)
-        self.addresses = [address(rig, name) for name in free]
-        self.threads = threads
-
-    def simulate(self, record: _Record, vectors: Array) -> Array:
-        """As `_LinearEngine.simulate`."""
-        model = self.rig.model
-        batch = Batch(model, len(vectors), self.threads)
-        for entry, values in zip(self.addresses, vectors.T, strict=True):
-            target = batch.expand(entry.field)[:, entry.index]
-            target[:] = values.reshape((-1,) + (1,) * (target.ndim - 1))
-        if any(entry.field != "numeric_data" for entry in self.addresses):
-            batch.set_const()
-        batch.bind("time")[:] = record.start_time
-        for joint, (position, velocity) in record.initial.items():
-            place = model.joint(joint)
-            batch.bind("qpos")[:, int(place.qposadr[0])] = position
-            batch.bind("qvel")[:, int(place.dofadr[0])] = velocity
-        for item in self.rig.built.placed:
-            if item.act >= 0:
-                start = item.element.law.start()
-                batch.bind("act")[:, item.act : item.act + len(start)] = start
-        steps, own = record.controls.shape
-        padded = np.zeros((len(vectors), steps, model.nu))
-        padded[:, :, :own] = record.controls
-        clock = mujoco.mjtState.mjSTATE_TIME
-        result = batch.rollout(steps, padded, mujoco.mjtState.mjSTATE_CTRL, [clock, "sensordata"])
-        found = result["sensordata"][:, :: record.stride][:, :, self.columns]
-        stopped = np.diff(result[clock][:, :, 0], axis=1, prepend=record.start_time) <= 0.0
-        found[stopped[:, :: record.stride]] = np.nan
-        return found
-
-
 class _Problem:
     """Residuals of all records, whitened, and the priors, as a function of the scaled parameters."""
 
     def __init__(
         self,
-        engine: _LinearEngine | _MujocoEngine,
-        records: Sequence[_Record],
+        engine: LinearEngine | MujocoEngine,
+        records: Sequence[RigRecord],
         weights: Array,
         scale: Array,
         prior: tuple[Array, Array],
@@ -166,7 +99,7 @@ class _Problem:
         self.evaluations = 0
         self.n_residuals = sum(len(r.measured[r.scored]) for r in records) * len(weights)
 
-    def residuals(self, record: _Record, points: Array) -> Array:
+    def residuals(self, record: RigRecord, points: Array) -> Array:
         """Simulated less measured over standard deviation ``(n_points, n)``."""
         self.evaluations += len(points)
         simulated = self.engine.simulate(record, points * self.scale)
@@ -193,7 +126,9 @@ class _Problem:
         for record in self.records:
             residual, *shifted = self.residuals(record, points)
             jacobian = (np.stack(shifted) - residual) / steps[:, None]
-            jacobian[~np.all(np.isfinite(jacobian), axis=1)] = 0.0  # diverged: leave that parameter where it is
+            jacobian[~np.all(np.isfinite(jacobian), axis=1)] = (
+                0.0  # diverged: leave that parameter where it is
+            )
             curvature = curvature + jacobian @ jacobian.T
             gradient = gradient + jacobian @ residual
         return curvature, gradient
@@ -222,7 +157,7 @@ def fit_output_error(
     search: Mapping[str, tuple[float, float]] | None = None,
     starts: int = 1,
     rng: np.random.Generator | None = None,
-    engine: Engine = "auto",
+    engine: EngineName = "auto",
     threads: int | None = None,
     max_iterations: int = 60,
     tolerance: float = 1e-9,
@@ -268,9 +203,9 @@ def fit_output_error(
         raise IdentificationError(
             f"{len(records)} records and the free parameters {list(names)} came; at least one each, all different, is expected"
         )
-    start = np.array([_current(rig, address(rig, name)) for name in names])
-    chosen = tuple(channels) if channels is not None else _moving_sensors(rig, records[0])
-    prepared = [_prepare(rig, r, chosen, inputs or {}, i) for r, i in _with_initial(records, initial)]
+    start = np.array([current(rig, name) for name in names])
+    chosen = tuple(channels) if channels is not None else moving_sensors(rig, records[0])
+    prepared = [prepare(rig, r, chosen, inputs or {}, i) for r, i in with_initial(records, initial)]
     weights, known = _weights(records, chosen, prepared, noise)
     scale = np.where(start != 0.0, np.abs(start), 1.0)
     for i, name in enumerate(names):
@@ -280,7 +215,7 @@ def fit_output_error(
     low, high = _bounds(rig, names, bounds or {}) / scale
     workers = threads or os.cpu_count() or 1
     with ThreadPoolExecutor(workers) as pool:
-        simulator = _engine(engine, rig, chosen, names, (pool, workers))
+        simulator = engine_for(engine, rig, chosen, names, (pool, workers))
         problem = _Problem(simulator, prepared, weights, scale, prior)
         points = _starts(problem, names, start / scale, (low, high), search or {}, starts, rng)
         minima = [_minimise(problem, p, (low, high), max_iterations, tolerance, progress) for p in points]
@@ -290,7 +225,8 @@ def fit_output_error(
                 f"rig '{rig.name}' diverges at every start; start nearer, narrow `search`, or set a smaller timestep"
             )
         residuals = tuple(
-            simulator.simulate(record, best.point[None, :] * scale)[0] - record.measured for record in prepared
+            simulator.simulate(record, best.point[None, :] * scale)[0] - record.measured
+            for record in prepared
         )
     return _report(rig, names, chosen, problem, best, (prepared, residuals, known))
 
@@ -301,7 +237,7 @@ def _report(
     channels: tuple[str, ...],
     problem: _Problem,
     best: _Minimum,
-    data: tuple[Sequence[_Record], tuple[Array, ...], bool],
+    data: tuple[Sequence[RigRecord], tuple[Array, ...], bool],
 ) -> OutputErrorModel:
     prepared, residuals, known = data
     values = best.point * problem.scale
@@ -311,7 +247,9 @@ def _report(
     curvature = best.curvature[np.ix_(moving, moving)]
     determined = np.diag(curvature) > 0.0
     sure = moving[determined]
-    covariance[np.ix_(sure, sure)] = variance * np.linalg.pinv(curvature[np.ix_(determined, determined)], rcond=1e-15)
+    covariance[np.ix_(sure, sure)] = variance * np.linalg.pinv(
+        curvature[np.ix_(determined, determined)], rcond=1e-15
+    )
     std = np.sqrt(np.diag(covariance))
     correlation = np.eye(len(names))
     correlation[np.ix_(sure, sure)] = covariance[np.ix_(sure, sure)] / np.outer(std[sure], std[sure])
@@ -430,81 +368,10 @@ def _starts(
     return [first, *(np.clip(candidates[i], *box) for i in order[: starts - 1])]
 
 
-def _engine(
-    engine: Engine, rig: Rig, channels: tuple[str, ...], free: tuple[str, ...], workers: tuple[Executor, int]
-) -> _LinearEngine | _MujocoEngine:
-    if engine not in ("auto", "linear", "mujoco"):
-        raise UnknownNameError("engine", engine, ("auto", "linear", "mujoco"))
-    if engine != "mujoco":
-        try:
-            return _LinearEngine(rig, channels, free, workers[0])
-        except ModelError:
-            if engine == "linear":
-                raise
-    return _MujocoEngine(rig, channels, free, workers[1])
-
-
-def _current(rig: Rig, entry: Address) -> float:
-    return float(np.ravel(getattr(rig.model, entry.field)[entry.index])[0])
-
-
-def _moving_sensors(rig: Rig, record: Recording) -> tuple[str, ...]:
-    model = rig.model
-    columns = np.repeat(model.sensor_type, model.sensor_dim)
-    first = len(rig.actuators)
-    sensors = rig.channels[first : first + model.nsensordata]
-    return tuple(
-        channel.name
-        for channel, kind in zip(sensors, columns, strict=True)
-        if channel.name in record
-        and int(kind) not in _COMMAND_SENSORS
-        and np.ptp(record[channel.name][record.scored]) > 0.0
-    )
-
-
-def _with_initial(
-    records: Sequence[Recording], initial: Initial | Sequence[Initial] | None
-) -> list[tuple[Recording, Initial]]:
-    if initial is None or isinstance(initial, Mapping):
-        return [(record, initial or {}) for record in records]
-    if len(initial) != len(records):
-        raise IdentificationError(f"{len(records)} records and {len(initial)} initial states came; one each is expected")
-    return list(zip(records, initial, strict=True))
-
-
-def _prepare(
-    rig: Rig, record: Recording, channels: tuple[str, ...], inputs: Mapping[str, str], initial: Initial
-) -> _Record:
-    if not channels:
-        raise IdentificationError(
-            f"the record has none of the sensors of rig '{rig.name}' in motion; it has {', '.join(record.names)}"
-        )
-    for name in inputs:
-        if name not in rig.actuators:
-            raise UnknownNameError(f"actuator of rig '{rig.name}'", name, rig.actuators)
-    arrays = {actuator: record[channel] for actuator, channel in inputs.items()}
-    arrays |= {name: record[name] for name in rig.actuators if name in record and name not in inputs}
-    if not arrays:
-        raise UnknownNameError(
-            f"channel for the actuators of rig '{rig.name}' in the record", rig.actuators[0], record.names
-        )
-    driven = Recording.from_arrays(
-        None, arrays, units=dict.fromkeys(arrays, "1"), sample_rate=record.sample_rate
-    )
-    for joint in initial:
-        if mujoco.mj_name2id(rig.model, mujoco.mjtObj.mjOBJ_JOINT, joint) < 0:
-            raise UnknownNameError("joint", joint, [rig.model.joint(i).name for i in range(rig.model.njnt)])
-    controls = controls_of(rig, driven)
-    measured = np.stack([record[name] for name in channels], axis=1)
-    return _Record(
-        controls, measured, record.scored, initial, len(controls) // len(record), float(record.time[0])
-    )
-
-
 def _weights(
     records: Sequence[Recording],
     channels: tuple[str, ...],
-    prepared: Sequence[_Record],
+    prepared: Sequence[RigRecord],
     noise: Mapping[str, float] | None,
 ) -> tuple[Array, bool]:
     """One over the standard deviation of each channel, and whether that is its noise."""
@@ -535,7 +402,9 @@ def _priors(
         if name not in names:
             raise UnknownNameError("free parameter", name, names)
         if not deviation > 0.0:
-            raise ParameterError(f"prior of '{name}' has the standard deviation {deviation}; a positive one is expected")
+            raise ParameterError(
+                f"prior of '{name}' has the standard deviation {deviation}; a positive one is expected"
+            )
         place = names.index(name)
         mean[place] = centre / scale[place]
         precision[place] = (scale[place] / deviation) ** 2
@@ -551,9 +420,10 @@ def _bounds(rig: Rig, names: tuple[str, ...], bounds: Mapping[str, tuple[float, 
     for name in names:
         first, _, rest = name.partition("/")
         if first == "structure" and "/" in rest:
-            entry = address(rig, name)
             kind = rest.split("/", 1)[0]
-            lowest = 1e-6 * _current(rig, entry) if kind in _POSITIVE else -math.inf if kind == "stiffness" else 0.0
+            lowest = (
+                1e-6 * current(rig, name) if kind in _POSITIVE else -math.inf if kind == "stiffness" else 0.0
+            )
             default = (lowest, math.inf)
         else:
             label, _, parameter = name.rpartition("/")

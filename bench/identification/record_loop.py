@@ -38,7 +38,9 @@ _A = np.array(
 _C = np.array([0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0, 1.0])
 _E = np.array([71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40])
 _STAGES = 7
-_SMALLEST = 1e-9  # of a step: where the error does not fall with the step (a jump), go on rather than for ever
+_SMALLEST = (
+    1e-9  # of a step: where the error does not fall with the step (a jump), go on rather than for ever
+)
 
 _jit = numba.njit(cache=True, error_model="numpy", nogil=True)
 _inline = numba.njit(cache=True, error_model="numpy", nogil=True, forceinline=True)

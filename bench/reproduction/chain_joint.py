@@ -1,7 +1,8 @@
-"""D2, D3: true and reduced-order joints in the chain of four bodies, system against system (Tasbihgoo 2006, Figs 5.4, 5.8, 5.9)."""
+"""D2, D3: true and reduced-order joints in the chain of four bodies (Tasbihgoo 2006, Figs 5.4, 5.8, 5.9)."""
 
 from __future__ import annotations
 
+import math
 import warnings
 from typing import NamedTuple
 
@@ -33,7 +34,11 @@ CHANNELS = {
     "rotation_1": "θ of body 1",
     "rotation_4": "θ of body 4",
 }
-NETWORK, POLYNOMIAL, PUBLISHED = "our network (40)", "our polynomial (order 3)", "published network (30)"
+NETWORK, PUBLISHED = "our network (40)", "published network (30)"
+TENSOR, TOTAL = "our polynomial (tensor of order 3)", "our polynomial (total degree 5)"
+LIMITS = {NETWORK: 1.0, PUBLISHED: 1.0, TOTAL: 5.0, TENSOR: math.inf}
+"""Largest NMSE required of the joint's motion and forces [%]: for networks a fifth of what counts as a good fit. The tensor is
+reported as it comes."""
 
 
 class Outcome(NamedTuple):
@@ -50,7 +55,8 @@ def elements() -> dict[str, Element]:
     fitted, printed = joint_models.models(), published_network()
     return {
         NETWORK: element_from(fitted.network, AXES),
-        POLYNOMIAL: element_from(fitted.polynomial, AXES),
+        TENSOR: element_from(fitted.polynomial, AXES),
+        TOTAL: element_from(joint_models.total_degree_polynomial(), AXES),
         PUBLISHED: Element(printed.law, AXES, printed.theta, name="joint"),
     }
 
@@ -68,7 +74,9 @@ def outcome(rig: Rig, element: Element, true: Recording, seed: int) -> Outcome:
             record = respond(rig.with_element(element), seed)
         except SimulationError as error:
             return Outcome(None, {}, 1.0, f"diverged after {error.time:.1f} s")
-    states = np.stack([record[f"joint/{kind}_{i}"] for kind in ("displacement", "velocity") for i in (1, 2)], axis=1)
+    states = np.stack(
+        [record[f"joint/{kind}_{i}"] for kind in ("displacement", "velocity") for i in (1, 2)], axis=1
+    )
     outside = 0.0 if element.validity is None else float(np.mean(element.validity.outside(states)))
     return Outcome(record, channel_nmse(true, record), outside, "")
 
@@ -81,12 +89,27 @@ def _rows(outcomes: dict[str, dict[str, Outcome]]) -> tuple[Row, ...]:
                 rows.append(Row(f"{excited} excitation, {label}", "", "", found.note))
                 continue
             for channel, name in list(CHANNELS.items())[:4]:
-                # 1 %: a fifth of what counts as a good fit; the published network leaves 0.1 to 0.4 % on two bodies.
-                high = 1.0 if label != POLYNOMIAL else np.inf
-                rows.append(value_row(f"{excited} excitation, {label}: NMSE of {name}", "%", None, found.nmse[channel], high=high))
+                rows.append(
+                    value_row(
+                        f"{excited} excitation, {label}: NMSE of {name}",
+                        "%",
+                        None,
+                        found.nmse[channel],
+                        high=LIMITS[label],
+                    )
+                )
             worst = max(found.nmse[channel] for channel in list(CHANNELS)[4:])
-            rows.append(value_row(f"{excited} excitation, {label}: worst NMSE of the outer bodies", "%", None, worst))
-            rows.append(value_row(f"{excited} excitation, {label}: samples outside the data's range", "%", None, 100.0 * found.outside))
+            rows.append(
+                value_row(f"{excited} excitation, {label}: worst NMSE of the outer bodies", "%", None, worst)
+            )
+            rows.append(
+                value_row(
+                    f"{excited} excitation, {label}: samples outside the data's range",
+                    "%",
+                    None,
+                    100.0 * found.outside,
+                )
+            )
     return tuple(rows)
 
 
@@ -106,7 +129,9 @@ def run(progress: Progress) -> Item:
     pairs = [("axial_23", "joint/force_1"), ("torsional_23", "joint/force_2")]
     for excited, figure in (("training", "Fig 5.8"), ("unseen", "Fig 5.9")):
         records = {"true joint": imperial(true[excited])} | {
-            label: imperial(found.record) for label, found in outcomes[excited].items() if found.record is not None
+            label: imperial(found.record)
+            for label, found in outcomes[excited].items()
+            if found.record is not None
         }
         names = [name for _, name in pairs]
         scores = {
@@ -116,15 +141,31 @@ def run(progress: Progress) -> Item:
         }
         window = (15.0, 18.0)
         pictures += [
-            Picture(f"{excited}_histories", f"Restoring forces, {excited} excitation ({figure} a, b).", time_histories(records, names, window=window)),
-            Picture(f"{excited}_loops", f"Loops of the joint, {excited} excitation ({figure} c, d).", fine(loops(records, pairs, window=window))),
-            Picture(f"{excited}_errors", f"System-level NMSE, {excited} excitation.", bar_table(scores, limit=5.0, limit_label="good fit")),
+            Picture(
+                f"{excited}_histories",
+                f"Restoring forces, {excited} excitation ({figure} a, b).",
+                time_histories(records, names, window=window),
+            ),
+            Picture(
+                f"{excited}_loops",
+                f"Loops of the joint, {excited} excitation ({figure} c, d).",
+                fine(loops(records, pairs, window=window)),
+            ),
+            Picture(
+                f"{excited}_errors",
+                f"System-level NMSE, {excited} excitation.",
+                bar_table(scores, limit=5.0, limit_label="good fit"),
+            ),
         ]
     both = {excited: nmse(true[excited]["joint/force_1"], np.zeros(len(true[excited]))) for excited in SEEDS}
     text = (
-        "The chain of Fig 5.4 with the deck's joint between bodies 2 and 3, and the same chain with the reduced-order joints in its place, all under the same "
-        "loads: the excitation of the third training record and one of another seed. Our models are those of C2, identified on the rig of two bodies; the "
-        "chain is another structure, in which the joint meets other motions. Nothing but the joint differs, and errors feed back through the structure. "
-        f"(An answer of no force at all would score {both['training']:.0f} %.)"
+        "The chain of Fig 5.4 with the deck's joint between bodies 2 and 3, and the same chain with the "
+        "reduced-order joints in its place, all under the same loads: the excitation of the third "
+        "training record and one of another seed. Our models are those of C2, identified on the rig of "
+        "two bodies; the chain is another structure, in which the joint meets other motions. Nothing but "
+        "the joint differs, and errors feed back through the structure. The full tensor of order 3, "
+        "which fits the forces to some 10 %, runs away in closed loop as soon as a state leaves its "
+        "data; a polynomial of total degree 5 with half as many coefficients does not. (An answer of no "
+        f"force at all would score {both['training']:.0f} %.)"
     )
     return Item(text, _rows(outcomes), tuple(pictures))

@@ -39,7 +39,9 @@ def overlaid(record: Recording, models: dict[str, Model]) -> dict[str, Recording
 
 def worst(model: Model) -> float:
     """Largest NMSE over the unseen records and axes [%]."""
-    scores = [errors for record in joint_models.unseen().values() for errors in joint_models.errors(model, record)]
+    scores = [
+        errors for record in joint_models.unseen().values() for errors in joint_models.errors(model, record)
+    ]
     return max(score for score in scores if score is not None)
 
 
@@ -79,20 +81,37 @@ def _rows(models: joint_models.Models, single: list[tuple[str, float, float]]) -
             if polynomial is None or network is None:
                 continue
             ratios.append(polynomial / network)
-            rows.append(value_row(f"unseen, {name} loaded: NMSE of the {axis} force, polynomial", "%", None, polynomial))
-            rows.append(value_row(f"unseen, {name} loaded: NMSE of the {axis} force, network", "%", None, network))
+            rows.append(
+                value_row(
+                    f"unseen, {name} loaded: NMSE of the {axis} force, polynomial", "%", None, polynomial
+                )
+            )
+            rows.append(
+                value_row(f"unseen, {name} loaded: NMSE of the {axis} force, network", "%", None, network)
+            )
     seconds = models.network_seconds / models.polynomial_seconds
     rows += [
         value_row("least ratio of the errors, polynomial over network", "1", 16.0, min(ratios), low=16.0),
         value_row("ratio of the fitting times, network over polynomial", "1", 180.0, seconds, high=20.0),
         value_row("fitting time, polynomial", "s", None, models.polynomial_seconds),
         value_row("fitting time, network of 40", "s", None, models.network_seconds),
-        value_row("coefficients of a force, polynomial", "1", 256.0, float(models.polynomial.report.n_terms), low=256.0, high=256.0),
+        value_row(
+            "coefficients of a force, polynomial",
+            "1",
+            256.0,
+            float(models.polynomial.report.n_terms),
+            low=256.0,
+            high=256.0,
+        ),
     ]
     whole = worst(models.network)
-    rows.append(value_row("trained on all three records: worst NMSE on unseen records, network", "%", None, whole))
+    rows.append(
+        value_row("trained on all three records: worst NMSE on unseen records, network", "%", None, whole)
+    )
     for name, polynomial, network in single:
-        rows.append(value_row(f"trained on the {name} record only: the same, polynomial", "%", None, polynomial))
+        rows.append(
+            value_row(f"trained on the {name} record only: the same, polynomial", "%", None, polynomial)
+        )
         rows.append(
             value_row(
                 f"trained on the {name} record only: the same, network",
@@ -117,7 +136,9 @@ def run(progress: Progress) -> Item:
     test = joint_models.unseen()["both"]
     both: dict[str, Model] = {"polynomial, order 3": models.polynomial, "network, 40 units": models.network}
     window = (10.0, 20.0)
-    views = {f"{name} loaded": shown(record, joint_models.view(record).forces) for name, record in records.items()}
+    views = {
+        f"{name} loaded": shown(record, joint_models.view(record).forces) for name, record in records.items()
+    }
     compared = overlaid(test, both)
     scores = {
         label: {
@@ -129,17 +150,42 @@ def run(progress: Progress) -> Item:
         for label, model in both.items()
     }
     pictures = (
-        Picture("training", "The three training records: loads on x only, on θ only, on both (Fig 4.6).", fine(loops({"both": views["both loaded"], "x only": views["axial loaded"], "θ only": views["torsional loaded"]}, PAIRS, window=window))),
-        Picture("unseen", "Unseen record, both axes: forces on the true states (Figs 4.8, 4.10 a, b).", time_histories(compared, [name for _, name in PAIRS], window=(15.0, 18.0))),
-        Picture("unseen_loops", "The same as loops: the polynomial rounds the corners of the gap (Figs 4.8, 4.10 c, d).", fine(loops(compared, PAIRS, window=(15.0, 18.0)))),
+        Picture(
+            "training",
+            "The three training records: loads on x only, on θ only, on both (Fig 4.6).",
+            fine(
+                loops(
+                    {
+                        "both": views["both loaded"],
+                        "x only": views["axial loaded"],
+                        "θ only": views["torsional loaded"],
+                    },
+                    PAIRS,
+                    window=window,
+                )
+            ),
+        ),
+        Picture(
+            "unseen",
+            "Unseen record, both axes: forces on the true states (Figs 4.8, 4.10 a, b).",
+            time_histories(compared, [name for _, name in PAIRS], window=(15.0, 18.0)),
+        ),
+        Picture(
+            "unseen_loops",
+            "The same as loops: the polynomial rounds the corners of the gap (Figs 4.8, 4.10 c, d).",
+            fine(loops(compared, PAIRS, window=(15.0, 18.0))),
+        ),
         Picture("errors", "NMSE on unseen records.", bar_table(scores, limit=5.0, limit_label="good fit")),
     )
     text = (
-        "The joint of the deck in appendix B.1 (spring, damper, gap of 0.2 on both axes, coupling by damping beyond the gap) between two "
-        "bodies on mounts, under noise flat to 12 Hz of 1000 lbf and 1000 lbf in. Restoring forces are found from what is measured at body 1. "
-        "Polynomial: full tensor of order 3 in the four states, 256 coefficients a force. Network: 40 tanh units, Levenberg-Marquardt with "
-        "Bayesian regularisation, staged, four starts. Both are fitted to the same 90 000 samples and judged on records of other seeds."
-        "\n\nSection 4.5 says that one record alone would not do. It holds for each record with one axis loaded. It does not hold here "
-        "for the record with both axes loaded: excited as strongly as this, and without sensor noise, it visits the states of the other two."
+        "The joint of the deck in appendix B.1 (spring, damper, gap of 0.2 on both axes, coupling by "
+        "damping beyond the gap) between two bodies on mounts, under noise flat to 12 Hz of 1000 lbf and "
+        "1000 lbf in. Restoring forces are found from what is measured at body 1. Polynomial: full "
+        "tensor of order 3 in the four states, 256 coefficients a force. Network: 40 tanh units, "
+        "Levenberg-Marquardt with Bayesian regularisation, staged, four starts. Both are fitted to the "
+        "same 90 000 samples and judged on records of other seeds.\n\nSection 4.5 says that one record "
+        "alone would not do. It holds for each record with one axis loaded. It does not hold here for "
+        "the record with both axes loaded: excited as strongly as this, and without sensor noise, it "
+        "visits the states of the other two."
     )
     return Item(text, _rows(models, single), pictures)

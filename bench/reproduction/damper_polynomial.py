@@ -35,9 +35,13 @@ def rig_difference(experiment: PolynomialExperiment) -> float:
     time = np.arange(int(record.time[-1] * rate)) / rate
     motion = [spline(time, k) for k in range(3)]
     clean = damper_record(time, *motion, rng=np.random.default_rng(0), noise=0.0, mass=0.0)
-    rig = damper_rig(Element(VISCOUS_DAMPER, ("piston",), VISCOUS_DAMPER.theta(), name="damper"), timestep=1.0 / rate)
+    rig = damper_rig(
+        Element(VISCOUS_DAMPER, ("piston",), VISCOUS_DAMPER.theta(), name="damper"), timestep=1.0 / rate
+    )
     moved = simulate(rig, prescribe(rig, motion[0]), initial=starting(rig, motion[0]))
-    late = time > 1.0  # the branch that remembers starts at rest in both, the piston's drive needs a moment to settle
+    late = (
+        time > 1.0
+    )  # the branch that remembers starts at rest in both, the piston's drive needs a moment to settle
     return nmse(clean.force[late], moved["damper/force"][late])
 
 
@@ -48,7 +52,12 @@ def _courses(experiment: PolynomialExperiment) -> Figure:
         figure, grid = axes_grid(9.0, 6.0, nrows=4, ncols=3, sharex=True)
         for axes, name in zip(grid.flat, SHOWN, strict=True):
             i = names.index(name)
-            axes.plot(*thin(experiment.time, experiment.theta[:, i]), color="#1a1a1a", linewidth=1.0, label="on line")
+            axes.plot(
+                *thin(experiment.time, experiment.theta[:, i]),
+                color="#1a1a1a",
+                linewidth=1.0,
+                label="on line",
+            )
             axes.axhline(experiment.theta_batch[i], label="batch least squares", **REFERENCE)
             axes.set_title(f"{name} [{_unit(name)}]", fontsize=8)
             axes.margins(x=0.0)
@@ -115,28 +124,65 @@ def run(progress: Progress) -> Item:
     order = sorted(ours, key=lambda name: ours[name])
     printed = sorted(PRINTED_NMSE, key=lambda name: PRINTED_NMSE[name])
     rows += [
-        fact_row("ordering of the errors", " < ".join(order), order == printed, printed=" < ".join(printed), requirement="as printed"),
+        fact_row(
+            "ordering of the errors",
+            " < ".join(order),
+            order == printed,
+            printed=" < ".join(printed),
+            requirement="as printed",
+        ),
         value_row("batch least squares on the training record: NMSE", "%", None, experiment.batch),
         value_row("number of parameters", "1", 37.0, float(len(experiment.names)), low=37.0, high=37.0),
-        value_row("MuJoCo damper rig against the law along the same motion: NMSE of the force", "%", None, difference, high=0.01),
+        value_row(
+            "MuJoCo damper rig against the law along the same motion: NMSE of the force",
+            "%",
+            None,
+            difference,
+            high=0.01,
+        ),
     ]
     training = beside(experiment.training, {"identified": np.nan_to_num(experiment.predicted)})
     half = beside(experiment.validation_half, {"estimated": experiment.predicted_half})
     segment = beside(experiment.validation_segment, {"estimated": experiment.predicted_segment})
     window = (20.0, 28.0)
     pictures = (
-        Picture("identified", "Identification record, force on line (Fig 3.5 a).", fine(time_histories(training, ["force"], window=window))),
-        Picture("identified_loops", "The same over displacement and velocity (Fig 3.5 b, c).", fine(loops(training, LOOPS, window=window))),
-        Picture("courses", "Twelve of the 37 estimates and their batch values (Fig 3.6).", _courses(experiment)),
-        Picture("contributions", "What these terms contribute in the last ten seconds; large ones cancel (Fig 3.7).", _contributions(experiment)),
-        Picture("half", "Validation at half the amplitude (Fig 3.8).", fine(loops(half, LOOPS, window=window))),
-        Picture("segment", "Validation on another segment of the same test (Fig 3.9).", fine(loops(segment, LOOPS, window=window))),
-        Picture("errors", "The three errors beside the printed ones.", bar_table({"printed": PRINTED_NMSE, "ours": ours}, limit=5.0, limit_label="good fit")),
+        Picture(
+            "identified",
+            "Identification record, force on line (Fig 3.5 a).",
+            fine(time_histories(training, ["force"], window=window)),
+        ),
+        Picture(
+            "identified_loops",
+            "The same over displacement and velocity (Fig 3.5 b, c).",
+            fine(loops(training, LOOPS, window=window)),
+        ),
+        Picture(
+            "courses", "Twelve of the 37 estimates and their batch values (Fig 3.6).", _courses(experiment)
+        ),
+        Picture(
+            "contributions",
+            "What these terms contribute in the last ten seconds: few of them matter (Fig 3.7).",
+            _contributions(experiment),
+        ),
+        Picture(
+            "half", "Validation at half the amplitude (Fig 3.8).", fine(loops(half, LOOPS, window=window))
+        ),
+        Picture(
+            "segment",
+            "Validation on another segment of the same test (Fig 3.9).",
+            fine(loops(segment, LOOPS, window=window)),
+        ),
+        Picture(
+            "errors",
+            "The three errors beside the printed ones.",
+            bar_table({"printed": PRINTED_NMSE, "ours": ours}, limit=5.0, limit_label="good fit"),
+        ),
     )
     text = (
-        "The synthetic damper of B1 under random motion of ±0.0254 m, band 0.1 to 1 Hz. Orders 5 and 5 in displacement and velocity "
-        "and the mass make 37 parameters, identified on line; the estimates at the end predict a record of half the amplitude and "
-        "another segment of the same test. The error on line includes the first seconds, in which the estimates are still found; that "
-        "is why the unseen segment does better, as printed."
+        "The synthetic damper of B1 under random motion of ±0.0254 m, band 0.1 to 1 Hz. Orders 5 and 5 "
+        "in displacement and velocity and the mass make 37 parameters, identified on line; the estimates "
+        "at the end predict a record of half the amplitude and another segment of the same test. The "
+        "error on line includes the first seconds, in which the estimates are still found; that is why "
+        "the unseen segment does better, as printed."
     )
     return Item(text, tuple(rows), pictures)

@@ -67,7 +67,7 @@ def _finish(grid: NDArray, count: int) -> None:
     for axes in list(grid.flat)[count:]:
         axes.remove()
     for column in range(grid.shape[1]):
-        lowest = [axes for axes in list(grid.flat)[column : count : grid.shape[1]]][-1]
+        lowest = list(grid.flat)[column : count : grid.shape[1]][-1]
         lowest.set_xlabel("time [s]")
         lowest.tick_params(labelbottom=True)
 
@@ -91,7 +91,12 @@ def contribution_histories(
     time, z = history.time[shown], learnt(history)[shown]
     parts = history.contributions()[shown]
     total = parts.sum(axis=1)
-    rows = {"z": z, **{f"{name} φ{i + 1}": parts[:, i] for i, name in enumerate(names)}, "sum": total, "z − sum": z - total}
+    rows = {
+        "z": z,
+        **{f"{name} φ{i + 1}": parts[:, i] for i, name in enumerate(names)},
+        "sum": total,
+        "z − sum": z - total,
+    }
     size = 1.05 * max(float(np.max(np.abs(values))) for values in rows.values())
     count = math.ceil(len(rows) / 2)
     with style():

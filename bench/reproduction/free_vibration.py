@@ -8,6 +8,7 @@ velocity would exceed the printed acceleration while they act.
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 
@@ -38,7 +39,9 @@ def record() -> Recording:
     )
     push = ImpulseTrain(amplitude=PUSH * POUND_FORCE, width=0.12, interval=2.0, alternate=True)
     rig = sdof_rig(spring, mass=MASS * STIFFNESS)
-    return sdof_view(simulate(rig, Excitation({"shaker": push}, duration=WINDOW[1], sample_rate=1000.0)), MASS)
+    return sdof_view(
+        simulate(rig, Excitation({"shaker": push}, duration=WINDOW[1], sample_rate=1000.0)), MASS
+    )
 
 
 def frequency_and_damping(displacement: np.ndarray, time: np.ndarray) -> tuple[float, float]:
@@ -46,7 +49,7 @@ def frequency_and_damping(displacement: np.ndarray, time: np.ndarray) -> tuple[f
     rising = np.flatnonzero((displacement[:-1] < 0.0) & (displacement[1:] >= 0.0))
     share = -displacement[rising] / (displacement[rising + 1] - displacement[rising])
     crossings = time[rising] + share * (time[rising + 1] - time[rising])
-    peaks = np.array([displacement[a:b].max() for a, b in zip(rising[:-1], rising[1:], strict=True)])
+    peaks = np.array([displacement[a:b].max() for a, b in pairwise(rising)])
     decrement = math.log(peaks[0] / peaks[-1]) / (len(peaks) - 1)
     ratio = decrement / math.hypot(decrement, 2.0 * math.pi)
     return float((len(crossings) - 1) / (crossings[-1] - crossings[0])) / math.sqrt(1.0 - ratio**2), ratio
@@ -63,7 +66,14 @@ def run(progress: Progress) -> Item:
         range_row("displacement, 12 to 16 s", "in", 0.8, shown["displacement"]),
         range_row("velocity, 12 to 16 s", "in/s", 15.0, shown["velocity"]),
         range_row("acceleration, 12 to 16 s", "in/s^2", 280.0, shown["acceleration"]),
-        value_row("undamped frequency from the decay", "Hz", 3.0, frequency, low=0.95 * FREQUENCY, high=1.05 * FREQUENCY),
+        value_row(
+            "undamped frequency from the decay",
+            "Hz",
+            3.0,
+            frequency,
+            low=0.95 * FREQUENCY,
+            high=1.05 * FREQUENCY,
+        ),
         value_row(
             "damping ratio from the decay (the rig's is 0.05)",
             "1",
@@ -87,8 +97,9 @@ def run(progress: Progress) -> Item:
         ),
     )
     text = (
-        f"Carriage of {MASS:g} lbf s²/in on a linear spring and damper, {FREQUENCY:g} Hz, {100 * DAMPING_RATIO:g} % of critical, "
-        "pushed alternately both ways for 0.12 s every two seconds. The dissertation prints neither mass nor stiffness nor the "
-        "impulses: these are chosen so that the ranges come out."
+        f"Carriage of {MASS:g} lbf s²/in on a linear spring and damper, {FREQUENCY:g} Hz, "
+        f"{100 * DAMPING_RATIO:g} % of critical, pushed alternately both ways for 0.12 s every two "
+        "seconds. The dissertation prints neither mass nor stiffness nor the impulses: these are chosen "
+        "so that the ranges come out."
     )
     return Item(text, tuple(rows), pictures)

@@ -47,7 +47,9 @@ def record(seed: int = SEED) -> Recording:
     """The test."""
     softening = SLOPE / STRENGTH / INCH
     rig = sdof_rig(
-        Element.of("linear", "carriage", name="spring", stiffness=SPRING * STIFFNESS, damping=DAMPER * STIFFNESS),
+        Element.of(
+            "linear", "carriage", name="spring", stiffness=SPRING * STIFFNESS, damping=DAMPER * STIFFNESS
+        ),
         Element.of(
             "bouc_wen",
             "carriage",
@@ -112,7 +114,13 @@ def _rows(test: Recording, history: AdaptiveHistory, theta: np.ndarray) -> tuple
         rows.append(value_row(f"θ{i + 1} = {name}", unit, PRINTED[i], float(theta[i])))
     signs = [bool(np.sign(theta[i]) == np.sign(PRINTED[i])) for i in range(5)]
     rows.append(
-        fact_row("signs of θ1 to θ5", "".join("+" if value > 0 else "-" for value in theta[:5]), all(signs), printed="++---", requirement="as printed")
+        fact_row(
+            "signs of θ1 to θ5",
+            "".join("+" if value > 0 else "-" for value in theta[:5]),
+            all(signs),
+            printed="++---",
+            requirement="as printed",
+        )
     )
     late = history.time >= 55.0
     error = nmse(history.measured[late], history.predicted[late])
@@ -136,7 +144,9 @@ def run(progress: Progress) -> Item:
         Picture(
             "histories",
             "Excitation, displacement, velocity and acceleration (Fig 2.14 a to d).",
-            fine(time_histories(records, ["force", "displacement", "velocity", "acceleration"], window=window)),
+            fine(
+                time_histories(records, ["force", "displacement", "velocity", "acceleration"], window=window)
+            ),
         ),
         Picture("phase", "Phase plots (Fig 2.14 e, f).", fine(loops(records, phases, window=window))),
         Picture(
@@ -151,10 +161,12 @@ def run(progress: Progress) -> Item:
         ),
     )
     text = (
-        f"The virtual rig: {MASS:g} lbf s²/in on a spring of {SPRING:g} lbf/in, a damper of {DAMPER:g} lbf s/in and a Bouc-Wen element "
-        f"of slope {SLOPE:g} lbf/in and strength {STRENGTH:g} lbf, under noise to {BAND[1]:g} Hz. The seven parameters of the general "
-        "model (section 2.4.1) are then identified on line. The printed parameters are those of another law: they agree in sign and "
-        "stiffness; the terms that describe softening together (x³, |v| r, v |r|) trade against one another, so that their single "
-        f"values mean little. Simulated as a rig of its own, the printed model {fate}: it predicts the force of a measured motion, and is no model to simulate with."
+        f"The virtual rig: {MASS:g} lbf s²/in on a spring of {SPRING:g} lbf/in, a damper of {DAMPER:g} "
+        f"lbf s/in and a Bouc-Wen element of slope {SLOPE:g} lbf/in and strength {STRENGTH:g} lbf, under "
+        f"noise to {BAND[1]:g} Hz. The seven parameters of the general model (section 2.4.1) are then "
+        "identified on line. The printed parameters are those of another law: they agree in sign and "
+        "stiffness; the terms that describe softening together (x³, |v| r, v |r|) trade against one "
+        "another, so that their single values mean little. Simulated as a rig of its own, the printed "
+        f"model {fate}: it predicts the force of a measured motion, and is no model to simulate with."
     )
     return Item(text, _rows(test, history, estimator.theta), pictures)

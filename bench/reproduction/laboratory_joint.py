@@ -76,12 +76,19 @@ def drive(loaded: tuple[bool, bool]) -> Excitation:
         BandLimitedNoise(low=BAND[0], cutoff=BAND[1], peak=peak) if on else Constant(0.0)
         for peak, on in zip(peaks, loaded, strict=True)
     ]
-    return Excitation(dict(zip(("force", "torque"), signals, strict=True)), duration=DURATION, sample_rate=RATE)
+    return Excitation(
+        dict(zip(("force", "torque"), signals, strict=True)), duration=DURATION, sample_rate=RATE
+    )
 
 
 def measured(record: Recording, rng: np.random.Generator) -> Recording:
     """A record of the rig as its sensors give it, filtered alike in all channels, with velocities from the encoders."""
-    full_scale = {"load_cell_force": 400.0, "load_cell_torque": 10.0, "acceleration_1_x": 200.0, "angular_acceleration_1_x": 2000.0}
+    full_scale = {
+        "load_cell_force": 400.0,
+        "load_cell_torque": 10.0,
+        "acceleration_1_x": 200.0,
+        "angular_acceleration_1_x": 2000.0,
+    }
     # Noise of a ten-thousandth of the range and 16 bits: a good amplifier and data-acquisition board.
     analogue = {
         name: Chain(FILTER, Noise(1e-4 * scale), Quantisation.from_bits(16, full_scale=scale))
@@ -97,7 +104,8 @@ def measured(record: Recording, rng: np.random.Generator) -> Recording:
 def tests(seeds: dict[str, int]) -> dict[str, Recording]:
     """True records by loading."""
     return {
-        name: simulate(rig(), drive(loaded), rng=np.random.default_rng(seeds[name])) for name, loaded in LOADINGS.items()
+        name: simulate(rig(), drive(loaded), rng=np.random.default_rng(seeds[name]))
+        for name, loaded in LOADINGS.items()
     }
 
 
@@ -157,7 +165,10 @@ def run(progress: Progress) -> Item:
     rng = np.random.default_rng(80)
     unseen = {name: measured(record, rng) for name, record in true.items()}
     views = {name: shown(record, view(record).forces) for name, record in records.items()}
-    pooled = {name: np.concatenate([record[name] for record in views.values()]) for name in ("axial", "torsional", "axial force", "torsional force")}
+    pooled = {
+        name: np.concatenate([record[name] for record in views.values()])
+        for name in ("axial", "torsional", "axial force", "torsional force")
+    }
     rows: list[Row] = [
         range_row("relative displacement, three records", "in", 0.2, pooled["axial"]),
         range_row("relative rotation", "rad", 0.2, pooled["torsional"]),
@@ -171,10 +182,18 @@ def run(progress: Progress) -> Item:
         for i, axis in enumerate(AXES):
             score = nmse(both.forces[:, i], predicted[:, i])
             limit = 5.0 if label.startswith("network") else math.inf
-            rows.append(value_row(f"unseen, both loaded, {axis} force: NMSE, {label}", "%", None, score, high=limit))
+            rows.append(
+                value_row(f"unseen, both loaded, {axis} force: NMSE, {label}", "%", None, score, high=limit)
+            )
         swapped[label] = in_place(model, true)
         limit = 5.0 if label.startswith("network") else math.inf
-        row = value_row(f"in the joint's place, three unseen loadings: worst NMSE of a force, {label}", "%", None, swapped[label].worst, high=limit)
+        row = value_row(
+            f"in the joint's place, three unseen loadings: worst NMSE of a force, {label}",
+            "%",
+            None,
+            swapped[label].worst,
+            high=limit,
+        )
         rows.append(row._replace(ours=swapped[label].note or row.ours))
     progress("drawing", 0.9)
     window = (10.0, 20.0)
@@ -186,14 +205,25 @@ def run(progress: Progress) -> Item:
         label: _joint(found.both) for label, found in swapped.items() if found.both is not None
     }
     pictures = (
-        Picture("training", "Measured training records (Fig 4.14).", fine(loops(named, PAIRS, window=window))),
-        Picture("unseen", "Unseen record, both axes: forces on the measured states (Figs 4.16, 4.18).", fine(loops(compared, PAIRS, window=(12.0, 15.0)))),
-        Picture("in_place", "The rig with the laboratory joint and with the identified ones in its place (Fig 5.12).", fine(loops(exchanged, PAIRS, window=(12.0, 15.0)))),
+        Picture(
+            "training", "Measured training records (Fig 4.14).", fine(loops(named, PAIRS, window=window))
+        ),
+        Picture(
+            "unseen",
+            "Unseen record, both axes: forces on the measured states (Figs 4.16, 4.18).",
+            fine(loops(compared, PAIRS, window=(12.0, 15.0))),
+        ),
+        Picture(
+            "in_place",
+            "The rig with the laboratory joint and with the identified ones in its place (Fig 5.12).",
+            fine(loops(exchanged, PAIRS, window=(12.0, 15.0))),
+        ),
     )
     text = (
-        "The laboratory rig with a joint chosen to give the printed ranges: 60 lbf/in, beyond 0.08 in 420 lbf/in more, and alike in torsion, with "
-        "coupling by damping. Load cells, accelerometers and encoders with their filters, noise, bits and counts stand between the rig "
-        "and the identification, which sees nothing else. Models are judged on measured forces of unseen tests, and in the joint's place "
-        "against the true joint, for loads on x only, on θ only and on both."
+        "The laboratory rig with a joint chosen to give the printed ranges: 60 lbf/in, beyond 0.08 in "
+        "420 lbf/in more, and alike in torsion, with coupling by damping. Load cells, accelerometers and "
+        "encoders with their filters, noise, bits and counts stand between the rig and the "
+        "identification, which sees nothing else. Models are judged on measured forces of unseen tests, "
+        "and in the joint's place against the true joint, for loads on x only, on θ only and on both."
     )
     return Item(text, tuple(rows), pictures)

@@ -1,7 +1,7 @@
 """D1: the linear chain of four bodies with eight degrees of freedom (Tasbihgoo 2006, Fig 5.3, eqs 5.47 to 5.53).
 
-The matrices are assembled here from the printed equations in inches and pounds-force and solved exactly for a load held over each step,
-by the matrix exponential: nothing in that solution comes from MuJoCo.
+The matrices are assembled here from the printed equations in inches and pounds-force and solved exactly for a load held
+over each step, by the matrix exponential: nothing in that solution comes from MuJoCo.
 """
 
 from __future__ import annotations
@@ -30,9 +30,13 @@ SEED = 51
 def rig(timestep: float = 1e-3) -> Rig:
     """The chain with a linear joint between bodies 2 and 3."""
     k, c = SPRINGS[2], DAMPERS[2]
-    axial = Element.of("linear", "axial_23", name="axial_joint", stiffness=k * STIFFNESS, damping=c * STIFFNESS)
+    axial = Element.of(
+        "linear", "axial_23", name="axial_joint", stiffness=k * STIFFNESS, damping=c * STIFFNESS
+    )
     torque = POUND_FORCE * INCH
-    torsional = Element.of("linear", "torsional_23", name="torsional_joint", stiffness=k * torque, damping=c * torque)
+    torsional = Element.of(
+        "linear", "torsional_23", name="torsional_joint", stiffness=k * torque, damping=c * torque
+    )
     return chain_rig(axial, torsional, timestep=timestep)
 
 
@@ -48,7 +52,7 @@ def matrix(values: tuple[float, ...], *, as_printed: bool = False) -> NDArray[np
         one[i, i] = values[i] + values[i + 1]
         if i < 3:
             one[i, i + 1] = one[i + 1, i] = -values[i + 1]
-    both = np.kron(one, np.eye(2))
+    both = np.kron(one, np.eye(2)).astype(np.float64)
     if as_printed:
         both[2, 2] = values[0] + values[1]
     return both
@@ -77,7 +81,9 @@ def _channels() -> tuple[str, ...]:
 def _deviation(record: Recording, solution: NDArray[np.float64]) -> float:
     """Largest difference over the largest displacement, of the worst coordinate."""
     pairs = zip(_channels(), solution.T, strict=True)
-    return max(float(np.max(np.abs(record[name] - column)) / np.max(np.abs(column))) for name, column in pairs)
+    return max(
+        float(np.max(np.abs(record[name] - column)) / np.max(np.abs(column))) for name, column in pairs
+    )
 
 
 def run(progress: Progress) -> Item:
@@ -98,7 +104,13 @@ def run(progress: Progress) -> Item:
     frequencies = np.sqrt(eigh(matrix(SPRINGS), eigvals_only=True)[::2]) / (2.0 * np.pi)
     order = float(np.log2(deviations[1] / deviations[2]))
     rows: list[Row] = [
-        value_row("largest difference from the matrix exponential over peak, 1 ms", "1", None, deviations[0], high=1e-3),
+        value_row(
+            "largest difference from the matrix exponential over peak, 1 ms",
+            "1",
+            None,
+            deviations[0],
+            high=1e-3,
+        ),
         value_row("the same at 0.5 ms", "1", None, deviations[1], high=1e-4),
         value_row("the same at 0.25 ms", "1", None, deviations[2], high=1e-5),
         value_row("order of convergence (Runge-Kutta: 4)", "1", None, order, low=3.5, high=4.5),
@@ -125,9 +137,10 @@ def run(progress: Progress) -> Item:
         ),
     )
     text = (
-        "Four unit masses and inertias, mounts of 1000 lbf/in and 10 lbf s/in at both ends and a linear joint of 200 lbf/in and 6.32 lbf s/in in "
-        "the middle, as in the deck of appendix B.1 and alike in torsion, under noise flat to 12 Hz. The bars between bodies 1-2 and "
-        "3-4 are 1e5 lbf/in here (71 Hz) instead of the deck's practically rigid ones. Equation 5.52 repeats k1 + k2 on the second "
-        "body, where its own figure has k2 + k3; the matrices are assembled from the figure."
+        "Four unit masses and inertias, mounts of 1000 lbf/in and 10 lbf s/in at both ends and a linear "
+        "joint of 200 lbf/in and 6.32 lbf s/in in the middle, as in the deck of appendix B.1 and alike "
+        "in torsion, under noise flat to 12 Hz. The bars between bodies 1-2 and 3-4 are 1e5 lbf/in here "
+        "(71 Hz) instead of the deck's practically rigid ones. Equation 5.52 repeats k1 + k2 on the "
+        "second body, where its own figure has k2 + k3; the matrices are assembled from the figure."
     )
     return Item(text, tuple(rows), pictures)

@@ -1,4 +1,8 @@
-"""D4: the published network as Nastran bulk data, and the expanded equations it stands for (Tasbihgoo 2006, eqs 5.16 to 5.46, appendix B.3)."""
+"""D4: the published network as Nastran bulk data, and the expanded equations that it stands for.
+
+References:
+    Tasbihgoo 2006, eqs 5.16 to 5.46 and appendix B.3.
+"""
 
 from __future__ import annotations
 
@@ -22,6 +26,7 @@ from bench.nastran import (
     parse_deck,
     read_network,
 )
+from bench.nastran.bulk import Format
 from bench.recording import Recording
 from bench.reproduction.chain_joint import AXES
 from bench.reproduction.estimates import fine
@@ -68,16 +73,28 @@ def smooth_drive(time: np.ndarray) -> np.ndarray:
 def _deck_rows() -> tuple[list[Row], str]:
     """Write the network as cards in each format, read it back, and count the cards."""
     weights = network_weights(element())
-    rows, text = [], ""
+    rows: list[Row] = []
     # Digits that the fields of each format hold: large fields nine after the point, small fields three.
-    for form, tolerance in (("large", 1e-8), ("free", 1e-8), ("small", 5e-3)):
+    formats: tuple[tuple[Format, float], ...] = (("large", 1e-8), ("free", 1e-8), ("small", 5e-3))
+    for form, tolerance in formats:
         text = network_text(element(), form=form, components=COMPONENTS, bodies=(3, 4), units=INCH_POUND)
         back = read_network(parse_deck(text), units=INCH_POUND).weights
         worst = max(
-            float(np.max(np.abs(ours - true)) / np.max(np.abs(true))) for ours, true in zip(back, weights, strict=True)
+            float(np.max(np.abs(ours - true)) / np.max(np.abs(true)))
+            for ours, true in zip(back, weights, strict=True)
         )
-        rows.append(value_row(f"deck written and read back, {form} fields: largest difference of a weight over the largest", "1", None, worst, high=tolerance))
-    deck = parse_deck(network_text(element(), form="large", components=COMPONENTS, bodies=(3, 4), units=INCH_POUND))
+        rows.append(
+            value_row(
+                f"deck written and read back, {form} fields: largest difference of a weight over the largest",
+                "1",
+                None,
+                worst,
+                high=tolerance,
+            )
+        )
+    deck = parse_deck(
+        network_text(element(), form="large", components=COMPONENTS, bodies=(3, 4), units=INCH_POUND)
+    )
     counts = Counter(type(card).__name__ for card in deck.cards)
     return rows, ", ".join(f"{count} {name}" for name, count in counts.most_common())
 
@@ -103,31 +120,69 @@ def run(progress: Progress) -> Item:
     systems = {form: expanded_system(chain_rig(element()), form=form) for form in ("deck", "printed")}
     found = {form: difference(system, record, commands) for form, system in systems.items()}
     progress("Nastran's evaluation over the step", 0.6)
-    study = lag_study(systems["deck"], smooth_drive, duration=1.0, steps=[8e-5, 1.6e-4, 3.2e-4], start="consistent")
+    study = lag_study(
+        systems["deck"], smooth_drive, duration=1.0, steps=[8e-5, 1.6e-4, 3.2e-4], start="consistent"
+    )
     rows = [
-        value_row("equations of the expanded system", "1", 72.0, float(systems["deck"].order), low=72.0, high=72.0),
-        value_row("expanded system (deck's form) against the direct swap: largest difference over peak", "1", None, found["deck"][0], high=1e-8),
-        value_row("expanded system (printed form, eqs 5.41, 5.63) against the direct swap", "1", None, found["printed"][0], high=1e-8),
+        value_row(
+            "equations of the expanded system", "1", 72.0, float(systems["deck"].order), low=72.0, high=72.0
+        ),
+        value_row(
+            "expanded system (deck's form) against the direct swap: largest difference over peak",
+            "1",
+            None,
+            found["deck"][0],
+            high=1e-8,
+        ),
+        value_row(
+            "expanded system (printed form, eqs 5.41, 5.63) against the direct swap",
+            "1",
+            None,
+            found["printed"][0],
+            high=1e-8,
+        ),
         *rows,
-        fact_row("cards of the deck", cards, all(name in cards for name in ("DmigColumn", "Nolin1", "Sload", "ScalarPoints", "Tabled1")), printed="DMIG, SPOINT, SLOAD, NOLIN1, TABLED1", requirement="all five kinds"),
-        value_row("Nastran's evaluation (NOLIN1 one step late): error of x at 0.08 ms", "%", None, 100.0 * float(study.errors[0, 0])),
-        value_row("order of that error in the step", "1", None, float(np.mean(study.orders)), low=0.9, high=1.1),
+        fact_row(
+            "cards of the deck",
+            cards,
+            all(name in cards for name in ("DmigColumn", "Nolin1", "Sload", "ScalarPoints", "Tabled1")),
+            printed="DMIG, SPOINT, SLOAD, NOLIN1, TABLED1",
+            requirement="all five kinds",
+        ),
+        value_row(
+            "Nastran's evaluation (NOLIN1 one step late): error of x at 0.08 ms",
+            "%",
+            None,
+            100.0 * float(study.errors[0, 0]),
+        ),
+        value_row(
+            "order of that error in the step", "1", None, float(np.mean(study.orders)), low=0.9, high=1.1
+        ),
     ]
-    names = {f"axial_{word}": 0 for word in ("23",)}
-    names["torsional_23"] = 1
+    names = {"axial_23": 0, "torsional_23": 1}
     expanded = record.with_channels({name: found["deck"][1][:, i] for name, i in names.items()})
     pictures = (
         Picture(
             "response",
             "Relative motion of the joint: MuJoCo with the network as an element, and the 72 equations of the deck.",
-            fine(time_histories({"direct swap": record, "72 equations": expanded}, list(names), window=(4.0, DURATION))),
+            fine(
+                time_histories(
+                    {"direct swap": record, "72 equations": expanded}, list(names), window=(4.0, DURATION)
+                )
+            ),
         ),
-        Picture("step", "What the deck's explicit loads cost: the error grows in proportion to the step.", _lag_figure(study)),
+        Picture(
+            "step",
+            "What the deck's explicit loads cost: the error grows in proportion to the step.",
+            _lag_figure(study),
+        ),
     )
     text = (
-        "The published network of 30 units between bodies 2 and 3 of the chain: as an element in MuJoCo, as the 8 + 2 + 30 + 30 + 2 equations of "
-        "section 5.2 assembled from the rig's matrices, and as bulk data. All three are the same system; the first two are integrated by the "
-        "same Runge-Kutta steps and differ by rounding. Nastran evaluates NOLIN1 loads from past steps, so that its restoring force lags: "
-        "this is integrated here from the published algorithm, and explains the deck's step of 0.01 ms."
+        "The published network of 30 units between bodies 2 and 3 of the chain: as an element in MuJoCo, "
+        "as the 8 + 2 + 30 + 30 + 2 equations of section 5.2 assembled from the rig's matrices, and as "
+        "bulk data. All three are the same system; the first two are integrated by the same Runge-Kutta "
+        "steps and differ by rounding. Nastran evaluates NOLIN1 loads from past steps, so that its "
+        "restoring force lags: this is integrated here from the published algorithm, and explains the "
+        "deck's step of 0.01 ms."
     )
     return Item(text, tuple(rows), pictures)

@@ -36,9 +36,16 @@ _ENTRIES = (
     Entry("A1", "Free vibration after impulses (Fig 2.6)", "free_vibration"),
     Entry("A2", "Gap under wide-band random excitation (Figs 2.7, 2.8)", "gap"),
     Entry("A3", "Sliding friction, constant and modulated (Figs 2.9, 2.10)", "sliding_friction"),
-    Entry("A4", "Simulated Bouc-Wen hysteresis identified on line (Figs 2.11-2.13)", "simulated_hysteresis", 6.0),
+    Entry(
+        "A4", "Simulated Bouc-Wen hysteresis identified on line (Figs 2.11-2.13)", "simulated_hysteresis", 6.0
+    ),
     Entry("A5", "Hysteretic rig identified on line (Figs 2.14-2.17)", "hysteretic_rig", 6.0),
-    Entry("B1", "Damper design model over 202 harmonic tests (Figs 3.3, 3.4, 3.10, Tables 3.1, 3.2)", "damper_design", 20.0),
+    Entry(
+        "B1",
+        "Damper design model over 202 harmonic tests (Figs 3.3, 3.4, 3.10, Tables 3.1, 3.2)",
+        "damper_design",
+        20.0,
+    ),
     Entry("B2", "Damper polynomial model under random excitation (Figs 3.5-3.9)", "damper_polynomial", 10.0),
     Entry("B3", "Order of the damper polynomial model (Figs 3.11, 3.12)", "damper_order", 30.0),
     Entry("C2", "Coupled joint: polynomial and network (Figs 4.6-4.10, section 4.5)", "coupled_joint", 120.0),

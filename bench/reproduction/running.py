@@ -143,5 +143,7 @@ def _made(folder: Path, entry: Entry, progress: Progress) -> Result:
         fingerprint(),
     )
     # Last, so that an item is known again only when all of it is there.
-    write_text(_file(folder, entry), json.dumps(result.to_dict(), indent=1, ensure_ascii=False, allow_nan=False))
+    write_text(
+        _file(folder, entry), json.dumps(result.to_dict(), indent=1, ensure_ascii=False, allow_nan=False)
+    )
     return result

@@ -94,7 +94,9 @@ def estimate(
     estimator: AdaptiveLeastSquares, time: NDArray, force: NDArray, velocity: NDArray, acceleration: NDArray
 ) -> AdaptiveHistory:
     """Run the estimator over a record, keeping the regressors."""
-    return estimator.run(time, force=force, velocity=velocity, acceleration=acceleration, keep_regressors=True)
+    return estimator.run(
+        time, force=force, velocity=velocity, acceleration=acceleration, keep_regressors=True
+    )
 
 
 def settled_after(history: AdaptiveHistory, theta: NDArray[np.float64], share: float = 0.05) -> float:
@@ -110,7 +112,8 @@ def _noisy_error(test: Recording, seeds: Sequence[int]) -> float:
     for seed in seeds:
         rng = np.random.default_rng(seed)
         force, a = (
-            test[name] + 0.02 * test[name].std() * rng.standard_normal(len(test)) for name in ("force", "acceleration")
+            test[name] + 0.02 * test[name].std() * rng.standard_normal(len(test))
+            for name in ("force", "acceleration")
         )
         model = noise_estimator()
         estimate(model, test.time, force, test["velocity"], a)
@@ -129,24 +132,55 @@ def _tracking(force: NDArray[np.float64]) -> tuple[AdaptiveHistory, float]:
     return history, (settled_after(history, CHANGED) - change) / PERIOD
 
 
-def _rows(test: Recording, history: AdaptiveHistory, noisy: float, tracked: float, apart: float) -> tuple[Row, ...]:
+def _rows(
+    test: Recording, history: AdaptiveHistory, noisy: float, tracked: float, apart: float
+) -> tuple[Row, ...]:
     late = history.time >= 30.0
     rows = [
         range_row("excitation", "lbf", 10.0, test["force"])._replace(requirement="", holds=None),
         range_row("displacement, first 50 s", "in", 1.5, test.slice_time(0.0, 50.0)["displacement"])._replace(
             requirement="", holds=None
         ),
-        range_row("restoring force", "lbf", 2.5, test["restoring_force"])._replace(requirement="", holds=None),
+        range_row("restoring force", "lbf", 2.5, test["restoring_force"])._replace(
+            requirement="", holds=None
+        ),
     ]
     for i, name in enumerate(NAMES):
-        row = value_row(f"{name} at 120 s (true {TRUE[i]:g})", UNITS[i], PRINTED[i], float(history.theta[-1, i]), low=TRUE[i] - 0.005, high=TRUE[i] + 0.005)
+        row = value_row(
+            f"{name} at 120 s (true {TRUE[i]:g})",
+            UNITS[i],
+            PRINTED[i],
+            float(history.theta[-1, i]),
+            low=TRUE[i] - 0.005,
+            high=TRUE[i] + 0.005,
+        )
         rows.append(row._replace(deviation=None, ours=f"{history.theta[-1, i]:.4f}"))
     rows += [
-        value_row("largest error of an estimate after 30 s", "", None, float(np.abs(history.theta[late] - TRUE).max()), high=0.005),
-        value_row("all estimates within 5 % after", "periods", 1.0, settled_after(history, TRUE) / PERIOD, high=1.5),
-        value_row("2 % noise on force and acceleration, ten seeds: largest error of θ1, θ4, θ5", "%", None, noisy, high=3.0),
+        value_row(
+            "largest error of an estimate after 30 s",
+            "",
+            None,
+            float(np.abs(history.theta[late] - TRUE).max()),
+            high=0.005,
+        ),
+        value_row(
+            "all estimates within 5 % after", "periods", 1.0, settled_after(history, TRUE) / PERIOD, high=1.5
+        ),
+        value_row(
+            "2 % noise on force and acceleration, ten seeds: largest error of θ1, θ4, θ5",
+            "%",
+            None,
+            noisy,
+            high=3.0,
+        ),
         value_row("parameters changed at 30 s: within 5 % after", "periods", None, tracked, high=2.0),
-        value_row("rig against an independent integration: largest difference over peak displacement", "1", None, apart, high=1e-6),
+        value_row(
+            "rig against an independent integration: largest difference over peak displacement",
+            "1",
+            None,
+            apart,
+            high=1e-6,
+        ),
     ]
     return tuple(rows)
 
@@ -191,13 +225,16 @@ def run(progress: Progress) -> Item:
         Picture(
             "change",
             "Estimates through a change of the parameters at 30 s; the dashed lines are the new values.",
-            estimate_histories(changed, NAMES, reference=tuple(CHANGED), units=UNITS, label="after the change"),
+            estimate_histories(
+                changed, NAMES, reference=tuple(CHANGED), units=UNITS, label="after the change"
+            ),
         ),
     )
     text = (
-        "Mass 1 lbf s²/in, A = 5, β = 0.1, γ = -1 in the dissertation's sign, n = 2 (2.17), simulated in MuJoCo at 1 kHz under noise "
-        f"flat to {CUTOFF:g} Hz with a peak of {PEAK:g} lbf. The band of the printed excitation is not given, and the displacement "
-        "wanders with it: the rig has no elastic spring. The restoring force cannot exceed its strength of √(5/1.1) = 2.13 lbf. "
-        f"One system period is {PERIOD:.2f} s."
+        "Mass 1 lbf s²/in, A = 5, β = 0.1, γ = -1 in the dissertation's sign, n = 2 (2.17), simulated in "
+        f"MuJoCo at 5 kHz under noise flat to {CUTOFF:g} Hz with a peak of {PEAK:g} lbf. The band of the "
+        "printed excitation is not given, and the displacement wanders with it: the rig has no elastic "
+        "spring, and the printed ranges of this item are axes of figures. The restoring force cannot "
+        f"exceed its strength of √(5/1.1) = 2.13 lbf. One system period is {PERIOD:.2f} s."
     )
     return Item(text, _rows(test, history, noisy, tracked, apart), pictures)

@@ -36,7 +36,9 @@ DURATION = 30.0
 def record(normal_force: Signal) -> Recording:
     """The test under a course of the normal force [N]."""
     rig = sdof_rig(
-        Element.of("linear", "carriage", name="spring", stiffness=SPRING * STIFFNESS, damping=0.02 * STIFFNESS),
+        Element.of(
+            "linear", "carriage", name="spring", stiffness=SPRING * STIFFNESS, damping=0.02 * STIFFNESS
+        ),
         Element.of(
             "controlled_friction",
             "carriage",
@@ -54,7 +56,9 @@ def record(normal_force: Signal) -> Recording:
     test = imperial(simulate(rig, drive)).renamed({"acceleration_x": "acceleration"})
     gauge = test["load_cell"] - test["back_emf/force"]
     arrays = {"force_gauge": gauge, "restoring_force": gauge - MASS * test["acceleration"]}
-    return test.with_channels(arrays, units=dict.fromkeys(arrays, "lbf"), quantities=dict.fromkeys(arrays, "force"))
+    return test.with_channels(
+        arrays, units=dict.fromkeys(arrays, "lbf"), quantities=dict.fromkeys(arrays, "force")
+    )
 
 
 def modulated() -> Signal:
@@ -128,14 +132,15 @@ def run(progress: Progress) -> Item:
         ),
         Picture(
             "loop_modulated",
-            "The same while the grip falls from its largest to its smallest value, 7.5 to 15 s: from short loops to long ones (Fig 2.10 b).",
+            "The same while the grip falls from its largest to its smallest value: from short loops to long ones (Fig 2.10 b).",
             fine(loops({"rig": test}, [("displacement", "restoring_force")], window=(7.5, 15.0))),
         ),
     )
     text = (
-        f"Carriage of {MASS:g} lbf s²/in, spring of {SPRING:g} lbf/in, friction coefficient {FRICTION_COEFFICIENT:g}, normal force "
-        f"between {GRIP[0]:g} and {GRIP[1]:g} lbf, coil force of {COIL:g} lbf at {FREQUENCY:g} Hz, chosen to give the printed ranges. "
-        "An ideal source of force would make the gauge read the same throughout; the printed gauge reads more when the grip is "
+        f"Carriage of {MASS:g} lbf s²/in, spring of {SPRING:g} lbf/in, friction coefficient "
+        f"{FRICTION_COEFFICIENT:g}, normal force between {GRIP[0]:g} and {GRIP[1]:g} lbf, coil force of "
+        f"{COIL:g} lbf at {FREQUENCY:g} Hz, chosen to give the printed ranges. An ideal source of force "
+        "would make the gauge read the same throughout; the printed gauge reads more when the grip is "
         "strong, which the back-EMF of a shaker on a voltage amplifier explains."
     )
     return Item(text, rows, pictures)

@@ -25,7 +25,9 @@ def _sentence(results: Sequence[Result]) -> str:
 
 
 def _footer() -> str:
-    return "Made by jointbench with " + ", ".join(f"{name} {version}" for name, version in software_versions())
+    return "Made by jointbench with " + ", ".join(
+        f"{name} {version}" for name, version in software_versions()
+    )
 
 
 def to_page(results: Sequence[Result], folder: Path) -> Page:
@@ -37,7 +39,9 @@ def to_page(results: Sequence[Result], folder: Path) -> Page:
             section.text(paragraph)
         for name, caption in result.pictures:
             section.picture((folder / name).read_bytes(), caption)
-        section.table(f"Printed and reproduced; {result.seconds:.1f} s", HEADER, [row.cells() for row in result.rows])
+        section.table(
+            f"Printed and reproduced; {result.seconds:.1f} s", HEADER, [row.cells() for row in result.rows]
+        )
     return page
 
 
@@ -47,6 +51,8 @@ def to_markdown(results: Sequence[Result]) -> str:
     for result in results:
         lines += [f"## {result.identifier}: {result.title}", ""]
         lines += ["| " + " | ".join(HEADER) + " |", "|" + "---|" * len(HEADER)]
-        lines += ["| " + " | ".join(cell.replace("|", "\\|") for cell in row.cells()) + " |" for row in result.rows]
+        lines += [
+            "| " + " | ".join(cell.replace("|", "\\|") for cell in row.cells()) + " |" for row in result.rows
+        ]
         lines += [""]
     return "\n".join([*lines, _footer(), ""])

@@ -309,7 +309,8 @@ def main(path: str, *, full: bool) -> None:
     file = Path(path)
     before, _, rest = file.read_text(encoding="utf-8").partition("<!-- measured -->")
     _, _, after = rest.partition("<!-- end of measured -->")
-    stamp = f"Measured on {time.strftime('%Y-%m-%d')}, {cores()} cores, by the command above."
+    load = f"load average {os.getloadavg()[0]:.1f} before"
+    stamp = f"Measured on {time.strftime('%Y-%m-%d')}, {cores()} cores, {load}, by the command above."
     block = f"{before}<!-- measured -->\n{stamp}\n\n{measured(full=full)}\n<!-- end of measured -->{after}"
     file.write_text(block, encoding="utf-8")
 

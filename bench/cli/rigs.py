@@ -1,43 +1,16 @@
-"""The command `jointbench`: parse, call, print, save."""
+"""Commands on rigs: the demo, the catalogue of laws, simulation, and the viewer."""
 
 from __future__ import annotations
 
-import contextlib
-import json
-import sys
-import warnings
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
 import tyro
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from bench.errors import BenchError
-
-Command = Callable[[], None]
-
-
-@contextlib.contextmanager
-def progress_bar(quiet: bool) -> Iterator[Callable[[str, float], None]]:
-    """A progress bar on standard error; call what is given with a label and the share done."""
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.percentage:>3.0f} %"),
-        TimeElapsedColumn(),
-    )
-    with Progress(*columns, console=Console(stderr=True), disable=quiet) as bar:
-        task = bar.add_task("starting", total=1.0)
-        yield lambda label, share: bar.update(task, description=label, completed=share)
-
-
-def emit(document: Any) -> None:
-    """Print JSON to standard output."""
-    print(json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False))
+from bench.cli.console import emit, progress_bar
 
 
 @dataclass
@@ -190,38 +163,3 @@ def _configured(path: Path, *, need_excitation: bool = True) -> tuple[Any, Any]:
             f"{path} has no [excitation]; say what drives the rig (see docs/configuration.md)"
         )
     return rig, Excitation.from_dict(document["excitation"]) if "excitation" in document else None
-
-
-COMMANDS: dict[str, type] = {"demo": Demo, "laws": Laws, "simulate": Simulate, "view": View}
-
-
-def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
-    Console(stderr=True, soft_wrap=True).print(
-        f"note: {message}", style="yellow", markup=False, highlight=False
-    )
-
-
-def main(argv: list[str] | None = None) -> int:
-    """Run the command line; returns the exit status: 0 done, 2 refused with a message, 130 stopped by hand."""
-    warnings.showwarning = _show_warning
-    try:
-        command: Command = tyro.extras.subcommand_cli_from_dict(
-            COMMANDS,
-            prog="jointbench",
-            description="A MuJoCo virtual test bench for nonlinear joints.",
-            args=argv,
-        )
-        command()
-    except BenchError as error:
-        Console(stderr=True, soft_wrap=True).print(
-            f"jointbench: {error}", style="red", markup=False, highlight=False
-        )
-        return 2
-    except KeyboardInterrupt:
-        print("jointbench: stopped", file=sys.stderr)
-        return 130
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -1,0 +1,59 @@
+"""The command `jointbench`: parse, call, print, save."""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+import tyro
+from rich.console import Console
+
+from bench.cli.diagnosis import Blind, Diagnose
+from bench.cli.rigs import Demo, Laws, Simulate, View
+from bench.cli.studies import Campaign, Reproduce
+from bench.errors import BenchError
+
+COMMANDS: dict[str, type] = {
+    "demo": Demo,
+    "laws": Laws,
+    "simulate": Simulate,
+    "view": View,
+    "diagnose": Diagnose,
+    "blind": Blind,
+    "reproduce": Reproduce,
+    "campaign": Campaign,
+}
+
+
+def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
+    Console(stderr=True, soft_wrap=True).print(
+        f"note: {message}", style="yellow", markup=False, highlight=False
+    )
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run the command line; returns the exit status: 0 done, 2 refused with a message, 130 stopped by hand."""
+    warnings.showwarning = _show_warning
+    try:
+        command: Callable[[], None] = tyro.extras.subcommand_cli_from_dict(
+            COMMANDS,
+            prog="jointbench",
+            description="A MuJoCo virtual test bench for nonlinear joints.",
+            args=argv,
+        )
+        command()
+    except (BenchError, OSError) as error:
+        Console(stderr=True, soft_wrap=True).print(
+            f"jointbench: {error}", style="red", markup=False, highlight=False
+        )
+        return 2
+    except KeyboardInterrupt:
+        print("jointbench: stopped", file=sys.stderr)
+        return 130
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,188 @@
+"""Effects of parameters, actuators and sensors: what is wrong with a number or a channel rather than with a force."""
+
+from __future__ import annotations
+
+import math
+
+from bench.discrepancy import signal_effects as signals
+from bench.discrepancy.effect import Effect, FreeParameter, log_grid
+
+CHANNELS: tuple[Effect, ...] = (
+    Effect(
+        "mass_error",
+        "inertia",
+        "inertia",
+        (FreeParameter("relative_error", signed=True, std=0.3, bounds=(-0.9, 5.0)),),
+        "m = m_nominal (1 + e)",
+        quantity="mass",
+    ),
+    Effect(
+        "stiffness_error",
+        "stiffness",
+        "inertia",
+        (FreeParameter("relative_error", signed=True, std=0.3, bounds=(-0.95, 5.0)),),
+        "k = k_nominal (1 + e)",
+        quantity="stiffness",
+        log_prior=-2.0,
+    ),
+    Effect(
+        "damping_error",
+        "damping",
+        "inertia",
+        (FreeParameter("relative_error", signed=True, std=1.0, bounds=(-0.95, 20.0)),),
+        "c = c_nominal (1 + e)",
+        quantity="damping",
+        log_prior=-2.0,
+    ),
+    Effect(
+        "actuator_delay",
+        "actuator",
+        "actuator",
+        (
+            FreeParameter(
+                "delay",
+                mean=math.log(0.008),
+                std=1.0,
+                bounds=(math.log(1e-4), math.log(1.0)),
+                grid=log_grid(0.003, 0.01, 0.03),
+            ),
+        ),
+        "F(t - tau)",
+        signal=signals.delay,
+    ),
+    Effect(
+        "actuator_lag",
+        "actuator",
+        "actuator",
+        (
+            FreeParameter(
+                "time_constant",
+                mean=math.log(0.008),
+                std=1.0,
+                bounds=(math.log(1e-4), math.log(1.0)),
+                grid=log_grid(0.003, 0.01, 0.03),
+            ),
+        ),
+        "tau F' + F = command",
+        signal=signals.lag,
+    ),
+    Effect(
+        "force_gain_error",
+        "actuator",
+        "actuator",
+        (FreeParameter("relative_error", signed=True, std=0.3, bounds=(-3.0, 5.0), grid=(0.0,)),),
+        "F = (1 + e) command",
+        signal=signals.gain,
+    ),
+    Effect(
+        "actuator_saturation",
+        "actuator",
+        "actuator",
+        (
+            FreeParameter(
+                "level", "force", mean=math.log(1.5), std=0.5, bounds=(-2.0, 2.0), grid=log_grid(1.0, 1.7)
+            ),
+        ),
+        "F = command, clipped at a level",
+        signal=signals.clip,
+        log_prior=-1.0,
+    ),
+    Effect(
+        "displacement_drift",
+        "sensor",
+        "sensor",
+        (FreeParameter("drift", "position", signed=True, std=0.5),),
+        "x + d t / T",
+        signal=signals.drift,
+        quantity="position",
+    ),
+    Effect(
+        "displacement_delay",
+        "sensor",
+        "sensor",
+        (
+            FreeParameter(
+                "delay",
+                mean=math.log(0.008),
+                std=1.0,
+                bounds=(math.log(1e-4), math.log(1.0)),
+                grid=log_grid(0.003, 0.01, 0.03),
+            ),
+        ),
+        "x(t - tau)",
+        signal=signals.delay,
+        quantity="position",
+    ),
+    Effect(
+        "displacement_gain_error",
+        "sensor",
+        "sensor",
+        (FreeParameter("relative_error", signed=True, std=0.3, bounds=(-3.0, 5.0)),),
+        "(1 + e) x",
+        signal=signals.gain,
+        quantity="position",
+    ),
+    Effect(
+        "displacement_bias",
+        "sensor",
+        "sensor",
+        (FreeParameter("bias", "position", signed=True, std=0.5),),
+        "x + b",
+        signal=signals.offset,
+        quantity="position",
+        log_prior=-1.0,
+    ),
+    Effect(
+        "displacement_clipping",
+        "sensor",
+        "sensor",
+        (
+            FreeParameter(
+                "level", "position", mean=math.log(0.8), std=0.3, bounds=(-2.0, 0.3), grid=log_grid(0.6, 0.9)
+            ),
+        ),
+        "x clipped at a level",
+        signal=signals.clip,
+        quantity="position",
+        log_prior=-1.0,
+    ),
+    Effect(
+        "acceleration_gain_error",
+        "sensor",
+        "sensor",
+        (FreeParameter("relative_error", signed=True, std=0.3, bounds=(-3.0, 5.0)),),
+        "(1 + e) a",
+        signal=signals.gain,
+        quantity="acceleration",
+        log_prior=-1.0,
+    ),
+    Effect(
+        "acceleration_delay",
+        "sensor",
+        "sensor",
+        (
+            FreeParameter(
+                "delay",
+                mean=math.log(0.008),
+                std=1.0,
+                bounds=(math.log(1e-4), math.log(1.0)),
+                grid=log_grid(0.003, 0.01),
+            ),
+        ),
+        "a(t - tau)",
+        signal=signals.delay,
+        quantity="acceleration",
+        log_prior=-1.0,
+    ),
+    Effect(
+        "acceleration_bias",
+        "sensor",
+        "sensor",
+        (FreeParameter("bias", "force", signed=True, std=0.5),),
+        "a + b",
+        signal=signals.offset,
+        quantity="acceleration",
+        log_prior=-1.0,
+    ),
+)
+"""Inertia, actuator and sensor effects."""

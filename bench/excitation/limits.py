@@ -1,0 +1,170 @@
+"""What an experiment may not exceed, and how large a signal may be so that it does not.
+
+Force and energy are properties of the commands alone. Stroke and velocity depend on the rig, which is not known: a signal is
+feasible when every rig of a set of prior draws stays within them. Comparisons between excitations are fair when each is made as
+large as these same limits allow.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.errors import ParameterError
+from bench.excitation.ensemble import Ensemble
+
+BISECTIONS = 12
+"""Halvings of the scale: the largest feasible one is then met within 0.03 %."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Limits of an experiment.
+
+    Attributes:
+        force: Largest magnitude of the command, by actuator [N or N m].
+        energy: Largest ``dt sum(u^2)`` of the command, by actuator [N^2 s or (N m)^2 s].
+        stroke: Largest magnitude by measured channel of displacement [m or rad].
+        velocity: Largest magnitude by measured channel of velocity [m/s or rad/s].
+    """
+
+    force: Mapping[str, float]
+    energy: Mapping[str, float] = field(default_factory=dict)
+    stroke: Mapping[str, float] = field(default_factory=dict)
+    velocity: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name in ("force", "energy", "stroke", "velocity"):
+            table = {key: float(value) for key, value in getattr(self, name).items()}
+            for key, value in table.items():
+                if not value > 0.0:  # infinity stands for no limit
+                    raise ParameterError(
+                        f"the {name} limit of '{key}' is {value}; a positive number is expected"
+                    )
+            object.__setattr__(self, name, MappingProxyType(table))
+        if not self.force:
+            raise ParameterError("limits need a largest force for at least one actuator")
+
+    def __reduce__(self) -> tuple:
+        return (Limits, (dict(self.force), dict(self.energy), dict(self.stroke), dict(self.velocity)))
+
+    @property
+    def actuators(self) -> tuple[str, ...]:
+        """Actuators that are driven: those with a force limit."""
+        return tuple(self.force)
+
+    @property
+    def watched(self) -> dict[str, float]:
+        """Stroke and velocity limits by channel."""
+        return {**self.stroke, **self.velocity}
+
+    def within_actuator(
+        self, controls: NDArray[np.float64], *, timestep: float, fill: bool = True
+    ) -> NDArray[np.float64]:
+        """Scale commands to the actuators' limits.
+
+        Args:
+            controls: Commands ``(…, n, n_actuators)`` in the order of `actuators`.
+            timestep: Their interval [s].
+            fill: Also scale up, to whichever of force and energy binds first; else only down.
+
+        Returns:
+            The scaled commands; a channel of zeros stays.
+        """
+        peak = np.max(np.abs(controls), axis=-2)
+        energy = timestep * np.sum(controls**2, axis=-2)
+        force = np.array([self.force[name] for name in self.actuators])
+        budget = np.array([self.energy.get(name, np.inf) for name in self.actuators])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            scale = np.minimum(force / peak, np.sqrt(budget / energy))
+        scale = np.where(peak > 0.0, scale, 0.0)
+        return controls * (scale if fill else np.minimum(scale, 1.0))[..., None, :]
+
+
+class Peaks(NamedTuple):
+    """What a feasible excitation reaches, as fractions of the limits (1 where a limit binds)."""
+
+    force: dict[str, float]
+    energy: dict[str, float]
+    stroke: dict[str, float]  # over the rigs it was made for
+    velocity: dict[str, float]
+
+
+def motion_ratio(ensemble: Ensemble, limits: Limits, controls: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Largest magnitude over limit, over channels of stroke and velocity and over the members ``(n_cases,)``.
+
+    Args:
+        ensemble: The rigs; its channels are those of `limits.watched`, in this order.
+        limits: The limits.
+        controls: Commands ``(n_cases, n, n_actuators)``.
+    """
+    if not limits.watched:
+        return np.zeros(len(controls))
+    bounds = np.array([limits.watched[name] for name in ensemble.channels])
+    return np.max(np.abs(ensemble.record(controls)) / bounds, axis=(1, 2, 3))
+
+
+def feasible(
+    ensemble: Ensemble, limits: Limits, controls: NDArray[np.float64], *, exact: bool = True
+) -> NDArray[np.float64]:
+    """Commands made as large as force and energy allow, then as small as stroke and velocity demand on every rig.
+
+    Args:
+        ensemble: As for `motion_ratio`.
+        limits: The limits.
+        controls: Commands of any size ``(n_cases, n, n_actuators)``; all actuators of a case are scaled down together.
+        exact: Bisect for the largest feasible scale; else a quick scale within some percent below it.
+
+    Returns:
+        Scaled commands in which every rig of the ensemble keeps the limits.
+    """
+    full = limits.within_actuator(np.asarray(controls, dtype=float), timestep=ensemble.timestep)
+    ratio = motion_ratio(ensemble, limits, full)
+    low, high = np.zeros(len(full)), np.ones(len(full))
+    low[ratio <= 1.0] = 1.0
+    scale = np.ones(len(full))
+    for _ in range(BISECTIONS):
+        open_ = low < high
+        if not open_.any():
+            return full * low[:, None, None]
+        step = 0.5 * (low + high)
+        if not exact or np.all(low == 0.0):  # the response is nearly proportional: begin where that would lead
+            step = np.clip(scale * 0.98 / np.maximum(ratio, 1e-9), low, high)
+        scale = np.where(open_, step, low)
+        ratio = np.where(open_, _ratio_of(ensemble, limits, full, scale, open_), ratio)
+        held = ratio <= 1.0
+        low = np.where(open_ & held, scale, low)
+        high = np.where(open_ & ~held, scale, high)
+        if not exact:
+            high = np.where(held, low, high)
+    return full * low[:, None, None]
+
+
+def _ratio_of(
+    ensemble: Ensemble, limits: Limits, full: NDArray, scale: NDArray, chosen: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    ratio = np.zeros(len(full))
+    ratio[chosen] = motion_ratio(ensemble, limits, full[chosen] * scale[chosen, None, None])
+    return ratio
+
+
+def peaks(ensemble: Ensemble, limits: Limits, controls: NDArray[np.float64]) -> Peaks:
+    """What commands ``(n, n_actuators)`` reach on the rigs of an ensemble, as fractions of the limits."""
+    records = np.max(np.abs(ensemble.record(controls[None])), axis=(0, 1, 2)) if ensemble.channels else []
+    reached = dict(zip(ensemble.channels, records, strict=True))
+    names: Sequence[str] = limits.actuators
+    return Peaks(
+        {name: float(np.max(np.abs(controls[:, i])) / limits.force[name]) for i, name in enumerate(names)},
+        {
+            name: float(ensemble.timestep * np.sum(controls[:, i] ** 2) / limits.energy[name])
+            for i, name in enumerate(names)
+            if name in limits.energy
+        },
+        {name: float(reached[name] / limit) for name, limit in limits.stroke.items()},
+        {name: float(reached[name] / limit) for name, limit in limits.velocity.items()},
+    )

@@ -1,0 +1,338 @@
+"""Seconds at equal error against SciPy's integrators on the joint rig, and what elements cost beside bare MuJoCo.
+
+A setting counts where it and all finer ones of its grid stay below the error wanted, so that no lucky one is chosen; the
+same rule holds for every method. The peer's right-hand side is compiled (the law's own kernel inside a numba function),
+its absolute tolerances follow each state's size, and its best method is taken. Under commands held over each sample,
+`solve_ivp` is started anew at every sample with a sensible first step, or integrates across them with the step limited to
+one: whichever is quicker.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cached_property, partial
+from typing import Any
+
+import numba
+import numpy as np
+from mujoco.batch import Batch
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+from bench import Element, Rig, joint_rig, sdof_rig
+from bench.identification.linear_rig import LinearRig
+from bench.laws.coupling import AXIAL_TORSIONAL_JOINT
+from bench.rig.library import INCH, POUND_FORCE
+from benchmarks.timing import Row, interleave, ratio_row
+
+ERROR = 1e-6
+N_BATCH = 64
+PEER_SHARE = 4
+"""The loop over `solve_ivp` runs this many of the batch, and its seconds are scaled up: it is the same work each time."""
+METHODS = ("RK45", "DOP853", "LSODA", "Radau", "BDF")
+RTOLS = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11)
+SUBSTEPS = (1, 2, 5, 10, 20, 50, 100, 200)
+"""MuJoCo's steps a millisecond."""
+CHANNELS = tuple(
+    f"{kind}_{body}"
+    for pair in (("displacement", "rotation"), ("velocity", "rotation_rate"))
+    for body in (1, 2)
+    for kind in pair
+)
+JOINTS = ("axial_1", "torsional_1", "axial_2", "torsional_2")
+TRUE = """≥ 50"""
+
+Array = NDArray[np.float64]
+_joint_force = numba.njit(error_model="numpy")(AXIAL_TORSIONAL_JOINT.force.function)
+
+
+@numba.njit(error_model="numpy")
+def _field(t, y, commands, mass, stiffness, damping, theta):
+    """Right-hand side of the joint rig: four positions, four velocities."""
+    q = np.array([y[2] - y[0], y[3] - y[1]])
+    v = np.array([y[6] - y[4], y[7] - y[5]])
+    f = np.zeros(2)
+    _joint_force(t, q, v, f, theta, f)
+    out = np.empty(8)
+    for i in range(4):
+        out[i] = y[4 + i]
+        sign = 1.0 if i < 2 else -1.0
+        load = commands[i] + sign * f[i % 2] if i < 2 else sign * f[i % 2]
+        out[4 + i] = (load - stiffness[i] * y[i] - damping[i] * y[4 + i]) / mass[i]
+    return out
+
+
+@numba.njit(error_model="numpy")
+def _field_across(t, y, commands, rate, mass, stiffness, damping, theta):
+    """The same under commands ``(n, 2)`` held over each sample."""
+    k = min(int(t * rate), commands.shape[0] - 1)
+    return _field(t, y, commands[k], mass, stiffness, damping, theta)
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A motion of the joint rig, and how an error in it is measured.
+
+    Attributes:
+        name: Name.
+        commands: Force and torque, held over each millisecond ``(n, 2)``; zeros for a free decay.
+        speeds: Velocities of the joints at the start ``(4,)``.
+        every: Milliseconds between the samples of the result.
+    """
+
+    name: str
+    commands: Array
+    speeds: tuple[float, float, float, float]
+    every: int
+
+    @property
+    def start(self) -> Array:
+        """State at the start ``(8,)``."""
+        return np.concatenate([np.zeros(4), self.speeds])
+
+    @property
+    def driven(self) -> bool:
+        """Whether there are commands."""
+        return bool(np.any(self.commands))
+
+    @cached_property
+    def reference(self) -> Array:
+        """The motion to the last digits of double precision that integration leaves ``(n_samples, 8)``."""
+        return self.scipy("DOP853", 1e-12, np.full(8, 1e-6), restart=True)
+
+    @cached_property
+    def scale(self) -> Array:
+        """Largest value of each state."""
+        return np.max(np.abs(self.reference), axis=0)
+
+    def error(self, result: Array) -> float:
+        """Largest error of any state at any sample, relative to that state's largest value."""
+        return float(np.max(np.abs(result - self.reference) / self.scale))
+
+    def scipy(self, method: str, rtol: float, scale: Array, *, restart: bool, speeds: Sequence[float] | None = None) -> Array:
+        """The motion by `solve_ivp`."""
+        model = joint_rig().model
+        numbers = (
+            model.dof_M0.copy(), model.jnt_stiffness.copy(), model.dof_damping.copy(), AXIAL_TORSIONAL_JOINT.theta(),
+        )  # fmt: skip
+        options: dict[str, Any] = {"method": method, "rtol": rtol, "atol": rtol * scale}
+        state = self.start if speeds is None else np.concatenate([np.zeros(4), speeds])
+        duration = 1e-3 * len(self.commands)
+        samples = 1e-3 * np.arange(0, len(self.commands), self.every)
+        if not self.driven:
+            field = partial(_field_tail, commands=np.zeros(2), numbers=numbers)
+            return solve_ivp(field, (0.0, duration), state, t_eval=samples, **options).y.T
+        if not restart:
+            rate = 1000.0 * (1.0 + 1e-12)
+            arguments = (self.commands, rate, *numbers)
+            return solve_ivp(
+                _field_across, (0.0, duration), state, t_eval=samples, max_step=1e-3, args=arguments, **options
+            ).y.T
+        out = np.empty((len(samples), 8))
+        for k, command in enumerate(self.commands):
+            if k % self.every == 0:
+                out[k // self.every] = state
+            field = partial(_field_tail, commands=command, numbers=numbers)
+            state = solve_ivp(field, (0.0, 1e-3), state, first_step=1e-3, **options).y[:, -1]
+        return out
+
+    def mujoco(self, substeps: int, *, speeds: Array | None = None, threads: int = 1) -> Array:
+        """The motions by `mujoco.batch` with native callbacks ``(n_motions, n_samples, 8)``."""
+        count = 1 if speeds is None else len(speeds)
+        batch = Batch(joint_rig(timestep=1e-3 / substeps).model, count, threads)
+        qpos, qvel, ctrl = (batch.bind(name) for name in ("qpos", "qvel", "ctrl"))
+        qvel[:] = self.speeds if speeds is None else speeds
+        out = np.empty((count, -(-len(self.commands) // self.every), 8))
+        stride = 1 if self.driven else self.every
+        for k in range(0, len(self.commands), stride):
+            if k % self.every == 0:
+                out[:, k // self.every, :4], out[:, k // self.every, 4:] = qpos, qvel
+            ctrl[:] = self.commands[k]
+            batch.step(nstep=stride * substeps)
+        return out
+
+    def compiled(self, rig: LinearRig, tolerance: float, speeds: Sequence[float] | None = None) -> Array:
+        """The motion by the compiled loop with controlled error."""
+        hold = round(rig.rig.timestep / 1e-3)
+        initial = {name: (0.0, float(v)) for name, v in zip(JOINTS, self.speeds if speeds is None else speeds, strict=True)}
+        return rig.simulate(
+            self.commands[::hold], initial=initial, stride=self.every // hold, tolerance=tolerance
+        )
+
+
+def _field_tail(t: float, y: Array, commands: Array, numbers: tuple[Array, ...]) -> Array:
+    return _field(t, y, commands, *numbers)
+
+
+def problems() -> tuple[Problem, Problem]:
+    """A free decay through all gaps, and the deck's noise held over each millisecond."""
+    rng = np.random.default_rng(46)
+    noise = np.fft.irfft(
+        np.where(np.arange(501)[:, None] <= 12, rng.standard_normal((501, 2)) + 1j * rng.standard_normal((501, 2)), 0.0),
+        axis=0,
+    )
+    noise *= np.array([1000.0 * POUND_FORCE, 1000.0 * POUND_FORCE * INCH]) / np.max(np.abs(noise), axis=0)
+    return (
+        Problem("free decay, 2 s", np.zeros((2000, 2)), (1.0, 40.0, 0.0, 0.0), every=10),
+        Problem("held noise, 1 s", noise, (0.0, 0.0, 0.0, 0.0), every=10),
+    )
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A way to simulate that is accurate enough.
+
+    Attributes:
+        label: What it is.
+        run: Simulates once.
+        seconds: Seconds of one run, for choosing only.
+        error: Its error.
+    """
+
+    label: str
+    run: Callable[[], Any]
+    seconds: float
+    error: float
+
+
+def _loosest(problem: Problem, label: str, make: Callable[[float], Callable[[], Array]], grid: Sequence[float]) -> Setting | None:
+    """The loosest setting of a grid (loosest first) that is accurate enough together with all finer ones."""
+    found = None
+    for value in reversed(grid):
+        run = make(value)
+        run()
+        start = time.perf_counter()
+        result = run()
+        seconds = time.perf_counter() - start
+        error = problem.error(result) if result.shape == problem.reference.shape else np.inf
+        if not error <= ERROR:
+            break
+        found = Setting(f"{label} {value:g}", run, seconds, error)
+    return found
+
+
+def _peer(problem: Problem) -> tuple[Setting, Callable[..., Array]]:
+    """The quickest of `solve_ivp`'s methods that is accurate enough."""
+    settings = []
+    for method in METHODS:
+        for restart in (True, False) if problem.driven else (True,):
+
+            def make(rtol: float, method: str = method, restart: bool = restart) -> Callable[..., Array]:
+                return partial(problem.scipy, method, rtol, problem.scale, restart=restart)
+
+            # an implicit or multistep method that is started a thousand times a second is no contender
+            if restart and problem.driven and method in {"LSODA", "Radau", "BDF"}:
+                continue
+            setting = _loosest(problem, f"{method}{' restarted' if restart and problem.driven else ''} rtol", make, RTOLS)
+            if setting is not None:
+                settings.append(setting)
+    best = min(settings, key=lambda setting: setting.seconds)
+    return best, best.run
+
+
+def _rows_of(problem: Problem, repeats: int) -> list[Row]:
+    peer, solve = _peer(problem)
+    rig = LinearRig.of(joint_rig(timestep=1e-3 if problem.driven else 1e-3 * problem.every), CHANNELS)
+    ours = {
+        "MuJoCo RK4": _loosest(problem, "steps a millisecond", lambda n: lambda: problem.mujoco(int(n))[0], SUBSTEPS),
+        "compiled loop": _loosest(problem, "tolerance", lambda tol: partial(problem.compiled, rig, tol), RTOLS),
+    }
+    rng = np.random.default_rng(64)
+    speeds = np.array(problem.speeds) + rng.uniform(0.0, 0.2, (N_BATCH, 4)) * np.array([1.0, 10.0, 1.0, 10.0])
+    rows = []
+    for label, setting in ours.items():
+        if setting is None:
+            raise RuntimeError(f"no setting of {label} reaches an error of {ERROR:g} in {problem.name}")
+        detail = {
+            "ours": setting.label, "our_error": setting.error, "peer": peer.label, "peer_error": peer.error,
+        }  # fmt: skip
+        limit = "≥ 50" if label == "compiled loop" else ""
+        single = interleave({"ours": setting.run, "peer": peer.run}, repeats)
+        rows.append(
+            ratio_row(
+                f"{problem.name}, error 1e-6, one record: {label}", single["ours"], single["peer"], limit=limit,
+                meaning="seconds of solve_ivp's best method / ours, equal error", detail=detail,
+            )  # fmt: skip
+        )
+        value = float(setting.label.split()[-1])
+        tasks: dict[str, Callable[[], Any]] = {"peer": partial(_loop, solve, speeds[:PEER_SHARE])}
+        if label == "MuJoCo RK4":
+            tasks["ours"] = partial(problem.mujoco, int(value), speeds=speeds, threads=2)
+        else:
+            tasks["ours"] = partial(_pooled, partial(problem.compiled, rig, value), speeds)
+        many = interleave(tasks, max(3, repeats // 5))
+        rows.append(
+            ratio_row(
+                f"{problem.name}, error 1e-6, {N_BATCH} records, 2 threads: {label}",
+                many["ours"], many["peer"] * (N_BATCH / PEER_SHARE), limit=limit,
+                meaning="seconds of a loop over solve_ivp / ours over two threads, equal error", detail=detail,
+            )  # fmt: skip
+        )
+    return rows
+
+
+def _loop(solve: Callable[..., Array], speeds: Array) -> None:
+    for row in speeds:
+        solve(speeds=row)
+
+
+def _pooled(run: Callable[..., Array], speeds: Array) -> None:
+    with ThreadPoolExecutor(2) as pool:
+        list(pool.map(lambda row: run(speeds=row), speeds))
+
+
+def _step(batch: Batch) -> None:
+    batch.bind("qvel")[:] = 0.3
+    batch.step(nstep=2000)
+
+
+def _stepping(repeats: int) -> list[Row]:
+    """Steps a second with elements against the same MJCF without any, and of the compiled loop against MuJoCo."""
+    gap = Element.of("gap", "carriage", stiffness=3000.0, clearance=0.003)
+    hysteresis = Element.of("bouc_wen", "carriage", A=800.0, beta=60.0, gamma=40.0, n=1.0)
+    rigs: dict[str, tuple[Rig, tuple[str, ...], int]] = {
+        "SDOF gap": (sdof_rig(gap, mass=2.0, stiffness=1500.0, damping=4.0), ("displacement", "velocity"), 2),
+        "SDOF gap + Bouc-Wen": (
+            sdof_rig(gap, hysteresis, mass=2.0, stiffness=1500.0, damping=4.0), ("displacement", "velocity"), 2,
+        ),
+        "deck joint": (joint_rig(), CHANNELS, 2),
+    }  # fmt: skip
+    rows = []
+    for name, (rig, channels, n_actuators) in rigs.items():
+        with_elements, bare = Batch(rig.model, 8, 2), Batch(rig.with_(elements=()).model, 8, 2)
+        compiled = LinearRig.of(rig, channels)
+        commands = np.random.default_rng(8).standard_normal((2000, n_actuators))
+        tasks = {
+            "with": partial(_step, with_elements),
+            "bare": partial(_step, bare),
+            "compiled": partial(_eight, compiled, commands),
+        }
+        seconds = interleave(tasks, repeats)
+        rows.append(
+            ratio_row(
+                f"{name}, RK4, Batch over 2 threads: elements against none",
+                seconds["with"], seconds["bare"],
+                meaning="step rate of the rig / of the same MJCF without its elements and their states",
+            )  # fmt: skip
+        )
+        rows.append(
+            ratio_row(
+                f"{name}, RK4, 2 threads: compiled loop against MuJoCo",
+                seconds["compiled"], seconds["with"], limit="≥ 10",
+                meaning="step rate of the compiled whole-record loop / of mujoco.batch, same rig",
+            )  # fmt: skip
+        )
+    return rows
+
+
+def _eight(rig: LinearRig, commands: Array) -> None:
+    with ThreadPoolExecutor(2) as pool:
+        list(pool.map(lambda _: rig.simulate(commands), range(8)))
+
+
+def rows(repeats: int = 15) -> list[Row]:
+    """Rows of the group."""
+    return [row for problem in problems() for row in _rows_of(problem, repeats)] + _stepping(repeats)
