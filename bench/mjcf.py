@@ -17,7 +17,9 @@ def model_path(name: str) -> Path:
         UnknownNameError: There is no such model.
     """
     here = Path(__file__).resolve().parent
-    folder = here / "_models" if (here / "_models").is_dir() else here.parent / "models"  # wheel, or source tree
+    folder = (
+        here / "_models" if (here / "_models").is_dir() else here.parent / "models"
+    )  # wheel, or source tree
     path = folder / f"{name}.xml"
     if not path.is_file():
         raise UnknownNameError("model", name, [file.stem for file in folder.glob("*.xml")])

@@ -6,6 +6,7 @@ import base64
 import io
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,32 +14,6 @@ from bench.files import write_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-_TEMPLATE = """<!doctype html>
-<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
-<title>{{ page.title }}</title>
-<style>
-:root { color-scheme: light; --ink: #1d2430; --soft: #5b6675; --rule: #d9dee6; --accent: #0b5cad; }
-body { font: 16px/1.55 system-ui, sans-serif; color: var(--ink); max-width: 62rem; margin: 2.5rem auto; padding: 0 1.25rem; }
-h1 { font-size: 1.9rem; line-height: 1.2; margin-bottom: .3rem } h2 { margin-top: 2.6rem; border-top: 1px solid var(--rule); padding-top: 1.2rem }
-p.lead { font-size: 1.15rem; } figure { margin: 1.4rem 0 } figure img { max-width: 100% } figcaption { color: var(--soft); font-size: .92rem }
-table { border-collapse: collapse; margin: 1rem 0; font-variant-numeric: tabular-nums } caption { text-align: left; color: var(--soft); font-size: .92rem; padding-bottom: .3rem }
-th, td { border-bottom: 1px solid var(--rule); padding: .3rem .9rem .3rem 0; text-align: left; vertical-align: top } th { color: var(--soft); font-weight: 600 }
-pre { background: #f4f6f9; padding: .8rem 1rem; overflow-x: auto; font-size: .88rem } footer { color: var(--soft); margin-top: 3rem; font-size: .88rem }
-</style></head><body>
-<h1>{{ page.title }}</h1>
-{% if page.lead %}<p class="lead">{{ page.lead }}</p>{% endif %}
-{% for section in page.sections %}<h2>{{ section.title }}</h2>
-{% for block in section.blocks %}
-{% if block.kind == "text" %}<p>{{ block.text }}</p>
-{% elif block.kind == "code" %}<pre><code>{{ block.text }}</code></pre>
-{% elif block.kind == "table" %}<table><caption>{{ block.text }}</caption><thead><tr>{% for h in block.header %}<th>{{ h }}</th>{% endfor %}</tr></thead>
-<tbody>{% for row in block.rows %}<tr>{% for cell in row %}<td>{{ cell }}</td>{% endfor %}</tr>{% endfor %}</tbody></table>
-{% else %}<figure><img alt="{{ block.text }}" src="{{ block.source }}"><figcaption>{{ block.text }}</figcaption></figure>{% endif %}
-{% endfor %}{% endfor %}
-<footer>{{ page.footer }}</footer>
-</body></html>
-"""
 
 
 @dataclass
@@ -106,7 +81,12 @@ class Page:
         import jinja2  # noqa: PLC0415
 
         environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True)
-        return environment.from_string(_TEMPLATE).render(page=self)
+        template = (
+            resources.files("bench")
+            .joinpath("_data", "templates", "page.html.j2")
+            .read_text(encoding="utf-8")
+        )
+        return environment.from_string(template).render(page=self)
 
     def write(self, path: str | Path) -> None:
         """Write the page whole or not at all."""

@@ -28,7 +28,9 @@ class Comparison(NamedTuple):
     nmse: dict[str, float]  # [%] by channel, settling time left out; only channels that move
 
 
-def element_from(model: PolynomialModel | NetworkModel, joints: Sequence[str], *, name: str = "joint") -> Element:
+def element_from(
+    model: PolynomialModel | NetworkModel, joints: Sequence[str], *, name: str = "joint"
+) -> Element:
     """The reduced-order joint of an identified model, ready to be put into a rig."""
     return Element(model.law, tuple(joints), model.theta, name=name, validity=model.range)
 

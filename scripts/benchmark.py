@@ -1,7 +1,7 @@
 """Benchmarks of jointbench, every row a ratio against a peer or a limit, run side by side.
 
-    python scripts/benchmark.py native stream --json out.json
-    python scripts/benchmark.py --compare before.json after.json
+python scripts/benchmark.py native stream --json out.json
+python scripts/benchmark.py --compare before.json after.json
 """
 
 from __future__ import annotations
@@ -24,7 +24,13 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 from benchmarks.timing import Row
 
-GROUPS = tuple(sorted(path.stem for path in (Path(__file__).parent / "benchmarks").glob("[a-z]*.py") if path.stem != "timing"))
+GROUPS = tuple(
+    sorted(
+        path.stem
+        for path in (Path(__file__).parent / "benchmarks").glob("[a-z]*.py")
+        if path.stem != "timing"
+    )
+)
 
 
 @dataclass
@@ -85,7 +91,14 @@ def _table(group: str, rows: list[Row]) -> Table:
         table.add_column(column)
     for row in rows:
         mark = {True: "yes", False: "[red]no[/red]", None: ""}[row.holds]
-        table.add_row(row.name, f"{row.ratio:.3g}", f"{row.spread[0]:.3g}–{row.spread[1]:.3g}", row.limit, mark, row.meaning)
+        table.add_row(
+            row.name,
+            f"{row.ratio:.3g}",
+            f"{row.spread[0]:.3g}–{row.spread[1]:.3g}",
+            row.limit,
+            mark,
+            row.meaning,
+        )
     return table
 
 

@@ -57,7 +57,7 @@ def multisine(folder: Path) -> dict[str, float]:
     u = loadmat(folder / "uval_multisine.mat")["uval_multisine"].ravel()
     y = loadmat(folder / "yval_multisine.mat")["yval_multisine"].ravel()
     fine = np.tile(np.asarray(resample(u, len(u) * UPSAMPLING)), 4)
-    return {"multisine": 100.0 * nrmse(y, response(fine)[:: UPSAMPLING][-len(u) :])}
+    return {"multisine": 100.0 * nrmse(y, response(fine)[::UPSAMPLING][-len(u) :])}
 
 
 def sweep(folder: Path) -> dict[str, float]:

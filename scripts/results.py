@@ -57,21 +57,39 @@ def _demo(told: Any) -> Figures:
             "network (30)": "no worse than the published one",
             "network (40)": "≤ 0.10 %",
         }
-        rows.append((f"deck joint, {model['model']}: force NMSE, closed loop, unseen", figure, limits.get(model["model"], "")))
+        rows.append(
+            (
+                f"deck joint, {model['model']}: force NMSE, closed loop, unseen",
+                figure,
+                limits.get(model["model"], ""),
+            )
+        )
         open_loop = model["open_loop_force_nmse_percent"]
         figure = f"{open_loop['axial']:.3f} % / {open_loop['torsional']:.3f} %"
         rows.append((f"deck joint, {model['model']}: force NMSE on the true states", figure, ""))
     for test in told["damper"]:
         for model, value in test["force_nrmse"].items():
             limit = "≤ 0.25" if model == "parametric" else ""
-            rows.append((f"real damper, {test['tension_lbf']} lbf, {model}: force NRMSE, unseen", f"{value:.3f}", limit))
-    rows.append(("time of the computation", f"{told['seconds']:.0f} s", "≤ 90 s with the installation left out"))
+            rows.append(
+                (
+                    f"real damper, {test['tension_lbf']} lbf, {model}: force NRMSE, unseen",
+                    f"{value:.3f}",
+                    limit,
+                )
+            )
+    rows.append(
+        ("time of the computation", f"{told['seconds']:.0f} s", "≤ 90 s with the installation left out")
+    )
     return rows
 
 
 def _benchmark(told: Any) -> Figures:
     return [
-        (f"{row['name']}: {row['meaning']}", f"{row['ratio']:.3g} ({row['spread'][0]:.3g} to {row['spread'][1]:.3g})", row["limit"])
+        (
+            f"{row['name']}: {row['meaning']}",
+            f"{row['ratio']:.3g} ({row['spread'][0]:.3g} to {row['spread'][1]:.3g})",
+            row["limit"],
+        )
         for rows in told["groups"].values()
         for row in rows
     ]
@@ -79,11 +97,14 @@ def _benchmark(told: Any) -> Figures:
 
 def _bouc_wen(told: Any) -> Figures:
     values = told["nrmse_percent"]
-    return [(f"{name.replace('_', ' ')}: NRMSE of the displacement", f"{values[name]:.4f} %", limit) for name, limit in (
-        ("multisine", "≤ 0.05 %"),
-        ("sweep", "≤ 0.05 %"),
-        ("sweep_without_decimation_filter", ""),
-    )]
+    return [
+        (f"{name.replace('_', ' ')}: NRMSE of the displacement", f"{values[name]:.4f} %", limit)
+        for name, limit in (
+            ("multisine", "≤ 0.05 %"),
+            ("sweep", "≤ 0.05 %"),
+            ("sweep_without_decimation_filter", ""),
+        )
+    ]
 
 
 def _benchmark_group(name: str, title: str) -> Capability:
@@ -127,7 +148,9 @@ def main() -> int:
     failed = False
     for capability in CAPABILITIES:
         wanted = capability.name in args.names or not args.names
-        if not wanted or (capability.data and (args.data is None or not (args.data / capability.data).is_dir())):
+        if not wanted or (
+            capability.data and (args.data is None or not (args.data / capability.data).is_dir())
+        ):
             continue
         with console.status(f"running {capability.name}"):
             told = _run(capability, args.data)
@@ -150,7 +173,9 @@ def _run(capability: Capability, data: Path | None) -> Any:
     command[0] = str(here / command[0])
     result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     try:
-        return json.loads(result.stdout)  # a benchmark whose limit does not hold exits with 1 and still reports
+        return json.loads(
+            result.stdout
+        )  # a benchmark whose limit does not hold exits with 1 and still reports
     except json.JSONDecodeError:
         print(f"{capability.name}: {capability.shown()} failed:\n{result.stderr[-2000:]}", file=sys.stderr)
         return None
@@ -172,7 +197,11 @@ def _page(results: dict[str, Any]) -> str:
             continue
         lines += ["| what | figure | must hold |", "|---|---|---|"]
         lines += [f"| {what} | {figure} | {limit} |" for what, figure, limit in entry["figures"]]
-        lines += ["", f"{entry['date']}, {entry['machine']['cores']} cores, Python {entry['machine']['python']}.", ""]
+        lines += [
+            "",
+            f"{entry['date']}, {entry['machine']['cores']} cores, Python {entry['machine']['python']}.",
+            "",
+        ]
     return "\n".join(lines)
 
 

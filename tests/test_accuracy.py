@@ -48,7 +48,12 @@ PARAMETERS: dict[str, dict[str, float]] = {
         "limit_negative": 4.0,
     },
     "iwan": {"stiffness": 500.0},
-    "printed_coupling": {"k0_axial": 50.0, "k0_torsional": 50.0, "clearance_axial": 0.01, "clearance_torsional": 0.01},
+    "printed_coupling": {
+        "k0_axial": 50.0,
+        "k0_torsional": 50.0,
+        "clearance_axial": 0.01,
+        "clearance_torsional": 0.01,
+    },
 }
 
 
@@ -93,7 +98,9 @@ def _mujoco(law: ForceLaw, timestep: float, normal_force: float) -> NDArray:
     rig = rig.with_structure(stiffness={"x": STIFFNESS, "y": STIFFNESS})
     n = round(DURATION / timestep) + 1
     moving = law.n_coordinates - law.n_inputs
-    initial = {joint: (0.0, speed) for joint, speed in zip(("x", "y")[:moving], AMPLITUDE.values(), strict=False)}
+    initial = {
+        joint: (0.0, speed) for joint, speed in zip(("x", "y")[:moving], AMPLITUDE.values(), strict=False)
+    }
     record = simulate(rig, {"squeeze": np.full(n, normal_force)}, initial=initial)
     suffixes = [""] if moving == 1 else ["_1", "_2"]
     return np.array([record[f"e/{kind}{s}"][-1] for kind in ("displacement", "velocity") for s in suffixes])
@@ -109,7 +116,9 @@ def _scale(law: ForceLaw) -> NDArray:
 def _errors(law: ForceLaw, timesteps: tuple[float, ...]) -> list[float]:
     normal_force = 10.0
     reference = _reference(law, _element(law).theta, normal_force)
-    return [float(np.max(np.abs(_mujoco(law, dt, normal_force) - reference) / _scale(law))) for dt in timesteps]
+    return [
+        float(np.max(np.abs(_mujoco(law, dt, normal_force) - reference) / _scale(law))) for dt in timesteps
+    ]
 
 
 SMOOTH = [law for law in LAWS.values() if law.smoothness == "smooth"]

@@ -37,7 +37,9 @@ def _callbacks_restored():
     native.install()
 
 
-def passive_force(rig: Rig, qpos: dict[str, float], qvel: dict[str, float], ctrl: dict[str, float] | None = None):
+def passive_force(
+    rig: Rig, qpos: dict[str, float], qvel: dict[str, float], ctrl: dict[str, float] | None = None
+):
     data = mujoco.MjData(rig.model)
     for name, value in qpos.items():
         data.joint(name).qpos = value
@@ -70,7 +72,12 @@ def test_element_with_several_coordinates_and_states_and_elements_add_up():
     )
     rig = Rig("r", MJCF, elements)
     data = mujoco.MjData(rig.model)
-    data.joint("x").qpos, data.joint("y").qpos, data.joint("x").qvel, data.joint("y").qvel = 0.2, 0.5, 0.1, -0.2
+    data.joint("x").qpos, data.joint("y").qpos, data.joint("x").qvel, data.joint("y").qvel = (
+        0.2,
+        0.5,
+        0.1,
+        -0.2,
+    )
     data.act[0] = 3.0
     mujoco.mj_forward(rig.model, data)
     q, v, f = np.array([0.2, 0.5]), np.array([0.1, -0.2]), np.zeros(2)
@@ -100,7 +107,8 @@ def test_results_are_bit_identical_over_thread_counts_in_rollout_and_batch():
     start = np.zeros((n, size))
     start[:, 1 + model.nq] = np.linspace(-1.0, 1.0, n)
     states = [
-        rollout.rollout(model, [mujoco.MjData(model) for _ in range(threads)], start, nstep=300)[0] for threads in (1, 2, 3)
+        rollout.rollout(model, [mujoco.MjData(model) for _ in range(threads)], start, nstep=300)[0]
+        for threads in (1, 2, 3)
     ]
     assert np.ptp(states[0][:, -1, 1]) > 0.0
     assert np.array_equal(states[0], states[1])
@@ -151,7 +159,7 @@ def test_foreign_callback_is_never_overwritten():
         return None
 
     mujoco.set_mjcb_passive(theirs)
-    with pytest.raises(NativeError, match="already set.*set_mjcb_passive"):
+    with pytest.raises(NativeError, match=r"already set.*set_mjcb_passive"):
         native.install()
     assert mujoco.get_mjcb_passive() is theirs
     with pytest.raises(NativeError):
@@ -209,7 +217,11 @@ def test_untested_mujoco_is_refused_with_the_tested_range():
         (Element.of("linear", "z"), UnknownNameError, "unknown joint or tendon.*'z'"),
         (Element.of("linear", "r"), ModelError, "'r' is a ball joint"),
         (Element.of("linear", "string"), ModelError, "'string' is spatial"),
-        (Element.of("controlled_friction", "x", inputs=("pull",)), UnknownNameError, "unknown actuator 'pull'"),
+        (
+            Element.of("controlled_friction", "x", inputs=("pull",)),
+            UnknownNameError,
+            "unknown actuator 'pull'",
+        ),
     ],
 )
 def test_element_that_does_not_fit_the_model_says_so(element, error, message):
@@ -219,10 +231,7 @@ def test_element_that_does_not_fit_the_model_says_so(element, error, message):
 
 def test_compiled_code_is_cached_between_processes():
     """A second process must find the callbacks compiled: no compilation of the passive callback."""
-    code = (
-        "from bench.native.callbacks import passive, act_dyn;"
-        "print(passive.cache_hits, act_dyn.cache_hits)"
-    )
+    code = "from bench.native.callbacks import passive, act_dyn;print(passive.cache_hits, act_dyn.cache_hits)"
     subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
     second = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
     assert second.stdout.split() == ["1", "1"]

@@ -17,7 +17,9 @@ GAP = Element.of("gap", "carriage", stiffness=3000.0, clearance=0.005)
 
 
 def harmonic(amplitude: float = 5.0, duration: float = 2.0) -> Excitation:
-    return Excitation({"shaker": Harmonic(amplitude=amplitude, frequency=2.0)}, duration=duration, sample_rate=1000.0)
+    return Excitation(
+        {"shaker": Harmonic(amplitude=amplitude, frequency=2.0)}, duration=duration, sample_rate=1000.0
+    )
 
 
 def test_linear_rig_follows_the_analytic_free_decay():
@@ -136,7 +138,9 @@ def test_deck_joint_rig_has_the_decks_frequency():
 
 def test_divergence_names_time_element_and_last_good_state():
     stiff = Element.of("linear", "carriage", stiffness=-1e9, damping=0.0, name="wrong sign")
-    with pytest.raises(SimulationError, match=r"diverged after t = .*carriage = .*'wrong sign'.*timestep") as caught:
+    with pytest.raises(
+        SimulationError, match=r"diverged after t = .*carriage = .*'wrong sign'.*timestep"
+    ) as caught:
         simulate(sdof_rig(stiff), harmonic())
     assert caught.value.element == "wrong sign"
     assert 0.0 < caught.value.time < 2.0
@@ -159,20 +163,44 @@ def test_leaving_the_validity_range_warns():
     ("make", "error", "message"),
     [
         (lambda: Element.of("gapp", "carriage"), UnknownNameError, "unknown law 'gapp'.*Did you mean 'gap'"),
-        (lambda: Element.of("gap", "carriage", width=1.0), UnknownNameError, "unknown parameter of law 'gap' 'width'"),
-        (lambda: Element.of("gap", "carriage", clearance=-1.0), ParameterError, "'clearance' of law 'gap' is -1"),
-        (lambda: Element.of("gap", "carriage", stiffness=np.nan), ParameterError, "is nan N/m; a finite value"),
+        (
+            lambda: Element.of("gap", "carriage", width=1.0),
+            UnknownNameError,
+            "unknown parameter of law 'gap' 'width'",
+        ),
+        (
+            lambda: Element.of("gap", "carriage", clearance=-1.0),
+            ParameterError,
+            "'clearance' of law 'gap' is -1",
+        ),
+        (
+            lambda: Element.of("gap", "carriage", stiffness=np.nan),
+            ParameterError,
+            "is nan N/m; a finite value",
+        ),
         (lambda: Element.of("gap", "a", "b"), ParameterError, r"acts on 1 joint\(s\)"),
-        (lambda: Element.of("stribeck", "carriage", exact=True), ParameterError, "exact stick is MuJoCo's frictionloss"),
+        (
+            lambda: Element.of("stribeck", "carriage", exact=True),
+            ParameterError,
+            "exact stick is MuJoCo's frictionloss",
+        ),
         (lambda: sdof_rig(GAP, GAP), ModelError, "elements of the same name"),
         (lambda: sdof_rig(integrator="RK5"), UnknownNameError, "unknown integrator 'RK5'"),
         (lambda: sdof_rig(timestep=0.0), ParameterError, "timestep of rig 'sdof' is 0.0 s"),
         (lambda: sdof_rig(mass=-1.0).model, ParameterError, "mass of 'carriage' is -1.0"),
         (lambda: sdof_rig().with_structure(masss={"a": 1.0}), UnknownNameError, "Did you mean 'mass'"),
-        (lambda: Rig("broken", "<mujoco><worldbody>").model, ModelError, "MJCF of rig 'broken' cannot be read"),
+        (
+            lambda: Rig("broken", "<mujoco><worldbody>").model,
+            ModelError,
+            "MJCF of rig 'broken' cannot be read",
+        ),
         (lambda: Rig.from_file("nowhere.xml"), ModelError, "cannot read the model nowhere.xml"),
         (lambda: simulate(sdof_rig(), {"shakr": np.zeros(5)}), UnknownNameError, "Did you mean 'shaker'"),
-        (lambda: simulate(sdof_rig(), {"shaker": np.array([0.0, np.nan])}), ParameterError, "is nan at sample 1"),
+        (
+            lambda: simulate(sdof_rig(), {"shaker": np.array([0.0, np.nan])}),
+            ParameterError,
+            "is nan at sample 1",
+        ),
         (lambda: simulate(sdof_rig(timestep=3e-3), harmonic()), ParameterError, "does not divide"),
         (lambda: prescribe(sdof_rig(), np.zeros(20)), ModelError, "cannot follow a prescribed motion"),
     ],
@@ -185,14 +213,18 @@ def test_bad_input_is_refused_with_a_clear_message(make, error, message):
 def test_element_json_round_trip():
     for law in LAWS.values():
         moving = law.n_coordinates - law.n_inputs
-        element = Element.of(law, *(f"j{i}" for i in range(moving)), inputs=tuple(f"u{i}" for i in range(law.n_inputs)))
+        element = Element.of(
+            law, *(f"j{i}" for i in range(moving)), inputs=tuple(f"u{i}" for i in range(law.n_inputs))
+        )
         again = Element.from_dict(element.to_dict())
         assert again.law == element.law
         assert np.array_equal(again.theta, element.theta)
         assert (again.joints, again.inputs, again.name) == (element.joints, element.inputs, element.name)
 
 
-@pytest.mark.parametrize("rig", [sdof_rig(GAP, stiffness=500.0), joint_rig(), damper_rig()], ids=lambda rig: rig.name)
+@pytest.mark.parametrize(
+    "rig", [sdof_rig(GAP, stiffness=500.0), joint_rig(), damper_rig()], ids=lambda rig: rig.name
+)
 def test_what_is_only_drawn_is_left_out_of_the_simulation_and_changes_no_bit(rig):
     import mujoco
 

@@ -128,7 +128,9 @@ def build(rig: Rig, *, drawings: bool = False) -> Built:
     """Compile a rig, with or without what is only drawn; see `Rig.built` for what it raises."""
     native.install()
     spec = specify(rig)
-    spec.compiler.discardvisual = not drawings  # MuJoCo keeps what moves, collides or is sensed: a third less a step
+    spec.compiler.discardvisual = (
+        not drawings
+    )  # MuJoCo keeps what moves, collides or is sensed: a third less a step
     own = tuple(actuator.name for actuator in spec.actuators if not actuator.name.startswith(native.PREFIX))
     for name in own:
         if not name:

@@ -63,7 +63,13 @@ def interleave(tasks: Mapping[str, Callable[[], Any]], repeats: int) -> dict[str
 
 
 def ratio_row(
-    name: str, ours: np.ndarray, peer: np.ndarray, *, limit: str = "", meaning: str, detail: dict[str, Any] | None = None
+    name: str,
+    ours: np.ndarray,
+    peer: np.ndarray,
+    *,
+    limit: str = "",
+    meaning: str,
+    detail: dict[str, Any] | None = None,
 ) -> Row:
     """Speed ratio (peer seconds over ours, pair by pair): above 1 where ours is faster."""
     ratios = peer / ours
