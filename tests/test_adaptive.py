@@ -203,8 +203,9 @@ def test_a4_with_two_percent_noise():
 
 
 def test_change_of_parameters_is_tracked_within_two_periods():
-    new = np.array([4.0, 0.0, 0.0, -0.2, -1.2])
-    for seed in range(3):
+    # yields at a larger force: one that has already been exceeded would leave the range in which the law is a joint
+    new = np.array([6.0, 0.0, 0.0, -0.2, -1.0])
+    for seed in range(4):
         history = run(a4_estimator(jump_ratio=4.0), a4(seed, seconds=40.0, change=(30.0, new)))
         settled = history.time >= 30.0 + 2.0 * PERIOD
         assert np.all(within(history.theta[settled], new, 0.05))
@@ -283,7 +284,8 @@ def test_damper_log_form():
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("p", "blocks"), [(7, 100), (37, 5)])
-def test_factors_stay_definite_over_ten_million_samples(p, blocks):
+def test_factors_stay_definite_over_long_runs(p, blocks):
+    """Ten million samples at 7 parameters, half a million at 37."""
     rng = np.random.default_rng(2)
     m = 100_000
     phi = rng.standard_normal((m, p))

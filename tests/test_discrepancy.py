@@ -86,6 +86,7 @@ def test_striking_the_true_effect_from_the_catalogue_leaves_unknown_or_kin():
     assert verdict.verdict == "unknown" or all(effect.name in {"cubic_stiffness"} for effect in verdict.named)
 
 
+@pytest.mark.slow
 def test_a_component_under_prescribed_motion_is_diagnosed(tmp_path):
     rng = np.random.default_rng(2)
     t = np.arange(3000) / 500.0

@@ -26,7 +26,7 @@ from bench.excitation.information import (
     directions,
     fisher_information,
     log_det,
-    log_evidence,
+    misfit,
     sensitivity,
 )
 from bench.excitation.limits import Limits, Peaks, feasible
@@ -60,6 +60,6 @@ __all__ = [
     "fisher_information",
     "linear_structure",
     "log_det",
-    "log_evidence",
+    "misfit",
     "sensitivity",
 ]

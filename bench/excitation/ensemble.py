@@ -212,6 +212,11 @@ class Ensemble:
         """Number of commands."""
         return len(self.actuators)
 
+    @property
+    def n_states(self) -> int:
+        """Number of states of a member: positions, velocities and hidden states."""
+        return self._packed.start.shape[1]
+
     def start(self, members: NDArray[np.int64]) -> NDArray[np.float64]:
         """States at rest of the members ``(…, n_states)`` for indices of shape ``(…)``; −1 gives zeros."""
         return np.where((members >= 0)[..., None], self._packed.start[members], 0.0)

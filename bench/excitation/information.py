@@ -197,12 +197,12 @@ def accumulate(first, last, outputs, counts, step, weights, measured, fisher, sc
             member += 1 + p
 
 
-def log_evidence(
+def misfit(
     fisher: NDArray[np.float64], score: NDArray[np.float64], square: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Log marginal likelihood [nat] of records under drawn rigs whose parameters are normal about the draw, linearised.
+    """Whitened squared residual of records under drawn rigs after the best linear correction of their parameters ``(…)``.
 
-    ``-(r'r - g'(I + F)^-1 g)/2 - log det(I + F)/2`` with ``g = J'r``; constants that all rigs share are left out.
+    ``r'r - g'(I + F)^-1 g`` with ``g = J'r``: the exponent of the marginal likelihood ``N(r; 0, I + J J')``, times −2.
 
     Args:
         fisher: Information matrices ``(…, p, p)``.
@@ -211,4 +211,4 @@ def log_evidence(
     """
     inner = np.eye(fisher.shape[-1]) + fisher
     explained = np.einsum("...i,...i->...", score, np.linalg.solve(inner, score[..., None])[..., 0])
-    return -0.5 * (square - explained) - 0.5 * np.linalg.slogdet(inner)[1]
+    return np.maximum(square - explained, 0.0)

@@ -92,6 +92,24 @@ def _setting(name: str, value: float, low: float, expected: str, *, strict: bool
     return float(value)
 
 
+def _model_settings(model: RegressorModel) -> dict[int, float]:
+    """Header entries that the model fixes."""
+    return {
+        layout.N: model.n_parameters,
+        layout.N_FILTERS: model.n_filters,
+        layout.KIND: KINDS.index(model.kind),
+        layout.ORDER_1: model.orders[0],
+        layout.ORDER_2: model.orders[1],
+        layout.MASS: model.mass,
+        layout.RATE: model.filter_rate,
+        layout.Z_INVERSE: 1.0 / model.force_scale,
+        layout.V_FLOOR: model.floors[0],
+        layout.F_FLOOR: model.floors[1],
+        layout.CROSSOVER: model.crossover,
+        layout.DENOISE_AFTER: model.denoise_after,
+    }
+
+
 class AdaptiveLeastSquares:
     """Continuous-time least squares with forgetting and normalisation on a stream of samples.
 
@@ -157,19 +175,7 @@ class AdaptiveLeastSquares:
         step = 0.0
         if sample_rate is not None:
             step = 1.0 / _setting("sample_rate", sample_rate, 0.0, "a positive rate", strict=True)
-        settings = {
-            layout.N: n,
-            layout.N_FILTERS: model.n_filters,
-            layout.KIND: KINDS.index(model.kind),
-            layout.ORDER_1: model.orders[0],
-            layout.ORDER_2: model.orders[1],
-            layout.MASS: model.mass,
-            layout.RATE: model.filter_rate,
-            layout.Z_INVERSE: 1.0 / model.force_scale,
-            layout.V_FLOOR: model.floors[0],
-            layout.F_FLOOR: model.floors[1],
-            layout.CROSSOVER: model.crossover,
-            layout.DENOISE_AFTER: model.denoise_after,
+        settings = _model_settings(model) | {
             layout.BETA: _setting("forgetting", forgetting, 0.0, "a rate of at least 0 1/s"),
             layout.P0: p0,
             layout.BOUND: limit,

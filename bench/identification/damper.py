@@ -66,7 +66,8 @@ class OnlineDesignFit(NamedTuple):
         time: Times of the history (m,) [s].
         coefficients: C after each sample (m,).
         exponents: n after each sample (m,).
-        settled: Periods until C and n stay within 10 % of the final pair's force over the range of speeds; inf if never.
+        settled: Periods until the force of C and n stays within 10 % of the final pair's, at the peak speed and at half of it;
+            inf if never.
     """
 
     coefficient: float
@@ -237,13 +238,10 @@ def fit_design_model_online(
     coefficients = np.exp(np.clip(log_peak + math.log(f_peak) - exponents * math.log(v_peak), -700.0, 700.0))
     last = t >= t[-1] - 2.0 / frequency
     coefficient, exponent = float(np.mean(coefficients[last])), float(np.mean(exponents[last]))
-    final = float(np.mean(log_peak[last]))
-    # log force error at the peak speed and at half of it
-    away = np.maximum(
-        np.abs(log_peak - final), np.abs(log_peak - final + (exponents - exponent) * math.log(0.5))
-    ) > math.log(1.1)
-    outside = np.flatnonzero(away)
-    settled = 0.0 if outside.size == 0 else float((t[outside[-1]] - t[0]) * frequency)
+    # log error of the force at the peak speed and at half of it
+    at_peak = np.abs(log_peak - float(np.mean(log_peak[last])))
+    at_half = np.abs(log_peak - float(np.mean(log_peak[last])) + (exponents - exponent) * math.log(0.5))
+    outside = np.flatnonzero(np.maximum(at_peak, at_half) > math.log(1.1))
     return OnlineDesignFit(
         coefficient=coefficient,
         exponent=exponent,
@@ -251,8 +249,15 @@ def fit_design_model_online(
         time=t.copy(),
         coefficients=coefficients,
         exponents=exponents.copy(),
-        settled=math.inf if outside.size and outside[-1] == t.size - 1 else settled,
+        settled=_settled(t, outside) * frequency,
     )
+
+
+def _settled(t: NDArray[np.float64], outside: NDArray[np.int64]) -> float:
+    """Time from the start to the last sample outside the band; inf if that is the end."""
+    if outside.size == 0:
+        return 0.0
+    return math.inf if outside[-1] == t.size - 1 else float(t[outside[-1]] - t[0])
 
 
 def check_design_model(

@@ -78,7 +78,7 @@ VISCOUS_DAMPER = ForceLaw(
         Parameter("n", "1", 0.65, (0.1, 2.0), "velocity exponent of the dashpot"),
         Parameter("series_stiffness", "N/m", 3.5e6, (1.0, math.inf), "spring k1 in series with the dashpot"),
         Parameter("stiffness", "N/m", 1e4, (0.0, math.inf), "spring k beside it"),
-        Parameter("friction", "N", 600.0, (0.0, math.inf), "seal friction Fc"),
+        Parameter("friction", "N", 1000.0, (0.0, math.inf), "seal friction Fc"),
         Parameter(
             "regularisation_velocity", "m/s", 2e-3, (1e-9, math.inf), "vc, rounds the friction at rest"
         ),

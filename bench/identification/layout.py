@@ -6,6 +6,8 @@ allocated in a step, and a copy of the array is a snapshot of the estimator.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numba
 from numba.core import cgutils
 from numba.extending import intrinsic
@@ -81,10 +83,12 @@ def split(s):
 _compiled_split = jit(split)
 
 
-@jit
-def views(s):
+def _views(s):
     """`split` for compiled callers, who hold the state themselves."""
-    return _compiled_split(unowned(s))
+    return _compiled_split(unowned(s))  # pyright: ignore[reportCallIssue]  (numba passes the typing context)
+
+
+views: Any = jit(_views)
 
 
 def size(n: int, n_filters: int) -> int:

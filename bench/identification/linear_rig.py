@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bench.errors import ModelError, ParameterError, UnknownNameError
-from bench.identification.record_loop import COLUMNS, run, work_size
+from bench.identification.record_loop import COLUMNS, Sparse, run, work_size
 from bench.rig import Rig
 from bench.rig.building import STRUCTURE
 
@@ -193,7 +193,8 @@ class LinearRig:
     _start: Array
     _observe: Array
     _kept: NDArray[np.int64]  # degrees of freedom that channels depend on
-    _rows: Array
+    _coordinates: Array  # coordinates of the elements (n_rows, n_dof), and the same sparse
+    _rows: Sparse
     _row_inputs: NDArray[np.int64]
     _table: NDArray[np.int64]
     _theta: Array
@@ -249,7 +250,8 @@ class LinearRig:
             start,
             np.ascontiguousarray(sensors[:, observed]),
             kept,
-            np.ascontiguousarray(rows[:, kept]),
+            rows[:, kept],
+            Sparse.of(rows[:, kept]),
             row_inputs,
             table,
             theta,
@@ -304,15 +306,17 @@ class LinearRig:
             else:
                 theta[place] = value
         n_dof = len(self._kept)
-        solved = np.linalg.solve(at.mass, np.hstack([at.stiffness, at.damping, at.inputs, self._rows.T]))
+        solved = np.linalg.solve(
+            at.mass, np.hstack([at.stiffness, at.damping, at.inputs, self._coordinates.T])
+        )
         parts = np.split(solved, np.cumsum([2 * n_dof, at.inputs.shape[1]]), axis=1)
-        system, inputs, spread = (np.ascontiguousarray(part) for part in parts)
+        inputs = np.ascontiguousarray(parts[1])
         commands = np.ascontiguousarray(np.hstack([commands, np.ones((len(commands), 1))]))
         state = np.concatenate([self._initial(initial), self._states])
         out = np.empty((-(-len(commands) // stride), len(self.channels)))
         run(
-            n_dof, len(state), self.rig.timestep, start_time, tolerance, stride, commands, system, inputs,
-            self._table, self._rows, self._row_inputs, spread, theta, self._observe, state,
+            n_dof, len(state), self.rig.timestep, start_time, tolerance, stride, commands, Sparse.of(parts[0]), inputs,
+            self._table, self._rows, self._row_inputs, Sparse.of(parts[2].T), theta, self._observe, state,
             np.zeros(work_size(len(state), n_dof)), out,
         )  # fmt: skip
         return out

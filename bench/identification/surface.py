@@ -259,13 +259,7 @@ def fit_surface(
     rows = _vandermonde(x, orders[0], basis, x_range)
     columns = _vandermonde(v, orders[1], basis, v_range)
     matrix = (rows[:, :, None] * columns[:, None, :]).reshape(x.size, n_terms)
-    weight = np.ones(x.size)
-    if balance:
-        i, j = (
-            np.clip(np.searchsorted(edges, values, side="right") - 1, 0, edges.size - 2)
-            for values, edges in ((x, covered.x_edges), (v, covered.v_edges))
-        )
-        weight = 1.0 / np.sqrt(covered.counts[i, j])
+    weight = _cell_weights(x, v, covered) if balance else np.ones(x.size)
     # Columns of equal norm: the rank is then judged on angles between terms, not on units.
     scale = np.linalg.norm(matrix * weight[:, None], axis=0)
     solution, _, rank, singular = np.linalg.lstsq(matrix * (weight[:, None] / scale), r * weight, rcond=1e-12)
@@ -284,6 +278,15 @@ def fit_surface(
         nmse=nmse(r, matrix @ coefficients.ravel()),
         condition=float(singular[0] / singular[-1]),
     )
+
+
+def _cell_weights(x: NDArray[np.float64], v: NDArray[np.float64], covered: Coverage) -> NDArray[np.float64]:
+    """Weights that make the squares of each cell count as those of one sample."""
+    i, j = (
+        np.clip(np.searchsorted(edges, values, side="right") - 1, 0, edges.size - 2)
+        for values, edges in ((x, covered.x_edges), (v, covered.v_edges))
+    )
+    return 1.0 / np.sqrt(covered.counts[i, j])
 
 
 def _columns(**channels: ArrayLike) -> tuple[NDArray[np.float64], ...]:

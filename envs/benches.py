@@ -1,0 +1,338 @@
+"""The benches behind the environments: any number side by side, stepped together.
+
+The single environment is one bench, the vector environment many; their numbers agree because they are the same code, and because
+nothing that a bench computes depends on how many stand beside it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.errors import ParameterError, UnknownNameError
+from bench.excitation import Contrast, Draw, Ensemble, RigPrior, Rivals, expected_log_bayes_factor, log_det
+from bench.excitation.bayes_factor import accumulate_contrast
+from bench.excitation.experiment import fan
+from bench.excitation.information import STEP, accumulate, misfit, noise_vector
+from envs.laboratory import Laboratories
+from envs.setups import Setup
+from envs.shaping import Shaping
+
+ENFORCEMENTS = ("terminate", "cost")
+AVERAGES = ("prior", "posterior")
+CERTAIN = math.log(99.0)
+"""Log Bayes factor of 99 % certainty between two rivals that were equally likely [nat]."""
+
+FLOATS = (
+    "merit", "gain", "cost", "stroke", "velocity", "force", "energy", "time", "effective_draws", "separated"
+)  # fmt: skip
+"""Entries of `info`, all floats; see the environments."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """What the environments can be asked for; see their documentation."""
+
+    shaping: str = "knots"
+    n_knots: int = 1
+    window: float | None = None
+    duration: float | None = None
+    enforcement: str = "terminate"
+    penalty: float = 10.0
+    average: str = "prior"
+    terminate_when_certain: bool = False
+
+    def __post_init__(self) -> None:
+        if self.enforcement not in ENFORCEMENTS:
+            raise UnknownNameError("enforcement of limits", self.enforcement, ENFORCEMENTS)
+        if self.average not in AVERAGES:
+            raise UnknownNameError("average of rewards", self.average, AVERAGES)
+        if not (math.isfinite(self.penalty) and self.penalty >= 0.0):
+            raise ParameterError(f"penalty is {self.penalty} nat; a number of at least 0 is expected")
+
+
+class Outcome(NamedTuple):
+    """What a step of several benches gives; m of them."""
+
+    observation: NDArray[np.float32]  # (m, n_observations)
+    reward: NDArray[np.float64]  # (m,)
+    terminated: NDArray[np.bool_]  # (m,)
+    truncated: NDArray[np.bool_]  # (m,)
+    info: dict[str, NDArray]  # (m,) each
+
+
+class _Panel(NamedTuple):
+    """The prior draws of all questions as one ensemble, and where each question's lie in it."""
+
+    ensemble: Ensemble
+    members: NDArray[np.int64]  # (n_questions, n_members), −1 beyond a question's own
+    n_members: NDArray[np.int64]  # (n_questions,)
+    counts: NDArray[np.int64]  # (n_questions, n_draws) parameters, −1 for none
+    places: NDArray[np.int64]  # (n_questions, n_draws) among a question's members
+    weights: NDArray[np.float64]  # (n_questions, n_draws) prior weights
+
+
+@lru_cache(maxsize=16)
+def _panel(setup: Setup, threads: int) -> _Panel:
+    rigs: list = []
+    parts = []
+    for experiment in setup.experiments:
+        own, places, counts = fan(experiment.rigs_drawn, STEP)
+        parts.append((len(rigs), len(own), places, counts))
+        rigs += own
+    n_draws = max(len(part[2]) for part in parts)
+    width = max(part[1] for part in parts)
+    shape = (len(parts), n_draws)
+    members = np.full((len(parts), width), -1, dtype=np.int64)
+    counts, places = np.full(shape, -1, dtype=np.int64), np.zeros(shape, dtype=np.int64)
+    weights = np.zeros(shape)
+    for i, (first, size, at, count) in enumerate(parts):
+        members[i, :size] = np.arange(first, first + size)
+        counts[i, : len(count)], places[i, : len(at)] = count, at
+        question, drawn = setup.questions[i], setup.experiments[i].rigs_drawn
+        weights[i, : len(count)] = (
+            question.draw_weights(drawn) if isinstance(question, RigPrior) else 1.0 / len(drawn)
+        )
+    sizes = np.array([part[1] for part in parts], dtype=np.int64)
+    ensemble = Ensemble(tuple(rigs), tuple(setup.noise), setup.limits.actuators, threads)
+    return _Panel(ensemble, members, sizes, counts, places, weights)
+
+
+class Benches:
+    """Laboratories with hidden rigs, and the experimenter's books on them.
+
+    Attributes:
+        setup: The laboratory and its questions.
+        options: What was asked for.
+        n: Number of benches.
+    """
+
+    def __init__(self, setup: Setup, options: Options, n: int, threads: int = 1) -> None:
+        """Set up benches; each must be `reset` before it is stepped."""
+        self.setup, self.options, self.n, self.threads = setup, options, n, threads
+        limits = setup.limits
+        self.channels, self.actuators = tuple(setup.noise), limits.actuators
+        self.timestep = setup.rig.timestep
+        self.n_steps = round((options.window or setup.window) / self.timestep)
+        self.n_windows = round((options.duration or setup.duration) / (self.n_steps * self.timestep)) if self.n_steps else 0
+        if self.n_steps < 1 or self.n_windows < 1:
+            raise ParameterError(
+                f"a window of {options.window} s and an episode of {options.duration} s came; a window takes at least one step "
+                f"of {self.timestep:g} s and an episode at least one window"
+            )
+        self.shaping = Shaping(
+            options.shaping, n, n_actuators=len(self.actuators), band=setup.band, n_knots=options.n_knots
+        )
+        hypotheses = [h for q in setup.questions for h in (q.hypotheses if isinstance(q, RigPrior) else (q.first, q.second))]
+        self._laboratories = Laboratories(
+            tuple(hypotheses), n, channels=self.channels, actuators=self.actuators, threads=threads
+        )
+        self._rivals = isinstance(setup.questions[0], Rivals)
+        self._noise = noise_vector(setup.noise, self.channels)
+        self._scale = np.array([setup.scale[name] for name in self.channels])
+        self._force = np.array([limits.force[name] for name in self.actuators])
+        self._budget = np.array([limits.energy.get(name, np.inf) for name in self.actuators])
+        self._watch = [self._watched(table) for table in (limits.stroke, limits.velocity)]
+        panel = _panel(setup, threads)
+        draws, p = panel.counts.shape[1], int(panel.counts.max())
+        self.truth: list[Draw | None] = [None] * n
+        self.question = np.zeros(n, dtype=np.int64)
+        self._window = np.zeros(n, dtype=np.int64)
+        self._energy = np.zeros((n, len(self.actuators)))
+        self._peak = np.zeros((n, 2))
+        self._merit = np.zeros(n)
+        self._states = np.zeros((n, panel.members.shape[1], panel.ensemble.n_states))
+        self._fisher, self._score = np.zeros((n, draws, p, p)), np.zeros((n, draws, p))
+        self._square = np.zeros((n, draws))
+        self._contrast = Contrast.zeros(n, draws // 2, parameters=p) if self._rivals else None
+        self._values = np.zeros((n, draws // 2 if self._rivals else draws))
+
+    def _watched(self, table: Any) -> tuple[list[int], NDArray[np.float64]]:
+        return [self.channels.index(name) for name in table], np.array(list(table.values()))
+
+    @property
+    def n_observations(self) -> int:
+        """Length of an observation."""
+        samples = self.n_steps * (len(self.channels) + len(self.actuators))
+        questions = len(self.setup.questions) if self._rivals else 0
+        return samples + self.shaping.width + 1 + len(self.actuators) + 2 + questions
+
+    def reset(self, places: NDArray[np.int64], rngs: Sequence[np.random.Generator]) -> NDArray[np.float32]:
+        """Put new hidden rigs, at rest, into some benches; return what their sensors show at rest.
+
+        Args:
+            places: Benches, ascending ``(m,)``.
+            rngs: Generators of all benches; only those of `places` are drawn from.
+        """
+        panel = _panel(self.setup, self.threads)
+        measured = np.empty((len(places), self.n_steps, len(self.channels)))
+        for row, place in enumerate(places):
+            rng = rngs[place]
+            self.question[place] = rng.integers(len(self.setup.questions))
+            question = self.setup.questions[self.question[place]]
+            self.truth[place] = (question if isinstance(question, RigPrior) else question.prior).draw(rng)
+            self._laboratories.install(int(place), self.truth[place])
+            measured[row] = self._noise * rng.standard_normal(measured.shape[1:])
+        self.shaping.begin(places)
+        for array in (self._window, self._energy, self._peak, self._merit, self._fisher, self._score, self._square, self._values):
+            array[places] = 0.0
+        for array in self._contrast or ():
+            array[places] = 0.0
+        self._states[places] = panel.ensemble.start(panel.members[self.question[places]])
+        m = len(places)
+        return self._observe(
+            places, measured, np.zeros((m, self.n_steps, len(self.actuators))), np.zeros((m, self.shaping.width))
+        )
+
+    def step(
+        self, places: NDArray[np.int64], actions: NDArray, rngs: Sequence[np.random.Generator]
+    ) -> Outcome:
+        """Run the next window on some benches.
+
+        Args:
+            places: Benches, ascending ``(m,)``.
+            actions: Actions ``(m, shaping.width)``; clipped to −1 … 1.
+            rngs: Generators of all benches.
+        """
+        actions = np.clip(np.asarray(actions, dtype=float).reshape(len(places), -1), -1.0, 1.0)
+        commands, exhausted = self._commands(places, actions)
+        ideal = self._laboratories.run(places, commands)
+        noise = np.stack([rngs[place].standard_normal(ideal.shape[1:]) for place in places])
+        measured = ideal + self._noise * noise
+        reached = np.stack(
+            [
+                np.max(np.abs(measured[:, :, columns]) / bounds, axis=(1, 2)) if columns else np.zeros(len(places))
+                for columns, bounds in self._watch
+            ],
+            axis=1,
+        )
+        self._peak[places] = np.maximum(self._peak[places], reached)
+        gain, effective = self._account(places, commands, measured)
+        self._window[places] += 1
+        over = reached > 1.0
+        excess = np.maximum(reached - 1.0, 0.0)
+        stop = over[:, 0] & (self.options.enforcement == "terminate")
+        cost = self.options.penalty * np.where(stop, 1.0, np.minimum(excess, 1.0).sum(axis=1))
+        separated = self._separated(places)
+        certain = (separated >= 1.0) & self.options.terminate_when_certain
+        terminated = stop | exhausted | certain
+        truncated = ~terminated & (self._window[places] >= self.n_windows)
+        info: dict[str, NDArray] = {
+            "merit": self._merit[places],
+            "gain": gain,
+            "cost": cost,
+            "stroke": reached[:, 0],
+            "velocity": reached[:, 1],
+            "force": np.max(np.abs(commands) / self._force, axis=(1, 2)),
+            "energy": np.max(self._energy[places] / self._budget, axis=1),
+            "time": self._window[places] * (self.n_steps * self.timestep),
+            "effective_draws": effective,
+            "separated": separated,
+            "violation": over.any(axis=1),
+        }
+        observation = self._observe(places, measured, commands, actions)
+        return Outcome(observation, gain - cost, terminated, truncated, info)
+
+    def _commands(self, places: NDArray, actions: NDArray) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        """Commands within force and what is left of the energy, and whether the energy is used up."""
+        commands = self._force * self.shaping.commands(places, actions, self.n_steps, self.timestep)
+        spent = self.timestep * np.sum(commands**2, axis=1)
+        left = np.maximum(self._budget - self._energy[places], 0.0)
+        over = spent > left
+        if over.any():
+            commands = commands * np.sqrt(np.where(over, left / np.where(over, spent, 1.0), 1.0))[:, None]
+            spent = np.minimum(spent, left)
+        self._energy[places] += spent
+        return commands, np.all(self._energy[places] >= self._budget * (1.0 - 1e-9), axis=1)
+
+    def _account(self, places: NDArray, commands: NDArray, measured: NDArray) -> tuple[NDArray, NDArray]:
+        """Book the window on all prior draws; return the growth of the merit and the effective number of draws."""
+        panel, m = _panel(self.setup, self.threads), len(places)
+        whole = m == self.n
+        asked = self.question[places]
+        counts = panel.counts[asked]
+        books = [self._states, self._fisher, self._score, self._square, *(self._contrast or ())]
+        states, fisher, score, square, *contrast = (
+            books if whole else [np.ascontiguousarray(book[places]) for book in books]
+        )
+        outputs = panel.ensemble.integrate(
+            commands,
+            states,
+            members=panel.members[asked],
+            counts=panel.n_members[asked],
+            clock=self._window[places] * (self.n_steps * self.timestep),
+        )
+        weights = 1.0 / self._noise
+        follow = self.options.average == "posterior"
+        if self._rivals:
+            sums = Contrast(*contrast)
+            pairs = counts.reshape(m, -1, 2)
+            at = panel.places[asked].reshape(m, -1, 2)
+            panel.ensemble.spread(
+                lambda a, b: accumulate_contrast(a, b, outputs, at, pairs, STEP, weights, sums), m
+            )
+            values = np.log1p(np.maximum(expected_log_bayes_factor(sums), 0.0))
+        if follow or not self._rivals:
+            panel.ensemble.spread(
+                lambda a, b: accumulate(a, b, outputs, counts, STEP, weights, measured, fisher, score, square), m
+            )
+        if not self._rivals:
+            values = log_det(fisher)
+        if not whole:
+            for book, part in zip(books, (states, fisher, score, square, *contrast), strict=True):
+                book[places] = part
+        probability = self._probability(panel.weights[asked], fisher, score, square, self._window[places] + 1)
+        if self._rivals:
+            probability = probability.reshape(m, -1, 2).sum(axis=2)
+        gain = np.sum(probability * (values - self._values[places]), axis=1)
+        self._values[places] = values
+        self._merit[places] += gain
+        return gain, 1.0 / np.sum(probability**2, axis=1)
+
+    def _probability(
+        self, prior: NDArray, fisher: NDArray, score: NDArray, square: NDArray, windows: NDArray
+    ) -> NDArray[np.float64]:
+        """Weights of the prior draws ``(m, n_draws)``: the prior's own, or given the measurements so far.
+
+        A handful of draws never meets the hidden rig within the noise, so that the noise level of the sensors would put all
+        weight on one of them. The level of the misfit is taken as unknown instead (Jeffreys' prior) and a window as one
+        independent observation of it, which makes the likelihood a power of the misfit.
+        """
+        if self.options.average == "prior":
+            return prior
+        remainder = np.log(np.maximum(misfit(fisher, score, square), 1e-300))
+        logarithm = np.log(np.maximum(prior, 1e-300)) - 0.5 * windows[:, None] * remainder
+        weight = np.exp(logarithm - logarithm.max(axis=1, keepdims=True)) * (prior > 0.0)
+        return weight / weight.sum(axis=1, keepdims=True)
+
+    def _separated(self, places: NDArray) -> NDArray[np.float64]:
+        """Share of the pairs of prior draws that are expected to be told apart with 99 % certainty."""
+        if not self._rivals:
+            return np.zeros(len(places))
+        return np.mean(self._values[places] >= math.log1p(CERTAIN), axis=1)
+
+    def _observe(
+        self, places: NDArray, measured: NDArray, commands: NDArray, actions: NDArray
+    ) -> NDArray[np.float32]:
+        m = len(places)
+        parts = [
+            (measured / self._scale).reshape(m, -1),
+            (commands / self._force).reshape(m, -1),
+            actions,
+            2.0 * self._window[places, None] / self.n_windows - 1.0,
+            2.0 * np.minimum(self._energy[places] / self._budget, 1.0) - 1.0,
+            2.0 * np.minimum(self._peak[places], 1.0) - 1.0,
+        ]
+        if self._rivals:
+            parts.append(np.eye(len(self.setup.questions))[self.question[places]])
+        return np.clip(np.concatenate(parts, axis=1), -1.0, 1.0).astype(np.float32)
+
+    def positions(self, place: int) -> NDArray[np.float64]:
+        """Joint positions of a bench's rig, to be looked at."""
+        return self._laboratories.positions(place)

@@ -1,0 +1,298 @@
+"""What the environments are about: rigs, distributions of unknown joints, sensors, limits.
+
+The figures are those of a weak shaker on a lightly damped rig: the force alone moves it by a few millimetres, and dead-space or
+yield is reached only by pumping the resonance, whose frequency is not known in advance. What to do next then depends on what
+has been measured.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from types import MappingProxyType
+
+import numpy as np
+
+from bench.errors import UnknownNameError
+from bench.excitation import Experiment, Hypothesis, Limits, RigPrior, Rivals, Uncertain, design
+from bench.excitation.design import controls_from
+from bench.excitation.information import noise_vector
+from bench.rig import Element, Rig
+from bench.rig.library import joint_rig, sdof_rig
+
+DRAWS_SEED = 2006
+"""Seed of the fixed prior draws that rewards are averaged over; hidden rigs are drawn anew in every episode."""
+
+REFERENCE_SECONDS = 3.0  # of the test under which rivals imitate each other
+
+
+@dataclass(frozen=True, eq=False)
+class Setup:
+    """A laboratory and the questions asked in it.
+
+    Attributes:
+        questions: One prior, or rivals of which each episode asks one.
+        experiments: The questions on their fixed draws, in the same order.
+        noise: Standard deviation of each measured channel's noise.
+        limits: Limits.
+        scale: What 1 stands for in observations, by channel, in the channel's unit.
+        band: Frequencies excited [Hz].
+        window: Default duration of a window [s].
+        duration: Default duration of an episode [s].
+    """
+
+    questions: tuple[RigPrior, ...] | tuple[Rivals, ...]
+    experiments: tuple[Experiment, ...]
+    noise: Mapping[str, float]
+    limits: Limits
+    scale: Mapping[str, float]
+    band: tuple[float, float]
+    window: float
+    duration: float
+
+    @property
+    def rig(self) -> Rig:
+        """A rig of the laboratory, for its MJCF."""
+        return self.experiments[0].rigs_drawn[0].hypothesis.rig
+
+
+class _Place:
+    """A laboratory: its rig, its sensors, and where a joint's effects act."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        if name == "sdof":
+            self.noise = {"displacement": 5e-4, "velocity": 1e-2, "acceleration_x": 0.2}
+            self.limits = Limits(
+                {"shaker": 2.0}, {"shaker": 10.0}, {"displacement": 0.04}, {"velocity": 0.6}
+            )
+            self.scale = {"displacement": 0.04, "velocity": 0.6, "acceleration_x": 10.0}
+            self.band, self.window, self.duration = (0.5, 5.0), 0.05, 8.0
+            self.joint = "carriage"
+        else:
+            self.noise = {
+                "axial": 2e-4, "torsional": 8e-3, "axial_velocity": 8e-3, "torsional_velocity": 0.3,
+                "displacement_1": 2e-4, "rotation_1": 8e-3,
+            }  # fmt: skip
+            self.limits = Limits(
+                {"force": 450.0, "torque": 12.0},
+                {"force": 3.0e5, "torque": 2.2e2},
+                {"axial": 0.015, "torsional": 0.6},
+                {"axial_velocity": 0.6, "torsional_velocity": 24.0},
+            )
+            self.scale = {**self.limits.watched, "displacement_1": 0.015, "rotation_1": 0.6}
+            self.band, self.window, self.duration = (1.5, 12.0), 0.025, 4.0
+            self.joint = "axial"
+
+    def rig(self, *elements: Element) -> Rig:
+        if self.name == "sdof":
+            return sdof_rig(*elements, mass=2.0, stiffness=300.0, damping=1.5, timestep=5e-3)
+        soft = {"axial_1": 300.0, "axial_2": 300.0, "torsional_1": 0.2, "torsional_2": 0.2}
+        return joint_rig(*elements, timestep=2.5e-3).with_structure(damping=soft)
+
+    def element(self, law: str, *joints: str, **parameters: float) -> Element:
+        return Element.of(law, *(joints or (self.joint,)), name=law, **parameters)
+
+
+def _sdof_structure() -> tuple[Uncertain, ...]:
+    return Uncertain("stiffness:carriage", 200.0, 400.0), Uncertain("damping:carriage", 0.8, 3.0)
+
+
+SDOF_LAWS = ("gap", "bouc_wen", "coulomb")
+"""Joints that `JointBench/SDOFExcitation-v0` may hide."""
+
+PAIRS = ("gap_cubic", "presliding_bouc_wen", "coulomb_stribeck", "axial_gap_coupling")
+"""Questions that `JointBench/Discrimination-v0` may ask; the last needs two loads."""
+
+RIGS = ("sdof", "joint")
+
+
+def _sdof_hypothesis(place: _Place, law: str) -> Hypothesis:
+    own = {
+        "gap": (
+            Uncertain("gap.stiffness", 300.0, 1500.0),
+            Uncertain("gap.clearance", 5e-3, 30e-3),
+        ),
+        "bouc_wen": (
+            Uncertain("bouc_wen.A", 30.0, 200.0),
+            Uncertain("bouc_wen.beta", 80.0, 300.0),
+            Uncertain("bouc_wen.gamma", 20.0, 120.0),
+        ),
+        "coulomb": (Uncertain("coulomb.limit", 0.1, 1.0),),
+    }[law]
+    fixed = {"coulomb": {"regularisation_velocity": 5e-3}}.get(law, {})
+    return Hypothesis(law, place.rig(place.element(law, **fixed)), (*_sdof_structure(), *own))
+
+
+@lru_cache(maxsize=16)
+def sdof_setup(laws: tuple[str, ...] = SDOF_LAWS, n_draws: int = 6) -> Setup:
+    """One load on the SDOF rig; stiffness, damping, the kind of joint and its parameters are unknown.
+
+    Args:
+        laws: Kinds of joint, from `SDOF_LAWS`.
+        n_draws: Prior draws that rewards are averaged over.
+    """
+    for law in laws:
+        if law not in SDOF_LAWS:
+            raise UnknownNameError("joint of the SDOF environment", law, SDOF_LAWS)
+    place = _Place("sdof")
+    return _identification(place, RigPrior(tuple(_sdof_hypothesis(place, law) for law in laws)), n_draws)
+
+
+@lru_cache(maxsize=4)
+def joint_setup(n_draws: int = 4) -> Setup:
+    """Two loads on the axial-torsional joint; clearances, contact stiffnesses and coupling damping are unknown.
+
+    Its springs and dampers at rest are taken as known, from a linear test at a low level.
+    """
+    place = _Place("joint")
+    law = "axial_torsional_joint"
+    parameters = (
+        Uncertain(f"{law}.k_gap_axial", 1e5, 6e5),
+        Uncertain(f"{law}.clearance_axial", 2e-3, 8e-3),
+        Uncertain(f"{law}.c_coupling_axial", 3e3, 9e4),
+        Uncertain(f"{law}.k_gap_torsional", 70.0, 400.0),
+        Uncertain(f"{law}.clearance_torsional", 0.08, 0.32),
+        Uncertain(f"{law}.c_coupling_torsional", 70.0, 2300.0),
+    )
+    rig = place.rig(place.element(law, "axial", "torsional"))
+    return _identification(place, RigPrior((Hypothesis(law, rig, parameters),)), n_draws)
+
+
+def _identification(place: _Place, prior: RigPrior, n_draws: int) -> Setup:
+    draws = prior.draws(n_draws, np.random.default_rng(DRAWS_SEED))
+    return _setup(place, (prior,), (Experiment(prior, place.noise, place.limits, draws),))
+
+
+def _setup(place: _Place, questions, experiments: tuple[Experiment, ...]) -> Setup:
+    return Setup(
+        questions,
+        experiments,
+        MappingProxyType(dict(place.noise)),
+        place.limits,
+        MappingProxyType(dict(place.scale)),
+        place.band,
+        place.window,
+        place.duration,
+    )
+
+
+@lru_cache(maxsize=16)
+def discrimination_setup(rig: str = "joint", pairs: tuple[str, ...] = PAIRS, n_draws: int = 4) -> Setup:
+    """Two rival effects a question.
+
+    Args:
+        rig: "sdof" (one load) or "joint" (two loads).
+        pairs: Questions, from `PAIRS`; each episode asks one of them.
+        n_draws: Pairs of prior draws a question.
+    """
+    if rig not in RIGS:
+        raise UnknownNameError("rig of the discrimination environment", rig, RIGS)
+    known = PAIRS if rig == "joint" else PAIRS[:-1]
+    for pair in pairs:
+        if pair not in known:
+            raise UnknownNameError(f"pair of effects on rig '{rig}'", pair, known)
+    place = _Place(rig)
+    questions = tuple(_rivals(place, pair) for pair in pairs)
+    return _setup(place, questions, tuple(_rival_experiment(place, item, n_draws) for item in questions))
+
+
+def _rival_experiment(place: _Place, rivals: Rivals, n_draws: int) -> Experiment:
+    rng = np.random.default_rng(DRAWS_SEED)
+    pilot = Experiment(rivals.prior, place.noise, place.limits, rivals.prior.draws(2, rng))
+    reference = controls_from(
+        design("schroeder", pilot, duration=REFERENCE_SECONDS, band=place.band, rng=rng)
+    )
+    draws = rivals.draws(
+        n_draws,
+        rng,
+        reference=reference,
+        channels=tuple(place.noise),
+        actuators=place.limits.actuators,
+        noise=noise_vector(place.noise, tuple(place.noise)),
+    )
+    return Experiment(rivals, place.noise, place.limits, draws)
+
+
+def _rivals(place: _Place, pair: str) -> Rivals:
+    # Forces and lengths of the joint rig stand to those of the SDOF rig as its axial contact to the other's.
+    force, length = (1.0, 1.0) if place.name == "sdof" else (250.0, 0.25)
+    stiffness = force / length
+    base: Sequence[Uncertain] = _sdof_structure() if place.name == "sdof" else ()
+
+    def hypothesis(name: str, *elements: Element, own: Sequence[Uncertain]) -> Hypothesis:
+        beside = (
+            () if place.name == "sdof" else (place.element("linear", stiffness=3.5e4, damping=300.0),)
+        )
+        return Hypothesis(name, place.rig(*beside, *elements), (*base, *own))
+
+    def scaled(name: str, low: float, high: float, unit: float) -> Uncertain:
+        return Uncertain(name, low * unit, high * unit)
+
+    if pair == "gap_cubic":
+        first = hypothesis(
+            "gap",
+            place.element("gap"),
+            own=(
+                scaled("gap.stiffness", 300.0, 1500.0, stiffness),
+                scaled("gap.clearance", 5e-3, 20e-3, length),
+            ),
+        )
+        second = hypothesis(
+            "cubic_stiffness",
+            place.element("cubic_stiffness"),
+            own=(scaled("cubic_stiffness.k3", 5e4, 2e6, stiffness / length**2),),
+        )
+    elif pair == "presliding_bouc_wen":
+        first = hypothesis(
+            "jenkins",
+            place.element("jenkins", transition=0.2),
+            own=(
+                scaled("jenkins.stiffness", 50.0, 300.0, stiffness),
+                scaled("jenkins.limit", 0.2, 1.5, force),
+            ),
+        )
+        second = hypothesis(
+            "bouc_wen",
+            place.element("bouc_wen"),
+            own=(
+                scaled("bouc_wen.A", 50.0, 300.0, stiffness),
+                scaled("bouc_wen.beta", 50.0, 250.0, 1.0 / length),
+                scaled("bouc_wen.gamma", 20.0, 120.0, 1.0 / length),
+            ),
+        )
+    elif pair == "coulomb_stribeck":
+        slow = {"regularisation_velocity": 5e-3 * length}
+        first = hypothesis(
+            "coulomb", place.element("coulomb", **slow), own=(scaled("coulomb.limit", 0.1, 1.0, force),)
+        )
+        second = hypothesis(
+            "stribeck",
+            place.element("stribeck", **slow),
+            own=(
+                scaled("stribeck.limit", 0.1, 0.8, force),
+                Uncertain("stribeck.boost", 0.1, 0.8),
+                scaled("stribeck.stribeck_velocity", 0.03, 0.2, length),
+            ),
+        )
+    else:
+        first = hypothesis(
+            "gap",
+            place.element("gap"),
+            own=(
+                scaled("gap.stiffness", 300.0, 1500.0, stiffness),
+                scaled("gap.clearance", 5e-3, 20e-3, length),
+            ),
+        )
+        second = hypothesis(
+            "gap_coupling",
+            place.element("gap_coupling", "axial", "torsional"),
+            own=(
+                Uncertain("gap_coupling.c_axial", 3e3, 9e4),
+                Uncertain("gap_coupling.c_torsional", 70.0, 2300.0),
+                Uncertain("gap_coupling.clearance_axial", 1e-3, 5e-3),
+                Uncertain("gap_coupling.clearance_torsional", 0.05, 0.25),
+            ),
+        )
+    return Rivals(pair, first, second)
