@@ -87,9 +87,9 @@ class _Place:
 
     def rig(self, *elements: Element) -> Rig:
         if self.name == "sdof":
-            return sdof_rig(*elements, mass=2.0, stiffness=300.0, damping=1.5, timestep=5e-3)
+            return sdof_rig(*elements, mass=2.0, stiffness=300.0, damping=1.5, timestep=1e-2)
         soft = {"axial_1": 300.0, "axial_2": 300.0, "torsional_1": 0.2, "torsional_2": 0.2}
-        return joint_rig(*elements, timestep=2.5e-3).with_structure(damping=soft)
+        return joint_rig(*elements, timestep=5e-3).with_structure(damping=soft)
 
     def element(self, law: str, *joints: str, **parameters: float) -> Element:
         return Element.of(law, *(joints or (self.joint,)), name=law, **parameters)
@@ -121,7 +121,7 @@ def _sdof_hypothesis(place: _Place, law: str) -> Hypothesis:
         ),
         "coulomb": (Uncertain("coulomb.limit", 0.1, 1.0),),
     }[law]
-    fixed = {"coulomb": {"regularisation_velocity": 5e-3}}.get(law, {})
+    fixed = {"coulomb": {"regularisation_velocity": 2e-2}}.get(law, {})
     return Hypothesis(law, place.rig(place.element(law, **fixed)), (*_sdof_structure(), *own))
 
 
@@ -149,12 +149,12 @@ def joint_setup(n_draws: int = 4) -> Setup:
     place = _Place("joint")
     law = "axial_torsional_joint"
     parameters = (
-        Uncertain(f"{law}.k_gap_axial", 1e5, 6e5),
+        Uncertain(f"{law}.k_gap_axial", 5e4, 3e5),
         Uncertain(f"{law}.clearance_axial", 2e-3, 8e-3),
         Uncertain(f"{law}.c_coupling_axial", 3e3, 9e4),
-        Uncertain(f"{law}.k_gap_torsional", 70.0, 400.0),
+        Uncertain(f"{law}.k_gap_torsional", 35.0, 200.0),
         Uncertain(f"{law}.clearance_torsional", 0.08, 0.32),
-        Uncertain(f"{law}.c_coupling_torsional", 70.0, 2300.0),
+        Uncertain(f"{law}.c_coupling_torsional", 50.0, 1000.0),
     )
     rig = place.rig(place.element(law, "axial", "torsional"))
     return _identification(place, RigPrior((Hypothesis(law, rig, parameters),)), n_draws)
@@ -263,7 +263,7 @@ def _rivals(place: _Place, pair: str) -> Rivals:
             ),
         )
     elif pair == "coulomb_stribeck":
-        slow = {"regularisation_velocity": 5e-3 * length}
+        slow = {"regularisation_velocity": 2e-2 * length}
         first = hypothesis(
             "coulomb", place.element("coulomb", **slow), own=(scaled("coulomb.limit", 0.1, 1.0, force),)
         )
@@ -290,7 +290,7 @@ def _rivals(place: _Place, pair: str) -> Rivals:
             place.element("gap_coupling", "axial", "torsional"),
             own=(
                 Uncertain("gap_coupling.c_axial", 3e3, 9e4),
-                Uncertain("gap_coupling.c_torsional", 70.0, 2300.0),
+                Uncertain("gap_coupling.c_torsional", 50.0, 1000.0),
                 Uncertain("gap_coupling.clearance_axial", 1e-3, 5e-3),
                 Uncertain("gap_coupling.clearance_torsional", 0.05, 0.25),
             ),

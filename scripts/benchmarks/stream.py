@@ -12,7 +12,6 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from benchmarks.timing import Row, interleave, ratio_row
 from numpy.typing import NDArray
 
 from bench.identification.adaptive import AdaptiveHistory, AdaptiveLeastSquares
@@ -23,6 +22,7 @@ from bench.identification.regressors import (
     polynomial_model,
     sdof_model,
 )
+from benchmarks.timing import Row, interleave, ratio_row
 
 N_WHOLE = 60_000  # a minute: start-up of a run and cold memory then count as they do in use
 N_SINGLE = 10_000
