@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.errors import ParameterError, UnknownNameError
-from bench.excitation import Contrast, Draw, Ensemble, RigPrior, Rivals, expected_log_bayes_factor, log_det
+from bench.excitation import Contrast, Draw, Ensemble, RigPrior, Rivals, expected_log_bayes_factor
 from bench.excitation.bayes_factor import accumulate_contrast
 from bench.excitation.experiment import fan
 from bench.excitation.information import STEP, accumulate, misfit, noise_vector
@@ -150,6 +150,8 @@ class Benches:
         self._states = np.zeros((n, panel.members.shape[1], panel.ensemble.n_states))
         self._fisher, self._score = np.zeros((n, draws, p, p)), np.zeros((n, draws, p))
         self._square = np.zeros((n, draws))
+        # The sensors' noise of an episode and, last, of the rest before it: drawn at once, which is faster.
+        self._disturbance = np.zeros((n, self.n_windows + 1, self.n_steps, len(self.channels)))
         self._contrast = Contrast.zeros(n, draws // 2, parameters=p) if self._rivals else None
         self._values = np.zeros((n, draws // 2 if self._rivals else draws))
 
@@ -171,14 +173,13 @@ class Benches:
             rngs: Generators of all benches; only those of `places` are drawn from.
         """
         panel = _panel(self.setup, self.threads)
-        measured = np.empty((len(places), self.n_steps, len(self.channels)))
-        for row, place in enumerate(places):
+        for place in places:
             rng = rngs[place]
             self.question[place] = rng.integers(len(self.setup.questions))
             question = self.setup.questions[self.question[place]]
             self.truth[place] = (question if isinstance(question, RigPrior) else question.prior).draw(rng)
             self._laboratories.install(int(place), self.truth[place])
-            measured[row] = self._noise * rng.standard_normal(measured.shape[1:])
+            rng.standard_normal(out=self._disturbance[place])
         self.shaping.begin(places)
         for array in (self._window, self._energy, self._peak, self._merit, self._fisher, self._score, self._square, self._values):
             array[places] = 0.0
@@ -186,25 +187,22 @@ class Benches:
             array[places] = 0.0
         self._states[places] = panel.ensemble.start(panel.members[self.question[places]])
         m = len(places)
+        measured = self._noise * self._disturbance[places, -1]
         return self._observe(
             places, measured, np.zeros((m, self.n_steps, len(self.actuators))), np.zeros((m, self.shaping.width))
         )
 
-    def step(
-        self, places: NDArray[np.int64], actions: NDArray, rngs: Sequence[np.random.Generator]
-    ) -> Outcome:
+    def step(self, places: NDArray[np.int64], actions: NDArray) -> Outcome:
         """Run the next window on some benches.
 
         Args:
             places: Benches, ascending ``(m,)``.
             actions: Actions ``(m, shaping.width)``; clipped to −1 … 1.
-            rngs: Generators of all benches.
         """
         actions = np.clip(np.asarray(actions, dtype=float).reshape(len(places), -1), -1.0, 1.0)
         commands, exhausted = self._commands(places, actions)
         ideal = self._laboratories.run(places, commands)
-        noise = np.stack([rngs[place].standard_normal(ideal.shape[1:]) for place in places])
-        measured = ideal + self._noise * noise
+        measured = ideal + self._noise * self._disturbance[places, self._window[places] % self.n_windows]
         reached = np.stack(
             [
                 np.max(np.abs(measured[:, :, columns]) / bounds, axis=(1, 2)) if columns else np.zeros(len(places))
@@ -270,6 +268,14 @@ class Benches:
         )
         weights = 1.0 / self._noise
         follow = self.options.average == "posterior"
+        values = np.zeros(counts.shape)
+        if follow or not self._rivals:
+            panel.ensemble.spread(
+                lambda a, b: accumulate(
+                    a, b, outputs, counts, STEP, weights, measured, fisher, score, square, values
+                ),
+                m,
+            )
         if self._rivals:
             sums = Contrast(*contrast)
             pairs = counts.reshape(m, -1, 2)
@@ -278,12 +284,6 @@ class Benches:
                 lambda a, b: accumulate_contrast(a, b, outputs, at, pairs, STEP, weights, sums), m
             )
             values = np.log1p(np.maximum(expected_log_bayes_factor(sums), 0.0))
-        if follow or not self._rivals:
-            panel.ensemble.spread(
-                lambda a, b: accumulate(a, b, outputs, counts, STEP, weights, measured, fisher, score, square), m
-            )
-        if not self._rivals:
-            values = log_det(fisher)
         if not whole:
             for book, part in zip(books, (states, fisher, score, square, *contrast), strict=True):
                 book[places] = part
@@ -332,6 +332,13 @@ class Benches:
         if self._rivals:
             parts.append(np.eye(len(self.setup.questions))[self.question[places]])
         return np.clip(np.concatenate(parts, axis=1), -1.0, 1.0).astype(np.float32)
+
+    def effective_draws(self, places: NDArray[np.int64]) -> NDArray[np.float64]:
+        """One over the sum of the squared prior weights of the draws (of the pairs, for rivals) ``(m,)``."""
+        weights = _panel(self.setup, self.threads).weights[self.question[places]]
+        if self._rivals:
+            weights = weights.reshape(len(places), -1, 2).sum(axis=2)
+        return 1.0 / np.sum(weights**2, axis=1)
 
     def positions(self, place: int) -> NDArray[np.float64]:
         """Joint positions of a bench's rig, to be looked at."""

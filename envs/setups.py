@@ -40,6 +40,7 @@ class Setup:
         band: Frequencies excited [Hz].
         window: Default duration of a window [s].
         duration: Default duration of an episode [s].
+        recipe: Function of this module and its arguments that make this setup; it travels in place of the setup.
     """
 
     questions: tuple[RigPrior, ...] | tuple[Rivals, ...]
@@ -50,11 +51,19 @@ class Setup:
     band: tuple[float, float]
     window: float
     duration: float
+    recipe: tuple[str, tuple]
+
+    def __reduce__(self) -> tuple:
+        return (_made, self.recipe)
 
     @property
     def rig(self) -> Rig:
         """A rig of the laboratory, for its MJCF."""
         return self.experiments[0].rigs_drawn[0].hypothesis.rig
+
+
+def _made(name: str, arguments: tuple) -> Setup:
+    return {"sdof": sdof_setup, "joint": joint_setup, "discrimination": discrimination_setup}[name](*arguments)
 
 
 class _Place:
@@ -68,7 +77,7 @@ class _Place:
                 {"shaker": 2.0}, {"shaker": 10.0}, {"displacement": 0.04}, {"velocity": 0.6}
             )
             self.scale = {"displacement": 0.04, "velocity": 0.6, "acceleration_x": 10.0}
-            self.band, self.window, self.duration = (0.5, 5.0), 0.05, 8.0
+            self.band, self.window, self.duration = (0.5, 5.0), 0.04, 8.0
             self.joint = "carriage"
         else:
             self.noise = {
@@ -76,13 +85,13 @@ class _Place:
                 "displacement_1": 2e-4, "rotation_1": 8e-3,
             }  # fmt: skip
             self.limits = Limits(
-                {"force": 450.0, "torque": 12.0},
-                {"force": 3.0e5, "torque": 2.2e2},
+                {"force": 800.0, "torque": 16.0},
+                {"force": 8e5, "torque": 3.2e2},
                 {"axial": 0.015, "torsional": 0.6},
                 {"axial_velocity": 0.6, "torsional_velocity": 24.0},
             )
             self.scale = {**self.limits.watched, "displacement_1": 0.015, "rotation_1": 0.6}
-            self.band, self.window, self.duration = (1.5, 12.0), 0.025, 4.0
+            self.band, self.window, self.duration = (1.5, 12.0), 0.02, 4.0
             self.joint = "axial"
 
     def rig(self, *elements: Element) -> Rig:
@@ -137,7 +146,8 @@ def sdof_setup(laws: tuple[str, ...] = SDOF_LAWS, n_draws: int = 6) -> Setup:
         if law not in SDOF_LAWS:
             raise UnknownNameError("joint of the SDOF environment", law, SDOF_LAWS)
     place = _Place("sdof")
-    return _identification(place, RigPrior(tuple(_sdof_hypothesis(place, law) for law in laws)), n_draws)
+    prior = RigPrior(tuple(_sdof_hypothesis(place, law) for law in laws))
+    return _identification(place, prior, n_draws, ("sdof", (laws, n_draws)))
 
 
 @lru_cache(maxsize=4)
@@ -157,15 +167,20 @@ def joint_setup(n_draws: int = 4) -> Setup:
         Uncertain(f"{law}.c_coupling_torsional", 50.0, 1000.0),
     )
     rig = place.rig(place.element(law, "axial", "torsional"))
-    return _identification(place, RigPrior((Hypothesis(law, rig, parameters),)), n_draws)
+    return _identification(place, RigPrior((Hypothesis(law, rig, parameters),)), n_draws, ("joint", (n_draws,)))
 
 
-def _identification(place: _Place, prior: RigPrior, n_draws: int) -> Setup:
+def _identification(place: _Place, prior: RigPrior, n_draws: int, recipe: tuple[str, tuple]) -> Setup:
     draws = prior.draws(n_draws, np.random.default_rng(DRAWS_SEED))
-    return _setup(place, (prior,), (Experiment(prior, place.noise, place.limits, draws),))
+    return _setup(place, (prior,), (Experiment(prior, place.noise, place.limits, draws),), recipe)
 
 
-def _setup(place: _Place, questions, experiments: tuple[Experiment, ...]) -> Setup:
+def _setup(
+    place: _Place,
+    questions: tuple[RigPrior, ...] | tuple[Rivals, ...],
+    experiments: tuple[Experiment, ...],
+    recipe: tuple[str, tuple],
+) -> Setup:
     return Setup(
         questions,
         experiments,
@@ -175,6 +190,7 @@ def _setup(place: _Place, questions, experiments: tuple[Experiment, ...]) -> Set
         place.band,
         place.window,
         place.duration,
+        recipe,
     )
 
 
@@ -195,7 +211,8 @@ def discrimination_setup(rig: str = "joint", pairs: tuple[str, ...] = PAIRS, n_d
             raise UnknownNameError(f"pair of effects on rig '{rig}'", pair, known)
     place = _Place(rig)
     questions = tuple(_rivals(place, pair) for pair in pairs)
-    return _setup(place, questions, tuple(_rival_experiment(place, item, n_draws) for item in questions))
+    experiments = tuple(_rival_experiment(place, item, n_draws) for item in questions)
+    return _setup(place, questions, experiments, ("discrimination", (rig, pairs, n_draws)))
 
 
 def _rival_experiment(place: _Place, rivals: Rivals, n_draws: int) -> Experiment:
@@ -219,6 +236,7 @@ def _rivals(place: _Place, pair: str) -> Rivals:
     # Forces and lengths of the joint rig stand to those of the SDOF rig as its axial contact to the other's.
     force, length = (1.0, 1.0) if place.name == "sdof" else (250.0, 0.25)
     stiffness = force / length
+    contact = stiffness if place.name == "sdof" else 0.2 * stiffness  # stiffer ones outrun the time step
     base: Sequence[Uncertain] = _sdof_structure() if place.name == "sdof" else ()
 
     def hypothesis(name: str, *elements: Element, own: Sequence[Uncertain]) -> Hypothesis:
@@ -235,7 +253,7 @@ def _rivals(place: _Place, pair: str) -> Rivals:
             "gap",
             place.element("gap"),
             own=(
-                scaled("gap.stiffness", 300.0, 1500.0, stiffness),
+                scaled("gap.stiffness", 300.0, 1500.0, contact),
                 scaled("gap.clearance", 5e-3, 20e-3, length),
             ),
         )
@@ -281,7 +299,7 @@ def _rivals(place: _Place, pair: str) -> Rivals:
             "gap",
             place.element("gap"),
             own=(
-                scaled("gap.stiffness", 300.0, 1500.0, stiffness),
+                scaled("gap.stiffness", 300.0, 1500.0, contact),
                 scaled("gap.clearance", 5e-3, 20e-3, length),
             ),
         )

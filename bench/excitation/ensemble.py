@@ -12,6 +12,7 @@ a population, the environments of a vector environment) drives the members of on
 from __future__ import annotations
 
 import os
+from collections import OrderedDict
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -23,13 +24,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.errors import ModelError, ParameterError, UnknownNameError
-from bench.excitation.linear_structure import linear_structure
+from bench.excitation.linear_structure import LinearStructure, linear_structure
 from bench.laws.base import MAX_COORDINATES
 from bench.laws.calling import advance, call_kernel, load_int, pointer_at
+from bench.native import Coordinate
 from bench.rig import Rig
 
 CASES_A_THREAD = 4
 """Fewest cases for which another thread is worth its start of some 20 µs."""
+
+STRUCTURES_KEPT = 256
 
 MOTION, UNDRIVEN = -1, -2
 """Marks of a law's coordinate that is a motion, or an input that gets no command."""
@@ -291,6 +295,20 @@ class Ensemble:
         return (Ensemble, (self.rigs, self.channels, self.actuators, self.threads))  # addresses of kernels hold in one process
 
 
+_structures: OrderedDict[tuple, LinearStructure] = OrderedDict()
+
+
+def _structure_of(rig: Rig, channels: tuple[str, ...]) -> LinearStructure:
+    """The linear structure, which the elements have no part in; the last ones asked for are kept."""
+    key = (rig.mjcf, rig.folder, rig.structure, rig.integrator, channels)
+    if any(element.exact for element in rig.elements) or key not in _structures:
+        _structures[key] = linear_structure(rig, channels)
+    _structures.move_to_end(key)
+    while len(_structures) > STRUCTURES_KEPT:
+        _structures.popitem(last=False)
+    return _structures[key]
+
+
 def _pack(rigs: Sequence[Rig], channels: tuple[str, ...], actuators: tuple[str, ...]) -> Packed:
     nv = rigs[0].model.nv
     driven = [rigs[0].actuators.index(name) for name in actuators]
@@ -309,19 +327,20 @@ def _pack(rigs: Sequence[Rig], channels: tuple[str, ...], actuators: tuple[str, 
         np.zeros((*shape, width)),
         np.zeros((len(rigs), 2 * nv + states)),
     )
-    known: dict[tuple, tuple[NDArray, NDArray]] = {}
+    layouts: dict[tuple, list[tuple[Coordinate, ...]]] = {}
     for d, rig in enumerate(rigs):
-        key = (rig.mjcf, rig.structure)
-        if key not in known:  # the structure does not depend on the elements' parameters
-            known[key] = linear_structure(rig, channels)
-        p.acceleration[d], p.sensors[d] = known[key]
+        p.acceleration[d], p.sensors[d] = _structure_of(rig, channels)
+        layout = tuple((element.joints, element.inputs) for element in rig.elements)
+        key = (rig.mjcf, layout)
+        if key not in layouts:  # a rig that differs in parameters only need not be compiled
+            layouts[key] = [item.coordinates for item in rig.built.placed]
         first = 0
-        for k, item in enumerate(rig.built.placed):
-            law = item.element.law
+        for k, (element, where) in enumerate(zip(rig.elements, layouts[key], strict=True)):
+            law = element.law
             p.kernels[d, k] = law.force.address, law.rate.address if law.rate is not None else 0
             p.sizes[d, k] = law.n_coordinates, len(law.states), first
-            p.theta[d, k, : len(item.element.theta)] = item.element.theta
-            for j, coordinate in enumerate(item.coordinates):
+            p.theta[d, k, : len(element.theta)] = element.theta
+            for j, coordinate in enumerate(where):
                 if coordinate.is_input:
                     p.inputs[d, k, j] = _place(driven, coordinate.terms[0][0])
                 else:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from bench.errors import ParameterError
 from bench.excitation.bayes_factor import Contrast, accumulate_contrast, expected_log_bayes_factor
 from bench.excitation.ensemble import Ensemble
-from bench.excitation.information import STEP, accumulate, log_det, noise_vector
+from bench.excitation.information import STEP, accumulate, noise_vector
 from bench.excitation.limits import Limits, motion_ratio
 from bench.excitation.prior import Draw, RigPrior
 from bench.excitation.rivals import RivalDraws, Rivals
@@ -59,6 +59,9 @@ class Experiment:
         object.__setattr__(self, "draws", tuple(self.draws))
         if not self.draws:
             raise ParameterError("an experiment is weighed on draws of its prior; none came")
+
+    def __reduce__(self) -> tuple:
+        return (Experiment, (self.question, dict(self.noise), self.limits, self.draws, self.threads))
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -113,13 +116,14 @@ class Experiment:
             many = np.tile(counts, (n, 1))
             fisher, score = np.zeros((n, len(counts), p, p)), np.zeros((n, len(counts), p))
             square, measured = np.zeros((n, len(counts))), np.zeros((n, *outputs.shape[2:]))
+            values = np.zeros((n, len(counts)))
             ensemble.spread(
                 lambda a, b: accumulate(
-                    a, b, outputs, many, STEP, weights, measured, fisher, score, square
+                    a, b, outputs, many, STEP, weights, measured, fisher, score, square, values
                 ),
                 n,
             )  # fmt: skip
-            return log_det(fisher) @ self.question.draw_weights(self.rigs_drawn)
+            return values @ self.question.draw_weights(self.rigs_drawn)
         pairs = len(self.draws)
         contrast = Contrast.zeros(n, pairs, parameters=p)
         at = np.tile(places.reshape(pairs, 2), (n, 1, 1))

@@ -156,7 +156,24 @@ def directions(information: NDArray[np.float64], *, threshold: float = 1.0) -> D
 
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
-def accumulate(first, last, outputs, counts, step, weights, measured, fisher, score, square):
+def _log_det(fisher, p, triangle):
+    """``log det(I + F)`` of the leading p rows, by Cholesky's decomposition, into the scratch `triangle`."""
+    total = 0.0
+    for j in range(p):
+        for i in range(j, p):
+            value = fisher[i, j] + (1.0 if i == j else 0.0)
+            for k in range(j):
+                value -= triangle[i, k] * triangle[j, k]
+            if i == j:
+                triangle[j, j] = np.sqrt(max(value, 1.0))  # never below one but by rounding
+                total += 2.0 * np.log(triangle[j, j])
+            else:
+                triangle[i, j] = value / triangle[j, j]
+    return total
+
+
+@numba.njit(cache=True, error_model="numpy", nogil=True)
+def accumulate(first, last, outputs, counts, step, weights, measured, fisher, score, square, values):
     """Add the information of records of perturbed rigs to running sums, for the cases ``first … last − 1``.
 
     Args:
@@ -171,9 +188,11 @@ def accumulate(first, last, outputs, counts, step, weights, measured, fisher, sc
         fisher: ``sum J'J`` ``(n_cases, n_draws, p, p)``, added to.
         score: ``sum J'r`` with the residual r = measured − drawn ``(n_cases, n_draws, p)``, added to.
         square: ``sum r'r`` ``(n_cases, n_draws)``, added to.
+        values: ``log det(I + F)`` ``(n_cases, n_draws)``, written.
     """
     p_max = fisher.shape[2]
     row = np.zeros(p_max)
+    triangle = np.zeros((p_max, p_max))
     for case in range(first, last):
         member = 0
         for draw in range(counts.shape[1]):
@@ -194,6 +213,7 @@ def accumulate(first, last, outputs, counts, step, weights, measured, fisher, sc
             for j in range(p):
                 for k in range(j):
                     fisher[case, draw, k, j] = fisher[case, draw, j, k]
+            values[case, draw] = _log_det(fisher[case, draw], p, triangle)
             member += 1 + p
 
 

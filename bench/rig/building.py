@@ -100,6 +100,16 @@ def specify(rig: Rig, built: Built | None = None) -> mujoco.MjSpec:
     return spec
 
 
+def _leave_out_drawings(spec: mujoco.MjSpec) -> None:
+    """Have MuJoCo keep what moves, collides or is sensed, and nothing that is only drawn: half the time of a step."""
+    spec.compiler.discardvisual = True
+    spec.compiler.fusestatic = True
+    sensed = {int(kind) for sensor in spec.sensors for kind in (sensor.objtype, sensor.reftype)}
+    seen = [] if int(mujoco.mjtObj.mjOBJ_CAMERA) in sensed else list(spec.cameras)
+    for drawing in [*spec.lights, *seen]:
+        spec.delete(drawing)
+
+
 def _set_exact_friction(spec: mujoco.MjSpec, element: Element) -> None:
     target = spec.joint(element.joints[0]) or spec.tendon(element.joints[0])
     if target is None:
@@ -128,9 +138,8 @@ def build(rig: Rig, *, drawings: bool = False) -> Built:
     """Compile a rig, with or without what is only drawn; see `Rig.built` for what it raises."""
     native.install()
     spec = specify(rig)
-    spec.compiler.discardvisual = (
-        not drawings
-    )  # MuJoCo keeps what moves, collides or is sensed: a third less a step
+    if not drawings:
+        _leave_out_drawings(spec)
     own = tuple(actuator.name for actuator in spec.actuators if not actuator.name.startswith(native.PREFIX))
     for name in own:
         if not name:

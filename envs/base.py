@@ -1,0 +1,74 @@
+"""What the single and the vector environments share: spaces, arguments and the benches behind them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+
+from envs.benches import FLOATS, Benches, Options
+from envs.setups import PAIRS, SDOF_LAWS, Setup, discrimination_setup, joint_setup, sdof_setup
+
+RENDER_MODES = ("rgb_array", "human")
+
+_OPTIONS = tuple(Options.__dataclass_fields__)
+
+
+def setup_of(kind: str, arguments: dict[str, Any]) -> Setup:
+    """The setup of an environment from its arguments; takes those that concern it out of `arguments`.
+
+    Args:
+        kind: "sdof", "joint" or "discrimination".
+        arguments: Keyword arguments of the environment.
+    """
+    if kind == "sdof":
+        laws = tuple(arguments.pop("laws", SDOF_LAWS))
+        return sdof_setup(laws, arguments.pop("n_draws", 2 * len(laws)))
+    if kind == "joint":
+        return joint_setup(arguments.pop("n_draws", 4))
+    rig = arguments.pop("rig", "joint")
+    pairs = tuple(arguments.pop("pairs", PAIRS if rig == "joint" else PAIRS[:-1]))
+    return discrimination_setup(rig, pairs, arguments.pop("n_draws", 4))
+
+
+def make_benches(kind: str, n: int, threads: int, arguments: dict[str, Any]) -> Benches:
+    """Benches for an environment with given arguments.
+
+    Raises:
+        TypeError: An argument is unknown.
+        BenchError: An argument has a value outside its range.
+    """
+    rest = dict(arguments)
+    setup = setup_of(kind, rest)
+    unknown = sorted(set(rest) - set(_OPTIONS))
+    if unknown:
+        raise TypeError(
+            f"unknown argument(s) {unknown} of a JointBench environment; known: {', '.join(_OPTIONS)}"
+        )
+    return Benches(setup, Options(**rest), n, threads)
+
+
+def observation_space(benches: Benches) -> spaces.Box:
+    """Box of a bench's observations."""
+    return spaces.Box(-1.0, 1.0, (benches.n_observations,), np.float32)
+
+
+def action_space(benches: Benches) -> spaces.Box:
+    """Box of a bench's actions."""
+    return spaces.Box(-1.0, 1.0, (benches.shaping.width,), np.float32)
+
+
+def info_of(info: dict[str, Any], row: int) -> dict[str, float | bool]:
+    """One bench's `info`, in Python floats and bools."""
+    entries: dict[str, float | bool] = {name: float(info[name][row]) for name in FLOATS}
+    entries["violation"] = bool(info["violation"][row])
+    return entries
+
+
+def rest_info(benches: Benches, places: np.ndarray) -> dict[str, np.ndarray]:
+    """`info` of benches that were just reset."""
+    info = {name: np.zeros(len(places)) for name in FLOATS}
+    info["effective_draws"] = benches.effective_draws(places)
+    info["violation"] = np.zeros(len(places), dtype=bool)
+    return info

@@ -1,0 +1,393 @@
+"""Identification against the tools people would otherwise take: torch, scikit-learn, mujoco.sysid, and the bare disk.
+
+Every comparison is to equal error: the error wanted is fixed, each side runs until it has it, and what it reached stands
+in the row's detail. A peer that does not get there within its time cap counts with the cap, and the row's name says so: the
+ratio is then a lower bound.
+"""
+
+from __future__ import annotations
+
+import copy
+import os
+import tempfile
+import time
+import warnings
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
+
+from bench import Element, Recording, Rig, joint_rig, sdof_rig, simulate, write_recording
+from bench.demo.joint import laboratory_view, training_records
+from bench.identification.linear_rig import address
+from bench.identification.network import fit_network
+from bench.identification.output_error import OutputErrorModel, fit_output_error
+from bench.identification.polynomial import fit_polynomial
+from bench.signals import BandLimitedNoise, Excitation
+from benchmarks.timing import Row, interleave, ratio_row
+
+Array = NDArray[np.float64]
+
+THIN = 30
+"""Every so many samples of the joint's three records are trained on: a training then takes a fraction of a second."""
+N_HIDDEN = 15
+TARGET = 2.0
+"""Normalised mean-square error that every training goes on to [%]."""
+CAP = 10.0
+"""Seconds after which a peer's training ends."""
+SEED = 2
+
+
+class _Training:
+    """The joint's data, scaled to ±1 as every side takes them."""
+
+    def __init__(self) -> None:
+        data = laboratory_view(training_records(), joint_rig())
+        self.states, self.forces = data.states[::THIN], data.forces[::THIN]
+        self.inputs, self.outputs = (_scaled(part) for part in (self.states, self.forces))
+        self.spread = float(np.sum(np.var(self.outputs, axis=0)))
+        self.reached: dict[str, float] = {}
+
+    def percent(self, estimated: Array) -> float:
+        """Normalised mean-square error [%]."""
+        return 100.0 * float(np.sum(np.mean((estimated - self.outputs) ** 2, axis=0))) / self.spread
+
+    def ours(self) -> None:
+        """`fit_network`, one start, without prior, on all samples: the same problem as the peers'."""
+        model = fit_network(
+            self.states,
+            self.forces,
+            rng=np.random.default_rng(SEED),
+            n_hidden=N_HIDDEN,
+            n_restarts=1,
+            n_stages=1,
+            max_samples=None,
+            max_iterations=1000,
+            tolerance=TARGET,
+            regularise=False,
+            validation_fraction=0.0,
+        )
+        low, high = self.forces.min(axis=0), self.forces.max(axis=0)
+        self.reached["ours"] = self.percent((2.0 * model.predict(self.states) - low - high) / (high - low))
+
+    def torch(self, name: str) -> None:
+        """Full-batch training by Adam (the quickest of its usual rates here) or L-BFGS with line search."""
+        import torch
+
+        torch.set_num_threads(1)  # of 1 and 2 the quicker one by far for matrices of this size
+        torch.manual_seed(SEED)
+        net = torch.nn.Sequential(
+            torch.nn.Linear(4, N_HIDDEN), torch.nn.Tanh(), torch.nn.Linear(N_HIDDEN, 2)
+        ).double()
+        inputs, outputs = torch.from_numpy(self.inputs), torch.from_numpy(self.outputs)
+
+        def loss() -> Any:
+            return ((net(inputs) - outputs) ** 2).mean(0).sum() * (100.0 / self.spread)
+
+        def closure() -> Any:
+            optimiser.zero_grad()
+            value = loss()
+            value.backward()
+            return value
+
+        optimiser: Any = (
+            torch.optim.Adam(net.parameters(), lr=1e-2)
+            if name == "Adam"
+            else torch.optim.LBFGS(
+                net.parameters(),
+                max_iter=20,
+                history_size=50,
+                line_search_fn="strong_wolfe",
+                tolerance_grad=1e-14,
+                tolerance_change=1e-16,
+            )
+        )
+        begun = time.perf_counter()
+        while True:
+            value = float(optimiser.step(closure))  # of before the step: at worst one step too many
+            if value <= TARGET or time.perf_counter() - begun > CAP:
+                break
+        self.reached[f"torch {name}"] = value
+
+    def scikit_learn(self, iterations: int) -> float:
+        """scikit-learn's L-BFGS, told how many iterations it will need."""
+        from sklearn.neural_network import MLPRegressor
+
+        model = MLPRegressor(
+            hidden_layer_sizes=(N_HIDDEN,),
+            activation="tanh",
+            solver="lbfgs",
+            alpha=0.0,
+            max_iter=iterations,
+            max_fun=10**9,
+            tol=1e-12,
+            random_state=SEED,
+        )
+        with threadpool_limits(1), warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # that it has not converged is the point of max_iter
+            model.fit(self.inputs, self.outputs)
+            self.reached["scikit-learn"] = self.percent(model.predict(self.inputs))
+        return self.reached["scikit-learn"]
+
+    def iterations_of_scikit_learn(self) -> int:
+        """Fewest iterations, to a tenth, that reach the target within the cap; those of the cap where none does."""
+        iterations = 100
+        while True:
+            begun = time.perf_counter()
+            error = self.scikit_learn(iterations)
+            if error <= TARGET or time.perf_counter() - begun > CAP / 1.5:
+                return iterations
+            iterations = int(1.1 * iterations)
+
+
+def _scaled(columns: Array) -> Array:
+    low, high = columns.min(axis=0), columns.max(axis=0)
+    return np.ascontiguousarray((2.0 * columns - low - high) / (high - low))
+
+
+def _networks(repeats: int) -> list[Row]:
+    training = _Training()
+    iterations = training.iterations_of_scikit_learn()
+    peers: dict[str, Callable[[], Any]] = {
+        "torch Adam": partial(training.torch, "Adam"),
+        "torch L-BFGS": partial(training.torch, "L-BFGS"),
+        "scikit-learn": partial(training.scikit_learn, iterations),
+    }
+    seconds = interleave({"ours": training.ours, **peers}, max(3, repeats // 5))
+    rows = []
+    for name in peers:
+        short = training.reached[name] > TARGET
+        rows.append(
+            ratio_row(
+                f"network training against {name}{f' (not there after {CAP:g} s: lower bound)' if short else ''}",
+                seconds["ours"],
+                seconds[name],
+                limit="≥ 1",
+                meaning=f"peer's seconds to an NMSE of {TARGET:g} % / ours, {N_HIDDEN} tanh units, "
+                f"{len(training.states)} samples",
+                detail={"our_nmse": training.reached["ours"], "peer_nmse": training.reached[name]},
+            )
+        )
+    return rows
+
+
+def _polynomials(repeats: int) -> list[Row]:
+    """The same 35 terms on both sides: total degree 3 in four states."""
+    from sklearn.linear_model import LinearRegression
+    from sklearn.pipeline import make_pipeline
+    from sklearn.preprocessing import MinMaxScaler, PolynomialFeatures
+
+    data = laboratory_view(training_records(), joint_rig())
+    reached: dict[str, float] = {}
+
+    def ours() -> None:
+        model = fit_polynomial(data.states, data.forces, orders=3, kind="total")
+        reached["our_nmse"] = float(np.mean(model.report.nmse))
+
+    def peer() -> None:
+        model = make_pipeline(
+            MinMaxScaler((-1.0, 1.0)), PolynomialFeatures(3, include_bias=False), LinearRegression()
+        )
+        with threadpool_limits(1):
+            estimated = model.fit(data.states, data.forces).predict(data.states)
+        spread = np.var(data.forces, axis=0)
+        reached["peer_nmse"] = float(
+            100.0 * np.mean(np.mean((estimated - data.forces) ** 2, axis=0) / spread)
+        )
+
+    seconds = interleave({"ours": ours, "peer": peer}, repeats)
+    if not np.isclose(reached["our_nmse"], reached["peer_nmse"], rtol=1e-6):
+        raise RuntimeError(f"the polynomial fits do not agree: {reached}")
+    return [
+        ratio_row(
+            "polynomial fit against scikit-learn",
+            seconds["ours"],
+            seconds["peer"],
+            limit="≥ 1",
+            meaning=f"seconds of PolynomialFeatures + LinearRegression, error included / ours, {len(data.states)} samples",
+            detail=reached,
+        )
+    ]
+
+
+def _disk(repeats: int) -> list[Row]:
+    rng = np.random.default_rng(5)
+    rig = joint_rig()
+    drive = {name: level * rng.standard_normal(30_000) for name, level in (("force", 4e3), ("torque", 1e2))}
+    recording = simulate(rig, drive)
+    with tempfile.TemporaryDirectory(dir=os.environ.get("TMPDIR")) as folder:
+        ours, peer = Path(folder) / "record.parquet", Path(folder) / "record.npy"
+        table = np.column_stack([recording.time, recording.values])
+
+        def raw() -> None:
+            with peer.open("wb") as file:
+                np.save(file, table)
+                file.flush()
+                os.fsync(file.fileno())
+
+        seconds = interleave({"ours": lambda: write_recording(ours, recording), "peer": raw}, repeats)
+        sizes = {"our_bytes": ours.stat().st_size, "peer_bytes": peer.stat().st_size}
+    return [
+        ratio_row(
+            "Parquet writing of a recording against raw disk",
+            seconds["ours"],
+            seconds["peer"],
+            meaning="seconds of np.save and fsync of the same numbers / ours, compressed and checked",
+            detail=sizes,
+        )
+    ]
+
+
+NOISE = {"displacement": 1e-4, "velocity": 3e-3}
+FREE = (
+    "structure/mass/carriage",
+    "structure/damping/carriage",
+    "structure/stiffness/carriage",
+    "joint/A",
+    "joint/beta",
+    "joint/gamma",
+    "joint/n",
+)
+
+
+def _rig(mass: float, damping: float, stiffness: float, **bouc_wen: float) -> Rig:
+    joint = Element.of("bouc_wen", "carriage", name="joint", **bouc_wen)
+    return sdof_rig(joint, mass=mass, damping=damping, stiffness=stiffness)
+
+
+def _record(rng: np.random.Generator) -> Recording:
+    """20 s at 1 kHz of a Bouc-Wen joint that yields at 5 mm, moved to four times that, with noise."""
+    true = _rig(2.0, 4.0, 1500.0, A=2000.0, beta=40.0, gamma=23.0, n=1.5)
+    noise = BandLimitedNoise(cutoff=12.0, peak=60.0)
+    clean = simulate(true, Excitation({"shaker": noise}, duration=20.0, sample_rate=1000.0), rng=rng)
+    noisy = {name: clean[name] + std * rng.standard_normal(len(clean)) for name, std in NOISE.items()}
+    return clean.with_channels(noisy, noise_std=NOISE).select(["shaker", *NOISE])
+
+
+class _Sysid:
+    """The same fit by `mujoco.sysid`, given every help.
+
+    It gets our native callback (a Python one would be slower by an order of magnitude), a model builder that writes into
+    a copy of the compiled model (its own recompiles the MJCF for every parameter vector), parameters scaled to their start,
+    and the residual without resampling.
+    """
+
+    def __init__(self, start: Rig, record: Recording) -> None:
+        from mujoco import sysid
+
+        self.sysid, self.start, self.record = sysid, start, record
+        self.addresses = [address(start, name) for name in FREE]
+        self.values = np.array([np.ravel(getattr(start.model, a.field)[a.index])[0] for a in self.addresses])
+        model = start.model
+        steps = np.arange(len(record) + 1) * start.timestep
+        controls = np.zeros((len(steps), model.nu))
+        controls[:-1, start.actuators.index("shaker")] = record["shaker"]
+        sensors = np.zeros((len(record), model.nsensordata))
+        self.columns = [int(model.sensor(name).adr[0]) for name in NOISE]
+        self.weights = 1.0 / np.array(list(NOISE.values()))
+        self.measured = np.stack([record[name] for name in NOISE], axis=1)
+        rest = mujoco.MjData(model)
+        sequences = sysid.ModelSequences(
+            "sdof",
+            _Compiled(model),
+            "record",
+            sysid.create_initial_state(model, rest.qpos, rest.qvel, rest.act),
+            sysid.TimeSeries(steps, controls),
+            sysid.TimeSeries.from_names(steps[:-1], sensors, model),
+        )
+        self.residual = sysid.build_residual_fn(
+            models_sequences=[sequences],
+            build_model=self._build,
+            modify_residual=self._whitened,
+            resample_true=False,
+        )
+
+    def _build(self, parameters: Any, _spec: Any) -> mujoco.MjModel:
+        model = copy.copy(self.start.model)
+        for entry, scaled, value in zip(self.addresses, parameters.as_vector(), self.values, strict=True):
+            getattr(model, entry.field)[entry.index] = scaled * value
+        return model
+
+    def _whitened(self, _parameters: Any, predicted: Any, *_rest: Any, **_more: Any) -> Any:
+        return (predicted.data[:, self.columns] - self.measured) * self.weights, predicted, predicted
+
+    def fit(self, optimizer: str, **options: Any) -> float:
+        """Run it; return the cost reached, half the sum of squares."""
+        parameters = self.sysid.ParameterDict()
+        for name in FREE:
+            parameters.add(self.sysid.Parameter(name, 1.0, 0.2 if name != "joint/n" else 1.0 / 1.2, 5.0))
+        _, result = self.sysid.optimize(
+            parameters, self.residual, optimizer=optimizer, verbose=False, **options
+        )
+        residual = np.concatenate(self.residual(np.asarray(result.x), parameters)[0])
+        return 0.5 * float(residual @ residual)
+
+
+class _Compiled:
+    """Stands in for an MjSpec where only its compiled model is wanted."""
+
+    def __init__(self, model: mujoco.MjModel) -> None:
+        self.model = model
+
+    def compile(self) -> mujoco.MjModel:
+        """The compiled model."""
+        return self.model
+
+
+def _output_error(repeats: int) -> list[Row]:
+    record = _record(np.random.default_rng(20))
+    start = _rig(2.3, 6.0, 1200.0, A=2600.0, beta=55.0, gamma=15.0, n=1.2)
+    peer = _Sysid(start, record)
+    fits: list[OutputErrorModel] = []
+
+    def ours() -> None:
+        fits.append(fit_output_error(start.with_(), [record], free=FREE, threads=2))
+
+    ours()
+    ways: dict[str, tuple[str, dict[str, Any]]] = {
+        "mujoco": ("mujoco", {}),
+        "mujoco, scaled": ("mujoco", {"x_scale": "jac"}),
+        "scipy_parallel_fd": ("scipy_parallel_fd", {}),
+        "scipy_parallel_fd, scaled": ("scipy_parallel_fd", {"x_scale": "jac"}),
+    }
+    tried: dict[str, tuple[float, float]] = {}
+    for label, (optimizer, options) in ways.items():
+        begun = time.perf_counter()
+        cost = peer.fit(optimizer, **options)
+        tried[label] = (time.perf_counter() - begun, cost)
+    wanted = fits[0].cost * (1.0 + 1e-6)  # a millionth of the cost is a hundredth of the cost's own spread
+    there = {label: seconds for label, (seconds, cost) in tried.items() if cost <= wanted}
+    best = (
+        min(there, key=lambda label: there[label]) if there else min(tried, key=lambda label: tried[label][1])
+    )
+    optimizer, options = ways[best]
+    seconds = interleave(
+        {"ours": ours, "peer": partial(peer.fit, optimizer, **options)}, max(3, repeats // 5)
+    )
+    return [
+        ratio_row(
+            f"output-error fit of Bouc-Wen and m, c, k against mujoco.sysid ({best}"
+            + ("" if there else "; never to the same cost: lower bound")
+            + ")",
+            seconds["ours"],
+            seconds["peer"],
+            limit="≥ 10",
+            meaning="seconds of mujoco.sysid with native callbacks / ours, 7 parameters, 20 s at 1 kHz, same cost",
+            detail={
+                "our_cost": fits[0].cost,
+                "our_engine": fits[0].engine,
+                "our_records": fits[0].evaluations,
+                "peer_seconds_and_cost": tried,
+            },
+        )
+    ]
+
+
+def rows(repeats: int = 15) -> list[Row]:
+    """Rows of the group."""
+    return [*_networks(repeats), *_polynomials(repeats), *_disk(repeats), *_output_error(repeats)]
