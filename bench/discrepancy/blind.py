@@ -21,9 +21,9 @@ from scipy.signal import chirp
 
 from bench.discrepancy.case import Case, CaseChannel, CaseRecord, NominalParameter, record_from_arrays
 from bench.discrepancy.catalogue import CATALOGUE
-from bench.discrepancy.closure import CLOSURES
 from bench.discrepancy.diagnosis import diagnose_folder
 from bench.discrepancy.effect import Effect
+from bench.discrepancy.foreign import FOREIGN
 from bench.discrepancy.problem import Array, Hypothesis, Placed, Problem
 from bench.discrepancy.structure import structure_of
 from bench.errors import FileFormatError, ParameterError
@@ -117,7 +117,7 @@ def draw_case(name: str, rng: np.random.Generator, options: BlindOptions) -> tup
     count = {"none": 0, "single": 1, "double": 2, "foreign": 0}[kind]
     chosen = [pool[int(i)] for i in rng.choice(len(pool), size=count, replace=False)]
     if kind == "foreign":
-        chosen = [next(c for c in CLOSURES if c.name == "modulated_stiffness")]
+        chosen = [FOREIGN[int(rng.integers(len(FOREIGN)))]]
     commanded = any(e.site == "actuator" for e in chosen) or bool(rng.random() < 0.1)
     sensors = SENSORS["both" if any(e.site == "sensor" for e in chosen) else str(rng.choice(options.sensors))]
     mass = float(rng.uniform(2.0, 13.0))

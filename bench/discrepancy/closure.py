@@ -1,13 +1,12 @@
 """Nonparametric closures: what an effect outside the catalogue looks like, and how far a free model of it gets.
 
 A closure is an effect like any other, except that its law promises nothing: a polynomial surface in displacement and
-velocity, a stiffness modulated in time. They are fitted on top of the best catalogued explanation, by the same fits,
-and serve only to state how much of the gap a free model closes and what the missing force looks like.
+velocity. It is fitted on top of the best catalogued explanation, by the same fits, and serves only to state how much of
+the gap a free model closes and what the missing force looks like. It knows no effect in particular, and nothing of time:
+a force that depends on the clock stays outside it, and the gap then says so.
 """
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 
@@ -16,9 +15,6 @@ from bench.laws.base import ForceLaw, Parameter, kernel
 
 POWERS = ((0, 0), (2, 0), (1, 1), (0, 2), (3, 0), (2, 1), (1, 2), (0, 3), (5, 0), (4, 1), (0, 5))
 """Powers of displacement and velocity of the surface; (1, 0) and (0, 1) are the nominal stiffness and damping."""
-
-CYCLES = tuple(math.log(c) for c in np.arange(1.0, 240.0, 0.8))
-"""Logarithms of the cycles a record at which a modulation is looked for; a record resolves about one cycle."""
 
 
 @kernel
@@ -43,12 +39,6 @@ def surface_force(t, q, v, z, theta, f):
     )
 
 
-@kernel
-def modulated_force(t, q, v, z, theta, f):
-    """``f = k (1 + a cos(w t + phi)) q - k q``, in cosine and sine parts."""
-    f[0] += (theta[0] * math.cos(theta[2] * t) + theta[1] * math.sin(theta[2] * t)) * q[0]
-
-
 _SURFACE = ForceLaw(
     "polynomial_surface",
     (
@@ -59,24 +49,10 @@ _SURFACE = ForceLaw(
     surface_force,
     equation="f = sum c_ij (q/Q)^i (v/V)^j",
 )
-_MODULATED = ForceLaw(
-    "modulated_stiffness",
-    (
-        Parameter("cosine", "N/m", 1.0, rotational="N m/rad"),
-        Parameter("sine", "N/m", 0.0, rotational="N m/rad"),
-        Parameter("omega", "rad/s", 1.0),
-    ),
-    modulated_force,
-    equation="f = (a cos(w t) + b sin(w t)) q",
-)
 
 
 def _surface_theta(values: Values, scales: Scales) -> Values:
     return np.concatenate([[scales.position, scales.velocity], values])
-
-
-def _modulated_theta(values: Values, scales: Scales) -> Values:
-    return np.array([values[0], values[1], 2.0 * np.pi * values[2]])
 
 
 CLOSURES = (
@@ -89,21 +65,5 @@ CLOSURES = (
         law=_SURFACE,
         theta=_surface_theta,
         n_linear=len(POWERS),
-    ),
-    Effect(
-        "modulated_stiffness",
-        "closure",
-        "joint",
-        (
-            FreeParameter("cosine", "stiffness", signed=True, std=0.5),
-            FreeParameter("sine", "stiffness", signed=True, std=0.5),
-            FreeParameter(
-                "frequency", "1/duration", mean=math.log(20.0), std=1.5, bounds=(-1.0, 8.0), grid=CYCLES
-            ),
-        ),
-        _MODULATED.equation,
-        law=_MODULATED,
-        theta=_modulated_theta,
-        n_linear=2,
     ),
 )

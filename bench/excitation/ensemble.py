@@ -42,8 +42,10 @@ MOTION, UNDRIVEN = -1, -2
 class Packed(NamedTuple):
     """Members as plain arrays for compiled code; d counts members, k elements, j coordinates of a law."""
 
-    acceleration: NDArray[np.float64]  # (D, nv, 1 + 3 nv + nu)
-    sensors: NDArray[np.float64]  # (D, nc, 1 + 3 nv + nu)
+    constants: NDArray[np.float64]  # (D, R) of the R = nv + nc affine rows: accelerations, then channels
+    coefficients: NDArray[np.float64]  # (D, n_terms) of all rows, one after the other; most are zero and left out
+    rows: NDArray[np.int64]  # (R + 1,) first term of each row
+    columns: NDArray[np.int64]  # (n_terms,) place in [states, generalised forces, commands]
     kernels: NDArray[np.int64]  # (D, K, 2) force and rate addresses, 0 for none
     sizes: NDArray[np.int64]  # (D, K, 3) coordinates, states, first state
     motion: NDArray[np.float64]  # (D, K, J, nv) coefficients of joints in a coordinate
@@ -53,30 +55,27 @@ class Packed(NamedTuple):
 
 
 @numba.njit(error_model="numpy", inline="always")
-def _affine(row, x, nv, u, nu, tau):
-    """An affine function of positions, velocities, commands and forces; `row` holds its coefficients."""
-    total = row[0]
-    for j in range(2 * nv):
-        total += row[1 + j] * x[j]
-    for j in range(nu):
-        total += row[1 + 2 * nv + j] * u[j]
-    for j in range(nv):
-        total += row[1 + 2 * nv + nu + j] * tau[j]
+def _affine(row, constants, coefficients, rows, columns, values):
+    """An affine function of states, generalised forces and commands, by its terms."""
+    total = constants[row]
+    for k in range(load_int(rows + 8 * row), load_int(rows + 8 * row + 8)):
+        total += coefficients[k] * values[load_int(columns + 8 * k)]
     return total
 
 
 @numba.njit(error_model="numpy", inline="always")
-def _derivative(t, x, u, nv, nu, n_elements, n_coordinates, n_theta, table, dx, scratch):
-    """Write the derivative of state `x` into `dx` and the elements' generalised forces into ``scratch[:nv]``.
+def _derivative(t, x, nv, nx, n_elements, n_coordinates, n_theta, table, rows, columns, dx, scratch):
+    """Write the derivative of the state at `x` into `dx`; behind the state stand generalised forces (written) and commands.
 
     Everything is a C pointer: arrays passed to a function are counted references, which cost more than the arithmetic here.
     """
-    acceleration, kernels, sizes, motion, inputs, theta = table
-    lq = advance(scratch, nv)
-    lv = advance(lq, MAX_COORDINATES)
+    constants, coefficients, kernels, sizes, motion, inputs, theta = table
+    tau = advance(x, nx)
+    u = advance(tau, nv)
+    lv = advance(scratch, MAX_COORDINATES)
     lf = advance(lv, MAX_COORDINATES)
     for i in range(nv):
-        scratch[i] = 0.0
+        tau[i] = 0.0
     for k in range(n_elements):
         force = load_int(kernels + 16 * k)
         if force == 0:
@@ -94,58 +93,63 @@ def _derivative(t, x, u, nv, nu, n_elements, n_coordinates, n_theta, table, dx, 
                 for i in range(nv):
                     position += row[i] * x[i]
                     velocity += row[i] * x[nv + i]
-            lq[j] = position
+            scratch[j] = position
             lv[j] = velocity
             lf[j] = 0.0
         parameters = advance(theta, n_theta * k)
         states = advance(x, first)
-        call_kernel(force, t, lq, lv, states, parameters, lf)
+        call_kernel(force, t, scratch, lv, states, parameters, lf)
         for j in range(count):
             if load_int(inputs + 8 * (n_coordinates * k + j)) == MOTION:
                 row = advance(motion, nv * (n_coordinates * k + j))
                 for i in range(nv):
-                    scratch[i] -= row[i] * lf[j]
+                    tau[i] -= row[i] * lf[j]
         rate = load_int(kernels + 16 * k + 8)
         if rate != 0:
-            call_kernel(rate, t, lq, lv, states, parameters, advance(dx, first))
+            call_kernel(rate, t, scratch, lv, states, parameters, advance(dx, first))
     for i in range(nv):
         dx[i] = x[nv + i]
-        dx[nv + i] = _affine(advance(acceleration, i * (1 + 3 * nv + nu)), x, nv, u, nu, scratch)
+        dx[nv + i] = _affine(i, constants, coefficients, rows, columns, x)
 
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
 def _integrate(first, last, h, clock, controls, members, counts, p, states, outputs, work):
-    """Advance the cases ``first … last − 1``; `states` and `outputs` are written, `work` is scratch of 5 nx + nv + 3 J."""
+    """Advance the cases ``first … last − 1``; `states` and `outputs` are written, `work` is scratch (`_scratch_size`)."""
     nx = states.shape[2]
-    nv = p.acceleration.shape[1]
-    nc = p.sensors.shape[1]
+    nv = p.motion.shape[3]
+    nr = p.constants.shape[1]
+    nc = nr - nv
     nu = controls.shape[2]
     n_steps = controls.shape[1]
+    n_terms = p.coefficients.shape[1]
     n_elements = p.kernels.shape[1]
     n_coordinates = p.motion.shape[2]
     n_theta = p.theta.shape[2]
-    columns = 1 + 3 * nv + nu
+    rows = p.rows.ctypes.data
+    columns = p.columns.ctypes.data
     x_now = pointer_at(work.ctypes.data)
-    rates = advance(x_now, nx)
-    scratch = advance(x_now, 5 * nx)
+    u = advance(x_now, nx + nv)
+    rates = advance(u, nu)
+    scratch = advance(rates, 4 * nx)
     for case in range(first, last):
         for m in range(counts[case]):
             d = members[case, m]
             x = pointer_at(states.ctypes.data + 8 * nx * (m + states.shape[1] * case))
             y = pointer_at(outputs.ctypes.data + 8 * nc * n_steps * (m + outputs.shape[1] * case))
-            sensors = pointer_at(p.sensors.ctypes.data + 8 * columns * nc * d)
             table = (
-                pointer_at(p.acceleration.ctypes.data + 8 * columns * nv * d),
+                pointer_at(p.constants.ctypes.data + 8 * nr * d),
+                pointer_at(p.coefficients.ctypes.data + 8 * n_terms * d),
                 p.kernels.ctypes.data + 16 * n_elements * d,
                 p.sizes.ctypes.data + 24 * n_elements * d,
                 pointer_at(p.motion.ctypes.data + 8 * nv * n_coordinates * n_elements * d),
                 p.inputs.ctypes.data + 8 * n_coordinates * n_elements * d,
                 pointer_at(p.theta.ctypes.data + 8 * n_theta * n_elements * d),
             )
-            for i in range(5 * nx):
-                x_now[i] = 0.0  # among them rates of states that this member does not have
+            for i in range(4 * nx):
+                rates[i] = 0.0  # among them rates of states that this member does not have
             for step in range(n_steps):
-                u = pointer_at(controls.ctypes.data + 8 * nu * (step + n_steps * case))
+                for i in range(nu):
+                    u[i] = controls[case, step, i]
                 for stage in range(4):
                     fraction = 0.0 if stage == 0 else (h if stage == 3 else 0.5 * h)
                     dx = advance(rates, stage * nx)
@@ -154,15 +158,20 @@ def _integrate(first, last, h, clock, controls, members, counts, p, states, outp
                         x_now[i] = x[i] + (fraction * before[i] if stage > 0 else 0.0)
                     t = clock[case] + h * step + fraction
                     _derivative(
-                        t, x_now, u, nv, nu, n_elements, n_coordinates, n_theta, table, dx, scratch
+                        t, x_now, nv, nx, n_elements, n_coordinates, n_theta, table, rows, columns, dx, scratch
                     )  # fmt: skip
                     if stage == 0:
                         for c in range(nc):
-                            y[nc * step + c] = _affine(advance(sensors, c * columns), x_now, nv, u, nu, scratch)
+                            y[nc * step + c] = _affine(nv + c, table[0], table[1], rows, columns, x_now)
                 for i in range(nx):
                     x[i] += (h / 6.0) * (
                         rates[i] + 2.0 * (rates[nx + i] + rates[2 * nx + i]) + rates[3 * nx + i]
                     )
+
+
+def _scratch_size(nx: int, nv: int, nu: int) -> int:
+    """State, generalised forces, commands, four rates; then coordinates, their velocities and forces of a law."""
+    return 5 * nx + nv + nu + 3 * MAX_COORDINATES
 
 
 def available_threads() -> int:
@@ -251,10 +260,10 @@ class Ensemble:
         n_cases, n_steps, _ = controls.shape
         outputs = np.zeros((n_cases, members.shape[1], n_steps, len(self.channels)))
         times = np.zeros(n_cases) if clock is None else np.ascontiguousarray(clock, dtype=float)
-        nx, nv = states.shape[2], self._packed.acceleration.shape[1]
+        size = _scratch_size(states.shape[2], self._packed.motion.shape[3], controls.shape[2])
 
         def run(first: int, last: int) -> None:
-            work = np.zeros(5 * nx + nv + 3 * MAX_COORDINATES)
+            work = np.zeros(size)
             _integrate(
                 first, last, self.timestep, times, controls, members, counts, self._packed, states, outputs, work
             )  # fmt: skip
@@ -316,10 +325,14 @@ def _pack(rigs: Sequence[Rig], channels: tuple[str, ...], actuators: tuple[str, 
     width = max([1, *(len(element.theta) for rig in rigs for element in rig.elements)])
     states = max(sum(len(element.law.states) for element in rig.elements) for rig in rigs)
     coordinates = max([1, *(element.law.n_coordinates for rig in rigs for element in rig.elements)])
-    shape, columns = (len(rigs), elements), 1 + 3 * nv + len(rigs[0].actuators)
+    shape = (len(rigs), elements)
+    table = np.zeros((len(rigs), nv + len(channels), 1 + 3 * nv + len(rigs[0].actuators)))
+    none = np.zeros(0)
     p = Packed(
-        np.zeros((len(rigs), nv, columns)),
-        np.zeros((len(rigs), len(channels), columns)),
+        none,
+        none,
+        none.astype(np.int64),
+        none.astype(np.int64),
         np.zeros((*shape, 2), dtype=np.int64),
         np.zeros((*shape, 3), dtype=np.int64),
         np.zeros((*shape, coordinates, nv)),
@@ -329,7 +342,7 @@ def _pack(rigs: Sequence[Rig], channels: tuple[str, ...], actuators: tuple[str, 
     )
     layouts: dict[tuple, list[tuple[Coordinate, ...]]] = {}
     for d, rig in enumerate(rigs):
-        p.acceleration[d], p.sensors[d] = _structure_of(rig, channels)
+        table[d] = np.concatenate(_structure_of(rig, channels))
         layout = tuple((element.joints, element.inputs) for element in rig.elements)
         key = (rig.mjcf, layout)
         if key not in layouts:  # a rig that differs in parameters only need not be compiled
@@ -347,7 +360,7 @@ def _pack(rigs: Sequence[Rig], channels: tuple[str, ...], actuators: tuple[str, 
                     for _, dof, coefficient in coordinate.terms:
                         p.motion[d, k, j, dof] += coefficient
             first += len(law.states)
-    return _reduced(p, rigs, nv, driven)
+    return _reduced(p, table, rigs, nv, driven)
 
 
 def _place(driven: list[int], actuator: int) -> int:
@@ -355,25 +368,33 @@ def _place(driven: list[int], actuator: int) -> int:
     return driven.index(actuator) if actuator in driven else UNDRIVEN
 
 
-def _reduced(p: Packed, rigs: Sequence[Rig], nv: int, driven: list[int]) -> Packed:
+def _reduced(p: Packed, table: NDArray, rigs: Sequence[Rig], nv: int, driven: list[int]) -> Packed:
     """The members without the degrees of freedom that no command and no element reaches: they stay at rest."""
-    a = np.abs(p.acceleration).max(axis=0)
+    a = np.abs(table[:, :nv]).max(axis=0)
     push = np.abs(p.motion).max(axis=(0, 1))  # (J, nv)
     coupled = a[:, 1 : 1 + nv] + a[:, 1 + nv : 1 + 2 * nv] + a[:, -nv:] + push.T @ push > 0.0
     reached = push.any(axis=0) | (a[:, 0] > 0.0) | (a[:, [1 + 2 * nv + i for i in driven]] > 0.0).any(axis=1)
     for _ in range(nv):
         reached |= (coupled & reached).any(axis=1)
     kept = np.flatnonzero(reached) if reached.any() else np.arange(nv)
-    columns = np.concatenate(
-        [[0], 1 + kept, 1 + nv + kept, 1 + 2 * nv + np.array(driven), 1 + 2 * nv + len(rigs[0].actuators) + kept]
-    ).astype(int)  # fmt: skip
     start = np.zeros((len(rigs), 2 * len(kept) + p.start.shape[1] - 2 * nv))
     for d, rig in enumerate(rigs):
         states = [value for element in rig.elements for value in element.law.start()]
         start[d, 2 * len(kept) : 2 * len(kept) + len(states)] = states
+    nx = start.shape[1]
+    source = np.concatenate(
+        [1 + kept, 1 + nv + kept, 1 + 2 * nv + len(rigs[0].actuators) + kept, 1 + 2 * nv + np.array(driven)]
+    ).astype(int)  # fmt: skip
+    target = np.concatenate(
+        [np.arange(2 * len(kept)), nx + np.arange(len(kept)), nx + len(kept) + np.arange(len(driven))]
+    )
+    lines = np.concatenate([kept, np.arange(nv, table.shape[1])])
+    used = (table[:, lines][:, :, source] != 0.0).any(axis=0)
     return p._replace(
-        acceleration=np.ascontiguousarray(p.acceleration[:, kept][:, :, columns]),
-        sensors=np.ascontiguousarray(p.sensors[:, :, columns]),
+        constants=np.ascontiguousarray(table[:, lines, 0]),
+        coefficients=np.ascontiguousarray(table[:, lines][:, :, source][:, used]),
+        rows=np.concatenate([[0], np.cumsum(used.sum(axis=1))]).astype(np.int64),
+        columns=target[np.nonzero(used)[1]].astype(np.int64),
         motion=np.ascontiguousarray(p.motion[..., kept]),
         start=start,
     )
