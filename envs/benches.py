@@ -64,7 +64,7 @@ class Outcome(NamedTuple):
     reward: NDArray[np.float64]  # (m,)
     terminated: NDArray[np.bool_]  # (m,)
     truncated: NDArray[np.bool_]  # (m,)
-    info: dict[str, NDArray]  # (m,) each
+    info: dict[str, Any]  # arrays (m,)
 
 
 class _Panel(NamedTuple):
@@ -120,7 +120,11 @@ class Benches:
         self.channels, self.actuators = tuple(setup.noise), limits.actuators
         self.timestep = setup.rig.timestep
         self.n_steps = round((options.window or setup.window) / self.timestep)
-        self.n_windows = round((options.duration or setup.duration) / (self.n_steps * self.timestep)) if self.n_steps else 0
+        self.n_windows = (
+            round((options.duration or setup.duration) / (self.n_steps * self.timestep))
+            if self.n_steps
+            else 0
+        )
         if self.n_steps < 1 or self.n_windows < 1:
             raise ParameterError(
                 f"a window of {options.window} s and an episode of {options.duration} s came; a window takes at least one step "
@@ -129,7 +133,11 @@ class Benches:
         self.shaping = Shaping(
             options.shaping, n, n_actuators=len(self.actuators), band=setup.band, n_knots=options.n_knots
         )
-        hypotheses = [h for q in setup.questions for h in (q.hypotheses if isinstance(q, RigPrior) else (q.first, q.second))]
+        hypotheses = [
+            h
+            for q in setup.questions
+            for h in (q.hypotheses if isinstance(q, RigPrior) else (q.first, q.second))
+        ]
         self._laboratories = Laboratories(
             tuple(hypotheses), n, channels=self.channels, actuators=self.actuators, threads=threads
         )
@@ -181,7 +189,16 @@ class Benches:
             self._laboratories.install(int(place), self.truth[place])
             rng.standard_normal(out=self._disturbance[place])
         self.shaping.begin(places)
-        for array in (self._window, self._energy, self._peak, self._merit, self._fisher, self._score, self._square, self._values):
+        for array in (
+            self._window,
+            self._energy,
+            self._peak,
+            self._merit,
+            self._fisher,
+            self._score,
+            self._square,
+            self._values,
+        ):
             array[places] = 0.0
         for array in self._contrast or ():
             array[places] = 0.0
@@ -189,7 +206,10 @@ class Benches:
         m = len(places)
         measured = self._noise * self._disturbance[places, -1]
         return self._observe(
-            places, measured, np.zeros((m, self.n_steps, len(self.actuators))), np.zeros((m, self.shaping.width))
+            places,
+            measured,
+            np.zeros((m, self.n_steps, len(self.actuators))),
+            np.zeros((m, self.shaping.width)),
         )
 
     def step(self, places: NDArray[np.int64], actions: NDArray) -> Outcome:
@@ -205,7 +225,9 @@ class Benches:
         measured = ideal + self._noise * self._disturbance[places, self._window[places] % self.n_windows]
         reached = np.stack(
             [
-                np.max(np.abs(measured[:, :, columns]) / bounds, axis=(1, 2)) if columns else np.zeros(len(places))
+                np.max(np.abs(measured[:, :, columns]) / bounds, axis=(1, 2))
+                if columns
+                else np.zeros(len(places))
                 for columns, bounds in self._watch
             ],
             axis=1,
@@ -221,7 +243,7 @@ class Benches:
         certain = (separated >= 1.0) & self.options.terminate_when_certain
         terminated = stop | exhausted | certain
         truncated = ~terminated & (self._window[places] >= self.n_windows)
-        info: dict[str, NDArray] = {
+        info: dict[str, Any] = {
             "merit": self._merit[places],
             "gain": gain,
             "cost": cost,
@@ -264,7 +286,7 @@ class Benches:
             states,
             members=panel.members[asked],
             counts=panel.n_members[asked],
-            clock=self._window[places] * (self.n_steps * self.timestep),
+            clock=(self.n_steps * self.timestep) * self._window[places].astype(float),
         )
         weights = 1.0 / self._noise
         follow = self.options.average == "posterior"

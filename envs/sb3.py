@@ -68,7 +68,9 @@ class BenchVecEnv(VecEnv):
         for place in np.flatnonzero(done):
             last = infos["final_info"]
             self.reset_infos[place] = dictionaries[place]
-            dictionaries[place] = {name: last[name][place].item() for name in last if not name.startswith("_")}
+            dictionaries[place] = {
+                name: last[name][place].item() for name in last if not name.startswith("_")
+            }
             dictionaries[place]["terminal_observation"] = infos["final_obs"][place]
             dictionaries[place]["TimeLimit.truncated"] = bool(truncated[place])
         return observation, reward.astype(np.float32), done, dictionaries  # type: ignore[return-value]
@@ -99,9 +101,7 @@ class BenchVecEnv(VecEnv):
         Raises:
             AttributeError: Always.
         """
-        raise AttributeError(
-            f"'{attr_name}' cannot be set; pass arguments when the environments are made"
-        )
+        raise AttributeError(f"'{attr_name}' cannot be set; pass arguments when the environments are made")
 
     def env_method(
         self, method_name: str, *method_args: Any, indices: VecEnvIndices = None, **method_kwargs: Any

@@ -18,6 +18,7 @@ from bench.errors import UnknownNameError
 from bench.excitation import Experiment, Hypothesis, Limits, RigPrior, Rivals, Uncertain, design
 from bench.excitation.design import controls_from
 from bench.excitation.information import noise_vector
+from bench.laws import find_law
 from bench.rig import Element, Rig
 from bench.rig.library import joint_rig, sdof_rig
 
@@ -63,7 +64,9 @@ class Setup:
 
 
 def _made(name: str, arguments: tuple) -> Setup:
-    return {"sdof": sdof_setup, "joint": joint_setup, "discrimination": discrimination_setup}[name](*arguments)
+    return {"sdof": sdof_setup, "joint": joint_setup, "discrimination": discrimination_setup}[name](
+        *arguments
+    )
 
 
 class _Place:
@@ -73,9 +76,7 @@ class _Place:
         self.name = name
         if name == "sdof":
             self.noise = {"displacement": 5e-4, "velocity": 1e-2, "acceleration_x": 0.2}
-            self.limits = Limits(
-                {"shaker": 2.0}, {"shaker": 10.0}, {"displacement": 0.04}, {"velocity": 0.6}
-            )
+            self.limits = Limits({"shaker": 2.0}, {"shaker": 10.0}, {"displacement": 0.04}, {"velocity": 0.6})
             self.scale = {"displacement": 0.04, "velocity": 0.6, "acceleration_x": 10.0}
             self.band, self.window, self.duration = (0.5, 5.0), 0.04, 8.0
             self.joint = "carriage"
@@ -101,7 +102,8 @@ class _Place:
         return joint_rig(*elements, timestep=5e-3).with_structure(damping=soft)
 
     def element(self, law: str, *joints: str, **parameters: float) -> Element:
-        return Element.of(law, *(joints or (self.joint,)), name=law, **parameters)
+        found = find_law(law)
+        return Element(found, joints or (self.joint,), found.theta(**parameters), name=law)
 
 
 def _sdof_structure() -> tuple[Uncertain, ...]:
@@ -167,7 +169,9 @@ def joint_setup(n_draws: int = 4) -> Setup:
         Uncertain(f"{law}.c_coupling_torsional", 50.0, 1000.0),
     )
     rig = place.rig(place.element(law, "axial", "torsional"))
-    return _identification(place, RigPrior((Hypothesis(law, rig, parameters),)), n_draws, ("joint", (n_draws,)))
+    return _identification(
+        place, RigPrior((Hypothesis(law, rig, parameters),)), n_draws, ("joint", (n_draws,))
+    )
 
 
 def _identification(place: _Place, prior: RigPrior, n_draws: int, recipe: tuple[str, tuple]) -> Setup:
@@ -240,9 +244,7 @@ def _rivals(place: _Place, pair: str) -> Rivals:
     base: Sequence[Uncertain] = _sdof_structure() if place.name == "sdof" else ()
 
     def hypothesis(name: str, *elements: Element, own: Sequence[Uncertain]) -> Hypothesis:
-        beside = (
-            () if place.name == "sdof" else (place.element("linear", stiffness=3.5e4, damping=300.0),)
-        )
+        beside = () if place.name == "sdof" else (place.element("linear", stiffness=3.5e4, damping=300.0),)
         return Hypothesis(name, place.rig(*beside, *elements), (*base, *own))
 
     def scaled(name: str, low: float, high: float, unit: float) -> Uncertain:

@@ -68,7 +68,7 @@ class BenchVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray
         self._rngs: list[np.random.Generator] = []
         self._all = np.arange(num_envs)
         self._ended = np.zeros(num_envs, dtype=bool)
-        self._observation = np.zeros(self.observation_space.shape, dtype=np.float32)
+        self._observation = np.zeros((num_envs, self.benches.n_observations), dtype=np.float32)
         self._picture: Picture | None = None
 
     @property

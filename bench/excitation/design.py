@@ -37,7 +37,9 @@ LINES = 12
 """Spectral lines a designed multisine has at most, spread evenly over the logarithm of frequency."""
 POPULATION = 16
 START_SPREAD = 0.3  # of coefficients of order one
-RESTARTS = 2  # of half the evaluations each; three of a third found less, one sometimes stayed in a poor optimum
+RESTARTS = (
+    2  # of half the evaluations each; three of a third found less, one sometimes stayed in a poor optimum
+)
 
 
 @dataclass(frozen=True)

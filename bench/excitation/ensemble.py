@@ -13,10 +13,11 @@ from __future__ import annotations
 
 import os
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import pairwise
 from typing import NamedTuple
 
 import numba
@@ -43,7 +44,9 @@ class Packed(NamedTuple):
     """Members as plain arrays for compiled code; d counts members, k elements, j coordinates of a law."""
 
     constants: NDArray[np.float64]  # (D, R) of the R = nv + nc affine rows: accelerations, then channels
-    coefficients: NDArray[np.float64]  # (D, n_terms) of all rows, one after the other; most are zero and left out
+    coefficients: NDArray[
+        np.float64
+    ]  # (D, n_terms) of all rows, one after the other; most are zero and left out
     rows: NDArray[np.int64]  # (R + 1,) first term of each row
     columns: NDArray[np.int64]  # (n_terms,) place in [states, generalised forces, commands]
     kernels: NDArray[np.int64]  # (D, K, 2) force and rate addresses, 0 for none
@@ -209,7 +212,11 @@ class Ensemble:
             if name not in first.actuators:
                 raise UnknownNameError(f"actuator of rig '{first.name}'", name, first.actuators)
         for rig in self.rigs:
-            if (rig.model.nv, rig.actuators, rig.timestep) != (first.model.nv, first.actuators, first.timestep):
+            if (rig.model.nv, rig.actuators, rig.timestep) != (
+                first.model.nv,
+                first.actuators,
+                first.timestep,
+            ):
                 raise ModelError(
                     f"rigs '{first.name}' and '{rig.name}' of one ensemble differ in joints, actuators or timestep"
                 )
@@ -271,14 +278,14 @@ class Ensemble:
         self.spread(run, n_cases)
         return outputs
 
-    def spread(self, task, n_cases: int) -> None:
+    def spread(self, task: Callable[[int, int], None], n_cases: int) -> None:
         """Call ``task(first, last)`` for contiguous shares of the cases, over the threads where there are enough cases."""
         parts = min(self.threads, n_cases // CASES_A_THREAD)
         if parts <= 1:
             task(0, n_cases)
             return
         edges = np.linspace(0, n_cases, parts + 1).astype(int).tolist()
-        pending = [self._pool.submit(task, a, b) for a, b in zip(edges[1:-1], edges[2:], strict=True)]
+        pending = [self._pool.submit(task, a, b) for a, b in pairwise(edges[1:])]
         task(edges[0], edges[1])
         for future in pending:
             future.result()
@@ -301,7 +308,10 @@ class Ensemble:
         return ThreadPoolExecutor(self.threads - 1)
 
     def __reduce__(self) -> tuple:
-        return (Ensemble, (self.rigs, self.channels, self.actuators, self.threads))  # addresses of kernels hold in one process
+        return (
+            Ensemble,
+            (self.rigs, self.channels, self.actuators, self.threads),
+        )  # addresses of kernels hold in one process
 
 
 _structures: OrderedDict[tuple, LinearStructure] = OrderedDict()
@@ -321,7 +331,7 @@ def _structure_of(rig: Rig, channels: tuple[str, ...]) -> LinearStructure:
 def _pack(rigs: Sequence[Rig], channels: tuple[str, ...], actuators: tuple[str, ...]) -> Packed:
     nv = rigs[0].model.nv
     driven = [rigs[0].actuators.index(name) for name in actuators]
-    elements = max(1, max(len(rig.elements) for rig in rigs))
+    elements = max([1, *(len(rig.elements) for rig in rigs)])
     width = max([1, *(len(element.theta) for rig in rigs for element in rig.elements)])
     states = max(sum(len(element.law.states) for element in rig.elements) for rig in rigs)
     coordinates = max([1, *(element.law.n_coordinates for rig in rigs for element in rig.elements)])

@@ -128,7 +128,5 @@ class Experiment:
         contrast = Contrast.zeros(n, pairs, parameters=p)
         at = np.tile(places.reshape(pairs, 2), (n, 1, 1))
         size = np.tile(counts.reshape(pairs, 2), (n, 1, 1))
-        ensemble.spread(
-            lambda a, b: accumulate_contrast(a, b, outputs, at, size, STEP, weights, contrast), n
-        )
+        ensemble.spread(lambda a, b: accumulate_contrast(a, b, outputs, at, size, STEP, weights, contrast), n)
         return np.mean(np.log1p(np.maximum(expected_log_bayes_factor(contrast), 0.0)), axis=1)

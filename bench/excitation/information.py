@@ -101,10 +101,8 @@ def sensitivity(
         recordings = simulate_batch(rigs, [columns], threads=threads)
         records = np.stack([np.stack([r[name] for name in channels], axis=1) for r in recordings])
     count = len(draw.hypothesis.parameters)
-    if central:
-        derivatives = (records[1 : 1 + count] - records[1 + count :]) / (2.0 * step)
-    else:
-        derivatives = (records[1:] - records[0]) / step
+    ahead, behind = records[1 : 1 + count], records[1 + count :] if central else records[:1]
+    derivatives = (ahead - behind) / (2.0 * step if central else step)
     return Sensitivity(records[0], np.moveaxis(derivatives, 0, -1))
 
 

@@ -92,7 +92,9 @@ def linear_structure(rig: Rig, channels: tuple[str, ...]) -> LinearStructure:
         )
     bare = copy.copy(model)
     for item in rig.built.placed:
-        bare.numeric_data[item.theta - _offset(bare, item.theta)] = 0.0  # without its mark an element is passed over
+        bare.numeric_data[item.theta - _offset(bare, item.theta)] = (
+            0.0  # without its mark an element is passed over
+        )
     data = mujoco.MjData(bare)
     n = 3 * model.nv + len(rig.actuators)
     constant = _respond(bare, data, np.zeros(n), len(rig.actuators))

@@ -5,12 +5,13 @@ nominal masses, stiffnesses and dampings are all fitted at once. `bench.identifi
 measured motion *and force* of one component; this needs no force channel at the joint, and pays with simulations.
 
 All columns of a finite-difference Jacobian are simulated in one batch over threads, and so are the trial steps for
-two dampings, so that no thread waits. Two engines give the same numbers: `LinearRig`, the compiled loop for rigs of
+several dampings, so that no thread waits. Two engines give the same numbers: `LinearRig`, the compiled loop for rigs of
 linear structure, and `mujoco.batch` for all others.
 
 References:
     Ljung 1999, System Identification, section 7.4 (output-error structure).
     More 1978, The Levenberg-Marquardt algorithm, Lecture Notes in Mathematics 630.
+    Transtrum and Sethna 2012, arXiv:1201.5885 (geodesic acceleration).
 """
 
 from __future__ import annotations
@@ -46,6 +47,8 @@ Array = NDArray[np.float64]
 _DIFFERENCE = (
     1e-6  # of a parameter's scale: truncation and the simulations' rounding of 1e-13 both stay below 1e-6
 )
+_AHEAD = 0.1  # of a move: where the second derivative along it is taken, after Transtrum and Sethna
+_DAMPINGS = (10.0, 1.0, 0.1)  # tried at once, times the last one chosen
 _POSITIVE = ("mass", "inertia")
 
 
@@ -117,21 +120,41 @@ class _Problem:
         total += 0.5 * ((points - self.prior_mean) ** 2 @ self.prior_precision)
         return np.where(np.isfinite(total), total, np.inf)
 
-    def normal_equations(self, point: Array, high: Array) -> tuple[Array, Array]:
-        """Curvature ``J'J`` and gradient ``J'r`` by forward differences, backwards at an upper bound."""
+    def linearise(self, point: Array, high: Array) -> _Linearisation:
+        """Residuals and Jacobians by forward differences, backwards at an upper bound."""
         steps = np.where(point + _DIFFERENCE > high, -_DIFFERENCE, _DIFFERENCE)
         points = np.vstack([point, point + np.diag(steps)])
         curvature = np.diag(self.prior_precision)
         gradient = self.prior_precision * (point - self.prior_mean)
+        residuals, jacobians = [], []
         for record in self.records:
             residual, *shifted = self.residuals(record, points)
             jacobian = (np.stack(shifted) - residual) / steps[:, None]
-            jacobian[~np.all(np.isfinite(jacobian), axis=1)] = (
-                0.0  # diverged: leave that parameter where it is
-            )
+            # diverged: leave that parameter where it is
+            jacobian[~np.all(np.isfinite(jacobian), axis=1)] = 0.0
             curvature = curvature + jacobian @ jacobian.T
             gradient = gradient + jacobian @ residual
-        return curvature, gradient
+            residuals.append(residual)
+            jacobians.append(jacobian)
+        return _Linearisation(point, curvature, gradient, residuals, jacobians)
+
+    def bending(self, at: _Linearisation, moves: Array) -> Array:
+        """``J' r''`` along each move ``(n_moves, n_parameters)``, r'' the second directional derivative of the residuals."""
+        total = np.zeros_like(moves)
+        for record, residual, jacobian in zip(self.records, at.residuals, at.jacobians, strict=True):
+            ahead = self.residuals(record, at.point + _AHEAD * moves)
+            with np.errstate(invalid="ignore", over="ignore"):
+                second = 2.0 / _AHEAD * ((ahead - residual) / _AHEAD - moves @ jacobian)
+            total += second @ jacobian.T
+        return total
+
+
+class _Linearisation(NamedTuple):
+    point: Array
+    curvature: Array  # J'J, priors included
+    gradient: Array
+    residuals: list[Array]  # by record (n,)
+    jacobians: list[Array]  # by record (n_parameters, n)
 
 
 class _Minimum(NamedTuple):
@@ -281,59 +304,62 @@ def _minimise(
     tolerance: float,
     progress: Callable[[int, float], None] | None,
 ) -> _Minimum:
-    """Levenberg-Marquardt within bounds; each iteration tries two dampings at once."""
+    """Levenberg-Marquardt with geodesic acceleration, within bounds; each iteration tries several dampings at once."""
     low, high = box
     cost = float(problem.costs(point[None, :])[0])
     damping, iterations, stopped = 1e-3, 0, "iterations"
     held = np.zeros(len(point), dtype=bool)
-    curvature = np.zeros((len(point), len(point)))
     if not math.isfinite(cost):
-        return _Minimum(point, cost, curvature, held, 0, "diverged")
+        return _Minimum(point, cost, np.zeros((len(point), len(point))), held, 0, "diverged")
     while True:
-        curvature, gradient = problem.normal_equations(point, high)
-        held = ((point <= low) & (gradient > 0.0)) | ((point >= high) & (gradient < 0.0))
-        if iterations == max_iterations:
+        at = problem.linearise(point, high)
+        held = ((point <= low) & (at.gradient > 0.0)) | ((point >= high) & (at.gradient < 0.0))
+        if iterations == max_iterations or stopped == "tolerance":
             break
-        if np.all(np.abs(gradient[~held]) <= 1e-14 * (1.0 + cost)):
+        if np.all(np.abs(at.gradient[~held]) <= 1e-14 * (1.0 + cost)):
             stopped = "gradient"
             break
         fall = -1.0
         while damping < 1e12 and fall <= 0.0:
-            trials = np.stack(
-                [_trial(point, curvature, gradient, held, box, d) for d in (damping, 0.01 * damping)]
-            )
+            dampings = damping * np.array(_DAMPINGS)
+            trials = np.clip(point + _moves(problem, at, held, dampings), low, high)
             costs = problem.costs(trials)
             chosen = int(np.argmin(costs))
             fall = cost - float(costs[chosen])
-            damping *= 100.0 if fall <= 0.0 else (0.5, 0.01)[chosen]
+            damping = dampings[chosen % len(dampings)] if fall > 0.0 else 1e3 * damping
         if fall <= 0.0:
             stopped = "stall"
             break
         point, cost, iterations = trials[chosen], float(costs[chosen]), iterations + 1
-        damping = max(damping, 1e-14)
+        damping = max(damping, 1e-12)
         if progress is not None:
             progress(iterations, cost)
         if fall <= tolerance * cost:
-            stopped = "tolerance"
-            max_iterations = iterations  # the curvature at the end is still wanted
-    return _Minimum(point, cost, curvature, held, iterations, stopped)
+            stopped = "tolerance"  # the curvature at the end is still wanted
+    return _Minimum(point, cost, at.curvature, held, iterations, stopped)
 
 
-def _trial(
-    point: Array,
-    curvature: Array,
-    gradient: Array,
-    held: NDArray[np.bool_],
-    box: tuple[Array, Array],
-    damping: float,
-) -> Array:
-    trial = point.copy()
+def _moves(problem: _Problem, at: _Linearisation, held: NDArray[np.bool_], dampings: Array) -> Array:
+    """Moves for each damping, straight and then bent along the valley ``(2 n_dampings, n_parameters)``.
+
+    Bouc-Wen parameters, among others, lie in narrow curved valleys that straight steps follow in hundreds of small ones.
+    A bent move whose correction is no longer small is left straight.
+    """
     moving = np.flatnonzero(~held)
-    damped = curvature[np.ix_(moving, moving)].copy()
-    diagonal = np.diag(damped)
-    damped[np.diag_indices_from(damped)] += damping * np.where(diagonal > 0.0, diagonal, 1.0)
-    trial[moving] -= np.linalg.lstsq(damped, gradient[moving], rcond=None)[0]
-    return np.clip(trial, *box)
+    curvature = at.curvature[np.ix_(moving, moving)]
+    diagonal = np.where(np.diag(curvature) > 0.0, np.diag(curvature), 1.0)
+    damped = [curvature + np.diag(damping * diagonal) for damping in dampings]
+    straight = np.zeros((len(dampings), len(held)))
+    for row, matrix in zip(straight, damped, strict=True):
+        row[moving] = -np.linalg.lstsq(matrix, at.gradient[moving], rcond=None)[0]
+    bent = straight.copy()
+    for row, matrix, right in zip(bent, damped, problem.bending(at, straight), strict=True):
+        if not np.all(np.isfinite(right)):
+            continue
+        correction = -0.5 * np.linalg.lstsq(matrix, right[moving], rcond=None)[0]
+        if correction @ (diagonal * correction) <= 0.75**2 * (row[moving] @ (diagonal * row[moving])):
+            row[moving] += correction
+    return np.vstack([straight, bent])
 
 
 def _starts(

@@ -55,8 +55,22 @@ def _batch(model: mujoco.MjModel) -> None:
     batch.step(nstep=STEPS // 16)
 
 
-def _python_passive(model: mujoco.MjModel, data: mujoco.MjData) -> None:
-    """The gap and the Bouc-Wen force of `_rig`, as a person would write the callback in Python."""
+def _numpy_passive(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    """The gap and the Bouc-Wen force of `_rig`, as they stand in a paper: with NumPy's functions."""
+    q = data.qpos[0]
+    force = 3000.0 * np.sign(q) * np.maximum(np.abs(q) - 0.003, 0.0)
+    if model.na:
+        force += data.act[0]
+    data.qfrc_passive[0] -= force
+
+
+def _numpy_act_dyn(model: mujoco.MjModel, data: mujoco.MjData, actuator: int) -> float:
+    v, z = data.qvel[0], data.act[0]
+    return 800.0 * v - 60.0 * np.abs(v) * z - 40.0 * v * np.abs(z)
+
+
+def _scalar_passive(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    """The same with as little work as Python allows."""
     q = data.qpos[0]
     engaged = abs(q) - 0.003
     force = data.act[0] if model.na else 0.0
@@ -65,8 +79,8 @@ def _python_passive(model: mujoco.MjModel, data: mujoco.MjData) -> None:
     data.qfrc_passive[0] -= force
 
 
-def _python_joint(model: mujoco.MjModel, data: mujoco.MjData) -> None:
-    """The deck's joint law between the two bodies, as a person would write the callback in Python."""
+def _scalar_joint(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    """The deck's joint law between the two bodies, with as little work as Python allows."""
     k, c, k_gap, c_c, kt, ct, kt_gap, ct_c, clearance_x, clearance_t = _DECK
     x, t = data.qpos[2] - data.qpos[0], data.qpos[3] - data.qpos[1]
     v, w = data.qvel[2] - data.qvel[0], data.qvel[3] - data.qvel[1]
@@ -79,7 +93,7 @@ def _python_joint(model: mujoco.MjModel, data: mujoco.MjData) -> None:
     data.qfrc_passive[3] -= torque
 
 
-def _python_act_dyn(model: mujoco.MjModel, data: mujoco.MjData, actuator: int) -> float:
+def _scalar_act_dyn(model: mujoco.MjModel, data: mujoco.MjData, actuator: int) -> float:
     v, z = data.qvel[0], data.act[0]
     return 800.0 * v - 60.0 * abs(v) * z - 40.0 * v * abs(z)
 
@@ -118,21 +132,29 @@ def rows(repeats: int = 15) -> list[Row]:
                     )
                 )
     gap = Element.of("gap", "carriage", stiffness=3000.0, clearance=0.003)
-    result.append(
-        _against_python("SDOF gap", sdof_rig(gap, mass=2.0, stiffness=1500.0, damping=4.0), repeats)
-    )
-    result.append(_against_python("SDOF gap + Bouc-Wen", _rig("RK4"), repeats))
+    plain, both = sdof_rig(gap, mass=2.0, stiffness=1500.0, damping=4.0), _rig("RK4")
+    for name, rig, callbacks, limit in (
+        ("SDOF gap, NumPy functions", plain, (_numpy_passive, _numpy_act_dyn), ""),
+        ("SDOF gap, scalar arithmetic", plain, (_scalar_passive, _scalar_act_dyn), ""),
+        ("SDOF gap + Bouc-Wen, NumPy functions", both, (_numpy_passive, _numpy_act_dyn), "≥ 3"),
+        ("SDOF gap + Bouc-Wen, scalar arithmetic", both, (_scalar_passive, _scalar_act_dyn), ""),
+        ("deck joint, scalar arithmetic", joint_rig(), (_scalar_joint, _scalar_act_dyn), "≥ 3"),
+    ):
+        result.append(_against_python(name, rig, callbacks, limit, repeats))
     return result
 
 
-def _against_python(name: str, rig: Rig, callback: Callable[..., None], limit: str, repeats: int) -> Row:
-    """A gap alone is a few operations even in Python: reported, without a limit."""
+def _against_python(
+    name: str, rig: Rig, callbacks: tuple[Callable[..., None], Callable[..., float]], limit: str, repeats: int
+) -> Row:
+    """What a single gap, or scalar arithmetic, costs in Python is the least there is: reported, without a limit."""
     model = rig.model
+    passive, act_dyn = callbacks
 
     def python() -> None:
         native.uninstall()
-        mujoco.set_mjcb_passive(callback)
-        mujoco.set_mjcb_act_dyn(_python_act_dyn)
+        mujoco.set_mjcb_passive(passive)
+        mujoco.set_mjcb_act_dyn(act_dyn)
         try:
             _loop(model)
         finally:
@@ -142,7 +164,7 @@ def _against_python(name: str, rig: Rig, callback: Callable[..., None], limit: s
 
     seconds = interleave({"native": lambda: _loop(model), "python": python}, max(5, repeats // 3))
     return ratio_row(
-        f"{name}, RK4, loop: native against Python callback",
+        f"{name}: RK4, loop, native against Python callback",
         seconds["native"],
         seconds["python"],
         limit=limit,
