@@ -21,7 +21,7 @@ class Diagnose:
     """Case folder: nominal.json and the records (see docs/howto-mismatch.md)."""
     json: Path | None = None
     """File for the result as JSON; "-" prints it."""
-    report: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
+    html: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
     """File for the report, a self-contained HTML page."""
     exclude: tuple[str, ...] = ()
     """Effects to leave out of the catalogue."""
@@ -34,8 +34,8 @@ class Diagnose:
         with Console(stderr=True).status("reading") as status:
             diagnosis = diagnose_folder(self.folder, exclude=self.exclude, progress=status.update)
         document = diagnosis.verdict.to_json()
-        if self.report is not None:
-            write_report(diagnosis, self.report)
+        if self.html is not None:
+            write_report(diagnosis, self.html)
         if self.json == Path("-"):
             emit(document)
             return
