@@ -26,18 +26,18 @@ class Picture:
 
     def __init__(self, rig: Rig) -> None:
         self.rig = rig.with_(elements=())
-        self._data = mujoco.MjData(self.rig.model)
+        self._data = mujoco.MjData(self.rig.scene)
         self._renderer: Any = None
         self._viewer: Any = None
 
     def _place(self, positions: NDArray[np.float64]) -> None:
         self._data.qpos[:] = positions
-        mujoco.mj_forward(self.rig.model, self._data)
+        mujoco.mj_forward(self.rig.scene, self._data)
 
     def array(self, positions: NDArray[np.float64]) -> NDArray[np.uint8]:
         """A picture ``(HEIGHT, WIDTH, 3)`` of the rig at joint positions ``(nq,)``."""
         if self._renderer is None:
-            self._renderer = mujoco.Renderer(self.rig.model, HEIGHT, WIDTH)
+            self._renderer = mujoco.Renderer(self.rig.scene, HEIGHT, WIDTH)
         self._place(positions)
         self._renderer.update_scene(self._data, camera=CAMERA)
         return self._renderer.render()
@@ -48,7 +48,7 @@ class Picture:
             from mujoco import viewer  # noqa: PLC0415  (opens a connection to the display)
 
             self._viewer = viewer.launch_passive(
-                self.rig.model, self._data, show_left_ui=False, show_right_ui=False
+                self.rig.scene, self._data, show_left_ui=False, show_right_ui=False
             )
         if self._viewer.is_running():
             with self._viewer.lock():

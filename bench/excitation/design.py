@@ -10,7 +10,7 @@
 | `d_optimal` | multisine whose amplitudes and phases maximise the merit under the prior (CMA-ES) |
 
 All share force peak, energy, stroke, velocity and duration: each is scaled up to its actuators' limits, then down until every
-drawn rig keeps stroke and velocity. `d_optimal` starts from the best of the random multisines and never returns less.
+drawn rig keeps stroke and velocity. `d_optimal` starts from the best of the others, as far as its lines hold it, and returns no less than that one.
 
 References:
     Hansen 2016, "The CMA evolution strategy: a tutorial", arXiv:1604.00772.
@@ -188,12 +188,17 @@ def _d_optimal(
     angle = 2.0 * np.pi * np.outer(np.arange(n) * experiment.timestep, lines)
     basis = np.concatenate([np.cos(angle), np.sin(angle)], axis=1)  # (n, 2 n_lines)
     shape = (basis.shape[1], len(experiment.actuators))
-    best = _best_random(experiment, n, band, rng)
-    best_merit = float(experiment.merit(best[None])[0])
-    count = CANDIDATES
-    for _ in range(RESTARTS):
+    others = [_signals(partial(make, band), experiment, n, rng) for make in _SIMPLE.values()]
+    others = np.stack([*others, _best_random(experiment, n, band, rng)])
+    others = feasible(experiment.watched, experiment.limits, others, exact=False)
+    merits = experiment.merit(others)
+    best, best_merit = others[int(np.argmax(merits))], float(merits.max())
+    count = CANDIDATES + len(_SIMPLE)
+    near = np.linalg.lstsq(basis, best, rcond=None)[0]  # the best of the others, as far as these lines hold it
+    starts = [near / max(float(np.std(near)), 1e-12), *rng.standard_normal((RESTARTS - 1, *shape))]
+    for start in starts:
         search = CMA(
-            mean=rng.standard_normal(shape[0] * shape[1]),
+            mean=start.ravel(),
             sigma=START_SPREAD,
             population_size=POPULATION,
             seed=int(rng.integers(2**31)),

@@ -18,7 +18,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
@@ -34,7 +34,7 @@ from bench.rig import Rig
 CASES_A_THREAD = 4
 """Fewest cases for which another thread is worth its start of some 20 µs."""
 
-STRUCTURES_KEPT = 256
+KEPT = 256
 
 MOTION, UNDRIVEN = -1, -2
 """Marks of a law's coordinate that is a motion, or an input that gets no command."""
@@ -193,7 +193,7 @@ class Ensemble:
         threads: Threads to spread cases over.
 
     Raises:
-        ModelError: The members differ in their structure's layout, or a member is not linear around its elements.
+        ModelError: The members differ in their MJCF or time step, or a member is not linear around its elements.
     """
 
     rigs: tuple[Rig, ...]
@@ -207,18 +207,15 @@ class Ensemble:
         if not self.rigs:
             raise ParameterError("an ensemble needs at least one rig; none came")
         first = self.rigs[0]
-        self.actuators = tuple(self.actuators) or first.actuators
+        known = _frame_of(first).actuators
+        self.actuators = tuple(self.actuators) or known
         for name in self.actuators:
-            if name not in first.actuators:
-                raise UnknownNameError(f"actuator of rig '{first.name}'", name, first.actuators)
+            if name not in known:
+                raise UnknownNameError(f"actuator of rig '{first.name}'", name, known)
         for rig in self.rigs:
-            if (rig.model.nv, rig.actuators, rig.timestep) != (
-                first.model.nv,
-                first.actuators,
-                first.timestep,
-            ):
+            if (rig.mjcf, rig.folder, rig.timestep) != (first.mjcf, first.folder, first.timestep):
                 raise ModelError(
-                    f"rigs '{first.name}' and '{rig.name}' of one ensemble differ in joints, actuators or timestep"
+                    f"rigs '{first.name}' and '{rig.name}' of one ensemble differ in their MJCF or timestep"
                 )
         self._packed = _pack(self.rigs, self.channels, self.actuators)
 
@@ -314,29 +311,51 @@ class Ensemble:
         )  # addresses of kernels hold in one process
 
 
-_structures: OrderedDict[tuple, LinearStructure] = OrderedDict()
+class _Frame(NamedTuple):
+    """What of a compiled rig does not depend on any parameter."""
+
+    nv: int
+    actuators: tuple[str, ...]
+    coordinates: tuple[tuple[Coordinate, ...], ...]  # by element
+
+
+_kept: OrderedDict[tuple, Any] = OrderedDict()
+"""What was read off compiled rigs, the last used last: a rig that differs in parameters only need not be compiled."""
+
+
+def _once(key: tuple, read: Callable[[], Any]) -> Any:
+    if key not in _kept:
+        _kept[key] = read()
+    _kept.move_to_end(key)
+    while len(_kept) > KEPT:
+        _kept.popitem(last=False)
+    return _kept[key]
+
+
+def _frame_of(rig: Rig) -> _Frame:
+    layout = tuple((element.joints, element.inputs) for element in rig.elements)
+    return _once(
+        (rig.mjcf, rig.folder, layout),
+        lambda: _Frame(rig.model.nv, rig.actuators, tuple(item.coordinates for item in rig.built.placed)),
+    )
 
 
 def _structure_of(rig: Rig, channels: tuple[str, ...]) -> LinearStructure:
-    """The linear structure, which the elements have no part in; the last ones asked for are kept."""
-    key = (rig.mjcf, rig.folder, rig.structure, rig.integrator, channels)
-    if any(element.exact for element in rig.elements) or key not in _structures:
-        _structures[key] = linear_structure(rig, channels)
-    _structures.move_to_end(key)
-    while len(_structures) > STRUCTURES_KEPT:
-        _structures.popitem(last=False)
-    return _structures[key]
+    """The linear structure, which ordinary elements have no part in."""
+    exact = tuple(element.name for element in rig.elements if element.exact)
+    key = (rig.mjcf, rig.folder, rig.structure, rig.integrator, channels, exact)
+    return _once(key, lambda: linear_structure(rig, channels))
 
 
 def _pack(rigs: Sequence[Rig], channels: tuple[str, ...], actuators: tuple[str, ...]) -> Packed:
-    nv = rigs[0].model.nv
-    driven = [rigs[0].actuators.index(name) for name in actuators]
+    nv, all_actuators, _ = _frame_of(rigs[0])
+    driven = [all_actuators.index(name) for name in actuators]
     elements = max([1, *(len(rig.elements) for rig in rigs)])
     width = max([1, *(len(element.theta) for rig in rigs for element in rig.elements)])
     states = max(sum(len(element.law.states) for element in rig.elements) for rig in rigs)
     coordinates = max([1, *(element.law.n_coordinates for rig in rigs for element in rig.elements)])
     shape = (len(rigs), elements)
-    table = np.zeros((len(rigs), nv + len(channels), 1 + 3 * nv + len(rigs[0].actuators)))
+    table = np.zeros((len(rigs), nv + len(channels), 1 + 3 * nv + len(all_actuators)))
     none = np.zeros(0)
     p = Packed(
         none,
@@ -350,15 +369,10 @@ def _pack(rigs: Sequence[Rig], channels: tuple[str, ...], actuators: tuple[str, 
         np.zeros((*shape, width)),
         np.zeros((len(rigs), 2 * nv + states)),
     )
-    layouts: dict[tuple, list[tuple[Coordinate, ...]]] = {}
     for d, rig in enumerate(rigs):
         table[d] = np.concatenate(_structure_of(rig, channels))
-        layout = tuple((element.joints, element.inputs) for element in rig.elements)
-        key = (rig.mjcf, layout)
-        if key not in layouts:  # a rig that differs in parameters only need not be compiled
-            layouts[key] = [item.coordinates for item in rig.built.placed]
         first = 0
-        for k, (element, where) in enumerate(zip(rig.elements, layouts[key], strict=True)):
+        for k, (element, where) in enumerate(zip(rig.elements, _frame_of(rig).coordinates, strict=True)):
             law = element.law
             p.kernels[d, k] = law.force.address, law.rate.address if law.rate is not None else 0
             p.sizes[d, k] = law.n_coordinates, len(law.states), first
@@ -370,7 +384,7 @@ def _pack(rigs: Sequence[Rig], channels: tuple[str, ...], actuators: tuple[str, 
                     for _, dof, coefficient in coordinate.terms:
                         p.motion[d, k, j, dof] += coefficient
             first += len(law.states)
-    return _reduced(p, table, rigs, nv, driven)
+    return _reduced(p, table, rigs, nv, len(all_actuators), driven)
 
 
 def _place(driven: list[int], actuator: int) -> int:
@@ -378,7 +392,9 @@ def _place(driven: list[int], actuator: int) -> int:
     return driven.index(actuator) if actuator in driven else UNDRIVEN
 
 
-def _reduced(p: Packed, table: NDArray, rigs: Sequence[Rig], nv: int, driven: list[int]) -> Packed:
+def _reduced(
+    p: Packed, table: NDArray, rigs: Sequence[Rig], nv: int, n_actuators: int, driven: list[int]
+) -> Packed:
     """The members without the degrees of freedom that no command and no element reaches: they stay at rest."""
     a = np.abs(table[:, :nv]).max(axis=0)
     push = np.abs(p.motion).max(axis=(0, 1))  # (J, nv)
@@ -393,7 +409,7 @@ def _reduced(p: Packed, table: NDArray, rigs: Sequence[Rig], nv: int, driven: li
         start[d, 2 * len(kept) : 2 * len(kept) + len(states)] = states
     nx = start.shape[1]
     source = np.concatenate(
-        [1 + kept, 1 + nv + kept, 1 + 2 * nv + len(rigs[0].actuators) + kept, 1 + 2 * nv + np.array(driven)]
+        [1 + kept, 1 + nv + kept, 1 + 2 * nv + n_actuators + kept, 1 + 2 * nv + np.array(driven)]
     ).astype(int)  # fmt: skip
     target = np.concatenate(
         [np.arange(2 * len(kept)), nx + np.arange(len(kept)), nx + len(kept) + np.arange(len(driven))]

@@ -9,7 +9,9 @@ For a linear model and a normal prior half of it is the information gained (Lind
 D-optimality.
 
 Derivatives are finite differences. Forces with kinks (dead-space, friction) have records that are continuous but only piecewise
-smooth in the parameters; the steps are small enough that the kinks' share is below a percent, and a test varies them.
+smooth in the parameters; the steps are small enough for the kinks to have no part. Where a lightly damped rig is driven hard
+against a dead-space, neighbouring motions part exponentially: derivatives then grow with the length of the record, all parameters
+look alike, and what a long record is predicted to tell depends on the step (by several percent after ten seconds).
 
 References:
     Fedorov 1972, "Theory of Optimal Experiments"; Chaloner, Verdinelli 1995, "Bayesian experimental design: a review",

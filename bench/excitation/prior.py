@@ -137,8 +137,11 @@ class Draw:
 
     def perturbed(self, step: float) -> tuple[Rig, ...]:
         """Rigs in which one standardised coordinate after the other is moved by `step`."""
-        moved = self.coordinates + step * np.eye(len(self.hypothesis.parameters))
-        return tuple(self.hypothesis.at(row).rig for row in moved)
+        rigs = []
+        for parameter in self.hypothesis.parameters:  # the others keep their values to the last bit
+            value = parameter.value(parameter.coordinate(self.values[parameter.name]) + step)
+            rigs.append(with_values(self.rig, {parameter.name: value}))
+        return tuple(rigs)
 
     def __reduce__(self) -> tuple:
         return (_draw, (self.hypothesis, dict(self.values)))

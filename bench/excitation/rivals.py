@@ -13,7 +13,10 @@ from bench.excitation.ensemble import Ensemble
 from bench.excitation.information import STEP
 from bench.excitation.prior import Draw, Hypothesis, RigPrior
 
-ROUNDS = 12
+ROUNDS = 20
+SETTLED = 1e-6
+"""Steps of a fit, rejected ones included, and the relative change of the misfit at which it ends before."""
+
 BOUND = math.sqrt(3.0)  # the range of a standardised coordinate
 
 
@@ -120,9 +123,12 @@ def imitate(
         trial = np.clip(x + step, -BOUND, BOUND)
         new, _ = misfit(trial, derive=False)
         new_cost = new @ new + trial @ trial
+        settled = abs(cost - new_cost) < SETTLED * cost
         if new_cost < cost:
             x, cost, damping = trial, new_cost, damping / 5.0
             residual, jacobian = misfit(x, derive=True)
         else:
             damping *= 5.0
+        if settled:
+            break
     return hypothesis.at(x)

@@ -309,8 +309,9 @@ class LinearRig:
         solved = np.linalg.solve(
             at.mass, np.hstack([at.stiffness, at.damping, at.inputs, self._coordinates.T])
         )
-        parts = np.split(solved, np.cumsum([2 * n_dof, at.inputs.shape[1]]), axis=1)
-        inputs = np.ascontiguousarray(parts[1])
+        pieces = np.split(solved, np.cumsum([2 * n_dof, at.inputs.shape[1]]), axis=1)
+        parts = [np.ascontiguousarray(piece, dtype=np.float64) for piece in pieces]
+        inputs = parts[1]
         commands = np.ascontiguousarray(np.hstack([commands, np.ones((len(commands), 1))]))
         state = np.concatenate([self._initial(initial), self._states])
         out = np.empty((-(-len(commands) // stride), len(self.channels)))

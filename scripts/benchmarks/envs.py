@@ -27,9 +27,8 @@ def _compare(identifier: str, repeats: int) -> list[Row]:
         for mode in LIMITS
     }
     ours = gymnasium.make_vec(identifier, num_envs=N_ENVS, enforcement="cost")
-    actions = (
-        np.random.default_rng(0).uniform(-1.0, 1.0, (STEPS, *ours.action_space.shape)).astype(np.float32)
-    )
+    shape = (STEPS, N_ENVS, *(ours.single_action_space.shape or ()))
+    actions = np.random.default_rng(0).uniform(-1.0, 1.0, shape).astype(np.float32)
 
     def run(environments: gymnasium.vector.VectorEnv) -> None:
         for action in actions:

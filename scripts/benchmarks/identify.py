@@ -133,18 +133,23 @@ class _Training:
         with threadpool_limits(1), warnings.catch_warnings():
             warnings.simplefilter("ignore")  # that it has not converged is the point of max_iter
             model.fit(self.inputs, self.outputs)
-            self.reached["scikit-learn"] = self.percent(model.predict(self.inputs))
+            self.reached["scikit-learn"] = self.percent(np.asarray(model.predict(self.inputs)))
         return self.reached["scikit-learn"]
 
     def iterations_of_scikit_learn(self) -> int:
-        """Fewest iterations, to a tenth, that reach the target within the cap; those of the cap where none does."""
-        iterations = 100
+        """Fewest iterations, to a tenth, that reach the target; those that fill the cap where none does."""
+        low, high = 100, 200
         while True:
             begun = time.perf_counter()
-            error = self.scikit_learn(iterations)
-            if error <= TARGET or time.perf_counter() - begun > CAP / 1.5:
-                return iterations
-            iterations = int(1.1 * iterations)
+            if self.scikit_learn(high) <= TARGET:
+                break
+            if time.perf_counter() - begun > CAP / 2.0:
+                return 2 * high
+            low, high = high, 2 * high
+        while high > 1.1 * low:
+            middle = (low + high) // 2
+            low, high = (low, middle) if self.scikit_learn(middle) <= TARGET else (middle, high)
+        return high
 
 
 def _scaled(columns: Array) -> Array:
@@ -257,14 +262,14 @@ FREE = (
 )
 
 
-def _rig(mass: float, damping: float, stiffness: float, **bouc_wen: float) -> Rig:
-    joint = Element.of("bouc_wen", "carriage", name="joint", **bouc_wen)
+def _rig(mass: float, damping: float, stiffness: float, *, theta: tuple[float, float, float, float]) -> Rig:
+    joint = Element.of("bouc_wen", "carriage", theta=theta, name="joint")
     return sdof_rig(joint, mass=mass, damping=damping, stiffness=stiffness)
 
 
 def _record(rng: np.random.Generator) -> Recording:
     """20 s at 1 kHz of a Bouc-Wen joint that yields at 5 mm, moved to four times that, with noise."""
-    true = _rig(2.0, 4.0, 1500.0, A=2000.0, beta=40.0, gamma=23.0, n=1.5)
+    true = _rig(2.0, 4.0, 1500.0, theta=(2000.0, 40.0, 23.0, 1.5))
     noise = BandLimitedNoise(cutoff=12.0, peak=60.0)
     clean = simulate(true, Excitation({"shaker": noise}, duration=20.0, sample_rate=1000.0), rng=rng)
     noisy = {name: clean[name] + std * rng.standard_normal(len(clean)) for name, std in NOISE.items()}
@@ -347,7 +352,7 @@ class _Compiled:
 
 def _output_error(repeats: int) -> list[Row]:
     record = _record(np.random.default_rng(20))
-    start = _rig(2.3, 6.0, 1200.0, A=2600.0, beta=55.0, gamma=15.0, n=1.2)
+    start = _rig(2.3, 6.0, 1200.0, theta=(2600.0, 55.0, 15.0, 1.2))
     peer = _Sysid(start, record)
     fits: list[OutputErrorModel] = []
 
