@@ -16,8 +16,8 @@ import numpy as np
 
 from bench.errors import UnknownNameError
 from bench.excitation import Experiment, Hypothesis, Limits, RigPrior, Rivals, Uncertain, design
-from bench.excitation.design import controls_from
 from bench.excitation.information import noise_vector
+from bench.excitation.methods import controls_from
 from bench.laws import find_law
 from bench.rig import Element, Rig
 from bench.rig.library import joint_rig, sdof_rig

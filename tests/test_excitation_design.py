@@ -35,9 +35,9 @@ from bench.excitation import (
     sensitivity,
 )
 from bench.excitation.bayes_factor import accumulate_contrast
-from bench.excitation.design import spectral_lines
 from bench.excitation.experiment import fan
 from bench.excitation.information import STEP, accumulate
+from bench.excitation.methods import spectral_lines
 from bench.excitation.prior import with_values
 from bench.excitation.rivals import imitate
 from bench.rig import Rig

@@ -12,14 +12,22 @@ from bench.measurement import Chain, Noise, measure
 from bench.recording import Recording, nrmse
 from bench.signals import Multisine
 
-FREE = ("carriage.bouc_wen/A", "carriage.bouc_wen/beta", "structure/mass/carriage", "structure/stiffness/carriage")
+FREE = (
+    "carriage.bouc_wen/A",
+    "carriage.bouc_wen/beta",
+    "structure/mass/carriage",
+    "structure/stiffness/carriage",
+)
 TRUTH = np.array([800.0, 60.0, 2.0, 1500.0])
 
 
 def rig_of(values: np.ndarray) -> Rig:
     a, beta, mass, stiffness = values
     return sdof_rig(
-        Element.of("bouc_wen", "carriage", A=a, beta=beta, gamma=20.0), mass=mass, stiffness=stiffness, damping=4.0
+        Element.of("bouc_wen", "carriage", A=a, beta=beta, gamma=20.0),
+        mass=mass,
+        stiffness=stiffness,
+        damping=4.0,
     )
 
 
@@ -46,7 +54,9 @@ def test_recovers_the_rig_and_predicts_another_excitation(engine):
 
 def test_noise_moves_the_estimates_by_what_their_standard_deviations_say(rng):
     clean = record(1)
-    noisy = measure(clean, {"displacement": Chain(Noise(std=0.01 * float(np.std(clean["displacement"]))))}, rng)
+    noisy = measure(
+        clean, {"displacement": Chain(Noise(std=0.01 * float(np.std(clean["displacement"]))))}, rng
+    )
     model = fit_output_error(rig_of(TRUTH * 1.05), [noisy], free=FREE, channels=("displacement",))
     std = np.array([model.std[name] for name in FREE])
     assert np.all(std > 0.0)

@@ -17,7 +17,6 @@
 """
 
 from bench.excitation.bayes_factor import Contrast, contrast_of, expected_log_bayes_factor
-from bench.excitation.design import METHODS, Design, controls_from, design
 from bench.excitation.ensemble import Ensemble
 from bench.excitation.experiment import Experiment
 from bench.excitation.information import (
@@ -31,6 +30,7 @@ from bench.excitation.information import (
 )
 from bench.excitation.limits import Limits, Peaks, feasible
 from bench.excitation.linear_structure import LinearStructure, linear_structure
+from bench.excitation.methods import METHODS, Design, controls_from, design
 from bench.excitation.prior import Draw, Hypothesis, RigPrior, Uncertain
 from bench.excitation.rivals import RivalDraws, Rivals
 

@@ -171,7 +171,7 @@ def _networks(repeats: int) -> list[Row]:
         short = training.reached[name] > TARGET
         rows.append(
             ratio_row(
-                f"network training against {name}{f' (never there: lower bound)' if short else ''}",
+                f"network training against {name}{' (never there: lower bound)' if short else ''}",
                 seconds["ours"],
                 seconds[name],
                 limit="≥ 1",

@@ -9,8 +9,9 @@
 | `prbs` | maximal-length binary sequence with its useful band below the band's upper edge |
 | `d_optimal` | multisine whose amplitudes and phases maximise the merit under the prior (CMA-ES) |
 
-All share force peak, energy, stroke, velocity and duration: each is scaled up to its actuators' limits, then down until every
-drawn rig keeps stroke and velocity. `d_optimal` starts from the best of the others, as far as its lines hold it, and returns no less than that one.
+All share force peak, energy, stroke, velocity and duration: each is scaled up to its actuators' limits,
+then down until every drawn rig keeps stroke and velocity. `d_optimal` starts from the best of the others,
+as far as its lines hold it, and returns no less than that one.
 
 References:
     Hansen 2016, "The CMA evolution strategy: a tutorial", arXiv:1604.00772.
@@ -194,7 +195,9 @@ def _d_optimal(
     merits = experiment.merit(others)
     best, best_merit = others[int(np.argmax(merits))], float(merits.max())
     count = CANDIDATES + len(_SIMPLE)
-    near = np.linalg.lstsq(basis, best, rcond=None)[0]  # the best of the others, as far as these lines hold it
+    near = np.linalg.lstsq(basis, best, rcond=None)[
+        0
+    ]  # the best of the others, as far as these lines hold it
     starts = [near / max(float(np.std(near)), 1e-12), *rng.standard_normal((RESTARTS - 1, *shape))]
     for start in starts:
         search = CMA(
