@@ -29,6 +29,9 @@ AVERAGES = ("prior", "posterior")
 CERTAIN = math.log(99.0)
 """Log Bayes factor of 99 % certainty between two rivals that were equally likely [nat]."""
 
+LOST = 10.0
+"""Fraction of the limits that is reported where a simulation diverged; ends the episode like the limit switch."""
+
 FLOATS = (
     "merit", "gain", "cost", "stroke", "velocity", "force", "energy", "time", "effective_draws", "separated"
 )  # fmt: skip
@@ -222,6 +225,9 @@ class Benches:
         actions = np.clip(np.asarray(actions, dtype=float).reshape(len(places), -1), -1.0, 1.0)
         commands, exhausted = self._commands(places, actions)
         ideal = self._laboratories.run(places, commands)
+        lost = np.logical_not(np.isfinite(ideal).all(axis=(1, 2)))
+        if lost.any():  # the simulation diverged: nothing more can be measured
+            ideal[lost] = 0.0
         measured = ideal + self._noise * self._disturbance[places, self._window[places] % self.n_windows]
         reached = np.stack(
             [
@@ -233,11 +239,12 @@ class Benches:
             axis=1,
         )
         self._peak[places] = np.maximum(self._peak[places], reached)
+        reached[lost] = LOST
         gain, effective = self._account(places, commands, measured)
         self._window[places] += 1
         over = reached > 1.0
         excess = np.maximum(reached - 1.0, 0.0)
-        stop = over[:, 0] & (self.options.enforcement == "terminate")
+        stop = lost | (over[:, 0] & (self.options.enforcement == "terminate"))
         cost = self.options.penalty * np.where(stop, 1.0, np.minimum(excess, 1.0).sum(axis=1))
         separated = self._separated(places)
         certain = (separated >= 1.0) & self.options.terminate_when_certain
@@ -306,6 +313,9 @@ class Benches:
                 lambda a, b: accumulate_contrast(a, b, outputs, at, pairs, STEP, weights, sums), m
             )
             values = np.log1p(np.maximum(expected_log_bayes_factor(sums), 0.0))
+        values = np.where(
+            np.isfinite(values), values, self._values[places]
+        )  # of a draw that diverged: no more
         if not whole:
             for book, part in zip(books, (states, fisher, score, square, *contrast), strict=True):
                 book[places] = part

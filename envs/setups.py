@@ -7,7 +7,7 @@ has been measured.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from types import MappingProxyType
@@ -126,9 +126,9 @@ def _sdof_hypothesis(place: _Place, law: str) -> Hypothesis:
             Uncertain("gap.clearance", 5e-3, 30e-3),
         ),
         "bouc_wen": (
-            Uncertain("bouc_wen.A", 30.0, 200.0),
-            Uncertain("bouc_wen.beta", 80.0, 300.0),
-            Uncertain("bouc_wen.gamma", 20.0, 120.0),
+            Uncertain("bouc_wen.A", 15.0, 80.0),
+            Uncertain("bouc_wen.beta", 20.0, 70.0),
+            Uncertain("bouc_wen.gamma", 5.0, 30.0),
         ),
         "coulomb": (Uncertain("coulomb.limit", 0.1, 1.0),),
     }[law]
@@ -163,7 +163,7 @@ def joint_setup(n_draws: int = 4) -> Setup:
     parameters = (
         Uncertain(f"{law}.k_gap_axial", 5e4, 3e5),
         Uncertain(f"{law}.clearance_axial", 2e-3, 8e-3),
-        Uncertain(f"{law}.c_coupling_axial", 3e3, 9e4),
+        Uncertain(f"{law}.c_coupling_axial", 3e3, 5e4),
         Uncertain(f"{law}.k_gap_torsional", 35.0, 200.0),
         Uncertain(f"{law}.clearance_torsional", 0.08, 0.32),
         Uncertain(f"{law}.c_coupling_torsional", 50.0, 1000.0),
@@ -236,83 +236,65 @@ def _rival_experiment(place: _Place, rivals: Rivals, n_draws: int) -> Experiment
     return Experiment(rivals, place.noise, place.limits, draws)
 
 
+_RIVALS = {
+    "gap_cubic": ("gap", "cubic_stiffness"),
+    "presliding_bouc_wen": ("jenkins", "bouc_wen"),
+    "coulomb_stribeck": ("coulomb", "stribeck"),
+    "axial_gap_coupling": ("gap", "gap_coupling"),
+}
+
+
 def _rivals(place: _Place, pair: str) -> Rivals:
+    first, second = (_effect(place, law) for law in _RIVALS[pair])
+    return Rivals(pair, first, second)
+
+
+def _effect(place: _Place, law: str) -> Hypothesis:
+    """One effect beside the spring and damper of a rig."""
     # Forces and lengths of the joint rig stand to those of the SDOF rig as its axial contact to the other's.
     force, length = (1.0, 1.0) if place.name == "sdof" else (250.0, 0.25)
     stiffness = force / length
     contact = stiffness if place.name == "sdof" else 0.2 * stiffness  # stiffer ones outrun the time step
-    base: Sequence[Uncertain] = _sdof_structure() if place.name == "sdof" else ()
-
-    def hypothesis(name: str, *elements: Element, own: Sequence[Uncertain]) -> Hypothesis:
-        beside = () if place.name == "sdof" else (place.element("linear", stiffness=3.5e4, damping=300.0),)
-        return Hypothesis(name, place.rig(*beside, *elements), (*base, *own))
-
-    def scaled(name: str, low: float, high: float, unit: float) -> Uncertain:
-        return Uncertain(name, low * unit, high * unit)
-
-    if pair == "gap_cubic":
-        first = hypothesis(
-            "gap",
-            place.element("gap"),
-            own=(
-                scaled("gap.stiffness", 300.0, 1500.0, contact),
-                scaled("gap.clearance", 5e-3, 20e-3, length),
-            ),
-        )
-        second = hypothesis(
-            "cubic_stiffness",
-            place.element("cubic_stiffness"),
-            own=(scaled("cubic_stiffness.k3", 5e4, 2e6, stiffness / length**2),),
-        )
-    elif pair == "presliding_bouc_wen":
-        first = hypothesis(
-            "jenkins",
-            place.element("jenkins", transition=0.2),
-            own=(
-                scaled("jenkins.stiffness", 50.0, 300.0, stiffness),
-                scaled("jenkins.limit", 0.2, 1.5, force),
-            ),
-        )
-        second = hypothesis(
-            "bouc_wen",
-            place.element("bouc_wen"),
-            own=(
-                scaled("bouc_wen.A", 50.0, 300.0, stiffness),
-                scaled("bouc_wen.beta", 50.0, 250.0, 1.0 / length),
-                scaled("bouc_wen.gamma", 20.0, 120.0, 1.0 / length),
-            ),
-        )
-    elif pair == "coulomb_stribeck":
-        slow = {"regularisation_velocity": 2e-2 * length}
-        first = hypothesis(
-            "coulomb", place.element("coulomb", **slow), own=(scaled("coulomb.limit", 0.1, 1.0, force),)
-        )
-        second = hypothesis(
-            "stribeck",
-            place.element("stribeck", **slow),
-            own=(
-                scaled("stribeck.limit", 0.1, 0.8, force),
-                Uncertain("stribeck.boost", 0.1, 0.8),
-                scaled("stribeck.stribeck_velocity", 0.03, 0.2, length),
-            ),
-        )
-    else:
-        first = hypothesis(
-            "gap",
-            place.element("gap"),
-            own=(
-                scaled("gap.stiffness", 300.0, 1500.0, contact),
-                scaled("gap.clearance", 5e-3, 20e-3, length),
-            ),
-        )
-        second = hypothesis(
-            "gap_coupling",
-            place.element("gap_coupling", "axial", "torsional"),
-            own=(
-                Uncertain("gap_coupling.c_axial", 3e3, 9e4),
-                Uncertain("gap_coupling.c_torsional", 50.0, 1000.0),
-                Uncertain("gap_coupling.clearance_axial", 1e-3, 5e-3),
-                Uncertain("gap_coupling.clearance_torsional", 0.05, 0.25),
-            ),
-        )
-    return Rivals(pair, first, second)
+    slow = {"regularisation_velocity": 2e-2 * length}
+    fixed, ranges = {
+        "gap": ({}, {"stiffness": (300.0, 1500.0, contact), "clearance": (5e-3, 20e-3, length)}),
+        "cubic_stiffness": ({}, {"k3": (5e4, 2e6, stiffness / length**2)}),
+        "jenkins": (
+            {"transition": 0.5},
+            {"stiffness": (20.0, 60.0, stiffness), "limit": (0.4, 1.5, force)},
+        ),
+        "bouc_wen": (
+            {},
+            {
+                "A": (20.0, 100.0, stiffness),
+                "beta": (20.0, 70.0, 1.0 / length),
+                "gamma": (5.0, 30.0, 1.0 / length),
+            },
+        ),
+        "coulomb": (slow, {"limit": (0.1, 1.0, force)}),
+        "stribeck": (
+            slow,
+            {
+                "limit": (0.1, 0.8, force),
+                "boost": (0.1, 0.8, 1.0),
+                "stribeck_velocity": (0.03, 0.2, length),
+            },
+        ),
+        "gap_coupling": (
+            {},
+            {
+                "c_axial": (3e3, 5e4, 1.0),
+                "c_torsional": (50.0, 1000.0, 1.0),
+                "clearance_axial": (1e-3, 5e-3, 1.0),
+                "clearance_torsional": (0.05, 0.25, 1.0),
+            },
+        ),
+    }[law]
+    own = tuple(
+        Uncertain(f"{law}.{name}", low * unit, high * unit) for name, (low, high, unit) in ranges.items()
+    )
+    joints = ("axial", "torsional") if law == "gap_coupling" else ()
+    element = place.element(law, *joints, **fixed)
+    if place.name == "sdof":
+        return Hypothesis(law, place.rig(element), (*_sdof_structure(), *own))
+    return Hypothesis(law, place.rig(place.element("linear", stiffness=3.5e4, damping=300.0), element), own)

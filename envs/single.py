@@ -127,12 +127,12 @@ class SDOFExcitationEnv(BenchEnv):
     | damping | N s/m | 0.8 | 3 | log-uniform | all |
     | contact stiffness | N/m | 300 | 1500 | log-uniform | gap |
     | clearance to each side | m | 0.005 | 0.03 | log-uniform | gap |
-    | A (stiffness before yield) | N/m | 30 | 200 | log-uniform | bouc_wen |
-    | beta | 1/m | 80 | 300 | log-uniform | bouc_wen |
-    | gamma | 1/m | 20 | 120 | log-uniform | bouc_wen |
+    | A (stiffness before yield) | N/m | 15 | 80 | log-uniform | bouc_wen |
+    | beta | 1/m | 20 | 70 | log-uniform | bouc_wen |
+    | gamma | 1/m | 5 | 30 | log-uniform | bouc_wen |
     | friction force | N | 0.1 | 1 | log-uniform | coulomb |
 
-    The yield level of a Bouc-Wen joint is A / (beta + gamma), 0.07 to 2 N.
+    The yield level of a Bouc-Wen joint is A / (beta + gamma), 0.15 to 3.2 N.
 
     ## Action Space
 
@@ -241,7 +241,7 @@ class JointExcitationEnv(BenchEnv):
     |---|---|---|---|---|
     | axial contact stiffness | N/m | 5e4 | 3e5 | log-uniform |
     | axial clearance to each side | m | 0.002 | 0.008 | log-uniform |
-    | axial damping beyond the torsional clearance | N s/(m rad) | 3e3 | 9e4 | log-uniform |
+    | axial damping beyond the torsional clearance | N s/(m rad) | 3e3 | 5e4 | log-uniform |
     | torsional contact stiffness | N m/rad | 35 | 200 | log-uniform |
     | torsional clearance to each side | rad | 0.08 | 0.32 | log-uniform |
     | torsional damping beyond the axial clearance | N s/rad | 50 | 1000 | log-uniform |
@@ -333,15 +333,15 @@ class DiscriminationEnv(BenchEnv):
     | axial_gap_coupling | axial dead-space | damping that couples the directions |
 
     Ranges on the rig "sdof"; on the rig "joint" forces are 250 times and lengths 0.25 times as large (contact stiffness 200 times),
-    spring and damper are known, and the coupling has 3e3 … 9e4 N s/(m rad), 50 … 1000 N s/rad, clearances 1 … 5 mm, 0.05 … 0.25 rad:
+    spring and damper are known, and the coupling has 3e3 … 5e4 N s/(m rad), 50 … 1000 N s/rad, clearances 1 … 5 mm, 0.05 … 0.25 rad:
 
     | Unknown | Unit | Smallest | Largest | Distribution |
     |---|---|---|---|---|
     | spring stiffness; damping | N/m; N s/m | 200; 0.8 | 400; 3 | log-uniform |
     | gap: contact stiffness; clearance | N/m; m | 300; 0.005 | 1500; 0.02 | log-uniform |
     | cubic: k3 | N/m³ | 5e4 | 2e6 | log-uniform |
-    | Jenkins: stiffness; slip force | N/m; N | 50; 0.2 | 300; 1.5 | log-uniform |
-    | Bouc-Wen: A; beta; gamma | N/m; 1/m; 1/m | 50; 50; 20 | 300; 250; 120 | log-uniform |
+    | Jenkins: stiffness; slip force | N/m; N | 20; 0.4 | 60; 1.5 | log-uniform |
+    | Bouc-Wen: A; beta; gamma | N/m; 1/m; 1/m | 20; 20; 5 | 100; 70; 30 | log-uniform |
     | Coulomb: friction force | N | 0.1 | 1 | log-uniform |
     | Stribeck: sliding force; boost; velocity | N; 1; m/s | 0.1; 0.1; 0.03 | 0.8; 0.8; 0.2 | log-uniform |
 

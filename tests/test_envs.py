@@ -226,6 +226,21 @@ def test_the_stroke_limit_trips_or_costs(enforcement: str) -> None:
     assert broken  # at resonance the shaker does reach the limit
 
 
+@pytest.mark.parametrize("enforcement", ["terminate", "cost"])
+def test_a_simulation_that_diverges_ends_the_episode(enforcement: str) -> None:
+    env = make(SDOF, enforcement=enforcement, penalty=3.0)
+    env.reset(seed=0)
+    env.step(np.ones(1, dtype=np.float32))
+    run = env.benches._laboratories.run
+    env.benches._laboratories.run = lambda places, u: run(places, u) * np.nan  # type: ignore[method-assign]
+    observation, reward, terminated, _, info = env.step(np.ones(1, dtype=np.float32))
+    assert terminated
+    assert info["violation"]
+    assert info["cost"] >= 3.0
+    assert np.isfinite(observation).all()
+    assert np.isfinite(reward)
+
+
 def test_the_energy_budget_is_kept_and_ends_the_episode() -> None:
     env = make(SDOF, enforcement="cost", laws=("bouc_wen",))
     env.reset(seed=0)

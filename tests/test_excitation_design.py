@@ -432,3 +432,13 @@ def test_priors_say_what_is_wrong() -> None:
         Limits({"shaker": -1.0})
     with pytest.raises(ParameterError, match="noise levels"):
         Experiment(PRIOR, {"displacement": 0.0}, LIMITS, PRIOR.draws(2, np.random.default_rng(0)))
+
+
+def test_unstable_rigs_are_named_instead_of_searched_for_ever() -> None:
+    away = Hypothesis(
+        "constant", sdof(Element.of("constant_force", "carriage", F0=100.0, name="constant")), STRUCTURE
+    )
+    prior = RigPrior((away,))
+    study = Experiment(prior, NOISE, LIMITS, prior.draws(1, np.random.default_rng(0)))
+    with pytest.raises(ParameterError, match="however small"):
+        feasible(study.watched, LIMITS, wave(100)[None])

@@ -21,6 +21,9 @@ from bench.excitation.ensemble import Ensemble
 BISECTIONS = 12
 """Halvings of the interval in which the largest feasible scale lies; it is then met within 0.02 %."""
 
+SMALLEST = 1e-9
+"""Share of the largest command below which a rig that still leaves its limits is taken for unstable."""
+
 
 @dataclass(frozen=True)
 class Limits:
@@ -106,7 +109,8 @@ def motion_ratio(ensemble: Ensemble, limits: Limits, controls: NDArray[np.float6
     if not limits.watched:
         return np.zeros(len(controls))
     bounds = np.array([limits.watched[name] for name in ensemble.channels])
-    return np.max(np.abs(ensemble.record(controls)) / bounds, axis=(1, 2, 3))
+    ratio = np.max(np.abs(ensemble.record(controls)) / bounds, axis=(1, 2, 3))
+    return np.where(np.isnan(ratio), np.inf, ratio)  # a rig that diverged
 
 
 def feasible(
@@ -122,11 +126,19 @@ def feasible(
 
     Returns:
         Scaled commands in which every rig of the ensemble keeps the limits.
+
+    Raises:
+        ParameterError: A rig leaves the limits however small the commands are (it is unstable).
     """
     full = limits.within_actuator(np.asarray(controls, dtype=float), timestep=ensemble.timestep)
     held, missed = np.ones(len(full)), np.ones(len(full))
     ratio = motion_ratio(ensemble, limits, full)
     while (over := ratio > 1.0).any():
+        if held.min() < SMALLEST:
+            raise ParameterError(
+                "drawn rigs leave the limits of stroke or velocity however small the excitation is; "
+                "check their parameters against the time step"
+            )
         missed[over] = held[over]
         held[over] *= np.clip(0.98 / ratio[over], 0.3, 0.98)  # the response is nearly proportional
         ratio[over] = motion_ratio(ensemble, limits, full[over] * held[over, None, None])

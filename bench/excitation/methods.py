@@ -34,13 +34,12 @@ from bench.signals import PRBS, Excitation, Multisine, Signal, Sweep
 from bench.signals.record import Record
 
 CANDIDATES = 32
-LINES = 12
+LINES = 20
 """Spectral lines a designed multisine has at most, spread evenly over the logarithm of frequency."""
 POPULATION = 16
 START_SPREAD = 0.3  # of coefficients of order one
-RESTARTS = (
-    2  # of half the evaluations each; three of a third found less, one sometimes stayed in a poor optimum
-)
+ROUNDS = 2
+"""Searches of half the evaluations each, from the best so far; a second one from a random start never came as far."""
 
 
 @dataclass(frozen=True)
@@ -195,18 +194,16 @@ def _d_optimal(
     merits = experiment.merit(others)
     best, best_merit = others[int(np.argmax(merits))], float(merits.max())
     count = CANDIDATES + len(_SIMPLE)
-    near = np.linalg.lstsq(basis, best, rcond=None)[
-        0
-    ]  # the best of the others, as far as these lines hold it
-    starts = [near / max(float(np.std(near)), 1e-12), *rng.standard_normal((RESTARTS - 1, *shape))]
-    for start in starts:
+    for _ in range(ROUNDS):
+        near = np.linalg.lstsq(basis, best, rcond=None)[0]  # the best so far, as far as these lines hold it
+        start = near / max(float(np.std(near)), 1e-12)
         search = CMA(
             mean=start.ravel(),
             sigma=START_SPREAD,
             population_size=POPULATION,
             seed=int(rng.integers(2**31)),
         )
-        for _ in range(max(1, (evaluations // RESTARTS) // POPULATION)):
+        for _ in range(max(1, (evaluations // ROUNDS) // POPULATION)):
             asked = [search.ask() for _ in range(POPULATION)]
             controls = np.stack([basis @ x.reshape(shape) for x in asked])
             controls = feasible(experiment.watched, experiment.limits, controls, exact=False)

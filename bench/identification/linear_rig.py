@@ -1,4 +1,4 @@
-"""Rigs of linear structure as one compiled loop, some thirty times faster than MuJoCo and equal to it up to rounding.
+"""Rigs of linear structure as one compiled loop, twenty to fifty times faster than MuJoCo and equal to it up to rounding.
 
 Many rigs, all of the bench's own among them, are nonlinear in their elements only: constant mass matrix, linear mounts,
 sensors that are linear in the motion. For these a record needs no multibody engine. `LinearRig` reads the matrices off

@@ -265,18 +265,8 @@ def _report(
     prepared, residuals, known = data
     values = best.point * problem.scale
     variance = 1.0 if known else 2.0 * best.cost / max(problem.n_residuals - len(names), 1)
-    covariance = np.zeros_like(best.curvature)
-    moving = np.flatnonzero(~best.held)
-    curvature = best.curvature[np.ix_(moving, moving)]
-    determined = np.diag(curvature) > 0.0
-    sure = moving[determined]
-    covariance[np.ix_(sure, sure)] = variance * np.linalg.pinv(
-        curvature[np.ix_(determined, determined)], rcond=1e-15
-    )
-    std = np.sqrt(np.diag(covariance))
-    correlation = np.eye(len(names))
-    correlation[np.ix_(sure, sure)] = covariance[np.ix_(sure, sure)] / np.outer(std[sure], std[sure])
-    std[moving[~determined]] = np.inf
+    std, correlation = _spread(best)
+    std[np.isfinite(std)] *= math.sqrt(variance)
     error = np.concatenate([part[record.scored] for part, record in zip(residuals, prepared, strict=True)])
     measured = np.concatenate([record.measured[record.scored] for record in prepared])
     nrmse = np.sqrt(np.mean(error**2, axis=0)) / np.std(measured, axis=0)
@@ -294,6 +284,29 @@ def _report(
         best.stopped,
         problem.engine.name,
     )
+
+
+def _spread(best: _Minimum) -> tuple[Array, Array]:
+    """Standard deviations for residuals of unit variance, and correlations, from the curvature at the optimum."""
+    n = len(best.point)
+    std, correlation = np.zeros(n), np.eye(n)
+    free = np.flatnonzero(~best.held)
+    size = np.sqrt(np.diag(best.curvature)[free])
+    std[free[size == 0.0]] = np.inf
+    free, size = free[size > 0.0], size[size > 0.0]
+    if not free.size:
+        return std, correlation
+    values, vectors = np.linalg.eigh(best.curvature[np.ix_(free, free)] / np.outer(size, size))
+    open_ends = values <= _DIFFERENCE**2 * values[-1]  # below what finite differences can tell from nothing
+    inverse = (vectors[:, ~open_ends] / values[~open_ends]) @ vectors[:, ~open_ends].T
+    spread = np.sqrt(np.diag(inverse))
+    lost = np.sum(vectors[:, open_ends] ** 2, axis=1) > _DIFFERENCE
+    with np.errstate(divide="ignore", invalid="ignore"):
+        correlation[np.ix_(free, free)] = np.where(
+            np.logical_or.outer(lost, lost), np.eye(free.size), inverse / np.outer(spread, spread)
+        )
+    std[free] = np.where(lost, np.inf, spread / size)
+    return std, correlation
 
 
 def _minimise(
