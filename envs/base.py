@@ -41,12 +41,22 @@ def make_benches(kind: str, n: int, threads: int, arguments: dict[str, Any]) -> 
     """
     rest = dict(arguments)
     setup = setup_of(kind, rest)
-    unknown = sorted(set(rest) - set(_OPTIONS))
+    return Benches(setup, options_of(rest), n, threads)
+
+
+def options_of(arguments: dict[str, Any]) -> Options:
+    """Options from what `setup_of` left of an environment's arguments.
+
+    Raises:
+        TypeError: An argument is unknown.
+        BenchError: An argument has a value outside its range.
+    """
+    unknown = sorted(set(arguments) - set(_OPTIONS))
     if unknown:
         raise TypeError(
             f"unknown argument(s) {unknown} of a JointBench environment; known: {', '.join(_OPTIONS)}"
         )
-    return Benches(setup, Options(**rest), n, threads)
+    return Options(**arguments)
 
 
 def observation_space(benches: Benches) -> spaces.Box:
@@ -56,7 +66,7 @@ def observation_space(benches: Benches) -> spaces.Box:
 
 def action_space(benches: Benches) -> spaces.Box:
     """Box of a bench's actions."""
-    return spaces.Box(-1.0, 1.0, (benches.shaping.width,), np.float32)
+    return spaces.Box(-1.0, 1.0, (benches.width,), np.float32)
 
 
 def info_of(info: dict[str, Any], row: int) -> dict[str, float | bool]:

@@ -19,10 +19,10 @@ from bench.errors import ParameterError, UnknownNameError
 from bench.excitation import Contrast, Draw, Ensemble, RigPrior, Rivals, expected_log_bayes_factor
 from bench.excitation.bayes_factor import accumulate_contrast
 from bench.excitation.experiment import fan
-from bench.excitation.information import STEP, accumulate, misfit, noise_vector
+from bench.excitation.information import STEP, accumulate, misfit
+from bench.excitation.station import Desk
 from envs.laboratory import Laboratories
 from envs.setups import Setup
-from envs.shaping import Shaping
 
 ENFORCEMENTS = ("terminate", "cost")
 AVERAGES = ("prior", "posterior")
@@ -133,9 +133,10 @@ class Benches:
                 f"a window of {options.window} s and an episode of {options.duration} s came; a window takes at least one step "
                 f"of {self.timestep:g} s and an episode at least one window"
             )
-        self.shaping = Shaping(
-            options.shaping, n, n_actuators=len(self.actuators), band=setup.band, n_knots=options.n_knots
+        self.station = setup.station(
+            self.n_steps, self.n_windows, shaping=options.shaping, n_knots=options.n_knots
         )
+        self.desk = Desk(self.station, n)
         hypotheses = [
             h
             for q in setup.questions
@@ -145,18 +146,11 @@ class Benches:
             tuple(hypotheses), n, channels=self.channels, actuators=self.actuators, threads=threads
         )
         self._rivals = isinstance(setup.questions[0], Rivals)
-        self._noise = noise_vector(setup.noise, self.channels)
-        self._scale = np.array([setup.scale[name] for name in self.channels])
-        self._force = np.array([limits.force[name] for name in self.actuators])
-        self._budget = np.array([limits.energy.get(name, np.inf) for name in self.actuators])
-        self._watch = [self._watched(table) for table in (limits.stroke, limits.velocity)]
+        self._noise = self.desk.noise
         panel = _panel(setup, threads)
         draws, p = panel.counts.shape[1], int(panel.counts.max())
         self.truth: list[Draw | None] = [None] * n
         self.question = np.zeros(n, dtype=np.int64)
-        self._window = np.zeros(n, dtype=np.int64)
-        self._energy = np.zeros((n, len(self.actuators)))
-        self._peak = np.zeros((n, 2))
         self._merit = np.zeros(n)
         self._states = np.zeros((n, panel.members.shape[1], panel.ensemble.n_states))
         self._fisher, self._score = np.zeros((n, draws, p, p)), np.zeros((n, draws, p))
@@ -166,15 +160,15 @@ class Benches:
         self._contrast = Contrast.zeros(n, draws // 2, parameters=p) if self._rivals else None
         self._values = np.zeros((n, draws // 2 if self._rivals else draws))
 
-    def _watched(self, table: Any) -> tuple[list[int], NDArray[np.float64]]:
-        return [self.channels.index(name) for name in table], np.array(list(table.values()))
+    @property
+    def width(self) -> int:
+        """Length of an action."""
+        return self.desk.shaping.width
 
     @property
     def n_observations(self) -> int:
         """Length of an observation."""
-        samples = self.n_steps * (len(self.channels) + len(self.actuators))
-        questions = len(self.setup.questions) if self._rivals else 0
-        return samples + self.shaping.width + 1 + len(self.actuators) + 2 + questions
+        return self.desk.n_observations
 
     def reset(self, places: NDArray[np.int64], rngs: Sequence[np.random.Generator]) -> NDArray[np.float32]:
         """Put new hidden rigs, at rest, into some benches; return what their sensors show at rest.
@@ -191,11 +185,8 @@ class Benches:
             self.truth[place] = (question if isinstance(question, RigPrior) else question.prior).draw(rng)
             self._laboratories.install(int(place), self.truth[place])
             rng.standard_normal(out=self._disturbance[place])
-        self.shaping.begin(places)
+        self.desk.begin(places)
         for array in (
-            self._window,
-            self._energy,
-            self._peak,
             self._merit,
             self._fisher,
             self._score,
@@ -208,40 +199,27 @@ class Benches:
         self._states[places] = panel.ensemble.start(panel.members[self.question[places]])
         m = len(places)
         measured = self._noise * self._disturbance[places, -1]
-        return self._observe(
-            places,
-            measured,
-            np.zeros((m, self.n_steps, len(self.actuators))),
-            np.zeros((m, self.shaping.width)),
-        )
+        rest = np.zeros((m, self.n_steps, len(self.actuators)))
+        return self.desk.observe(places, measured, rest, np.zeros((m, self.width)), self.question)
 
     def step(self, places: NDArray[np.int64], actions: NDArray) -> Outcome:
         """Run the next window on some benches.
 
         Args:
             places: Benches, ascending ``(m,)``.
-            actions: Actions ``(m, shaping.width)``; clipped to −1 … 1.
+            actions: Actions ``(m, width)``; clipped to −1 … 1.
         """
         actions = np.clip(np.asarray(actions, dtype=float).reshape(len(places), -1), -1.0, 1.0)
-        commands, exhausted = self._commands(places, actions)
+        commands, exhausted = self.desk.commands(places, actions)
         ideal = self._laboratories.run(places, commands)
         lost = np.logical_not(np.isfinite(ideal).all(axis=(1, 2)))
         if lost.any():  # the simulation diverged: nothing more can be measured
             ideal[lost] = 0.0
-        measured = ideal + self._noise * self._disturbance[places, self._window[places] % self.n_windows]
-        reached = np.stack(
-            [
-                np.max(np.abs(measured[:, :, columns]) / bounds, axis=(1, 2))
-                if columns
-                else np.zeros(len(places))
-                for columns, bounds in self._watch
-            ],
-            axis=1,
-        )
-        self._peak[places] = np.maximum(self._peak[places], reached)
+        measured = ideal + self._noise * self._disturbance[places, self.desk.window[places] % self.n_windows]
+        reached = self.desk.book(places, measured)
         reached[lost] = LOST
         gain, effective = self._account(places, commands, measured)
-        self._window[places] += 1
+        self.desk.window[places] += 1
         over = reached > 1.0
         excess = np.maximum(reached - 1.0, 0.0)
         stop = lost | (over[:, 0] & (self.options.enforcement == "terminate"))
@@ -249,34 +227,22 @@ class Benches:
         separated = self._separated(places)
         certain = (separated >= 1.0) & self.options.terminate_when_certain
         terminated = stop | exhausted | certain
-        truncated = ~terminated & (self._window[places] >= self.n_windows)
+        truncated = ~terminated & (self.desk.window[places] >= self.n_windows)
         info: dict[str, Any] = {
             "merit": self._merit[places],
             "gain": gain,
             "cost": cost,
             "stroke": reached[:, 0],
             "velocity": reached[:, 1],
-            "force": np.max(np.abs(commands) / self._force, axis=(1, 2)),
-            "energy": np.max(self._energy[places] / self._budget, axis=1),
-            "time": self._window[places] * (self.n_steps * self.timestep),
+            "force": np.max(np.abs(commands) / self.desk.force, axis=(1, 2)),
+            "energy": np.max(self.desk.energy[places] / self.desk.budget, axis=1),
+            "time": self.desk.window[places] * (self.n_steps * self.timestep),
             "effective_draws": effective,
             "separated": separated,
             "violation": over.any(axis=1),
         }
-        observation = self._observe(places, measured, commands, actions)
+        observation = self.desk.observe(places, measured, commands, actions, self.question)
         return Outcome(observation, gain - cost, terminated, truncated, info)
-
-    def _commands(self, places: NDArray, actions: NDArray) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """Commands within force and what is left of the energy, and whether the energy is used up."""
-        commands = self._force * self.shaping.commands(places, actions, self.n_steps, self.timestep)
-        spent = self.timestep * np.sum(commands**2, axis=1)
-        left = np.maximum(self._budget - self._energy[places], 0.0)
-        over = spent > left
-        if over.any():
-            commands = commands * np.sqrt(np.where(over, left / np.where(over, spent, 1.0), 1.0))[:, None]
-            spent = np.minimum(spent, left)
-        self._energy[places] += spent
-        return commands, np.all(self._energy[places] >= self._budget * (1.0 - 1e-9), axis=1)
 
     def _account(self, places: NDArray, commands: NDArray, measured: NDArray) -> tuple[NDArray, NDArray]:
         """Book the window on all prior draws; return the growth of the merit and the effective number of draws."""
@@ -293,7 +259,7 @@ class Benches:
             states,
             members=panel.members[asked],
             counts=panel.n_members[asked],
-            clock=(self.n_steps * self.timestep) * self._window[places].astype(float),
+            clock=(self.n_steps * self.timestep) * self.desk.window[places].astype(float),
         )
         weights = 1.0 / self._noise
         follow = self.options.average == "posterior"
@@ -319,7 +285,9 @@ class Benches:
         if not whole:
             for book, part in zip(books, (states, fisher, score, square, *contrast), strict=True):
                 book[places] = part
-        probability = self._probability(panel.weights[asked], fisher, score, square, self._window[places] + 1)
+        probability = self._probability(
+            panel.weights[asked], fisher, score, square, self.desk.window[places] + 1
+        )
         if self._rivals:
             probability = probability.reshape(m, -1, 2).sum(axis=2)
         gain = np.sum(probability * (values - self._values[places]), axis=1)
@@ -348,22 +316,6 @@ class Benches:
         if not self._rivals:
             return np.zeros(len(places))
         return np.mean(self._values[places] >= math.log1p(CERTAIN), axis=1)
-
-    def _observe(
-        self, places: NDArray, measured: NDArray, commands: NDArray, actions: NDArray
-    ) -> NDArray[np.float32]:
-        m = len(places)
-        parts = [
-            (measured / self._scale).reshape(m, -1),
-            (commands / self._force).reshape(m, -1),
-            actions,
-            2.0 * self._window[places, None] / self.n_windows - 1.0,
-            2.0 * np.minimum(self._energy[places] / self._budget, 1.0) - 1.0,
-            2.0 * np.minimum(self._peak[places], 1.0) - 1.0,
-        ]
-        if self._rivals:
-            parts.append(np.eye(len(self.setup.questions))[self.question[places]])
-        return np.clip(np.concatenate(parts, axis=1), -1.0, 1.0).astype(np.float32)
 
     def effective_draws(self, places: NDArray[np.int64]) -> NDArray[np.float64]:
         """One over the sum of the squared prior weights of the draws (of the pairs, for rivals) ``(m,)``."""

@@ -12,7 +12,11 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvStepReturn
 
+from envs import IDS
+from envs.practice import PracticeVectorEnv
 from envs.vector import BenchVectorEnv
+
+KINDS: dict[str, str] = dict(zip(IDS, PracticeVectorEnv.KINDS, strict=True))
 
 
 class BenchVecEnv(VecEnv):
@@ -26,20 +30,26 @@ class BenchVecEnv(VecEnv):
         benches: The vector environment behind it, in autoreset mode SAME_STEP.
     """
 
-    def __init__(self, id: str, num_envs: int, **arguments: Any) -> None:
+    def __init__(self, id: str, num_envs: int, *, practice: bool = False, **arguments: Any) -> None:
         """Make a vector environment.
 
         Args:
             id: Id of a registered environment.
             num_envs: How many.
+            practice: Practice benches in its place, see `envs.practice`.
             **arguments: Arguments of the environment.
         """
-        vector: Any = gymnasium.make_vec(
-            id,
-            num_envs=num_envs,
-            vectorization_mode="vector_entry_point",
-            autoreset_mode=AutoresetMode.SAME_STEP,
-            **arguments,
+        mode = AutoresetMode.SAME_STEP
+        vector: Any = (
+            PracticeVectorEnv(KINDS[id], num_envs, autoreset_mode=mode, **arguments)
+            if practice
+            else gymnasium.make_vec(
+                id,
+                num_envs=num_envs,
+                vectorization_mode="vector_entry_point",
+                autoreset_mode=mode,
+                **arguments,
+            )
         )
         self.benches: BenchVectorEnv = vector
         self._actions: NDArray[np.float32] | None = None

@@ -18,6 +18,7 @@ from bench.errors import UnknownNameError
 from bench.excitation import Experiment, Hypothesis, Limits, RigPrior, Rivals, Uncertain, design
 from bench.excitation.information import noise_vector
 from bench.excitation.methods import controls_from
+from bench.excitation.station import Station
 from bench.laws import find_law
 from bench.rig import Element, Rig
 from bench.rig.library import joint_rig, sdof_rig
@@ -42,6 +43,7 @@ class Setup:
         window: Default duration of a window [s].
         duration: Default duration of an episode [s].
         recipe: Function of this module and its arguments that make this setup; it travels in place of the setup.
+        place: What rigs are made of there.
     """
 
     questions: tuple[RigPrior, ...] | tuple[Rivals, ...]
@@ -53,9 +55,41 @@ class Setup:
     window: float
     duration: float
     recipe: tuple[str, tuple]
+    place: Place
 
     def __reduce__(self) -> tuple:
-        return (_made, self.recipe)
+        return (made, self.recipe)
+
+    def station(
+        self,
+        n_steps: int | None = None,
+        n_windows: int | None = None,
+        *,
+        shaping: str = "knots",
+        n_knots: int = 1,
+    ) -> Station:
+        """The experimenter's place, by default with windows and a duration as the environments have them.
+
+        Args:
+            n_steps: Steps a window.
+            n_windows: Windows of a test.
+            shaping: How actions become commands.
+            n_knots: Knots a window.
+        """
+        timestep = self.rig.timestep
+        steps = n_steps or round(self.window / timestep)
+        return Station(
+            self.noise,
+            self.scale,
+            self.limits,
+            timestep,
+            steps,
+            n_windows or round(self.duration / (steps * timestep)),
+            self.band,
+            shaping,
+            n_knots,
+            tuple(question.name for question in self.questions if isinstance(question, Rivals)),
+        )
 
     @property
     def rig(self) -> Rig:
@@ -63,13 +97,14 @@ class Setup:
         return self.experiments[0].rigs_drawn[0].hypothesis.rig
 
 
-def _made(name: str, arguments: tuple) -> Setup:
+def made(name: str, arguments: tuple) -> Setup:
+    """The setup of a recipe."""
     return {"sdof": sdof_setup, "joint": joint_setup, "discrimination": discrimination_setup}[name](
         *arguments
     )
 
 
-class _Place:
+class Place:
     """A laboratory: its rig, its sensors, and where a joint's effects act."""
 
     def __init__(self, name: str) -> None:
@@ -96,12 +131,14 @@ class _Place:
             self.joint = "axial"
 
     def rig(self, *elements: Element) -> Rig:
+        """The rig with some elements."""
         if self.name == "sdof":
             return sdof_rig(*elements, mass=2.0, stiffness=300.0, damping=1.5, timestep=1e-2)
         soft = {"axial_1": 300.0, "axial_2": 300.0, "torsional_1": 0.2, "torsional_2": 0.2}
         return joint_rig(*elements, timestep=5e-3).with_structure(damping=soft)
 
     def element(self, law: str, *joints: str, **parameters: float) -> Element:
+        """An element at the joint, or at others, with some parameters."""
         found = find_law(law)
         return Element(found, joints or (self.joint,), found.theta(**parameters), name=law)
 
@@ -119,7 +156,7 @@ PAIRS = ("gap_cubic", "presliding_bouc_wen", "coulomb_stribeck", "axial_gap_coup
 RIGS = ("sdof", "joint")
 
 
-def _sdof_hypothesis(place: _Place, law: str) -> Hypothesis:
+def _sdof_hypothesis(place: Place, law: str) -> Hypothesis:
     own = {
         "gap": (
             Uncertain("gap.stiffness", 300.0, 1500.0),
@@ -147,7 +184,7 @@ def sdof_setup(laws: tuple[str, ...] = SDOF_LAWS, n_draws: int = 6) -> Setup:
     for law in laws:
         if law not in SDOF_LAWS:
             raise UnknownNameError("joint of the SDOF environment", law, SDOF_LAWS)
-    place = _Place("sdof")
+    place = Place("sdof")
     prior = RigPrior(tuple(_sdof_hypothesis(place, law) for law in laws))
     return _identification(place, prior, n_draws, ("sdof", (laws, n_draws)))
 
@@ -158,7 +195,7 @@ def joint_setup(n_draws: int = 4) -> Setup:
 
     Its springs and dampers at rest are taken as known, from a linear test at a low level.
     """
-    place = _Place("joint")
+    place = Place("joint")
     law = "axial_torsional_joint"
     parameters = (
         Uncertain(f"{law}.k_gap_axial", 5e4, 3e5),
@@ -174,13 +211,13 @@ def joint_setup(n_draws: int = 4) -> Setup:
     )
 
 
-def _identification(place: _Place, prior: RigPrior, n_draws: int, recipe: tuple[str, tuple]) -> Setup:
+def _identification(place: Place, prior: RigPrior, n_draws: int, recipe: tuple[str, tuple]) -> Setup:
     draws = prior.draws(n_draws, np.random.default_rng(DRAWS_SEED))
     return _setup(place, (prior,), (Experiment(prior, place.noise, place.limits, draws),), recipe)
 
 
 def _setup(
-    place: _Place,
+    place: Place,
     questions: tuple[RigPrior, ...] | tuple[Rivals, ...],
     experiments: tuple[Experiment, ...],
     recipe: tuple[str, tuple],
@@ -195,6 +232,7 @@ def _setup(
         place.window,
         place.duration,
         recipe,
+        place,
     )
 
 
@@ -213,13 +251,20 @@ def discrimination_setup(rig: str = "joint", pairs: tuple[str, ...] = PAIRS, n_d
     for pair in pairs:
         if pair not in known:
             raise UnknownNameError(f"pair of effects on rig '{rig}'", pair, known)
-    place = _Place(rig)
+    place = Place(rig)
     questions = tuple(_rivals(place, pair) for pair in pairs)
-    experiments = tuple(_rival_experiment(place, item, n_draws) for item in questions)
+    experiments = tuple(rival_experiment(place, item, n_draws) for item in questions)
     return _setup(place, questions, experiments, ("discrimination", (rig, pairs, n_draws)))
 
 
-def _rival_experiment(place: _Place, rivals: Rivals, n_draws: int) -> Experiment:
+def rival_experiment(place: Place, rivals: Rivals, n_draws: int) -> Experiment:
+    """A question on pairs of draws that imitate each other under a middling test.
+
+    Args:
+        place: The laboratory.
+        rivals: The question.
+        n_draws: Pairs.
+    """
     rng = np.random.default_rng(DRAWS_SEED)
     pilot = Experiment(rivals.prior, place.noise, place.limits, rivals.prior.draws(2, rng))
     reference = controls_from(
@@ -244,12 +289,12 @@ _RIVALS = {
 }
 
 
-def _rivals(place: _Place, pair: str) -> Rivals:
+def _rivals(place: Place, pair: str) -> Rivals:
     first, second = (_effect(place, law) for law in _RIVALS[pair])
     return Rivals(pair, first, second)
 
 
-def _effect(place: _Place, law: str) -> Hypothesis:
+def _effect(place: Place, law: str) -> Hypothesis:
     """One effect beside the spring and damper of a rig."""
     # Forces and lengths of the joint rig stand to those of the SDOF rig as its axial contact to the other's.
     force, length = (1.0, 1.0) if place.name == "sdof" else (250.0, 0.25)

@@ -54,7 +54,7 @@ class BenchVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray
         self.num_envs = num_envs
         self.autoreset_mode = AutoresetMode(autoreset_mode)
         self.render_mode = render_mode
-        self.benches = make_benches(self.kind, num_envs, threads or available_threads(), arguments)
+        self.benches = self._make(num_envs, threads or available_threads(), arguments)
         fps = round(1.0 / (self.benches.n_steps * self.benches.timestep))
         self.metadata = {
             "autoreset_mode": self.autoreset_mode,
@@ -70,6 +70,10 @@ class BenchVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray
         self._ended = np.zeros(num_envs, dtype=bool)
         self._observation = np.zeros((num_envs, self.benches.n_observations), dtype=np.float32)
         self._picture: Picture | None = None
+
+    def _make(self, n: int, threads: int, arguments: dict[str, Any]) -> Any:
+        """The benches behind it."""
+        return make_benches(self.kind, n, threads, arguments)
 
     @property
     def truth(self) -> tuple[Any, ...]:

@@ -1,12 +1,14 @@
 """Benchmarks of jointbench, every row a ratio against a peer or a limit, run side by side.
 
-python scripts/benchmark.py native stream --json out.json
+python scripts/benchmark.py native stream --save out.json
+python scripts/benchmark.py diagnosis --data FOLDER --full
 python scripts/benchmark.py --compare before.json after.json
 """
 
 from __future__ import annotations
 
 import importlib
+import inspect
 import json
 import os
 import platform
@@ -28,7 +30,7 @@ GROUPS = tuple(
     sorted(
         path.stem
         for path in (Path(__file__).parent / "benchmarks").glob("[a-z]*.py")
-        if path.stem != "timing"
+        if path.stem != "timing" and not path.stem.startswith("peer_")
     )
 )
 
@@ -43,6 +45,8 @@ class Args:
         json: Print JSON instead of a table.
         save: File the results are written to as JSON.
         compare: Two saved files to compare instead of running.
+        full: More and longer cases, for the groups that draw cases.
+        data: Folder of cases with their answers, for the groups that draw cases, in place of drawn ones.
     """
 
     groups: tyro.conf.Positional[tuple[str, ...]] = ()
@@ -50,6 +54,8 @@ class Args:
     json: bool = False
     save: Path | None = None
     compare: Annotated[tuple[Path, Path] | None, tyro.conf.arg(metavar="A B")] = field(default=None)
+    full: bool = False
+    data: Path | None = None
 
 
 def main() -> int:
@@ -67,7 +73,10 @@ def main() -> int:
     holds = True
     for group in args.groups or GROUPS:
         with console.status(f"running {group}"):
-            rows: list[Row] = importlib.import_module(f"benchmarks.{group}").rows(args.repeats)
+            run = importlib.import_module(f"benchmarks.{group}").rows
+            taken = inspect.signature(run).parameters
+            settings = {"full": args.full, "data": args.data}
+            rows: list[Row] = run(args.repeats, **{k: v for k, v in settings.items() if k in taken})
         document["groups"][group] = [row.to_dict() for row in rows]
         holds &= all(row.holds is not False for row in rows)
         if not args.json:

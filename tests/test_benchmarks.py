@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+import importlib
+import inspect
 import itertools
+import json
 import sys
+from dataclasses import MISSING, fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "scripts"))
 
+import benchmark
 from benchmarks.timing import Row, interleave, ratio_row
+
+from bench.discrepancy import BlindOptions
 
 
 def _row(ratio: float, limit: str) -> Row:
@@ -69,3 +77,128 @@ def test_solve_ivp_is_given_the_same_motion_as_mujoco_and_the_compiled_loop():
         assert problem.error(problem.compiled(rig, 1e-11)) < 1e-8
         # at 20 steps a millisecond kinks of the gaps leave 3e-7
         assert problem.error(problem.mujoco(20)[0]) < 1e-6
+
+
+def test_every_group_gives_rows_and_peers_are_no_groups():
+    assert {"accuracy", "campaign", "diagnosis", "envs", "identify", "native", "stream"} <= set(
+        benchmark.GROUPS
+    )
+    for group in benchmark.GROUPS:
+        assert "repeats" in inspect.signature(importlib.import_module(f"benchmarks.{group}").rows).parameters
+
+
+def test_results_are_saved_and_compared(tmp_path, monkeypatch, capsys):
+    from benchmarks import stream
+
+    held = [_row(2.0, "≥ 1"), Row("b", 0.5, (0.4, 0.6), "≥ 1", "", {})]
+    for name, chosen, status in (("one", held[:1], 0), ("two", held, 1)):
+        monkeypatch.setattr(stream, "rows", lambda repeats, chosen=chosen: chosen)
+        monkeypatch.setattr(sys, "argv", ["benchmark.py", "stream", "--json", "--save", str(tmp_path / name)])
+        assert benchmark.main() == status  # a row whose limit does not hold fails the command
+        told = json.loads(capsys.readouterr().out)
+        assert told == json.loads((tmp_path / name).read_text(encoding="utf-8"))
+        assert [row["holds"] for row in told["groups"]["stream"]] == [True, False][: len(chosen)]
+    monkeypatch.setattr(
+        sys, "argv", ["benchmark.py", "--compare", str(tmp_path / "one"), str(tmp_path / "two")]
+    )
+    assert benchmark.main() == 0
+    lines = [line for line in capsys.readouterr().out.splitlines() if "stream" in line]
+    assert len(lines) == 2
+    assert "–" in lines[1]  # the second row is not in the first file
+
+
+QUIET = BlindOptions(
+    noise=(1e-3, 1e-3), gap=(0.3, 0.3), duration=6.0, sample_rate=1000.0, sensors=("both",),
+    shares=(0.0, 1.0, 0.0, 0.0), rigs=(1.0, 0.0, 0.0), detectability=False,
+)  # fmt: skip
+
+
+def _case(effect: str, seed: int):
+    import dataclasses
+
+    from bench.discrepancy.blind import draw_case
+
+    options = dataclasses.replace(QUIET, effects=(effect,))
+    return draw_case(effect, np.random.default_rng(seed), options)[0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("effect", "tolerance"),
+    [
+        ("gap", 2e-3),  # the peer holds each step's mean load: (omega h)^2 / 12 at the upper end of the band
+        ("bouc_wen_hysteresis", 2e-3),
+        ("coulomb_friction", 5e-2),  # MuJoCo's friction constraint is soft, ours sticks
+        ("displacement_delay", 2e-3),
+        ("mass_error", 2e-3),
+    ],
+)
+def test_sysid_is_given_the_same_problem(effect, tolerance):
+    from benchmarks.peer_sysid import Candidate
+
+    from bench.discrepancy.attribute import placements
+    from bench.discrepancy.catalogue import CATALOGUE
+    from bench.discrepancy.problem import Problem
+    from bench.discrepancy.structure import structure_of
+
+    case = _case("gap", 5)
+    structure = structure_of(case)
+    problem = Problem(case, structure, case.identification)
+    placed = next(p for p in placements(case, structure, CATALOGUE) if p.effect.name == effect)
+    candidate = Candidate(problem, placed)
+    etas = [0.2 if p.signed else (p.grid[0] if p.grid else p.mean) for p in placed.effect.parameters]
+    vector = np.concatenate([[0.5, -1.0, 0.3], etas])
+    ours = problem.simulate((placed,), vector, case.validation[0])
+    theirs = np.column_stack(list(candidate.predict(vector, case.validation[0]).values()))
+    assert np.all(np.std(ours - theirs, axis=0) < tolerance * np.std(ours, axis=0))
+    # and so is the cost that it minimises
+    residual = problem.residual((placed,), vector)
+    mean, std, *_ = problem.prior((placed,))
+    own = float(residual @ residual + np.sum(((vector - mean) / std)[candidate.free] ** 2))
+    assert candidate.cost(vector) == pytest.approx(own, rel=20 * tolerance)
+
+
+@pytest.mark.slow
+def test_sysid_names_an_effect_of_its_own_when_it_is_plain():
+    from benchmarks import peer_sysid
+
+    from bench.discrepancy.catalogue import effect_named
+
+    # the whole catalogue takes it minutes; these are the gap's nearest rivals, and an effect of another kind each
+    rivals = ("gap", "cubic_stiffness", "coulomb_friction", "mass_error")
+    placed, _ = peer_sysid.diagnose(_case("gap", 5), catalogue=[effect_named(name) for name in rivals])
+    assert placed is not None
+    assert placed.effect.name == "gap"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("effect", ["cubic_stiffness", "quadratic_damping"])
+def test_sparse_regression_names_what_its_library_holds(effect):
+    from benchmarks import diagnosis
+
+    answer = diagnosis.by_sindy(_case(effect, 5))
+    assert [entry["name"] for entry in answer["named"]] == [effect]
+    # derivatives of noisy records leave some bias: a tenth of a gap of 0.3 stays
+    assert answer["gaps"][0]["after"] < 0.03
+
+
+def test_rows_of_the_diagnosis_come_from_the_scores_of_all_tools():
+    from benchmarks import diagnosis
+
+    from bench.discrepancy import BlindScore
+
+    def outcome(exact: float, seconds: float, after: float) -> diagnosis.Outcome:
+        names = [entry.name for entry in fields(BlindScore) if entry.default is MISSING]
+        known = {"exact": exact, "family": exact, "median_ratio": after}
+        figures: dict[str, Any] = dict.fromkeys(names, float("nan")) | known
+        return diagnosis.Outcome(BlindScore(**figures), seconds)
+
+    mine = [outcome(1.0, 1.0, 1.0), outcome(1.0, 2.0, 1.0), outcome(float("nan"), 3.0, 1.0)]
+    theirs = [outcome(1.0, 10.0, 2.0), outcome(0.0, 20.0, 2.0), outcome(float("nan"), 30.0, 4.0)]
+    rows = {row.name.partition(",")[0]: row for row in diagnosis._against("mujoco.sysid", mine, theirs)}
+    assert rows["single effects named exactly"].ratio == 2.0  # the clean case has no part in it
+    assert rows["seconds a case"].ratio == 10.0
+    assert rows["gap after over noise floor"].ratio == 2.0
+    assert "clean cases called clean" not in rows  # no case was scored for it
+    low, high = rows["single effects named exactly"].spread
+    assert low <= 2.0 <= high

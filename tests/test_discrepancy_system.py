@@ -8,8 +8,9 @@ from scipy.integrate import solve_ivp
 from scipy.signal import cont2discrete, dlsim
 
 from bench.discrepancy import friction_limits
+from bench.discrepancy.driven import driven_force
 from bench.discrepancy.smoothing import smooth_motion
-from bench.discrepancy.system import NO_ELEMENTS, Elements, LinearStructure, driven_force, free_run
+from bench.discrepancy.system import NO_ELEMENTS, Elements, LinearStructure, free_run
 from bench.laws.bouc_wen import BOUC_WEN
 from bench.laws.gap import GAP
 

@@ -18,11 +18,11 @@ import envs
 from bench import simulate
 from bench.errors import BenchError, ModelError
 from bench.excitation import Hypothesis, Uncertain
+from bench.excitation.shaping import SHAPINGS, Shaping
 from envs import rendering, single
 from envs.benches import FLOATS, Benches, Options
 from envs.laboratory import Laboratories, combined
 from envs.setups import PAIRS, SDOF_LAWS, discrimination_setup, joint_setup, sdof_setup
-from envs.shaping import SHAPINGS, Shaping
 
 SDOF, JOINT, DISCRIMINATION = envs.IDS
 QUICK: dict[str, Any] = {"rig": "sdof", "pairs": ("gap_cubic", "coulomb_stribeck"), "n_draws": 2}
@@ -189,7 +189,7 @@ def test_posterior_weights_move_towards_rigs_like_the_hidden_one() -> None:
         place = np.arange(1)
         prior = np.full((1, 6), 1.0 / 6.0)
         weights = benches._probability(
-            prior, benches._fisher, benches._score, benches._square, benches._window[place]
+            prior, benches._fisher, benches._score, benches._square, benches.desk.window[place]
         )
         truth = env.truth.values["stiffness:carriage"]
         distance = np.abs(np.log(np.array(drawn) / truth))
@@ -276,7 +276,7 @@ def test_observations_are_measurements_of_the_last_window() -> None:
     # Noise is there, and it is the sensors': the position at rest is zero, and known no better than that.
     rest = np.array([env.reset(seed=s)[0][:12:3] for s in range(200)]) * 0.04
     assert np.std(rest) == pytest.approx(5e-4, rel=0.1)  # 800 numbers: 2.5 % one sigma
-    assert env.benches._window[place] == 0
+    assert env.benches.desk.window[place] == 0
 
 
 @pytest.mark.parametrize("kind", SHAPINGS)

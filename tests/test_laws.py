@@ -192,6 +192,7 @@ def test_importing_the_laws_is_light():
 
 NOT_ODD = {
     "asymmetric_gap",
+    "asymmetric_damping",
     "one_sided_stop",
     "quadratic_stiffness",
     "constant_force",

@@ -11,6 +11,7 @@ import tyro
 from rich.console import Console
 
 from bench.cli.diagnosis import Blind, Diagnose
+from bench.cli.excite import Excite
 from bench.cli.rigs import Demo, Laws, Simulate, View
 from bench.cli.studies import Campaign, Reproduce
 from bench.errors import BenchError
@@ -20,6 +21,7 @@ COMMANDS: dict[str, type] = {
     "laws": Laws,
     "simulate": Simulate,
     "view": View,
+    "excite": Excite,
     "diagnose": Diagnose,
     "blind": Blind,
     "reproduce": Reproduce,

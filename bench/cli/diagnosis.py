@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
-from dataclasses import asdict, dataclass
+import os
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 from rich.console import Console
+from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.table import Table
+from rich.text import Text
 
 from bench.cli.console import emit, finite
+
+if TYPE_CHECKING:
+    from bench.discrepancy.diagnosis import Diagnosis
+    from bench.discrepancy.verdict import Verdict
 
 
 @dataclass
@@ -23,27 +33,140 @@ class Diagnose:
     """File for the result as JSON; "-" prints it."""
     html: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
     """File for the report, a self-contained HTML page."""
+    rrd: Path | None = None
+    """File for a rerun recording: measured and simulated channels, and where the gap lies."""
     exclude: tuple[str, ...] = ()
     """Effects to leave out of the catalogue."""
+    most: int = 3
+    """Largest number of effects named together."""
+    progress: bool = True
+    """Show what is being done, on standard error."""
 
     def __call__(self) -> None:
         """Run the command."""
-        from bench.discrepancy import diagnose_folder, write_report
         from bench.files import write_text
 
-        with Console(stderr=True).status("reading") as status:
-            diagnosis = diagnose_folder(self.folder, exclude=self.exclude, progress=status.update)
-        document = diagnosis.verdict.to_json()
-        if self.html is not None:
-            write_report(diagnosis, self.html)
-        if self.json == Path("-"):
+        self._check_places()
+        with _stages(self.progress) as stage:
+            diagnosis = _diagnosed(self.folder, self.exclude, self.most, stage)
+            document = diagnosis.verdict.to_json()
+            if self.html is not None:
+                from bench.discrepancy import write_report
+
+                stage(f"writing {self.html}")
+                write_report(diagnosis, self.html)
+            if self.rrd is not None:
+                from bench.discrepancy.rerun_report import write_rerun
+
+                stage(f"writing {self.rrd}")
+                write_rerun(diagnosis, self.rrd)
+        if self.json == PRINTED:
             emit(document)
-            return
-        if self.json is not None:
-            write_text(self.json, json.dumps(finite(document), indent=1, ensure_ascii=False))
-        Console().print(diagnosis.verdict.explanation, markup=False, highlight=False)
+        else:
+            if self.json is not None:
+                write_text(self.json, json.dumps(finite(document), indent=1, ensure_ascii=False))
+            for part in summary(diagnosis.verdict):
+                Console().print(part, markup=False, highlight=False)
+            for path in (self.json, self.html, self.rrd):
+                if path is not None:
+                    print(f"written: {path}")
         for warning in diagnosis.verdict.warnings:
-            Console(stderr=True).print(f"note: {warning}", style="yellow", markup=False, highlight=False)
+            Console(stderr=True, soft_wrap=True).print(
+                f"note: {warning}", style="yellow", markup=False, highlight=False
+            )
+
+    def _check_places(self) -> None:
+        """Refuse places that cannot be written to before a minute is spent on the diagnosis."""
+        from bench.errors import ParameterError
+        from bench.files import OutputError
+
+        if self.most < 1:
+            raise ParameterError(f"--most is {self.most}; at least one effect has to be allowed")
+        taken: set[Path] = set()
+        for path in (self.json, self.html, self.rrd):
+            if path is None or path == PRINTED:
+                continue
+            if path.is_dir():
+                raise OutputError(f"cannot write {path}: it is a folder; name a file in it")
+            nearest = next(parent for parent in path.resolve().parents if parent.exists())
+            if not nearest.is_dir() or not os.access(nearest, os.W_OK):
+                raise OutputError(
+                    f"cannot write {path}: {nearest} is no folder one may write to; choose another place"
+                )
+            if path.resolve() in taken:
+                raise OutputError(f"{path} is named for two results; give each a file of its own")
+            taken.add(path.resolve())
+
+
+PRINTED = Path("-")
+"""Stands for standard output."""
+
+
+@contextlib.contextmanager
+def _stages(shown: bool) -> Iterator[Callable[[str], None]]:
+    """A line on standard error with what is being done and for how long; call what is given with the text."""
+    columns = (SpinnerColumn(), TimeElapsedColumn(), TextColumn("{task.description}", markup=False))
+    with Progress(*columns, console=Console(stderr=True), disable=not shown, transient=True) as bar:
+        task = bar.add_task("reading", total=None)
+        yield lambda text: bar.update(task, description=text)
+
+
+def _diagnosed(folder: Path, exclude: tuple[str, ...], most: int, stage: Callable[[str], None]) -> Diagnosis:
+    """The diagnosis of a folder; what numerics cannot cope with is told like any other input that cannot be used."""
+    import numpy as np
+
+    from bench.discrepancy import diagnose_folder
+    from bench.errors import IdentificationError
+
+    try:
+        return diagnose_folder(folder, exclude=exclude, most=most, progress=stage)
+    except (np.linalg.LinAlgError, ArithmeticError) as error:
+        raise IdentificationError(
+            f"the numbers of '{folder}' cannot be worked with ({error}); check nominal values, units and noise_std: "
+            "one of them is probably off by orders of magnitude"
+        ) from error
+
+
+def summary(verdict: Verdict) -> list[Any]:
+    """A verdict for people: sentences and tables to print.
+
+    Args:
+        verdict: The verdict.
+    """
+    parts: list[Any] = [verdict.explanation]
+    if verdict.named:
+        table = Table("effect", "where", "probability", "parameters", title="Missing from the model")
+        for effect in verdict.named:
+            values = "\n".join(
+                f"{name} = {p.value:.5g} ± {p.std:.2g} {p.unit if p.unit != '1' else ''}".rstrip()
+                for name, p in effect.parameters.items()
+            )
+            where = " ".join(text for text in (effect.where, effect.channel) if text)
+            table.add_row(effect.name, where, f"{effect.probability:.3f}", Text(values))
+        parts.append(table)
+    table = Table(
+        "gap", "before", "parameters only", "after", "noise", "closed", title="How far the gap shrinks"
+    )
+    for gap in verdict.gaps:
+        closed = f"{100 * gap.closed:.1f} % ({100 * gap.closed_ci95[0]:.1f} … {100 * gap.closed_ci95[1]:.1f})"
+        label = f"{gap.dof}: {gap.metric}" if gap.dof else gap.metric
+        table.add_row(
+            label,
+            *(f"{x:.3g}" for x in (gap.before, gap.parameters_only, gap.after, gap.noise_floor)),
+            closed,
+        )
+    parts.append(table)
+    for names in verdict.indistinguishable:
+        parts.append(f"These records cannot tell {' from '.join(names)}.")
+    proposal = verdict.next_excitation
+    if proposal.get("reason"):
+        parts.append(proposal["reason"])
+    if proposal.get("separates") and proposal.get("excitation"):
+        parts.append(
+            f"To separate {' from '.join(proposal['separates'])}: {proposal['excitation']}, peak load "
+            f"{proposal['peak_load']:.3g}, {proposal['duration_s']:.3g} s; power {100 * proposal['power']:.0f} %."
+        )
+    return parts
 
 
 @dataclass
@@ -57,20 +180,43 @@ class BlindMake:
     n: int = 20
     """Number of cases."""
     seed: int = 0
-    """Seed of all randomness."""
+    """Seed of all randomness; the same seed makes the same cases, answers and seals."""
+    gap: tuple[float, float] = (0.03, 0.6)
+    """Smallest and largest gap (NRMSE)."""
+    noise: tuple[float, float] = (0.003, 0.03)
+    """Smallest and largest noise, as a part of a channel's standard deviation."""
+    shares: tuple[float, float, float, float] = (0.15, 0.55, 0.15, 0.15)
+    """Shares of clean, single, double and foreign cases."""
+    rigs: tuple[float, float, float] = (0.65, 0.15, 0.2)
+    """Shares of the rigs sdof, damper and joint."""
+    effects: tuple[str, ...] = ()
+    """Effects to draw from; all where none is named."""
+    duration: float = 10.0
+    """Length of a record [s]."""
+    sample_rate: float = 500.0
+    """Sample rate [Hz]."""
+    leave_one_out: bool = False
+    """Single effects only, each struck from the catalogue that its diagnosis may use."""
+    detectability: bool = True
+    """Compute how well the records of each case can tell its effect, for the answers."""
+    workers: int = 1
+    """Processes."""
 
     def __call__(self) -> None:
         """Run the command."""
         import numpy as np
 
-        from bench.discrepancy import make_blind
+        from bench.discrepancy import BlindOptions, make_blind
 
+        chosen = {key: value for key, value in vars(self).items() if key in BlindOptions.__dataclass_fields__}
         with Console(stderr=True).status("making cases") as status:
             names = make_blind(
                 self.folder,
                 self.answers,
                 n=self.n,
                 rng=np.random.default_rng(self.seed),
+                options=BlindOptions(**chosen),
+                workers=self.workers,
                 progress=status.update,
             )
         print(f"{len(names)} cases in {self.folder}, answers in {self.answers}")
@@ -84,6 +230,10 @@ class BlindRun:
     """Folder of case folders."""
     results: tyro.conf.Positional[Path]
     """Folder for one JSON file a case."""
+    workers: int = 1
+    """Processes."""
+    again: bool = False
+    """Diagnose cases whose result is there already as well."""
 
     def __call__(self) -> None:
         """Run the command."""
@@ -93,7 +243,9 @@ class BlindRun:
         written = run_blind(
             self.folder,
             self.results,
-            progress=lambda text: console.print(text, markup=False, highlight=False),
+            again=self.again,
+            workers=self.workers,
+            progress=lambda text: console.print(text, markup=False, highlight=False, soft_wrap=True),
         )
         print(f"{len(written)} diagnoses in {self.results}")
 
@@ -110,24 +262,31 @@ class BlindScore:
     """Folder of the cases, to check the answers against their seals."""
     json: bool = False
     """Print JSON."""
+    html: Path | None = None
+    """File for the scores as a self-contained page."""
+    markdown: Path | None = None
+    """File for the scores as Markdown."""
 
     def __call__(self) -> None:
         """Run the command."""
         from bench.discrepancy import score_blind
+        from bench.discrepancy.blind_report import markdown, page, tables
+        from bench.files import write_text
 
         score = score_blind(self.results, self.answers, cases=self.cases)
+        if self.html is not None:
+            page(score).write(self.html)
+        if self.markdown is not None:
+            write_text(self.markdown, markdown(score))
         if self.json:
-            emit(asdict(score))
+            emit(score.to_json())
             return
-        for name, value in asdict(score).items():
-            if name not in {"confusion", "wrong"}:
-                print(
-                    f"{name.replace('_', ' ')}: {value:.3g}"
-                    if isinstance(value, float)
-                    else f"{name}: {value}"
-                )
-        for line in score.wrong:
-            print(f"  {line}")
+        console = Console()
+        for table in tables(score):
+            shown = Table(*table.header, title=table.caption, title_justify="left")
+            for row in table.rows:
+                shown.add_row(*(Text(cell) for cell in row))
+            console.print(shown)
 
 
 @dataclass

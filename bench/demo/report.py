@@ -9,6 +9,8 @@ from rich.table import Table
 from bench.demo import DemoResult
 from bench.demo.damper import DamperTest
 from bench.demo.joint import JointModel, Progress
+from bench.discrepancy import write_report, write_rerun
+from bench.discrepancy.report_figures import state_figure
 from bench.figures import bar_table, loops, time_histories
 from bench.page import Page
 from bench.record_files import write_recording
@@ -30,7 +32,19 @@ def summary(result: DemoResult) -> list[Table]:
         joint.add_column(column)
     for row in _joint_rows(result):
         joint.add_row(*row)
-    return [damper, joint]
+    return [damper, joint, _diagnosis_table(result)]
+
+
+def _diagnosis_table(result: DemoResult) -> Table:
+    verdict = result.diagnosis.verdict
+    table = Table(title="Diagnosis of the real damper against Coulomb friction alone: force NRMSE at 1 Hz")
+    for column in ("missing from the model", "before", "parameters only", "after", "probability"):
+        table.add_column(column)
+    gap = verdict.gap
+    figures = [f"{x:.3f}" for x in (gap.before, gap.parameters_only, gap.after)]
+    name = " + ".join(effect.name for effect in verdict.named) or verdict.verdict
+    table.add_row(name, *figures, f"{verdict.probabilities[verdict.verdict]:.2f}")
+    return table
 
 
 def _joint_rows(result: DemoResult) -> list[list[str]]:
@@ -47,7 +61,7 @@ def _joint_rows(result: DemoResult) -> list[list[str]]:
 
 
 def write(result: DemoResult, folder: Path, progress: Progress) -> list[Path]:
-    """Write index.html, joint.rrd and the records; returns the files, the page first.
+    """Write index.html, joint.rrd, diagnosis.html, diagnosis.rrd and the records; returns the files, the page first.
 
     Args:
         result: The demo's result.
@@ -63,8 +77,12 @@ def write(result: DemoResult, folder: Path, progress: Progress) -> list[Path]:
     progress("writing the rerun recording", 1.0)
     viewer = folder / "joint.rrd"
     log_joint(result, viewer)
+    progress("writing the diagnosis", 1.0)
+    told = [folder / "diagnosis.html", folder / "diagnosis.rrd"]
+    write_report(result.diagnosis, told[0])
+    write_rerun(result.diagnosis, told[1])
     progress("writing the records", 1.0)
-    return [page, viewer, *_write_records(result, folder / "records")]
+    return [page, viewer, *told, *_write_records(result, folder / "records")]
 
 
 def _converged(result: DemoResult) -> list[JointModel]:
@@ -111,7 +129,27 @@ def _page(result: DemoResult) -> Page:
     )
     _damper_section(page, result.damper)
     _joint_section(page, result)
+    _diagnosis_section(page, result)
     return page
+
+
+def _diagnosis_section(page: Page, result: DemoResult) -> None:
+    verdict = result.diagnosis.verdict
+    section = page.section("What a Coulomb model of the damper lacks")
+    section.text(
+        "The other way round: the nominal model of the damper knows Coulomb friction only, and the diagnosis says from the 0.5 Hz test "
+        "what is missing and how far the gap shrinks at 1 Hz. The whole of it is in diagnosis.html and diagnosis.rrd beside this page."
+    )
+    section.text(verdict.explanation)
+    section.table(
+        "Force NRMSE at 1 Hz",
+        ("stage", "NRMSE"),
+        [(label, f"{value:.3f}") for label, value in verdict.gap.steps],
+    )
+    for found in result.diagnosis.where.maps:
+        section.figure(
+            state_figure(found), "Force that the Coulomb model lacks, over the states of the 0.5 Hz test."
+        )
 
 
 def _damper_section(page: Page, tests: tuple[DamperTest, ...]) -> None:

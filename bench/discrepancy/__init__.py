@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from bench.discrepancy.blind import BlindOptions, BlindScore, make_blind, run_blind
+    from bench.discrepancy.blind import BlindOptions, make_blind, run_blind
     from bench.discrepancy.case import (
         Case,
         CaseChannel,
@@ -20,12 +20,13 @@ if TYPE_CHECKING:
     )
     from bench.discrepancy.diagnosis import Diagnosis, diagnose, diagnose_folder
     from bench.discrepancy.report import write_report
-    from bench.discrepancy.scoring import score_blind
+    from bench.discrepancy.rerun_report import write_rerun
+    from bench.discrepancy.scoring import BlindScore, score_blind
     from bench.discrepancy.verdict import Verdict
 
 _HOMES = {
     "BlindOptions": "blind",
-    "BlindScore": "blind",
+    "BlindScore": "scoring",
     "Case": "case",
     "CaseChannel": "case",
     "CaseRecord": "case",
@@ -40,6 +41,7 @@ _HOMES = {
     "run_blind": "blind",
     "score_blind": "scoring",
     "write_report": "report",
+    "write_rerun": "rerun_report",
 }
 
 __all__ = [
@@ -59,6 +61,7 @@ __all__ = [
     "run_blind",
     "score_blind",
     "write_report",
+    "write_rerun",
 ]
 
 

@@ -2,27 +2,31 @@
 
 Screening proposes, output-error fits decide, and hypotheses are compared by their evidence. Effects are added one at
 a time as long as the residuals do not look like noise: to the best few hypotheses so far, the screening conditioned on each.
-An effect that a larger hypothesis does not need any more loses to the smaller one by its Occam factor.
+An effect that a larger hypothesis does not need any more loses to the smaller one by its Occam factor. In the end every effect
+of the best hypothesis is challenged by those that do nearly as well along the measured motion, each fitted from several
+starts, so that no flexible law wins because a simpler one was fitted carelessly.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from bench.discrepancy.case import Case
 from bench.discrepancy.effect import Effect
 from bench.discrepancy.fit import Fit, fit
-from bench.discrepancy.problem import Hypothesis, Placed, Problem
-from bench.discrepancy.screen import Point, Screen
+from bench.discrepancy.problem import FROM, Hypothesis, Placed, Problem
+from bench.discrepancy.screen import Ground, Point, Screen
 from bench.discrepancy.structure import Structure
 
 THREADS = 2
-QUICK = 4
+QUICK = 6
 """Iterations of a first fit; the best are carried on to convergence."""
+THOROUGH = 30
+"""Iterations of a fit that is carried on to convergence."""
 LOG_PRIOR_EFFECT = -3.4
 """Log prior odds of one more effect: about one in the number of effects of the catalogue."""
 SIGNIFICANT = 4.0
@@ -36,10 +40,36 @@ HOPELESS = 3.0
 """A first fit that leaves more than this many times the excess of the best one is not carried on."""
 SHORT = 0.2
 """Effects whose screened gain is less than this part of the best one are not fitted."""
+REFINED_EFFECTS = 12
+"""Effects whose grid points are refined along the measured motion."""
+REFINED_STARTS = 3
+"""Grid points refined of each."""
+APART = 0.8
+"""Distance of starts of an effect, in prior standard deviations of its grid parameters."""
+SAME = 0.3
+"""Distance within which two refined starts of an effect count as one."""
+NEARLY = 0.9
+"""Further starts of an effect are worth a fit if they gain this part of what its best one does."""
+LEFT = 0.02
+"""Part of a named effect's gain along the measured motion that a challenger may lack, besides twice what the effect leaves."""
+WITHIN_REACH = 30.0
+"""Difference in log posterior that carrying a first fit on to convergence may still make up."""
+REFUTED = 2.0
+"""Reduced chi-squared from which the best hypothesis is so far off that its rivals are not fitted again: none of them will do."""
 STALLED = 0.7
 """If one more effect leaves more than this part of the excess of chi-squared, a further one is not tried."""
 MODEL_ERROR = 0.02
 """Relative excess of chi-squared that is laid to the smoothing and integration of the diagnosis itself."""
+
+OTHER_AXIS = {
+    "displacement": "rotation",
+    "rotation": "displacement",
+    "velocity": "angular_velocity",
+    "angular_velocity": "velocity",
+    "acceleration": "angular_acceleration",
+    "angular_acceleration": "acceleration",
+}
+"""Channels of the joint rig that one sensor measures along its two axes."""
 
 
 @dataclass
@@ -50,11 +80,25 @@ class Search:
         problem: Records and priors.
         fits: Fitted hypotheses by their set of keys.
         converged: Keys of the fits carried on to convergence.
+        started: Where fits have begun.
+        first: Refined starts of single effects.
     """
 
     problem: Problem
     fits: dict[frozenset, Fit] = field(default_factory=dict)
     converged: set[frozenset] = field(default_factory=set)
+    started: set[tuple] = field(default_factory=set)
+    first: list[Point] = field(default_factory=list)
+
+    def start(self, base: Hypothesis, point: Point) -> bool:
+        """Note that a fit begins here; False where one has begun so near before."""
+        spread = [p.std for p in point.placed.effect.parameters]
+        place = tuple(int(x) for x in np.round(point.eta / spread / SAME))
+        mark = (key_of((*base, point.placed)), point.placed.key, place)
+        if mark in self.started:
+            return False
+        self.started.add(mark)
+        return True
 
     def add(self, fitted: Fit) -> None:
         """Keep a fit if it is the best of its hypothesis."""
@@ -114,8 +158,24 @@ def _targets(case: Case, effect: Effect, structure: Structure, place) -> list[st
         ]
     if effect.site == "sensor":
         order = {"position": 0, "velocity": 1, "acceleration": 2}[effect.quantity]
-        return [o.channel for o in structure.observers if o.order == order and np.abs(o.row[dofs]).sum() > 0]
+        channels = [
+            o.channel for o in structure.observers if o.order == order and np.abs(o.row[dofs]).sum() > 0
+        ]
+        return _pickups(case, structure, channels) if effect.pickup else channels
     return []
+
+
+def _pickups(case: Case, structure: Structure, channels: Sequence[str]) -> list[str]:
+    """Cross-talk into response channels: from the loads on their structure, and from the same sensor's other axis."""
+    if case.rig == "damper":  # what the force channel picks up from the displacement is a stiffness
+        return []
+    out = []
+    for channel in channels:
+        kind, _, number = channel.rpartition("_")
+        across = f"{OTHER_AXIS[kind]}_{number}" if kind in OTHER_AXIS else ""
+        sources = [*structure.loads, across] if case.has(across) else structure.loads
+        out += [f"{channel}{FROM}{source}" for source in sources]
+    return out
 
 
 def attribute(
@@ -145,25 +205,39 @@ def attribute(
         at_ease = consistent(nothing) and nothing.cost - nothing.chi2 < len(problem.nominal) + WORTH_A_FIT / 2
         if at_ease and (not points or points[0].gain < WORTH_A_FIT):
             return search
-        _extend(search, screen, [nothing], pool, seconds=7)
+        _extend(search, screen, [nothing], pool, count=6)
+        rare = [p for p in candidates if p.effect.rare]
+        if rare and not consistent(search.ranked()[0]):
+            progress("rarer effects")
+            screen.add(rare, pool.map)
+            _extend(search, screen, [nothing], pool, count=6, among={p.key for p in rare})
         for size in range(1, most):
             best = search.ranked()[0]
             progress(
                 f"{len(best.hypothesis)} effect(s): {names(best.hypothesis)}, chi-squared {best.reduced:.3g}"
             )
             if consistent(best):
-                points = screen.ranked(best) if len(best.hypothesis) == size else []
-                if not points or points[0].gain < WORTH_A_FIT:
+                if len(best.hypothesis) != size or not _promising(screen, best):
                     break
-                _extend(search, screen, [best], pool, seconds=6)
+                _extend(search, screen, [best], pool, count=4)
                 reduce_best(search, pool)
                 continue
             ranked = search.ranked(size)
             if not ranked or ranked[0].reduced - 1.0 > STALLED * (search.ranked(size - 1)[0].reduced - 1.0):
                 break
-            _extend(search, screen, ranked[: 4 - size], pool, seconds=6 - size)
+            _extend(search, screen, ranked[: 4 - size], pool, count=6 - size)
             reduce_best(search, pool)
+        best = search.ranked()[0]
+        if problem.noise_stated and best.reduced < REFUTED:
+            progress(f"rivals of {names(best.hypothesis)}")
+            challenge(search, screen, pool)
     return search
+
+
+def _promising(screen: Screen, best: Fit) -> bool:
+    """Whether one more effect could still be in the residual of a hypothesis that is down to the noise."""
+    points = screen.ranked(best, screen.ground(best, simulated=True))
+    return bool(points) and points[0].gain > max(WORTH_A_FIT, IMMATERIAL * best.n_residuals)
 
 
 def prepare(
@@ -178,7 +252,7 @@ def prepare(
     """
     search = Search(problem)
     search.add(fit(problem, (), start=np.zeros(len(problem.nominal))))
-    screen = Screen(problem, candidates, each)
+    screen = Screen(problem, [p for p in candidates if not p.effect.rare], each)
     return search, screen, screen.ranked()
 
 
@@ -191,44 +265,125 @@ def names(hypothesis: Hypothesis) -> str:
 
 
 def _extend(
-    search: Search, screen: Screen, bases: Sequence[Fit], pool: ThreadPoolExecutor, *, seconds: int
+    search: Search,
+    screen: Screen,
+    bases: Sequence[Fit],
+    pool: ThreadPoolExecutor,
+    *,
+    count: int,
+    among: Collection[tuple[str, str, str]] = (),
 ) -> None:
-    """Add one effect to every base: screen, fit quickly, carry the best on."""
+    """Add one effect to every base, of those `among` where some are given: screen, refine, fit quickly, carry the best on."""
     problem = search.problem
     tasks: list[tuple[Hypothesis, np.ndarray]] = []
     size = len(bases[0].hypothesis) + 1
     for base in bases:
-        points = screen.ranked(base if base.hypothesis else None)
-        for placed, etas in _starts(points, seconds):
-            for eta in etas:
-                tasks.append(
-                    ((*base.hypothesis, placed), np.concatenate([base.vector * bool(base.hypothesis), eta]))
-                )
+        named = base if base.hypothesis else None
+        ground = screen.ground(named, simulated=named is not None and consistent(base))
+        solved = [p for p in screen.ranked(named, ground) if not among or p.placed.key in among]
+        points = refined(screen, ground, solved, pool)
+        if not named:
+            search.first = sorted([*search.first, *points] if among else points, key=lambda p: -p.gain)
+        inertia = {} if among else screen.inertia_gains(ground)
+        most = max([p.gain for p in points] + list(inertia.values()), default=0.0)
+        for point in _leading(points, count, SHORT * most):
+            if search.start(base.hypothesis, point):
+                start = np.concatenate([base.vector * bool(base.hypothesis), point.eta])
+                tasks.append(((*base.hypothesis, point.placed), start))
         own = {placed.key for placed in base.hypothesis}
         for placed in screen.inertia:
-            if placed.key not in own:
+            if placed.key not in own and inertia.get(placed.key, 0.0) > SHORT * most:
                 tasks.append(((*base.hypothesis, placed), np.concatenate([base.vector, [0.0]])))
 
+    limit = _limit(search, size)
+
     def quick(task: tuple[Hypothesis, np.ndarray]) -> Fit:
-        return fit(
-            problem,
-            task[0],
-            start=task[1],
-            iterations=QUICK if task[0][-1].effect.site == "joint" else 3 * QUICK,
-        )
+        iterations = QUICK if task[0][-1].effect.site == "joint" else 2 * QUICK
+        return fit(problem, task[0], start=task[1], iterations=iterations, exact=False, limit=limit)
 
     for fitted in pool.map(quick, tasks):
         search.add(fitted)
-    ranked = [f for f in search.ranked(size) if np.isfinite(f.cost)]
-    carried = [
-        f
-        for f in ranked[:4]
-        if key_of(f.hypothesis) not in search.converged
-        and f.reduced < 1.5 + HOPELESS * (ranked[0].reduced - 1.0)
-    ]
-    for fitted in pool.map(lambda f: fit(problem, f.hypothesis, start=f.vector, iterations=20), carried):
+    carry_on(search, pool, size, most=4)
+
+
+def carry_on(search: Search, pool: ThreadPoolExecutor, size: int, *, most: int) -> None:
+    """Carry the fits of one size that may still become the best on to convergence."""
+    for share in (HOPELESS, 0.0):
+        ranked = [f for f in search.ranked(size) if np.isfinite(f.cost)]
+        if not ranked:
+            return
+        limit = 1.5 * bool(share) + share * (ranked[0].reduced - 1.0)
+        chosen = [
+            f
+            for f in ranked[:most]
+            if key_of(f.hypothesis) not in search.converged
+            and (f.reduced < limit or posterior(f) > posterior(ranked[0]) - WITHIN_REACH)
+        ]
+        converge(search, pool, [(f.hypothesis, f.vector) for f in chosen])
+
+
+def converge(
+    search: Search, pool: ThreadPoolExecutor, tasks: Sequence[tuple[Hypothesis, np.ndarray]]
+) -> None:
+    """Fit hypotheses from starts to convergence, but for those that cannot come near the best."""
+
+    limits = {size: _limit(search, size) for size in {len(hypothesis) for hypothesis, _ in tasks}}
+
+    def thorough(task: tuple[Hypothesis, np.ndarray]) -> Fit:
+        limit = limits[len(task[0])]
+        return fit(search.problem, task[0], start=task[1], iterations=THOROUGH, limit=limit)
+
+    for fitted in pool.map(thorough, tasks):
         search.add(fitted)
         search.converged.add(key_of(fitted.hypothesis))
+
+
+def _limit(search: Search, size: int) -> float:
+    """Cost beyond which a fit of so many effects is of no more interest."""
+    best = min((f.cost for f in search.fits.values() if len(f.hypothesis) == size), default=np.inf)
+    return best + 4.0 * WITHIN_REACH + max(best - search.problem.n_residuals, 0.0)
+
+
+def challenge(search: Search, screen: Screen, pool: ThreadPoolExecutor, *, rounds: int = 2) -> None:
+    """Fit the rivals of every effect of the best hypothesis, and that effect itself, from several starts.
+
+    Args:
+        search: Fits so far; the new ones are added.
+        screen: Screening of the same problem.
+        pool: Threads.
+        rounds: A rival that wins is challenged in turn, so many times at most.
+    """
+    challenged: set[frozenset] = set()
+    n = len(search.problem.nominal)
+    for _ in range(rounds):
+        best = search.ranked()[0]
+        if not best.hypothesis or key_of(best.hypothesis) in challenged:
+            return
+        challenged.add(key_of(best.hypothesis))
+        _, etas = search.problem.split(best.hypothesis, best.vector)
+        tasks = []
+        for i, placed in enumerate(best.hypothesis):
+            rest = best.hypothesis[:i] + best.hypothesis[i + 1 :]
+            vector = np.concatenate([best.vector[:n], *(eta for j, eta in enumerate(etas) if j != i)])
+            base = replace(best, hypothesis=rest, vector=vector) if rest else None
+            points, alone = search.first, search.ranked(0)[0].chi2
+            if rest:
+                ground = screen.ground(base)
+                alone = float(np.sum(ground.project(ground.residual) ** 2))
+                points = refined(screen, ground, screen.ranked(base, ground), pool)
+            own = max((p.gain for p in points if p.placed.key == placed.key), default=np.inf)
+            left = max(alone - own, search.problem.n_residuals)
+            for point in _leading(points, 5, own - left - LEFT * own, starts=REFINED_STARTS):
+                if search.start(rest, point):
+                    tasks.append(((*rest, point.placed), np.concatenate([vector, point.eta])))
+                    continue
+                # begun before, but perhaps left after a few iterations because a more flexible law was ahead by then
+                begun = search.fits.get(key_of((*rest, point.placed)))
+                known = begun is not None and any(begun.vector is start for _, start in tasks)
+                if begun is not None and not known and key_of(begun.hypothesis) not in search.converged:
+                    tasks.append((begun.hypothesis, begun.vector))
+        converge(search, pool, tasks)
+        carry_on(search, pool, len(best.hypothesis), most=6)
 
 
 def reduce_best(search: Search, pool: ThreadPoolExecutor) -> None:
@@ -244,17 +399,56 @@ def reduce_best(search: Search, pool: ThreadPoolExecutor) -> None:
         tasks.append(
             (rest, np.concatenate([best.vector[:n], *(eta for j, eta in enumerate(etas) if j != i)]))
         )
-    for fitted in pool.map(lambda task: fit(search.problem, task[0], start=task[1], iterations=20), tasks):
-        search.add(fitted)
+    converge(search, pool, tasks)
 
 
-def _starts(points: Sequence[Point], count: int) -> list[tuple[Placed, list[np.ndarray]]]:
-    """Best `count` effects of a screening, with their best one or two starts."""
-    grouped: dict[tuple[str, str, str], tuple[Placed, list[np.ndarray]]] = {}
+def refined(screen: Screen, ground: Ground, points: Sequence[Point], pool: ThreadPoolExecutor) -> list[Point]:
+    """Refine the leading grid points of the leading effects along the measured motion; by decreasing gain.
+
+    Args:
+        screen: Screening.
+        ground: What the base leaves.
+        points: Solved grid points by decreasing gain.
+        pool: Threads.
+    """
+    chosen: dict[tuple[str, str, str], list[Point]] = {}
     for point in points:
-        if point.gain < SHORT * points[0].gain:
+        if point.gain < 0.5 * SHORT * points[0].gain:
             break
-        _, etas = grouped.setdefault(point.placed.key, (point.placed, []))
-        if len(etas) < (1 if point.placed.effect.site != "joint" else 2):
-            etas.append(point.eta)
-    return list(grouped.values())[:count]
+        if point.placed.key not in chosen and len(chosen) == REFINED_EFFECTS:
+            continue
+        starts = chosen.setdefault(point.placed.key, [])
+        if len(starts) < REFINED_STARTS and all(_apart(point, other) > APART for other in starts):
+            starts.append(point)
+    tasks = [point for starts in chosen.values() for point in starts]
+    return sorted(pool.map(lambda point: screen.refine(point, ground), tasks), key=lambda p: -p.gain)
+
+
+def _apart(point: Point, other: Point) -> float:
+    """Distance of two starts of an effect in the parameters that have a grid."""
+    return max(
+        (
+            abs(a - b) / p.std
+            for a, b, p in zip(point.eta, other.eta, point.placed.effect.parameters, strict=True)
+            if p.grid
+        ),
+        default=0.0,
+    )
+
+
+def _leading(points: Sequence[Point], count: int, least: float, starts: int = 2) -> list[Point]:
+    """Starts of the `count` effects of largest gain: the best of each, and further ones that are nearly as good."""
+    grouped: dict[tuple[str, str, str], list[Point]] = {}
+    for point in points:
+        if point.gain < least:
+            break
+        if point.placed.key not in grouped and len(grouped) == count:
+            continue
+        own = grouped.setdefault(point.placed.key, [])
+        if not own or (
+            len(own) < starts
+            and point.gain > NEARLY * own[0].gain
+            and all(_apart(point, other) > SAME for other in own)
+        ):
+            own.append(point)
+    return [point for own in grouped.values() for point in own]

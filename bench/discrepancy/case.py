@@ -3,6 +3,11 @@
 A case is a folder with ``nominal.json`` and records as ``.csv`` or ``.csv.gz``. Records whose name begins with
 ``identification`` serve to find the effect, those beginning with ``validation`` to judge. ``nominal.json`` names the
 rig, the sample rate, every nominal parameter with its one-sigma uncertainty and every channel with unit, noise and role.
+
+What is known of the acquisition goes there too: ``"load_interpolation": "linear" | "band_limited" | "zero_order_hold"`` for the
+loads between their samples, ``"starts_in_motion": ["validation", …]`` (or true, for all of them) for records that do not start at
+rest, ``"periodic": ["identification_2", …]`` for records that are whole periods of a steady state, and
+``"antialias": {"kind": "butterworth", "order": 4, "cutoff_hz": 300}`` at a response channel that was filtered on its way.
 """
 
 from __future__ import annotations
@@ -10,16 +15,21 @@ from __future__ import annotations
 import gzip
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from bench.discrepancy.acquisition import INTERPOLATIONS, Antialias
+from bench.discrepancy.nominal_file import check_document
 from bench.errors import FileFormatError, RecordingError, UnknownNameError
 
 ROLES = ("measured", "command", "prescribed", "response")
 """Roles of a channel: a measured load, a commanded load, a prescribed motion, a response."""
+
+TARGETS = ("sensor", "joint", "actuator")
+"""Entries of a user's own MJCF that a channel can refer to."""
 
 SUFFIXES = (".csv", ".csv.gz")
 MIN_SAMPLES = 200
@@ -52,12 +62,19 @@ class CaseChannel:
         unit: Unit.
         role: One of `ROLES`.
         noise_std: One-sigma noise; None where it is not stated.
+        antialias: Filter that a response passed before it was sampled; None where there was none, or the loads passed it too.
+        target: Entry of the user's own MJCF that it stands for: "sensor:NAME", "joint:NAME" or "actuator:NAME"; found by
+            the channel's own name where empty.
+        quantity: "position", "velocity" or "acceleration" of a joint.
     """
 
     name: str
     unit: str = ""
     role: str = "response"
     noise_std: float | None = None
+    antialias: Antialias | None = None
+    target: str = ""
+    quantity: str = ""
 
 
 @dataclass(frozen=True)
@@ -70,6 +87,8 @@ class CaseRecord:
         start: Time of the first sample [s].
         values: Channel name to samples (n,).
         at_rest: Whether the record starts at rest.
+        periodic: Whether it is a whole period of a steady state (or several), its end joining its start; simulations of it are
+            then run in from rest over so many periods that nothing is left of the start.
     """
 
     name: str
@@ -77,6 +96,7 @@ class CaseRecord:
     start: float
     values: Mapping[str, NDArray[np.float64]]
     at_rest: bool = True
+    periodic: bool = False
 
     def __len__(self) -> int:
         return len(next(iter(self.values.values())))
@@ -122,13 +142,30 @@ class Case:
                 return channel
         raise UnknownNameError("channel", name, (c.name for c in self.channels))
 
+    @property
+    def load_interpolation(self) -> str:
+        """How the loads ran between their samples, one of `INTERPOLATIONS`; option "load_interpolation", "linear" without it.
+
+        Raises:
+            UnknownNameError: It is none of them.
+        """
+        chosen = str(self.options.get("load_interpolation", "linear"))
+        if chosen not in INTERPOLATIONS:
+            raise UnknownNameError("load_interpolation", chosen, INTERPOLATIONS)
+        return chosen
+
     def has(self, name: str) -> bool:
         """Whether the case has a channel called `name`."""
         return any(channel.name == name for channel in self.channels)
 
 
 def record_from_arrays(
-    name: str, time: ArrayLike, values: Mapping[str, ArrayLike], *, at_rest: bool = True
+    name: str,
+    time: ArrayLike,
+    values: Mapping[str, ArrayLike],
+    *,
+    at_rest: bool = True,
+    periodic: bool = False,
 ) -> CaseRecord:
     """Build a record; the arrays are copied and made read-only.
 
@@ -137,6 +174,7 @@ def record_from_arrays(
         time: Uniform, increasing sample times (n,) [s].
         values: Channel name to samples (n,).
         at_rest: Whether it starts at rest.
+        periodic: Whether it is one or more whole periods of a steady state.
 
     Raises:
         RecordingError: Too short, not uniform in time, NaN, or channels of another length.
@@ -145,6 +183,10 @@ def record_from_arrays(
     if clock.ndim != 1 or len(clock) < MIN_SAMPLES:
         raise RecordingError(
             f"record '{name}' has {clock.size} samples; at least {MIN_SAMPLES} are needed: give a longer record"
+        )
+    if not np.isfinite(clock).all():
+        raise RecordingError(
+            f"record '{name}': the time column is not finite in row {int(np.argmax(~np.isfinite(clock))) + 1}; repair it"
         )
     steps = np.diff(clock)
     step = float(np.median(steps))
@@ -170,7 +212,7 @@ def record_from_arrays(
             )
         column.setflags(write=False)
         columns[channel] = column
-    return CaseRecord(name, step, float(clock[0]), columns, at_rest)
+    return CaseRecord(name, step, float(clock[0]), columns, at_rest, periodic)
 
 
 def read_case(folder: str | Path) -> Case:
@@ -185,22 +227,26 @@ def read_case(folder: str | Path) -> Case:
     """
     folder = Path(folder)
     path = folder / "nominal.json"
+    if not folder.is_dir():
+        raise FileFormatError(
+            f"'{folder}' is no folder; give the folder that holds nominal.json and the records"
+        )
     if not path.is_file():
         raise FileFormatError(f"no nominal.json in '{folder}'; a case folder needs one beside its records")
     try:
-        nominal = json.loads(path.read_text())
-    except json.JSONDecodeError as error:
+        nominal = json.loads(path.read_text(encoding="utf-8"))
+    except (json.JSONDecodeError, UnicodeDecodeError, RecursionError) as error:
         raise FileFormatError(f"'{path}' is not valid JSON: {error}") from None
-    for key in ("rig", "parameters", "channels"):
-        if key not in nominal:
-            raise FileFormatError(f"'{path}' has no entry '{key}'; expected rig, parameters and channels")
+    check_document(nominal, path)
     parameters = tuple(
         NominalParameter(name, float(entry["value"]), float(entry.get("std", 0.0)), entry.get("unit", ""))
         for name, entry in nominal["parameters"].items()
     )
     channels = tuple(_channel(name, entry) for name, entry in nominal["channels"].items() if name != "time")
     rest = {key: value for key, value in nominal.items() if key not in {"rig", "parameters", "channels"}}
-    in_motion = set(rest.get("starts_in_motion", []))
+    moving = rest.get("starts_in_motion", [])
+    in_motion = set() if isinstance(moving, bool) else set(moving)
+    periodic = set(rest.get("periodic", []))
     groups: dict[str, list[CaseRecord]] = {"identification": [], "validation": []}
     for file in sorted(folder.iterdir()):
         stem = next((file.name.removesuffix(s) for s in SUFFIXES if file.name.endswith(s)), None)
@@ -208,14 +254,23 @@ def read_case(folder: str | Path) -> Case:
             continue
         for group, records in groups.items():
             if stem.startswith(group):
-                records.append(_read_record(file, stem, channels, nominal, stem not in in_motion))
+                record = _read_record(
+                    file, stem, channels, nominal, moving is not True and stem not in in_motion
+                )
+                records.append(replace(record, periodic=stem in periodic))
     for group, records in groups.items():
         if not records:
             raise FileFormatError(f"no {group}*.csv or .csv.gz in '{folder}'; at least one is needed")
-    return Case(
+    have = [record.name for records in groups.values() for record in records]
+    for name in sorted(periodic.union(in_motion, *(c.antialias.records for c in channels if c.antialias))):
+        if name not in have:
+            raise UnknownNameError("record", name, have)
+    case = Case(
         folder.name, str(nominal["rig"]), parameters, channels,
         tuple(groups["identification"]), tuple(groups["validation"]), folder, rest,
     )  # fmt: skip
+    case.load_interpolation  # noqa: B018  (an unknown one is refused here, not in the first simulation)
+    return case
 
 
 def _channel(name: str, entry: Mapping[str, object]) -> CaseChannel:
@@ -223,7 +278,46 @@ def _channel(name: str, entry: Mapping[str, object]) -> CaseChannel:
     if role not in ROLES:
         raise UnknownNameError(f"role of channel '{name}'", role, ROLES)
     noise = entry.get("noise_std")
-    return CaseChannel(name, str(entry.get("unit", "")), role, None if noise is None else float(str(noise)))
+    antialias = entry.get("antialias")
+    if antialias is not None and role != "response":
+        raise FileFormatError(
+            f"channel '{name}' has an antialias filter but the role '{role}'; a filter that loads and responses passed alike "
+            "cancels and need not be stated, and one that only a load passed cannot be undone: state it on responses only"
+        )
+    if antialias is not None and not isinstance(antialias, Mapping):
+        raise FileFormatError(
+            f"the antialias filter of channel '{name}' is {antialias!r}; expected an object with a 'kind'"
+        )
+    return CaseChannel(
+        name,
+        str(entry.get("unit", "")),
+        role,
+        None if noise is None else float(str(noise)),
+        None if antialias is None else Antialias.from_json(antialias),
+        _target(name, entry),
+        str(entry.get("quantity", "")),
+    )
+
+
+def _target(name: str, entry: Mapping[str, object]) -> str:
+    given = [f"{kind}:{entry[kind]}" for kind in TARGETS if kind in entry]
+    if len(given) > 1:
+        raise FileFormatError(f"channel '{name}' refers to {' and '.join(given)}; one of them is expected")
+    return given[0] if given else ""
+
+
+def _check_header(file: Path, names: list[str], channels: tuple[CaseChannel, ...]) -> None:
+    missing = [c.name for c in channels if c.name not in names]
+    if missing:
+        hint = " (columns are separated by commas)" if len(names) == 1 else ""
+        raise FileFormatError(
+            f"'{file}' lacks the column(s) {', '.join(missing)}; its header is '{','.join(names)}'{hint}"
+        )
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise FileFormatError(
+            f"'{file}' names the column '{twice}' twice; give every column one name of its own"
+        )
 
 
 def _read_record(
@@ -233,13 +327,14 @@ def _read_record(
         opener = gzip.open if file.suffix == ".gz" else open
         with opener(file, "rt", encoding="utf-8") as stream:
             names = [name.strip() for name in stream.readline().lstrip("#").split(",")]
-            table = np.loadtxt(stream, delimiter=",", ndmin=2)
+            _check_header(file, names, channels)
+            lines = [line for line in stream if line.strip()]
+            table = np.loadtxt(lines, delimiter=",", ndmin=2) if lines else np.zeros((0, len(names)))
     except (ValueError, OSError, EOFError, UnicodeDecodeError) as error:
         raise FileFormatError(f"'{file}' is no readable CSV table with a header line: {error}") from None
-    missing = [c.name for c in channels if c.name not in names]
-    if missing:
+    if table.shape[1] != len(names):
         raise FileFormatError(
-            f"'{file}' lacks the column(s) {', '.join(missing)}; it has {', '.join(names) or 'no header'}"
+            f"'{file}' has {len(names)} names over {table.shape[1]} columns; give every column one name of its own"
         )
     columns = {name: table[:, i] for i, name in enumerate(names) if i < table.shape[1]}
     if "time" in columns:

@@ -13,6 +13,7 @@ import numpy as np
 from bench.discrepancy import friction_limits as limits
 from bench.discrepancy.channel_effects import CHANNELS
 from bench.discrepancy.effect import Effect, FreeParameter, Scales, Values, log_grid
+from bench.discrepancy.rarer_forces import RARER, hysteretic_rate
 from bench.errors import UnknownNameError
 from bench.laws.bouc_wen import BOUC_WEN
 from bench.laws.constant_force import CONSTANT_FORCE
@@ -141,7 +142,7 @@ FORCES: tuple[Effect, ...] = (
         "f = z, z' = A v - beta |v| |z|^(n-1) z - gamma v |z|^n",
         law=BOUC_WEN,
         theta=_bouc_wen_theta,
-        rate_bound=lambda values, scales: scales.velocity * values[1] * (1.0 + abs(values[2])),
+        rate_bound=hysteretic_rate,
     ),
     Effect(
         "backlash_friction",
@@ -374,7 +375,7 @@ FORCES: tuple[Effect, ...] = (
     ),
 )
 
-CATALOGUE: tuple[Effect, ...] = FORCES + CHANNELS
+CATALOGUE: tuple[Effect, ...] = FORCES + RARER + CHANNELS
 """Every effect: forces first, then parameters, actuators and sensors."""
 
 

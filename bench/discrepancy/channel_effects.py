@@ -5,7 +5,13 @@ from __future__ import annotations
 import math
 
 from bench.discrepancy import signal_effects as signals
-from bench.discrepancy.effect import Effect, FreeParameter, log_grid
+from bench.discrepancy.effect import RARE, Effect, FreeParameter, log_grid
+
+POSITION_AND_ACCELERATION = (("displacement", "position", "x"), ("acceleration", "acceleration", "a"))
+"""Name of the channel in effects, its quantity, its symbol."""
+REVERSAL = FreeParameter("reversal", grid=(0.0,), fixed=True)
+REVERSED = -1.5
+"""Log prior odds of a reversed channel; not so rare that a gain of minus one would be tried first."""
 
 CHANNELS: tuple[Effect, ...] = (
     Effect(
@@ -138,7 +144,12 @@ CHANNELS: tuple[Effect, ...] = (
         "sensor",
         (
             FreeParameter(
-                "level", "position", mean=math.log(0.8), std=0.3, bounds=(-2.0, 0.3), grid=log_grid(0.6, 0.9)
+                "level",
+                "position",
+                mean=math.log(0.9),
+                std=0.3,
+                bounds=(-2.0, 0.3),
+                grid=log_grid(0.75, 0.97),
             ),
         ),
         "x clipped at a level",
@@ -178,11 +189,78 @@ CHANNELS: tuple[Effect, ...] = (
         "acceleration_bias",
         "sensor",
         "sensor",
-        (FreeParameter("bias", "force", signed=True, std=0.5),),
+        (FreeParameter("bias", "acceleration", signed=True, std=0.5),),
         "a + b",
         signal=signals.offset,
         quantity="acceleration",
         log_prior=-1.0,
+    ),
+    Effect(
+        "acceleration_clipping",
+        "sensor",
+        "sensor",
+        (
+            FreeParameter(
+                "level",
+                "acceleration",
+                mean=math.log(0.9),
+                std=0.3,
+                bounds=(-2.0, 0.3),
+                grid=log_grid(0.75, 0.97),
+            ),
+        ),
+        "a clipped at a level",
+        signal=signals.clip,
+        quantity="acceleration",
+        log_prior=RARE,
+    ),
+    *(
+        Effect(
+            f"{channel}_crosstalk",
+            "sensor",
+            "sensor",
+            (FreeParameter("share", f"{quantity}/source", signed=True, std=0.2, bounds=(-5.0, 5.0)),),
+            f"{symbol} + e s, s another measured channel: a load, or the other axis",
+            quantity=quantity,
+            pickup=True,
+            log_prior=RARE,
+        )
+        for channel, quantity, symbol in POSITION_AND_ACCELERATION
+    ),
+    *(
+        Effect(
+            f"{channel}_polarity",
+            "sensor",
+            "sensor",
+            (REVERSAL,),
+            f"-{symbol}",
+            signal=signals.reverse,
+            quantity=quantity,
+            log_prior=REVERSED,
+        )
+        for channel, quantity, symbol in POSITION_AND_ACCELERATION
+    ),
+    Effect(
+        "force_polarity",
+        "actuator",
+        "actuator",
+        (REVERSAL,),
+        "F = -command",
+        signal=signals.reverse,
+        log_prior=REVERSED,
+    ),
+    *(
+        Effect(
+            f"{channel}_quantisation",
+            "sensor",
+            "record",
+            (FreeParameter("step", quantity),),
+            f"{symbol} rounded to a multiple of q",
+            signal=signals.quantise,
+            quantity=quantity,
+            log_prior=RARE,
+        )
+        for channel, quantity, symbol in POSITION_AND_ACCELERATION
     ),
 )
 """Inertia, actuator and sensor effects."""

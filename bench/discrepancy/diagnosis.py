@@ -21,12 +21,16 @@ from bench.discrepancy.catalogue import CATALOGUE
 from bench.discrepancy.closure import CLOSURES
 from bench.discrepancy.effect import Effect
 from bench.discrepancy.explain import Explanation, close, explain
-from bench.discrepancy.locate import locate
-from bench.discrepancy.next_excitation import separate
+from bench.discrepancy.locate import Whereabouts, locate
+from bench.discrepancy.next_excitation import separate, told_apart
+from bench.discrepancy.nominal_file import check_units
 from bench.discrepancy.problem import Problem
+from bench.discrepancy.quality import notes, refuse
+from bench.discrepancy.quantisation import recorded
 from bench.discrepancy.shrink import gaps, nominal_prediction
+from bench.discrepancy.start_estimates import start_warnings
 from bench.discrepancy.structure import structure_of
-from bench.discrepancy.verdict import Verdict
+from bench.discrepancy.verdict import NamedEffect, Ranked, Verdict
 from bench.errors import UnknownNameError
 
 SEED = 20060501
@@ -45,6 +49,7 @@ class Diagnosis:
         explanations: All fitted explanations by decreasing posterior.
         verdict: The verdict.
         final: The explanation behind `verdict.gap.after`: the best one, or for an unknown effect its closure.
+        where: Where the gap lies, with the maps behind `verdict.locations`.
     """
 
     case: Case
@@ -52,6 +57,7 @@ class Diagnosis:
     explanations: tuple[Explanation, ...]
     verdict: Verdict
     final: Explanation
+    where: Whereabouts
 
 
 def diagnose(
@@ -84,10 +90,17 @@ def diagnose(
         if name not in known:
             raise UnknownNameError("effect", name, known)
     catalogue = [effect for effect in catalogue if effect.name not in exclude]
-    explanations = explain(case, catalogue, most=most, progress=progress)
+    progress("looking at the records")
+    check_units(case)
     problem = Problem(case, structure_of(case), case.identification)
+    refuse(problem)
+    explanations = explain(case, catalogue, most=most, progress=progress)
     best = explanations[0]
     kind, probabilities = evidence.judge(explanations)
+    seen, fitted = recorded(problem, catalogue), kind
+    if seen and kind == "none":
+        kind = "effect"
+        probabilities |= {"effect": 1.0 - probabilities["unknown"], "none": 0.0}
     final, closure = best, ""
     if kind == "unknown":
         progress("nonparametric closure")
@@ -99,22 +112,36 @@ def diagnose(
     progress("gap on the judging records")
     found = gaps(case, problem, stages=stages, rng=rng)
     widest = max(found, key=lambda gap: gap.before / max(gap.noise_floor, 1e-12))
+    where = locate(problem, nothing, best)
     verdict = Verdict(
         verdict=kind,
-        named=evidence.named(explanations) if kind == "effect" else (),
-        ranking=evidence.ranking(explanations),
+        named=(*evidence.named(explanations), *seen) if kind == "effect" else (),
+        ranking=(*(Ranked(e.name, e.where, e.probability) for e in seen), *evidence.ranking(explanations)),
         indistinguishable=evidence.indistinguishable(explanations) if kind != "unknown" else (),
-        locations=locate(problem, nothing, best),
+        locations=where.locations,
         gap=widest,
         gaps=found,
         probabilities=probabilities,
-        explanation=evidence.plain_words(kind, explanations),
-        warnings=_warnings(case, problem),
+        explanation=_told(evidence.plain_words(fitted, explanations), seen),
+        warnings=(*notes(case, problem), *start_warnings(problem, (*case.identification, *case.validation))),
         closure=closure,
-        next_excitation=separate(problem, explanations) if kind == "effect" else {},
+        next_excitation=(
+            separate(problem, explanations) if fitted == "effect" else told_apart(problem, fitted, catalogue)
+        ),
+        splits=where.splits,
         seconds=time.perf_counter() - began,
     )
-    return Diagnosis(case, problem, tuple(explanations), verdict, final)
+    return Diagnosis(case, problem, tuple(explanations), verdict, final, where)
+
+
+def _told(words: str, seen: Sequence[NamedEffect]) -> str:
+    """The verdict in words, with the effects that were read off the samples."""
+    told = "".join(
+        f" '{e.channel}' is recorded in steps of {e.parameters['step'].value:.4g} {e.parameters['step'].unit}, "
+        f"coarser than its noise: {e.name}."
+        for e in seen
+    )
+    return words + told
 
 
 def diagnose_folder(folder: str | Path, **options) -> Diagnosis:
@@ -135,22 +162,3 @@ def _path(explanations: Sequence[Explanation]) -> list[tuple[str, Explanation]]:
                 reached = keys
                 break
     return steps
-
-
-def _warnings(case: Case, problem: Problem) -> tuple[str, ...]:
-    out = []
-    for channel in case.channels:
-        if (
-            channel.role == "response"
-            and channel.noise_std is None
-            and channel.name in problem.structure.channels
-        ):
-            out.append(
-                f"the noise of '{channel.name}' is not stated; its high-frequency floor is taken instead"
-            )
-    for record in (*case.identification, *case.validation):
-        for name, samples in record.values.items():
-            peak = np.max(np.abs(samples))
-            if peak > 0 and np.mean(np.abs(samples) > 0.999 * peak) > 0.01:
-                out.append(f"'{name}' in '{record.name}' stays at its extreme: it may be saturated")
-    return tuple(out)

@@ -21,8 +21,11 @@ from numpy.typing import NDArray
 
 from bench.laws.base import ForceLaw, Kernel
 
-Site = Literal["joint", "inertia", "actuator", "sensor"]
+Site = Literal["joint", "inertia", "actuator", "sensor", "record"]
 Values = NDArray[np.float64]
+
+RARE = -2.0
+"""Log prior odds of a rare effect against a common one."""
 
 
 class Scales(NamedTuple):
@@ -36,6 +39,9 @@ class Scales(NamedTuple):
         duration: Length of the record [s].
         step: Time between samples [s].
         force2, position2, velocity2: The same for the last coordinate of the place; equal to the first on one coordinate.
+        acceleration: Largest acceleration along the coordinate.
+        damping: Nominal damping, zero where there is none.
+        source: Largest value of the channel that a sensor picks up, for cross-talk.
     """
 
     force: float
@@ -47,6 +53,9 @@ class Scales(NamedTuple):
     force2: float
     position2: float
     velocity2: float
+    acceleration: float = 1.0
+    damping: float = 0.0
+    source: float = 1.0
 
 
 def log_grid(*values: float) -> tuple[float, ...]:
@@ -109,11 +118,14 @@ def unit_of(key: str, position: str, force: str) -> str:
     names = {
         "force": force, "position": position, "velocity": f"{position}/s", "stiffness": f"({force}/{position})",
         "duration": "s", "step": "s", "1": "1", "force2": "N m", "position2": "rad", "velocity2": "rad/s",
+        "acceleration": f"{position}/s^2", "damping": f"({force} s/{position})", "source": "source",
     }  # fmt: skip
     head, *divisors = key.split("/")
     if not divisors:
         return names[head].strip("()")
-    return names[head] + "".join(f"/({names[d]})" if "/" in names[d] else f"/{names[d]}" for d in divisors)
+    return names[head] + "".join(
+        f"/({names[d]})" if set("/ ") & set(names[d]) else f"/{names[d]}" for d in divisors
+    )
 
 
 @dataclass(frozen=True)
@@ -123,7 +135,8 @@ class Effect:
     Attributes:
         name: Name in verdicts.
         family: Family in the scoring.
-        site: "joint" (a force), "inertia" (a nominal parameter beyond its uncertainty), "actuator", "sensor".
+        site: "joint" (a force), "inertia" (a nominal parameter beyond its uncertainty), "actuator", "sensor", or
+            "record": it shows in the samples themselves, is read off them (`bench.discrepancy.quality`), and needs no fit.
         parameters: Free parameters, the amplitude first.
         equation: One line for reports.
         law: Law of a joint effect, as it goes back into a rig.
@@ -134,7 +147,8 @@ class Effect:
         modulated: Parameters 1 to 3 are depth, frequency and phase of a modulation of the amplitude.
         affine: The force is affine in parameter 1.
         signal: For actuator and sensor effects, the operation on a channel.
-        quantity: For sensor effects the kind of channel (0 position, 2 acceleration); for inertia the parameter kind.
+        quantity: For sensor effects the kind of channel ("position", "acceleration"); for inertia the parameter kind.
+        pickup: The sensor adds a share of another measured channel: a load, or the response of the other axis.
         log_prior: Log prior odds against an effect of the README's list.
         rate_bound: Parameter values and scales to the fastest rate of the law [1/s]; the structure's own where None.
     """
@@ -153,8 +167,14 @@ class Effect:
     affine: bool = False
     signal: Callable[[Values, Values, float], Values] | None = None
     quantity: str = ""
+    pickup: bool = False
     log_prior: float = 0.0
     rate_bound: Callable[[Values, Scales], float] | None = None
+
+    @property
+    def rare(self) -> bool:
+        """Whether it is tried only where no commoner effect alone explains the records."""
+        return self.log_prior <= RARE and self.site != "inertia"
 
     @property
     def addresses(self) -> tuple[int, int, int]:

@@ -120,6 +120,8 @@ def _named(problem, placed: Placed, eta: np.ndarray, std: np.ndarray, probabilit
     estimates = {}
     for parameter, value, deviation in zip(effect.parameters, eta, std, strict=True):
         unit = parameter.unit or unit_of(parameter.scale, place.position_unit, place.force_unit)
+        if placed.source:
+            unit = "/".join(f"({problem.case.channel(c).unit})" for c in (placed.channel, placed.source))
         spread = 0.0 if parameter.fixed else abs(parameter.slope(value, scales)) * deviation
         estimates[parameter.name] = Estimate(parameter.value(value, scales), float(spread), unit)
     theta = tuple(float(x) for x in effect.kernel_theta(eta, scales)) if effect.law is not None else ()

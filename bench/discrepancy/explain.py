@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from bench.discrepancy.attribute import (
     IMMATERIAL,
@@ -23,23 +24,29 @@ from bench.discrepancy.attribute import (
     Search,
     attribute,
     consistent,
+    converge,
     names,
     placements,
     posterior,
     prepare,
     reduce_best,
+    refined,
 )
 from bench.discrepancy.case import Case, CaseRecord
 from bench.discrepancy.effect import Effect
 from bench.discrepancy.fit import Fit, fit
-from bench.discrepancy.problem import Array, Hypothesis, Problem, band_bins, whitened
+from bench.discrepancy.prepared import whitened
+from bench.discrepancy.problem import Array, Hypothesis, Problem, band_bins
 from bench.discrepancy.screen import Point, Screen
+from bench.discrepancy.start_estimates import predict
 from bench.discrepancy.structure import Structure, structure_of
 
 HELPFUL = 0.3
 """A catalogued explanation that leaves less than this part of the excess is kept under a closure; others only disturb it."""
 HOPELESS_COUPLING = 50.0
 """Reduced chi-squared of a coupling effect alone above which no further effect is added to it."""
+HOPELESS_THIRD = 5.0
+"""The same for a pair that a coupling effect belongs to: a third effect then repairs little."""
 PROMISING = 4.0
 """Reduced chi-squared that a screening must promise in every group, if groups are to be searched before couplings."""
 KEPT = 12
@@ -80,7 +87,7 @@ class Explanation:
         """Free run of a record: response channel to samples (n,)."""
         out: dict[str, Array] = {}
         for problem, fitted in self.parts:
-            samples = problem.simulate(fitted.hypothesis, fitted.vector, record)
+            samples = predict(problem, fitted.hypothesis, fitted.vector, record)
             out.update({name: samples[:, c] for c, name in enumerate(problem.structure.channels)})
         return out
 
@@ -90,7 +97,7 @@ class Explanation:
         for problem, fitted in self.parts:
             data = problem.prepare(record, problem.split(fitted.hypothesis, fitted.vector)[0])
             residual = whitened(
-                data.responses - problem.simulate(fitted.hypothesis, fitted.vector, record), data
+                data.responses - predict(problem, fitted.hypothesis, fitted.vector, record), data
             )
             chi2 += float(residual @ residual)
             count += len(residual)
@@ -112,6 +119,14 @@ def explain(
         most: Largest number of effects in a group.
         progress: Called with a line of text at every stage.
     """
+    # Fits run in threads of their own; threads of BLAS within them would only get in each other's way.
+    with threadpool_limits(1, user_api="blas"):
+        return _explain(case, catalogue, most, progress)
+
+
+def _explain(
+    case: Case, catalogue: Sequence[Effect], most: int, progress: Callable[[str], None]
+) -> list[Explanation]:
     structure = structure_of(case)
     groups = structure.groups()
     if len(groups) == 1:
@@ -158,62 +173,72 @@ def _coupled(
 ) -> list[Fit]:
     """Search explanations that hold an effect which couples the groups; by decreasing posterior."""
     progress("effects that couple the degrees of freedom")
-    candidates = [p for p in placements(whole.case, whole.structure, catalogue) if p.effect.site == "joint"]
+    candidates = [
+        p
+        for p in placements(whole.case, whole.structure, catalogue)
+        if p.effect.site == "joint" and not p.effect.rare
+    ]
     kept = Search(whole)
     with ThreadPoolExecutor(THREADS) as pool:
         screen = Screen(whole, candidates, pool.map)
         coupling = {p.key for p in candidates if p.effect.n_coordinates > 1}
-        starts = {}
-        for point in screen.ranked():
-            if point.placed.key in coupling:
-                starts.setdefault(point.placed.key, point)
+        ground = screen.ground()
+        points = refined(screen, ground, [p for p in screen.ranked() if p.placed.key in coupling], pool)
         zero = np.zeros(len(whole.nominal))
-        for fitted in pool.map(
-            lambda p: fit(whole, (p.placed,), start=np.append(zero, p.eta)), starts.values()
-        ):
-            kept.add(fitted)
+        carry_all = [((p.placed,), np.append(zero, p.eta)) for p in _best_of_each(points)]
+        converge(kept, pool, carry_all)
         for _ in range(1, most):
             if not kept.fits:
                 break
             base = kept.ranked()[0]
-            if base.reduced > HOPELESS_COUPLING:
+            if base.reduced > (HOPELESS_COUPLING if len(base.hypothesis) == 1 else HOPELESS_THIRD):
                 break
             progress(f"{names(base.hypothesis)}, chi-squared {base.reduced:.3g}")
-            points = [
-                p for p in screen.ranked(base) if p.gain > max(WORTH_A_FIT, IMMATERIAL * base.n_residuals)
-            ]
-            leading = list(dict.fromkeys(p.placed.key for p in points))[:3]
-            worth = [p for key in leading for p in [q for q in points if q.placed.key == key][:2]]
+            ground = screen.ground(base, simulated=consistent(base))
+            points = refined(screen, ground, screen.ranked(base, ground), pool)
+            worth = [p for p in points if p.gain > max(WORTH_A_FIT, IMMATERIAL * base.n_residuals)]
             if not worth:
                 break
 
             def extended(point: Point, base: Fit = base) -> Fit:
                 start = np.append(base.vector, point.eta)
-                return fit(whole, (*base.hypothesis, point.placed), start=start, iterations=QUICK)
+                return fit(
+                    whole, (*base.hypothesis, point.placed), start=start, iterations=QUICK, exact=False
+                )
 
-            trials = sorted(pool.map(extended, worth), key=lambda f: -f.log_evidence)
-            for trial in trials[:2]:
-                kept.add(fit(whole, trial.hypothesis, start=trial.vector, iterations=20))
+            trials = sorted(pool.map(extended, _best_of_each(worth)[:4]), key=lambda f: f.cost)
+            converge(kept, pool, [(f.hypothesis, f.vector) for f in trials[:2]])
             reduce_best(kept, pool)
             if kept.ranked()[0] is base or kept.ranked()[0].reduced - 1.0 > STALLED * (base.reduced - 1.0):
                 break
     return kept.ranked()
 
 
+def _best_of_each(points: Sequence[Point]) -> list[Point]:
+    """Keep the first point of every effect."""
+    kept: dict[tuple[str, str, str], Point] = {}
+    for point in points:
+        kept.setdefault(point.placed.key, point)
+    return list(kept.values())
+
+
 def _parsimonious(found: list[Explanation]) -> list[Explanation]:
-    """Put first the smallest explanation that one more effect would not improve much.
+    """Put first the explanation of fewest parameters that no larger one improves much.
 
     Where the noise is not stated, chi-squared has no absolute scale and residuals of a measured component are mostly
-    model error, far from independent: differences in evidence then say little about one more effect.
+    model error, far from independent: differences in evidence then say little about one more effect. Parameters are counted,
+    not effects, since a law of seven would else be preferred to two of one each.
     """
-    chosen = found[0]
-    sizes = sorted({len(e.hypothesis) for e in found})
-    for size in sizes:
-        best = min((e for e in found if len(e.hypothesis) == size), key=lambda e: e.reduced)
-        larger = [e.reduced for e in found if len(e.hypothesis) == size + 1]
-        chosen = best
-        if not larger or min(larger) > STALLED * best.reduced:
-            break
+
+    def size(explanation: Explanation) -> int:
+        free = [p for placed in explanation.hypothesis for p in placed.effect.parameters if not p.fixed]
+        return len(free)
+
+    ordered = sorted(found, key=lambda e: (size(e), e.reduced))
+    chosen = ordered[0]
+    for larger in ordered[1:]:
+        if larger.reduced < STALLED * chosen.reduced:
+            chosen = larger
     return [chosen, *(e for e in found if e is not chosen)]
 
 

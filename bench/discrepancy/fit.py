@@ -1,32 +1,28 @@
 """Output-error fits: maximum a posteriori parameters of a hypothesis, and its evidence.
 
-The free run of the model is fitted to the records by a Levenberg-Marquardt iteration on the whitened residuals and
-the priors together. Nominal parameters move in units of their stated uncertainty with a unit Gaussian prior, so that a
-wrong stiffness is never called an effect; effect parameters have the priors of the catalogue.
+The free run of the model is fitted to the records: whitened residuals and priors together (`minimise`). Nominal
+parameters move in units of their stated uncertainty with a unit Gaussian prior, so that a wrong stiffness is never called an
+effect; effect parameters have the priors of the catalogue.
 
 References:
     D. J. C. MacKay, Bayesian interpolation, Neural Computation 4 (1992) 415-447 (evidence and Occam factor).
-    J. J. More, The Levenberg-Marquardt algorithm, Lecture Notes in Mathematics 630 (1978).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.discrepancy.minimise import Prior, minimise
 from bench.discrepancy.problem import Hypothesis, Problem
 
 Array = NDArray[np.float64]
 
-DIFFERENCE = 1e-4
-"""Step of the finite differences, in units of the prior standard deviation."""
-
-
-REFRESH = 3
-"""Iterations for which the columns of the nominal parameters are kept."""
+NOMINAL_REACH, EFFECT_REACH = 20.0, 2.0
+"""Longest step in prior standard deviations: responses are nearly linear in nominal parameters, but not in shapes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +37,7 @@ class Fit:
         n_residuals: Number of residuals.
         precision: Posterior precision of the vector (n, n).
         log_evidence: Laplace approximation of the log evidence (constants common to all hypotheses left out).
+        settled: Whether the iteration ended because nothing more was to be gained.
     """
 
     hypothesis: Hypothesis
@@ -50,6 +47,7 @@ class Fit:
     n_residuals: int
     precision: Array
     log_evidence: float
+    settled: bool = False
 
     @property
     def reduced(self) -> float:
@@ -76,6 +74,9 @@ def fit(
     iterations: int = 15,
     tolerance: float = 0.05,
     fixed: Array | None = None,
+    limit: float = np.inf,
+    exact: bool = True,
+    each: Callable = map,
 ) -> Fit:
     """Fit a hypothesis from one start.
 
@@ -86,99 +87,39 @@ def fit(
         iterations: Most iterations.
         tolerance: Decrease of the cost below which the iteration ends; costs differ meaningfully from about one.
         fixed: (n,) boolean, entries held at their start.
+        limit: Cost that has to be within sight, see `minimise`.
+        exact: Whether the curvature is taken anew at the end, as the evidence and intervals need it.
+        each: Maps a function over the columns of the Jacobian, in threads where wanted.
 
     Returns:
         The fit; its cost is infinite where no simulation stayed finite.
     """
-    mean, std, low, high = problem.prior(hypothesis)
-    held = np.zeros(len(mean), dtype=bool) if fixed is None else fixed.copy()
+    prior = Prior(*problem.prior(hypothesis))
     n = len(problem.nominal)
+    held = np.zeros(len(prior.mean), dtype=bool) if fixed is None else fixed.copy()
     held[:n] |= problem.spread == 0
     names = [p for placed in hypothesis for p in placed.effect.parameters]
     held[n:] |= np.array([p.fixed for p in names], dtype=bool)
     free = np.flatnonzero(np.logical_not(held))
-    vector = np.clip(start, low, high)
-    residual = problem.residual(hypothesis, vector)
-    cost = _cost(residual, vector, mean, std, free)
-    damping = 1e-3
-    normal = np.diag(1.0 / std**2)
-    jacobian = None
-    gained = np.inf
-    if np.isfinite(cost):
-        for iteration in range(iterations):
-            # The response is nearly linear in the nominal parameters: their columns are kept for some iterations.
-            stale = jacobian is None or iteration % REFRESH == 0
-            jacobian = _jacobian(
-                problem, hypothesis, (vector, residual), free, (std, high), None if stale else jacobian
-            )
-            if jacobian is None:
-                break
-            curvature = jacobian.T @ jacobian
-            normal = np.diag(1.0 / std**2)
-            normal[np.ix_(free, free)] += curvature
-            gradient = jacobian.T @ residual + ((vector - mean) / std**2)[free]
-            vector, residual, cost, damping, gained = _step(
-                problem, hypothesis, (vector, residual, cost, damping), normal[np.ix_(free, free)], gradient,
-                free, (mean, std, low, high),
-            )  # fmt: skip
-            if gained < tolerance:
-                if stale:
-                    break
-                jacobian = None
-    chi2 = float(residual @ residual)
-    scaled = std[free, None] * normal[np.ix_(free, free)] * std[None, free]
-    log_prior = sum(placed.effect.log_prior for placed in hypothesis)
-    evidence = -0.5 * cost - 0.5 * np.linalg.slogdet(scaled)[1] + log_prior if np.isfinite(cost) else -np.inf
-    return Fit(hypothesis, vector, chi2, cost, problem.n_residuals, normal, float(evidence))
-
-
-def _cost(residual: Array, vector: Array, mean: Array, std: Array, free: NDArray[np.int64]) -> float:
-    return float(residual @ residual + np.sum((((vector - mean) / std)[free]) ** 2))
-
-
-def _jacobian(
-    problem: Problem,
-    hypothesis: Hypothesis,
-    point: tuple[Array, Array],
-    free: NDArray[np.int64],
-    prior: tuple[Array, Array],
-    previous: Array | None,
-) -> Array | None:
-    """Finite differences of the residual by the free entries; nominal columns from `previous` where it is given."""
-    vector, residual = point
-    std, high = prior
-    out = np.empty((len(residual), len(free)))
-    for column, i in enumerate(free):
-        if previous is not None and i < len(problem.nominal):
-            out[:, column] = previous[:, column]
-            continue
-        delta = DIFFERENCE * std[i]
-        if vector[i] + delta > high[i]:
-            delta = -delta
-        moved = vector.copy()
-        moved[i] += delta
-        shifted = problem.residual(hypothesis, moved)
-        if shifted.shape != residual.shape:
-            return None
-        out[:, column] = (shifted - residual) / delta
-    return out
-
-
-def _step(problem, hypothesis, state, normal, gradient, free, prior):
-    """Damp the Gauss-Newton step until the cost falls; return the new state and the gain."""
-    vector, residual, cost, damping = state
-    mean, std, low, high = prior
-    for _ in range(7):
-        damped = normal + damping * np.diag(np.diag(normal))
-        move = -np.linalg.solve(damped, gradient)
-        # Further than this the linearisation does not reach; nominal parameters are linear and may go further.
-        reach = np.where(free < len(problem.nominal), 20.0, 2.0) * std[free]
-        move *= min(1.0, 1.0 / max(np.max(np.abs(move) / reach), 1e-12))
-        trial = vector.copy()
-        trial[free] = np.clip(vector[free] + move, low[free], high[free])
-        trial_residual = problem.residual(hypothesis, trial)
-        trial_cost = _cost(trial_residual, trial, mean, std, free)
-        if trial_cost < cost:
-            return trial, trial_residual, trial_cost, max(damping * 0.1, 1e-9), cost - trial_cost
-        damping *= 8.0
-    return vector, residual, cost, damping, 0.0
+    found = minimise(
+        lambda vector: problem.residual(hypothesis, vector),
+        np.clip(start, prior.low, prior.high),
+        prior=prior,
+        free=free,
+        reach=np.where(free < n, NOMINAL_REACH, EFFECT_REACH),
+        iterations=iterations,
+        tolerance=tolerance,
+        limit=limit,
+        exact=exact,
+        each=each,
+    )
+    precision = np.diag(1.0 / prior.std**2)
+    precision[np.ix_(free, free)] = found.curvature / np.outer(prior.std[free], prior.std[free])
+    evidence = -np.inf
+    if np.isfinite(found.cost):
+        log_prior = sum(placed.effect.log_prior for placed in hypothesis)
+        evidence = -0.5 * found.cost - 0.5 * np.linalg.slogdet(found.curvature)[1] + log_prior
+    return Fit(
+        hypothesis, found.vector, float(found.residual @ found.residual), found.cost, problem.n_residuals,
+        precision, float(evidence), found.settled,
+    )  # fmt: skip

@@ -1,9 +1,12 @@
-"""Where the gap lies: channels, frequency bands, times, and regions of the state space.
+"""Where the gap lies: channels, degrees of freedom, frequency bands, times, and regions of the state space.
 
-Channels, bands and times are read off the whitened residuals of the nominal model, whose power beyond one is excess.
-Shares are of the total excess and add up to one. State regions are read off the force that is missing along the
-measured motion: cells of displacement and of velocity in which its mean over separate visits differs from zero, the
-false discovery rate being controlled over all cells.
+Two residuals are split. That of the free run of the nominal model, its parameters re-estimated, is whitened; what its
+power has beyond one is excess, and is split by channel, by frequency band and by time. That of the equations is the force
+missing along the measured motion (`missing_force`); it is split by displacement, velocity, travel since the last reversal, in
+and out of contact, band and time (`state_map`). Shares of a split add up to one, and in each the false discovery rate is
+controlled. Channels that contradict one another whatever the force (`redundancy`) make it a fault of a sensor.
+
+No split knows which effect is named later; the regions are those of the force map.
 
 References:
     Y. Benjamini, Y. Hochberg, Journal of the Royal Statistical Society B 57 (1995) 289-300.
@@ -11,110 +14,236 @@ References:
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 from scipy import stats
 
 from bench.discrepancy.explain import Explanation
-from bench.discrepancy.problem import Array, Problem, fast_length, whitened
-from bench.discrepancy.structure import Place
-from bench.discrepancy.verdict import Location
+from bench.discrepancy.prepared import fast_length, whitened_spectrum
+from bench.discrepancy.problem import Array, Problem
+from bench.discrepancy.redundancy import Contradiction, contradictions
+from bench.discrepancy.state_map import FALSE_DISCOVERIES, Region, StateMap, state_maps
+from bench.discrepancy.state_splits import force_splits
+from bench.discrepancy.verdict import Location, Split
 
-CELLS = 16
-"""Cells a coordinate of the state space is cut into."""
-FALSE_DISCOVERIES = 0.05
-WEAK = 0.1
-"""Cells whose mean force is below this part of the largest one do not count towards a region."""
+BANDS = 12
+"""Frequency bands, evenly over the logarithm of frequency."""
+INTERVALS = 20
+"""Intervals of time a residual is split into."""
 HOLDS = (0.05, 0.95)
 """Cumulated parts of the excess between which a band or an interval is said to hold it."""
 
 
-class CellMap(NamedTuple):
-    """Missing force by cells of one coordinate.
+class Whereabouts(NamedTuple):
+    """Where the gap lies.
 
     Attributes:
-        edges: (CELLS + 1,) cell edges.
-        force: (CELLS,) mean missing force; NaN in cells never visited.
-        p_value: (CELLS,) of a zero mean.
-        significant: (CELLS,) after control of the false discovery rate.
+        locations: Channels with an excess, by decreasing share.
+        splits: Shares by channel, band, time and state.
+        maps: Missing force over the state space, for every place with one coordinate.
+        contradictions: Pairs of channels held against each other.
     """
 
-    edges: Array
-    force: Array
-    p_value: Array
-    significant: np.ndarray
+    locations: tuple[Location, ...]
+    splits: tuple[Split, ...]
+    maps: tuple[StateMap, ...]
+    contradictions: tuple[Contradiction, ...]
 
 
-def locate(problem: Problem, nominal: Explanation, best: Explanation) -> tuple[Location, ...]:
-    """Locate the residuals of the re-estimated nominal model; by decreasing share.
+class _Excess(NamedTuple):
+    """Whitened free-run residual of a channel over all records.
+
+    Attributes:
+        chi2: Sum of squares.
+        count: Its expectation.
+        frequency: (n_bins,) [Hz].
+        power: (n_bins,) squares, two each in expectation.
+        time: (n,) [s].
+        signal: (n,) band-limited whitened residual, of unit variance in expectation.
+        density: Independent samples of the signal per sample.
+    """
+
+    chi2: float
+    count: int
+    frequency: Array
+    power: Array
+    time: Array
+    signal: Array
+    density: float
+
+
+def locate(problem: Problem, nominal: Explanation, best: Explanation) -> Whereabouts:
+    """Locate the residuals of the nominal model.
 
     Args:
         problem: Records and structure on all degrees of freedom.
-        nominal: The explanation without effects.
-        best: The best explanation; its nominal parameters serve for the map of the missing force.
+        nominal: The explanation without effects, its parameters re-estimated.
+        best: The best explanation; where it is down to the noise its nominal parameters serve for the force map.
     """
-    excess: dict[str, tuple[float, Array, Array, Array, Array, float]] = {}
     names = problem.structure.channels
-    for c, name in enumerate(names):
-        excess[name] = _channel_excess(problem, nominal, c, name)
-    total = sum(max(entry[0], 0.0) for entry in excess.values())
-    if total <= 0.0:
-        return ()
-    regions = {
-        place.name: _regions(problem, best, place)
-        for place in problem.structure.places
-        if len(place.rows) == 1
-    }
-    out = []
-    for name, (power, frequency, by_frequency, time, by_time, p_value) in excess.items():
-        if power <= 0.0:
+    excess = _excess(problem, nominal)
+    found = contradictions(problem)
+    maps = state_maps(problem, problem.records, known=known_parameters(best))
+    total = sum(max(e.chi2 - e.count, 0.0) for e in excess.values())
+    p_values = [float(stats.chi2.sf(e.chi2, e.count)) for e in excess.values()]
+    adjusted = dict(zip(excess, stats.false_discovery_control(p_values), strict=True)) if excess else {}
+    locations = []
+    for name, own in excess.items():
+        share = max(own.chi2 - own.count, 0.0) / total if total > 0.0 else 0.0
+        if share <= 0.0:
             continue
-        observer = next(o for o in problem.structure.observers if o.channel == name)
-        touched = [
-            p.name
-            for p in problem.structure.places
-            if len(p.rows) == 1 and np.any(p.rows[0] * observer.row != 0)
-        ]
-        out.append(
+        observer = problem.structure.observers[names.index(name)]
+        touched = [m for m in maps if np.any(m.place.rows[0] * observer.row != 0)]
+        kind = _kind(name, found)
+        regions = () if kind == "sensor" else tuple(r for m in touched for r in m.regions)
+        locations.append(
             Location(
                 channel=name,
                 dof=problem.structure.dofs[int(np.argmax(np.abs(observer.row)))],
-                share=power / total,
-                band_hz=_holding(frequency, by_frequency),
-                time_s=_holding(time, by_time),
-                state_region=regions[touched[0]] if touched else {},
-                p_value=min(1.0, p_value * len(names)),
+                share=share,
+                band_hz=_holding(own.frequency, own.power - 2.0),
+                time_s=_holding(own.time, own.signal**2 - 1.0),
+                state_region=box(regions[0]) if regions else {},
+                p_value=float(adjusted[name]),
+                kind=kind,
+                regions=tuple({**box(r), "share": r.share, "force": r.force} for r in regions),
             )
         )
-    return tuple(sorted(out, key=lambda location: -location.share))
+    return Whereabouts(
+        tuple(sorted(locations, key=lambda location: -location.share)),
+        (*_residual_splits(problem, excess), *force_splits(problem, problem.records, maps)),
+        maps,
+        found,
+    )
 
 
-def _channel_excess(problem: Problem, nominal: Explanation, c: int, name: str):
-    """Excess power of a channel, by frequency and by time, and its p-value."""
-    chi2 = 0.0
-    count = 0
-    frequencies, powers, times, local = [], [], [], []
+def box(region: Region) -> dict[str, tuple[float, float]]:
+    """The limits of a region by coordinate; a coordinate that it does not depend on is left out."""
+    limits = {"displacement": region.displacement, "velocity": region.velocity}
+    return {name: limit for name, limit in limits.items() if limit is not None}
+
+
+def known_parameters(best: Explanation) -> dict[str, float] | None:
+    """Nominal parameters as the best explanation has them; None where it does not reach the noise and so proves nothing."""
+    if not best.consistent or not all(problem.noise_stated for problem, _ in best.parts):
+        return None
+    out: dict[str, float] = {}
+    for part, fitted in best.parts:
+        values = part.nominal + part.spread * fitted.vector[: len(part.nominal)]
+        out.update(dict(zip(part.structure.parameters, values, strict=True)))
+    return out
+
+
+def _kind(channel: str, found: tuple[Contradiction, ...]) -> str:
+    own = [c for c in found if channel in c.channels]
+    if not own:
+        return "undetermined"
+    if any(c.found and c.suspect in {"", channel} for c in own):
+        return "sensor"
+    return "force"
+
+
+def _excess(problem: Problem, nominal: Explanation) -> dict[str, _Excess]:
+    """Whitened free-run residuals by channel, records one after the other."""
+    parts: dict[str, list[_Excess]] = {name: [] for name in problem.structure.channels}
     for data in problem.data:
-        predicted = nominal.predict(data.record)
+        predicted: Mapping[str, Array] = nominal.predict(data.record)
         residual = np.column_stack([data.record.values[n] - predicted[n] for n in problem.structure.channels])
         if not np.isfinite(residual).all():
             continue
-        white = whitened(residual, data).reshape(2, data.n_bins, -1)[:, :, c]
-        power = np.sum(white**2, axis=0)
-        chi2 += float(power.sum())
-        count += 2 * data.n_bins
-        frequencies.append(np.arange(data.n_bins) / (fast_length(len(data.record)) * data.record.step))
-        powers.append(power - 2.0)
-        times.append(data.record.time)
-        local.append(residual[:, c] ** 2 - problem.noise[c] ** 2)
-    if not count:
-        return 0.0, np.zeros(1), np.zeros(1), np.zeros(1), np.zeros(1), 1.0
-    longest = int(np.argmax([len(t) for t in times]))
-    return (
-        chi2 - count, np.concatenate(frequencies), np.concatenate(powers), times[longest], local[longest],
-        float(stats.chi2.sf(chi2, count)),
-    )  # fmt: skip
+        white = whitened_spectrum(residual, data).reshape(2, data.n_bins, -1)
+        length = fast_length(len(residual))
+        for c, name in enumerate(problem.structure.channels):
+            spectrum = np.zeros(length // 2 + 1, dtype=complex)
+            spectrum[: data.n_bins] = white[0, :, c] + 1j * white[1, :, c]
+            power = np.abs(spectrum[: data.n_bins]) ** 2
+            # Parseval: of 2 n_bins unit variances the signal keeps a mean square of one
+            signal = np.fft.irfft(spectrum, length)[: len(residual)] * length / (2.0 * np.sqrt(data.n_bins))
+            frequency = np.arange(data.n_bins) / (length * data.record.step)
+            parts[name].append(
+                _Excess(
+                    float(power.sum()), 2 * data.n_bins, frequency, power, data.record.time, signal,
+                    2.0 * data.n_bins / length,
+                )
+            )  # fmt: skip
+    return {name: _joined(entries) for name, entries in parts.items() if entries}
+
+
+def _joined(entries: list[_Excess]) -> _Excess:
+    return _Excess(
+        sum(e.chi2 for e in entries),
+        sum(e.count for e in entries),
+        np.concatenate([e.frequency for e in entries]),
+        np.concatenate([e.power for e in entries]),
+        np.concatenate([e.time for e in entries]),
+        np.concatenate([e.signal for e in entries]),
+        float(np.mean([e.density for e in entries])),
+    )
+
+
+def _residual_splits(problem: Problem, excess: dict[str, _Excess]) -> list[Split]:
+    """Splits of the free run's residual by channel, and of every channel's by band and by time."""
+    if not excess:
+        return []
+    dofs = {
+        o.channel: problem.structure.dofs[int(np.argmax(np.abs(o.row)))] for o in problem.structure.observers
+    }
+    chi2 = np.array([e.chi2 for e in excess.values()])
+    count = np.array([float(e.count) for e in excess.values()])
+    out = [split("channel", "free run", "", tuple(excess), chi2 - count, stats.chi2.sf(chi2, count))]
+    by_dof = sorted(set(dofs.values()))
+    if len(by_dof) > 1:
+        own = [np.array([dofs[name] == dof for name in excess]) for dof in by_dof]
+        sums = [(chi2[mask].sum(), count[mask].sum()) for mask in own]
+        out.append(
+            split(
+                "dof", "free run", "", tuple(by_dof), np.array([a - b for a, b in sums]),
+                np.array([stats.chi2.sf(a, b) for a, b in sums]),
+            )
+        )  # fmt: skip
+    for name, e in excess.items():
+        positive = e.frequency[e.frequency > 0.0]
+        edges = np.geomspace(positive.min(), e.frequency.max() * (1.0 + 1e-9), BANDS + 1)
+        edges[0] = 0.0
+        out.append(
+            _histogram("band_hz", name, dofs[name], edges, e.frequency, e.power, np.full(len(e.power), 2.0))
+        )
+        edges = np.linspace(e.time.min(), e.time.max() + 1e-9, INTERVALS + 1)
+        expected = np.full(len(e.signal), e.density)
+        out.append(_histogram("time_s", name, dofs[name], edges, e.time, e.signal**2 * e.density, expected))
+    return out
+
+
+def _histogram(
+    kind: str, channel: str, dof: str, edges: Array, axis: Array, squares: Array, expected: Array
+) -> Split:
+    """Split squares along an axis, each cell held against the chi-squared distribution of its expectation."""
+    cell = np.clip(np.digitize(axis, edges) - 1, 0, len(edges) - 2)
+    power = np.bincount(cell, squares, len(edges) - 1)
+    count = np.bincount(cell, expected, len(edges) - 1)
+    excess = np.asarray(power - count, dtype=np.float64)
+    p_values = np.where(count > 0.0, stats.chi2.sf(power, np.maximum(count, 1e-9)), 1.0)
+    return split(kind, channel, dof, tuple(float(x) for x in edges), excess, p_values)
+
+
+def split(
+    kind: str, of: str, dof: str, cells: tuple[str, ...] | tuple[float, ...], excess: Array, p_values: Array
+) -> Split:
+    """Make a split of excess power whose shares add up to one."""
+    positive = np.maximum(np.nan_to_num(excess), 0.0)
+    total = float(positive.sum())
+    adjusted = stats.false_discovery_control(np.clip(p_values, 0.0, 1.0))
+    return Split(
+        kind=kind,
+        of=of,
+        dof=dof,
+        cells=cells,
+        shares=tuple(float(x) for x in (positive / total if total > 0.0 else positive)),
+        p_values=tuple(float(x) for x in adjusted),
+        significant=tuple(bool(x < FALSE_DISCOVERIES) for x in adjusted),
+    )
 
 
 def _holding(axis: Array, excess: Array) -> tuple[float, float]:
@@ -125,61 +254,3 @@ def _holding(axis: Array, excess: Array) -> tuple[float, float]:
         return float(axis.min()), float(axis.max())
     low, high = np.searchsorted(cumulated / cumulated[-1], HOLDS)
     return float(axis[order[low]]), float(axis[order[min(high, len(axis) - 1)]])
-
-
-def missing_force(problem: Problem, best: Explanation, place: Place, index: int) -> Array:
-    """Force (n,) that the linear structure, at the best parameters, lacks along the measured motion of a record."""
-    values = {}
-    for part, fitted in best.parts:
-        split, _ = part.split(fitted.hypothesis, fitted.vector)
-        values.update(dict(zip(part.structure.parameters, split, strict=True)))
-    vector = np.array([values[name] for name in problem.structure.parameters])
-    linear = problem.structure.at(vector)
-    motion = problem.motion(index)
-    row = place.rows[0]
-    if problem.driven:
-        force = problem.data[index].responses[:, 0]
-        return force - motion.position @ linear.stiffness[0] - motion.velocity @ linear.damping[0]
-    loads = problem.data[index].loads @ linear.inputs.T
-    rest = loads - motion.acceleration @ linear.mass.T - motion.velocity @ linear.damping.T
-    rest = rest - motion.position @ linear.stiffness.T
-    return rest @ row / (row @ row)
-
-
-def cell_map(coordinate: Array, force: Array) -> CellMap:
-    """Mean missing force in cells of one coordinate, with significance over separate visits.
-
-    Args:
-        coordinate: (n,) displacement or velocity.
-        force: (n,) missing force.
-    """
-    reach = float(np.abs(coordinate).max()) or 1.0
-    edges = np.linspace(-reach, reach, CELLS + 1)
-    cell = np.clip(np.digitize(coordinate, edges) - 1, 0, CELLS - 1)
-    starts = np.flatnonzero(np.diff(cell, prepend=-1))
-    lengths = np.diff(np.append(starts, len(cell)))
-    visits = np.add.reduceat(force, starts) / lengths
-    visited = cell[starts]
-    mean, p_value = np.full(CELLS, np.nan), np.ones(CELLS)
-    for k in range(CELLS):
-        own = visits[visited == k]
-        if len(own) < 4:
-            continue
-        mean[k] = own.mean()
-        error = own.std(ddof=1) / np.sqrt(len(own))
-        p_value[k] = 2.0 * stats.t.sf(abs(mean[k]) / max(error, 1e-300), len(own) - 1)
-    rejected = stats.false_discovery_control(p_value) < FALSE_DISCOVERIES
-    strong = np.abs(np.nan_to_num(mean)) > WEAK * np.nanmax(np.abs(mean), initial=0.0)
-    return CellMap(edges, mean, p_value, rejected & strong)
-
-
-def _regions(problem: Problem, best: Explanation, place: Place) -> dict[str, tuple[float, float]]:
-    force = np.concatenate([missing_force(problem, best, place, i) for i in range(len(problem.records))])
-    out = {}
-    for name, kind in (("displacement", "position"), ("velocity", "velocity")):
-        samples = [getattr(problem.motion(i), kind) @ place.rows[0] for i in range(len(problem.records))]
-        cells = cell_map(np.concatenate(samples), force)
-        found = np.flatnonzero(cells.significant)
-        if len(found):
-            out[name] = (float(cells.edges[found[0]]), float(cells.edges[found[-1] + 1]))
-    return out

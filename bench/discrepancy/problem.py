@@ -9,26 +9,40 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft
 
 from bench.discrepancy.case import Case, CaseRecord
+from bench.discrepancy.driven import driven_force
+from bench.discrepancy.driving import driving_loads, fewest_steps, run_in
 from bench.discrepancy.effect import Effect, Scales
+from bench.discrepancy.measured_motion import measured_motion
+from bench.discrepancy.prepared import RecordData, band_bins, fast_length, noise_floor, projected
+from bench.discrepancy.quantisation import raised_noise
 from bench.discrepancy.smoothing import smooth_motion
-from bench.discrepancy.structure import Place, Structure
-from bench.discrepancy.system import Elements, LinearStructure, Motion, driven_force, free_run
+from bench.discrepancy.starts import (
+    cut,
+    drifts,
+    in_motion,
+    measured_states,
+    restarted,
+    start_priors,
+    start_responses,
+    windows_of,
+    with_starts,
+    without_starts,
+)
+from bench.discrepancy.structure import Place, Structure, with_frictions
+from bench.discrepancy.system import Elements, LinearStructure, Motion
 
 Array = NDArray[np.float64]
-ABOVE_NOISE = 1.5
-"""A frequency belongs to the band of a record while a smoothed response spectrum exceeds this many times its noise."""
 MAX_SUBSTEPS = 16
 COULOMB = "coulomb"
 """Nominal friction force of a component under prescribed motion."""
-MAX_BINS = 2500
-"""Most frequency bins of a record; friction rattles an accelerometer up to the Nyquist frequency and one need not follow."""
+FROM = " from "
+"""Between the channel and the source of cross-talk."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +52,8 @@ class Placed:
     Attributes:
         effect: The effect.
         place: Where it sits.
-        target: Nominal parameter, load channel or response channel of an inertia, actuator or sensor effect.
+        target: Nominal parameter, load channel or response channel of an inertia, actuator or sensor effect; for
+            cross-talk "channel from source".
     """
 
     effect: Effect
@@ -50,26 +65,18 @@ class Placed:
         """Name, place and target: what tells two placed effects apart."""
         return (self.effect.name, self.place.name, self.target)
 
+    @property
+    def channel(self) -> str:
+        """Channel that a sensor effect acts on."""
+        return self.target.partition(FROM)[0]
+
+    @property
+    def source(self) -> str:
+        """Channel that cross-talk comes from; empty for other effects."""
+        return self.target.partition(FROM)[2]
+
 
 Hypothesis = tuple[Placed, ...]
-
-
-class RecordData(NamedTuple):
-    """One record, prepared for fits.
-
-    Attributes:
-        record: The record.
-        loads: (n, n_loads).
-        responses: (n, n_channels).
-        n_bins: Number of frequency bins in the band.
-        whitening: (n_bins, n_channels, n_channels) complex; whitening times the spectrum of the noise is white.
-    """
-
-    record: CaseRecord
-    loads: Array
-    responses: Array
-    n_bins: int
-    whitening: NDArray[np.complex128]
 
 
 @dataclass
@@ -82,10 +89,12 @@ class Problem:
         records: Records to be explained.
         bins: Frequency bins of every record, where they have to agree with those of another problem.
         substeps: Integration steps a sample; chosen by the fastest rate where None.
-        nominal: (n_nominal,) values of the structure's parameters.
+        nominal: (n_nominal,) values of the structure's parameters, initial states of records in motion after them.
         spread: (n_nominal,) their one-sigma uncertainties.
         noise: (n_channels,) noise of the response channels.
         load_noise: (n_loads,).
+        n_physical: Number of parameters of the structure proper.
+        windowed: Whether free runs would drift, so that records are cut into windows.
     """
 
     case: Case
@@ -99,8 +108,11 @@ class Problem:
     load_noise: Array = field(init=False)
     data: tuple[RecordData, ...] = field(init=False)
     motions: dict[str, Motion] = field(init=False, default_factory=dict)
+    n_physical: int = field(init=False)
+    windowed: bool = field(init=False)
 
     def __post_init__(self) -> None:
+        self.structure = without_starts(self.structure)
         table = {p.name: p for p in self.case.parameters}
         self.nominal = np.array([table[name].value for name in self.structure.parameters])
         self.spread = np.array([table[name].std for name in self.structure.parameters])
@@ -108,12 +120,19 @@ class Problem:
         self.load_noise = np.array(
             [self.case.channel(name).noise_std or 0.0 for name in self.structure.loads]
         )
+        self.n_physical = len(self.nominal)
+        duration = max(len(record) * record.step for record in self.records)
+        self.windowed = not self.driven and drifts(self.structure, self.structure.at(self.nominal), duration)
+        if not self.driven and not self.windowed:
+            self.structure = with_starts(self.structure, self.records)
+            mean, std = start_priors([self.motion_of(r) for r in self.records if in_motion(r)])
+            self.nominal, self.spread = np.append(self.nominal, mean), np.append(self.spread, std)
         self.data = tuple(self.prepare(record, self.nominal) for record in self.records)
 
     def _noise_of(self, name: str) -> float:
         stated = self.case.channel(name).noise_std
         if stated is not None and stated > 0:
-            return stated
+            return max(raised_noise(stated, record.values[name]) for record in self.records)
         return max(noise_floor(record.values[name]) for record in self.records)
 
     def prepare(self, record: CaseRecord, values: Array) -> RecordData:
@@ -125,7 +144,8 @@ class Problem:
             if self.bins and record.name in self.bins
             else band_bins(responses, self.noise)
         )
-        return RecordData(record, loads, responses, n_bins, self.whitening(record, n_bins, values))
+        windows = windows_of(self, record, n_bins, values)
+        return RecordData(record, loads, responses, n_bins, self.whitening(record, n_bins, values), windows)
 
     def whitening(self, record: CaseRecord, n_bins: int, values: Array) -> NDArray[np.complex128]:
         """Return the whitening matrices of a record, the loads' noise passed through the linear structure at `values`."""
@@ -156,6 +176,25 @@ class Problem:
         orders = np.array([o.order for o in self.structure.observers])
         return (1j * omega[:, None, None]) ** orders[None, :, None] * (rows @ position)
 
+    def acquired(self, channels: Array, record: CaseRecord) -> Array:
+        """Channels (n, n_channels) behind the filters they passed on their way into a record; changed in place."""
+        for c, name in enumerate(self.structure.channels):
+            antialias = self.case.channel(name).antialias
+            if antialias is not None and antialias.passed(record.name) and np.isfinite(channels[:, c]).all():
+                channels[:, c] = antialias.apply(channels[:, c], record.step, periodic=record.periodic)
+        return channels
+
+    def lead_in(self, record: CaseRecord) -> int:
+        """Samples of run-in before a periodic record, see `driving.run_in`."""
+        if not record.periodic or self.driven or self.windowed:
+            return 0
+        return run_in(self.structure.at(self.nominal), len(record), record.step)
+
+    @cached_property
+    def finest(self) -> int:
+        """Fewest integration steps a sample, see `driving.fewest_steps`."""
+        return fewest_steps(self, MAX_SUBSTEPS)
+
     def motion(self, index: int) -> Motion:
         """Smoothed measured motion of every degree of freedom in record `index`."""
         return self.motion_of(self.records[index])
@@ -178,58 +217,62 @@ class Problem:
         return Motion(*(out[:, [i]] for i in range(3)))
 
     def _smoothed(self, record: CaseRecord) -> Motion:
-        n_dof = len(self.structure.dofs)
-        out = np.zeros((3, len(record), n_dof))
-        for i in range(n_dof):
-            own = [
-                c
-                for c, o in enumerate(self.structure.observers)
-                if abs(o.row[i]) == 1.0 and np.abs(o.row).sum() == 1.0
-            ]
-            if not own:
-                continue
-            samples = np.column_stack([record.values[self.structure.channels[c]] for c in own])
-            orders = tuple(self.structure.observers[c].order for c in own)
-            out[:, :, i] = smooth_motion(samples, orders, self.noise[own], record.step).T
-        return Motion(*out)
+        samples = np.column_stack([record.values[name] for name in self.structure.channels])
+        at_rest = not in_motion(record)
+        return measured_motion(self.structure.observers, samples, self.noise, record.step, at_rest=at_rest)
 
     def scales(self, place: Place) -> Scales:
         """Magnitudes along the coordinates of a place, over all records."""
         count = len(place.rows)
-        position, velocity = np.zeros(count), np.zeros(count)
+        position, velocity, acceleration = np.zeros(count), np.zeros(count), 0.0
         for i in range(len(self.records)):
             motion = self.motion(i)
             position = np.maximum(position, np.abs(motion.position @ place.rows.T).max(axis=0))
             velocity = np.maximum(velocity, np.abs(motion.velocity @ place.rows.T).max(axis=0))
+            acceleration = max(acceleration, float(np.abs(motion.acceleration @ place.rows[0]).max()))
         position[position == 0.0] = 1.0
         velocity[velocity == 0.0] = 1.0
         force = np.array([self._loading(row) for row in place.rows])
         stiffness = force[0] / position[0]
         if place.stiffness in self.structure.parameters:
             stiffness = self.nominal[self.structure.parameters.index(place.stiffness)] or stiffness
+        damping = 0.0
+        if place.damping in self.structure.parameters:
+            damping = self.nominal[self.structure.parameters.index(place.damping)]
         record = self.records[0]
         return Scales(
             float(force[0]), float(position[0]), float(velocity[0]), float(stiffness), len(record) * record.step,
             record.step, float(force[-1]), float(position[-1]), float(velocity[-1]),
+            acceleration or 1.0, float(damping),
         )  # fmt: skip
 
     def _loading(self, row: Array) -> float:
         """RMS load of the group of degrees of freedom that a coordinate belongs to."""
         if self.driven:
-            return float(np.sqrt(np.mean([np.mean(d.responses**2) for d in self.data]))) or 1.0
+            return float(np.sqrt(np.mean([float(np.mean(d.responses**2)) for d in self.data]))) or 1.0
         group = next(g for g in self.structure.groups() if np.any(row[list(g)] != 0.0))
         acting = np.abs(self.structure.inputs[list(group)]).sum(axis=0) > 0
         if not acting.any():
             return 1.0
-        return float(np.sqrt(np.mean([np.mean(d.loads[:, acting] ** 2) for d in self.data]))) or 1.0
+        return float(np.sqrt(np.mean([float(np.mean(d.loads[:, acting] ** 2)) for d in self.data]))) or 1.0
 
-    def simulate(self, hypothesis: Hypothesis, vector: Array, record: CaseRecord) -> Array:
+    def simulate(
+        self,
+        hypothesis: Hypothesis,
+        vector: Array,
+        record: CaseRecord,
+        *,
+        starts: Array | None = None,
+        friction: bool = True,
+    ) -> Array:
         """Free run of a hypothesis.
 
         Args:
             hypothesis: Effects.
             vector: Deviations of the nominal parameters in units of their uncertainty, then the etas of all effects.
             record: Record whose loads drive the run.
+            starts: (n_windows, 2 n_dof) positions and velocities at `firsts`; those of `starts_of` where None.
+            friction: Whether the nominal model keeps its own dry friction.
 
         Returns:
             (n, n_channels) predicted responses; NaN where it diverged.
@@ -237,22 +280,48 @@ class Problem:
         values, etas = self.split(hypothesis, vector)
         if self.driven:
             return self._driven_response(hypothesis, etas, values, record)
-        loads = np.column_stack([record.values[name] for name in self.structure.loads])
-        for placed, eta in zip(hypothesis, etas, strict=True):
-            effect = placed.effect
-            scales = self.scales_of(placed)
-            if effect.site == "actuator" and effect.signal is not None:
-                j = self.structure.loads.index(placed.target)
-                loads[:, j] = effect.signal(loads[:, j], effect.values(eta, scales), record.step)
+        lead = self.lead_in(record)
         linear = self.structure.at(values)
         elements, rate = self.elements(hypothesis, etas, record)
-        fastest = max(rate, np.sqrt(np.max(np.abs(linear.stiffness).sum(1) / np.diag(linear.mass))))
+        if friction and self.structure.frictions:
+            elements = with_frictions(elements, self.structure, values)
+        # The rate of a law is that at its largest velocity, where a step of one time constant is still accurate enough.
+        fastest = max(0.6 * rate, np.sqrt(np.max(np.abs(linear.stiffness).sum(1) / np.diag(linear.mass))))
         # RK4 with h * rate = 0.6 leaves a relative error of 1e-4 over one time constant, below any noise considered
-        substeps = self.substeps or int(np.clip(np.ceil(record.step * fastest / 0.6), 1, MAX_SUBSTEPS))
-        motion = free_run(
-            linear, elements, loads=loads, step=record.step, substeps=substeps, start_time=record.start
+        substeps = self.substeps or int(
+            np.clip(np.ceil(record.step * fastest / 0.6), self.finest, MAX_SUBSTEPS)
         )
-        return self.observe(hypothesis, etas, motion, record.step)
+        loads, factor = driving_loads(self, (hypothesis, etas), record, substeps)
+        motion = restarted(
+            linear,
+            elements,
+            loads=loads,
+            load_factor=factor,
+            step=record.step,
+            substeps=substeps,
+            start_time=record.start - lead * record.step,
+            firsts=self.firsts(record),
+            starts=self.starts_of(record, values) if starts is None else starts,
+            motion=self.motion_of(record) if self.windowed else None,
+        )
+        motion = Motion(*(samples[lead:] for samples in motion))
+        channels = self.observe(hypothesis, etas, motion, record.step)
+        return self.acquired(self.picked_up(hypothesis, etas, channels, record), record)
+
+    def firsts(self, record: CaseRecord) -> NDArray[np.int64]:
+        """First samples (n_windows,) of the runs that a simulation of a record is made of."""
+        return cut(self.case, record, len(self.noise))[0] if self.windowed else np.zeros(1, dtype=np.int64)
+
+    def starts_of(self, record: CaseRecord, values: Array) -> Array:
+        """Initial states (n_windows, 2 n_dof): at rest, as fitted (in `values`), or as measured."""
+        n_dof = len(self.structure.dofs)
+        if not self.windowed and not in_motion(record):
+            return np.zeros((1, 2 * n_dof))
+        fitted = [r.name for r in self.records if in_motion(r)]
+        if not self.windowed and record.name in fitted:
+            first = self.n_physical + 2 * n_dof * fitted.index(record.name)
+            return values[first : first + 2 * n_dof][None, :]
+        return measured_states(self.motion_of(record), self.firsts(record))
 
     def _driven_response(
         self, hypothesis: Hypothesis, etas: list[Array], values: Array, record: CaseRecord
@@ -296,12 +365,29 @@ class Problem:
                 )
         return out
 
+    def picked_up(
+        self, hypothesis: Hypothesis, etas: list[Array], channels: Array, record: CaseRecord
+    ) -> Array:
+        """Channels (n, n_channels) with what they pick up from other measured channels; changed in place."""
+        for placed, eta in zip(hypothesis, etas, strict=True):
+            if placed.effect.pickup:
+                share = placed.effect.values(eta, self.scales_of(placed))[0]
+                channels[:, self.structure.channels.index(placed.channel)] += (
+                    share * record.values[placed.source]
+                )
+        return channels
+
     def scales_of(self, placed: Placed) -> Scales:
-        """Cached `scales` of the place of an effect."""
+        """Cached `scales` of the place of an effect, with the size of the channel it picks up."""
         cache = self.__dict__.setdefault("_scales", {})
         if placed.place.name not in cache:
             cache[placed.place.name] = self.scales(placed.place)
-        return cache[placed.place.name]
+        if not placed.source:
+            return cache[placed.place.name]
+        if placed.key not in cache:
+            largest = max(float(np.abs(record.values[placed.source]).max()) for record in self.records)
+            cache[placed.key] = cache[placed.place.name]._replace(source=largest or 1.0)
+        return cache[placed.key]
 
     def split(self, hypothesis: Hypothesis, vector: Array) -> tuple[Array, list[Array]]:
         """Nominal parameter values, and the etas of every effect; inertia effects already applied to the values."""
@@ -358,7 +444,8 @@ class Problem:
             predicted = self.simulate(hypothesis, vector, data.record)
             if not np.isfinite(predicted).all():
                 return np.array([np.inf])
-            parts.append(whitened(data.responses - predicted, data))
+            moved = start_responses(self, hypothesis, vector, data.record, predicted) if self.windowed else ()
+            parts.append(projected(data.responses - predicted, moved, data))
         return np.concatenate(parts)
 
     @property
@@ -374,14 +461,16 @@ class Problem:
     @property
     def n_residuals(self) -> int:
         """Number of real residuals, that is degrees of freedom of chi-squared before the fit."""
-        return sum(2 * d.n_bins * len(self.noise) for d in self.data)
+        return sum(
+            2 * d.n_bins * len(self.noise) if d.windows is None else d.windows.n_residuals for d in self.data
+        )
 
     def prior(self, hypothesis: Hypothesis) -> tuple[Array, Array, Array, Array]:
         """Mean, standard deviation, lower and upper bound of the vector of a hypothesis."""
         n = len(self.nominal)
         mean, std = [np.zeros(n)], [np.ones(n)]
         low, high = [np.full(n, -np.inf)], [np.full(n, np.inf)]
-        positive = (self.nominal > 0) & (self.spread > 0)
+        positive = (self.nominal > 0) & (self.spread > 0) & (np.arange(n) < self.n_physical)
         low[0][positive] = -0.98 * self.nominal[positive] / self.spread[positive]
         for placed in hypothesis:
             p = placed.effect.parameters
@@ -390,40 +479,3 @@ class Problem:
             low.append(np.array([x.bounds[0] for x in p]))
             high.append(np.array([x.bounds[1] for x in p]))
         return np.concatenate(mean), np.concatenate(std), np.concatenate(low), np.concatenate(high)
-
-
-def fast_length(n: int) -> int:
-    """FFT length for a record of `n` samples."""
-    return int(fft.next_fast_len(n, real=True) or n)
-
-
-def noise_floor(x: Array) -> float:
-    """White noise of a channel whose noise is not stated, from the flattest quarter of its spectrum."""
-    spectrum = np.abs(np.fft.rfft((x - x.mean()) * np.hanning(len(x)))) ** 2 / (len(x) * 0.375)
-    upper = spectrum[len(spectrum) // 2 :]
-    blocks = [np.mean(block) for block in np.array_split(upper, 8)]
-    return float(np.sqrt(max(min(blocks), (1e-6 * np.std(x)) ** 2, 1e-300)))
-
-
-def band_bins(responses: Array, noise: Array) -> int:
-    """Number of frequency bins up to where every response has sunk into its noise."""
-    n = fast_length(len(responses))
-    last = 32
-    for c in range(responses.shape[1]):
-        spectrum = np.abs(np.fft.rfft(responses[:, c], n)) ** 2 / len(responses)
-        width = max(len(spectrum) // 200, 8)
-        usable = len(spectrum) // width * width
-        smooth = spectrum[:usable].reshape(-1, width).mean(axis=1)
-        above = np.flatnonzero(smooth > ABOVE_NOISE * noise[c] ** 2)
-        if len(above):
-            last = max(last, (above[-1] + 2) * width)
-    return int(min(last, n // 2, MAX_BINS))
-
-
-def whitened(residual: Array, data: RecordData) -> Array:
-    """Whitened spectrum of time-domain residuals (n, n_channels) over the band, as real numbers."""
-    n = len(residual)
-    spectrum = fft.rfft(residual, fast_length(n), axis=0)[: data.n_bins] / np.sqrt(n / 2.0)
-    white = (data.whitening @ spectrum[:, :, None])[:, :, 0]
-    white[0] /= np.sqrt(2.0)
-    return np.concatenate([white.real.ravel(), white.imag.ravel()])

@@ -1,49 +1,34 @@
 """The diagnosis as a page: one self-contained HTML file with the verdict, the pictures behind it, and the way back.
 
-The page answers in the order of the questions: what is missing, where the gap lies, how sure that is, how far the gap
-shrinks, and how to put the effect into one's own model.
+The page answers in the order of the questions: what is missing, how far the gap shrinks, where it lies, how sure that is,
+what to measure next, and how to put the effect into one's own model.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bench.discrepancy.application import recipes
 from bench.discrepancy.diagnosis import Diagnosis
-from bench.discrepancy.locate import cell_map, missing_force
-from bench.discrepancy.shrink import coordinates, nominal_prediction
-from bench.discrepancy.structure import Place
-from bench.page import Page
+from bench.discrepancy.shrink import coordinates
+from bench.discrepancy.state_map import StateMap
+from bench.discrepancy.variants import MEASURED, NOMINAL, variants
+from bench.discrepancy.verdict import Split
+from bench.page import Page, Section
 from bench.recording import Recording
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-PERIODS_SHOWN = 8.0
-"""Seconds around the largest response that the overlays show."""
+CYCLES_SHOWN = 12
+"""Cycles around the largest response that the overlays show."""
+WORTH_SHOWING = 0.02
+"""Share of the excess below which a channel's own bands and times are not drawn."""
 
 
 def simulated(diagnosis: Diagnosis) -> dict[str, Recording]:
-    """Measured, nominal and final responses of the first judging record, as recordings.
-
-    Returns:
-        "measured", "nominal model" and "with the effect" (or "with the closure").
-    """
-    record = diagnosis.case.validation[0]
-    units = {c.name: c.unit or "1" for c in diagnosis.case.channels}
-    final = "with the closure" if diagnosis.verdict.verdict == "unknown" else "with the effect"
-    runs = {
-        "measured": dict(record.values),
-        "nominal model": dict(nominal_prediction(diagnosis.problem)(record)),
-        final: diagnosis.final.predict(record),
-    }
-    return {
-        label: Recording.from_arrays(record.time, values, units={name: units[name] for name in values})
-        for label, values in runs.items()
-        if all(np.isfinite(v).all() for v in values.values())
-    }
+    """Measured, nominal and final responses of the first judging record, see `variants`."""
+    return variants(diagnosis)
 
 
 def page(diagnosis: Diagnosis) -> Page:
@@ -52,38 +37,15 @@ def page(diagnosis: Diagnosis) -> Page:
     out = Page(
         f"Diagnosis of {diagnosis.case.name}", verdict.explanation, f"{verdict.seconds:.1f} s of computation"
     )
-    section = out.section("Verdict")
-    section.table(
-        "Probabilities",
-        ("verdict", "probability"),
-        [(k, f"{p:.3f}") for k, p in verdict.probabilities.items()],
-    )
-    for effect in verdict.named:
-        where = f" ({effect.where})" if effect.where else ""
-        section.table(
-            f"{effect.name}{where}, probability {effect.probability:.3f}: {effect.equation}",
-            ("parameter", "value", "one-sigma", "unit"),
-            [(name, f"{e.value:.5g}", f"{e.std:.2g}", e.unit) for name, e in effect.parameters.items()],
-        )
-    for group in verdict.indistinguishable:
-        section.text(f"These records cannot tell apart: {', '.join(group)}.")
-    for warning in verdict.warnings:
-        section.text(f"Note: {warning}.")
-    _gap_section(out, diagnosis)
-    _location_section(out, diagnosis)
-    rows = [(r.name, r.where, f"{r.probability:.4f}") for r in verdict.ranking[:12]]
-    if rows:
-        out.section("Ranking").table(
-            "Effects by posterior probability", ("effect", "place", "probability"), rows
-        )
+    runs = variants(diagnosis)
+    _verdict_section(out, diagnosis)
+    _gap_section(out, diagnosis, runs)
+    _location_section(out, diagnosis, runs)
+    if verdict.ranking:
+        _ranking_section(out, diagnosis)
     _parameter_section(out, diagnosis)
     if verdict.next_excitation:
-        proposal = verdict.next_excitation
-        out.section("The next test").text(
-            f"To tell {proposal['separates'][0]} from {proposal['separates'][1]}: {proposal['excitation']}, peak load "
-            f"{proposal['peak_load']:.3g}, {proposal['duration_s']:.3g} s. Expected log odds "
-            f"{proposal['expected_log_odds']:.3g}; the present records give {proposal['log_odds_now']:.3g}."
-        )
+        _next_section(out, verdict.next_excitation)
     _application_section(out, diagnosis)
     return out
 
@@ -93,8 +55,48 @@ def write_report(diagnosis: Diagnosis, path: str | Path) -> None:
     page(diagnosis).write(path)
 
 
-def _gap_section(out: Page, diagnosis: Diagnosis) -> None:
-    from bench.figures import time_histories, waterfall  # noqa: PLC0415  (matplotlib, for reports only)
+def _verdict_section(out: Page, diagnosis: Diagnosis) -> None:
+    verdict = diagnosis.verdict
+    section = out.section("Verdict")
+    section.table(
+        "Probabilities",
+        ("verdict", "probability"),
+        [(k, f"{p:.3f}") for k, p in verdict.probabilities.items()],
+    )
+    for effect in verdict.named:
+        where = f" ({effect.where})" if effect.where else ""
+        rows = [
+            (
+                name, f"{e.value:.5g}", f"{e.std:.2g}",
+                f"{e.value - 1.96 * e.std:.5g} to {e.value + 1.96 * e.std:.5g}", e.unit,
+            )
+            for name, e in effect.parameters.items()
+        ]  # fmt: skip
+        section.table(
+            f"{effect.name}{where}, probability {effect.probability:.3f}: {effect.equation}",
+            ("parameter", "value", "one-sigma", "95 % interval", "unit"),
+            rows,
+        )
+    for group in verdict.indistinguishable:
+        section.text(f"These records cannot tell apart: {', '.join(group)}.")
+    for warning in verdict.warnings:
+        section.text(f"Note: {warning}.")
+
+
+def _window(diagnosis: Diagnosis, reference: Recording) -> tuple[float, float]:
+    """Some cycles around the largest response."""
+    channels = [name for _, names in coordinates(diagnosis.problem.structure) for name, _ in names]
+    y = reference[channels[0]] - np.mean(reference[channels[0]])
+    crossings = max(int(np.count_nonzero(np.diff(np.signbit(y)))), 1)
+    first, last = float(reference.time[0]), float(reference.time[-1])
+    width = min((last - first) * 2.0 * CYCLES_SHOWN / crossings, last - first)
+    middle = float(reference.time[int(np.argmax(np.abs(y)))])
+    start = float(np.clip(middle - 0.5 * width, first, last - width))
+    return start, start + width
+
+
+def _gap_section(out: Page, diagnosis: Diagnosis, runs: Mapping[str, Recording]) -> None:
+    from bench.figures import error_histories, time_histories, waterfall  # noqa: PLC0415  (matplotlib)
 
     section = out.section("How far the gap shrinks")
     for gap in diagnosis.verdict.gaps:
@@ -111,118 +113,213 @@ def _gap_section(out: Page, diagnosis: Diagnosis) -> None:
     gap = diagnosis.verdict.gap
     values = [value for _, value in gap.steps]
     if np.all(np.isfinite(values)):
-        figure = waterfall(
-            [label for label, _ in gap.steps[1:]], values, floor=gap.noise_floor, axis="NRMSE [1]"
-        )
+        labels = [label.replace(" + ", "\n+ ") for label, _ in gap.steps[1:]]
+        figure = waterfall(labels, values, floor=gap.noise_floor, axis="NRMSE [1]")
         section.figure(figure, "The gap after each step, and the floor that the noise sets.")
-    runs = simulated(diagnosis)
     channels = [name for _, names in coordinates(diagnosis.problem.structure) for name, _ in names]
-    reference = runs["measured"]
-    middle = float(reference.time[int(np.argmax(np.abs(reference[channels[0]])))])
-    window = (
-        max(float(reference.time[0]), middle - 0.5 * PERIODS_SHOWN),
-        min(float(reference.time[-1]), middle + 0.5 * PERIODS_SHOWN),
-    )
-    figure = time_histories(runs, channels, window=window)
-    section.figure(
-        figure, "Judging record: measured, nominal model, and final model, around the largest response."
-    )
-
-
-def _location_section(out: Page, diagnosis: Diagnosis) -> None:
-    section = out.section("Where the gap lies")
-    rows = []
-    for location in diagnosis.verdict.locations:
-        region = (
-            "; ".join(f"{k} {a:.3g} to {b:.3g}" for k, (a, b) in location.state_region.items())
-            or "everywhere"
+    window = _window(diagnosis, runs[MEASURED])
+    before = {label: run for label, run in runs.items() if label in {MEASURED, NOMINAL}}
+    after = {label: run for label, run in runs.items() if label != NOMINAL}
+    for shown, caption in (
+        (before, "Judging record, before: measured and nominal model, around the largest response."),
+        (after, "The same after: measured and final model."),
+    ):
+        if len(shown) > 1:
+            section.figure(time_histories(shown, channels, window=window), caption)
+    if len(runs) > 1:
+        section.figure(
+            error_histories(runs, channels), "What is left: simulated less measured, over the whole record."
         )
+    if NOMINAL not in runs:
+        section.text("The nominal model diverges on the judging record; it is not drawn.")
+
+
+def _location_section(out: Page, diagnosis: Diagnosis, runs: Mapping[str, Recording]) -> None:
+    section = out.section("Where the gap lies")
+    where, verdict = diagnosis.where, diagnosis.verdict
+    rows = []
+    for location in verdict.locations:
         band = f"{location.band_hz[0]:.3g} to {location.band_hz[1]:.3g}"
         span = f"{location.time_s[0]:.3g} to {location.time_s[1]:.3g}"
-        rows.append((location.channel, location.dof, f"{100 * location.share:.1f} %", band, span, region))
+        share = f"{100 * location.share:.1f} %"
+        rows.append(
+            (location.channel, location.dof, share, band, span, location.kind, f"{location.p_value:.1g}")
+        )
     if rows:
-        header = ("channel", "degree of freedom", "share", "band [Hz]", "time [s]", "region of the state")
-        section.table("Residuals of the nominal model, parameters re-estimated", header, rows)
-    for place in diagnosis.problem.structure.places:
-        if len(place.rows) == 1:
-            section.figure(
-                state_map(diagnosis, place),
-                f"Force that the nominal model lacks along the measured motion{' (' + place.name + ')' if place.name else ''}; "
-                "filled cells differ from zero significantly.",
-            )
+        header = ("channel", "degree of freedom", "share", "band [Hz]", "time [s]", "cause in", "p-value")
+        section.table("Residuals of the nominal model's free run, parameters re-estimated", header, rows)
+    for found in where.contradictions:
+        section.text(_contradiction_text(found))
+    for found in where.maps:
+        _map(section, found, runs, verdict.splits, found.place.name or diagnosis.problem.structure.dofs[0])
+    main = {location.channel for location in verdict.locations if location.share > WORTH_SHOWING}
+    residual = [s for s in verdict.splits if s.kind in {"band_hz", "time_s"} and s.of in main]
+    if residual:
+        from bench.discrepancy.report_figures import shares  # noqa: PLC0415  (matplotlib)
+
+        section.figure(
+            shares(residual),
+            "Excess power of the free run's residuals by frequency and by time; filled parts are significant, false discoveries "
+            "held at 5 %.",
+        )
 
 
-def state_map(diagnosis: Diagnosis, place: Place) -> Figure:
-    """Draw the missing force over displacement and over velocity, by cells, with their significance."""
-    from bench.figures.look import axes_grid, style  # noqa: PLC0415  (matplotlib, for reports only)
+def _contradiction_text(found) -> str:
+    low, high = found.channels
+    if not found.found:
+        return (
+            f"{low} and {high} agree with each other (power of their contradiction {found.ratio:.2f} times the noise's): "
+            "a force is missing rather than a sensor at fault, as far as they can tell."
+        )
+    blame = f" The nominal model contradicts {found.suspect}." if found.suspect else ""
+    return (
+        f"{low} and {high} contradict each other whatever force acts (power {found.ratio:.3g} times the noise's over windows of "
+        f"{found.window_s:.2g} s, p = {found.p_value:.1g}): a sensor or its clock is at fault.{blame}"
+    )
 
-    problem, best = diagnosis.problem, diagnosis.explanations[0]
-    force = np.concatenate([missing_force(problem, best, place, i) for i in range(len(problem.records))])
-    with style():
-        figure, axes = axes_grid(9.0, 3.2, nrows=1, ncols=2)
-        for ax, kind, unit in zip(
-            np.ravel(axes),
-            ("position", "velocity"),
-            (place.position_unit, f"{place.position_unit}/s"),
-            strict=True,
-        ):
-            samples = [getattr(problem.motion(i), kind) @ place.rows[0] for i in range(len(problem.records))]
-            cells = cell_map(np.concatenate(samples), force)
-            centres = 0.5 * (cells.edges[1:] + cells.edges[:-1])
-            width = 0.9 * (cells.edges[1] - cells.edges[0])
-            ax.bar(centres, np.nan_to_num(cells.force), width, color="none", edgecolor="0.6")
-            ax.bar(centres[cells.significant], cells.force[cells.significant], width, color="#0072b2")
-            ax.set_xlabel(f"{kind} [{unit}]")
-            ax.set_ylabel(f"mean missing force [{place.force_unit}]")
-    return figure
+
+def _map(
+    section: Section, found: StateMap, runs: Mapping[str, Recording], splits: Sequence[Split], name: str
+) -> None:
+    from bench.discrepancy.report_figures import force_loops, shares, state_figure  # noqa: PLC0415  (matplotlib)
+
+    place = found.place
+    title = f" ({place.name})" if place.name else ""
+    section.text(f"Missing force{title}: {region_words(found)}")
+    section.figure(
+        state_figure(found),
+        f"Force that the nominal model lacks along the measured motion{title}. Outlined cells differ from zero significantly; "
+        "grey: never visited twice.",
+    )
+    section.figure(
+        force_loops(runs, place.name),
+        f"The same force on the judging record{title}, beside that of the simulations, all through the same estimator.",
+    )
+    own = [s for s in splits if s.of == "missing force" and s.dof == name]
+    if own:
+        section.figure(
+            shares(own, units=(place.position_unit, place.force_unit)),
+            f"Shares of the squared missing force{title}; filled parts are significant.",
+        )
+
+
+def region_words(found: StateMap) -> str:
+    """The regions of a map in words."""
+    unit = found.place.position_unit
+    if not found.regions:
+        return "no region of the state space stands out."
+    parts = []
+    for region in found.regions[:4]:
+        limits = []
+        if region.displacement is not None:
+            limits.append(f"displacement {region.displacement[0]:.3g} to {region.displacement[1]:.3g} {unit}")
+        if region.velocity is not None:
+            limits.append(f"velocity {region.velocity[0]:.3g} to {region.velocity[1]:.3g} {unit}/s")
+        where = " and ".join(limits) or "everywhere"
+        parts.append(
+            f"{where}: {region.force:+.3g} {found.place.force_unit} on average, {100 * region.share:.0f} % of its square"
+        )
+    return "; ".join(parts) + "."
+
+
+def _ranking_section(out: Page, diagnosis: Diagnosis) -> None:
+    from bench.discrepancy.report_figures import ranking_bars  # noqa: PLC0415  (matplotlib)
+
+    verdict = diagnosis.verdict
+    section = out.section("Which effect")
+    section.figure(ranking_bars(verdict.ranking), "Effects by posterior probability.")
+    rows = [
+        (
+            " + ".join(f"{p.effect.name}{f' ({p.place.name})' if p.place.name else ''}" for p in e.hypothesis)
+            or "nothing",
+            f"{e.log_posterior - diagnosis.explanations[0].log_posterior:.1f}",
+            f"{e.reduced:.4g}",
+            f"{e.reduced_on(diagnosis.case.validation[0]):.4g}",
+        )
+        for e in diagnosis.explanations[:8]
+    ]
+    section.table(
+        "Explanations by posterior; a chi-squared of one is noise alone, and the last column is on a record that no fit has seen",
+        ("explanation", "log odds against the first", "chi-squared", "chi-squared, judging record"),
+        rows,
+    )
 
 
 def _parameter_section(out: Page, diagnosis: Diagnosis) -> None:
-    section = out.section("Nominal parameters")
+    from bench.discrepancy.report_figures import correlation_map  # noqa: PLC0415  (matplotlib)
+
+    section = out.section("Parameters")
     for problem, fitted in diagnosis.explanations[0].parts:
         deviations = np.sqrt(np.diag(fitted.covariance))
         rows = []
         for i, name in enumerate(problem.structure.parameters):
             value = problem.nominal[i] + problem.spread[i] * fitted.vector[i]
+            std = problem.spread[i] * deviations[i]
             rows.append(
                 (
-                    name,
-                    f"{problem.nominal[i]:.5g}",
-                    f"{value:.5g}",
-                    f"{problem.spread[i] * deviations[i]:.2g}",
-                    f"{fitted.vector[i]:+.2f}",
+                    name, f"{problem.nominal[i]:.5g}", f"{value:.5g}", f"{std:.2g}",
+                    f"{value - 1.96 * std:.5g} to {value + 1.96 * std:.5g}", f"{fitted.vector[i]:+.2f}",
                 )
-            )
-        header = ("parameter", "nominal", "estimate", "one-sigma", "moved [stated sigma]")
+            )  # fmt: skip
+        header = ("parameter", "nominal", "estimate", "one-sigma", "95 % interval", "moved [stated sigma]")
         section.table("Re-estimated within their stated uncertainty, together with the effects", header, rows)
-        covariance = fitted.covariance
-        scale = np.sqrt(np.diag(covariance))
-        correlation = covariance / np.outer(scale, scale)
+        free = [
+            i
+            for i, s in enumerate(deviations)
+            if i >= len(problem.nominal) or (problem.spread[i] > 0.0 and s > 0.0)
+        ]
+        scale = np.maximum(deviations, 1e-300)
+        correlation = (fitted.covariance / np.outer(scale, scale))[np.ix_(free, free)]
         labels = [
             *problem.structure.parameters,
             *(f"{p.effect.name}: {q.name}" for p in fitted.hypothesis for q in p.effect.parameters),
         ]
-        strong = [
-            (labels[i], labels[j], f"{correlation[i, j]:+.2f}")
-            for i in range(len(labels))
-            for j in range(i)
-            if abs(correlation[i, j]) > 0.7
-        ]
-        if strong:
-            section.table("Correlations above 0.7", ("parameter", "with", "correlation"), strong)
+        section.figure(
+            correlation_map([labels[i] for i in free], correlation),
+            "Correlations of the estimates; a pair near one in magnitude is known as a combination only.",
+        )
+
+
+def _next_section(out: Page, proposal: Mapping) -> None:
+    section = out.section(
+        "The next test" if proposal.get("excitation") else "What these records could have shown"
+    )
+    if proposal.get("reason"):
+        section.text(str(proposal["reason"]))
+    if not proposal.get("excitation"):
+        return
+    first, second = proposal["separates"]
+    section.text(
+        f"To tell {first} from {second}: {proposal['excitation']}, for {proposal['duration_s']:.3g} s. It is expected to bring "
+        f"log odds of {proposal['expected_log_odds']:.3g}; with a probability of {100 * proposal['power']:.0f} % the true one of "
+        f"the two is then known with 99 %. The present records give {proposal['log_odds_now']:.3g}."
+    )
+    rows = [(name, f"{value:.4g}") for name, value in proposal["peak_loads"].items()]
+    rows += [(name, f"{value:.4g}") for name, value in proposal["largest_response"].items()]
+    section.table("Largest values, within what the records show the rig to do", ("channel", "peak"), rows)
+    repeating = proposal.get("repeating")
+    if repeating:
+        section.text(
+            f"Repeating the longest present record instead: expected log odds {repeating['expected_log_odds']:.3g}, "
+            f"probability of a decision {100 * repeating['power']:.0f} %."
+        )
 
 
 def _application_section(out: Page, diagnosis: Diagnosis) -> None:
-    laws = [effect for effect in diagnosis.verdict.named if effect.law]
-    if not laws:
+    found = recipes(diagnosis)
+    if not found:
         return
     section = out.section("Back into the model")
-    section.text("The effect as an element of the bench; put the name of your own joint in place of JOINT.")
-    for effect in laws:
-        section.code(element_code(effect.law, effect.theta))
-
-
-def element_code(law: str, theta: tuple[float, ...]) -> str:
-    """Python code that makes the element of a found effect."""
-    numbers = ", ".join(f"{value:.6g}" for value in theta)
-    return f'Element(law=LAWS["{law}"], joints=("JOINT",), theta=LAWS["{law}"].theta([{numbers}]))'
+    section.text(
+        "Each effect as an element of the bench in Python, as an entry of a rig configuration, and in MuJoCo's own elements where it "
+        "has them. Re-estimated nominal parameters belong to it: see the table above."
+    )
+    for recipe in found:
+        section.text(f"{recipe.title}: {recipe.equation}")
+        if recipe.code:
+            section.code(recipe.code)
+            section.code(recipe.toml)
+        if recipe.mjcf:
+            section.code(recipe.mjcf)
+        if recipe.note:
+            section.text(recipe.note)

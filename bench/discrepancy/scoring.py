@@ -1,17 +1,186 @@
-"""Scoring of blind trials against their answers."""
+"""Scoring of blind trials against their answers.
+
+What counts as right, by the class of a case:
+
+- none: the verdict *none* (anything else is a false alarm); foreign: the verdict *unknown*.
+- single, double: the verdict *effect*, with the withheld effects and no others, each at its place; one of them may be another
+  member of a set that the verdict declares indistinguishable, if the set holds the truth.
+- struck (the true effect was taken out of the catalogue): *unknown*, or an effect of the truth's family: its nearest kin.
+
+Shares come with Wilson's interval, since most bands hold a few dozen cases.
+
+References:
+    E. B. Wilson, J. Am. Stat. Assoc. 22 (1927) 209-212 (interval).
+    M. P. Naeini, G. F. Cooper, M. Hauskrecht, AAAI 2015 (expected calibration error).
+"""
 
 from __future__ import annotations
 
 import hashlib
 import json
+import math
 from collections import defaultdict
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from bench.discrepancy.blind import FAMILIES, BlindScore
+from bench.discrepancy.catalogue import CATALOGUE
 from bench.errors import FileFormatError
+
+FAMILIES = {e.name: e.family for e in CATALOGUE}
+NAN = math.nan
+TELLABLE = 10.0
+"""Expected log odds from which a record is said to be able to tell: noise then misleads in a few cases of ten thousand."""
+CELLS = 32
+"""Cells of the reach of a coordinate in which planted and found regions are compared."""
+
+BANDS: Mapping[str, tuple[float, ...]] = {
+    "gap": (0.0, 0.06, 0.12, 0.25, math.inf),
+    "noise": (0.0, 0.006, 0.012, math.inf),
+    "log odds against the nearest rival": (-math.inf, 3.0, 10.0, 50.0, math.inf),
+    "log odds against none": (-math.inf, 10.0, 100.0, math.inf),
+}
+"""Edges of the bands that accuracy is reported by."""
+
+
+class Share(NamedTuple):
+    """A share with its 95 % interval.
+
+    Attributes:
+        value: Hits over cases; NaN without cases.
+        n: Number of cases.
+        low, high: Ends of Wilson's interval.
+    """
+
+    value: float
+    n: int
+    low: float
+    high: float
+
+
+def wilson(hits: Iterable[bool]) -> Share:
+    """Share of hits with Wilson's 95 % interval."""
+    flags = list(hits)
+    n = len(flags)
+    if n == 0:
+        return Share(NAN, 0, NAN, NAN)
+    z, p = 1.959964, sum(flags) / n
+    middle = (p + z * z / (2 * n)) / (1 + z * z / n)
+    half = z / (1 + z * z / n) * math.sqrt(p * (1 - p) / n + z * z / (4 * n * n))
+    # at no hits or all hits the end is 0 or 1; rounding may leave it 1e-17 beside
+    return Share(p, n, max(middle - half, 0.0) if p > 0 else 0.0, min(middle + half, 1.0) if p < 1 else 1.0)
+
+
+@dataclass(frozen=True)
+class Scored:
+    """One case with its score.
+
+    Attributes:
+        name: Name of the case.
+        kind: "none", "single", "double", "foreign" or "struck".
+        right: Whether the verdict is right.
+        family: Whether the families are right; None where there is no catalogued effect.
+        bands: Dimension to band.
+        truth: Withheld effects, (name, place).
+        said: Named effects, (name, place).
+        verdict: The verdict.
+        result: The result as JSON.
+        answer: The answer as JSON.
+    """
+
+    name: str
+    kind: str
+    right: bool
+    family: bool | None
+    bands: Mapping[str, str]
+    truth: tuple[tuple[str, str], ...]
+    said: tuple[tuple[str, str], ...]
+    verdict: str
+    result: Mapping[str, Any] = field(repr=False)
+    answer: Mapping[str, Any] = field(repr=False)
+
+
+@dataclass(frozen=True)
+class BlindScore:
+    """Scores of a blind run; shares are NaN where no case of the kind exists.
+
+    Attributes:
+        n: Number of cases scored.
+        exact: Share of single-effect cases named exactly, or with the truth in a declared indistinguishable set.
+        strict: Share of single-effect cases named exactly, no set helping.
+        family: Share of single-effect cases with the right family.
+        place: Share of named joint-rig effects at the right place.
+        false_alarms: Share of clean cases with another verdict than "none".
+        unknown_caught: Share of foreign cases with the verdict "unknown".
+        both_named: Share of double cases with both effects named.
+        tellable: Share of right verdicts over all cases whose records can tell: expected log odds of at least `TELLABLE` against
+            the nearest rival and against none, where the answers state them.
+        unknown_tellable: Share of the foreign cases among these that end in "unknown".
+        struck_right: Share of cases with the true effect struck from the catalogue that end in unknown or in its kin.
+        struck_unknown: Share of them that end in unknown.
+        sets_hold_truth: Share of verdicts with a declared indistinguishable set whose names, sets included, hold the truth.
+        mean_set: Mean size of the declared sets.
+        region_f1: Mean F1 of found against planted regions of the state, over effects that act in a region only.
+        calibration_error: Expected calibration error of the named effects' probabilities, in ten bins.
+        verdict_calibration_error: The same of the probability of the verdict.
+        median_ratio: Median of after / noise_floor over cases.
+        p90_ratio: Its 90th percentile.
+        median_seconds, p90_seconds: The same of the time of a diagnosis [s].
+        failed: Number of diagnoses that ended in an error.
+        shares: The shares above with their numbers of cases and intervals.
+        bands: Dimension to band to the share of right cases.
+        reliability: Bins of stated probability: (mean stated, share true, count).
+        confusion: True name to named name to count, single-effect cases.
+        wrong: One line for every case that is not right.
+    """
+
+    n: int
+    exact: float
+    strict: float
+    family: float
+    place: float
+    false_alarms: float
+    unknown_caught: float
+    both_named: float
+    tellable: float
+    unknown_tellable: float
+    struck_right: float
+    struck_unknown: float
+    sets_hold_truth: float
+    mean_set: float
+    region_f1: float
+    calibration_error: float
+    verdict_calibration_error: float
+    median_ratio: float
+    p90_ratio: float
+    median_seconds: float
+    p90_seconds: float
+    failed: int
+    shares: Mapping[str, Share] = field(default_factory=dict)
+    bands: Mapping[str, Mapping[str, Share]] = field(default_factory=dict)
+    reliability: tuple[tuple[float, float, int], ...] = ()
+    confusion: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
+    wrong: tuple[str, ...] = ()
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the score as JSON values: NaN as None, a share as {value, n, low, high}."""
+        return _plain(asdict(self))
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Share):
+        return {k: _plain(v) for k, v in value._asdict().items()}
+    if isinstance(value, Mapping):
+        return {key: _plain(entry) for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(entry) for entry in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
 
 
 def score_blind(results: str | Path, answers: str | Path, *, cases: str | Path | None = None) -> BlindScore:
@@ -25,87 +194,299 @@ def score_blind(results: str | Path, answers: str | Path, *, cases: str | Path |
     Raises:
         FileFormatError: No result has an answer, or an answer does not match its hash.
     """
+    return summary(score_cases(results, answers, cases=cases))
+
+
+def score_cases(results: str | Path, answers: str | Path, *, cases: str | Path | None = None) -> list[Scored]:
+    """Score every case on its own; see `score_blind`."""
     results, answers = Path(results), Path(answers)
-    pairs = []
+    out = []
     for path in sorted(results.glob("*.json")):
-        answer = answers / path.name
-        if answer.is_file():
-            text = answer.read_text()
-            _check_seal(text, path.stem, cases)
-            pairs.append((path.stem, json.loads(path.read_text()), json.loads(text)))
-    if not pairs:
+        file = answers / path.name
+        if not file.is_file():
+            continue
+        text = file.read_text(encoding="utf-8")
+        _check_seal(text, path.stem, cases)
+        try:
+            out.append(_scored(path.stem, json.loads(path.read_text(encoding="utf-8")), json.loads(text)))
+        except (json.JSONDecodeError, KeyError, TypeError) as error:
+            raise FileFormatError(
+                f"'{path}' or its answer '{file}' is not what a diagnosis and a maker of cases write: {error!r}"
+            ) from error
+    if not out:
         raise FileFormatError(f"no result in '{results}' has an answer in '{answers}'")
-    by_class: dict[str, list[bool]] = defaultdict(list)
-    families, places, hits, ratios, wrong = [], [], [], [], []
-    confusion: dict[str, dict[str, int]] = defaultdict(lambda: defaultdict(int))
-    for name, result, answer in pairs:
-        truth = {(e["name"], e.get("where", "") or "") for e in answer["effects"]}
-        right = _right(result, truth, answer["class"])
-        by_class[answer["class"]].append(right)
-        if not right:
-            said = (
-                ", ".join(f"{e['name']} {e['where']}".strip() for e in result["named"]) or result["verdict"]
-            )
-            wrong.append(f"{name}: {answer['class']} {sorted(n for n, _ in truth)} diagnosed as {said}")
-        if answer["class"] == "single":
-            (true_name, _), *_ = truth
-            said = result["named"][0]["name"] if result["named"] else result["verdict"]
-            confusion[true_name][said] += 1
-            families.append(right or FAMILIES.get(said) == FAMILIES.get(true_name))
-        wheres = dict(truth)
-        places += [e["where"] == wheres[e["name"]] for e in result["named"] if wheres.get(e["name"])]
-        hits += [(e["probability"], e["name"] in wheres) for e in result["named"]]
-        ratios += [g["after"] / g["noise_floor"] for g in result.get("gaps") or [result["gap"]]]
-    return BlindScore(
-        n=len(pairs),
-        exact=_share(by_class["single"]),
-        family=_share(families),
-        place=_share(places),
-        false_alarms=1.0 - _share(by_class["none"]),
-        unknown_caught=_share(by_class["foreign"]),
-        both_named=_share(by_class["double"]),
-        calibration_error=calibration_error(hits),
-        median_ratio=float(np.median(ratios)),
-        p90_ratio=float(np.percentile(ratios, 90)),
-        confusion={k: dict(v) for k, v in confusion.items()},
-        wrong=tuple(wrong),
+    return out
+
+
+def _scored(name: str, result: Mapping[str, Any], answer: Mapping[str, Any]) -> Scored:
+    truth = tuple((e["name"], e.get("where", "") or "") for e in answer["effects"])
+    said = tuple((e["name"], e.get("where", "") or "") for e in result["named"])
+    kind = "struck" if answer.get("struck") else str(answer["class"])
+    right = _right(result, set(said), set(truth), kind)
+    families = None
+    if kind in {"single", "double"}:
+        families = right or (
+            result["verdict"] == "effect"
+            and sorted(_family(n) for n, _ in truth) == sorted(_family(n) for n, _ in said)
+        )
+    return Scored(
+        name,
+        kind,
+        right,
+        families,
+        _bands_of(name, answer, kind),
+        truth,
+        said,
+        str(result["verdict"]),
+        result,
+        answer,
     )
 
 
-def _right(result: dict[str, Any], truth: set[tuple[str, str]], kind: str) -> bool:
-    said = {(e["name"], e["where"]) for e in result["named"]}
+def _family(name: str) -> str:
+    return str(FAMILIES.get(name, name))
+
+
+def _right(
+    result: Mapping[str, Any], said: set[tuple[str, str]], truth: set[tuple[str, str]], kind: str
+) -> bool:
+    verdict = result["verdict"]
     if kind == "none":
-        return result["verdict"] == "none"
+        return verdict == "none"
     if kind == "foreign":
-        return result["verdict"] == "unknown"
-    if result["verdict"] != "effect" or len(said) != len(truth):
+        return verdict == "unknown"
+    if kind == "struck":
+        own = {FAMILIES.get(name) for name, _ in truth}
+        return verdict == "unknown" or (
+            verdict == "effect" and bool(said) and {FAMILIES.get(name) for name, _ in said} <= own
+        )
+    if verdict != "effect" or len(said) != len(truth):
         return False
     missed, extra = truth - said, said - truth
     if not missed:
         return True
-    sets = [set(entry) for entry in result["indistinguishable"]]
     if len(missed) == len(extra) == 1:
         (name, where), (other, place) = *missed, *extra
-        return where == place and any({name, other} <= entry for entry in sets)
+        return where == place and any({name, other} <= set(entry) for entry in result["indistinguishable"])
     return False
 
 
-def calibration_error(hits: list[tuple[float, bool]], bins: int = 10) -> float:
-    """Expected calibration error: mean distance between stated and observed frequency, weighed by bin counts."""
-    if not hits:
-        return float("nan")
-    stated = np.array([p for p, _ in hits])
-    true = np.array([h for _, h in hits], dtype=float)
-    which = np.minimum((stated * bins).astype(int), bins - 1)
-    return float(
-        sum(
-            abs(stated[which == b].mean() - true[which == b].mean()) * np.mean(which == b) for b in set(which)
-        )
+def summary(scored: Sequence[Scored]) -> BlindScore:
+    """Sum up scored cases."""
+    by_kind: dict[str, list[Scored]] = defaultdict(list)
+    confusion: dict[str, dict[str, int]] = defaultdict(lambda: defaultdict(int))
+    for s in scored:
+        by_kind[s.kind].append(s)
+        if s.kind == "single":
+            confusion[s.truth[0][0]][" + ".join(sorted(n for n, _ in s.said)) or s.verdict] += 1
+    singles = by_kind["single"]
+    declared = [s for s in scored if s.kind in {"single", "double"} and s.result.get("indistinguishable")]
+    tellable = [s for s in scored if s.kind != "struck" and _least_odds(s.answer) >= TELLABLE]
+    sizes = [len(entry) for s in declared for entry in s.result["indistinguishable"]]
+    shares = {
+        "exact": wilson(s.right for s in singles),
+        "strict": wilson(set(s.said) == set(s.truth) and s.verdict == "effect" for s in singles),
+        "family": wilson(bool(s.family) for s in singles),
+        "place": wilson(_places(scored)),
+        "false_alarms": wilson(not s.right for s in by_kind["none"]),
+        "unknown_caught": wilson(s.right for s in by_kind["foreign"]),
+        "both_named": wilson(s.right for s in by_kind["double"]),
+        "tellable": wilson(s.right for s in tellable),
+        "unknown_tellable": wilson(s.right for s in tellable if s.kind == "foreign"),
+        "struck_right": wilson(s.right for s in by_kind["struck"]),
+        "struck_unknown": wilson(s.verdict == "unknown" for s in by_kind["struck"]),
+        "sets_hold_truth": wilson(_held(s) for s in declared),
+    }
+    hits = [
+        (float(e["probability"]), e["name"] in {n for n, _ in s.truth})
+        for s in scored
+        if s.kind != "struck"
+        for e in s.result["named"]
+    ]
+    own = {"none": "none", "foreign": "unknown", "single": "effect", "double": "effect"}
+    verdicts = [
+        (float(s.result["probabilities"][s.verdict]), s.verdict == own[s.kind])
+        for s in scored
+        if s.kind in own and s.verdict in (s.result.get("probabilities") or {})
+    ]
+    ratios = [r for s in scored for r in _ratios(s.result)]
+    seconds = [float(s.result["seconds"]) for s in scored if s.result.get("seconds")]
+    f1 = [f for s in scored for f in region_scores(s.result, s.answer)]
+    return BlindScore(
+        n=len(scored),
+        **{name: share.value for name, share in shares.items()},
+        mean_set=float(np.mean(sizes)) if sizes else NAN,
+        region_f1=float(np.mean(f1)) if f1 else NAN,
+        calibration_error=calibration_error(hits),
+        verdict_calibration_error=calibration_error(verdicts),
+        median_ratio=_quantile(ratios, 0.5),
+        p90_ratio=_quantile(ratios, 0.9),
+        median_seconds=_quantile(seconds, 0.5),
+        p90_seconds=_quantile(seconds, 0.9),
+        failed=sum(s.verdict == "failed" for s in scored),
+        shares=shares,
+        bands=_by_band(scored),
+        reliability=tuple(reliability(hits)),
+        confusion={k: dict(v) for k, v in sorted(confusion.items())},
+        wrong=tuple(_complaint(s) for s in scored if not s.right),
     )
 
 
-def _share(flags: list[bool]) -> float:
-    return float(np.mean(flags)) if flags else float("nan")
+def _least_odds(answer: Mapping[str, Any]) -> float:
+    """Smaller one of the expected log odds that an answer states; minus infinity where it states none."""
+    odds = answer.get("detectability") or {}
+    return min(odds.get("log_odds_rival", -math.inf), odds.get("log_odds_none", -math.inf))
+
+
+def _complaint(s: Scored) -> str:
+    truth = ", ".join(f"{n} {w}".strip() for n, w in s.truth) or "nothing"
+    said = ", ".join(f"{n} {w}".strip() for n, w in s.said) or s.verdict
+    odds = (s.answer.get("detectability") or {}).get("log_odds_rival")
+    rival = (
+        f" (expected log odds {odds:.1f} against {s.answer['detectability']['rival']})"
+        if odds is not None
+        else ""
+    )
+    return f"{s.name}: {s.kind}, {truth} diagnosed as {said}{rival}"
+
+
+def _places(scored: Sequence[Scored]) -> list[bool]:
+    return [where in {w for n, w in s.truth if n == name} for s in scored for name, where in s.said
+            if any(n == name and w for n, w in s.truth)]  # fmt: skip
+
+
+def _held(s: Scored) -> bool:
+    """Whether the named effects and the sets they stand in hold all withheld effects."""
+    held = {n for n, _ in s.said}.union(*(set(entry) for entry in s.result["indistinguishable"]))
+    return {n for n, _ in s.truth} <= held
+
+
+def _ratios(result: Mapping[str, Any]) -> list[float]:
+    gaps = result.get("gaps") or ([result["gap"]] if result.get("gap") else [])
+    return [
+        g["after"] / g["noise_floor"] if g["after"] is not None else math.inf
+        for g in gaps
+        if g.get("noise_floor")
+    ]
+
+
+def _quantile(values: Sequence[float], q: float) -> float:
+    return float(np.quantile(values, q, method="linear")) if len(values) else NAN
+
+
+def region_scores(result: Mapping[str, Any], answer: Mapping[str, Any]) -> list[float]:
+    """F1 of the found regions of displacement, for every planted one, in cells of the coordinate's reach.
+
+    Found is what the locations of the degree of freedom (or of the place) mark: all their regions, or the strongest one where
+    only that is given.
+    """
+    out = []
+    for planted in answer.get("regions") or ():
+        reach = planted["reach"]
+        edges = np.linspace(-reach, reach, CELLS + 1)
+        middle = 0.5 * (edges[1:] + edges[:-1])
+        truth = _inside(middle, planted["intervals"])
+        found = np.zeros(CELLS, dtype=bool)
+        for location in result.get("locations") or ():
+            dof = str(location.get("dof", ""))
+            if planted["dof"] and not dof.startswith(
+                {"axial": ("x", "axial"), "torsional": ("th", "tor")}[planted["dof"]]
+            ):
+                continue
+            for region in location.get("regions") or [location.get("state_region") or {}]:
+                if region:  # a region that does not depend on the coordinate lies everywhere along it
+                    found |= _inside(middle, [region.get(planted["coordinate"], (-reach, reach))])
+        both = np.sum(truth & found)
+        out.append(float(2.0 * both / max(np.sum(truth) + np.sum(found), 1)))
+    return out
+
+
+def _inside(middle: np.ndarray, intervals: Iterable[Sequence[float]]) -> np.ndarray:
+    return np.any([(middle >= low) & (middle <= high) for low, high in intervals], axis=0)
+
+
+def _bands_of(name: str, answer: Mapping[str, Any], kind: str) -> dict[str, str]:
+    """The band of a case in every dimension that its answer states."""
+    gap = answer.get("gap_nrmse_identification", answer.get("gap_nrmse_validation"))
+    odds = answer.get("detectability") or {}
+    numbers = {
+        "gap": None if gap is None or kind == "none" else float(np.max(gap)),
+        "noise": answer.get("noise"),
+        "log odds against the nearest rival": odds.get("log_odds_rival"),
+        "log odds against none": odds.get("log_odds_none"),
+    }
+    bands = {
+        key: _band(value, BANDS[key], percent=key in {"gap", "noise"})
+        for key, value in numbers.items()
+        if value is not None
+    }
+    bands["class"] = kind
+    bands["rig"] = str(answer.get("rig") or name.partition("-")[0])
+    if answer.get("sensors"):
+        sensors = answer["sensors"]
+        bands["sensors"] = sensors if isinstance(sensors, str) else "+".join(sensors)
+    if answer.get("signals"):
+        bands["identification signal"] = (
+            answer["signals"][0] if bands["rig"] != "joint" else "several (joint)"
+        )
+    if answer["effects"]:
+        bands["effect"] = answer["effects"][0]["name"] if len(answer["effects"]) == 1 else "double"
+    return bands
+
+
+def _band(value: float, edges: Sequence[float], *, percent: bool) -> str:
+    i = int(np.clip(np.searchsorted(edges, value, side="right") - 1, 0, len(edges) - 2))
+    low, high = edges[i], edges[i + 1]
+    scale, unit = (100.0, " %") if percent else (1.0, "")
+    if math.isinf(high):
+        return f"above {scale * low:g}{unit}"
+    if math.isinf(low):
+        return f"below {scale * high:g}{unit}"
+    return f"{scale * low:g} to {scale * high:g}{unit}"
+
+
+def _by_band(scored: Sequence[Scored]) -> dict[str, dict[str, Share]]:
+    flags: dict[str, dict[str, list[bool]]] = defaultdict(lambda: defaultdict(list))
+    for s in scored:
+        for dimension, band in s.bands.items():
+            flags[dimension][band].append(s.right)
+    ordered = ("class", "rig", *BANDS, "sensors", "identification signal", "effect")
+    return {
+        d: {band: wilson(flags[d][band]) for band in sorted(flags[d], key=_order(d))}
+        for d in ordered
+        if d in flags
+    }
+
+
+def _order(dimension: str) -> Callable[[str], Any]:
+    if dimension not in BANDS:
+        return lambda band: band
+    edges = BANDS[dimension]
+    names = [
+        _band(low + 1e-9 if math.isfinite(low) else high - 1e-9, edges, percent=dimension in {"gap", "noise"})
+        for low, high in pairwise(edges)
+    ]
+    return names.index
+
+
+def reliability(hits: Sequence[tuple[float, bool]], bins: int = 10) -> list[tuple[float, float, int]]:
+    """Bins of stated probability that hold a case: mean stated, share true, count."""
+    if not hits:
+        return []
+    stated = np.array([p for p, _ in hits])
+    true = np.array([h for _, h in hits], dtype=float)
+    which = np.minimum((stated * bins).astype(int), bins - 1)
+    return [
+        (float(stated[which == b].mean()), float(true[which == b].mean()), int(np.sum(which == b)))
+        for b in sorted(set(which.tolist()))
+    ]
+
+
+def calibration_error(hits: Sequence[tuple[float, bool]], bins: int = 10) -> float:
+    """Expected calibration error: mean distance between stated and observed frequency, weighed by bin counts."""
+    if not hits:
+        return NAN
+    return float(sum(abs(stated - true) * n for stated, true, n in reliability(hits, bins)) / len(hits))
 
 
 def _check_seal(text: str, name: str, cases: str | Path | None) -> None:

@@ -18,14 +18,25 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.discrepancy.driven import driven_force
 from bench.discrepancy.fit import Fit
-from bench.discrepancy.problem import COULOMB, Array, Hypothesis, Placed, Problem, whitened
-from bench.discrepancy.system import NO_ELEMENTS, Elements, LinearStructure, driven_force, free_run
+from bench.discrepancy.linear_run import linear_run
+from bench.discrepancy.minimise import Prior, minimise
+from bench.discrepancy.prepared import whitened
+from bench.discrepancy.problem import COULOMB, Array, Hypothesis, Placed, Problem
+from bench.discrepancy.starts import channels_of, in_motion
+from bench.discrepancy.system import Elements, LinearStructure
 
 SIGNAL_STEP = 0.1
 """Value of eta at which a signed channel effect without grid is tried."""
 TINY = -60.0
 """Value of eta that makes a positive amplitude vanish."""
+REFINED = 1e-3
+"""Part of chi-squared that is not worth a step of a refinement."""
+REFINING_REACH = 1.5
+"""Longest step of a refinement, in prior standard deviations."""
+LARGEST = 1e15
+"""Whitened response beyond which a grid point counts as diverged."""
 SHAPE_STEP = 0.02
 """Finite difference in the shape parameters of a base effect, in units of their prior standard deviation."""
 
@@ -60,6 +71,25 @@ class Point(NamedTuple):
     eta: Array
 
 
+class Ground(NamedTuple):
+    """What the effects of a base and the nominal parameters leave to be explained, and what they can imitate.
+
+    Attributes:
+        residual: (n,) whitened residual of the base.
+        head: (n, k) orthonormal basis of the base's columns, together with `tail`.
+        tail: (k_prior, k) the same basis in the rows of the priors.
+    """
+
+    residual: Array
+    head: Array
+    tail: Array
+
+    def project(self, response: Array) -> Array:
+        """Part of a response (n,) that the base cannot imitate, the price of its priors appended."""
+        imitated = self.head.T @ response
+        return np.concatenate([response - self.head @ imitated, -self.tail @ imitated])
+
+
 class Screen:
     """Whitened responses to all joint effects along the measured motion, ready to be conditioned on a base.
 
@@ -71,27 +101,83 @@ class Screen:
 
     def __init__(self, problem: Problem, candidates: Sequence[Placed], each: Callable = map) -> None:
         self.problem = problem
-        self.inertia = [p for p in candidates if p.effect.site == "inertia"]
-        self.signals = [p for p in candidates if p.effect.site in {"actuator", "sensor"}]
         linear = problem.structure.at(problem.nominal)
         self.linear = LinearStructure(linear.mass, linear.damping, linear.stiffness, np.eye(len(linear.mass)))
         n = len(problem.nominal)
         for i in range(len(problem.records)):
             problem.motion(i)
         self.zero = problem.residual((), np.zeros(n))
+        if problem.structure.frictions and not problem.driven:
+            self.zero = self._without_friction() - self.response(self._nominal_friction)
         self.nominal = np.column_stack(
-            [self.response(lambda i, p=p: self._deviation(i, p)) for p in range(n)]
+            [
+                self.response(lambda i, p=p: self._deviation(i, p))
+                if p < problem.n_physical
+                else self._start_response(p)
+                for p in range(n)
+            ]
         )
+        self.inertia: list[Placed] = []
+        self.signals: list[Placed] = []
+        self.nodes: list[Node] = []
+        self.add(candidates, each)
+
+    def add(self, candidates: Sequence[Placed], each: Callable = map) -> None:
+        """Screen further effects.
+
+        Args:
+            candidates: Effects that are not screened yet.
+            each: Maps a function over items, in threads where wanted.
+        """
+        self.inertia += [p for p in candidates if p.effect.site == "inertia"]
+        self.signals += [p for p in candidates if p.effect.site in {"actuator", "sensor"}]
         tasks = [(p, eta) for p in candidates if p.effect.site == "joint" for eta in p.effect.grid()]
-        self.nodes = [node for node in each(lambda task: self._node(*task), tasks) if node is not None]
+        self.nodes += [node for node in each(lambda task: self._node(*task), tasks) if node is not None]
 
     def _deviation(self, index: int, parameter: int) -> Array:
         """Force that a deviation of one nominal parameter by its uncertainty takes from the structure."""
         if self.problem.structure.parameters[parameter] == COULOMB:
             return -self.problem.spread[parameter] * np.sign(self.problem.motion(index).velocity)
         motion, s = self.problem.motion(index), self.problem.structure
+        for friction in s.frictions:
+            if friction.parameter == s.parameters[parameter]:
+                rate = motion.velocity @ friction.row
+                return -self.problem.spread[parameter] * np.outer(np.sign(rate), friction.row)
         force = motion.acceleration @ s.mass[parameter].T + motion.velocity @ s.damping[parameter].T
         return -self.problem.spread[parameter] * (force + motion.position @ s.stiffness[parameter].T)
+
+    def _nominal_friction(self, index: int) -> Array:
+        """Force (n, n_dof) of the nominal model's own dry friction along the measured motion, as it acts."""
+        structure, velocity = self.problem.structure, self.problem.motion(index).velocity
+        force = np.zeros_like(velocity)
+        for friction in structure.frictions:
+            level = friction.level(structure, self.problem.nominal)
+            force -= level * np.outer(np.sign(velocity @ friction.row), friction.row)
+        return force
+
+    def _without_friction(self) -> Array:
+        """Whitened residuals of the nominal model without its own dry friction."""
+        problem, zero = self.problem, np.zeros(len(self.problem.nominal))
+        parts = [
+            whitened(d.responses - problem.simulate((), zero, d.record, friction=False), d)
+            for d in problem.data
+        ]
+        return np.concatenate(parts)
+
+    def _start_response(self, parameter: int) -> Array:
+        """Whitened response of all records to a deviation of one initial state by its uncertainty."""
+        problem = self.problem
+        values = np.zeros(len(problem.nominal))
+        values[parameter] = problem.spread[parameter]
+        parts = []
+        for data in problem.data:
+            record, n_dof = data.record, len(problem.structure.dofs)
+            start = problem.starts_of(record, values)[0] if in_motion(record) else np.zeros(2 * n_dof)
+            motion = linear_run(
+                self.linear, loads=np.zeros((len(record), n_dof)), step=record.step, start=start
+            )
+            parts.append(whitened(problem.acquired(channels_of(problem.structure, motion), record), data))
+        return np.concatenate(parts)
 
     def response(self, force_on_dofs: Callable[[int], Array]) -> Array:
         """Whitened response of all records to forces on the degrees of freedom, given by record index."""
@@ -100,9 +186,12 @@ class Screen:
             if self.problem.driven:
                 parts.append(whitened(-force_on_dofs(i), data))
                 continue
-            motion = free_run(self.linear, NO_ELEMENTS, loads=force_on_dofs(i), step=data.record.step)
-            channels = np.column_stack([motion[o.order] @ o.row for o in self.problem.structure.observers])
-            parts.append(whitened(channels, data))
+            force, lead = force_on_dofs(i), self.problem.lead_in(data.record)
+            firsts = self.problem.firsts(data.record)[1:]
+            loads = np.vstack([force] * (1 + lead // len(force)))
+            motion = linear_run(self.linear, loads=loads, step=data.record.step, restarts=firsts)
+            channels = channels_of(self.problem.structure, motion)[lead:]
+            parts.append(whitened(self.problem.acquired(channels, data.record), data))
         return np.concatenate(parts)
 
     def effect_response(self, placed: Placed, eta: Array) -> Array:
@@ -113,27 +202,40 @@ class Screen:
         columns = np.column_stack([self.effect_response(placed, point) for point in _spanning(placed, eta)])
         if placed.effect.modulated or placed.effect.affine:
             columns[:, 1:] -= columns[:, :1]
-        if not np.isfinite(columns).all() or not np.any(columns):
+        # products of what a hidden resonance makes of a record can be beyond single precision
+        if not np.abs(columns).max() < LARGEST or not np.any(columns):
             return None
         return Node(placed, eta, columns.astype(np.float32), columns.T @ columns)
 
-    def ranked(self, base: Fit | None = None) -> list[Point]:
-        """Solve all grid points, given a base hypothesis; by decreasing gain.
+    def ground(self, base: Fit | None = None, *, simulated: bool = False) -> Ground:
+        """What a base hypothesis leaves.
 
         Args:
             base: Fitted hypothesis that stays in the model, its parameters free to first order; None for none.
+            simulated: Take the residual and the columns of the base from its free run rather than from the measured motion.
+                Right for a base that already explains the records, whose residual then is noise; with much still
+                missing, only the measured motion tells what the base's own force is.
         """
         hypothesis: Hypothesis = () if base is None else base.hypothesis
         vector = np.zeros(len(self.problem.nominal)) if base is None else base.vector
-        residual, columns = self._base(hypothesis, vector)
+        residual, columns = self._base(hypothesis, vector, simulated)
+        n = len(self.problem.nominal)
+        basis, _ = np.linalg.qr(np.vstack([columns, np.eye(n, columns.shape[1])]))
+        return Ground(residual, basis[: len(residual)], basis[len(residual) :])
+
+    def ranked(self, base: Fit | None = None, ground: Ground | None = None) -> list[Point]:
+        """Solve all grid points, given a base hypothesis; by decreasing gain.
+
+        Args:
+            base: Fitted hypothesis that stays in the model; None for none.
+            ground: What `ground` returned for it, where it was called before.
+        """
+        hypothesis: Hypothesis = () if base is None else base.hypothesis
+        vector = np.zeros(len(self.problem.nominal)) if base is None else base.vector
+        ground = ground or self.ground(base)
         own = {placed.key for placed in hypothesis}
-        n = columns.shape[1]
-        priors = np.zeros((n, n))
-        priors[: len(self.problem.nominal), : len(self.problem.nominal)] = np.eye(len(self.problem.nominal))
-        basis, _ = np.linalg.qr(np.vstack([columns, priors]))
-        head = basis[: len(residual)]
-        rest = (residual - head @ (head.T @ residual)).astype(np.float32)
-        head = head.astype(np.float32)
+        rest = (ground.residual - ground.head @ (ground.head.T @ ground.residual)).astype(np.float32)
+        head = ground.head.astype(np.float32)
         points = []
         for node in [node for node in self.nodes if node.placed.key not in own] + self._signal_nodes(
             hypothesis, vector
@@ -145,13 +247,52 @@ class Screen:
         points.sort(key=lambda point: -point.gain)
         return points
 
-    def _base(self, hypothesis: Hypothesis, vector: Array) -> tuple[Array, Array]:
+    def inertia_gains(self, ground: Ground) -> dict[tuple[str, str, str], float]:
+        """Decrease of chi-squared if the prior of one nominal parameter fell, for every inertia effect."""
+        alone = ground.project(ground.residual)
+        gains = {}
+        for placed in self.inertia:
+            column = ground.project(self.nominal[:, self.problem.structure.parameters.index(placed.target)])
+            gains[placed.key] = float((column @ alone) ** 2 / max(column @ column, 1e-300))
+        return gains
+
+    def refine(self, point: Point, ground: Ground, iterations: int = 6) -> Point:
+        """Move a grid point of a joint effect to the nearest optimum along the measured motion.
+
+        Costs no free run of the nonlinear model: a handful of forces along the measured motion and linear responses.
+        """
+        effect = point.placed.effect
+        if effect.site != "joint" or not any(p.grid and not p.fixed for p in effect.parameters):
+            return point
+        prior = Prior(
+            *(np.array(x) for x in zip(*((p.mean, p.std, *p.bounds) for p in effect.parameters), strict=True))
+        )
+        alone = ground.project(ground.residual)
+        free = np.flatnonzero([not p.fixed for p in effect.parameters])
+        found = minimise(
+            lambda eta: ground.project(ground.residual - self.effect_response(point.placed, eta)),
+            point.eta,
+            prior=prior,
+            free=free,
+            reach=np.full(len(free), REFINING_REACH),
+            iterations=iterations,
+            tolerance=max(1.0, REFINED * float(alone @ alone)),
+            exact=False,
+        )
+        if not np.isfinite(found.cost):
+            return point
+        return Point(point.placed, float(alone @ alone - found.residual @ found.residual), found.vector)
+
+    def _base(self, hypothesis: Hypothesis, vector: Array, simulated: bool) -> tuple[Array, Array]:
         """Residual and parameter columns of a base: along the measured motion for forces, simulated otherwise."""
-        if any(placed.effect.site in {"actuator", "sensor"} for placed in hypothesis):
+        if simulated or any(placed.effect.site in {"actuator", "sensor"} for placed in hypothesis):
             residual = self.problem.residual(hypothesis, vector)
             columns = []
             _, std, _, high = self.problem.prior(hypothesis)
+            fixed = [p.fixed for placed in hypothesis for p in placed.effect.parameters]
             for i in range(len(vector)):
+                if i >= len(self.problem.nominal) and fixed[i - len(self.problem.nominal)]:
+                    continue
                 moved = vector.copy()
                 moved[i] += 1e-3 * std[i] * (1.0 if moved[i] + 1e-3 * std[i] <= high[i] else -1.0)
                 columns.append((residual - self.problem.residual(hypothesis, moved)) / (moved[i] - vector[i]))

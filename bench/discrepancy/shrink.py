@@ -2,6 +2,8 @@
 
 The gap is rms(simulated - measured) / std(measured) of a position-like channel over whole judging records, simulated
 from rest with the measured loads and nothing else. On the joint it is that of the relative motion of each axis.
+Records that start in motion, and windows of records that would drift, begin at the state estimated from the record itself
+(`start_estimates`), every model's from the same samples; the metric says so.
 """
 
 from __future__ import annotations
@@ -12,6 +14,8 @@ import numpy as np
 
 from bench.discrepancy.case import Case, CaseRecord
 from bench.discrepancy.problem import Array, Problem
+from bench.discrepancy.start_estimates import predict as predicted
+from bench.discrepancy.start_estimates import run_kind
 from bench.discrepancy.structure import Structure
 from bench.discrepancy.verdict import Gap
 
@@ -79,8 +83,7 @@ def gaps(
         interval = _bootstrap(measured, simulated[0], simulated[-1], floor * float(np.std(whole)), rng)
         out.append(
             Gap(
-                metric=f"validation {_label(channels)} NRMSE, "
-                + ("prescribed motion" if problem.driven else "free run"),
+                metric=f"validation {_label(channels)} NRMSE, {run_kind(problem, case.validation)}",
                 before=values[0],
                 parameters_only=values[1],
                 after=values[-1],
@@ -111,6 +114,10 @@ def noise_level(
     if problem.driven or not np.any(problem.load_noise > 0):
         return float(np.sqrt(own))
     record = records[0]
+    if problem.windowed:
+        windows = problem.prepare(record, problem.nominal).windows
+        assert windows is not None
+        return float(np.sqrt(signs @ windows.floor[np.ix_(index, index)] @ signs))
     omega = np.asarray(2.0 * np.pi * np.fft.rfftfreq(len(record), record.step)[1:], dtype=np.float64)
     response = problem.transfer(problem.structure.at(problem.nominal), omega)[:, index]
     combined = np.abs(np.einsum("fcu,c->fu", response, signs)) ** 2 @ problem.load_noise**2
@@ -167,7 +174,7 @@ def nominal_prediction(problem: Problem) -> Prediction:
     """Prediction of the untouched nominal model, for `gaps`."""
 
     def predict(record: CaseRecord) -> Mapping[str, Array]:
-        samples = problem.simulate((), np.zeros(len(problem.nominal)), record)
+        samples = predicted(problem, (), np.zeros(len(problem.nominal)), record)
         return {name: samples[:, c] for c, name in enumerate(problem.structure.channels)}
 
     return predict

@@ -44,6 +44,16 @@ def drift(x: Samples, values: Samples, step: float) -> Samples:
     return x + values[0] * np.arange(len(x)) / len(x)
 
 
+def reverse(x: Samples, values: Samples, step: float) -> Samples:
+    """Return ``-r x``: a channel wired the wrong way round, r = 1."""
+    return -values[0] * x
+
+
+def quantise(x: Samples, values: Samples, step: float) -> Samples:
+    """Return `x` rounded to a multiple of q."""
+    return values[0] * np.round(x / values[0])
+
+
 def clip(x: Samples, values: Samples, step: float) -> Samples:
     """Return `x` clipped at ± level."""
     return np.clip(x, -values[0], values[0])

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.discrepancy.case import Case
-from bench.discrepancy.system import LinearStructure
+from bench.discrepancy.friction_limits import coulomb_limit
+from bench.discrepancy.system import ROW, THETA, Elements, LinearStructure
 from bench.errors import FileFormatError
 
 
@@ -58,6 +59,27 @@ class Place:
 
 
 @dataclass(frozen=True)
+class NominalFriction:
+    """Dry friction that the nominal model has already.
+
+    Attributes:
+        row: (n_dof,) relative coordinate that it acts on.
+        parameter: Name of the nominal parameter that is its limit; empty where the limit is fixed.
+        value: The limit where it is fixed [N or N m].
+    """
+
+    row: NDArray[np.float64]
+    parameter: str = ""
+    value: float = 0.0
+
+    def level(self, structure: Structure, values: NDArray[np.float64]) -> float:
+        """Limit of the friction at nominal parameter values (n_parameters,)."""
+        if not self.parameter:
+            return self.value
+        return max(float(values[structure.parameters.index(self.parameter)]), 0.0)
+
+
+@dataclass(frozen=True)
 class Structure:
     """A rig with constant mass matrix, linear in its nominal parameters.
 
@@ -71,6 +93,8 @@ class Structure:
         loads: Load channels.
         observers: Response channels.
         places: Where effects can sit.
+        fixed: Mass, damping and stiffness (3, n_dof, n_dof) that no parameter changes; None for none.
+        frictions: Dry friction of the nominal model.
     """
 
     dofs: tuple[str, ...]
@@ -82,15 +106,21 @@ class Structure:
     loads: tuple[str, ...]
     observers: tuple[Observer, ...]
     places: tuple[Place, ...]
+    fixed: NDArray[np.float64] | None = None
+    frictions: tuple[NominalFriction, ...] = ()
 
     def at(self, values: NDArray[np.float64]) -> LinearStructure:
         """Return the matrices at parameter values (n_parameters,)."""
-        return LinearStructure(
-            np.tensordot(values, self.mass, 1),
-            np.tensordot(values, self.damping, 1),
-            np.tensordot(values, self.stiffness, 1),
-            self.inputs,
+        mass, damping, stiffness = (
+            np.tensordot(values, stack, 1) for stack in (self.mass, self.damping, self.stiffness)
         )
+        if self.fixed is not None:
+            mass, damping, stiffness = (
+                mass + self.fixed[0],
+                damping + self.fixed[1],
+                stiffness + self.fixed[2],
+            )
+        return LinearStructure(mass, damping, stiffness, self.inputs)
 
     @cached_property
     def channels(self) -> tuple[str, ...]:
@@ -100,6 +130,10 @@ class Structure:
     def groups(self) -> list[tuple[int, ...]]:
         """Return the sets of degrees of freedom that the linear structure couples with one another."""
         linked = (np.abs(self.mass).sum(0) + np.abs(self.damping).sum(0) + np.abs(self.stiffness).sum(0)) > 0
+        if self.fixed is not None:
+            linked |= np.abs(self.fixed).sum(0) > 0
+        for friction in self.frictions:
+            linked |= np.outer(friction.row, friction.row) != 0
         linked |= np.eye(len(self.dofs), dtype=bool)
         for _ in self.dofs:
             linked = (linked.astype(int) @ linked.astype(int)) > 0
@@ -117,6 +151,10 @@ class Structure:
             for i in range(len(self.parameters))
             if any(np.abs(stack[i][block]).sum() > 0 for stack in (self.mass, self.damping, self.stiffness))
         ]
+        frictions = tuple(
+            NominalFriction(f.row[keep], f.parameter, f.value) for f in self.frictions if np.any(f.row[keep])
+        )
+        active = sorted({*active, *(self.parameters.index(f.parameter) for f in frictions if f.parameter)})
         loads = [i for i in range(len(self.loads)) if np.abs(self.inputs[keep, i]).sum() > 0]
         return Structure(
             tuple(self.dofs[i] for i in keep),
@@ -136,7 +174,28 @@ class Structure:
                 for p in self.places
                 if np.abs(p.rows[:, keep]).sum() == np.abs(p.rows).sum()
             ),
+            None if self.fixed is None else self.fixed[np.ix_(range(3), keep, keep)],
+            frictions,
         )
+
+
+def with_frictions(elements: Elements, structure: Structure, values: NDArray[np.float64]) -> Elements:
+    """Return elements preceded by the nominal model's own dry friction, at parameter values (n_parameters,)."""
+    own = structure.frictions
+    if not own:
+        return elements
+    count = len(own)
+    theta = np.array([friction.level(structure, values) for friction in own])
+    table = elements.table.copy()
+    table[:, ROW] += count
+    table[:, THETA] += count
+    mine = [[0, 0, coulomb_limit.address, 1, i, i, 0, 0] for i in range(count)]
+    return Elements(
+        np.vstack([np.array(mine, dtype=np.int64), table]),
+        np.vstack([np.array([friction.row for friction in own]), elements.rows]),
+        np.concatenate([theta, elements.theta]),
+        elements.start,
+    )
 
 
 def structure_of(case: Case) -> Structure:
@@ -151,8 +210,12 @@ def structure_of(case: Case) -> Structure:
         return _joint(case)
     if case.rig == "damper":
         return _damper(case)
+    if case.rig.endswith(".xml"):
+        from bench.discrepancy.mjcf_structure import mjcf_structure  # noqa: PLC0415  (imports this module)
+
+        return mjcf_structure(case)
     raise FileFormatError(
-        f"rig '{case.rig}' is unknown; known: sdof, joint, damper, or the path of an MJCF file"
+        f"rig '{case.rig}' is unknown; known: sdof, joint, damper, or the path of an MJCF file (ending in .xml)"
     )
 
 
@@ -179,10 +242,11 @@ def _observers(case: Case, table: Sequence[tuple[str, int, NDArray[np.float64]]]
 
 
 def _sdof(case: Case) -> Structure:
-    names = ("mass", "damping", "stiffness")
+    names = ("mass", "damping", "stiffness", "coulomb")
     _require(case, ("mass",), ("force",))
     have = tuple(name for name in names if any(p.name == name for p in case.parameters))
-    stacks = [np.array([[[1.0 if name == kind else 0.0]] for name in have]) for kind in names]
+    frictions = (NominalFriction(np.ones(1), "coulomb"),) if "coulomb" in have else ()
+    stacks = [np.array([[[1.0 if name == kind else 0.0]] for name in have]) for kind in names[:3]]
     one = np.ones(1)
     length = next((c.unit for c in case.channels if c.name == "displacement"), "m") or "m"
     observers = _observers(case, (("displacement", 0, one), ("velocity", 1, one), ("acceleration", 2, one)))
@@ -191,7 +255,16 @@ def _sdof(case: Case) -> Structure:
         "stiffness" if "stiffness" in have else "", "damping" if "damping" in have else "",
     )  # fmt: skip
     return Structure(
-        ("x",), have, stacks[0], stacks[1], stacks[2], np.ones((1, 1)), ("force",), observers, (place,)
+        ("x",),
+        have,
+        stacks[0],
+        stacks[1],
+        stacks[2],
+        np.ones((1, 1)),
+        ("force",),
+        observers,
+        (place,),
+        frictions=frictions,
     )
 
 

@@ -2,7 +2,8 @@
 
 A diagnosis asks for thousands of free runs. They are made here, by one compiled loop over the same law kernels that
 the MuJoCo callback calls; the test suite holds the two equal. Two things differ from a general simulator and make it fast:
-the structure is linear with a constant mass matrix, and its loads are known samples, taken as piecewise linear.
+the structure is linear with a constant mass matrix, and its loads are known samples: piecewise linear between them, held,
+or given on a finer grid by whoever knows better (`bench.discrepancy.acquisition`).
 
 Dry friction is no smoothed sign function here. A friction element carries a mode: sliding (+1, -1) or sticking (0).
 While it slides the force is ``mode * limit(t, q, v)``; while it sticks the force is whatever keeps the relative
@@ -106,6 +107,7 @@ class _Plan(NamedTuple):
     n_inputs: int
     n_elements: int
     n_rows: int
+    load_factor: int
     matrices: Any
     table: int
     rows: Any
@@ -249,14 +251,18 @@ def _settle(p, e, t, load):
 
 @_inline
 def _fill_loads(p, u, k, fraction, share):
+    """Loads at the start, middle and end of a step that begins at `fraction` of sample `k` and is `share` of it long."""
     load = 7 * p.n + 3 * MAX_ROWS + 1
     n_inputs = u.shape[1]
-    for j in range(n_inputs):
-        low = u[k, j]
-        rise = u[k + 1, j] - low
-        p.work[load + j] = low + rise * fraction
-        p.work[load + n_inputs + j] = low + rise * (fraction + 0.5 * share)
-        p.work[load + 2 * n_inputs + j] = low + rise * (fraction + share)
+    for i in range(3):
+        at = (fraction + 0.5 * i * share) * p.load_factor
+        whole = min(int(at), max(p.load_factor - 1, 0))
+        first = k * max(p.load_factor, 1) + whole
+        for j in range(n_inputs):
+            low = u[first, j]
+            if p.load_factor > 0:
+                low += (u[first + 1, j] - low) * (at - whole)
+            p.work[load + i * n_inputs + j] = low
 
 
 @_jit
@@ -314,11 +320,14 @@ def _pass_event(p, u, k, t, dt, event, fraction, first, rest):
 
 
 @_jit
-def _free_run(dt, t0, substeps, u, start, scratch, n_dof, matrices, table, rows, spread, theta, out):  # noqa: PLR0912  (one compiled loop)
-    """Integrate over all samples of `u` (n, n_inputs) from `start`; write position, velocity, acceleration to `out`.
+def _free_run(clock, u, start, scratch, n_dof, matrices, table, rows, spread, theta, out):  # noqa: PLR0912  (one compiled loop)
+    """Integrate over all samples from `start`; write position, velocity, acceleration to `out`.
+
+    `clock` is the time between samples, the time of the first, the steps a sample and the rows of `u` a sample (zero: held).
 
     `scratch` belongs to the caller: memory reached only through pointers would be freed here after its last mention.
     """
+    dt, t0, substeps, load_factor = clock
     n = start.shape[0]
     n_elements = table.shape[0]
     work = scratch[2 * n_elements + n_elements :]
@@ -326,7 +335,7 @@ def _free_run(dt, t0, substeps, u, start, scratch, n_dof, matrices, table, rows,
     position, velocity, acceleration = out
     base = pointer_at(scratch.ctypes.data)
     p = _Plan(
-        n_dof, n, u.shape[1], n_elements, rows.shape[0], pointer_at(matrices.ctypes.data), table.ctypes.data,
+        n_dof, n, u.shape[1], n_elements, rows.shape[0], load_factor, pointer_at(matrices.ctypes.data), table.ctypes.data,
         pointer_at(rows.ctypes.data), pointer_at(spread.ctypes.data), base, advance(base, n_elements),
         pointer_at(theta.ctypes.data), advance(base, 3 * n_elements),
     )  # fmt: skip
@@ -344,10 +353,11 @@ def _free_run(dt, t0, substeps, u, start, scratch, n_dof, matrices, table, rows,
             else:
                 _settle(p, e, t0, load)
     share = 1.0 / substeps
-    for k in range(u.shape[0]):
+    n_samples = position.shape[0]
+    for k in range(n_samples):
         t = t0 + k * dt
         for j in range(u.shape[1]):
-            work[load + j] = u[k, j]
+            work[load + j] = u[k * max(load_factor, 1), j]
         _derivative(p, t, 0, 3 * n, load)
         for i in range(n_dof):
             position[k, i] = work[i]
@@ -356,7 +366,7 @@ def _free_run(dt, t0, substeps, u, start, scratch, n_dof, matrices, table, rows,
         if not abs(work[0]) < DIVERGED:
             position[k:] = np.nan
             return
-        if k == u.shape[0] - 1:
+        if k == n_samples - 1:
             return
         for s in range(substeps):
             fraction = s * share
@@ -379,61 +389,6 @@ def _free_run(dt, t0, substeps, u, start, scratch, n_dof, matrices, table, rows,
                 rest -= used
 
 
-@_jit
-def _driven(dt, t0, substeps, q, v, table, theta, z, force):
-    """Force (n, n_rows) and hidden states of elements whose coordinates follow the samples `q`, `v` (n, n_rows)."""
-    n_states = z.shape[0]
-    work = np.zeros((3, MAX_ROWS + 1))
-    slopes = np.zeros((4, max(n_states, 1)))
-    stage = np.zeros(max(n_states, 1))
-    wq = pointer_at(work[0].ctypes.data)
-    wv = pointer_at(work[1].ctypes.data)
-    wf = pointer_at(work[2].ctypes.data)
-    theta_pointer = pointer_at(theta.ctypes.data)
-    z_pointer = pointer_at(z.ctypes.data)
-    stage_pointer = pointer_at(stage.ctypes.data)
-    share = 1.0 / substeps
-    for k in range(q.shape[0]):
-        t = t0 + k * dt
-        for e in range(table.shape[0]):
-            first = table[e, ROW]
-            rows = table[e, N_ROWS]
-            parameters = advance(theta_pointer, table[e, THETA])
-            for r in range(rows):
-                work[0, r] = q[k, first + r]
-                work[1, r] = v[k, first + r]
-                work[2, r] = 0.0
-            work[2, MAX_ROWS] = 0.0
-            zp = advance(z_pointer, table[e, STATE])
-            if table[e, FORCE] != 0:
-                call_kernel(table[e, FORCE], t, wq, wv, zp, parameters, wf)
-            if table[e, LIMIT] != 0:
-                call_kernel(table[e, LIMIT], t, wq, wv, zp, parameters, advance(wf, MAX_ROWS))
-                work[2, 0] += np.sign(work[1, 0]) * max(work[2, MAX_ROWS], 0.0)
-            for r in range(rows):
-                force[k, first + r] = work[2, r]
-            if table[e, RATE] == 0 or k == q.shape[0] - 1:
-                continue
-            first_state = table[e, STATE]
-            for s in range(substeps):
-                for i in range(4):
-                    at = (s + (0.0 if i == 0 else (1.0 if i == 3 else 0.5))) * share
-                    ahead = 0.0 if i == 0 else (dt * share if i == 3 else 0.5 * dt * share)
-                    for r in range(rows):
-                        work[0, r] = q[k, first + r] + at * (q[k + 1, first + r] - q[k, first + r])
-                        work[1, r] = v[k, first + r] + at * (v[k + 1, first + r] - v[k, first + r])
-                    for j in range(first_state, first_state + table[e, N_STATES]):
-                        stage[j] = z[j] + (ahead * slopes[i - 1, j] if i > 0 else 0.0)
-                    call_kernel(
-                        table[e, RATE], t + at * dt, wq, wv, advance(stage_pointer, first_state), parameters,
-                        advance(pointer_at(slopes[i].ctypes.data), first_state),
-                    )  # fmt: skip
-                for j in range(first_state, first_state + table[e, N_STATES]):
-                    z[j] += (
-                        dt * share / 6.0 * (slopes[0, j] + 2.0 * (slopes[1, j] + slopes[2, j]) + slopes[3, j])
-                    )
-
-
 def free_run(
     structure: LinearStructure,
     elements: Elements,
@@ -441,17 +396,19 @@ def free_run(
     loads: NDArray[np.float64],
     step: float,
     substeps: int = 1,
+    load_factor: int = 1,
     start: NDArray[np.float64] | None = None,
     start_time: float = 0.0,
 ) -> Motion:
-    """Simulate the structure with its elements under sampled loads, taken as piecewise linear.
+    """Simulate the structure with its elements under sampled loads.
 
     Args:
         structure: Mass, damping, stiffness and input matrices.
         elements: Force laws.
-        loads: (n, n_inputs) [N or N m].
+        loads: ((n - 1) load_factor + 1, n_inputs) [N or N m], piecewise linear between its rows.
         step: Time between samples [s].
         substeps: Runge-Kutta steps a sample.
+        load_factor: Rows of `loads` a sample; 0: one row a sample, held until the next.
         start: Positions and velocities at the first sample (2 n_dof,); at rest where None.
         start_time: Time of the first sample [s].
 
@@ -468,29 +425,12 @@ def free_run(
     if start is not None:
         y[: 2 * n_dof] = start
     y[2 * n_dof :] = elements.start
-    n, n_inputs = loads.shape
+    n, n_inputs = (len(loads) - 1) // max(load_factor, 1) + 1, loads.shape[1]
     scratch = np.zeros(3 * len(elements.table) + 7 * len(y) + 3 * MAX_ROWS + 1 + 3 * n_inputs)
     motion = Motion(np.zeros((n, n_dof)), np.zeros((n, n_dof)), np.zeros((n, n_dof)))
     _free_run(
-        step, start_time, substeps, np.ascontiguousarray(loads), y, scratch, n_dof, matrices, elements.table, rows,
+        (step, start_time, substeps, load_factor), np.ascontiguousarray(loads), y, scratch, n_dof, matrices,
+        elements.table, rows,
         np.ascontiguousarray(inverse @ rows.T), elements.theta, tuple(motion),
     )  # fmt: skip
     return motion
-
-
-def driven_force(
-    elements: Elements,
-    *,
-    position: NDArray[np.float64],
-    velocity: NDArray[np.float64],
-    step: float,
-    substeps: int = 1,
-    start_time: float = 0.0,
-) -> NDArray[np.float64]:
-    """Force of elements whose coordinates follow a given motion (n, n_rows); friction takes the sign of the velocity."""
-    force = np.zeros_like(position)
-    _driven(
-        step, start_time, substeps, np.ascontiguousarray(position), np.ascontiguousarray(velocity), elements.table,
-        elements.theta, elements.start.copy(), force,
-    )  # fmt: skip
-    return force

@@ -64,6 +64,10 @@ class Location:
         time_s: Interval that holds most of it.
         state_region: Interval by coordinate ("displacement", "velocity") where the missing force is significant.
         p_value: Probability of such an excess from noise alone, after correction for the number of cells looked at.
+        kind: "force" where channels of the same coordinate agree with one another, "sensor" where they contradict each
+            other, "undetermined" where there is only one.
+        regions: All regions of the missing force at the places the channel touches, the strongest first: their limits
+            by coordinate, "share" of the squared missing force there, and mean "force".
     """
 
     channel: str
@@ -73,6 +77,32 @@ class Location:
     time_s: tuple[float, float]
     state_region: dict[str, tuple[float, float]] = field(default_factory=dict)
     p_value: float = 1.0
+    kind: str = "undetermined"
+    regions: tuple[dict[str, Any], ...] = ()
+
+
+@dataclass(frozen=True)
+class Split:
+    """A residual split into parts.
+
+    Attributes:
+        kind: What it is split by: "channel", "dof", "band_hz", "time_s", "displacement", "velocity", "after_reversal",
+            "contact".
+        of: What is split: "free run", a channel, or "missing force".
+        dof: Degree of freedom or place; empty where it is all of them.
+        cells: Names of the parts, or the edges between them (one more than parts).
+        shares: Part of the excess power in each; they add up to one.
+        p_values: Of no excess in each, after control of the false discovery rate.
+        significant: Whether the excess of each is significant.
+    """
+
+    kind: str
+    of: str
+    dof: str
+    cells: tuple[Any, ...]
+    shares: tuple[float, ...]
+    p_values: tuple[float, ...]
+    significant: tuple[bool, ...]
 
 
 @dataclass(frozen=True)
@@ -119,6 +149,7 @@ class Verdict:
         warnings: What limits the verdict.
         closure: Name of the nonparametric closure behind `gap.after` when the verdict is "unknown".
         next_excitation: Excitation that would separate the rivals; empty where there are none.
+        splits: Residuals by channel, band, time and state.
         seconds: Wall time.
     """
 
@@ -134,6 +165,7 @@ class Verdict:
     warnings: tuple[str, ...] = ()
     closure: str = ""
     next_excitation: dict[str, Any] = field(default_factory=dict)
+    splits: tuple[Split, ...] = ()
     seconds: float = 0.0
 
     def to_json(self) -> dict[str, Any]:

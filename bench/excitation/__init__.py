@@ -18,7 +18,9 @@
 
 from bench.excitation.bayes_factor import Contrast, contrast_of, expected_log_bayes_factor
 from bench.excitation.ensemble import Ensemble
+from bench.excitation.estimation import Estimates, Records, estimate
 from bench.excitation.experiment import Experiment
+from bench.excitation.family import Family, fans
 from bench.excitation.information import (
     Directions,
     Sensitivity,
@@ -31,35 +33,50 @@ from bench.excitation.information import (
 from bench.excitation.limits import Limits, Peaks, feasible
 from bench.excitation.linear_structure import LinearStructure, linear_structure
 from bench.excitation.methods import METHODS, Design, controls_from, design
+from bench.excitation.planner import Plan, Planner
+from bench.excitation.policy import Policy, find_policy, policy_names
 from bench.excitation.prior import Draw, Hypothesis, RigPrior, Uncertain
 from bench.excitation.rivals import RivalDraws, Rivals
+from bench.excitation.station import Desk, Station
 
 __all__ = [
     "METHODS",
     "Contrast",
     "Design",
+    "Desk",
     "Directions",
     "Draw",
     "Ensemble",
+    "Estimates",
     "Experiment",
+    "Family",
     "Hypothesis",
     "Limits",
     "LinearStructure",
     "Peaks",
+    "Plan",
+    "Planner",
+    "Policy",
+    "Records",
     "RigPrior",
     "RivalDraws",
     "Rivals",
     "Sensitivity",
+    "Station",
     "Uncertain",
     "contrast_of",
     "controls_from",
     "design",
     "directions",
+    "estimate",
     "expected_log_bayes_factor",
+    "fans",
     "feasible",
+    "find_policy",
     "fisher_information",
     "linear_structure",
     "log_det",
     "misfit",
+    "policy_names",
     "sensitivity",
 ]

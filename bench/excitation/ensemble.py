@@ -177,6 +177,47 @@ def _scratch_size(nx: int, nv: int, nu: int) -> int:
     return 5 * nx + nv + nu + 3 * MAX_COORDINATES
 
 
+def integrate_cases(
+    packed: Packed,
+    controls: NDArray[np.float64],
+    states: NDArray[np.float64],
+    *,
+    members: NDArray[np.int64],
+    counts: NDArray[np.int64],
+    timestep: float,
+    clock: NDArray[np.float64] | None = None,
+    spread: Callable[[Callable[[int, int], None], int], None] | None = None,
+) -> NDArray[np.float64]:
+    """Advance cases of packed members; as `Ensemble.integrate`, which calls it.
+
+    Args:
+        packed: The members.
+        controls: Commands by case ``(n_cases, n, n_actuators)``.
+        states: States ``(n_cases, n_members, n_states)``, advanced in place.
+        members: Members of each case ``(n_cases, n_members)``.
+        counts: How many of them are real ``(n_cases,)``.
+        timestep: Integration step [s].
+        clock: Time at the first command [s] ``(n_cases,)``; zero by default.
+        spread: Called with a task and the number of cases, to spread shares of them over threads; one thread by default.
+    """
+    controls = np.ascontiguousarray(controls, dtype=float)
+    n_cases, n_steps, _ = controls.shape
+    nv = packed.motion.shape[3]
+    outputs = np.zeros((n_cases, members.shape[1], n_steps, packed.constants.shape[1] - nv))
+    times = np.zeros(n_cases) if clock is None else np.ascontiguousarray(clock, dtype=float)
+    size = _scratch_size(states.shape[2], nv, controls.shape[2])
+
+    def run(first: int, last: int) -> None:
+        work = np.zeros(size)
+        _integrate(first, last, timestep, times, controls, members, counts, packed, states, outputs, work)
+
+    if spread is None:
+        run(0, n_cases)
+    else:
+        spread(run, n_cases)
+    return outputs
+
+
 def available_threads() -> int:
     """Number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
@@ -225,6 +266,11 @@ class Ensemble:
         return self.rigs[0].timestep
 
     @property
+    def packed(self) -> Packed:
+        """The members as plain arrays."""
+        return self._packed
+
+    @property
     def n_actuators(self) -> int:
         """Number of commands."""
         return len(self.actuators)
@@ -260,20 +306,16 @@ class Ensemble:
             Channels ``(n_cases, n_members, n, n_channels)`` at the start of each step; zero for members that are not real.
             They do not depend on the number of threads, to the last bit.
         """
-        controls = np.ascontiguousarray(controls, dtype=float)
-        n_cases, n_steps, _ = controls.shape
-        outputs = np.zeros((n_cases, members.shape[1], n_steps, len(self.channels)))
-        times = np.zeros(n_cases) if clock is None else np.ascontiguousarray(clock, dtype=float)
-        size = _scratch_size(states.shape[2], self._packed.motion.shape[3], controls.shape[2])
-
-        def run(first: int, last: int) -> None:
-            work = np.zeros(size)
-            _integrate(
-                first, last, self.timestep, times, controls, members, counts, self._packed, states, outputs, work
-            )  # fmt: skip
-
-        self.spread(run, n_cases)
-        return outputs
+        return integrate_cases(
+            self._packed,
+            controls,
+            states,
+            members=members,
+            counts=counts,
+            timestep=self.timestep,
+            clock=clock,
+            spread=self.spread,
+        )
 
     def spread(self, task: Callable[[int, int], None], n_cases: int) -> None:
         """Call ``task(first, last)`` for contiguous shares of the cases, over the threads where there are enough cases."""

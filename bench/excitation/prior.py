@@ -51,8 +51,8 @@ class Uncertain:
             )
 
     @property
-    def _range(self) -> tuple[float, float]:
-        """Middle and standard deviation of the value, or of its logarithm."""
+    def range(self) -> tuple[float, float]:
+        """Middle and standard deviation of the value, or of its logarithm where the scale is logarithmic."""
         low, high = (
             (self.low, self.high) if self.scale == "linear" else (math.log(self.low), math.log(self.high))
         )
@@ -60,13 +60,13 @@ class Uncertain:
 
     def value(self, coordinate: float) -> float:
         """The value at a standardised coordinate."""
-        middle, spread = self._range
+        middle, spread = self.range
         place = middle + spread * coordinate
         return place if self.scale == "linear" else math.exp(place)
 
     def coordinate(self, value: float) -> float:
         """The standardised coordinate of a value; the range is ±sqrt(3)."""
-        middle, spread = self._range
+        middle, spread = self.range
         return ((value if self.scale == "linear" else math.log(value)) - middle) / spread
 
 

@@ -67,7 +67,7 @@ def waterfall(
                 linewidth=1.0,
                 label=f"noise floor {floor:.3g}",
             )
-            axes.legend(loc="upper right")
+            axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0))
         axes.set_xticks(
             places, names, rotation=25 if len(names) > 4 else 0, ha="right" if len(names) > 4 else "center"
         )

@@ -15,6 +15,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import mujoco
@@ -22,9 +23,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bench.errors import ModelError, ParameterError, UnknownNameError
+from bench.identification.parameter_address import Address, address
 from bench.identification.record_loop import COLUMNS, Sparse, run, work_size
 from bench.rig import Rig
-from bench.rig.building import STRUCTURE
 
 Array = NDArray[np.float64]
 
@@ -33,66 +34,9 @@ _AGREEMENT = (
 )
 
 
-class Address(NamedTuple):
-    """Where a free parameter stands in a compiled model: ``getattr(model, field)[index]``."""
-
-    field: str
-    index: int
-
-
-def address(rig: Rig, name: str) -> Address:
-    """Find a free parameter in the compiled model.
-
-    Args:
-        rig: The rig.
-        name: "structure/<quantity>/<body, joint or tendon>" or "<element>/<parameter>".
-
-    Raises:
-        UnknownNameError: The rig has no such quantity, body, joint, element or parameter.
-        ParameterError: The element is exact friction, which has no smooth response.
-    """
-    first, _, rest = name.partition("/")
-    if first == "structure" and "/" in rest:
-        return _structural(rig.model, *rest.split("/", 1))
-    label, _, parameter = name.rpartition("/")
-    element = rig.element(label)
-    if element.exact:
-        raise ParameterError(f"element '{label}' is exact friction; make it with exact=False to fit it")
-    if parameter not in element.law.parameter_names:
-        raise UnknownNameError(f"parameter of element '{label}'", parameter, element.law.parameter_names)
-    item = next(item for item in rig.built.placed if item.element.name == label)
-    place = len(element.law.header) + element.law.parameter_names.index(parameter)
-    return Address("numeric_data", item.theta + place)
-
-
 def current(rig: Rig, name: str) -> float:
     """Value of a free parameter in a rig; raises as `address`."""
     return _value(rig.model, address(rig, name))
-
-
-def _structural(model: mujoco.MjModel, kind: str, name: str) -> Address:
-    kinds = mujoco.mjtObj
-    if kind not in STRUCTURE or kind == "frictionloss":
-        raise UnknownNameError(
-            "structural quantity", kind, [entry for entry in STRUCTURE if entry != "frictionloss"]
-        )
-    if kind in {"mass", "inertia"}:
-        body = mujoco.mj_name2id(model, kinds.mjOBJ_BODY, name)
-        if body < 0:
-            raise UnknownNameError("body", name, [model.body(i).name for i in range(1, model.nbody)])
-        return Address(f"body_{kind}", body)
-    joint = mujoco.mj_name2id(model, kinds.mjOBJ_JOINT, name)
-    if joint >= 0:
-        if kind == "stiffness":
-            return Address("jnt_stiffness", joint)
-        return Address(f"dof_{kind}", int(model.jnt_dofadr[joint]))
-    tendon = mujoco.mj_name2id(model, kinds.mjOBJ_TENDON, name)
-    if tendon < 0:
-        joints = [model.joint(i).name for i in range(model.njnt)]
-        raise UnknownNameError(
-            "joint or tendon", name, joints + [model.tendon(i).name for i in range(model.ntendon)]
-        )
-    return Address(f"tendon_{kind}", tendon)
 
 
 class _Matrices(NamedTuple):
@@ -258,6 +202,28 @@ class LinearRig:
             states,
         )
 
+    @property
+    def dofs(self) -> NDArray[np.int64]:
+        """Degrees of freedom of the model that the channels depend on (n_dof,)."""
+        return self._kept
+
+    @property
+    def observation(self) -> Array:
+        """Channels as a map of position, velocity and acceleration of `dofs`, commands and 1: (n_channels, 3 n_dof + n_u + 1)."""
+        return self._observe
+
+    @property
+    def matrices(self) -> tuple[Array, Array, Array, Array]:
+        """Mass, damping, stiffness (n_dof, n_dof) and input (n_dof, n_u + 1; the last column constant) at the rig's own values."""
+        return self._base.mass, self._base.damping, self._base.stiffness, self._base.inputs
+
+    def slope(self, parameter: str) -> tuple[Array, Array, Array]:
+        """Change of mass, damping and stiffness with a unit of a structural parameter, in which they are affine."""
+        change = self._slopes[self.parameters.index(parameter)]
+        if change is None:
+            raise ParameterError(f"'{parameter}' belongs to an element; a structural parameter is expected")
+        return change.mass, change.damping, change.stiffness
+
     def simulate(
         self,
         controls: ArrayLike,
@@ -266,6 +232,7 @@ class LinearRig:
         initial: Mapping[str, tuple[float, float]] | None = None,
         stride: int = 1,
         tolerance: float = 0.0,
+        sizes: Mapping[str, tuple[float, float]] | None = None,
         start_time: float = 0.0,
     ) -> Array:
         """Simulate one record; releases the GIL, so that threads run records in parallel.
@@ -276,8 +243,10 @@ class LinearRig:
             values: Free parameters ``(n_parameters,)``; those of the rig where None.
             initial: (position, velocity) by joint at the start; at rest where not given.
             stride: Steps a sample.
-            tolerance: Local error relative to the peak of each state, by Dormand-Prince steps within each step of the
-                rig; 0 for MuJoCo's own Runge-Kutta step.
+            tolerance: Local error relative to the peak of each state so far, by Dormand-Prince steps; 0 for MuJoCo's own
+                Runge-Kutta step.
+            sizes: (position, velocity) by joint that these peaks are taken to be at least, where they are known about: a
+                state that is still at rest is else followed to a part in 1 / `tolerance` of next to nothing.
             start_time: Time of the first sample [s].
 
         Returns:
@@ -298,40 +267,71 @@ class LinearRig:
                 f"values of shape {vector.shape}, stride {stride} and tolerance {tolerance} came; shape {self._start.shape}, "
                 "a stride of at least 1 and a tolerance in [0, 1) are expected"
             )
-        at = self._base
-        theta = self._theta.copy()
-        for value, start, slope, place in zip(vector, self._start, self._slopes, self._places, strict=True):
-            if slope is not None:
-                at = at.plus(slope, value - start)
-            else:
-                theta[place] = value
+        at, theta, solved = self._base, self._theta, self._own
+        if values is not None:
+            theta = theta.copy()
+            for value, start, slope, place in zip(
+                vector, self._start, self._slopes, self._places, strict=True
+            ):
+                if slope is not None:
+                    at = at.plus(slope, value - start)
+                else:
+                    theta[place] = value
+            solved = self._own if at is self._base else self._solved(at)
         n_dof = len(self._kept)
-        solved = np.linalg.solve(
-            at.mass, np.hstack([at.stiffness, at.damping, at.inputs, self._coordinates.T])
-        )
-        pieces = np.split(solved, np.cumsum([2 * n_dof, at.inputs.shape[1]]), axis=1)
-        parts = [np.ascontiguousarray(piece, dtype=np.float64) for piece in pieces]
-        inputs = parts[1]
-        commands = np.ascontiguousarray(np.hstack([commands, np.ones((len(commands), 1))]))
-        state = np.concatenate([self._initial(initial), self._states])
+        columns = np.empty((len(commands), commands.shape[1] + 1))
+        columns[:, :-1], columns[:, -1] = commands, 1.0
+        n = 2 * n_dof + len(self._states)
+        state, least = np.zeros(n + 3), np.zeros(n)  # the loop takes four states at a time
+        state[: 2 * n_dof] = self._motion(initial, self.rig.model.qpos0[self._kept])
+        state[2 * n_dof : n] = self._states
+        least[: 2 * n_dof] = self._motion(sizes, np.zeros(n_dof))
         out = np.empty((-(-len(commands) // stride), len(self.channels)))
         run(
-            n_dof, len(state), self.rig.timestep, start_time, tolerance, stride, commands, Sparse.of(parts[0]), inputs,
-            self._table, self._rows, self._row_inputs, Sparse.of(parts[2].T), theta, self._observe, state,
-            np.zeros(work_size(len(state), n_dof)), out,
+            n_dof, n, self.rig.timestep, start_time, tolerance, stride, columns, *solved[:2], self._table,
+            self._rows, self._row_inputs, solved[2], theta, self._observed, state, least,
+            np.zeros(work_size(n, n_dof)), out,
         )  # fmt: skip
         return out
 
-    def _initial(self, initial: Mapping[str, tuple[float, float]] | None) -> Array:
-        model = self.rig.model
-        motion = np.concatenate([model.qpos0[self._kept], np.zeros(len(self._kept))])
-        for name, (position, velocity) in (initial or {}).items():
-            joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name)
-            if joint < 0:
-                raise UnknownNameError("joint", name, [model.joint(i).name for i in range(model.njnt)])
-            place = np.flatnonzero(self._kept == model.jnt_dofadr[joint])
-            if place.size:
-                motion[place[0]], motion[len(self._kept) + place[0]] = position, velocity
+    @cached_property
+    def _observed(self) -> Sparse:
+        return Sparse.of(self._observe)
+
+    @cached_property
+    def _own(self) -> tuple[Sparse, Array, Sparse]:
+        return self._solved(self._base)
+
+    def _solved(self, at: _Matrices) -> tuple[Sparse, Array, Sparse]:
+        """``M^-1 [K, C]``, ``M^-1 B`` and ``(M^-1 R')'``."""
+        solved = np.linalg.solve(
+            at.mass, np.hstack([at.stiffness, at.damping, at.inputs, self._coordinates.T])
+        )
+        split = np.cumsum([2 * len(self._kept), at.inputs.shape[1]])
+        system, inputs, spread = np.split(solved, split, axis=1)
+        return (
+            Sparse.of(np.asarray(system, np.float64)),
+            np.ascontiguousarray(inputs, np.float64),
+            Sparse.of(np.asarray(spread.T, np.float64)),
+        )
+
+    @cached_property
+    def _joints(self) -> dict[str, int]:
+        """Place among `dofs` of every joint; -1 of those that no channel depends on."""
+        model, kept = self.rig.model, self._kept.tolist()
+        dofs = {model.joint(i).name: int(model.jnt_dofadr[i]) for i in range(model.njnt)}
+        return {name: kept.index(dof) if dof in kept else -1 for name, dof in dofs.items()}
+
+    def _motion(self, given: Mapping[str, tuple[float, float]] | None, positions: Array) -> Array:
+        """Positions and velocities (2 n_dof,), those of joints that are not given at `positions` and at rest."""
+        n_dof = len(self._kept)
+        motion = np.concatenate([positions, np.zeros(n_dof)])
+        for name, (position, velocity) in (given or {}).items():
+            if name not in self._joints:
+                raise UnknownNameError("joint", name, list(self._joints))
+            place = self._joints[name]
+            if place >= 0:
+                motion[place], motion[n_dof + place] = position, velocity
         return motion
 
 

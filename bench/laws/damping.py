@@ -1,7 +1,9 @@
-"""Dampers without memory: linear, quadratic and power-law.
+"""Dampers without memory: linear, asymmetric, quadratic and power-law.
 
 - `linear_damping`: ``c v``. The damper of `linear` alone, for fits in which stiffness and damping are
   separate effects.
+- `asymmetric_damping`: its own constant in either direction, as vehicle dampers have by design (rebound and
+  jounce) and drives by their gears.
 - `quadratic_damping`: ``c2 v |v|``, turbulent drag; equivalent linear damping at amplitude X and frequency
   omega ``8/(3 pi) c2 omega X``.
 - `power_law_damping`: ``C sgn(v) |v|^n``, the design model of fluid dampers (n from 0.3 to 1 by the shape of
@@ -16,7 +18,7 @@
 
 References:
     Tasbihgoo 2006, eq. 3.2; Soong & Constantinou 1994, Passive and Active Structural Vibration Control, ch.
-    3; Morison et al. 1950.
+    3; Morison et al. 1950; Dixon 2007, The Shock Absorber Handbook, ch. 8 (asymmetry).
 """
 
 from __future__ import annotations
@@ -30,6 +32,12 @@ from bench.laws.base import ForceLaw, Parameter, kernel
 def force_linear(t, q, v, z, theta, f):
     """``f = c v``."""
     f[0] += theta[0] * v[0]
+
+
+@kernel
+def force_asymmetric(t, q, v, z, theta, f):
+    """``f = c+ v`` for v > 0, ``c- v`` for v < 0."""
+    f[0] += (theta[0] if v[0] > 0.0 else theta[1]) * v[0]
 
 
 @kernel
@@ -52,6 +60,20 @@ LINEAR_DAMPING = ForceLaw(
     force=force_linear,
     equation="f = c v",
     reference="Rayleigh 1877, The Theory of Sound, section 81",
+)
+
+_CONSTANT = (-math.inf, math.inf)
+
+ASYMMETRIC_DAMPING = ForceLaw(
+    name="asymmetric_damping",
+    parameters=(
+        Parameter("damping_positive", "N s/m", 10.0, _CONSTANT, "c+, constant for v > 0", "N m s/rad"),
+        Parameter("damping_negative", "N s/m", 5.0, _CONSTANT, "c-, constant for v < 0", "N m s/rad"),
+    ),
+    force=force_asymmetric,
+    equation="f = c+ v for v > 0, c- v for v < 0",
+    reference="Dixon 2007, The Shock Absorber Handbook, ch. 8",
+    smoothness="continuous",
 )
 
 QUADRATIC_DAMPING = ForceLaw(

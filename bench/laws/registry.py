@@ -15,6 +15,7 @@ from typing import Any
 
 from bench.errors import ParameterError, UnknownNameError
 from bench.laws.base import ForceLaw
+from bench.laws.base_flexibility import BASE_FLEXIBILITY
 from bench.laws.bouc_wen import BOUC_WEN
 from bench.laws.bouc_wen_variants import (
     BOUC_WEN_DEGRADING,
@@ -26,7 +27,7 @@ from bench.laws.constant_force import CONSTANT_FORCE
 from bench.laws.coulomb import ASYMMETRIC_COULOMB, COULOMB
 from bench.laws.coupling import AXIAL_TORSIONAL_JOINT, CROSS_STIFFNESS, GAP_COUPLING, PRINTED_COUPLING
 from bench.laws.dahl import DAHL
-from bench.laws.damping import LINEAR_DAMPING, POWER_LAW_DAMPING, QUADRATIC_DAMPING
+from bench.laws.damping import ASYMMETRIC_DAMPING, LINEAR_DAMPING, POWER_LAW_DAMPING, QUADRATIC_DAMPING
 from bench.laws.gap import ASYMMETRIC_GAP, GAP, ONE_SIDED_STOP
 from bench.laws.jenkins import IWAN, JENKINS, iwan_law
 from bench.laws.jenkins_backlash import JENKINS_BACKLASH
@@ -57,9 +58,11 @@ LAWS: Mapping[str, ForceLaw] = MappingProxyType(
             COGGING,
             CONSTANT_FORCE,
             LINEAR_DAMPING,
+            ASYMMETRIC_DAMPING,
             QUADRATIC_DAMPING,
             POWER_LAW_DAMPING,
             MAXWELL,
+            BASE_FLEXIBILITY,
             COULOMB,
             ASYMMETRIC_COULOMB,
             STRIBECK,

@@ -4,7 +4,8 @@
 in seconds of the record.
 """
 
+from bench.rerun_log.bands import GAP, REGION, Band
 from bench.rerun_log.comparison import log_comparison
 from bench.rerun_log.kinematics import body_poses, joint_positions
 
-__all__ = ["body_poses", "joint_positions", "log_comparison"]
+__all__ = ["GAP", "REGION", "Band", "body_poses", "joint_positions", "log_comparison"]

@@ -21,6 +21,11 @@ Bouc-Wen and Iwan joints have no sharp transition."""
 
 CONTACT = ("contact −", "free", "contact +")
 SLIDER = ("stick", "slip")
+GAP = ("within noise", "gap")
+"""Where a simulation agrees with the measurement, and where it does not."""
+
+REGION = ("outside", "region −", "region +")
+"""Where the motion is outside the regions of a missing force, and where in one with a negative or a positive force."""
 
 
 @dataclass(frozen=True)
@@ -32,12 +37,18 @@ class Band:
         states: Names of the states.
         channels: Channels that the classification reads, in its order.
         classify: Samples of these channels ``(n,)`` each to state numbers ``(n,)``.
+        variants: Records it is drawn for; all that hold the channels where empty.
     """
 
     name: str
     states: tuple[str, ...]
     channels: tuple[str, ...]
     classify: Callable[..., NDArray[np.int64]]
+    variants: tuple[str, ...] = ()
+
+    def drawn_for(self, variant: str) -> bool:
+        """Whether it is drawn for a record of that name."""
+        return not self.variants or variant in self.variants
 
     def of(self, recording: Recording) -> NDArray[np.int64] | None:
         """State numbers ``(n,)`` over a record; None where it lacks a channel."""

@@ -33,6 +33,11 @@ _BAND_COLOURS = {
     "contact +": (220, 38, 127, 255),
     "stick": (64, 176, 166, 255),
     "slip": (60, 60, 60, 255),
+    "within noise": (60, 60, 60, 255),
+    "gap": (255, 176, 0, 255),
+    "outside": (60, 60, 60, 255),
+    "region −": (120, 94, 240, 255),
+    "region +": (220, 38, 127, 255),
 }
 
 
@@ -48,6 +53,7 @@ def log_comparison(
     records: Mapping[str, Recording],
     *,
     loops: Sequence[tuple[str, str]] | None = None,
+    bands: Sequence[Band] = (),
     poses: Mapping[str, ArrayLike] | None = None,
     camera: str = "",
     frame_rate: float = 30.0,
@@ -65,6 +71,7 @@ def log_comparison(
         rigs: Rigs by variant, as far as there are any; a laboratory record has none.
         records: Records by variant ("true", "network", …), the reference first, on the same clock.
         loops: (x channel, y channel) of the loops; by default those of the elements of the first rig.
+        bands: Further bands, after those of the elements of the first rig.
         poses: Joint positions (n, nq) by variant, for rigs whose record does not tell them.
         camera: Camera of the model to look from; its first one where empty.
         frame_rate: Frames of the 3-D motion and of the loops [1/s]; at most 1800 in all.
@@ -86,16 +93,17 @@ def log_comparison(
     pairs = _loops(records, first_rig) if loops is None else list(loops)
     for pair in pairs:
         holder_of(records, *pair)
-    bands = [band for element in (first_rig.elements if first_rig else ()) for band in bands_of(element)]
-    bands = [band for band in bands if any(band.of(recording) is not None for recording in records.values())]
+    lanes = _lanes(
+        [*(b for element in (first_rig.elements if first_rig else ()) for b in bands_of(element)), *bands],
+        records,
+    )
 
     with replacing(path) if path is not None else nullcontext() as target:
         stream = rr.RecordingStream(APPLICATION)
         try:
             keys = _keys(records)
             scenes = {keys[variant]: variant for variant in records if variant in rigs}
-            lanes = sum(band.of(recording) is not None for band in bands for recording in records.values())
-            page = Page.of(records, scenes, pairs, lanes=lanes)
+            page = Page.of(records, scenes, pairs, lanes=len(lanes))
             if first_rig is not None:
                 page = page._replace(eye=eye_of(first_rig.scene, camera))
             if target is None:
@@ -111,7 +119,7 @@ def log_comparison(
             _log_channels(stream, records, clock)
             _log_errors(stream, records, page.errors, clock)
             _log_loops(stream, records, pairs, clock)
-            _log_bands(stream, records, bands, clock)
+            _log_bands(stream, records, lanes, clock)
             stream.log(
                 "scores", rr.TextDocument(_scores(records, clock), media_type="text/markdown"), static=True
             )
@@ -246,32 +254,43 @@ def _log_loops(
             )  # fmt: skip
 
 
+def _lanes(
+    bands: Sequence[Band], records: Mapping[str, Recording]
+) -> list[tuple[Band, str, NDArray[np.int64]]]:
+    """Bands with the variants they are drawn for, and their states there."""
+    return [
+        (band, variant, states)
+        for band in bands
+        for variant, recording in records.items()
+        if band.drawn_for(variant) and (states := band.of(recording)) is not None
+    ]
+
+
 def _log_bands(
-    stream: rr.RecordingStream, records: Mapping[str, Recording], bands: Sequence[Band], clock: _Clock
+    stream: rr.RecordingStream,
+    records: Mapping[str, Recording],
+    lanes: Sequence[tuple[Band, str, NDArray[np.int64]]],
+    clock: _Clock,
 ) -> None:
     keys = _keys(records)
-    for band in bands:
-        for variant, recording in records.items():
-            states = band.of(recording)
-            if states is None:
-                continue
-            entity = rr.new_entity_path(["bands", band.name, keys[variant]])
-            stream.log(
-                entity,
-                rr.StateConfiguration(
-                    values=list(band.states),
-                    labels=list(band.states),
-                    colors=[_BAND_COLOURS[s] for s in band.states],
-                ),
-                static=True,
-            )
-            at = changes(states)
-            rr.send_columns(
-                entity,
-                [rr.TimeColumn("time", duration=clock.time[at])],
-                rr.StateChange.columns(state=[band.states[i] for i in states[at]]),
-                recording=stream,
-            )
+    for band, variant, states in lanes:
+        entity = rr.new_entity_path(["bands", band.name, keys[variant]])
+        stream.log(
+            entity,
+            rr.StateConfiguration(
+                values=list(band.states),
+                labels=list(band.states),
+                colors=[_BAND_COLOURS[s] for s in band.states],
+            ),
+            static=True,
+        )
+        at = changes(states)
+        rr.send_columns(
+            entity,
+            [rr.TimeColumn("time", duration=clock.time[at])],
+            rr.StateChange.columns(state=[band.states[i] for i in states[at]]),
+            recording=stream,
+        )
 
 
 def _scores(records: Mapping[str, Recording], clock: _Clock) -> str:

@@ -40,7 +40,9 @@ RIGS: Mapping[str, Callable[..., Rig]] = {
 }
 """The rigs of the bench by name."""
 
-_ENTRIES = ("rig", "name", "timestep", "integrator", "structure", "elements", "excitation", "seed")
+_ENTRIES = (
+    "rig", "name", "timestep", "integrator", "structure", "elements", "excitation", "experiment", "seed"
+)  # fmt: skip
 
 
 def read_document(path: str | Path) -> dict[str, Any]:

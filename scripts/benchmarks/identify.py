@@ -31,6 +31,7 @@ from bench.identification.network import fit_network
 from bench.identification.output_error import OutputErrorModel, fit_output_error
 from bench.identification.polynomial import fit_polynomial
 from bench.signals import BandLimitedNoise, Excitation
+from benchmarks.peer_model import Compiled
 from benchmarks.timing import Row, interleave, ratio_row
 
 Array = NDArray[np.float64]
@@ -301,7 +302,7 @@ class _Sysid:
         rest, self.scratch = mujoco.MjData(model), mujoco.MjData(model)
         sequences = sysid.ModelSequences(
             "sdof",
-            _Compiled(model),
+            Compiled(model),
             "record",
             sysid.create_initial_state(model, rest.qpos, rest.qvel, rest.act),
             sysid.TimeSeries(steps, controls),
@@ -337,17 +338,6 @@ class _Sysid:
             )
         residual = np.concatenate(self.residual(np.asarray(result.x), parameters)[0])
         return 0.5 * float(residual @ residual)
-
-
-class _Compiled:
-    """Stands in for an MjSpec where only its compiled model is wanted."""
-
-    def __init__(self, model: mujoco.MjModel) -> None:
-        self.model = model
-
-    def compile(self) -> mujoco.MjModel:
-        """The compiled model."""
-        return self.model
 
 
 def _output_error(repeats: int) -> list[Row]:

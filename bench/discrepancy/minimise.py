@@ -1,0 +1,224 @@
+"""Least squares with a Gaussian prior and bounds, sparing of evaluations.
+
+A free run costs milliseconds and everything else microseconds, so free runs are what is saved: the Jacobian is taken by
+finite differences once, carried along by Broyden's update, and taken anew only where it predicts badly, and at the end.
+
+References:
+    J. J. More, The Levenberg-Marquardt algorithm, Lecture Notes in Mathematics 630 (1978).
+    C. G. Broyden, A class of methods for solving nonlinear simultaneous equations, Math. Comp. 19 (1965) 577-593.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+DIFFERENCE = 1e-4
+"""Step of the finite differences, in units of the prior standard deviation."""
+FAITHFUL = 0.3
+"""Part of the predicted decrease that a step has to bring for the updated Jacobian to be kept."""
+PATIENCE = 3
+"""Steps after which a minimisation may be given up."""
+OPTIMISM = 4.0
+"""How many times the decrease that the linearisation promises may still come."""
+NOISE = 1.1
+"""Squared residuals, over their number, up to which a minimisation is carried to its end."""
+COARSE = 2e-3
+"""Part of what lies beyond that is not worth a step: a wrong model is no less wrong for it."""
+FRESH_TRIALS, STALE_TRIALS = 7, 2
+"""Dampings that are tried with a Jacobian taken at the point and with one carried along."""
+
+
+class Prior(NamedTuple):
+    """Gaussian prior with bounds.
+
+    Attributes:
+        mean: (n,).
+        std: (n,).
+        low: (n,).
+        high: (n,).
+    """
+
+    mean: Array
+    std: Array
+    low: Array
+    high: Array
+
+
+class Minimum(NamedTuple):
+    """Where a minimisation ended.
+
+    Attributes:
+        vector: (n,).
+        residual: (n_residuals,) at the vector.
+        cost: Squared residuals plus prior misfit; infinite where nothing finite was found.
+        curvature: (n_free, n_free) of the cost in units of the prior's standard deviations, halved; the prior included.
+        settled: Whether nothing more was to be gained.
+    """
+
+    vector: Array
+    residual: Array
+    cost: float
+    curvature: Array
+    settled: bool
+
+
+class _State(NamedTuple):
+    vector: Array
+    residual: Array
+    cost: float
+
+
+class _Task(NamedTuple):
+    """What stays the same during a minimisation; all arrays (n_free,)."""
+
+    residual_at: Callable[[Array], Array]
+    free: NDArray[np.int64]
+    mean: Array
+    std: Array
+    low: Array
+    high: Array
+    reach: Array
+    each: Callable
+
+    def state(self, vector: Array) -> _State:
+        residual = self.residual_at(vector)
+        return _State(vector, residual, float(residual @ residual + np.sum(self.deviation(vector) ** 2)))
+
+    def deviation(self, vector: Array) -> Array:
+        return (vector[self.free] - self.mean) / self.std
+
+    def blocked(self, vector: Array, gradient: Array) -> NDArray[np.bool_]:
+        """Which entries lie on a bound that the cost pushes them against."""
+        x = vector[self.free]
+        return ((x <= self.low) & (gradient > 0)) | ((x >= self.high) & (gradient < 0))
+
+
+def minimise(
+    residual_at: Callable[[Array], Array],
+    start: Array,
+    *,
+    prior: Prior,
+    free: NDArray[np.int64],
+    reach: Array,
+    iterations: int,
+    tolerance: float = 0.05,
+    limit: float = np.inf,
+    exact: bool = True,
+    each: Callable = map,
+) -> Minimum:
+    """Minimise squared residuals plus the misfit of a Gaussian prior.
+
+    Args:
+        residual_at: Vector (n,) to residuals; any other shape than at the start stands for "diverged".
+        start: Within the bounds.
+        prior: Prior and bounds.
+        free: Indices of the entries that move.
+        reach: (n_free,) longest step, in prior standard deviations.
+        iterations: Most steps.
+        tolerance: Decrease of the cost that is not worth a step.
+        limit: Cost that has to be within sight; the iteration ends where the linearisation promises much less.
+        exact: Whether the curvature is taken anew at the end, where the residuals have come near the noise.
+        each: Maps a function over the columns of the Jacobian.
+    """
+    task = _Task(
+        residual_at, free, prior.mean[free], prior.std[free], prior.low[free], prior.high[free], reach, each
+    )
+    state = task.state(start.copy())
+    jacobian: Array | None = None
+    fresh = settled = False
+    damping = 1e-3
+    identity = np.eye(len(free))
+    near = NOISE * len(state.residual)
+    if not np.isfinite(state.cost):
+        return Minimum(state.vector, state.residual, np.inf, identity, False)
+    for iteration in range(iterations):
+        if jacobian is None:
+            jacobian, fresh = _jacobian(task, state), True
+            if jacobian is None:
+                break
+        normal = jacobian.T @ jacobian + identity
+        gradient = jacobian.T @ state.residual + task.deviation(state.vector)
+        normal, gradient = _without(task.blocked(state.vector, gradient), normal, gradient)
+        promise = float(gradient @ np.linalg.solve(normal, gradient))
+        trifle = max(tolerance, COARSE * (state.cost - near))
+        settled = fresh and promise < trifle
+        hopeless = iteration >= PATIENCE and state.cost - OPTIMISM * promise > limit
+        if settled or hopeless:
+            break
+        moved, damping = _step(
+            task, state, normal, gradient, damping, FRESH_TRIALS if fresh else STALE_TRIALS
+        )
+        if moved is None:
+            settled = fresh
+            if fresh:
+                break
+            jacobian = None
+            continue
+        move = (moved.vector - state.vector)[free] / task.std
+        gained = state.cost - moved.cost
+        predicted = -2.0 * gradient @ move - move @ normal @ move
+        surprise = moved.residual - state.residual - jacobian @ move
+        state = moved
+        settled = fresh and gained < trifle
+        if settled:
+            break
+        if gained < max(FAITHFUL * predicted, trifle):
+            jacobian = None
+        else:
+            jacobian, fresh = jacobian + np.outer(surprise, move / (move @ move)), False
+    if jacobian is None or (exact and not fresh and state.cost < near):
+        anew = _jacobian(task, state)
+        jacobian = jacobian if anew is None else anew
+    curvature = identity if jacobian is None else identity + jacobian.T @ jacobian
+    return Minimum(state.vector, state.residual, state.cost, curvature, settled)
+
+
+def _without(blocked: NDArray[np.bool_], normal: Array, gradient: Array) -> tuple[Array, Array]:
+    if not blocked.any():
+        return normal, gradient
+    normal, gradient = normal.copy(), np.where(blocked, 0.0, gradient)
+    normal[blocked] = 0.0
+    normal[:, blocked] = 0.0
+    normal[blocked, blocked] = 1.0
+    return normal, gradient
+
+
+def _step(
+    task: _Task, state: _State, normal: Array, gradient: Array, damping: float, trials: int
+) -> tuple[_State | None, float]:
+    """Damp the Gauss-Newton step until the cost falls; return the new state (None: it never did) and the damping."""
+    for _ in range(trials):
+        move = -np.linalg.solve(normal + damping * np.diag(np.diag(normal)), gradient)
+        # further than this the linearisation does not reach
+        move *= min(1.0, 1.0 / max(np.max(np.abs(move) / task.reach), 1e-12))
+        vector = state.vector.copy()
+        vector[task.free] = np.clip(vector[task.free] + task.std * move, task.low, task.high)
+        trial = task.state(vector)
+        if trial.cost < state.cost:
+            return trial, max(damping * 0.1, 1e-9)
+        damping *= 8.0
+    return None, damping
+
+
+def _jacobian(task: _Task, state: _State) -> Array | None:
+    """Finite differences (n_residuals, n_free) by prior standard deviations; None where a run diverged."""
+    residual = state.residual
+
+    def column(k: int) -> Array:
+        at = state.vector[task.free[k]]
+        delta = DIFFERENCE if at + DIFFERENCE * task.std[k] <= task.high[k] else -DIFFERENCE
+        moved = state.vector.copy()
+        moved[task.free[k]] += delta * task.std[k]
+        shifted = task.residual_at(moved)
+        return (shifted - residual) / delta if shifted.shape == residual.shape else np.full(1, np.nan)
+
+    columns = list(task.each(column, range(len(task.free))))
+    if any(c.shape != residual.shape for c in columns):
+        return None
+    return np.column_stack(columns) if columns else np.zeros((len(residual), 0))

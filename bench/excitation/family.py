@@ -1,0 +1,131 @@
+"""Families: the rigs of one hypothesis at any parameters, many at a time, without compiling each.
+
+An `Ensemble` is made from rigs, each with a compiled MuJoCo model; identifications and closed loops need thousands of rigs
+that differ in their parameters only. The rows of a packed ensemble are affine in the parameters' values (stiffness and damping
+enter the accelerations so, and a law's own parameters are copied), so that two rigs a parameter tell them all. A parameter of
+which that is not true, as a mass, is refused.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.errors import ModelError
+from bench.excitation.ensemble import Ensemble, Packed, integrate_cases
+from bench.excitation.prior import Hypothesis
+
+AGREEMENT = 1e-9
+"""Of the largest coefficient: what is affine agrees to 1e-13."""
+
+_AFFINE = ("constants", "coefficients", "theta")
+
+
+@dataclass(eq=False)
+class Family:
+    """The rigs of a hypothesis as a function of its standardised parameters.
+
+    Attributes:
+        hypothesis: The hypothesis.
+        channels: Measured channels that records hold.
+        actuators: Driven actuators.
+
+    Raises:
+        ModelError: The rig is not linear around its elements, or not affine in an uncertain parameter.
+    """
+
+    hypothesis: Hypothesis
+    channels: tuple[str, ...]
+    actuators: tuple[str, ...]
+    _packed: Packed = field(init=False, repr=False)
+    _slopes: dict[str, NDArray[np.float64]] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        self.channels, self.actuators = tuple(self.channels), tuple(self.actuators)
+        p = self.n_parameters
+        check = np.linspace(-1.5, 1.2, p)
+        places = np.concatenate([np.zeros((1, p)), 1.7 * np.eye(p), check[None]])
+        rigs = tuple(self.hypothesis.at(row).rig for row in places)
+        packed = Ensemble(rigs, self.channels, self.actuators).packed
+        values = self.values(places)
+        self._slopes = {}
+        for name in _AFFINE:
+            rows = getattr(packed, name)
+            change = np.diag(values[1:-1] - values[0]).reshape(-1, *(1,) * (rows.ndim - 1))
+            self._slopes[name] = (rows[1:-1] - rows[0]) / change
+        self._packed = packed._replace(
+            **{name: array[:1] for name, array in packed._asdict().items() if name not in {"rows", "columns"}}
+        )
+        found = self.packed(check[None])
+        for name in _AFFINE:
+            given, ours = getattr(packed, name)[-1], getattr(found, name)[0]
+            if np.max(np.abs(given - ours), initial=0.0) > AGREEMENT * np.max(np.abs(given), initial=1e-300):
+                raise ModelError(
+                    f"hypothesis '{self.hypothesis.name}' is not affine in its parameters {', '.join(self.hypothesis.names)}; "
+                    "stiffnesses, dampings and parameters of laws are, masses and inertias are not: make those known"
+                )
+
+    @property
+    def n_parameters(self) -> int:
+        """Number of uncertain parameters."""
+        return len(self.hypothesis.parameters)
+
+    @property
+    def n_states(self) -> int:
+        """Number of states of a rig."""
+        return self._packed.start.shape[1]
+
+    @property
+    def timestep(self) -> float:
+        """Integration step, and interval of the records [s]."""
+        return self.hypothesis.rig.timestep
+
+    def values(self, coordinates: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values of the parameters ``(…, p)`` at standardised coordinates ``(…, p)``."""
+        result = np.empty_like(coordinates, dtype=float)
+        for i, parameter in enumerate(self.hypothesis.parameters):
+            middle, spread = parameter.range
+            place = middle + spread * coordinates[..., i]
+            result[..., i] = np.exp(place) if parameter.scale == "logarithmic" else place
+        return result
+
+    def packed(self, coordinates: NDArray[np.float64]) -> Packed:
+        """Rigs at standardised coordinates ``(n_rigs, p)`` for `bench.excitation.ensemble.integrate_cases`."""
+        n, base = len(coordinates), self._packed
+        offsets = self.values(coordinates) - self.values(np.zeros((1, self.n_parameters)))
+        affine = {
+            name: getattr(base, name) + np.tensordot(offsets, slope, axes=1)
+            for name, slope in self._slopes.items()
+        }
+        same = {
+            name: np.ascontiguousarray(np.broadcast_to(array, (n, *array.shape[1:])))
+            for name, array in base._asdict().items()
+            if name not in {"rows", "columns", *_AFFINE}
+        }
+        return base._replace(**affine, **same)
+
+    def record(self, coordinates: NDArray[np.float64], controls: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Records from rest of several rigs under each of several drives.
+
+        Args:
+            coordinates: Standardised parameters ``(n_cases, n_rigs, p)``.
+            controls: Commands ``(n_cases, n, n_actuators)``.
+
+        Returns:
+            ``(n_cases, n_rigs, n, n_channels)``.
+        """
+        cases, rigs, p = coordinates.shape
+        packed = self.packed(coordinates.reshape(-1, p))
+        states = packed.start.reshape(cases, rigs, -1).copy()
+        members = np.arange(cases * rigs).reshape(cases, rigs)
+        return integrate_cases(
+            packed, controls, states, members=members, counts=np.full(cases, rigs), timestep=self.timestep
+        )
+
+
+def fans(coordinates: NDArray[np.float64], step: float) -> NDArray[np.float64]:
+    """Each point followed by itself moved by `step` along one coordinate after the other ``(…, 1 + p, p)``."""
+    p = coordinates.shape[-1]
+    return coordinates[..., None, :] + step * np.concatenate([np.zeros((1, p)), np.eye(p)])

@@ -1,0 +1,120 @@
+"""A request for an excitation: a rig and, in its file, what is unknown, measured and allowed.
+
+```toml
+rig = "sdof"
+[[elements]]
+law = "gap"
+joints = ["carriage"]
+parameters = { stiffness = 800.0, clearance = 0.012 }
+
+[experiment]
+duration = 8.0                                   # [s]
+band = [0.5, 5.0]                                # [Hz]
+force = { shaker = 2.0 }                         # largest command, by actuator
+energy = { shaker = 10.0 }                       # optional: largest dt sum(u^2)
+stroke = { displacement = 0.04 }                 # optional
+velocity = { velocity = 0.6 }                    # optional
+noise = { displacement = 5e-4, velocity = 0.01 } # standard deviations of the measured channels
+[experiment.uncertain]                           # optional: ranges; by default all of the elements' parameters, a factor two
+"gap.clearance" = [0.005, 0.03]
+"stiffness:carriage" = [200.0, 400.0]
+```
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from bench.errors import ParameterError, UnknownNameError
+from bench.excitation.experiment import Experiment
+from bench.excitation.limits import Limits
+from bench.excitation.prior import Hypothesis, RigPrior, Uncertain
+from bench.rig import Rig
+
+ENTRIES = ("duration", "band", "force", "energy", "stroke", "velocity", "noise", "uncertain")
+FACTOR = 2.0
+"""Range of a parameter about its value in the file, both ways, where no range is given."""
+
+
+@dataclass(frozen=True)
+class Request:
+    """What an excitation is asked for.
+
+    Attributes:
+        rig: The rig as its file describes it.
+        experiment: What is asked, measured and allowed, on draws about that rig.
+        duration: Duration [s].
+        band: Frequencies [Hz].
+    """
+
+    rig: Rig
+    experiment: Experiment
+    duration: float
+    band: tuple[float, float]
+
+
+def request(rig: Rig, table: Mapping[str, Any], *, draws: int = 8, rng: np.random.Generator) -> Request:
+    """Read the table `experiment` of a rig's file.
+
+    Args:
+        rig: The rig.
+        table: Entries as in the module's example.
+        draws: Prior draws that the excitation is weighed on, and on all of which it keeps the limits.
+        rng: Source of the draws.
+
+    Raises:
+        UnknownNameError: An entry, actuator, channel or parameter is not known.
+        ParameterError: An entry is missing or out of range.
+    """
+    for key in table:
+        if key not in ENTRIES:
+            raise UnknownNameError("entry of an experiment", key, ENTRIES)
+    missing = [key for key in ("duration", "band", "force", "noise") if key not in table]
+    if missing:
+        raise ParameterError(
+            f"an experiment needs the entries duration, band, force and noise; missing: {', '.join(missing)}"
+        )
+    band = tuple(float(x) for x in table["band"])
+    if len(band) != 2:
+        raise ParameterError(f"the band is {list(band)}; lowest and highest frequency [Hz] are expected")
+    limits = Limits(**{key: table.get(key, {}) for key in ("force", "energy", "stroke", "velocity")})
+    for name in limits.actuators:
+        if name not in rig.actuators:
+            raise UnknownNameError(f"actuator of rig '{rig.name}'", name, rig.actuators)
+    measured = tuple(channel.name for channel in rig.channels if channel.role == "measured")
+    for name in (*table["noise"], *limits.watched):
+        if name not in measured:
+            raise UnknownNameError(f"measured channel of rig '{rig.name}'", name, measured)
+    prior = RigPrior((Hypothesis(rig.name, rig, _uncertain(rig, table.get("uncertain", {}))),))
+    experiment = Experiment(prior, table["noise"], limits, prior.draws(draws, rng))
+    return Request(rig, experiment, float(table["duration"]), band)
+
+
+def _uncertain(rig: Rig, ranges: Mapping[str, Any]) -> tuple[Uncertain, ...]:
+    if ranges:
+        for name, bounds in ranges.items():
+            if not isinstance(bounds, list | tuple) or len(bounds) != 2:
+                raise ParameterError(f"the range of '{name}' is {bounds}; [lowest, highest] is expected")
+        return tuple(
+            Uncertain(name, float(low), float(high), "logarithmic" if low > 0.0 else "linear")
+            for name, (low, high) in ranges.items()
+        )
+    found = []
+    for element in rig.elements:
+        for parameter in element.law.parameters:
+            value = element.parameters[parameter.name]
+            low, high = sorted((value / FACTOR, value * FACTOR))
+            low, high = max(low, parameter.bounds[0]), min(high, parameter.bounds[1])
+            if value != 0.0 and low < high:
+                scale = "logarithmic" if low > 0.0 else "linear"
+                found.append(Uncertain(f"{element.name}.{parameter.name}", low, high, scale))
+    if not found:
+        raise ParameterError(
+            "nothing is uncertain: the rig has no element with parameters; name ranges in [experiment.uncertain], "
+            'as "stiffness:carriage" = [200.0, 400.0]'
+        )
+    return tuple(found)

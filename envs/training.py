@@ -1,0 +1,427 @@
+"""Training of policies with stable-baselines3, from a pumping start, with checkpoints, and their export to plain arrays.
+
+Importing this module imports torch and stable-baselines3 (extra `rl`); policies run without (`bench.excitation.policy`).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+import os
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import torch
+from gymnasium.vector import AutoresetMode
+from numpy.typing import NDArray
+from stable_baselines3 import PPO, SAC
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.vec_env import VecEnvWrapper, VecNormalize
+
+from bench.errors import FileFormatError, ParameterError, UnknownNameError
+from bench.excitation.policy import Policy
+from bench.excitation.station import Station
+from envs import IDS
+from envs.base import setup_of
+from envs.feedback import Feedback, braked_design, pump
+from envs.practice import PracticeVectorEnv
+from envs.sb3 import KINDS, BenchVecEnv
+
+TASKS: dict[str, tuple[str, dict[str, Any]]] = {
+    "sdof": (IDS[0], {}),
+    "joint": (IDS[1], {}),
+    "rivals": (IDS[2], {"rig": "sdof"}),
+    "joint_rivals": (IDS[2], {}),
+}
+"""What can be trained: an environment and its arguments."""
+
+ALGORITHMS = ("ppo", "sac")
+REWARDS = ("practice", "prior", "posterior")
+STARTS = ("pump", "design", "nothing")
+HELD_OUT = 1_000_000
+"""Seeds from here on are for evaluation only."""
+EPISODES = 3
+NOISE = 0.3  # of the largest force: so that the start has seen what follows its own mistakes
+LOG_STD = -1.2
+"""Logarithm of the exploration's standard deviation at the start."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What to train and how.
+
+    Attributes:
+        task: One of `TASKS`.
+        algorithm: "ppo" or "sac".
+        steps: Windows in all.
+        seed: Seed of rigs, noise, network and exploration.
+        n_envs: Benches side by side.
+        network: Units of the hidden layers.
+        start: What is imitated before, see `envs.feedback`: "pump", "design", or "nothing".
+        reward: "practice" (see `envs.practice`), or the registered environment with the merit's "prior" or "posterior" average.
+        learning_rate: Of Adam, at the start; falls linearly.
+        discount: Of rewards, a window.
+        evaluate_every: Windows between evaluations, each with a checkpoint.
+        n_held_out: Rigs of an evaluation.
+    """
+
+    task: str = "sdof"
+    algorithm: str = "ppo"
+    steps: int = 1_500_000
+    seed: int = 0
+    n_envs: int = 96
+    network: tuple[int, ...] = (64, 64)
+    start: str = "pump"
+    reward: str = "practice"
+    learning_rate: float = 4e-4
+    discount: float = 0.995
+    evaluate_every: int = 100_000
+    n_held_out: int = 96
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "network", tuple(self.network))
+        for what, name, known in (
+            ("task", self.task, TASKS),
+            ("algorithm", self.algorithm, ALGORITHMS),
+            ("reward", self.reward, REWARDS),
+            ("start", self.start, STARTS),
+        ):
+            if name not in known:
+                raise UnknownNameError(what, name, known)
+        if min(self.steps, self.n_envs, self.evaluate_every, self.n_held_out, *self.network) < 1:
+            raise ParameterError(f"{self} has a number below one; steps, benches and units are positive")
+
+
+class Score(NamedTuple):
+    """A policy on held-out rigs."""
+
+    steps: int  # windows trained
+    seconds: float  # of training
+    merit: float  # mean at the end [nat]
+    score: float  # merit less costs [nat]
+    violations: float  # share of windows with stroke or velocity beyond its limit
+    stopped: float  # share of tests that the limit switch ended
+    certain: float  # mean time to expected 99 % certainty [s], the duration where not reached (rivals only)
+
+
+def evaluate(policy: Policy, task: str, *, n: int = 96, seed: int = HELD_OUT) -> Score:
+    """Run a policy for one test on each of `n` held-out rigs (practice benches).
+
+    Args:
+        policy: The policy.
+        task: One of `TASKS`.
+        n: Number of rigs.
+        seed: Seed of the first; counted up.
+    """
+    identifier, arguments = TASKS[task]
+    env = PracticeVectorEnv(KINDS[identifier], n, autoreset_mode=AutoresetMode.SAME_STEP, **arguments)
+    observation, _ = env.reset(seed=seed)
+    benches = env.benches
+    alive = np.ones(n, dtype=bool)
+    merit, cost, violated, windows = np.zeros(n), np.zeros(n), 0, 0
+    stopped = np.zeros(n, dtype=bool)
+    certain = np.full(n, benches.station.duration)
+    for window in range(benches.n_windows):
+        outcome = benches.step(np.arange(n), policy.act(observation))
+        observation = outcome.observation
+        merit = np.where(alive, outcome.info["merit"], merit)
+        cost += np.where(alive, outcome.info["cost"], 0.0)
+        violated += int(np.sum(outcome.info["violation"] & alive))
+        windows += int(alive.sum())
+        now = (outcome.info["separated"] >= 1.0) & alive & (certain >= benches.station.duration)
+        certain[now] = (window + 1) * benches.n_steps * benches.timestep
+        stopped |= alive & (outcome.info["stroke"] > 1.0)
+        alive &= ~outcome.terminated
+        if not alive.any():
+            break
+    return Score(
+        0,
+        0.0,
+        float(merit.mean()),
+        float((merit - cost).mean()),
+        violated / windows,
+        float(stopped.mean()),
+        float(certain.mean()),
+    )
+
+
+def export(model: PPO | SAC, normaliser: VecNormalize, *, name: str, about: dict[str, Any]) -> Policy:
+    """The mean of a model's actions as a `Policy` of plain arrays.
+
+    Args:
+        model: The model.
+        normaliser: The statistics of its observations, over the benches with their schedule.
+        name: Name of the policy.
+        about: Where it comes from.
+    """
+    layers = [module for module in _layers(model) if isinstance(module, torch.nn.Linear)]
+    statistics = normaliser.obs_rms
+    return Policy(
+        name,
+        tuple(layer.weight.detach().cpu().numpy() for layer in layers),
+        tuple(layer.bias.detach().cpu().numpy() for layer in layers),
+        statistics.mean,  # type: ignore[union-attr]
+        np.sqrt(statistics.var + normaliser.epsilon),  # type: ignore[union-attr]
+        _scheduled(normaliser).schedule,
+        _scheduled(normaliser).station,
+        isinstance(model, SAC),
+        about,
+    )
+
+
+def _layers(model: PPO | SAC) -> list[torch.nn.Module]:
+    if isinstance(model, SAC):
+        return [*model.actor.latent_pi, model.actor.mu]
+    return [*model.policy.mlp_extractor.policy_net, model.policy.action_net]
+
+
+class Scheduled(VecEnvWrapper):
+    """Adds a schedule to actions, as `bench.excitation.Policy` does.
+
+    Attributes:
+        station: Where the benches stand.
+        schedule: Actions ``(n_questions, n_windows, width)``.
+    """
+
+    def __init__(self, venv: BenchVecEnv, schedule: NDArray[np.float32]) -> None:
+        super().__init__(venv)
+        self.station: Station = venv.benches.benches.station
+        self.schedule = schedule
+        self._last = np.zeros((venv.num_envs, venv.benches.benches.n_observations), dtype=np.float32)
+
+    def reset(self) -> NDArray[np.float32]:
+        """Reset all."""
+        self._last = np.asarray(self.venv.reset())
+        return self._last
+
+    def step_async(self, actions: NDArray[np.float32]) -> None:
+        """Take corrections of the schedule."""
+        self.venv.step_async(np.clip(actions + self.station.scheduled(self._last, self.schedule), -1.0, 1.0))
+
+    def step_wait(self) -> Any:
+        """Run the step."""
+        result = self.venv.step_wait()
+        self._last = np.asarray(result[0])
+        return result
+
+
+def _environment(plan: Plan, schedule: NDArray[np.float32]) -> VecNormalize:
+    identifier, arguments = TASKS[plan.task]
+    practice = plan.reward == "practice"
+    rest = arguments if practice else {**arguments, "average": plan.reward}
+    env = BenchVecEnv(identifier, plan.n_envs, practice=practice, **rest)
+    env.seed(plan.seed)
+    return VecNormalize(Scheduled(env, schedule), gamma=plan.discount)
+
+
+def _model(plan: Plan, env: VecNormalize) -> PPO | SAC:
+    def rate(left: float) -> float:
+        return plan.learning_rate * max(left, 0.1)
+
+    units = list(plan.network)
+    common: dict[str, Any] = {
+        "learning_rate": rate, "gamma": plan.discount, "seed": plan.seed, "device": "cpu"
+    }  # fmt: skip
+    if plan.algorithm == "sac":
+        kwargs = {
+            "net_arch": {"pi": units, "qf": [128, 128]},
+            "activation_fn": torch.nn.Tanh,
+            "log_std_init": -2.0,
+        }
+        return SAC(
+            "MlpPolicy", env, batch_size=512, gradient_steps=16, buffer_size=300_000, policy_kwargs=kwargs, **common
+        )  # fmt: skip
+    kwargs = {"net_arch": {"pi": units, "vf": [64, 64]}, "log_std_init": LOG_STD}
+    episode = _scheduled(env).station.n_windows
+    n_steps = min(episode, max(1, plan.evaluate_every // plan.n_envs))
+    return PPO(
+        "MlpPolicy", env, n_steps=n_steps, batch_size=max(64, n_steps * plan.n_envs // 8), n_epochs=8, clip_range=0.2,
+        target_kl=0.04, policy_kwargs=kwargs, **common,
+    )  # fmt: skip
+
+
+def _scheduled(env: VecNormalize) -> Scheduled:
+    assert isinstance(env.venv, Scheduled)
+    return env.venv
+
+
+def first_feedback(plan: Plan) -> Feedback:
+    """What training starts from."""
+    identifier, arguments = TASKS[plan.task]
+    setup = setup_of(KINDS[identifier], dict(arguments))
+    if plan.start == "design":
+        return braked_design(setup, np.random.default_rng(plan.seed))
+    start = pump(setup.station())
+    return start if plan.start == "pump" else replace(start, schedule=np.zeros_like(start.schedule))
+
+
+def imitate(model: PPO | SAC, env: VecNormalize, feedback: Feedback, *, seed: int) -> None:
+    """Fit a model's mean action to a feedback's corrections, and the statistics of the observations to what it meets.
+
+    Args:
+        model: The model.
+        env: Its environment.
+        feedback: What is imitated; its schedule is the environment's.
+        seed: Seed of the tests.
+    """
+    venv, rng = _scheduled(env), np.random.default_rng(seed)
+    seen, told = [], []
+    observation = venv.reset()
+    for _ in range(EPISODES * feedback.station.n_windows):
+        wanted = feedback.correction(observation)
+        seen.append(observation)
+        told.append(wanted)
+        observation = np.asarray(venv.step(wanted + NOISE * rng.standard_normal(wanted.shape))[0])
+    x, y = np.concatenate(seen), np.concatenate(told)
+    env.obs_rms.update(x)  # type: ignore[union-attr]
+    y = np.arctanh(np.clip(y, -0.96, 0.96)) if isinstance(model, SAC) else y
+    target = torch.as_tensor(y, dtype=torch.float32)
+    inputs = torch.as_tensor(np.asarray(env.normalize_obs(x)), dtype=torch.float32)
+    network = torch.nn.Sequential(*_layers(model))
+    optimiser = torch.optim.Adam(network.parameters(), lr=2e-3)
+    for _ in range(1500):
+        rows = torch.as_tensor(rng.integers(len(x), size=512))
+        loss = torch.nn.functional.mse_loss(network(inputs[rows]), target[rows])
+        optimiser.zero_grad()
+        loss.backward()
+        optimiser.step()
+
+
+class _Watch(BaseCallback):
+    """Evaluates, saves and tells; stops at the end of the time."""
+
+    def __init__(self, trainer: Trainer, until: float, progress: Callable[[str, float], None] | None) -> None:
+        super().__init__()
+        self.trainer, self.until, self.progress = trainer, until, progress
+        self._next = trainer.plan.evaluate_every + (trainer.curve[-1].steps if trainer.curve else 0)
+
+    def _on_step(self) -> bool:
+        return time.monotonic() < self.until or self.trainer.plan.algorithm == "ppo"
+
+    def _on_rollout_end(self) -> None:
+        plan, steps = self.trainer.plan, self.num_timesteps
+        if steps >= self._next:
+            self.trainer.checkpoint(steps)
+            self._next = steps + plan.evaluate_every
+        if self.progress is not None:
+            last = self.trainer.curve[-1]
+            self.progress(
+                f"{last.merit:.1f} nat, {100 * last.violations:.2f} % violations",
+                min(steps / plan.steps, 1.0),
+            )
+
+    def _on_rollout_start(self) -> None:
+        if time.monotonic() >= self.until:
+            raise _Stop
+
+
+class _Stop(Exception):
+    """The time is over."""
+
+
+class Trainer:
+    """A training run in a folder, from where it was stopped.
+
+    Attributes:
+        plan: What is trained.
+        folder: Checkpoint, curve (`curve.json`) and best policy so far (`best.npz`).
+        curve: Evaluations so far, the first before training.
+    """
+
+    def __init__(self, plan: Plan, folder: Path, *, resume: bool = True) -> None:
+        """Start or go on.
+
+        Args:
+            plan: What to train.
+            folder: Where.
+            resume: Go on with what is there, if it is of the same plan but for its number of steps.
+
+        Raises:
+            FileFormatError: The folder holds another plan's training.
+        """
+        torch.set_num_threads(
+            max(1, len(os.sched_getaffinity(0)) // 2) if hasattr(os, "sched_getaffinity") else 1
+        )
+        self.plan, self.folder = plan, folder
+        self._spent, self._started = 0.0, time.monotonic()
+        self.curve: list[Score] = []
+        document = folder / "curve.json"
+        if resume and document.is_file():
+            saved = json.loads(document.read_text(encoding="utf-8"))
+            if replace(Plan(**saved["plan"]), steps=plan.steps) != plan:
+                raise FileFormatError(
+                    f"{folder} holds the training of another plan ({saved['plan']}); take another folder or start afresh"
+                )
+            self.curve = [Score(**row) for row in saved["curve"]]
+            self._spent = self.curve[-1].seconds
+            fresh = _environment(plan, np.load(folder / "schedule.npy"))
+            self.env = VecNormalize.load(str(folder / "statistics.pkl"), _scheduled(fresh))
+            kind = SAC if plan.algorithm == "sac" else PPO
+            self.model = kind.load(folder / "model.zip", env=self.env, device="cpu")
+            return
+        feedback = first_feedback(plan)
+        self.env = _environment(plan, feedback.schedule)
+        self.model = _model(plan, self.env)
+        if plan.start != "nothing":
+            imitate(self.model, self.env, feedback, seed=plan.seed)
+        folder.mkdir(parents=True, exist_ok=True)
+        np.save(folder / "schedule.npy", feedback.schedule)
+        self.checkpoint(0)
+
+    @property
+    def seconds(self) -> float:
+        """Time spent on training so far, evaluations included [s]."""
+        return self._spent + time.monotonic() - self._started
+
+    def policy(self) -> Policy:
+        """The policy as it is now."""
+        identifier, arguments = TASKS[self.plan.task]
+        about = {
+            "environment": identifier,
+            "arguments": arguments,
+            "plan": asdict(self.plan),
+            "steps": int(self.model.num_timesteps),
+            "seconds": round(self.seconds, 1),
+        }
+        return export(self.model, self.env, name=self.plan.task, about=about)
+
+    def checkpoint(self, steps: int) -> None:
+        """Evaluate on held-out rigs and save."""
+        policy = self.policy()
+        score = evaluate(policy, self.plan.task, n=self.plan.n_held_out)
+        best = max((row.score for row in self.curve), default=-math.inf)
+        self.curve.append(score._replace(steps=steps, seconds=round(self.seconds, 1)))
+        if score.score > best:
+            policy.save(self.folder / "best.npz")
+        self.model.save(self.folder / "model.zip")
+        self.env.save(str(self.folder / "statistics.pkl"))
+        document = {"plan": asdict(self.plan), "curve": [row._asdict() for row in self.curve]}
+        temporary = self.folder / "curve.json.part"
+        temporary.write_text(json.dumps(document, indent=1), encoding="utf-8")
+        temporary.replace(self.folder / "curve.json")
+
+    def run(
+        self, *, seconds: float = math.inf, progress: Callable[[str, float], None] | None = None
+    ) -> Policy:
+        """Train to the end of the plan or of the time.
+
+        Args:
+            seconds: Most time to spend now.
+            progress: Called with a label and the share done.
+
+        Returns:
+            The best policy so far, by its score on held-out rigs.
+        """
+        left = self.plan.steps - self.model.num_timesteps
+        if left > 0:
+            watch = _Watch(self, time.monotonic() + seconds, progress)
+            with contextlib.suppress(_Stop):
+                self.model.learn(left, callback=watch, reset_num_timesteps=self.model.num_timesteps == 0)
+            if self.model.num_timesteps > self.curve[-1].steps:
+                self.checkpoint(int(self.model.num_timesteps))
+        return Policy.load(self.folder / "best.npz")

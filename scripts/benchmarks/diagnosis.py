@@ -1,0 +1,189 @@
+"""The diagnosis against what people would otherwise take, on the same cases in one run, all scored by the same code.
+
+The peers are `mujoco.sysid` fitted to every candidate effect and chosen by its BIC (`peer_sysid`), and a global sparse
+regression (`peer_sindy`). The cases are sealed ones made here with a fixed seed, or with ``--data FOLDER`` any folder of
+cases with an ``answers`` folder in it, which only the scoring opens. Ten short cases by default, some four minutes on two
+cores; ``--full`` makes sixty of a release's length, of all kinds, or takes the whole folder, which is hours.
+
+    python scripts/benchmark.py diagnosis
+    python scripts/benchmark.py diagnosis --data FOLDER --full --save diagnosis.json
+"""
+
+from __future__ import annotations
+
+import json
+import tempfile
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.discrepancy import BlindOptions, BlindScore, diagnose, make_blind, read_case, score_blind
+from bench.discrepancy.case import Case, CaseRecord
+from bench.discrepancy.problem import Problem
+from bench.discrepancy.shrink import DIVERGED_GAP, coordinates, noise_level, nrmse
+from bench.discrepancy.structure import structure_of
+from benchmarks.timing import Row
+
+SEED = 20061
+CASES, ALL_CASES = 10, 60
+SHORT = BlindOptions(
+    duration=6.0, sample_rate=500.0, noise=(0.003, 0.02), gap=(0.05, 0.5), shares=(0.25, 0.75, 0.0, 0.0),
+    rigs=(1.0, 0.0, 0.0), detectability=False,
+)  # fmt: skip
+LONG = BlindOptions(rigs=(0.75, 0.0, 0.25), detectability=False)
+RIGS = ("sdof", "joint")
+"""Rigs that the peers are built for; cases of others are passed over."""
+DRAWS = 2000
+"""Draws of the bootstrap over cases."""
+
+Prediction = Callable[[CaseRecord], Mapping[str, NDArray[np.float64]]]
+Tool = Callable[[Case], dict[str, Any]]
+
+
+def ours(case: Case) -> dict[str, Any]:
+    """The diagnosis."""
+    return diagnose(case).verdict.to_json()
+
+
+def by_sysid(case: Case) -> dict[str, Any]:
+    """`mujoco.sysid`, a candidate at a time."""
+    from benchmarks import peer_sysid
+
+    placed, predict = peer_sysid.diagnose(case)
+    return _answer(case, None if placed is None else (placed.effect.name, placed.place.name), predict)
+
+
+def by_sindy(case: Case) -> dict[str, Any]:
+    """Sparse regression."""
+    from benchmarks import peer_sindy
+
+    return _answer(case, *peer_sindy.diagnose(case))
+
+
+TOOLS: dict[str, Tool] = {"ours": ours, "mujoco.sysid + BIC": by_sysid, "pysindy": by_sindy}
+
+
+def _answer(case: Case, found: tuple[str, str] | None, predict: Prediction) -> dict[str, Any]:
+    """What a peer found in the form that is scored, its gap judged as the diagnosis judges its own."""
+    structure = structure_of(case)
+    problem = Problem(case, structure, case.identification)
+    predicted = [predict(record) for record in case.validation]
+    gaps = []
+    for _, channels in coordinates(structure):
+        measured = np.concatenate([sum(s * r.values[c] for c, s in channels) for r in case.validation])
+        simulated = np.concatenate([sum(s * p[c] for c, s in channels) for p in predicted])
+        floor = noise_level(problem, channels, case.validation) / float(np.std(measured))
+        gaps.append({"after": nrmse(measured, simulated), "noise_floor": floor})
+    named = [] if found is None else [{"name": found[0], "where": found[1], "probability": 1.0}]
+    return {"verdict": "effect" if found else "none", "named": named, "indistinguishable": [], "gaps": gaps}
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A tool on a case.
+
+    Attributes:
+        score: The score of this case alone.
+        seconds: Wall time [s].
+    """
+
+    score: BlindScore
+    seconds: float
+
+
+def outcomes(cases: Sequence[Path], answers: Path, folder: Path) -> dict[str, list[Outcome]]:
+    """Run every tool on every case, one after the other, and score each."""
+    ours(read_case(cases[0]))  # compiled code and native callbacks are loaded before anything is timed
+    found: dict[str, list[Outcome]] = {name: [] for name in TOOLS}
+    for path in cases:
+        case = read_case(path)
+        for number, (name, tool) in enumerate(TOOLS.items()):
+            begun = time.perf_counter()
+            answer = tool(case)
+            seconds = time.perf_counter() - begun
+            results = folder / str(number) / path.name
+            results.mkdir(parents=True)
+            (results / f"{path.name}.json").write_text(json.dumps(answer), encoding="utf-8")
+            found[name].append(Outcome(score_blind(results, answers, cases=path.parent), seconds))
+    return found
+
+
+def rows(repeats: int = 15, *, full: bool = False, data: Path | None = None) -> list[Row]:
+    """Rows of the group; a run of each tool a case, whatever `repeats`, and the spread is that over cases."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        if data is None:
+            rng = np.random.default_rng(SEED)
+            count, options = (ALL_CASES, LONG) if full else (CASES, SHORT)
+            make_blind(folder / "cases", folder / "answers", n=count, rng=rng, options=options)
+            home, answers = folder / "cases", folder / "answers"
+        else:
+            home, answers = data, data / "answers"
+        found = sorted(path.parent for path in home.glob("*/nominal.json"))
+        cases = [path for path in found if read_case(path).rig in RIGS]
+        if data is not None and not full:
+            cases = cases[:: -(-len(cases) // CASES)]
+        told = outcomes(cases, answers, folder / "results")
+    return [row for peer in list(TOOLS)[1:] for row in _against(peer, told["ours"], told[peer])]
+
+
+def _against(peer: str, mine: list[Outcome], theirs: list[Outcome]) -> list[Row]:
+    """Ours over the peer's where more is better, the peer's over ours where less is."""
+
+    def shares(label: str, value: Callable[[BlindScore], float]) -> Row | None:
+        pairs = np.array([[value(a.score), value(b.score)] for a, b in zip(mine, theirs, strict=True)])
+        pairs = pairs[np.isfinite(pairs).all(axis=1)]
+        if not len(pairs):
+            return None
+        # a peer that is never right counts as right in half a case, that there be a ratio
+        least = 0.5 / len(pairs)
+
+        def ratio(sample: NDArray[np.float64]) -> float:
+            own, other = sample.mean(axis=0)
+            return float(own / max(other, least))
+
+        return _row(f"{label}, against {peer}", pairs, ratio, "≥ 1", _told(pairs.mean(axis=0), len(pairs)))
+
+    def lower(label: str, pairs: NDArray[np.float64], limit: str) -> Row:
+        def ratio(sample: NDArray[np.float64]) -> float:
+            own, other = np.median(sample, axis=0)
+            return float(other / own)
+
+        return _row(
+            f"{label}, against {peer}", pairs, ratio, limit, _told(np.median(pairs, axis=0), len(pairs))
+        )
+
+    gaps = np.array([[a.score.median_ratio, b.score.median_ratio] for a, b in zip(mine, theirs, strict=True)])
+    seconds = np.array([[a.seconds, b.seconds] for a, b in zip(mine, theirs, strict=True)])
+    # a linear regression is quicker than any fit of free runs: reported against pysindy, without a limit
+    pace = "≥ 1" if peer.startswith("mujoco") else ""
+    made = [
+        shares("single effects named exactly", lambda s: s.exact),
+        shares("single effects, family right", lambda s: s.family),
+        shares("clean cases called clean", lambda s: 1.0 - s.false_alarms),
+        lower("gap after over noise floor, median", np.minimum(gaps, DIVERGED_GAP), "≥ 1"),
+        lower("seconds a case, median", seconds, pace),
+    ]
+    return [row for row in made if row is not None]
+
+
+def _told(figures: NDArray[np.float64], count: int) -> str:
+    return f"ours {figures[0]:.3g}, theirs {figures[1]:.3g}, {count} cases"
+
+
+def _row(
+    name: str,
+    pairs: NDArray[np.float64],
+    ratio: Callable[[NDArray[np.float64]], float],
+    limit: str,
+    told: str,
+) -> Row:
+    rng = np.random.default_rng(SEED)
+    draws = [ratio(pairs[rng.integers(len(pairs), size=len(pairs))]) for _ in range(DRAWS)]
+    low, high = np.percentile(draws, [10, 90])
+    return Row(name, ratio(pairs), (float(low), float(high)), limit, told, {"pairs": pairs.tolist()})

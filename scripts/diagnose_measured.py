@@ -1,0 +1,150 @@
+"""Diagnose measured records, the effect never named to the tool.
+
+    python scripts/diagnose_measured.py
+    python scripts/diagnose_measured.py --data FOLDER bouc_wen silverbox --json
+
+Without FOLDER the friction damper that comes with the bench is diagnosed. FOLDER holds what may not be shipped, in the
+sub-folders that the modules in scripts/measured name. NAMES are cases or beginnings of their names; all where none is given.
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import sys
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tyro
+from rich.console import Console
+from rich.table import Table
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+from measured.target import Target
+
+from bench.discrepancy import Case, Diagnosis, diagnose
+
+SOURCES = tuple(
+    sorted(
+        path.stem for path in (Path(__file__).parent / "measured").glob("[a-z]*.py") if path.stem != "target"
+    )
+)
+
+
+@dataclass
+class Args:
+    """Diagnose measured records."""
+
+    names: tyro.conf.Positional[tuple[str, ...]] = ()
+    """Cases, or beginnings of their names; all where none is given."""
+    data: Path | None = None
+    """Folder of the records that are not shipped."""
+    json: bool = False
+    """Print JSON."""
+    html: Path | None = None
+    """Folder for a report page of every case."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of a diagnosis, on one judging record.
+
+    Attributes:
+        case: Case.
+        record: Judging record.
+        verdict: "effect", "none" or "unknown".
+        named: Names of the effects.
+        before: Error of the nominal model.
+        after: Error of the final model.
+        limit: Largest error to be reached; None where none is set.
+        unit: Unit of the errors.
+        seconds: Wall time of the whole diagnosis [s].
+        parameters: Estimates of every named effect.
+    """
+
+    case: str
+    record: str
+    verdict: str
+    named: tuple[str, ...]
+    before: float
+    after: float
+    limit: float | None
+    unit: str
+    seconds: float
+    parameters: dict[str, Any]
+
+
+def gather(data: Path | None, names: tuple[str, ...]) -> dict[str, tuple[Case, Target | None]]:
+    """The wanted cases of every source, with what they are to reach."""
+    found: dict[str, tuple[Case, Target | None]] = {}
+    for source in SOURCES:
+        module = importlib.import_module(f"measured.{source}")
+        folder = (data or Path("none")) / getattr(module, "FOLDER", source)
+        if getattr(module, "SHIPPED", False) is False and not folder.is_dir():
+            continue
+        for name, case in module.cases(folder).items():
+            if not names or any(name.startswith(wanted) for wanted in names):
+                found[name] = (case, getattr(module, "TARGET", None))
+    return found
+
+
+def outcomes(diagnosis: Diagnosis, target: Target | None) -> list[Outcome]:
+    """One outcome a judging record."""
+    verdict, problem = diagnosis.verdict, diagnosis.problem
+    channel = problem.structure.channels[0]
+    target = target or Target(channel, "nrmse", np.nan, "1")
+    column = problem.structure.channels.index(target.channel)
+    zero = np.zeros(len(problem.nominal))
+    out = []
+    for record in diagnosis.case.validation:
+        measured = record.values[target.channel]
+        before = target.error(measured, problem.simulate((), zero, record)[:, column])
+        after = target.error(measured, diagnosis.final.predict(record)[target.channel])
+        out.append(
+            Outcome(
+                diagnosis.case.name, record.name, verdict.verdict, tuple(e.name for e in verdict.named), before, after,
+                target.limit if np.isfinite(target.limit) else None, target.unit, verdict.seconds,
+                {e.name: {k: asdict(v) for k, v in e.parameters.items()} for e in verdict.named},
+            )
+        )  # fmt: skip
+    return out
+
+
+def table(rows: list[Outcome]) -> Table:
+    """Outcomes as a table."""
+    out = Table("case", "record", "verdict", "named", "before", "after", "target", "seconds")
+    for row in rows:
+        reached = "" if row.limit is None else f"≤ {row.limit:g} {'yes' if row.after <= row.limit else 'no'}"
+        unit = "" if row.unit == "1" else f" {row.unit}"
+        out.add_row(
+            row.case, row.record, row.verdict, " + ".join(row.named) or "-", f"{row.before:.3g}{unit}",
+            f"{row.after:.3g}{unit}", reached, f"{row.seconds:.1f}",
+        )  # fmt: skip
+    return out
+
+
+def main() -> int:
+    """Diagnose and print."""
+    args = tyro.cli(Args, description=__doc__)
+    console = Console(stderr=True)
+    rows: list[Outcome] = []
+    for name, (case, target) in gather(args.data, args.names).items():
+        diagnosis = diagnose(case, progress=lambda text, name=name: console.print(f"{name}: {text}"))
+        if args.html:
+            from bench.discrepancy import write_report
+
+            args.html.mkdir(parents=True, exist_ok=True)
+            write_report(diagnosis, args.html / f"{name}.html")
+        rows += outcomes(diagnosis, target)
+    if args.json:
+        print(json.dumps([asdict(row) for row in rows], indent=2))
+    else:
+        Console(width=None if sys.stdout.isatty() else 140).print(table(rows))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

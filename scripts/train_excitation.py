@@ -1,0 +1,103 @@
+"""Train a policy that shapes an excitation as it measures, and export it as plain arrays.
+
+python scripts/train_excitation.py sdof
+python scripts/train_excitation.py rivals --algorithm sac --steps 200000 --out out/sac
+
+Stopped or killed, it goes on from its last checkpoint when called again.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+
+@dataclass
+class Args:
+    """Train a policy.
+
+    Attributes:
+        task: sdof, joint, rivals (on the SDOF rig) or joint_rivals.
+        algorithm: ppo or sac.
+        steps: Windows in all.
+        seconds: Most time to spend now.
+        seed: Seed.
+        n_envs: Benches side by side.
+        start: pump (imitates a push along the velocity), design (corrects a D-optimal multisine), or nothing.
+        reward: practice (merit at each rig itself), or prior or posterior (as the registered environments).
+        learning_rate: Of Adam.
+        discount: Of rewards, a window.
+        out: Folder for checkpoint, curve and best policy; by default out/policies/TASK.
+        fresh: Start anew where there is a checkpoint.
+        export: File to write the best policy to (.npz).
+        json: Print the curve as JSON.
+    """
+
+    task: tyro.conf.Positional[str] = "sdof"
+    algorithm: str = "ppo"
+    steps: int = 1_500_000
+    seconds: float = math.inf
+    seed: int = 0
+    n_envs: int = 96
+    start: str = "pump"
+    reward: str = "practice"
+    learning_rate: float = 4e-4
+    discount: float = 0.995
+    out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
+    fresh: bool = False
+    export: Path | None = None
+    json: bool = False
+
+
+def main() -> int:
+    """Train, tell, export."""
+    args = tyro.cli(Args, description=__doc__)
+    from bench.errors import BenchError
+    from envs.training import Plan, Trainer
+
+    folder = args.out or Path("out/policies") / args.task
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.percentage:>3.0f} %"),
+        TimeElapsedColumn(),
+    )
+    try:
+        plan = Plan(
+            args.task, args.algorithm, args.steps, args.seed, args.n_envs,
+            start=args.start, reward=args.reward, learning_rate=args.learning_rate, discount=args.discount,
+        )  # fmt: skip
+        with Progress(*columns, console=Console(stderr=True), disable=args.json) as bar:
+            task = bar.add_task("starting", total=1.0)
+            trainer = Trainer(plan, folder, resume=not args.fresh)
+            policy = trainer.run(
+                seconds=args.seconds,
+                progress=lambda label, share: bar.update(task, description=label, completed=share),
+            )
+    except BenchError as error:
+        print(f"train_excitation: {error}", file=sys.stderr)
+        return 2
+    if args.export is not None:
+        policy.save(args.export)
+    if args.json:
+        print(json.dumps([row._asdict() for row in trainer.curve], indent=1))
+        return 0
+    for row in trainer.curve:
+        print(
+            f"{row.steps:>9} windows {row.seconds:6.0f} s: {row.merit:6.2f} nat, score {row.score:6.2f}, "
+            f"violations {100 * row.violations:.2f} %, certain after {row.certain:.2f} s"
+        )
+    print(f"best policy: {args.export or folder / 'best.npz'}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,199 @@
+"""The rarer half of the catalogue: what is planted is named, and nothing of it is seen where nothing was planted."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from planted_cases import (
+    BASE_DAMPING,
+    BASE_MASS,
+    BASE_STIFFNESS,
+    DAMPING,
+    MASS,
+    SAMPLE_RATE,
+    STIFFNESS,
+    base_motion,
+    degraded,
+    linear_motion,
+    load,
+    motion_with,
+    pinched,
+    planted_case,
+)
+
+from bench.discrepancy import diagnose
+from bench.discrepancy.catalogue import CATALOGUE, effect_named
+from bench.discrepancy.effect import unit_of
+from bench.discrepancy.quantisation import quantisation_step, raised_noise
+from bench.laws import LAWS
+from bench.laws.evaluate import evaluate
+
+
+def named(case, *rivals, most=1):
+    """Verdict with a part of the catalogue: the rivals that could take an effect's place."""
+    return diagnose(case, catalogue=[effect_named(name) for name in rivals], most=most).verdict
+
+
+def estimate(verdict, parameter):
+    return verdict.named[0].parameters[parameter].value
+
+
+def test_names_are_single_and_units_can_be_printed():
+    names = [effect.name for effect in CATALOGUE]
+    assert len(set(names)) == len(names)
+    for effect in CATALOGUE:
+        for parameter in effect.parameters:
+            assert parameter.unit or unit_of(parameter.scale, "m", "N")
+
+
+@pytest.mark.slow
+def test_nothing_is_seen_in_a_clean_record():
+    verdict = diagnose(planted_case()).verdict
+    assert verdict.verdict == "none"
+    assert verdict.named == ()
+    assert verdict.warnings == ()
+
+
+@pytest.mark.slow
+def test_a_gap_with_two_different_sides_is_named():
+    def sides(x, v, z):
+        return 900.0 * max(x - 0.004, 0.0) - 450.0 * max(-x - 0.007, 0.0), []
+
+    verdict = named(
+        planted_case(lambda f: motion_with(f, sides)),
+        "asymmetric_gap", "gap", "one_sided_stop", "cubic_stiffness", "quadratic_stiffness",
+    )  # fmt: skip
+    assert [e.name for e in verdict.named] == ["asymmetric_gap"]
+    # noise of 1e-4 m over some dozen contacts: 2e-5 m, half a percent
+    assert estimate(verdict, "clearance_positive") == pytest.approx(0.004, rel=0.05)
+    assert estimate(verdict, "clearance_negative") == pytest.approx(0.007, rel=0.05)
+
+
+@pytest.mark.slow
+def test_cogging_is_named_with_its_pitch():
+    def teeth(x, v, z):
+        return 1.5 * math.sin(2.0 * math.pi * x / 0.012), []
+
+    verdict = named(
+        planted_case(lambda f: motion_with(f, teeth)), "cogging", "cubic_stiffness", "coulomb_friction", "gap"
+    )
+    assert [e.name for e in verdict.named] == ["cogging"]
+    assert estimate(verdict, "period") == pytest.approx(0.012, rel=0.02)  # over some five teeth
+    assert estimate(verdict, "sine") == pytest.approx(1.5, rel=0.05)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "effect", "hidden"), [("degrading_hysteresis", degraded, 2), ("pinching_hysteresis", pinched, 1)]
+)
+def test_hysteresis_that_changes_or_pinches_is_named(name, effect, hidden):
+    verdict = named(
+        planted_case(lambda f: motion_with(f, effect, hidden)),
+        "degrading_hysteresis", "pinching_hysteresis", "bouc_wen_hysteresis", "presliding_friction",
+    )  # fmt: skip
+    assert [e.name for e in verdict.named] == [name]
+
+
+@pytest.mark.slow
+def test_a_base_on_a_spring_is_named_with_its_frequency():
+    verdict = named(
+        planted_case(base_motion),
+        "base_flexibility", "viscoelastic_relaxation", "stiffness_error", "mass_error", "acceleration_delay",
+    )  # fmt: skip
+    assert [e.name for e in verdict.named] == ["base_flexibility"]
+    frequency = math.sqrt((STIFFNESS + BASE_STIFFNESS) / BASE_MASS) / (2.0 * math.pi)
+    assert estimate(verdict, "frequency") == pytest.approx(frequency, rel=0.05)
+    assert estimate(verdict, "stiffness_loss") == pytest.approx(
+        STIFFNESS**2 / (STIFFNESS + BASE_STIFFNESS), rel=0.3
+    )
+
+
+def test_the_law_of_a_flexible_base_is_the_difference_of_two_linear_systems():
+    """Along the exact motion: k x + c v plus the law is the force that the sprung base really lets through."""
+    force = load(3, 3000)
+    x, a = base_motion(force)
+    # trapezoidal integration of the exact acceleration: relative error (omega h)^2/12, 3e-4 at 5 Hz and 500 Hz
+    v = np.concatenate([[0.0], np.cumsum(0.5 * (a[1:] + a[:-1]))]) / SAMPLE_RATE
+    law = LAWS["base_flexibility"]
+    kappa = STIFFNESS**2 / (STIFFNESS + BASE_STIFFNESS)
+    omega = math.sqrt((STIFFNESS + BASE_STIFFNESS) / BASE_MASS)
+    theta = law.theta(
+        stiffness_loss=kappa,
+        frequency=omega / (2.0 * math.pi),
+        damping_ratio=(DAMPING + BASE_DAMPING) / (2.0 * omega * BASE_MASS),
+        lead=DAMPING / STIFFNESS,
+    )
+    t = np.arange(len(force)) / SAMPLE_RATE
+    extra = np.ravel(evaluate(law, theta, t, x, v).force)
+    through = force - MASS * a
+    np.testing.assert_allclose(
+        STIFFNESS * x + DAMPING * v + extra, through, atol=0.01 * np.abs(through).max()
+    )
+
+
+SENSORS = (
+    "displacement_crosstalk", "acceleration_crosstalk", "displacement_polarity", "acceleration_polarity",
+    "displacement_gain_error", "acceleration_gain_error", "displacement_bias", "acceleration_bias",
+    "displacement_clipping", "acceleration_clipping", "displacement_delay", "acceleration_delay",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("name", "measured"),
+    [
+        ("displacement_crosstalk", lambda x, a, f: (x + 5e-5 * f, a)),
+        ("acceleration_crosstalk", lambda x, a, f: (x, a + 0.05 * f)),
+        ("displacement_polarity", lambda x, a, f: (-x, a)),
+        ("acceleration_polarity", lambda x, a, f: (x, -a)),
+        ("displacement_clipping", lambda x, a, f: (np.clip(x, -0.01, 0.01), a)),
+        ("acceleration_clipping", lambda x, a, f: (x, np.clip(a, -8.0, 8.0))),
+        ("displacement_bias", lambda x, a, f: (x + 0.002, a)),
+        ("acceleration_bias", lambda x, a, f: (x, a + 0.3)),
+    ],
+)
+def test_faults_of_a_sensor_are_named(name, measured):
+    verdict = named(planted_case(measured=measured), *SENSORS)
+    assert [e.name for e in verdict.named] == [name]
+    assert verdict.named[0].channel.startswith(name.split("_", maxsplit=1)[0])
+
+
+@pytest.mark.parametrize(
+    ("name", "driven"),
+    [
+        ("force_polarity", lambda f: linear_motion(-f)),
+        ("actuator_saturation", lambda f: linear_motion(np.clip(f, -10.0, 10.0))),
+    ],
+)
+def test_faults_of_an_actuator_are_named(name, driven):
+    rivals = ("force_polarity", "actuator_saturation", "force_gain_error", "actuator_delay", "actuator_lag")
+    verdict = named(planted_case(driven, role="command"), *rivals)
+    assert [e.name for e in verdict.named] == [name]
+
+
+@pytest.mark.parametrize("channel", ["displacement", "acceleration"])
+def test_a_coarse_converter_is_read_off_the_samples(channel):
+    case = planted_case()
+    step = {"displacement": 1e-3, "acceleration": 0.8}[channel]
+    records = []
+    for record in (*case.identification, *case.validation):
+        values = dict(record.values) | {channel: step * np.round(record.values[channel] / step)}
+        records.append(type(record)(record.name, record.step, record.start, values))
+    coarse = type(case)(case.name, case.rig, case.parameters, case.channels, (records[0],), (records[1],))
+    verdict = named(coarse, f"{channel}_quantisation", *SENSORS)
+    assert verdict.verdict == "effect"
+    assert [e.name for e in verdict.named] == [f"{channel}_quantisation"]
+    assert estimate(verdict, "step") == pytest.approx(step, rel=1e-6)
+    assert verdict.gap.after < 1.2 * verdict.gap.noise_floor  # the floor includes the step
+
+
+def test_a_lattice_is_seen_through_the_rounding_of_a_text_file_and_not_elsewhere():
+    rng = np.random.default_rng(3)
+    x = rng.standard_normal(4000)
+    printed = np.array([float(f"{v:.8g}") for v in 0.0123 * np.round(x / 0.0123)])
+    assert quantisation_step(printed) == pytest.approx(0.0123, rel=1e-6)
+    assert quantisation_step(x) == 0.0
+    assert quantisation_step(np.sign(x)) == 0.0
+    assert raised_noise(1e-3, printed) == pytest.approx(math.hypot(1e-3, 0.0123 / math.sqrt(12.0)))
+    assert raised_noise(0.1, printed) == 0.1

@@ -1,0 +1,151 @@
+"""The parts of the search: minimisation, exact linear runs, whitening, refinement of starts."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+
+from bench.discrepancy import BlindOptions
+from bench.discrepancy.attribute import placements, refined
+from bench.discrepancy.blind import draw_case
+from bench.discrepancy.catalogue import effect_named
+from bench.discrepancy.linear_run import linear_run
+from bench.discrepancy.minimise import Prior, minimise
+from bench.discrepancy.problem import Problem
+from bench.discrepancy.screen import Screen
+from bench.discrepancy.structure import structure_of
+from bench.discrepancy.system import NO_ELEMENTS, LinearStructure, free_run
+from bench.discrepancy.whitening import whiten
+
+TIME = np.linspace(0.0, 3.0, 200)
+DATA = 2.0 * np.exp(-1.3 * TIME) * np.cos(4.0 * TIME)
+
+
+def residual(x: np.ndarray) -> np.ndarray:
+    return (x[0] * np.exp(-x[1] * TIME) * np.cos(x[2] * TIME) - DATA) / 0.05
+
+
+def broad(n: int) -> Prior:
+    return Prior(np.zeros(n), np.full(n, 10.0), np.full(n, -np.inf), np.full(n, np.inf))
+
+
+def search(start, prior, **options):
+    free = np.arange(len(start))
+    return minimise(
+        residual,
+        np.array(start),
+        prior=prior,
+        free=free,
+        reach=np.full(len(free), 2.0),
+        iterations=40,
+        **options,
+    )
+
+
+def test_minimum_and_curvature_agree_with_another_optimiser():
+    prior = broad(3)
+    found = search([1.0, 1.0, 3.8], prior, tolerance=1e-6)
+    other = least_squares(
+        lambda x: np.concatenate([residual(x), (x - prior.mean) / prior.std]), [1.0, 1.0, 3.8], xtol=1e-12
+    )
+    assert found.settled
+    np.testing.assert_allclose(found.vector, other.x, rtol=1e-4)  # forward differences
+    scaled = other.jac.T @ other.jac * np.outer(prior.std, prior.std)
+    np.testing.assert_allclose(found.curvature, scaled, rtol=2e-2, atol=1e-3 * np.abs(scaled).max())
+
+
+def test_a_minimum_on_a_bound_is_found_and_ends_the_iteration():
+    # just short of the true 1.3: residuals far above the noise are not followed to their minimum
+    prior = broad(3)._replace(high=np.array([np.inf, 1.29, np.inf]))
+    found = search([1.0, 0.5, 3.8], prior)
+    assert found.settled
+    assert found.vector[1] == 1.29
+    free = least_squares(lambda x: residual(np.array([x[0], 1.29, x[1]])), [1.0, 3.8]).x
+    np.testing.assert_allclose(
+        found.vector[[0, 2]], free, rtol=1e-3
+    )  # the prior's pull, and forward differences
+
+
+def test_a_minimisation_without_prospects_is_given_up():
+    calls = []
+
+    def stubborn(x: np.ndarray) -> np.ndarray:
+        calls.append(1)
+        return np.append(residual(x), 400.0)
+
+    options = {"prior": broad(3), "free": np.arange(3), "reach": np.full(3, 0.02), "iterations": 200}
+    given_up = minimise(stubborn, np.array([1.0, 1.0, 3.0]), limit=1e3, **options)
+    few = len(calls)
+    minimise(stubborn, np.array([1.0, 1.0, 3.0]), **options)
+    assert not given_up.settled
+    assert few < 0.7 * (len(calls) - few)  # without the limit it goes on to the minimum
+
+
+def test_a_start_that_diverges_has_infinite_cost():
+    found = minimise(
+        lambda x: np.array([np.inf]),
+        np.zeros(2),
+        prior=broad(2),
+        free=np.arange(2),
+        reach=np.ones(2),
+        iterations=5,
+    )
+    assert found.cost == np.inf
+
+
+@pytest.mark.parametrize("factor", [0, 1, 2])
+def test_exact_linear_runs_agree_with_the_integrator(factor):
+    rng = np.random.default_rng(3)
+    structure = LinearStructure(
+        np.diag([1.0, 2.5]), np.array([[1.2, -0.4], [-0.4, 2.0]]), np.array([[900.0, -300.0], [-300.0, 1500.0]]),
+        np.eye(2),
+    )  # fmt: skip
+    loads = rng.normal(size=(500 * max(factor, 1) + 1, 2))
+    start = np.array([0.01, -0.02, 0.1, 0.3])
+    exact = linear_run(structure, loads=loads, step=2e-3, load_factor=factor, start=start)
+    stepped = free_run(
+        structure, NO_ELEMENTS, loads=loads, step=2e-3, substeps=4, load_factor=factor, start=start
+    )
+    for a, b in zip(exact, stepped, strict=True):
+        np.testing.assert_allclose(a, b, atol=1e-7 * np.abs(b).max())  # RK4 with omega h = 0.02
+
+
+def test_restarts_are_runs_of_their_own():
+    structure = LinearStructure(np.eye(1), np.full((1, 1), 0.3), np.full((1, 1), 80.0), np.eye(1))
+    loads = np.random.default_rng(1).normal(size=(300, 1))
+    whole = linear_run(structure, loads=loads, step=5e-3, restarts=np.array([120]))
+    second = linear_run(structure, loads=loads[120:], step=5e-3)
+    np.testing.assert_allclose(whole.position[120:], second.position, rtol=1e-12, atol=1e-15)
+
+
+def test_whitening_is_the_matrix_product():
+    rng = np.random.default_rng(0)
+    factor = np.tril(rng.normal(size=(7, 3, 3)) + 1j * rng.normal(size=(7, 3, 3)))
+    spectrum = rng.normal(size=(7, 3)) + 1j * rng.normal(size=(7, 3))
+    product = np.einsum("kij,kj->ki", factor, spectrum)
+    np.testing.assert_allclose(whiten(spectrum, factor), [product.real, product.imag], rtol=1e-12)
+
+
+@pytest.mark.slow
+def test_refinement_along_the_measured_motion_nears_the_truth_without_a_nonlinear_run():
+    options = BlindOptions(
+        shares=(0.0, 1.0, 0.0, 0.0), effects=("gap",), noise=(0.005, 0.005), gap=(0.2, 0.3), duration=10.0,
+        sample_rate=500.0, sensors=("both",),
+    )  # fmt: skip
+    case, answer = draw_case("gap", np.random.default_rng(11), options)
+    structure = structure_of(case)
+    problem = Problem(case, structure, case.identification)
+    candidates = placements(case, structure, [effect_named("gap")])
+    with ThreadPoolExecutor(2) as pool:
+        screen = Screen(problem, candidates, pool.map)
+        ground = screen.ground()
+        coarse = screen.ranked(None, ground)
+        fine = refined(screen, ground, coarse, pool)
+    assert fine[0].gain >= coarse[0].gain
+    scales = problem.scales_of(candidates[0])
+    clearance = candidates[0].effect.values(fine[0].eta, scales)[1]
+    # the smoothed motion carries some percent of the noise of a record into the force along it
+    assert clearance == pytest.approx(answer["effects"][0]["parameters"][1], rel=0.05)
