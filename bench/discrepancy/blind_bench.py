@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import chirp, fftconvolve
+from scipy.signal import bessel, chirp, fftconvolve, sosfilt
 
 from bench.discrepancy.blind_effects import Reach, Recipe, recipe_named
 from bench.discrepancy.time_stepping import TrueMotion
@@ -17,6 +17,8 @@ from bench.errors import ParameterError
 Array = NDArray[np.float64]
 
 SENSORS = ("both", "position", "acceleration")
+MACHINE = 6.0
+"""Bandwidth of the machine that prescribes a motion, as a multiple of the signal's central frequency."""
 SIGNALS = ("random", "sweep", "multisine", "stepped", "decaying")
 RAMP = 0.3
 """Seconds over which loads and motions set in [s]."""
@@ -243,7 +245,11 @@ def draw_bench(plan: Plan, rng: np.random.Generator, options: BlindOptions) -> B
         stroke = float(rng.uniform(0.004, 0.03))
         stiffness = float(np.exp(rng.uniform(np.log(1e3), np.log(1e5))))
         damping = stiffness / (2.0 * np.pi * frequency) * float(rng.uniform(0.2, 1.0))
-        loads = tuple(stroke * load(s, frequency, n * STEPS, rate * STEPS, rng)[:, None] for s in signals)
+        fine = rate * STEPS
+        loads = tuple(
+            stroke * followed(load(s, frequency, n * STEPS, fine, rng), frequency, fine)[:, None]
+            for s in signals
+        )
         return Bench(
             plan, Truth("damper", {"stiffness": stiffness, "damping": damping}, rate), names, signals, loads
         )
@@ -254,6 +260,13 @@ def draw_bench(plan: Plan, rng: np.random.Generator, options: BlindOptions) -> B
     loads = tuple(level * rng.uniform(0.8, 1.25) * load(s, frequency, n, rate, rng)[:, None] for s in signals)
     values = {"mass": mass, "stiffness": stiffness, "damping": damping}
     return Bench(plan, Truth("sdof", values, rate), names, signals, loads)
+
+
+def followed(signal: Array, frequency: float, rate: float) -> Array:
+    """Motion (n,) of a machine that is asked for a signal: no actuator jumps, nor does it turn a corner."""
+    return np.asarray(
+        sosfilt(bessel(4, MACHINE * frequency, fs=rate, output="sos"), signal), dtype=np.float64
+    )
 
 
 def _joint_values(rng: np.random.Generator) -> tuple[dict[str, float], float, tuple[float, float]]:

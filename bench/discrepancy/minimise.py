@@ -88,7 +88,8 @@ class _Task(NamedTuple):
 
     def state(self, vector: Array) -> _State:
         residual = self.residual_at(vector)
-        return _State(vector, residual, float(residual @ residual + np.sum(self.deviation(vector) ** 2)))
+        with np.errstate(over="ignore"):  # a run on its way to divergence
+            return _State(vector, residual, float(residual @ residual + np.sum(self.deviation(vector) ** 2)))
 
     def deviation(self, vector: Array) -> Array:
         return (vector[self.free] - self.mean) / self.std

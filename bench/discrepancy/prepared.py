@@ -30,6 +30,7 @@ class RecordData(NamedTuple):
         n_bins: Number of frequency bins in the band.
         whitening: (n_bins, n_channels, n_channels) complex; whitening times the spectrum of the noise is white.
         windows: Windows that restart from the measured state; None where the whole record is one free run.
+        compared: (n,) ones and zeros: samples that are compared; None for all.
     """
 
     record: CaseRecord
@@ -38,6 +39,7 @@ class RecordData(NamedTuple):
     n_bins: int
     whitening: NDArray[np.complex128]
     windows: Windows | None = None
+    compared: Array | None = None
 
 
 def fast_length(n: int) -> int:
@@ -97,6 +99,8 @@ def projected(residual: Array, moved: Sequence[Array], data: RecordData) -> Arra
 def whitened_spectrum(residual: Array, data: RecordData) -> Array:
     """Whitened spectrum of time-domain residuals (n, n_channels) of a whole record, real parts before imaginary ones."""
     n = len(residual)
+    if data.compared is not None:
+        residual = residual * (data.compared / np.sqrt(data.compared.mean()))[:, None]
     spectrum = fft.rfft(residual, fast_length(n), axis=0)[: data.n_bins] / np.sqrt(n / 2.0)
     white = whiten(spectrum, data.whitening)
     white[:, 0] /= np.sqrt(2.0)

@@ -13,6 +13,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from bench.discrepancy.case import Case, CaseRecord
 from bench.discrepancy.driven import driven_force
@@ -20,8 +21,8 @@ from bench.discrepancy.driving import driving_loads, fewest_steps, run_in
 from bench.discrepancy.effect import Effect, Scales
 from bench.discrepancy.measured_motion import measured_motion
 from bench.discrepancy.prepared import RecordData, band_bins, fast_length, noise_floor, projected
+from bench.discrepancy.prescribed_motion import decided, motion_error, prescribed_motion
 from bench.discrepancy.quantisation import raised_noise
-from bench.discrepancy.smoothing import smooth_motion
 from bench.discrepancy.starts import (
     cut,
     drifts,
@@ -39,6 +40,8 @@ from bench.discrepancy.system import Elements, LinearStructure, Motion
 
 Array = NDArray[np.float64]
 MAX_SUBSTEPS = 16
+SMOOTHED_BINS = 65
+"""Bins over which the spectrum of one draw is averaged."""
 COULOMB = "coulomb"
 """Nominal friction force of a component under prescribed motion."""
 FROM = " from "
@@ -145,7 +148,16 @@ class Problem:
             else band_bins(responses, self.noise)
         )
         windows = windows_of(self, record, n_bins, values)
-        return RecordData(record, loads, responses, n_bins, self.whitening(record, n_bins, values), windows)
+        whitening = self.whitening(record, n_bins, values)
+        compared = decided(self.motion_of(record), self.motion_error(record)) if self.driven else None
+        return RecordData(record, loads, responses, n_bins, whitening, windows, compared)
+
+    def motion_error(self, record: CaseRecord) -> Array:
+        """Cached `prescribed_motion.motion_error` of a record."""
+        cache = self.__dict__.setdefault("_motion_errors", {})
+        if record.name not in cache:
+            cache[record.name] = motion_error(self.case, record)
+        return cache[record.name]
 
     def whitening(self, record: CaseRecord, n_bins: int, values: Array) -> NDArray[np.complex128]:
         """Return the whitening matrices of a record, the loads' noise passed through the linear structure at `values`."""
@@ -153,11 +165,27 @@ class Problem:
         noise = np.broadcast_to(
             np.diag(self.noise**2).astype(complex), (n_bins, len(self.noise), len(self.noise))
         )
-        if np.any(self.load_noise > 0) and not self.driven:
+        if self.driven:
+            noise = noise + self.motion_noise(record, values)[:n_bins, None, None]
+        elif np.any(self.load_noise > 0):
             response = self.transfer(self.structure.at(values), np.asarray(omega, dtype=np.float64))
             scaled = response * self.load_noise
             noise = noise + scaled @ np.conj(np.swapaxes(scaled, 1, 2))
         return np.asarray(np.linalg.inv(np.linalg.cholesky(noise)), dtype=np.complex128)
+
+    def motion_noise(self, record: CaseRecord, values: Array) -> Array:
+        """Power (n_frequencies,) of the force that the noise of a prescribed motion makes in the component at `values`.
+
+        Only what the linear part makes of it is counted. Zero where that noise is not stated.
+        """
+        n = fast_length(len(record))
+        if self.load_noise[0] == 0.0:
+            return np.zeros(n // 2 + 1)
+        linear = self.structure.at(values)
+        error = self.motion_error(record)
+        force = linear.stiffness[0, 0] * error[:, 0] + linear.damping[0, 0] * error[:, 1]
+        power = np.abs(np.fft.rfft(force, n)) ** 2 / len(record)
+        return np.asarray(ndimage.uniform_filter1d(power, SMOOTHED_BINS, mode="nearest"), dtype=np.float64)
 
     def transfer(
         self, linear: LinearStructure, omega: Array, inputs: Array | None = None
@@ -202,19 +230,10 @@ class Problem:
     def motion_of(self, record: CaseRecord) -> Motion:
         """Smoothed measured motion of any record of the case."""
         if record.name not in self.motions:
-            self.motions[record.name] = self._prescribed(record) if self.driven else self._smoothed(record)
+            self.motions[record.name] = (
+                prescribed_motion(self.case, record) if self.driven else self._smoothed(record)
+            )
         return self.motions[record.name]
-
-    def _prescribed(self, record: CaseRecord) -> Motion:
-        """Motion that drives a component: its measured displacement, and velocity where there is one, smoothed."""
-        orders = {name: order for order, name in enumerate(("displacement", "velocity", "acceleration"))}
-        have = [name for name in orders if self.case.has(name) and name in record.values]
-        noise = np.array(
-            [self.case.channel(name).noise_std or noise_floor(record.values[name]) for name in have]
-        )
-        samples = np.column_stack([record.values[name] for name in have])
-        out = smooth_motion(samples, tuple(orders[name] for name in have), noise, record.step)
-        return Motion(*(out[:, [i]] for i in range(3)))
 
     def _smoothed(self, record: CaseRecord) -> Motion:
         samples = np.column_stack([record.values[name] for name in self.structure.channels])

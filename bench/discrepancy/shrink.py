@@ -111,9 +111,11 @@ def noise_level(
     index = [problem.structure.channels.index(name) for name, _ in channels]
     signs = np.array([sign for _, sign in channels])
     own = float(np.sum(signs**2 * problem.noise[index] ** 2))
-    if problem.driven or not np.any(problem.load_noise > 0):
-        return float(np.sqrt(own))
     record = records[0]
+    if problem.driven:
+        return float(np.sqrt(own + np.mean(problem.motion_noise(record, problem.nominal))))
+    if not np.any(problem.load_noise > 0):
+        return float(np.sqrt(own))
     if problem.windowed:
         windows = problem.prepare(record, problem.nominal).windows
         assert windows is not None

@@ -1,0 +1,103 @@
+"""A motion that a machine prescribes: smoothed, its direction where the machine dwells, and how well both are known."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from bench.discrepancy.case import Case, CaseRecord
+from bench.discrepancy.prepared import noise_floor
+from bench.discrepancy.smoothing import smooth_motion
+from bench.discrepancy.system import Motion
+
+Array = NDArray[np.float64]
+
+DOUBT = 3.0
+"""Standard deviations of the velocity of a prescribed motion below which its direction is in doubt."""
+MOST_IN_DOUBT = 0.7
+"""Part of a record that may be in doubt; a motion so slow or so noisy is compared as it is."""
+REVERSAL = 2.0
+"""Way back of a prescribed motion, in units of its noise, from which it counts as a reversal."""
+CHANNELS = ("displacement", "velocity", "acceleration")
+
+
+def prescribed_motion(case: Case, record: CaseRecord) -> Motion:
+    """Motion that drives a component: its measured displacement, and velocity where there is one, smoothed."""
+    orders, samples, noise = _prescribing(case, record)
+    out = smooth_motion(samples, orders, noise, record.step)
+    out[:, 1] = held(out[:, 0], out[:, 1], REVERSAL * noise[0])
+    return Motion(*(out[:, [i]] for i in range(3)))
+
+
+def motion_error(case: Case, record: CaseRecord) -> Array:
+    """Error (n, 2) of a prescribed position and velocity: what smoothing makes of one more draw of the noise."""
+    orders, samples, noise = _prescribing(case, record)
+    drawn = np.random.default_rng(0).standard_normal(samples.shape) * noise
+    moved = smooth_motion(samples + drawn, orders, noise, record.step)
+    return np.asarray((moved - smooth_motion(samples, orders, noise, record.step))[:, :2], dtype=np.float64)
+
+
+def decided(motion: Motion, error: Array) -> Array | None:
+    """Samples (n,) of a prescribed motion whose direction the noise leaves in no doubt, as ones and zeros.
+
+    Dry friction changes its sign at a reversal, and the moment of the reversal is known to the noise only: a few
+    samples there would outweigh all the others. None where hardly anything would be left.
+
+    Args:
+        motion: The motion of one coordinate.
+        error: What `motion_error` gave for it.
+    """
+    sure = np.abs(motion.velocity[:, 0]) > DOUBT * float(np.std(error[:, 1]))
+    sure = ndimage.binary_erosion(sure, iterations=2, border_value=1)
+    return np.asarray(sure, dtype=np.float64) if sure.mean() > 1.0 - MOST_IN_DOUBT else None
+
+
+def _prescribing(case: Case, record: CaseRecord) -> tuple[tuple[int, ...], Array, Array]:
+    """Orders, samples (n, n_channels) and noise of the channels that tell a prescribed motion."""
+    have = [name for name in CHANNELS if case.has(name) and name in record.values]
+    noise = [case.channel(name).noise_std or noise_floor(record.values[name]) for name in have]
+    samples = np.column_stack([record.values[name] for name in have])
+    return tuple(CHANNELS.index(name) for name in have), samples, np.array(noise)
+
+
+@numba.njit(cache=True, error_model="numpy", nogil=True)
+def _directions(position, width, out):
+    """Direction of motion (+1 or -1), turned back to the extremum once the motion has come back from it by `width`."""
+    direction = 0.0
+    turn = 0
+    low = high = 0
+    for k in range(position.shape[0]):
+        if position[k] >= position[high]:
+            high = k
+        if position[k] <= position[low]:
+            low = k
+        if direction <= 0.0 and position[k] > position[low] + width:
+            turn = low if direction < 0.0 else 0
+            direction, high = 1.0, k
+        elif direction >= 0.0 and position[k] < position[high] - width:
+            turn = high if direction > 0.0 else 0
+            direction, low = -1.0, k
+        else:
+            turn = k
+        for i in range(turn, k + 1):
+            out[i] = direction
+
+
+def held(position: Array, velocity: Array, width: float) -> Array:
+    """Velocity (n,) without the reversals that only noise makes.
+
+    While a machine dwells, the smoothed velocity changes sign at random, and a friction law would make a rattle of it; a
+    real one holds the force of the last slip. Where the velocity is against the direction of the motion, reversals smaller than
+    `width` not counted, it is set to a trifle in that direction.
+
+    Args:
+        position: (n,).
+        velocity: (n,).
+        width: Way back that makes a reversal.
+    """
+    direction = np.zeros(len(position))
+    _directions(np.ascontiguousarray(position), width, direction)
+    trifle = 1e-9 * float(np.max(np.abs(velocity), initial=0.0))
+    return np.where(velocity * direction < 0.0, trifle * direction, velocity)
