@@ -74,10 +74,10 @@ def _directions(position, width, out):
         if position[k] <= position[low]:
             low = k
         if direction <= 0.0 and position[k] > position[low] + width:
-            turn = low if direction < 0.0 else 0
+            turn = low + 1 if direction < 0.0 else 0
             direction, high = 1.0, k
         elif direction >= 0.0 and position[k] < position[high] - width:
-            turn = high if direction > 0.0 else 0
+            turn = high + 1 if direction > 0.0 else 0
             direction, low = -1.0, k
         else:
             turn = k

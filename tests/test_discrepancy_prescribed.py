@@ -1,0 +1,82 @@
+"""Motions that a machine prescribes: dwells, reversals, and what the noise leaves open."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bench.discrepancy.case import Case, CaseChannel, NominalParameter, record_from_arrays
+from bench.discrepancy.diagnosis import diagnose
+from bench.discrepancy.prescribed_motion import decided, held, motion_error, prescribed_motion
+
+STEP = 0.002
+TIME = np.arange(5000) * STEP
+STIFFNESS, DAMPING, FRICTION = 4000.0, 150.0, 12.0
+NOISE = {"displacement": 2e-5, "force": 0.4}
+
+
+def strokes(first: float, second: float) -> np.ndarray:
+    """Strokes of two rates with a dwell of a second in the middle of every four."""
+    phase = 2.0 * np.pi * (first * TIME + second * np.sin(0.3 * TIME))
+    hold = (TIME % 4.0 > 1.5) & (TIME % 4.0 < 2.5)
+    turning = np.cumsum(np.where(hold, 0.0, np.gradient(phase)))
+    return 0.01 * np.convolve(np.sin(turning), np.hanning(201) / np.hanning(201).sum(), mode="same")
+
+
+def case(rng: np.random.Generator, *, friction: float) -> Case:
+    records = []
+    for name, x in (("identification", strokes(0.8, 0.3)), ("validation", strokes(1.1, 0.5))):
+        v = np.gradient(x, STEP)
+        direction = np.sign(v)
+        for k in range(1, len(v)):  # set-valued: at rest the force of the last slip is held
+            direction[k] = np.sign(v[k]) if abs(v[k]) > 1e-9 else direction[k - 1]
+        clean = {"displacement": x, "force": STIFFNESS * x + DAMPING * v + friction * direction}
+        noisy = {k: y + NOISE[k] * rng.standard_normal(len(y)) for k, y in clean.items()}
+        records.append(record_from_arrays(name, TIME, noisy))
+    channels = (
+        CaseChannel("displacement", "m", "prescribed", NOISE["displacement"]),
+        CaseChannel("force", "N", "response", NOISE["force"]),
+    )
+    parameters = (
+        NominalParameter("stiffness", 1.01 * STIFFNESS, 0.02 * STIFFNESS, "N/m"),
+        NominalParameter("damping", 0.97 * DAMPING, 0.05 * DAMPING, "N s/m"),
+    )
+    return Case("machine", "damper", parameters, channels, (records[0],), (records[1],))
+
+
+def test_dry_friction_is_found_through_dwells_and_noise(rng: np.random.Generator) -> None:
+    verdict = diagnose(case(rng, friction=FRICTION)).verdict
+    (effect,) = verdict.named
+    assert effect.name == "coulomb_friction"
+    estimate = effect.parameters["friction_force"]
+    assert (
+        abs(estimate.value - FRICTION) < 5.0 * estimate.std
+    )  # 5 sigma: the noise of the motion is counted to first order
+    assert verdict.gap.closed > 0.8
+
+
+def test_a_component_as_modelled_raises_no_alarm(rng: np.random.Generator) -> None:
+    assert diagnose(case(rng, friction=0.0)).verdict.verdict == "none"
+
+
+def test_reversals_smaller_than_the_noise_do_not_count() -> None:
+    position = np.array([0.0, 1.0, 2.0, 1.9, 2.0, 1.9, 3.0, 2.0, 1.0])
+    velocity = np.array([1.0, 1.0, 0.5, -0.1, 0.1, -0.1, 1.0, -1.0, -1.0])
+    out = held(position, velocity, 0.5)
+    assert np.array_equal(np.sign(out), [1, 1, 1, 1, 1, 1, 1, -1, -1])
+    kept = [0, 1, 2, 4, 6, 7, 8]
+    assert np.array_equal(out[kept], velocity[kept])
+
+
+def test_only_reversals_and_dwells_are_in_doubt(rng: np.random.Generator) -> None:
+    known = case(rng, friction=FRICTION)
+    record = known.identification[0]
+    motion, error = prescribed_motion(known, record), motion_error(known, record)
+    compared = decided(motion, error)
+    assert compared is not None
+    true = np.gradient(strokes(0.8, 0.3), STEP)
+    fast = np.abs(true) > 0.3 * np.abs(true).max()
+    assert compared[fast].mean() > 0.99
+    assert compared[np.abs(true) < 1e-9].mean() < 0.2
+    # the drawn error is as large as the one that was made, to within the spread of two draws of some hundred independent values
+    made = motion.velocity[:, 0] - true
+    assert 0.5 < np.std(error[200:-200, 1]) / np.std(made[200:-200]) < 2.0
