@@ -50,6 +50,8 @@ class Args:
     """Diagnose cases whose result is there already as well."""
     out: Path = ROOT / "docs" / "blind_results"
     """The files to write, without suffix."""
+    json: bool = False
+    """Print the figures as JSON as well."""
     html: Path | None = None
     """File for the scores as a page, where wanted."""
 
@@ -97,7 +99,7 @@ def write(args: Args, score: BlindScore, seconds: float) -> None:
     write_text(args.out.with_suffix(".md"), markdown(score, title="Sealed cases", lead=lead))
     if args.html is not None:
         page(score, title="Sealed cases", lead=lead).write(args.html)
-    print(args.out.with_suffix(".md"))
+    print(json.dumps(document) if args.json else args.out.with_suffix(".md"))
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ import numpy as np
 from bench.discrepancy import friction_limits as limits
 from bench.discrepancy.channel_effects import CHANNELS
 from bench.discrepancy.effect import Effect, FreeParameter, Scales, Values, log_grid
-from bench.discrepancy.rarer_forces import RARER, hysteretic_rate
+from bench.discrepancy.rarer_forces import RARER, bouc_wen_theta, hysteretic_rate
 from bench.errors import UnknownNameError
 from bench.laws.bouc_wen import BOUC_WEN
 from bench.laws.constant_force import CONSTANT_FORCE
@@ -39,12 +39,6 @@ SLOW = 1e-3
 def _lugre_theta(values: Values, scales: Scales) -> Values:
     level, preslide, ratio = values
     return np.array([level, level / preslide, level * ratio, 0.0, scales.velocity, 0.0])
-
-
-def _bouc_wen_theta(values: Values, scales: Scales) -> Values:
-    stiffness, beta, ratio, n = values
-    b = beta * scales.position ** (1.0 - n)
-    return np.array([stiffness, b * stiffness ** (1.0 - n), ratio * b * stiffness ** (1.0 - n), n])
 
 
 def _backlash_theta(values: Values, scales: Scales) -> Values:
@@ -141,7 +135,7 @@ FORCES: tuple[Effect, ...] = (
         ),
         "f = z, z' = A v - beta |v| |z|^(n-1) z - gamma v |z|^n",
         law=BOUC_WEN,
-        theta=_bouc_wen_theta,
+        theta=lambda values, scales: np.array(bouc_wen_theta(values, scales)),
         rate_bound=hysteretic_rate,
     ),
     Effect(

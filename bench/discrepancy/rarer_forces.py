@@ -21,21 +21,22 @@ PINCH_SPREAD = 0.25
 """psi_0: spread of the pinched part of a loop as a share of the ultimate strength; a record hardly tells it from the severity."""
 
 
-def _bouc_wen_theta(values: Values, scales: Scales) -> tuple[float, float, float, float]:
+def bouc_wen_theta(values: Values, scales: Scales) -> tuple[float, float, float, float]:
+    """A, beta, gamma and n of a Bouc-Wen law from parameters that do not depend on the size of its force."""
     stiffness, beta, ratio, n = values[:4]
     b = beta * scales.position ** (1.0 - n) * stiffness ** (1.0 - n)
     return stiffness, b, ratio * b, n
 
 
 def _degrading_theta(values: Values, scales: Scales) -> Values:
-    return np.array([*_bouc_wen_theta(values, scales), 0.0, values[4], values[5]])
+    return np.array([*bouc_wen_theta(values, scales), 0.0, values[4], values[5]])
 
 
 def _pinching_theta(values: Values, scales: Scales) -> Values:
     # p is large: the slack is there from the first cycle, as in a joint that has been used
     work = scales.force * scales.position
     spread = [1e4 / work, PINCH_SPREAD, 0.0, 0.5]
-    return np.array([*_bouc_wen_theta(values, scales), 0.0, 0.0, values[5], values[4], *spread])
+    return np.array([*bouc_wen_theta(values, scales), 0.0, 0.0, values[5], values[4], *spread])
 
 
 def _cogging_theta(values: Values, scales: Scales) -> Values:
