@@ -26,8 +26,8 @@ sys.path.insert(0, str(ROOT / "scripts"))
 from benchmark import machine  # noqa: E402
 
 from bench.discrepancy import BlindOptions, BlindScore, make_blind, run_blind  # noqa: E402
-from bench.discrepancy.blind_report import markdown, page  # noqa: E402
-from bench.discrepancy.scoring import score_cases, summary  # noqa: E402
+from bench.discrepancy.blind.score_report import markdown, page  # noqa: E402
+from bench.discrepancy.blind.scoring import score_cases, summary  # noqa: E402
 from bench.files import write_text  # noqa: E402
 from bench.provenance import provenance  # noqa: E402
 

@@ -116,7 +116,7 @@ QUIET = BlindOptions(
 def _case(effect: str, seed: int):
     import dataclasses
 
-    from bench.discrepancy.blind import draw_case
+    from bench.discrepancy.blind.protocol import draw_case
 
     options = dataclasses.replace(QUIET, effects=(effect,))
     return draw_case(effect, np.random.default_rng(seed), options)[0]

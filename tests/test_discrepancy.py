@@ -21,10 +21,10 @@ from bench.discrepancy import (
     score_blind,
     write_report,
 )
-from bench.discrepancy.blind import draw_case, write_case
+from bench.discrepancy.blind.protocol import draw_case, write_case
+from bench.discrepancy.blind.scoring import calibration_error
 from bench.discrepancy.catalogue import CATALOGUE, effect_named
 from bench.discrepancy.effect import Scales
-from bench.discrepancy.scoring import calibration_error
 from bench.discrepancy.shrink import closed_share, nrmse
 from bench.errors import FileFormatError, ParameterError, RecordingError, UnknownNameError
 

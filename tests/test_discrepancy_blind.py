@@ -11,17 +11,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bench.cli import main
-from bench.discrepancy import foreign, make_blind, read_case, run_blind, score_blind
 from bench.discrepancy import friction_limits as limits
-from bench.discrepancy.blind_bench import SIGNALS, BlindOptions, Plan, draw_bench, load, reach_of
-from bench.discrepancy.blind_cases import ALIKE, CLOSE, draw_case
-from bench.discrepancy.blind_effects import RECIPES, Reach, recipe_named
-from bench.discrepancy.blind_report import markdown, page, tables
+from bench.discrepancy import make_blind, read_case, run_blind, score_blind
+from bench.discrepancy.blind import foreign
+from bench.discrepancy.blind.benches import SIGNALS, BlindOptions, Plan, draw_bench, load, reach_of
+from bench.discrepancy.blind.cases import ALIKE, CLOSE, draw_case
+from bench.discrepancy.blind.effects import RECIPES, Reach, recipe_named
+from bench.discrepancy.blind.score_report import markdown, page, tables
+from bench.discrepancy.blind.scoring import calibration_error, region_scores, score_cases, wilson
+from bench.discrepancy.blind.time_stepping import Acting, Matrices, Stop, march
+from bench.discrepancy.blind.truth import ROWS, Placed, Truth, motion_of, played, sensed
 from bench.discrepancy.catalogue import CATALOGUE
-from bench.discrepancy.scoring import calibration_error, region_scores, score_cases, wilson
 from bench.discrepancy.system import Elements, LinearStructure, free_run
-from bench.discrepancy.time_stepping import Acting, Matrices, Stop, march
-from bench.discrepancy.truth import ROWS, Placed, Truth, motion_of, played, sensed
 from bench.errors import FileFormatError, ParameterError, UnknownNameError
 from bench.laws import LAWS
 from bench.laws.coulomb import COULOMB

@@ -7,12 +7,12 @@ import pytest
 from numpy.typing import NDArray
 
 from bench.discrepancy import Case, CaseChannel, NominalParameter, record_from_arrays
-from bench.discrepancy.missing_force import observers
 from bench.discrepancy.problem import Problem
-from bench.discrepancy.redundancy import contradictions
-from bench.discrepancy.state_map import CELLS, state_maps
-from bench.discrepancy.state_splits import force_splits
 from bench.discrepancy.structure import structure_of
+from bench.discrepancy.where.missing_force import observers
+from bench.discrepancy.where.redundancy import contradictions
+from bench.discrepancy.where.state_map import CELLS, state_maps
+from bench.discrepancy.where.state_splits import force_splits
 
 MASS, DAMPING, STIFFNESS = 2.0, 4.0, 1500.0
 RATE, N = 1000.0, 10_000

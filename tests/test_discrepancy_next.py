@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from bench.discrepancy import Case, CaseChannel, NominalParameter, record_from_arrays
-from bench.discrepancy.application import element_code, element_toml
 from bench.discrepancy.catalogue import effect_named
 from bench.discrepancy.explain import Explanation
 from bench.discrepancy.fit import fit
@@ -14,6 +13,7 @@ from bench.discrepancy.next_excitation import Rival, outlook, propose, separate,
 from bench.discrepancy.problem import Placed, Problem
 from bench.discrepancy.proposals import limits_of
 from bench.discrepancy.reasons import why_none
+from bench.discrepancy.report.application import element_code, element_toml
 from bench.discrepancy.structure import structure_of
 
 RATE, N = 500.0, 3000

@@ -13,7 +13,7 @@ from planted_cases import DAMPING, MASS, NOISE, SAMPLE_RATE, STIFFNESS, linear_m
 
 from bench.cli import main
 from bench.discrepancy import Case, diagnose, read_case, record_from_arrays
-from bench.discrepancy.blind import write_case
+from bench.discrepancy.blind.protocol import write_case
 from bench.discrepancy.nominal_file import check_units
 from bench.discrepancy.problem import Problem
 from bench.discrepancy.quality import compare, notes, refuse, unit_factor

@@ -10,7 +10,7 @@ from scipy.optimize import least_squares
 
 from bench.discrepancy import BlindOptions
 from bench.discrepancy.attribute import placements, refined
-from bench.discrepancy.blind import draw_case
+from bench.discrepancy.blind.protocol import draw_case
 from bench.discrepancy.catalogue import effect_named
 from bench.discrepancy.linear_run import linear_run
 from bench.discrepancy.minimise import Prior, minimise

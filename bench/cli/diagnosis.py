@@ -56,7 +56,7 @@ class Diagnose:
                 stage(f"writing {self.html}")
                 write_report(diagnosis, self.html)
             if self.rrd is not None:
-                from bench.discrepancy.rerun_report import write_rerun
+                from bench.discrepancy.report.rerun import write_rerun
 
                 stage(f"writing {self.rrd}")
                 write_rerun(diagnosis, self.rrd)
@@ -270,7 +270,7 @@ class BlindScore:
     def __call__(self) -> None:
         """Run the command."""
         from bench.discrepancy import score_blind
-        from bench.discrepancy.blind_report import markdown, page, tables
+        from bench.discrepancy.blind.score_report import markdown, page, tables
         from bench.files import write_text
 
         score = score_blind(self.results, self.answers, cases=self.cases)

@@ -10,7 +10,7 @@ from bench.demo import DemoResult
 from bench.demo.damper import DamperTest
 from bench.demo.joint import JointModel, Progress
 from bench.discrepancy import write_report, write_rerun
-from bench.discrepancy.report_figures import state_figure
+from bench.discrepancy.report.figures import state_figure
 from bench.figures import bar_table, loops, time_histories
 from bench.page import Page
 from bench.record_files import write_recording

@@ -9,7 +9,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from bench.discrepancy.blind import BlindOptions, make_blind, run_blind
+    from bench.discrepancy.blind.protocol import BlindOptions, make_blind, run_blind
+    from bench.discrepancy.blind.scoring import BlindScore, score_blind
     from bench.discrepancy.case import (
         Case,
         CaseChannel,
@@ -19,14 +20,13 @@ if TYPE_CHECKING:
         record_from_arrays,
     )
     from bench.discrepancy.diagnosis import Diagnosis, diagnose, diagnose_folder
-    from bench.discrepancy.report import write_report
-    from bench.discrepancy.rerun_report import write_rerun
-    from bench.discrepancy.scoring import BlindScore, score_blind
+    from bench.discrepancy.report.pages import write_report
+    from bench.discrepancy.report.rerun import write_rerun
     from bench.discrepancy.verdict import Verdict
 
 _HOMES = {
-    "BlindOptions": "blind",
-    "BlindScore": "scoring",
+    "BlindOptions": "blind.protocol",
+    "BlindScore": "blind.scoring",
     "Case": "case",
     "CaseChannel": "case",
     "CaseRecord": "case",
@@ -35,13 +35,13 @@ _HOMES = {
     "Verdict": "verdict",
     "diagnose": "diagnosis",
     "diagnose_folder": "diagnosis",
-    "make_blind": "blind",
+    "make_blind": "blind.protocol",
     "read_case": "case",
     "record_from_arrays": "case",
-    "run_blind": "blind",
-    "score_blind": "scoring",
-    "write_report": "report",
-    "write_rerun": "rerun_report",
+    "run_blind": "blind.protocol",
+    "score_blind": "blind.scoring",
+    "write_report": "report.pages",
+    "write_rerun": "report.rerun",
 }
 
 __all__ = [

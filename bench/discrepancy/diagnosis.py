@@ -21,7 +21,6 @@ from bench.discrepancy.catalogue import CATALOGUE
 from bench.discrepancy.closure import CLOSURES
 from bench.discrepancy.effect import Effect
 from bench.discrepancy.explain import Explanation, close, explain
-from bench.discrepancy.locate import Whereabouts, locate
 from bench.discrepancy.next_excitation import separate, told_apart
 from bench.discrepancy.nominal_file import check_units
 from bench.discrepancy.problem import Problem
@@ -31,6 +30,7 @@ from bench.discrepancy.shrink import gaps, nominal_prediction
 from bench.discrepancy.start_estimates import start_warnings
 from bench.discrepancy.structure import structure_of
 from bench.discrepancy.verdict import NamedEffect, Ranked, Verdict
+from bench.discrepancy.where.locate import Whereabouts, locate
 from bench.errors import UnknownNameError
 
 SEED = 20060501

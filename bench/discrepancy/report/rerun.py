@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from bench.discrepancy.locate import box
 from bench.discrepancy.problem import Array
+from bench.discrepancy.report.variants import MEASURED, place_channels, variants
 from bench.discrepancy.shrink import coordinates
-from bench.discrepancy.state_map import StateMap
-from bench.discrepancy.variants import MEASURED, place_channels, variants
+from bench.discrepancy.where.locate import box
+from bench.discrepancy.where.state_map import StateMap
 
 if TYPE_CHECKING:
     from bench.discrepancy.diagnosis import Diagnosis

@@ -25,9 +25,9 @@ from numpy.typing import NDArray
 from scipy import ndimage, stats
 
 from bench.discrepancy.case import CaseRecord
-from bench.discrepancy.missing_force import ForceObserver, observers
 from bench.discrepancy.problem import Array, Problem
 from bench.discrepancy.structure import Place
+from bench.discrepancy.where.missing_force import ForceObserver, observers
 
 CELLS = 12
 """Cells a coordinate of the state space is cut into; even, so that zero is an edge."""

@@ -4,7 +4,7 @@ Everything is drawn from one generator, so a case is a function of its seed. A d
 until the gap of the identification records is the wanted one, and the draw is thrown away where the judging
 record then shows less than half or more than twice of that, or where one of two effects hides behind the other.
 Nothing is thrown away for being hard to tell apart: how well a record can tell at all is computed beside the case instead
-(`bench.discrepancy.detectability`) and stands in the answer.
+(`bench.discrepancy.blind.detectability`) and stands in the answer.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.discrepancy.blind_bench import Bench, BlindOptions, Plan, draw_bench, reach_of
-from bench.discrepancy.blind_effects import RECIPES, Drawn, Shape
+from bench.discrepancy.blind.benches import Bench, BlindOptions, Plan, draw_bench, reach_of
+from bench.discrepancy.blind.detectability import detectability
+from bench.discrepancy.blind.effects import RECIPES, Drawn, Shape
+from bench.discrepancy.blind.time_stepping import TrueMotion
+from bench.discrepancy.blind.truth import ROWS, STEPS, Placed, Truth
 from bench.discrepancy.case import Case, CaseChannel, NominalParameter, record_from_arrays
-from bench.discrepancy.detectability import detectability
-from bench.discrepancy.time_stepping import TrueMotion
-from bench.discrepancy.truth import ROWS, STEPS, Placed, Truth
 from bench.errors import ParameterError, SimulationError
 
 Array = NDArray[np.float64]

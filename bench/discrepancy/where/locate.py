@@ -23,10 +23,10 @@ from scipy import stats
 from bench.discrepancy.explain import Explanation
 from bench.discrepancy.prepared import fast_length, whitened_spectrum
 from bench.discrepancy.problem import Array, Problem
-from bench.discrepancy.redundancy import Contradiction, contradictions
-from bench.discrepancy.state_map import FALSE_DISCOVERIES, Region, StateMap, state_maps
-from bench.discrepancy.state_splits import force_splits
 from bench.discrepancy.verdict import Location, Split
+from bench.discrepancy.where.redundancy import Contradiction, contradictions
+from bench.discrepancy.where.state_map import FALSE_DISCOVERIES, Region, StateMap, state_maps
+from bench.discrepancy.where.state_splits import force_splits
 
 BANDS = 12
 """Frequency bands, evenly over the logarithm of frequency."""

@@ -2,7 +2,7 @@
 
 Smooth and continuous laws on the sdof and the joint rig are integrated by MuJoCo through the bench's native callback,
 Runge-Kutta with `STEPS` steps a sample: the engine that users run. Set-valued friction and rigid stops, which MuJoCo's
-callback can only round, go through Moreau's time stepping (`bench.discrepancy.time_stepping`). A component under prescribed
+callback can only round, go through Moreau's time stepping (`bench.discrepancy.blind.time_stepping`). A component under prescribed
 motion needs no dynamics; its hidden states are integrated along the finely sampled motion. None of these is the integrator of
 the fits. What they share with the fits are the kernels of the laws, which is the point of having them written once.
 
@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
-from bench.discrepancy.blind_effects import Drawn, Recipe
-from bench.discrepancy.time_stepping import Acting, Matrices, Stop, TrueMotion, follow, march
+from bench.discrepancy.blind.effects import Drawn, Recipe
+from bench.discrepancy.blind.time_stepping import Acting, Matrices, Stop, TrueMotion, follow, march
 
 Array = NDArray[np.float64]
 

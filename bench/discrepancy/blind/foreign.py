@@ -11,7 +11,7 @@ or the closures; they are laws all the same, so that MuJoCo's callback integrate
   remembers which threshold was passed last.
 - `friction_cone`: friction in two directions with one limit for both together; axial slip lowers the torsional friction.
 - `restitution_stop`: a rigid stop that throws back with a coefficient of restitution; an impulse, hence no law: the time
-  stepping of `bench.discrepancy.time_stepping` knows it.
+  stepping of `bench.discrepancy.blind.time_stepping` knows it.
 """
 
 from __future__ import annotations

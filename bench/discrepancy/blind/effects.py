@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bench.discrepancy import foreign
 from bench.discrepancy import friction_limits as limits
+from bench.discrepancy.blind import foreign
 from bench.errors import UnknownNameError
 from bench.laws.base import ForceLaw, Kernel
 from bench.laws.bouc_wen import BOUC_WEN

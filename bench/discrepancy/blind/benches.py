@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import bessel, chirp, fftconvolve, sosfilt
 
-from bench.discrepancy.blind_effects import Reach, Recipe, recipe_named
-from bench.discrepancy.time_stepping import TrueMotion
-from bench.discrepancy.truth import ROWS, STEPS, Placed, Truth, force_under, motion_of, sensed
+from bench.discrepancy.blind.effects import Reach, Recipe, recipe_named
+from bench.discrepancy.blind.time_stepping import TrueMotion
+from bench.discrepancy.blind.truth import ROWS, STEPS, Placed, Truth, force_under, motion_of, sensed
 from bench.errors import ParameterError
 
 Array = NDArray[np.float64]

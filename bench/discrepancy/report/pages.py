@@ -11,12 +11,12 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.discrepancy.application import recipes
 from bench.discrepancy.diagnosis import Diagnosis
+from bench.discrepancy.report.application import recipes
+from bench.discrepancy.report.variants import MEASURED, NOMINAL, variants
 from bench.discrepancy.shrink import coordinates
-from bench.discrepancy.state_map import StateMap
-from bench.discrepancy.variants import MEASURED, NOMINAL, variants
 from bench.discrepancy.verdict import Split
+from bench.discrepancy.where.state_map import StateMap
 from bench.page import Page, Section
 from bench.recording import Recording
 
@@ -155,7 +155,7 @@ def _location_section(out: Page, diagnosis: Diagnosis, runs: Mapping[str, Record
     main = {location.channel for location in verdict.locations if location.share > WORTH_SHOWING}
     residual = [s for s in verdict.splits if s.kind in {"band_hz", "time_s"} and s.of in main]
     if residual:
-        from bench.discrepancy.report_figures import shares  # noqa: PLC0415  (matplotlib)
+        from bench.discrepancy.report.figures import shares  # noqa: PLC0415  (matplotlib)
 
         section.figure(
             shares(residual),
@@ -181,7 +181,7 @@ def _contradiction_text(found) -> str:
 def _map(
     section: Section, found: StateMap, runs: Mapping[str, Recording], splits: Sequence[Split], name: str
 ) -> None:
-    from bench.discrepancy.report_figures import force_loops, shares, state_figure  # noqa: PLC0415  (matplotlib)
+    from bench.discrepancy.report.figures import force_loops, shares, state_figure  # noqa: PLC0415  (matplotlib)
 
     place = found.place
     title = f" ({place.name})" if place.name else ""
@@ -223,7 +223,7 @@ def region_words(found: StateMap) -> str:
 
 
 def _ranking_section(out: Page, diagnosis: Diagnosis) -> None:
-    from bench.discrepancy.report_figures import ranking_bars  # noqa: PLC0415  (matplotlib)
+    from bench.discrepancy.report.figures import ranking_bars  # noqa: PLC0415  (matplotlib)
 
     verdict = diagnosis.verdict
     section = out.section("Which effect")
@@ -246,7 +246,7 @@ def _ranking_section(out: Page, diagnosis: Diagnosis) -> None:
 
 
 def _parameter_section(out: Page, diagnosis: Diagnosis) -> None:
-    from bench.discrepancy.report_figures import correlation_map  # noqa: PLC0415  (matplotlib)
+    from bench.discrepancy.report.figures import correlation_map  # noqa: PLC0415  (matplotlib)
 
     section = out.section("Parameters")
     for problem, fitted in diagnosis.explanations[0].parts:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from bench.discrepancy.scoring import BlindScore, Share
+from bench.discrepancy.blind.scoring import BlindScore, Share
 from bench.page import Page
 
 REQUIRED = {

@@ -7,7 +7,7 @@ is why steps are short (`SUBSTEPS` a sample).
 
 This is a second integrator on purpose. The fits have one of their own (`bench.discrepancy.system`: Runge-Kutta between
 events that are located); a case made with that would forgive its mistakes. Smooth laws go through MuJoCo instead, see
-`bench.discrepancy.truth`; the tests hold all three equal.
+`bench.discrepancy.blind.truth`; the tests hold all three equal.
 
 References:
     J. J. Moreau, Unilateral contact and dry friction in finite freedom dynamics, CISM 302 (1988).

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bench.discrepancy.case import CaseRecord
-from bench.discrepancy.locate import known_parameters
-from bench.discrepancy.missing_force import observers
 from bench.discrepancy.problem import Array
 from bench.discrepancy.shrink import nominal_prediction
+from bench.discrepancy.where.locate import known_parameters
+from bench.discrepancy.where.missing_force import observers
 from bench.recording import Recording
 
 if TYPE_CHECKING:

@@ -9,8 +9,8 @@ from scipy import stats
 
 from bench.discrepancy.case import CaseRecord
 from bench.discrepancy.problem import Array, Problem
-from bench.discrepancy.state_map import FALSE_DISCOVERIES, StateMap, Track, independent
 from bench.discrepancy.verdict import Split
+from bench.discrepancy.where.state_map import FALSE_DISCOVERIES, StateMap, Track, independent
 
 BANDS = 10
 TRAVELS = 8

@@ -2,7 +2,7 @@
 
 `make_blind` writes cases into one folder and their answers into another; beside each case stands the SHA-256 of its answer,
 so that nobody can change an answer afterwards, and the answer holds a random salt, so that nobody can guess it from
-the hash. `run_blind` opens the cases only. `bench.discrepancy.scoring.score_blind` opens both and checks the hashes.
+the hash. `run_blind` opens the cases only. `bench.discrepancy.blind.scoring.score_blind` opens both and checks the hashes.
 
 Cases are functions of a seed and their number, each with a generator of its own: a maker that was stopped goes on
 where it was, several processes make the same cases as one, and whoever is told the seed afterwards can make them again.
@@ -27,7 +27,7 @@ from typing import Any
 
 import numpy as np
 
-from bench.discrepancy.blind_cases import BlindOptions, draw_case
+from bench.discrepancy.blind.cases import BlindOptions, draw_case
 from bench.discrepancy.case import Case
 from bench.errors import BenchError, FileFormatError, ParameterError
 from bench.files import replacing, write_text
