@@ -62,11 +62,13 @@ def driving_loads(
         for placed, eta in zip(*effects, strict=True)
         if placed.effect.site == "actuator" and placed.effect.signal is not None
     ]
-    cache, key = problem.__dict__.setdefault("_loads", {}), (record.name, substeps)
+    lead = problem.lead_in(record)
+    # a proposed test may bear the name of a record, but be no period of anything
+    cache, key = problem.__dict__.setdefault("_loads", {}), (record.name, len(record), lead, substeps)
     if not acting and key in cache:
         return cache[key]
     loads = np.column_stack([record.values[name] for name in problem.structure.loads])
-    loads = np.vstack([loads] * (1 + problem.lead_in(record) // len(record)))
+    loads = np.vstack([loads] * (1 + lead // len(record)))
     for placed, signal, eta in acting:
         j = problem.structure.loads.index(placed.target)
         values = placed.effect.values(eta, problem.scales_of(placed))

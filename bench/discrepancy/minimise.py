@@ -26,9 +26,9 @@ PATIENCE = 3
 """Steps after which a minimisation may be given up."""
 OPTIMISM = 4.0
 """How many times the decrease that the linearisation promises may still come."""
-NOISE = 1.1
+NOISE = 2.0
 """Squared residuals, over their number, up to which a minimisation is carried to its end."""
-COARSE = 2e-3
+COARSE = 1e-3
 """Part of what lies beyond that is not worth a step: a wrong model is no less wrong for it."""
 FRESH_TRIALS, STALE_TRIALS = 7, 2
 """Dampings that are tried with a Jacobian taken at the point and with one carried along."""
