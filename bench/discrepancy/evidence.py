@@ -150,4 +150,10 @@ def plain_words(kind: Kind, explanations: Sequence[Explanation]) -> str:
             "Something is missing from the model, and no catalogued effect brings the records down to their noise. "
             f"The nearest is {nearest}, which leaves {best.reduced:.3g} times the power of the noise."
         )
-    return f"Missing from the model: {names(best.hypothesis)}. With it the records are explained to within their noise."
+    missing = f"Missing from the model: {names(best.hypothesis)}."
+    if not _noise_stated(explanations):
+        nothing = next(e for e in explanations if not e.hypothesis)
+        share = 100.0 * (1.0 - best.reduced / nothing.reduced)
+        taken = f"It takes away {share:.3g} % of the power of the residuals"
+        return f"{missing} {taken}; without the noise being stated nobody can say whether that is all."
+    return f"{missing} With it the records are explained to within their noise."
