@@ -18,8 +18,9 @@ import numpy as np
 from bench.discrepancy.case import Case
 from bench.discrepancy.effect import Effect
 from bench.discrepancy.fit import Fit, fit
+from bench.discrepancy.grid_points import Point
 from bench.discrepancy.problem import FROM, Hypothesis, Placed, Problem
-from bench.discrepancy.screen import Ground, Point, Screen
+from bench.discrepancy.screen import Ground, Screen
 from bench.discrepancy.structure import Structure
 
 THREADS = 2
@@ -202,6 +203,8 @@ def attribute(
         search, screen, points = prepared or prepare(problem, candidates, pool.map)
         nothing = search.ranked(0)[0]
         progress(f"nominal model: chi-squared {nothing.reduced:.3g} of its expectation")
+        if consistent(nothing):
+            points = _about(screen, nothing).ranked()
         at_ease = consistent(nothing) and nothing.cost - nothing.chi2 < len(problem.nominal) + WORTH_A_FIT / 2
         if at_ease and (not points or points[0].gain < WORTH_A_FIT):
             return search
@@ -236,8 +239,16 @@ def attribute(
 
 def _promising(screen: Screen, best: Fit) -> bool:
     """Whether one more effect could still be in the residual of a hypothesis that is down to the noise."""
+    screen = _about(screen, best)
     points = screen.ranked(best, screen.ground(best, simulated=True))
     return bool(points) and points[0].gain > max(WORTH_A_FIT, IMMATERIAL * best.n_residuals)
+
+
+def _about(screen: Screen, base: Fit) -> Screen:
+    """The screening that tells what a base lacks."""
+    spoilt = any(placed.effect.site == "sensor" for placed in base.hypothesis)
+    explained = consistent(base)
+    return screen.beside(base, simulated=explained) if spoilt or explained else screen
 
 
 def prepare(
@@ -279,12 +290,13 @@ def _extend(
     size = len(bases[0].hypothesis) + 1
     for base in bases:
         named = base if base.hypothesis else None
-        ground = screen.ground(named, simulated=named is not None and consistent(base))
-        solved = [p for p in screen.ranked(named, ground) if not among or p.placed.key in among]
-        points = refined(screen, ground, solved, pool)
+        local = _about(screen, base)
+        ground = local.ground(named, simulated=named is not None and consistent(base))
+        solved = [p for p in local.ranked(named, ground) if not among or p.placed.key in among]
+        points = refined(local, ground, solved, pool)
         if not named:
             search.first = sorted([*search.first, *points] if among else points, key=lambda p: -p.gain)
-        inertia = {} if among else screen.inertia_gains(ground)
+        inertia = {} if among else local.inertia_gains(ground)
         most = max([p.gain for p in points] + list(inertia.values()), default=0.0)
         for point in _leading(points, count, SHORT * most):
             if search.start(base.hypothesis, point):
@@ -368,9 +380,10 @@ def challenge(search: Search, screen: Screen, pool: ThreadPoolExecutor, *, round
             base = replace(best, hypothesis=rest, vector=vector) if rest else None
             points, alone = search.first, search.ranked(0)[0].chi2
             if rest:
-                ground = screen.ground(base)
-                alone = float(np.sum(ground.project(ground.residual) ** 2))
-                points = refined(screen, ground, screen.ranked(base, ground), pool)
+                local = _about(screen, base)
+                ground = local.ground(base)
+                alone = float(np.sum(ground.left**2))
+                points = refined(local, ground, local.ranked(base, ground), pool)
             own = max((p.gain for p in points if p.placed.key == placed.key), default=np.inf)
             left = max(alone - own, search.problem.n_residuals)
             for point in _leading(points, 5, own - left - LEFT * own, starts=REFINED_STARTS):

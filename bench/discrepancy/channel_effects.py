@@ -116,7 +116,7 @@ CHANNELS: tuple[Effect, ...] = (
             ),
         ),
         "x(t - tau)",
-        signal=signals.delay,
+        signal=signals.sensor_delay,
         quantity="position",
     ),
     Effect(
@@ -181,7 +181,7 @@ CHANNELS: tuple[Effect, ...] = (
             ),
         ),
         "a(t - tau)",
-        signal=signals.delay,
+        signal=signals.sensor_delay,
         quantity="acceleration",
         log_prior=-1.0,
     ),

@@ -95,7 +95,7 @@ def diagnose(
     problem = Problem(case, structure_of(case), case.identification)
     refuse(problem)
     explanations = explain(case, catalogue, most=most, progress=progress)
-    best = explanations[0]
+    best, nothing = explanations[0], next(e for e in explanations if not e.hypothesis)
     kind, probabilities = evidence.judge(explanations)
     seen, fitted = recorded(problem, catalogue), kind
     if seen and kind == "none":
@@ -104,8 +104,7 @@ def diagnose(
     final, closure = best, ""
     if kind == "unknown":
         progress("nonparametric closure")
-        final, closure = close(best, CLOSURES)
-    nothing = next(e for e in explanations if not e.hypothesis)
+        final, closure = close(best, nothing, CLOSURES)
     stages = [("nominal", nominal_prediction(problem)), ("parameters only", nothing.predict)]
     stages += [(label, e.predict) for label, e in _path(explanations)]
     stages.append((names(best.hypothesis) + (f" + {closure}" if closure else ""), final.predict))

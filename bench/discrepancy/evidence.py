@@ -39,11 +39,17 @@ def judge(explanations: Sequence[Explanation]) -> tuple[Kind, dict[str, float]]:
         return _judge_unscaled(explanations)
     shares = weights(explanations)
     none = float(sum(w for w, e in zip(shares, explanations, strict=True) if not e.hypothesis))
-    known = 1.0 - OUTSIDE if best.consistent else OUTSIDE
+    complete = best.consistent and not any(best.lacking(_nothing(explanations)))
+    known = 1.0 - OUTSIDE if complete else OUTSIDE
     probabilities = {"effect": known * (1.0 - none), "none": known * none, "unknown": 1.0 - known}
-    if not best.consistent:
+    if not complete:
         return "unknown", probabilities
     return ("none" if not best.hypothesis else "effect"), probabilities
+
+
+def _nothing(explanations: Sequence[Explanation]) -> Explanation:
+    """The nominal model alone."""
+    return next(e for e in explanations if not e.hypothesis)
 
 
 def _noise_stated(explanations: Sequence[Explanation]) -> bool:
@@ -53,7 +59,7 @@ def _noise_stated(explanations: Sequence[Explanation]) -> bool:
 def _judge_unscaled(explanations: Sequence[Explanation]) -> tuple[Kind, dict[str, float]]:
     """Verdict where the noise is not stated: by the part of the residual power that the best explanation takes away."""
     best = explanations[0]
-    nothing = next(e for e in explanations if not e.hypothesis)
+    nothing = _nothing(explanations)
     explained = 1.0 - best.reduced / nothing.reduced
     if not best.hypothesis:
         return "none", {"effect": 0.0, "none": 1.0, "unknown": 0.0}
@@ -137,6 +143,25 @@ def _named(problem, placed: Placed, eta: np.ndarray, std: np.ndarray, probabilit
     )
 
 
+def _short_of_it(best: Explanation) -> str:
+    nearest = names(best.hypothesis)
+    if not _noise_stated([best]) or not best.consistent:
+        return (
+            "and no catalogued effect brings the records down to their noise. "
+            f"The nearest is {nearest}, which leaves {best.reduced:.3g} times the power of the noise."
+        )
+    lack = min(best.lacks, key=lambda lack: lack.p_value)
+    free = {
+        "memory": "with a memory of its own",
+        "product": "of displacement and velocity",
+        "any": "of any kind",
+    }
+    return (
+        f"and no catalogued effect is it: {nearest} comes near, but a force {free.get(lack.model, f'of {lack.model}')} on top of "
+        f"it lowers chi-squared by {lack.gain:.0f}, where noise would let it gain {lack.freedom}."
+    )
+
+
 def plain_words(kind: Kind, explanations: Sequence[Explanation]) -> str:
     """The verdict in a sentence or two."""
     best = explanations[0]
@@ -145,14 +170,10 @@ def plain_words(kind: Kind, explanations: Sequence[Explanation]) -> str:
             "The stated uncertainties and the noise explain the records; nothing is missing from the model."
         )
     if kind == "unknown":
-        nearest = names(best.hypothesis)
-        return (
-            "Something is missing from the model, and no catalogued effect brings the records down to their noise. "
-            f"The nearest is {nearest}, which leaves {best.reduced:.3g} times the power of the noise."
-        )
+        return f"Something is missing from the model, {_short_of_it(best)}"
     missing = f"Missing from the model: {names(best.hypothesis)}."
     if not _noise_stated(explanations):
-        nothing = next(e for e in explanations if not e.hypothesis)
+        nothing = _nothing(explanations)
         share = 100.0 * (1.0 - best.reduced / nothing.reduced)
         taken = f"It takes away {share:.3g} % of the power of the residuals"
         return f"{missing} {taken}; without the noise being stated nobody can say whether that is all."

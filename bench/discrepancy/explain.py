@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 
 import numpy as np
@@ -35,9 +36,11 @@ from bench.discrepancy.attribute import (
 from bench.discrepancy.case import Case, CaseRecord
 from bench.discrepancy.effect import Effect
 from bench.discrepancy.fit import Fit, fit
+from bench.discrepancy.grid_points import Point
+from bench.discrepancy.lack_of_fit import LackOfFit, lack_of_fit
 from bench.discrepancy.prepared import whitened
 from bench.discrepancy.problem import Array, Hypothesis, Problem, band_bins
-from bench.discrepancy.screen import Point, Screen
+from bench.discrepancy.screen import Screen
 from bench.discrepancy.start_estimates import predict
 from bench.discrepancy.structure import Structure, structure_of
 
@@ -78,10 +81,30 @@ class Explanation:
         """Whether every group's residuals are down to the noise."""
         return all(consistent(fitted) for _, fitted in self.parts)
 
+    @cached_property
+    def lacks(self) -> tuple[LackOfFit, ...]:
+        """What free models still find in each group."""
+        return tuple(lack_of_fit(problem, fitted) for problem, fitted in self.parts)
+
+    def lacking(self, nothing: Explanation) -> tuple[bool, ...]:
+        """Whether something is left in each group although chi-squared is down to the noise; beside the nominal model alone.
+
+        Not asked of windows: their motion is known as measured only, and its noise is that of the residuals.
+        """
+        if not self.consistent or any(problem.windowed for problem, _ in self.parts):
+            return (False,) * len(self.parts)
+        explained = nothing.chi2 - self.chi2
+        return tuple(lack.significant(explained) for lack in self.lacks)
+
+    @property
+    def chi2(self) -> float:
+        """Chi-squared of all groups."""
+        return sum(f.chi2 for _, f in self.parts)
+
     @property
     def reduced(self) -> float:
         """Chi-squared of all groups over its expectation."""
-        return sum(f.chi2 for _, f in self.parts) / sum(f.n_residuals for _, f in self.parts)
+        return self.chi2 / sum(f.n_residuals for _, f in self.parts)
 
     def predict(self, record: CaseRecord) -> dict[str, Array]:
         """Free run of a record: response channel to samples (n,)."""
@@ -260,20 +283,21 @@ def _combined(searches: Sequence[Search]) -> list[Explanation]:
     return sorted(found, key=lambda e: -e.log_posterior)
 
 
-def close(best: Explanation, closures: Sequence[Effect]) -> tuple[Explanation, str]:
+def close(best: Explanation, nothing: Explanation, closures: Sequence[Effect]) -> tuple[Explanation, str]:
     """Add nonparametric closures to an explanation while they pay.
 
     Args:
         best: The best catalogued explanation.
+        nothing: The nominal model alone.
         closures: Free models of a missing force.
 
     Returns:
         The closed explanation, and the names of the closures used.
     """
     parts, used = [], []
-    for problem, fitted in best.parts:
+    for (problem, fitted), lacks in zip(best.parts, best.lacking(nothing), strict=True):
         current = fitted
-        if not consistent(fitted):
+        if lacks or not consistent(fitted):
             candidates = placements(problem.case, problem.structure, closures)
             screen = Screen(problem, candidates)
             current = fit(problem, (), start=np.zeros(len(problem.nominal)))
@@ -289,7 +313,7 @@ def close(best: Explanation, closures: Sequence[Effect]) -> tuple[Explanation, s
                     break
                 current = closed
                 used.append(points[0].placed.effect.name)
-                if consistent(current):
+                if consistent(current) and not lacks:
                     break
         parts.append((problem, current))
     return Explanation(tuple(parts)), " + ".join(dict.fromkeys(used))

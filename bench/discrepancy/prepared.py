@@ -16,6 +16,8 @@ from bench.discrepancy.whitening import whiten
 Array = NDArray[np.float64]
 ABOVE_NOISE = 1.5
 """A frequency belongs to the band of a record while a smoothed response spectrum exceeds this many times its noise."""
+TIMED = 5.0
+"""Residual, in standard deviations of the noise, that a jump within a sample of its time may leave."""
 MAX_BINS = 2500
 """Most frequency bins of a record; friction rattles an accelerometer up to the Nyquist frequency and one need not follow."""
 
@@ -68,6 +70,31 @@ def band_bins(responses: Array, noise: Array) -> int:
         if len(above):
             last = max(last, (above[-1] + 2) * width)
     return int(min(last, n // 2, MAX_BINS))
+
+
+def timed(residual: Array, predicted: Array, noise: float) -> Array:
+    """Residuals (n,) of one channel, limited where a predicted jump that comes a sample early or late explains them.
+
+    Friction and stops make accelerations jump. The noise of the loads moves the time of a jump by microseconds; where a sample
+    falls into them it is off by the whole jump, tens of standard deviations, and no parameter is to blame.
+
+    Args:
+        residual: Measured minus predicted.
+        predicted: The free run.
+        noise: Standard deviation of the channel's noise.
+    """
+    rise = np.diff(predicted)
+    around = np.stack([np.roll(rise, shift) for shift in (-2, -1, 1, 2)])
+    slope = np.median(around, axis=0)
+    jump = rise - slope
+    sharp = np.abs(jump) > np.maximum(2.0 * TIMED * noise, 2.0 * np.abs(around[1:3] - slope).max(axis=0))
+    k = np.flatnonzero(sharp[2:-2]) + 2
+    out = residual.copy()
+    for samples, reach in ((k, jump[k]), (k + 1, -jump[k])):
+        part = residual[samples] * np.sign(reach)
+        excused = (part > TIMED * noise) & (part < np.abs(reach) + TIMED * noise)
+        out[samples[excused]] = TIMED * noise * np.sign(reach[excused])
+    return out
 
 
 def whitened(residual: Array, data: RecordData) -> Array:

@@ -20,7 +20,7 @@ from bench.discrepancy.driven import driven_force
 from bench.discrepancy.driving import driving_loads, fewest_steps, run_in
 from bench.discrepancy.effect import Effect, Scales
 from bench.discrepancy.measured_motion import measured_motion
-from bench.discrepancy.prepared import RecordData, band_bins, fast_length, noise_floor, projected
+from bench.discrepancy.prepared import RecordData, band_bins, fast_length, noise_floor, projected, timed
 from bench.discrepancy.prescribed_motion import decided, motion_error, prescribed_motion
 from bench.discrepancy.quantisation import raised_noise
 from bench.discrepancy.starts import (
@@ -36,10 +36,10 @@ from bench.discrepancy.starts import (
     without_starts,
 )
 from bench.discrepancy.structure import Place, Structure, with_frictions
-from bench.discrepancy.system import Elements, LinearStructure, Motion
+from bench.discrepancy.system import Elements, Motion
 
 Array = NDArray[np.float64]
-MAX_SUBSTEPS = 16
+MAX_SUBSTEPS, ACCELERATION = 16, 2
 SMOOTHED_BINS = 65
 """Bins over which the spectrum of one draw is averaged."""
 COULOMB = "coulomb"
@@ -168,7 +168,7 @@ class Problem:
         if self.driven:
             noise = noise + self.motion_noise(record, values)[:n_bins, None, None]
         elif np.any(self.load_noise > 0):
-            response = self.transfer(self.structure.at(values), np.asarray(omega, dtype=np.float64))
+            response = self.structure.transfer(self.structure.at(values), np.asarray(omega, dtype=np.float64))
             scaled = response * self.load_noise
             noise = noise + scaled @ np.conj(np.swapaxes(scaled, 1, 2))
         return np.asarray(np.linalg.inv(np.linalg.cholesky(noise)), dtype=np.complex128)
@@ -186,23 +186,6 @@ class Problem:
         force = linear.stiffness[0, 0] * error[:, 0] + linear.damping[0, 0] * error[:, 1]
         power = np.abs(np.fft.rfft(force, n)) ** 2 / len(record)
         return np.asarray(ndimage.uniform_filter1d(power, SMOOTHED_BINS, mode="nearest"), dtype=np.float64)
-
-    def transfer(
-        self, linear: LinearStructure, omega: Array, inputs: Array | None = None
-    ) -> NDArray[np.complex128]:
-        """Frequency responses (n_frequencies, n_channels, n_inputs) from forces on the structure to its channels."""
-        b = linear.inputs if inputs is None else inputs
-        dynamic = (
-            linear.stiffness[None]
-            + 1j * omega[:, None, None] * linear.damping[None]
-            - (omega**2)[:, None, None] * linear.mass[None]
-        )
-        # A free body has no static response; its response at zero frequency is not asked for.
-        dynamic[omega == 0] += 1e-9 * np.abs(linear.mass).max() * np.eye(len(linear.mass))
-        position = np.linalg.solve(dynamic, np.broadcast_to(b, (len(omega), *b.shape)).astype(complex))
-        rows = np.array([o.row for o in self.structure.observers])
-        orders = np.array([o.order for o in self.structure.observers])
-        return (1j * omega[:, None, None]) ** orders[None, :, None] * (rows @ position)
 
     def acquired(self, channels: Array, record: CaseRecord) -> Array:
         """Channels (n, n_channels) behind the filters they passed on their way into a record; changed in place."""
@@ -231,14 +214,15 @@ class Problem:
         """Smoothed measured motion of any record of the case."""
         if record.name not in self.motions:
             self.motions[record.name] = (
-                prescribed_motion(self.case, record) if self.driven else self._smoothed(record)
+                prescribed_motion(self.case, record) if self.driven else self.smoothed(record)
             )
         return self.motions[record.name]
 
-    def _smoothed(self, record: CaseRecord) -> Motion:
+    def smoothed(self, record: CaseRecord) -> Motion:
+        """Motion behind the response channels of a record of this structure."""
         samples = np.column_stack([record.values[name] for name in self.structure.channels])
-        at_rest = not in_motion(record)
-        return measured_motion(self.structure.observers, samples, self.noise, record.step, at_rest=at_rest)
+        rest = not in_motion(record)
+        return measured_motion(self.structure.observers, samples, self.noise, record.step, at_rest=rest)
 
     def scales(self, place: Place) -> Scales:
         """Magnitudes along the coordinates of a place, over all records."""
@@ -366,23 +350,21 @@ class Problem:
             if not np.isfinite(driven).all():
                 return np.full_like(force, np.nan)
             force += driven @ elements.rows
-        for placed, eta in zip(hypothesis, etas, strict=True):
-            if placed.effect.site == "sensor" and placed.effect.signal is not None:
-                force[:, 0] = placed.effect.signal(
-                    force[:, 0], placed.effect.values(eta, self.scales_of(placed)), record.step
-                )
-        return force
+        return self.sensed(hypothesis, etas, force, record.step)
 
     def observe(self, hypothesis: Hypothesis, etas: list[Array], motion: Motion, step: float) -> Array:
         """Channels (n, n_channels) of a motion, sensor effects included."""
         out = np.column_stack([motion[o.order] @ o.row for o in self.structure.observers])
+        return self.sensed(hypothesis, etas, out, step)
+
+    def sensed(self, hypothesis: Hypothesis, etas: list[Array], channels: Array, step: float) -> Array:
+        """Channels (n, n_channels) behind the sensor effects of a hypothesis; changed in place."""
         for placed, eta in zip(hypothesis, etas, strict=True):
             if placed.effect.site == "sensor" and placed.effect.signal is not None:
                 c = self.structure.channels.index(placed.target)
-                out[:, c] = placed.effect.signal(
-                    out[:, c], placed.effect.values(eta, self.scales_of(placed)), step
-                )
-        return out
+                values = placed.effect.values(eta, self.scales_of(placed))
+                channels[:, c] = placed.effect.signal(channels[:, c], values, step)
+        return channels
 
     def picked_up(
         self, hypothesis: Hypothesis, etas: list[Array], channels: Array, record: CaseRecord
@@ -464,7 +446,11 @@ class Problem:
             if not np.isfinite(predicted).all():
                 return np.array([np.inf])
             moved = start_responses(self, hypothesis, vector, data.record, predicted) if self.windowed else ()
-            parts.append(projected(data.responses - predicted, moved, data))
+            residual = data.responses - predicted
+            for c, observer in enumerate(self.structure.observers if hypothesis and not self.driven else ()):
+                if observer.order == ACCELERATION:
+                    residual[:, c] = timed(residual[:, c], predicted[:, c], self.noise[c])
+            parts.append(projected(residual, moved, data))
         return np.concatenate(parts)
 
     @property

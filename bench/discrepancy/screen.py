@@ -12,14 +12,17 @@ simulated channels instead.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.discrepancy.case import CaseRecord
 from bench.discrepancy.driven import driven_force
 from bench.discrepancy.fit import Fit
+from bench.discrepancy.grid_points import SIGNAL_STEP, Node, Point, read, spanning
 from bench.discrepancy.linear_run import linear_run
 from bench.discrepancy.minimise import Prior, minimise
 from bench.discrepancy.prepared import whitened
@@ -27,10 +30,6 @@ from bench.discrepancy.problem import COULOMB, Array, Hypothesis, Placed, Proble
 from bench.discrepancy.starts import channels_of, in_motion
 from bench.discrepancy.system import Elements, LinearStructure
 
-SIGNAL_STEP = 0.1
-"""Value of eta at which a signed channel effect without grid is tried."""
-TINY = -60.0
-"""Value of eta that makes a positive amplitude vanish."""
 REFINED = 1e-3
 """Part of chi-squared that is not worth a step of a refinement."""
 REFINING_REACH = 1.5
@@ -41,53 +40,38 @@ SHAPE_STEP = 0.02
 """Finite difference in the shape parameters of a base effect, in units of their prior standard deviation."""
 
 
-class Node(NamedTuple):
-    """A grid point of an effect.
-
-    Attributes:
-        placed: The effect.
-        eta: Parameters with unit amplitude.
-        columns: (n, k) whitened responses that span the effect at this shape.
-        gram: (k, k) their products.
-    """
-
-    placed: Placed
-    eta: Array
-    columns: NDArray[np.float32]
-    gram: Array
-
-
-class Point(NamedTuple):
-    """A grid point, solved.
-
-    Attributes:
-        placed: The effect.
-        gain: Decrease of chi-squared, nominal deviations and the base's parameters re-estimated.
-        eta: Start for a fit.
-    """
-
-    placed: Placed
-    gain: float
-    eta: Array
-
-
 class Ground(NamedTuple):
     """What the effects of a base and the nominal parameters leave to be explained, and what they can imitate.
 
     Attributes:
         residual: (n,) whitened residual of the base.
+        prior: (k_prior,) residual of the nominal parameters' priors where the base has them.
         head: (n, k) orthonormal basis of the base's columns, together with `tail`.
         tail: (k_prior, k) the same basis in the rows of the priors.
     """
 
     residual: Array
+    prior: Array
     head: Array
     tail: Array
+
+    @property
+    def left(self) -> Array:
+        """What the base leaves (n + k_prior,), its parameters free to first order."""
+        imitated = self.head.T @ self.residual + self.tail.T @ self.prior
+        return np.concatenate([self.residual - self.head @ imitated, self.prior - self.tail @ imitated])
 
     def project(self, response: Array) -> Array:
         """Part of a response (n,) that the base cannot imitate, the price of its priors appended."""
         imitated = self.head.T @ response
         return np.concatenate([response - self.head @ imitated, -self.tail @ imitated])
+
+
+class About(NamedTuple):
+    """What a screening is about, see `Screen.beside`."""
+
+    base: Fit
+    simulated: bool
 
 
 class Screen:
@@ -97,16 +81,38 @@ class Screen:
         problem: Records and nominal model.
         candidates: Effects; actuator, sensor and inertia effects are kept for `ranked`.
         each: Maps a function over items, in threads where wanted.
+        about: Where the linear structure, the sensors and perhaps the motion are taken from; see `beside`.
     """
 
-    def __init__(self, problem: Problem, candidates: Sequence[Placed], each: Callable = map) -> None:
-        self.problem = problem
-        linear = problem.structure.at(problem.nominal)
-        self.linear = LinearStructure(linear.mass, linear.damping, linear.stiffness, np.eye(len(linear.mass)))
+    def __init__(
+        self,
+        problem: Problem,
+        candidates: Sequence[Placed],
+        each: Callable = map,
+        *,
+        about: About | None = None,
+    ) -> None:
+        self.each = each
+        self.candidates: list[Placed] = []
+        self._beside: tuple[bytes, Screen] | None = None
         n = len(problem.nominal)
+        values, self.sensors = problem.nominal, []
+        if about is not None:
+            values, etas = problem.split(about.base.hypothesis, about.base.vector)
+            own = zip(about.base.hypothesis, etas, strict=True)
+            self.sensors = [(p, eta) for p, eta in own if p.effect.site == "sensor"]
+            self._unspoilt = [_unspoilt(problem, about.base, record) for record in problem.records]
+            # windows restart from the measured motion, so that a free run of them has no motion of its own
+            if not problem.driven and not problem.windowed and (self.sensors or about.simulated):
+                problem = _moving(problem, about, self._unspoilt)
+        self.problem = problem
+        linear = problem.structure.at(values)
+        self.linear = LinearStructure(linear.mass, linear.damping, linear.stiffness, np.eye(len(linear.mass)))
         for i in range(len(problem.records)):
             problem.motion(i)
-        self.zero = problem.residual((), np.zeros(n))
+        spread = np.where(problem.spread > 0.0, problem.spread, 1.0)
+        self.deviations = (values - problem.nominal) / spread
+        self.zero = problem.residual((), self.deviations)
         if problem.structure.frictions and not problem.driven:
             self.zero = self._without_friction() - self.response(self._nominal_friction)
         self.nominal = np.column_stack(
@@ -129,10 +135,37 @@ class Screen:
             candidates: Effects that are not screened yet.
             each: Maps a function over items, in threads where wanted.
         """
+        self.candidates += candidates
         self.inertia += [p for p in candidates if p.effect.site == "inertia"]
         self.signals += [p for p in candidates if p.effect.site in {"actuator", "sensor"}]
         tasks = [(p, eta) for p in candidates if p.effect.site == "joint" for eta in p.effect.grid()]
         self.nodes += [node for node in each(lambda task: self._node(*task), tasks) if node is not None]
+
+    def beside(self, base: Fit, *, simulated: bool) -> Screen:
+        """This screening about a base: for the structure it found, and seen through its sensor effects.
+
+        A small second effect is told from the nominal parameters by little, and a wrong gain of an accelerometer bends the fused
+        motion by more than such an effect leaves in the records.
+
+        Args:
+            base: Fitted hypothesis.
+            simulated: Take the motion from its free run, where it explains the records: the noise of the measured
+                motion is that of the residual, and what is small would be found in it.
+        """
+        key = repr([placed.key for placed in base.hypothesis]).encode() + base.vector.tobytes()
+        if self._beside is None or self._beside[0] != key:
+            about = About(base, simulated)
+            self._beside = key, Screen(self.problem, self.candidates, self.each, about=about)
+        return self._beside[1]
+
+    def _sensed(self, channels: Array, index: int) -> Array:
+        """Change of the channels (n, n_channels) of a record behind the sensor effects that this screening is about."""
+        if not self.sensors:
+            return channels
+        placed, etas = tuple(p for p, _ in self.sensors), [eta for _, eta in self.sensors]
+        step, free = self.problem.records[index].step, self._unspoilt[index]
+        with_change = self.problem.sensed(placed, etas, free + channels, step)
+        return with_change - self.problem.sensed(placed, etas, free.copy(), step)
 
     def _deviation(self, index: int, parameter: int) -> Array:
         """Force that a deviation of one nominal parameter by its uncertainty takes from the structure."""
@@ -184,13 +217,13 @@ class Screen:
         parts = []
         for i, data in enumerate(self.problem.data):
             if self.problem.driven:
-                parts.append(whitened(-force_on_dofs(i), data))
+                parts.append(whitened(self._sensed(-force_on_dofs(i), i), data))
                 continue
             force, lead = force_on_dofs(i), self.problem.lead_in(data.record)
             firsts = self.problem.firsts(data.record)[1:]
             loads = np.vstack([force] * (1 + lead // len(force)))
             motion = linear_run(self.linear, loads=loads, step=data.record.step, restarts=firsts)
-            channels = channels_of(self.problem.structure, motion)[lead:]
+            channels = self._sensed(channels_of(self.problem.structure, motion)[lead:], i)
             parts.append(whitened(self.problem.acquired(channels, data.record), data))
         return np.concatenate(parts)
 
@@ -199,13 +232,13 @@ class Screen:
         return self.response(lambda i: -force_along(self.problem, placed, eta, i))
 
     def _node(self, placed: Placed, eta: Array) -> Node | None:
-        columns = np.column_stack([self.effect_response(placed, point) for point in _spanning(placed, eta)])
+        columns = np.column_stack([self.effect_response(placed, point) for point in spanning(placed, eta)])
         if placed.effect.modulated or placed.effect.affine:
             columns[:, 1:] -= columns[:, :1]
         # products of what a hidden resonance makes of a record can be beyond single precision
         if not np.abs(columns).max() < LARGEST or not np.any(columns):
             return None
-        return Node(placed, eta, columns.astype(np.float32), columns.T @ columns)
+        return Node(placed, eta, columns, columns.T @ columns)
 
     def ground(self, base: Fit | None = None, *, simulated: bool = False) -> Ground:
         """What a base hypothesis leaves.
@@ -218,10 +251,10 @@ class Screen:
         """
         hypothesis: Hypothesis = () if base is None else base.hypothesis
         vector = np.zeros(len(self.problem.nominal)) if base is None else base.vector
-        residual, columns = self._base(hypothesis, vector, simulated)
+        residual, columns, deviations = self._base(hypothesis, vector, simulated)
         n = len(self.problem.nominal)
         basis, _ = np.linalg.qr(np.vstack([columns, np.eye(n, columns.shape[1])]))
-        return Ground(residual, basis[: len(residual)], basis[len(residual) :])
+        return Ground(residual, -deviations, basis[: len(residual)], basis[len(residual) :])
 
     def ranked(self, base: Fit | None = None, ground: Ground | None = None) -> list[Point]:
         """Solve all grid points, given a base hypothesis; by decreasing gain.
@@ -234,14 +267,13 @@ class Screen:
         vector = np.zeros(len(self.problem.nominal)) if base is None else base.vector
         ground = ground or self.ground(base)
         own = {placed.key for placed in hypothesis}
-        rest = (ground.residual - ground.head @ (ground.head.T @ ground.residual)).astype(np.float32)
-        head = ground.head.astype(np.float32)
+        rest = ground.left[: len(ground.residual)]
         points = []
         for node in [node for node in self.nodes if node.placed.key not in own] + self._signal_nodes(
             hypothesis, vector
         ):
-            inner = (head.T @ node.columns).astype(float)
-            point = _read(node, node.gram - inner.T @ inner, (node.columns.T @ rest).astype(float))
+            inner = ground.head.T @ node.columns
+            point = read(node, node.gram - inner.T @ inner, node.columns.T @ rest)
             if point is not None:
                 points.append(point)
         points.sort(key=lambda point: -point.gain)
@@ -249,7 +281,7 @@ class Screen:
 
     def inertia_gains(self, ground: Ground) -> dict[tuple[str, str, str], float]:
         """Decrease of chi-squared if the prior of one nominal parameter fell, for every inertia effect."""
-        alone = ground.project(ground.residual)
+        alone = ground.left
         gains = {}
         for placed in self.inertia:
             column = ground.project(self.nominal[:, self.problem.structure.parameters.index(placed.target)])
@@ -267,10 +299,10 @@ class Screen:
         prior = Prior(
             *(np.array(x) for x in zip(*((p.mean, p.std, *p.bounds) for p in effect.parameters), strict=True))
         )
-        alone = ground.project(ground.residual)
+        alone = ground.left
         free = np.flatnonzero([not p.fixed for p in effect.parameters])
         found = minimise(
-            lambda eta: ground.project(ground.residual - self.effect_response(point.placed, eta)),
+            lambda eta: alone - ground.project(self.effect_response(point.placed, eta)),
             point.eta,
             prior=prior,
             free=free,
@@ -283,8 +315,8 @@ class Screen:
             return point
         return Point(point.placed, float(alone @ alone - found.residual @ found.residual), found.vector)
 
-    def _base(self, hypothesis: Hypothesis, vector: Array, simulated: bool) -> tuple[Array, Array]:
-        """Residual and parameter columns of a base: along the measured motion for forces, simulated otherwise."""
+    def _base(self, hypothesis: Hypothesis, vector: Array, simulated: bool) -> tuple[Array, Array, Array]:
+        """Residual, parameter columns and nominal deviations of a base: along the measured motion for forces, simulated otherwise."""
         if simulated or any(placed.effect.site in {"actuator", "sensor"} for placed in hypothesis):
             residual = self.problem.residual(hypothesis, vector)
             columns = []
@@ -296,7 +328,7 @@ class Screen:
                 moved = vector.copy()
                 moved[i] += 1e-3 * std[i] * (1.0 if moved[i] + 1e-3 * std[i] <= high[i] else -1.0)
                 columns.append((residual - self.problem.residual(hypothesis, moved)) / (moved[i] - vector[i]))
-            return residual, np.column_stack(columns)
+            return residual, np.column_stack(columns), vector[: len(self.problem.nominal)]
         residual = self.zero.copy()
         columns = [self.nominal]
         _, etas = self.problem.split(hypothesis, vector)
@@ -316,7 +348,7 @@ class Screen:
                 columns.append(
                     ((self.effect_response(placed, moved) - response) / (moved[k] - eta[k]))[:, None]
                 )
-        return residual, np.hstack(columns)
+        return residual, np.hstack(columns), self.deviations
 
     def _signal_nodes(self, hypothesis: Hypothesis, vector: Array) -> list[Node]:
         """Changes that actuator and sensor effects make to the simulated channels of a base."""
@@ -333,8 +365,32 @@ class Screen:
                 changed = self.problem.residual((*hypothesis, placed), np.concatenate([vector, point]))
                 if changed.shape == base.shape and np.any(changed != base):
                     column = (base - changed)[:, None]
-                    nodes.append(Node(placed, point, column.astype(np.float32), column.T @ column))
+                    nodes.append(Node(placed, point, column, column.T @ column))
         return nodes
+
+
+def _unspoilt(problem: Problem, base: Fit, record: CaseRecord) -> Array:
+    """Channels (n, n_channels) of the free run of a base without its sensor effects."""
+    _, etas = problem.split(base.hypothesis, base.vector)
+    kept = [(p, eta) for p, eta in zip(base.hypothesis, etas, strict=True) if p.effect.site != "sensor"]
+    vector = np.concatenate([base.vector[: len(problem.nominal)], *(eta for _, eta in kept)])
+    return problem.simulate(tuple(p for p, _ in kept), vector, record)
+
+
+def _moving(problem: Problem, about: About, unspoilt: Sequence[Array]) -> Problem:
+    """A problem whose motion is that of a base's free run, or the measured one less what its sensor effects change."""
+    motions = {}
+    for record, free in zip(problem.records, unspoilt, strict=True):
+        channels = free
+        if not about.simulated:
+            spoilt = problem.simulate(about.base.hypothesis, about.base.vector, record)
+            measured = np.column_stack([record.values[name] for name in problem.structure.channels])
+            channels = measured - spoilt + free
+        values = dict(zip(problem.structure.channels, channels.T, strict=True))
+        motions[record.name] = problem.smoothed(replace(record, values={**record.values, **values}))
+    moving = copy.copy(problem)
+    moving.motions = motions
+    return moving
 
 
 def force_along(problem: Problem, placed: Placed, eta: Array, index: int) -> Array:
@@ -354,75 +410,3 @@ def force_along(problem: Problem, placed: Placed, eta: Array, index: int) -> Arr
         start_time=record.start,
     )
     return force @ rows
-
-
-def _amplitudes(placed: Placed) -> list[int]:
-    count = placed.effect.n_linear or placed.effect.n_coordinates
-    return [i for i, p in enumerate(placed.effect.parameters) if i < count and not p.grid]
-
-
-def _spanning(placed: Placed, eta: Array) -> list[Array]:
-    """Parameter points whose responses span the effect at one shape."""
-    effect = placed.effect
-    unit = eta.copy()
-    amplitudes = _amplitudes(placed)
-    for i in amplitudes:
-        unit[i] = 1.0 if effect.parameters[i].signed else 0.0
-    if effect.modulated:
-        still, sine, cosine = unit.copy(), unit.copy(), unit.copy()
-        still[1], sine[1], cosine[1] = TINY, 0.0, 0.0
-        sine[3], cosine[3] = 0.0, 0.5 * np.pi
-        return [still, sine, cosine]
-    if effect.affine:
-        without, with_one = unit.copy(), unit.copy()
-        without[1], with_one[1] = TINY, 0.0
-        return [without, with_one]
-    points = []
-    for i in amplitudes:
-        single = unit.copy()
-        for j in amplitudes:
-            if j != i:
-                single[j] = 0.0 if effect.parameters[j].signed else TINY
-        points.append(single)
-    return points
-
-
-def _read(node: Node, gram: Array, right: Array) -> Point | None:  # noqa: PLR0912  (one branch a kind of effect)
-    """Best coefficients of a node, and the parameters they stand for; None where their sign makes no sense."""
-    effect = node.placed.effect
-    parameters = effect.parameters
-    eta = node.eta.copy()
-    # single precision leaves a relative error of some 1e-6 in the projected products
-    if gram.trace() <= 1e-5 * max(node.gram.trace(), 1e-300):
-        return None
-    c = np.linalg.lstsq(gram, right, rcond=1e-10)[0]
-    if effect.site in {"actuator", "sensor"}:
-        if parameters[0].signed:
-            eta[0] = np.clip(SIGNAL_STEP * c[0], *parameters[0].bounds)
-        elif c[0] <= 0:
-            return None
-    elif effect.modulated:
-        if c[0] <= 0:
-            return None
-        eta[0] = np.log(c[0])
-        eta[1] = np.log(max(np.hypot(c[1], c[2]) / c[0], 1e-6))
-        eta[3] = np.arctan2(c[2], c[1])
-    elif effect.affine:
-        if c[0] <= 0 or c[1] <= 0:
-            return None
-        eta[0], eta[1] = np.log(c[0]), np.log(c[1] / c[0])
-    else:
-        for position, i in enumerate(_amplitudes(node.placed)):
-            if parameters[i].signed:
-                eta[i] = c[position]
-            elif c[position] > 0:
-                eta[i] = np.log(c[position])
-            elif len(c) == 1:
-                return None
-            else:
-                c[position] = 0.0
-                eta[i] = -7.0
-    low = np.array([p.bounds[0] for p in parameters])
-    high = np.array([p.bounds[1] for p in parameters])
-    gain = float(2.0 * c @ right - c @ gram @ c)
-    return Point(node.placed, gain, np.clip(eta, low, high))

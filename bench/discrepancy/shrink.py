@@ -121,7 +121,7 @@ def noise_level(
         assert windows is not None
         return float(np.sqrt(signs @ windows.floor[np.ix_(index, index)] @ signs))
     omega = np.asarray(2.0 * np.pi * np.fft.rfftfreq(len(record), record.step)[1:], dtype=np.float64)
-    response = problem.transfer(problem.structure.at(problem.nominal), omega)[:, index]
+    response = problem.structure.transfer(problem.structure.at(problem.nominal), omega)[:, index]
     combined = np.abs(np.einsum("fcu,c->fu", response, signs)) ** 2 @ problem.load_noise**2
     return float(np.sqrt(own + np.mean(combined)))
 

@@ -7,10 +7,30 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 Samples = NDArray[np.float64]
+TAPS = 24
+"""Half-width in samples of the interpolation of a sensor's delay: flat within 0.1 % up to nine tenths of the Nyquist frequency."""
+KAISER = 6.0
+"""Shape of its window."""
+
+
+def sensor_delay(x: Samples, values: Samples, step: float) -> Samples:
+    """Return ``x(t - tau)``, band-limited, the ends held.
+
+    A response holds the noise of measured loads up to the Nyquist frequency. Interpolation along straight lines would
+    smooth that noise away, and a fraction of a sample of delay would seem to explain records that have none.
+    """
+    whole, fraction = divmod(values[0] / step, 1.0)
+    lags = np.arange(1 - TAPS, TAPS + 1)
+    taps = np.sinc(lags - fraction) * np.i0(
+        KAISER * np.sqrt(np.clip(1.0 - ((lags - fraction) / TAPS) ** 2, 0.0, None))
+    )
+    before = min(int(whole), len(x)) + TAPS
+    held = np.pad(x, (before, TAPS - 1), mode="edge")[: len(x) + 2 * TAPS - 1]
+    return np.asarray(np.convolve(held, taps / taps.sum(), mode="valid"), dtype=np.float64)
 
 
 def delay(x: Samples, values: Samples, step: float) -> Samples:
-    """Return ``x(t - tau)``, linear between samples, zero before the record."""
+    """Return the load ``x(t - tau)``, linear between samples as loads are, zero before the record."""
     shift = values[0] / step
     whole = int(shift)
     fraction = shift - whole

@@ -127,6 +127,23 @@ class Structure:
         """Response channels in the order of the observers."""
         return tuple(observer.channel for observer in self.observers)
 
+    def transfer(
+        self, linear: LinearStructure, omega: NDArray[np.float64], inputs: NDArray[np.float64] | None = None
+    ) -> NDArray[np.complex128]:
+        """Frequency responses (n_frequencies, n_channels, n_inputs) from forces on the structure to its channels."""
+        b = linear.inputs if inputs is None else inputs
+        dynamic = (
+            linear.stiffness[None]
+            + 1j * omega[:, None, None] * linear.damping[None]
+            - (omega**2)[:, None, None] * linear.mass[None]
+        )
+        # A free body has no static response; its response at zero frequency is not asked for.
+        dynamic[omega == 0] += 1e-9 * np.abs(linear.mass).max() * np.eye(len(linear.mass))
+        position = np.linalg.solve(dynamic, np.broadcast_to(b, (len(omega), *b.shape)).astype(complex))
+        rows = np.array([o.row for o in self.observers])
+        orders = np.array([o.order for o in self.observers])
+        return (1j * omega[:, None, None]) ** orders[None, :, None] * (rows @ position)
+
     def groups(self) -> list[tuple[int, ...]]:
         """Return the sets of degrees of freedom that the linear structure couples with one another."""
         linked = (np.abs(self.mass).sum(0) + np.abs(self.damping).sum(0) + np.abs(self.stiffness).sum(0)) > 0

@@ -312,21 +312,19 @@ class Candidate:
         return cost + effect * float(np.log(self.problem.n_residuals))
 
     def predict(self, vector: Array, record: CaseRecord) -> Mapping[str, Array]:
-        """Free run of a record."""
+        """Free run of a record; NaN where it diverged."""
         rest = mujoco.MjData(self.model)
-        run = sysid.sysid_rollout(
-            models=[self.build(vector)],
-            datas=[rest],
-            control_signal=[self.controls(vector, record)],
-            initial_states=[sysid.create_initial_state(self.model, rest.qpos, rest.qvel, rest.act)],
-        )[0]
-        return dict(
-            zip(
-                self.problem.structure.channels,
-                self.observe(vector, record, run.sensordata.data).T,
-                strict=True,
-            )
-        )
+        channels = self.problem.structure.channels
+        try:
+            run = sysid.sysid_rollout(
+                models=[self.build(vector)],
+                datas=[rest],
+                control_signal=[self.controls(vector, record)],
+                initial_states=[sysid.create_initial_state(self.model, rest.qpos, rest.qvel, rest.act)],
+            )[0]
+        except ValueError:  # as in `residual`
+            return {name: np.full(len(record), np.nan) for name in channels}
+        return dict(zip(channels, self.observe(vector, record, run.sensordata.data).T, strict=True))
 
 
 def diagnose(case: Case, *, catalogue: Sequence[Effect] = CATALOGUE) -> tuple[Placed | None, Any]:

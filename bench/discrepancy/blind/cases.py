@@ -3,8 +3,10 @@
 Everything is drawn from one generator, so a case is a function of its seed. A drawn effect has to act: its strength is searched
 until the gap of the identification records is the wanted one, and the draw is thrown away where the judging
 record then shows less than half or more than twice of that, or where one of two effects hides behind the other.
-Nothing is thrown away for being hard to tell apart: how well a record can tell at all is computed beside the case instead
-(`bench.discrepancy.blind.detectability`) and stands in the answer.
+What the stated uncertainties of the nominal model explain is no gap and is thrown away too, since the right answer would be
+"none"; so is a foreign effect that a single catalogued one explains, since "unknown" would be wrong.
+Nothing else is thrown away for being hard to tell: how well a record can tell at all is computed beside the
+case instead (`bench.discrepancy.blind.detectability`) and stands in the answer.
 """
 
 from __future__ import annotations
@@ -38,6 +40,11 @@ ALIKE = (0.5, 2.0)
 """Gap of the judging record over the wanted one."""
 HIDDEN = 0.3
 """Least part of the wanted gap that each of two effects has to add to the other."""
+BEYOND = 4.0
+"""An error of a nominal parameter is an effect from so many of its stated standard deviations on."""
+EXPECTED = 10.0
+"""Expected log odds against the nominal model, re-estimated within its uncertainty, from which there is a gap; and those
+against the nearest catalogued effect from which a foreign one is foreign to the records."""
 
 
 def draw_case(name: str, rng: np.random.Generator, options: BlindOptions) -> tuple[Case, dict[str, Any]]:
@@ -104,7 +111,7 @@ def _attempt(
     bare = bench.responses((), quick=True)
     shapes = [r.draw(rng, reach_of(bench, w)) for r, w in zip(plan.recipes, plan.places, strict=True)]
     effects = _strengths(bench, shapes, bare[:-1], rng)
-    if effects is None:
+    if effects is None or any(_stated(plan.rig, e) for e in effects):
         return None
     coarse = bench.responses(effects, quick=True)
     if not _acts(bench, coarse, bare):
@@ -116,13 +123,21 @@ def _attempt(
     # both from the coarse runs: the difference of two integrators is no gap
     gaps = bench.gaps(coarse[:-1], bare[:-1]), bench.gaps(coarse[-1:], bare[-1:])
     case, pure = _measured(name, bench, with_effects, rng)
-    answer = _answer(bench, effects, runs, gaps, options)
-    answer["detectability"] = (
-        detectability(pure, bench.truth.values, {e.recipe.name for e in effects})
-        if effects and options.detectability
-        else {}
-    )
-    return case, answer
+    odds: dict[str, Any] = {}
+    if effects and options.detectability:
+        odds = detectability(pure, bench.truth.values, {e.recipe.name for e in effects})
+    told = odds.get("log_odds_rival" if plan.kind == "foreign" else "log_odds_none", np.inf)
+    if told < EXPECTED:
+        return None
+    return case, _answer(bench, effects, runs, gaps, options) | {"detectability": odds}
+
+
+def _stated(rig: str, placed: Placed) -> bool:
+    """Whether an effect is an error of a nominal parameter that its stated uncertainty already allows for."""
+    if placed.recipe.site != "inertia":
+        return False
+    spread = SPREADS[rig]["mass" if rig == "sdof" or placed.where == "axial" else "inertia"]
+    return abs(placed.drawn.values["relative_error"]) < BEYOND * spread
 
 
 def _acts(bench: Bench, real: Sequence[Mapping[str, Array]], bare: Sequence[Mapping[str, Array]]) -> bool:

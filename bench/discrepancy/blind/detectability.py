@@ -6,8 +6,8 @@ sealed case: against *none*, the nominal model re-estimated within its uncertain
 other single effect of the catalogue. A diagnosis cannot be right more often than these numbers let it, and the
 scoring reports its bands.
 
-The fits are those of the diagnosis, at noise-free data; they choose no case and change none. Few rivals are fitted, each from one
-start: the odds against the nearest rival are an upper bound, and a small value is certain while a large one is not.
+The fits are those of the diagnosis, at noise-free data. Few rivals are fitted, each from one start: the odds against the nearest
+rival are an upper bound, and a small value is certain while a large one is not.
 """
 
 from __future__ import annotations
@@ -23,9 +23,10 @@ from bench.errors import BenchError
 if TYPE_CHECKING:
     from bench.discrepancy.fit import Fit
 
-RIVALS = 3
+RIVALS = 5
 """Effects that the screening likes best and that are fitted."""
-ITERATIONS = 6
+ITERATIONS, LAST = 6, 25
+"""Iterations of each, and of the best of them."""
 
 
 def detectability(pure: Case, true: Mapping[str, float], truth: Collection[str]) -> dict[str, Any]:
@@ -77,6 +78,7 @@ def _odds_of(pure: Case, true: Mapping[str, float], truth: Collection[str]) -> d
         for point in list(starts.values())[:RIVALS]
     ]
     rival = min(fits, key=lambda f: f.cost, default=nothing)
+    rival = fit(problem, rival.hypothesis, start=rival.vector, iterations=LAST)
     return {
         "log_odds_none": _odds(nothing, cost),
         "log_odds_rival": min(_odds(rival, cost), _odds(nothing, cost)),

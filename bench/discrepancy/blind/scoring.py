@@ -30,6 +30,7 @@ import numpy as np
 
 from bench.discrepancy.catalogue import CATALOGUE
 from bench.errors import FileFormatError
+from bench.files import json_values
 
 FAMILIES = {e.name: e.family for e in CATALOGUE}
 NAN = math.nan
@@ -168,19 +169,7 @@ class BlindScore:
 
     def to_json(self) -> dict[str, Any]:
         """Return the score as JSON values: NaN as None, a share as {value, n, low, high}."""
-        return _plain(asdict(self))
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, Share):
-        return {k: _plain(v) for k, v in value._asdict().items()}
-    if isinstance(value, Mapping):
-        return {key: _plain(entry) for key, entry in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(entry) for entry in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
+        return json_values(asdict(self))
 
 
 def score_blind(results: str | Path, answers: str | Path, *, cases: str | Path | None = None) -> BlindScore:

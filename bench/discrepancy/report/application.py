@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple
 
 from bench.discrepancy.verdict import NamedEffect
@@ -108,137 +107,111 @@ def _mjcf(
     effect: NamedEffect, estimates: dict[str, float], diagnosis: Diagnosis, joint: tuple[str, ...]
 ) -> tuple[str, str]:
     """MuJoCo's own form of an effect, and what to know about it."""
-    maker = _NATIVE.get(effect.name)
-    if maker is None:
+    native = _NATIVE.get(effect.name)
+    if native is None:
         return "", "MuJoCo has no native form of it; use the element." if effect.law else ""
     place = next((p for p in diagnosis.problem.structure.places if p.name == effect.where), None)
     stiffness = estimates.get(place.stiffness, 0.0) if place else 0.0
     damping = estimates.get(place.damping, 0.0) if place else 0.0
-    own = _Own(joint[0], stiffness, damping, diagnosis.case.identification[0].step)
-    return maker(effect, own)
+    own = _Own(effect, joint[0], stiffness, damping, diagnosis.case.identification[0].step)
+    return native.text.format(own), native.note.format(own)
 
 
 class _Own(NamedTuple):
-    """What the joint has already: its name, stiffness and damping; and the step of the records [s]."""
+    """An effect, and what its joint has already: the name, stiffness and damping; and the step of the records [s]."""
 
+    effect: NamedEffect
     joint: str
     stiffness: float
     damping: float
     step: float
 
+    @property
+    def value(self) -> float:
+        """The effect's first parameter."""
+        return next(iter(self.effect.parameters.values())).value
 
-def _first(effect: NamedEffect) -> float:
-    return next(iter(effect.parameters.values())).value
+    @property
+    def magnitude(self) -> float:
+        return abs(self.value)
+
+    @property
+    def factor(self) -> float:
+        """What the effect multiplies by, its parameter being an error relative to one."""
+        return 1.0 + self.value
+
+    @property
+    def percent(self) -> float:
+        return 100.0 * self.value
+
+    @property
+    def samples(self) -> int:
+        """Length of MuJoCo's buffer for a delay, in steps of the records."""
+        return math.ceil(self.value / self.step) + 1
+
+    @property
+    def moved(self) -> str:
+        """The channel or nominal parameter that the effect acts on; the joint where it names none."""
+        return self.effect.channel or self.joint
 
 
-def _friction(effect: NamedEffect, own: _Own) -> tuple[str, str]:
-    return (
-        f'<joint name="{own.joint}" frictionloss="{_first(effect):.6g}"/>',
+class _Native(NamedTuple):
+    """MuJoCo's own form of an effect and what to know about it: texts to be filled in from an `_Own`."""
+
+    text: str
+    note: str = ""
+
+
+_NATIVE: dict[str, _Native] = {
+    "coulomb_friction": _Native(
+        '<joint name="{0.joint}" frictionloss="{0.value:.6g}"/>',
         "MuJoCo's constraint holds the joint at rest, as real friction does; the element rounds the sign function instead.",
-    )
-
-
-def _cubic(effect: NamedEffect, own: _Own) -> tuple[str, str]:
-    return (
-        f'<joint name="{own.joint}" stiffness="{own.stiffness:.6g} 0 {_first(effect):.6g}"/>',
+    ),
+    "cubic_stiffness": _Native(
+        '<joint name="{0.joint}" stiffness="{0.stiffness:.6g} 0 {0.value:.6g}"/>',
         "The first number is the linear stiffness as re-estimated.",
-    )
-
-
-def _quadratic(effect: NamedEffect, own: _Own) -> tuple[str, str]:
-    return (
-        f'<joint name="{own.joint}" stiffness="{own.stiffness:.6g} {_first(effect):.6g}"/>',
+    ),
+    "quadratic_stiffness": _Native(
+        '<joint name="{0.joint}" stiffness="{0.stiffness:.6g} {0.value:.6g}"/>',
         "The first number is the linear stiffness as re-estimated.",
-    )
-
-
-def _quadratic_damping(effect: NamedEffect, own: _Own) -> tuple[str, str]:
-    return (
-        f'<joint name="{own.joint}" damping="{own.damping:.6g} {_first(effect):.6g}"/>',
+    ),
+    "quadratic_damping": _Native(
+        '<joint name="{0.joint}" damping="{0.damping:.6g} {0.value:.6g}"/>',
         "The first number is the viscous damping as re-estimated; the second multiplies v |v|.",
-    )
-
-
-def _parameter(attribute: str) -> Callable[[NamedEffect, _Own], tuple[str, str]]:
-    def make(effect: NamedEffect, own: _Own) -> tuple[str, str]:
-        value = own.stiffness if attribute == "stiffness" else own.damping
-        return (
-            f'<joint name="{own.joint}" {attribute}="{value:.6g}"/>',
-            "A number of the model was wrong, nothing else.",
-        )
-
-    return make
-
-
-def _mass(effect: NamedEffect, own: _Own) -> tuple[str, str]:
-    return (
-        f'<inertial mass="{1.0 + _first(effect):.6g} * (mass in the model)" … />',
-        f"The body moved by {effect.channel or own.joint} is {100 * _first(effect):+.3g} % off; change its inertial or its geoms.",
-    )
-
-
-def _actuator_delay(effect: NamedEffect, own: _Own) -> tuple[str, str]:
-    delay = _first(effect)
-    return (
-        f'<general name="ACTUATOR" joint="{own.joint}" delay="{delay:.6g}" nsample="{_samples(delay, own)}"/>',
+    ),
+    "stiffness_error": _Native(
+        '<joint name="{0.joint}" stiffness="{0.stiffness:.6g}"/>',
+        "A number of the model was wrong, nothing else.",
+    ),
+    "damping_error": _Native(
+        '<joint name="{0.joint}" damping="{0.damping:.6g}"/>',
+        "A number of the model was wrong, nothing else.",
+    ),
+    "mass_error": _Native(
+        '<inertial mass="{0.factor:.6g} * (mass in the model)" … />',
+        "The body moved by {0.moved} is {0.percent:+.3g} % off; change its inertial or its geoms.",
+    ),
+    "actuator_delay": _Native(
+        '<general name="ACTUATOR" joint="{0.joint}" delay="{0.value:.6g}" nsample="{0.samples}"/>',
         "nsample is the length of MuJoCo's buffer in steps of the simulation; here for the step of the records.",
-    )
-
-
-def _samples(delay: float, own: _Own) -> int:
-    return math.ceil(delay / own.step) + 1
-
-
-def _actuator_lag(effect: NamedEffect, own: _Own) -> tuple[str, str]:
-    return (
-        f'<general name="ACTUATOR" joint="{own.joint}" dyntype="filterexact" dynprm="{_first(effect):.6g}"/>',
-        "",
-    )
-
-
-def _gain(effect: NamedEffect, own: _Own) -> tuple[str, str]:
-    return (
-        f'<general name="ACTUATOR" joint="{own.joint}" gainprm="{1.0 + _first(effect):.6g}"/>',
+    ),
+    "actuator_lag": _Native(
+        '<general name="ACTUATOR" joint="{0.joint}" dyntype="filterexact" dynprm="{0.value:.6g}"/>',
+    ),
+    "force_gain_error": _Native(
+        '<general name="ACTUATOR" joint="{0.joint}" gainprm="{0.factor:.6g}"/>',
         "Relative to a gain of one; multiply the actuator's own.",
-    )
-
-
-def _saturation(effect: NamedEffect, own: _Own) -> tuple[str, str]:
-    level = abs(_first(effect))
-    return (
-        f'<general name="ACTUATOR" joint="{own.joint}" forcelimited="true" forcerange="{-level:.6g} {level:.6g}"/>',
-        "",
-    )
-
-
-def _sensor_delay(effect: NamedEffect, own: _Own) -> tuple[str, str]:
-    delay = _first(effect)
-    return (
-        f'<jointpos name="{effect.channel}" joint="{own.joint}" delay="{delay:.6g}" nsample="{_samples(delay, own)}"/>',
+    ),
+    "actuator_saturation": _Native(
+        '<general name="ACTUATOR" joint="{0.joint}" forcelimited="true" forcerange="-{0.magnitude:.6g} {0.magnitude:.6g}"/>',
+    ),
+    "displacement_delay": _Native(
+        '<jointpos name="{0.effect.channel}" joint="{0.joint}" delay="{0.value:.6g}" nsample="{0.samples}"/>',
         "The mechanics are as modelled: the sensor is late.",
-    )
-
-
-def _sensor_clip(effect: NamedEffect, own: _Own) -> tuple[str, str]:
-    return (
-        f'<jointpos name="{effect.channel}" joint="{own.joint}" cutoff="{abs(_first(effect)):.6g}"/>',
+    ),
+    "displacement_clipping": _Native(
+        '<jointpos name="{0.effect.channel}" joint="{0.joint}" cutoff="{0.magnitude:.6g}"/>',
         "The mechanics are as modelled: the sensor saturates.",
-    )
-
-
-_NATIVE: dict[str, Callable[[NamedEffect, _Own], tuple[str, str]]] = {
-    "coulomb_friction": _friction,
-    "cubic_stiffness": _cubic,
-    "quadratic_stiffness": _quadratic,
-    "quadratic_damping": _quadratic_damping,
-    "stiffness_error": _parameter("stiffness"),
-    "damping_error": _parameter("damping"),
-    "mass_error": _mass,
-    "actuator_delay": _actuator_delay,
-    "actuator_lag": _actuator_lag,
-    "force_gain_error": _gain,
-    "actuator_saturation": _saturation,
-    "displacement_delay": _sensor_delay,
-    "displacement_clipping": _sensor_clip,
+    ),
 }
 """Effects that MuJoCo has natively, by name."""
