@@ -26,8 +26,15 @@ def weights(explanations: Sequence[Explanation]) -> np.ndarray:
     """Posterior probabilities of explanations (n,), as if one of them were true."""
     logs = np.array([e.log_posterior for e in explanations])
     if not _noise_stated(explanations):
-        # The noise is whatever the first explanation leaves, and hardly more independent than the visits to a state.
-        logs = np.array([-0.5 * e.reduced / explanations[0].reduced * INDEPENDENT for e in explanations])
+        # The noise is whatever the first explanation leaves, and hardly more independent than the visits to a state;
+        # what has more parameters was passed over because it is not much better.
+        best = explanations[0]
+        logs = np.array(
+            [
+                -0.5 * INDEPENDENT * e.reduced / best.reduced if e.n_free <= best.n_free else -np.inf
+                for e in explanations
+            ]
+        )
     shares = np.exp(logs - logs.max())
     return shares / shares.sum()
 

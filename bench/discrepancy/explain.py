@@ -72,6 +72,11 @@ class Explanation:
         return tuple(placed for _, fitted in self.parts for placed in fitted.hypothesis)
 
     @property
+    def n_free(self) -> int:
+        """Number of free parameters of all effects."""
+        return sum(not p.fixed for placed in self.hypothesis for p in placed.effect.parameters)
+
+    @property
     def log_posterior(self) -> float:
         """Log posterior up to a constant common to all explanations of a case."""
         return sum(posterior(fitted) for _, fitted in self.parts)
@@ -253,11 +258,7 @@ def _parsimonious(found: list[Explanation]) -> list[Explanation]:
     not effects, since a law of seven would else be preferred to two of one each.
     """
 
-    def size(explanation: Explanation) -> int:
-        free = [p for placed in explanation.hypothesis for p in placed.effect.parameters if not p.fixed]
-        return len(free)
-
-    ordered = sorted(found, key=lambda e: (size(e), e.reduced))
+    ordered = sorted(found, key=lambda e: (e.n_free, e.reduced))
     chosen = ordered[0]
     for larger in ordered[1:]:
         if larger.reduced < STALLED * chosen.reduced:

@@ -23,7 +23,7 @@ from bench.errors import BenchError
 if TYPE_CHECKING:
     from bench.discrepancy.fit import Fit
 
-RIVALS = 5
+RIVALS = 3
 """Effects that the screening likes best and that are fitted."""
 ITERATIONS, LAST = 6, 25
 """Iterations of each, and of the best of them."""
