@@ -1,12 +1,14 @@
-"""Files written whole or not at all."""
+"""Files written whole or not at all, and the values that JSON files hold."""
 
 from __future__ import annotations
 
+import math
 import os
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from bench.errors import BenchError
 
@@ -55,3 +57,20 @@ def write_text(path: str | Path, text: str) -> None:
     """Write a text file whole or not at all."""
     with replacing(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
+
+
+def json_values(document: Any) -> Any:
+    """The document in values that JSON can hold.
+
+    Numbers that are not finite become None, sequences lists, and named tuples objects by the names of their fields; anything
+    else stays as it is.
+    """
+    if isinstance(document, float):
+        return document if math.isfinite(document) else None
+    if isinstance(document, Mapping):
+        return {key: json_values(value) for key, value in document.items()}
+    if isinstance(document, tuple) and hasattr(document, "_asdict"):
+        return json_values(document._asdict())
+    if isinstance(document, list | tuple):
+        return [json_values(value) for value in document]
+    return document

@@ -12,7 +12,7 @@ with 30 units 576 weights.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal, NamedTuple
 
 import mujoco
@@ -199,8 +199,31 @@ def six_dof_study(
         rngs=generators[:n_records],
         settle=settle,
     )
-    recovered = [recovered_forces(true, record) for record in training]
+    data, recovery = _recovered(true, training, stride)
+    element = _identify(data, kind, dict(settings or {}), generators[-1])
+    reduced = true.with_(elements=(element,))
+    drive = six_dof_excitation(duration=unseen_duration, level=unseen_level)
+    commands = dict(zip(drive.names, drive.sample(generators[-2]).T, strict=True))
+    unseen = [simulate(rig, commands, settle=settle) for rig in (true, reduced)]
+    rows = unseen[0].scored
+    return SixDofStudy(
+        true=true,
+        reduced=reduced,
+        training=tuple(training),
+        data=data,
+        recovery=recovery,
+        fit=_scores(data.forces, _forces_at(element, data.states)),
+        unseen_true=unseen[0],
+        unseen_reduced=unseen[1],
+        displacement={name: nmse(unseen[0][name][rows], unseen[1][name][rows]) for name in COORDINATES},
+        force=_scores(coordinate_forces(true, unseen[0])[rows], coordinate_forces(reduced, unseen[1])[rows]),
+    )
+
+
+def _recovered(true: Rig, training: Sequence[Recording], stride: int) -> tuple[JointData, dict[str, float]]:
+    """Every stride-th sample recovered from the records, and the NMSE of all recovered forces against the true ones [%]."""
     scored = [record.scored for record in training]
+    recovered = [recovered_forces(true, record) for record in training]
     states = [data.states[rows] for data, rows in zip(recovered, scored, strict=True)]
     forces = [data.forces[rows] for data, rows in zip(recovered, scored, strict=True)]
     exact = [coordinate_forces(true, record)[rows] for record, rows in zip(training, scored, strict=True)]
@@ -208,27 +231,12 @@ def six_dof_study(
         np.concatenate([part[::stride] for part in states]),
         np.concatenate([part[::stride] for part in forces]),
     )
-    element = _identify(data, kind, dict(settings or {}), generators[-1])
-    reduced = true.with_(elements=(element,))
-    drive = six_dof_excitation(duration=unseen_duration, level=unseen_level)
-    commands = dict(zip(drive.names, drive.sample(generators[-2]).T, strict=True))
-    unseen = [simulate(rig, commands, settle=settle) for rig in (true, reduced)]
-    rows = unseen[0].scored
-    model_forces = force_along(
-        element.law, element.theta, np.zeros(len(data.states)), *np.hsplit(data.states, 2)
-    )
-    return SixDofStudy(
-        true,
-        reduced,
-        tuple(training),
-        data,
-        _scores(np.concatenate(exact), np.concatenate(forces)),
-        _scores(data.forces, model_forces),
-        unseen[0],
-        unseen[1],
-        {name: nmse(unseen[0][name][rows], unseen[1][name][rows]) for name in COORDINATES},
-        _scores(coordinate_forces(true, unseen[0])[rows], coordinate_forces(reduced, unseen[1])[rows]),
-    )
+    return data, _scores(np.concatenate(exact), np.concatenate(forces))
+
+
+def _forces_at(element: Element, states: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Forces of an identified joint ``(n, 6)`` at states ``(n, 12)``."""
+    return force_along(element.law, element.theta, np.zeros(len(states)), *np.hsplit(states, 2))
 
 
 def _identify(data: JointData, kind: str, settings: dict[str, Any], rng: np.random.Generator) -> Element:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
+from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 
 from bench.cli import main
+from bench.files import json_values
 from bench.record_files import read_recording
 
 CONFIGURATION = """
@@ -132,3 +136,19 @@ def test_blind_score_of_nothing_says_so(tmp_path, capsys):
     (tmp_path / "results").mkdir()
     assert main(["blind", "score", str(tmp_path / "results"), str(tmp_path)]) == 2
     assert "no result" in capsys.readouterr().err
+
+
+def test_json_values_are_finite_and_plain():
+    class Point(NamedTuple):
+        x: float
+        y: float
+
+    document = {
+        "a": (1.0, math.nan),
+        "b": [Point(math.inf, 2.0)],
+        "c": MappingProxyType({"d": "inf"}),
+        "e": True,
+    }
+    plain = json_values(document)
+    assert plain == {"a": [1.0, None], "b": [{"x": None, "y": 2.0}], "c": {"d": "inf"}, "e": True}
+    assert json.loads(json.dumps(plain, allow_nan=False)) == plain

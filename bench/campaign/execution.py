@@ -136,15 +136,8 @@ def run_campaign(
         CampaignError: The folder cannot be used, or a part repeatedly takes its worker down.
         BenchError: The plan is wrong, or the folder cannot be written to.
     """
-    if not isinstance(plan, Plan):
-        plan = plan_from_dict(plan) if isinstance(plan, Mapping) else read_plan(plan)
-    for name, value in (("workers", workers), ("threads", threads)):
-        if value is not None and (isinstance(value, bool) or value < 1):
-            raise ParameterError(f"{name} is {value!r}; a whole number of at least 1 is expected")
-    if scheduler is not None and workers is not None:
-        raise ParameterError(
-            "workers came together with a scheduler, which has workers of its own; give one of them"
-        )
+    plan = _plan_of(plan)
+    _check_means(workers, threads, scheduler)
     payload = payload_of(plan)
     generator = generator_of(payload)
     generator.check()
@@ -156,8 +149,7 @@ def run_campaign(
     with store.opened(plan, channels, resume=resume) as entries:
         tally = _Tally(plan, entries, progress)
         left = [part for part in range(plan.n_parts) if part not in entries]
-        means = "nothing left to run"
-        status = "stopped"
+        status, means = "stopped", "nothing left to run"
         try:
             if left:
                 with _means(workers, threads, scheduler, store) as (submit, window, means):
@@ -165,13 +157,36 @@ def run_campaign(
             status = "complete"
         finally:
             store.write_manifest(plan, channels, entries, status=status)
-    done = counts(list(entries.values()))
-    failed = sorted(record for entry in entries.values() for record in entry["failed"])
+    return _result(store, status, tally, seconds=time.perf_counter() - start, means=means)
+
+
+def _plan_of(plan: str | Path | Plan | Mapping[str, Any]) -> Plan:
+    if isinstance(plan, Plan):
+        return plan
+    return plan_from_dict(plan) if isinstance(plan, Mapping) else read_plan(plan)
+
+
+def _check_means(workers: int | None, threads: int | None, scheduler: str | None) -> None:
+    """Raise `ParameterError` for numbers below 1, and for workers beside a scheduler."""
+    for name, value in (("workers", workers), ("threads", threads)):
+        if value is not None and (isinstance(value, bool) or value < 1):
+            raise ParameterError(f"{name} is {value!r}; a whole number of at least 1 is expected")
+    if scheduler is not None and workers is not None:
+        raise ParameterError(
+            "workers came together with a scheduler, which has workers of its own; give one of them"
+        )
+
+
+def _result(store: Store, status: str, tally: _Tally, *, seconds: float, means: str) -> CampaignResult:
+    """What was done, from the entries of the finished parts."""
+    entries = list(tally.entries.values())
+    done = counts(entries)
+    failed = sorted(record for entry in entries for record in entry["failed"])
     return CampaignResult(
         folder=str(store.folder),
-        name=plan.name,
+        name=tally.plan.name,
         status=status,
-        planned=plan.records,
+        planned=tally.plan.records,
         records=done["records"],
         resumed=tally.before,
         failed=done["failed"],
@@ -179,7 +194,7 @@ def run_campaign(
         parts=len(entries),
         rows=done["rows"],
         size=done["bytes"],
-        seconds=time.perf_counter() - start,
+        seconds=seconds,
         means=means,
     )
 

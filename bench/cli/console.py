@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import json
-import math
 from collections.abc import Callable, Iterator
 from typing import Any
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+from bench.files import json_values
 
 
 @contextlib.contextmanager
@@ -28,15 +29,4 @@ def progress_bar(quiet: bool) -> Iterator[Callable[[str, float], None]]:
 
 def emit(document: Any) -> None:
     """Print JSON to standard output."""
-    print(json.dumps(finite(document), indent=1, ensure_ascii=False, allow_nan=False))
-
-
-def finite(document: Any) -> Any:
-    """The document with numbers that JSON cannot hold as null."""
-    if isinstance(document, float):
-        return document if math.isfinite(document) else None
-    if isinstance(document, dict):
-        return {key: finite(value) for key, value in document.items()}
-    if isinstance(document, list | tuple):
-        return [finite(value) for value in document]
-    return document
+    print(json.dumps(json_values(document), indent=1, ensure_ascii=False, allow_nan=False))

@@ -16,7 +16,7 @@ from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 from rich.text import Text
 
-from bench.cli.console import emit, finite
+from bench.cli.console import emit
 
 if TYPE_CHECKING:
     from bench.discrepancy.diagnosis import Diagnosis
@@ -64,7 +64,7 @@ class Diagnose:
             emit(document)
         else:
             if self.json is not None:
-                write_text(self.json, json.dumps(finite(document), indent=1, ensure_ascii=False))
+                write_text(self.json, json.dumps(document, indent=1, ensure_ascii=False))
             for part in summary(diagnosis.verdict):
                 Console().print(part, markup=False, highlight=False)
             for path in (self.json, self.html, self.rrd):

@@ -210,16 +210,11 @@ def fit_design_model_online(
     from bench.identification.adaptive import AdaptiveLeastSquares  # noqa: PLC0415  (compiled code, not for every user)
     from bench.identification.regressors import damper_model  # noqa: PLC0415
 
-    v, f = _pair(velocity, force)
-    t = np.asarray(time, dtype=float)
     if not (frequency > 0.0 and memory > 0.0):
         raise ParameterError(
             f"frequency {frequency} Hz and memory {memory} came; positive numbers are expected"
         )
-    if t.shape != v.shape or (t[-1] - t[0]) * frequency < 2.99:
-        raise IdentificationError(
-            f"{(t[-1] - t[0]) * frequency:.1f} periods came; at least three are needed, two of them for the means"
-        )
+    t, v, f = _harmonic_test(time, velocity, force, frequency)
     v_peak = float(np.abs(v).max())
     # Speeds relative to the peak: log|v| is then of the order of one and log C' the log of the peak force.
     model = damper_model(velocity_floor=velocity_floor, force_floor=force_floor)
@@ -238,10 +233,6 @@ def fit_design_model_online(
     coefficients = np.exp(np.clip(log_peak + math.log(f_peak) - exponents * math.log(v_peak), -700.0, 700.0))
     last = t >= t[-1] - 2.0 / frequency
     coefficient, exponent = float(np.mean(coefficients[last])), float(np.mean(exponents[last]))
-    # log error of the force at the peak speed and at half of it
-    at_peak = np.abs(log_peak - float(np.mean(log_peak[last])))
-    at_half = np.abs(log_peak - float(np.mean(log_peak[last])) + (exponents - exponent) * math.log(0.5))
-    outside = np.flatnonzero(np.maximum(at_peak, at_half) > math.log(1.1))
     return OnlineDesignFit(
         coefficient=coefficient,
         exponent=exponent,
@@ -249,12 +240,40 @@ def fit_design_model_online(
         time=t.copy(),
         coefficients=coefficients,
         exponents=exponents.copy(),
-        settled=_settled(t, outside) * frequency,
+        settled=_settled(t, log_peak, exponents, last) * frequency,
     )
 
 
-def _settled(t: NDArray[np.float64], outside: NDArray[np.int64]) -> float:
-    """Time from the start to the last sample outside the band; inf if that is the end."""
+def _harmonic_test(
+    time: ArrayLike, velocity: ArrayLike, force: ArrayLike, frequency: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Time, velocity and force of a test, as equal rows of at least three periods."""
+    v, f = _pair(velocity, force)
+    t = np.asarray(time, dtype=float)
+    if t.shape != v.shape or (t[-1] - t[0]) * frequency < 2.99:
+        raise IdentificationError(
+            f"{(t[-1] - t[0]) * frequency:.1f} periods came; at least three are needed, two of them for the means"
+        )
+    return t, v, f
+
+
+def _settled(
+    t: NDArray[np.float64],
+    log_peak: NDArray[np.float64],
+    exponents: NDArray[np.float64],
+    last: NDArray[np.bool_],
+) -> float:
+    """Time until the force stays within 10 % of that of the final pair, at the peak speed and at half of it; inf if never [s].
+
+    Args:
+        t: Times (n,) [s].
+        log_peak: Logarithm of the force at the peak speed after each sample (n,).
+        exponents: Exponent after each sample (n,).
+        last: The samples whose means are the final pair (n,).
+    """
+    at_peak = log_peak - float(np.mean(log_peak[last]))
+    at_half = at_peak + (exponents - float(np.mean(exponents[last]))) * math.log(0.5)
+    outside = np.flatnonzero(np.maximum(np.abs(at_peak), np.abs(at_half)) > math.log(1.1))
     if outside.size == 0:
         return 0.0
     return math.inf if outside[-1] == t.size - 1 else float(t[outside[-1]] - t[0])
@@ -299,26 +318,10 @@ def check_design_model(
     opposed = float(np.mean(f[moving] * v[moving] < 0.0)) if np.any(moving) else 0.0
     bins, rising, falling, width = _loop(v, acceleration, f, n_bins)
     share, f_statistic, p_value = _lack_of_fit(x, v, acceleration, f, residual)
-    reasons = []
-    if fit.nmse > GOOD_FIT:
-        reasons.append(
-            f"the best design model misses the force by {fit.nmse:.1f} % NMSE ({GOOD_FIT:g} % is a good fit)"
-        )
-    if opposed > OPPOSED_LIMIT:
-        reasons.append(f"in {100 * opposed:.1f} % of the moving samples the damper pushes along its velocity")
-    if width > LOOP_LIMIT * rms:
-        reasons.append(
-            f"force against velocity is a loop, {100 * width / rms:.0f} % of the rms force in half width: "
-            "the force depends on more than the velocity"
-        )
-    if share > MEMORY_LIMIT and p_value < 1e-3:
-        reasons.append(
-            f"displacement and acceleration explain {share:.1f} % of the force beyond velocity (F = {f_statistic:.1f}): "
-            "stiffness, inertia or memory"
-        )
+    reasons = _objections(fit, opposed, width / rms, share, f_statistic, p_value)
     return TrustReport(
         trusted=not reasons,
-        reasons=tuple(reasons),
+        reasons=reasons,
         fit=fit,
         opposed=opposed,
         loop_width=width / rms,
@@ -329,6 +332,30 @@ def check_design_model(
         accelerating=rising,
         decelerating=falling,
     )
+
+
+def _objections(
+    fit: DesignFit, opposed: float, loop_width: float, memory_share: float, f_statistic: float, p_value: float
+) -> tuple[str, ...]:
+    """What speaks against the design model, one sentence each; the arguments are those of `TrustReport`."""
+    reasons = []
+    if fit.nmse > GOOD_FIT:
+        reasons.append(
+            f"the best design model misses the force by {fit.nmse:.1f} % NMSE ({GOOD_FIT:g} % is a good fit)"
+        )
+    if opposed > OPPOSED_LIMIT:
+        reasons.append(f"in {100 * opposed:.1f} % of the moving samples the damper pushes along its velocity")
+    if loop_width > LOOP_LIMIT:
+        reasons.append(
+            f"force against velocity is a loop, {100 * loop_width:.0f} % of the rms force in half width: "
+            "the force depends on more than the velocity"
+        )
+    if memory_share > MEMORY_LIMIT and p_value < 1e-3:
+        reasons.append(
+            f"displacement and acceleration explain {memory_share:.1f} % of the force beyond velocity (F = {f_statistic:.1f}): "
+            "stiffness, inertia or memory"
+        )
+    return tuple(reasons)
 
 
 def _loop(

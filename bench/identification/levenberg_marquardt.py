@@ -136,8 +136,7 @@ def minimise(
         IdentificationError: The residuals are not finite at the start.
     """
     weights = np.array(start, dtype=float)
-    ratio = decay if regularise else 0.0
-    effective = float(len(weights))
+    prior = _Prior(problem.n_residuals, regularise, decay if regularise else 0.0, float(len(weights)))
     damping, growth = 1e-3, 2.0
     model = problem.normal_equations(weights)
     if not np.isfinite(model.sum_of_squares):
@@ -154,13 +153,10 @@ def minimise(
         if time.monotonic() > deadline:
             stopped = "time"
             break
-        step = _step(problem, weights, model, ratio, damping, growth)
+        step = _step(problem, weights, model, prior.ratio, damping, growth)
         iteration += 1
         if step is None:
-            before = ratio
-            if regularise:
-                ratio, effective = _evidence(problem.n_residuals, weights, model, ratio, effective)
-            if abs(ratio - before) <= _SETTLED * before:
+            if prior.settles(weights, model):
                 stopped = "damping"
                 break
             damping, growth = 1e-3, 2.0  # at the minimum for the old prior: go on with the new one
@@ -169,23 +165,52 @@ def minimise(
         model = problem.normal_equations(weights)
         if on_iteration is not None:
             on_iteration(iteration, model.sum_of_squares)
-        if regularise and iteration % _EVIDENCE_INTERVAL == 0:
-            before = ratio
-            ratio, effective = _evidence(problem.n_residuals, weights, model, ratio, effective)
-            settled = abs(ratio - before) <= _SETTLED * before
+        if iteration % _EVIDENCE_INTERVAL == 0:
+            settled = prior.settles(weights, model)
         costs.append(model.sum_of_squares)
-        # While the prior still tightens the sum of squares may rise; that is no stall.
-        if (
-            settled
-            and len(costs) > _STALL_INTERVAL
-            and costs[-1] > (1.0 - _STALL) * costs[-1 - _STALL_INTERVAL]
-        ):
+        if settled and _stalled(costs):  # while the prior still tightens the sum of squares may rise
             stopped = "stall"
             break
-    if regularise:
-        ratio, effective = _evidence(problem.n_residuals, weights, model, ratio, effective)
-    beta = max(problem.n_residuals - effective, 1.0) / (2.0 * max(model.sum_of_squares, np.finfo(float).tiny))
-    return Minimum(weights, model.sum_of_squares, ratio * beta, beta, effective, iteration, stopped)
+    prior.settles(weights, model)
+    beta = prior.residual_precision(model)
+    return Minimum(
+        weights, model.sum_of_squares, prior.ratio * beta, beta, prior.effective, iteration, stopped
+    )
+
+
+@dataclass
+class _Prior:
+    """The prior of the weights, re-estimated from the evidence where it is to be.
+
+    Attributes:
+        n_residuals: Number of residuals of the problem.
+        regularise: Whether there is a prior; without, nothing changes.
+        ratio: alpha / beta.
+        effective: Number of weights determined by the data.
+    """
+
+    n_residuals: int
+    regularise: bool
+    ratio: float
+    effective: float
+
+    def settles(self, weights: NDArray[np.float64], model: NormalEquations) -> bool:
+        """Re-estimate at `weights`; whether the ratio hardly changed."""
+        if not self.regularise:
+            return True
+        before = self.ratio
+        self.ratio, self.effective = _evidence(self.n_residuals, weights, model, self.ratio, self.effective)
+        return abs(self.ratio - before) <= _SETTLED * before
+
+    def residual_precision(self, model: NormalEquations) -> float:
+        """beta."""
+        free = max(self.n_residuals - self.effective, 1.0)
+        return free / (2.0 * max(model.sum_of_squares, np.finfo(float).tiny))
+
+
+def _stalled(costs: list[float]) -> bool:
+    """Whether the last iterations made hardly any progress."""
+    return len(costs) > _STALL_INTERVAL and costs[-1] > (1.0 - _STALL) * costs[-1 - _STALL_INTERVAL]
 
 
 def _step(

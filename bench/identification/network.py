@@ -19,7 +19,7 @@ import json
 import math
 import os
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -31,7 +31,13 @@ from threadpoolctl import threadpool_limits
 
 from bench.errors import FileFormatError, IdentificationError, ParameterError
 from bench.identification.levenberg_marquardt import HiddenLayerProblem, Minimum, minimise
-from bench.identification.polynomial import ValidityRange, checked_data, frozen, nmse_percent
+from bench.identification.polynomial import (
+    ValidityRange,
+    centre_and_scale,
+    checked_data,
+    frozen,
+    nmse_percent,
+)
 from bench.laws.base import ForceLaw
 from bench.laws.network import NetworkWeights, fold_scaling, network_law, published_network
 
@@ -161,6 +167,15 @@ class _Data(NamedTuple):
     held_out: NDArray[np.int64]  # samples to choose between starts; all of them where none was held out
 
 
+class _Scaling(NamedTuple):
+    """Centre and half-range of the inputs (n_inputs,) and the outputs (n_outputs,), in physical units."""
+
+    input_centre: NDArray[np.float64]
+    input_scale: NDArray[np.float64]
+    output_centre: NDArray[np.float64]
+    output_scale: NDArray[np.float64]
+
+
 class _Training(NamedTuple):
     n_hidden: int
     n_starts: int
@@ -232,24 +247,19 @@ def fit_network(
     """
     begun = time.monotonic()
     s, f, a = checked_data(states, forces, accelerations)
-    if min(n_hidden, n_restarts, n_stages, max_iterations) < 1 or not 0.0 <= validation_fraction <= 0.5:
-        raise ParameterError(
-            f"n_hidden {n_hidden}, n_restarts {n_restarts}, n_stages {n_stages}, max_iterations {max_iterations} and "
-            f"validation_fraction {validation_fraction:g} came; at least 1 each, and a fraction in [0, 0.5] are expected"
-        )
-    if len(s) < 100:
-        raise IdentificationError(
-            f"{len(s)} samples came; at least 100 are expected to train and validate a network"
-        )
-    if not np.any(np.ptp(f, axis=0) > 0.0):
-        raise IdentificationError("all forces are constant; there is nothing to learn from these records")
+    counts = {
+        "n_hidden": n_hidden,
+        "n_restarts": n_restarts,
+        "n_stages": n_stages,
+        "max_iterations": max_iterations,
+    }
+    _check(s, f, counts, validation_fraction)
     raw = np.hstack([s, a])
-    in_centre, in_scale = _normalisation(raw)
-    out_centre, out_scale = _normalisation(f)
-    inputs = (raw - in_centre) / in_scale
+    scaling = _Scaling(*centre_and_scale(raw), *centre_and_scale(f))
     train, held_out = _split(len(s), validation_fraction, rng)
+    inputs = (raw - scaling.input_centre) / scaling.input_scale
     order = _spread(inputs, train, rng)
-    data = _Data(inputs, (f - out_centre) / out_scale, order, held_out)
+    data = _Data(inputs, (f - scaling.output_centre) / scaling.output_scale, order, held_out)
     most = len(order) if max_samples is None else min(max_samples, len(order))
     sizes = tuple(max(most >> (n_stages - 1 - stage), min(100, most)) for stage in range(n_stages))
     limit = math.inf if time_limit is None else time_limit
@@ -258,30 +268,73 @@ def fit_network(
     # which made an iteration ten times slower.
     with threadpool_limits(1, user_api="blas"), ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
         starts = _train(data, training, rng, pool.map)
-    best = starts[0]
-    problem = HiddenLayerProblem(inputs[:1], data.outputs[:1], n_hidden)
-    A, B = problem.unpack(best.weights)
-    normalised = NetworkWeights(A[:-1].T, A[-1], B[:, :-1], B[:, -1])
-    folded = fold_scaling(normalised, in_centre, in_scale, output_centre=out_centre, output_scale=out_scale)
-    weights = NetworkWeights(*(frozen(part) for part in folded))
-    estimated = weights(raw)
-    minimum = best.minimum
-    assert minimum is not None
-    report = NetworkReport(
-        nmse_percent(f, estimated),
-        nmse_percent(f[held_out], estimated[held_out]) if len(train) < len(s) else (),
-        len(best.weights),
-        minimum.effective_parameters,
-        minimum.alpha,
-        minimum.beta,
-        sizes[-1],
-        best.iterations,
-        tuple(start.error for start in sorted(starts, key=lambda start: start.number)),
-        minimum.stopped,
-        time.monotonic() - begun,
-    )
+    weights = _in_physical_units(starts[0].weights, data, n_hidden, scaling)
+    judged = held_out if len(train) < len(s) else None
+    report = _report(starts, f, weights(raw), judged, n_samples=sizes[-1], seconds=time.monotonic() - begun)
     mass, deviation = _mass(weights, raw[order[:most]]) if a.shape[1] else (None, None)
     return NetworkModel(weights, ValidityRange.of(s), report, mass, deviation)
+
+
+def _check(
+    states: NDArray[np.float64],
+    forces: NDArray[np.float64],
+    counts: Mapping[str, int],
+    fraction: float,
+) -> None:
+    """Raise an error for settings or data that nothing can be learnt from."""
+    if min(counts.values()) < 1 or not 0.0 <= fraction <= 0.5:
+        raise ParameterError(
+            f"{', '.join(f'{name} {count}' for name, count in counts.items())} and validation_fraction {fraction:g} came; "
+            "at least 1 each, and a fraction in [0, 0.5] are expected"
+        )
+    if len(states) < 100:
+        raise IdentificationError(
+            f"{len(states)} samples came; at least 100 are expected to train and validate a network"
+        )
+    if not np.any(np.ptp(forces, axis=0) > 0.0):
+        raise IdentificationError("all forces are constant; there is nothing to learn from these records")
+
+
+def _in_physical_units(
+    flat: NDArray[np.float64], data: _Data, n_hidden: int, scaling: _Scaling
+) -> NetworkWeights:
+    """Weights on physical units, from those on normalised data as a minimisation leaves them."""
+    A, B = HiddenLayerProblem(data.inputs[:1], data.outputs[:1], n_hidden).unpack(flat)
+    folded = fold_scaling(
+        NetworkWeights(A[:-1].T, A[-1], B[:, :-1], B[:, -1]),
+        scaling.input_centre,
+        scaling.input_scale,
+        output_centre=scaling.output_centre,
+        output_scale=scaling.output_scale,
+    )
+    return NetworkWeights(*(frozen(part) for part in folded))
+
+
+def _report(
+    starts: list[_Start],
+    forces: NDArray[np.float64],
+    estimated: NDArray[np.float64],
+    held_out: NDArray[np.int64] | None,
+    *,
+    n_samples: int,
+    seconds: float,
+) -> NetworkReport:
+    """How the training went, from its starts, the best first."""
+    best = starts[0]
+    assert best.minimum is not None
+    return NetworkReport(
+        nmse=nmse_percent(forces, estimated),
+        nmse_validation=() if held_out is None else nmse_percent(forces[held_out], estimated[held_out]),
+        n_weights=len(best.weights),
+        effective_parameters=best.minimum.effective_parameters,
+        alpha=best.minimum.alpha,
+        beta=best.minimum.beta,
+        n_samples=n_samples,
+        iterations=best.iterations,
+        starts=tuple(start.error for start in sorted(starts, key=lambda start: start.number)),
+        stopped=best.minimum.stopped,
+        seconds=seconds,
+    )
 
 
 def _train(
@@ -334,12 +387,6 @@ def _reporter(progress: Progress | None, label: str, percent: float) -> Callable
     if progress is None:
         return None
     return lambda iteration, squares: progress(label, iteration, percent * squares)
-
-
-def _normalisation(columns: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Centre and half-range of each column, over all records; 1 where a column does not vary."""
-    low, high = columns.min(axis=0), columns.max(axis=0)
-    return 0.5 * (low + high), np.where(high > low, 0.5 * (high - low), 1.0)
 
 
 def _split(n: int, fraction: float, rng: np.random.Generator) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

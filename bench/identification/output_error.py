@@ -221,19 +221,12 @@ def fit_output_error(
         ModelError: The linear engine was asked for and the rig is not of linear structure.
         ParameterError: A setting is out of range.
     """
-    names = tuple(free)
-    if not records or not names or len(set(names)) != len(names):
-        raise IdentificationError(
-            f"{len(records)} records and the free parameters {list(names)} came; at least one each, all different, is expected"
-        )
+    names = _names(records, free)
     start = np.array([current(rig, name) for name in names])
     chosen = tuple(channels) if channels is not None else moving_sensors(rig, records[0])
     prepared = [prepare(rig, r, chosen, inputs or {}, i) for r, i in with_initial(records, initial)]
     weights, known = _weights(records, chosen, prepared, noise)
-    scale = np.where(start != 0.0, np.abs(start), 1.0)
-    for i, name in enumerate(names):
-        if name in (search or {}) and start[i] == 0.0:
-            scale[i] = max(np.abs((search or {})[name]))
+    scale = _scales(names, start, search or {})
     prior = _priors(names, scale, priors or {}, known)
     low, high = _bounds(rig, names, bounds or {}) / scale
     workers = threads or os.cpu_count() or 1
@@ -252,6 +245,24 @@ def fit_output_error(
             for record in prepared
         )
     return _report(rig, names, chosen, problem, best, (prepared, residuals, known))
+
+
+def _names(records: Sequence[Recording], free: Sequence[str]) -> tuple[str, ...]:
+    names = tuple(free)
+    if not records or not names or len(set(names)) != len(names):
+        raise IdentificationError(
+            f"{len(records)} records and the free parameters {list(names)} came; at least one each, all different, is expected"
+        )
+    return names
+
+
+def _scales(names: tuple[str, ...], start: Array, search: Mapping[str, tuple[float, float]]) -> Array:
+    """Size of each parameter: that of its start, of its range of search where it starts at zero, or one."""
+    scale = np.where(start != 0.0, np.abs(start), 1.0)
+    for i, name in enumerate(names):
+        if name in search and start[i] == 0.0:
+            scale[i] = max(np.abs(search[name]))
+    return scale
 
 
 def _report(

@@ -55,14 +55,38 @@ class ParametricModel:
         return dict(zip(self.law.parameter_names, values.tolist(), strict=True))
 
 
-def _scaled_residual(
-    law: ForceLaw, motions: Sequence[Motion], theta: NDArray, weights: Sequence[float]
-) -> NDArray[np.float64]:
-    parts = [
-        (evaluate(law, theta, m.time, m.displacement, m.velocity)[0] - m.force).ravel() * weight
-        for m, weight in zip(motions, weights, strict=True)
-    ]
-    return np.nan_to_num(np.concatenate(parts), nan=1e6, posinf=1e6, neginf=-1e6)
+class _Residual:
+    """Scaled force residuals of all records as a function of the free parameters."""
+
+    def __init__(self, law: ForceLaw, motions: Sequence[Motion], base: NDArray, free: NDArray) -> None:
+        self.law, self.motions, self.base, self.free = law, motions, base, free
+        self.weights = _weights(motions)
+        self.evaluations = 0
+
+    def theta(self, x: NDArray) -> NDArray[np.float64]:
+        """Header and parameters with the free ones at `x`."""
+        theta = self.base.copy()
+        theta[self.free] = x
+        return theta
+
+    def __call__(self, x: NDArray) -> NDArray[np.float64]:
+        self.evaluations += 1
+        theta = self.theta(x)
+        parts = [
+            (evaluate(self.law, theta, m.time, m.displacement, m.velocity)[0] - m.force).ravel() * weight
+            for m, weight in zip(self.motions, self.weights, strict=True)
+        ]
+        return np.nan_to_num(np.concatenate(parts), nan=1e6, posinf=1e6, neginf=-1e6)
+
+
+def _weights(motions: Sequence[Motion]) -> list[float]:
+    """Weight of each record's residuals, so that every record counts alike and their squares add up to one."""
+    if not motions:
+        raise IdentificationError("no records came; at least one record of motion and force is expected")
+    spreads = [float(np.std(m.force)) for m in motions]
+    if min(spreads) == 0.0:
+        raise IdentificationError("a record's force is constant; a law cannot be identified from it")
+    return [1.0 / (s * np.sqrt(m.force.size * len(motions))) for s, m in zip(spreads, motions, strict=True)]
 
 
 def fit_law(
@@ -99,29 +123,13 @@ def fit_law(
     for name in (*start, *(search or {}), *fixed):
         if name not in law.parameter_names:
             raise UnknownNameError(f"parameter of law '{law.name}'", name, law.parameter_names)
-    if not motions:
-        raise IdentificationError("no records came; at least one record of motion and force is expected")
-    spreads = [float(np.std(m.force)) for m in motions]
-    if min(spreads) == 0.0:
-        raise IdentificationError("a record's force is constant; a law cannot be identified from it")
-    weights = [
-        1.0 / (s * np.sqrt(m.force.size * len(motions))) for s, m in zip(spreads, motions, strict=True)
-    ]
     names = [name for name in law.parameter_names if name not in fixed]
     places = len(law.header) + np.array([law.parameter_names.index(name) for name in names])
     bounds = np.array([law.parameters[i - len(law.header)].bounds for i in places], dtype=float).T
     base = law.theta(**start)
+    residual = _Residual(law, motions, base, places)
     ranges = {name: 0.5 * abs(high - low) for name, (low, high) in (search or {}).items()}
     half_ranges = np.array([ranges.get(name, 1.0) for name in names])  # the scale of what starts at zero
-    evaluations = 0
-
-    def residual(x: NDArray) -> NDArray:
-        nonlocal evaluations
-        evaluations += 1
-        theta = base.copy()
-        theta[places] = x
-        return _scaled_residual(law, motions, theta, weights)
-
     best = None
     for number, x0 in enumerate(_starts(base[places], names, search or {}, starts, rng)):
         scale = np.where(x0 != 0.0, np.abs(x0), half_ranges)
@@ -134,12 +142,12 @@ def fit_law(
         if best is None or result.cost < best.cost:
             best = result
     assert best is not None
-    theta = base.copy()
-    theta[places] = best.x
     samples = sum(m.force.size for m in motions)
     covariance = np.linalg.pinv(best.jac.T @ best.jac) * 2.0 * best.cost / max(samples - len(names), 1)
     std = dict(zip(names, np.sqrt(np.diag(covariance)).tolist(), strict=True))
-    return ParametricModel(law, theta, std, float(np.sqrt(2.0 * best.cost)), evaluations)
+    return ParametricModel(
+        law, residual.theta(best.x), std, float(np.sqrt(2.0 * best.cost)), residual.evaluations
+    )
 
 
 def _starts(

@@ -40,6 +40,12 @@ def frozen(values: ArrayLike) -> NDArray[np.float64]:
     return array
 
 
+def centre_and_scale(columns: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Centre and half-range of each column ``(n_columns,)`` each; a half-range of 1 where a column does not vary."""
+    low, high = columns.min(axis=0), columns.max(axis=0)
+    return 0.5 * (low + high), np.where(high > low, 0.5 * (high - low), 1.0)
+
+
 @dataclass(frozen=True)
 class ValidityRange:
     """The region of states a model was identified from: a box, and an ellipsoid inside it.
@@ -369,20 +375,14 @@ def fit_polynomial(
     """
     begun = time.perf_counter()
     s, f, a = checked_data(states, forces, accelerations)
-    powers = (int(orders),) * s.shape[1] if isinstance(orders, int) else tuple(int(order) for order in orders)
-    if len(powers) != s.shape[1]:
-        raise ParameterError(
-            f"{len(powers)} polynomial orders came for {s.shape[1]} states; one a state is expected"
-        )
+    powers = _orders_of(orders, s.shape[1])
     if basis == "chebyshev" and not normalise:
         raise ParameterError(
             "a Chebyshev basis came with normalise=False; it needs states scaled to [-1, 1], use basis='power'"
         )
     if ridge < 0.0:
         raise ParameterError(f"ridge is {ridge:g}; 0 or more is expected")
-    low, high = s.min(axis=0), s.max(axis=0)
-    centre = 0.5 * (low + high) if normalise else np.zeros_like(low)
-    scale = np.where(high > low, 0.5 * (high - low), 1.0) if normalise else np.ones_like(low)
+    centre, scale = centre_and_scale(s) if normalise else (np.zeros(s.shape[1]), np.ones(s.shape[1]))
     exponents = polynomial_exponents(powers, kind, degree=degree)
     n_terms = len(exponents)
     unknowns = n_terms + a.shape[1]
@@ -397,17 +397,34 @@ def fit_polynomial(
     solution, singular, rank = _solve(blocks, f, unknowns, ridge, rcond)
     coefficients = frozen(solution[:n_terms].T)
     mass = frozen(solution[n_terms:].T) if a.shape[1] else None
-    limit = (max(powers) if degree is None else degree) if kind == "total" else None
-    model_range = ValidityRange.of(s)
     condition = float(singular[0] / singular[-1]) if singular[-1] > 0.0 else float("inf")
     pending = PolynomialReport((), condition, rank, n_terms, len(s), 0.0)
     model = PolynomialModel(
-        powers, kind, limit, basis, frozen(centre), frozen(scale), coefficients, model_range, pending, mass
+        orders=powers,
+        kind=kind,
+        degree=(max(powers) if degree is None else degree) if kind == "total" else None,
+        basis=basis,
+        centre=frozen(centre),
+        scale=frozen(scale),
+        coefficients=coefficients,
+        range=ValidityRange.of(s),
+        report=pending,
+        mass=mass,
     )
     estimated = model.predict(s) + (0.0 if mass is None else a @ mass.T)
     return replace(
         model, report=replace(pending, nmse=nmse_percent(f, estimated), seconds=time.perf_counter() - begun)
     )
+
+
+def _orders_of(orders: int | Sequence[int], n_states: int) -> tuple[int, ...]:
+    """Highest exponent of each state."""
+    powers = (int(orders),) * n_states if isinstance(orders, int) else tuple(int(order) for order in orders)
+    if len(powers) != n_states:
+        raise ParameterError(
+            f"{len(powers)} polynomial orders came for {n_states} states; one a state is expected"
+        )
+    return powers
 
 
 def _blocks(array: NDArray[np.float64]) -> Iterator[NDArray[np.float64]]:

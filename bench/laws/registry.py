@@ -7,13 +7,13 @@ and header.
 
 from __future__ import annotations
 
-import math
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
 from bench.errors import ParameterError, UnknownNameError
+from bench.files import json_values
 from bench.laws.base import ForceLaw
 from bench.laws.base_flexibility import BASE_FLEXIBILITY
 from bench.laws.bouc_wen import BOUC_WEN
@@ -127,10 +127,6 @@ def describe(law: ForceLaw) -> dict[str, Any]:
     Infinite bounds are None, since JSON has no infinity. `documentation` is the text of the module that holds the law:
     its relatives, its range of validity, its references.
     """
-
-    def finite(value: float) -> float | None:
-        return value if math.isfinite(value) else None
-
     return {
         "name": law.name,
         "equation": law.equation,
@@ -146,7 +142,7 @@ def describe(law: ForceLaw) -> dict[str, Any]:
                 "unit": parameter.unit,
                 "rotational_unit": parameter.unit if parameter.rotational is None else parameter.rotational,
                 "default": parameter.default,
-                "bounds": [finite(bound) for bound in parameter.bounds],
+                "bounds": json_values(parameter.bounds),
                 "description": parameter.description,
             }
             for parameter in law.parameters

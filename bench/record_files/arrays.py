@@ -55,7 +55,7 @@ def read_mat(path: Path) -> dict[str, Variable]:
 
     try:
         contents = loadmat(path, squeeze_me=True, struct_as_record=False)
-    except NotImplementedError:
+    except NotImplementedError:  # scipy raises it for version 7.3 and for nothing else
         raise FileFormatError(
             f"'{path}' is a MATLAB file of version 7.3, which is HDF5: save it with '-v7', or give a copy the suffix .h5 and "
             "name the lines of its arrays transposed ('data[2, :]' for MATLAB's data(:, 3))"

@@ -78,7 +78,8 @@ def _parsed(unit: str) -> tuple[Any, str]:
         parsed = registry.parse_units(text)
         return parsed, str(registry.get_root_units(parsed)[1])
     except Exception:
-        # pint evaluates the text with Python's tokenizer, so that a typing error surfaces as almost any class
+        # As broad as it stands: pint evaluates the text as a Python expression of units, so that typing errors surface as
+        # AssertionError ("m/"), TokenError ("N m)"), TypeError ("m+1") and others that its documentation does not list.
         raise UnitError(
             f"unknown unit '{unit}'; expected a unit such as m, inch, N, lbf, kip, N m, deg, rad/s, m/s^2 or V, "
             "with products as 'N m', powers as 'm/s^2' and '1' for a pure number"

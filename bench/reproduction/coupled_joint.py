@@ -125,17 +125,9 @@ def _rows(models: joint_models.Models, single: list[tuple[str, float, float]]) -
     return tuple(rows)
 
 
-def run(progress: Progress) -> Item:
-    """Make the item."""
-    progress("simulating the training records", 0.02)
-    records = joint_models.training()
-    progress("fitting polynomial and network", 0.08)
-    models = joint_models.models()
-    single = _single(progress)
-    progress("drawing", 0.9)
+def _pictures(records: dict[str, Recording], models: joint_models.Models) -> tuple[Picture, ...]:
     test = joint_models.unseen()["both"]
     both: dict[str, Model] = {"polynomial, order 3": models.polynomial, "network, 40 units": models.network}
-    window = (10.0, 20.0)
     views = {
         f"{name} loaded": shown(record, joint_models.view(record).forces) for name, record in records.items()
     }
@@ -149,7 +141,7 @@ def run(progress: Progress) -> Item:
         }
         for label, model in both.items()
     }
-    pictures = (
+    return (
         Picture(
             "training",
             "The three training records: loads on x only, on θ only, on both (Fig 4.6).",
@@ -161,7 +153,7 @@ def run(progress: Progress) -> Item:
                         "θ only": views["torsional loaded"],
                     },
                     PAIRS,
-                    window=window,
+                    window=(10.0, 20.0),
                 )
             ),
         ),
@@ -177,6 +169,16 @@ def run(progress: Progress) -> Item:
         ),
         Picture("errors", "NMSE on unseen records.", bar_table(scores, limit=5.0, limit_label="good fit")),
     )
+
+
+def run(progress: Progress) -> Item:
+    """Make the item."""
+    progress("simulating the training records", 0.02)
+    records = joint_models.training()
+    progress("fitting polynomial and network", 0.08)
+    models = joint_models.models()
+    single = _single(progress)
+    progress("drawing", 0.9)
     text = (
         "The joint of the deck in appendix B.1 (spring, damper, gap of 0.2 on both axes, coupling by "
         "damping beyond the gap) between two bodies on mounts, under noise flat to 12 Hz of 1000 lbf and "
@@ -188,4 +190,4 @@ def run(progress: Progress) -> Item:
         "the record with both axes loaded: excited as strongly as this, and without sensor noise, it "
         "visits the states of the other two."
     )
-    return Item(text, _rows(models, single), pictures)
+    return Item(text, _rows(models, single), _pictures(records, models))

@@ -2,18 +2,29 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from matplotlib.figure import Figure
 
 from bench.figures import COLOURS, loops, style
 from bench.figures.look import axes_grid
 from bench.identification.damper import (
+    DesignFit,
+    OnlineDesignFit,
+    TrustReport,
     check_design_model,
     design_force,
     fit_design_model,
     fit_design_model_online,
 )
-from bench.identification.damper_study import Campaign, harmonic_campaign, harmonic_record, random_record
+from bench.identification.damper_study import (
+    Campaign,
+    DamperRecord,
+    harmonic_campaign,
+    harmonic_record,
+    random_record,
+)
 from bench.reproduction.damper_records import LOOPS, beside
 from bench.reproduction.estimates import REFERENCE, fine
 from bench.reproduction.item import Item, Picture, Progress, Row, fact_row, value_row
@@ -87,29 +98,36 @@ def _course(time: np.ndarray, courses: dict[str, tuple[np.ndarray, float, tuple[
     return figure
 
 
-def run(progress: Progress) -> Item:
-    """Make the item."""
-    rng = np.random.default_rng(SEED)
-    progress("202 harmonic tests", 0.05)
-    campaign = harmonic_campaign(rng)
-    progress("one slow test", 0.8)
-    slow = harmonic_record(0.25, 0.051, rng=rng, periods=15)
-    online = fit_design_model_online(slow.time, slow.velocity, slow.force, frequency=0.25)
-    offline = fit_design_model(slow.velocity, slow.force)
-    slow_trust = check_design_model(slow.time, slow.displacement, slow.velocity, slow.force)
-    progress("random motion", 0.85)
-    wild = random_record(rng)
-    trust = check_design_model(wild.time, wild.displacement, wild.velocity, wild.force)
-    rows = _table_rows(campaign)
-    rows += [
+class _SlowTest(NamedTuple):
+    """The harmonic test of 0.25 Hz and ±0.051 m, and the design models found from it."""
+
+    record: DamperRecord
+    online: OnlineDesignFit
+    offline: DesignFit
+    trust: TrustReport
+
+
+def _slow_test(rng: np.random.Generator) -> _SlowTest:
+    test = harmonic_record(0.25, 0.051, rng=rng, periods=15)
+    return _SlowTest(
+        test,
+        fit_design_model_online(test.time, test.velocity, test.force, frequency=0.25),
+        fit_design_model(test.velocity, test.force),
+        check_design_model(test.time, test.displacement, test.velocity, test.force),
+    )
+
+
+def _rows(campaign: Campaign, slow: _SlowTest, trust: TrustReport) -> tuple[Row, ...]:
+    return (
+        *_table_rows(campaign),
         value_row("harmonic tests", "1", 202.0, float(len(campaign.tests)), low=202.0, high=202.0),
-        value_row("0.25 Hz, ±0.051 m: on line settled after", "periods", 1.0, online.settled, high=1.0),
+        value_row("0.25 Hz, ±0.051 m: on line settled after", "periods", 1.0, slow.online.settled, high=1.0),
         value_row("on line settled after, median of all tests", "periods", 1.0, campaign.settled, high=1.0),
-        value_row("0.25 Hz, ±0.051 m: NMSE of the on-line model", "%", None, online.nmse, high=5.0),
+        value_row("0.25 Hz, ±0.051 m: NMSE of the on-line model", "%", None, slow.online.nmse, high=5.0),
         fact_row(
             "0.25 Hz test: design model trusted",
-            "yes" if slow_trust.trusted else "no",
-            slow_trust.trusted,
+            "yes" if slow.trust.trusted else "no",
+            slow.trust.trusted,
             requirement="yes",
         ),
         fact_row(
@@ -123,14 +141,20 @@ def run(progress: Progress) -> Item:
         value_row(
             "tests of the campaign in which the model is trusted", "1", None, float(campaign.n_trusted)
         ),
-    ]
-    forces = {"design model": design_force(slow.velocity, online.coefficient, online.exponent)}
+    )
+
+
+def _pictures(
+    campaign: Campaign, slow: _SlowTest, wild: DamperRecord, trust: TrustReport
+) -> tuple[Picture, ...]:
+    online, offline = slow.online, slow.offline
+    forces = {"design model": design_force(slow.record.velocity, online.coefficient, online.exponent)}
     wild_forces = {"design model": design_force(wild.velocity, trust.fit.coefficient, trust.fit.exponent)}
     courses = {
         "C [kN (s/m)^n]": (1e-3 * online.coefficients, 1e-3 * offline.coefficient, (0.0, 200.0)),
         "n [1]": (online.exponents, offline.exponent, (-2.0, 2.0)),
     }
-    pictures = (
+    return (
         Picture(
             "course",
             "Harmonic test of 0.25 Hz and ±0.051 m: C and n on line (Fig 3.3 a, b).",
@@ -139,7 +163,7 @@ def run(progress: Progress) -> Item:
         Picture(
             "harmonic",
             "The same test: measured force and design model (Fig 3.3 d, e).",
-            fine(loops(beside(slow, forces), LOOPS)),
+            fine(loops(beside(slow.record, forces), LOOPS)),
         ),
         Picture("histograms", "C and n over the 202 tests (Fig 3.4).", histograms(campaign)),
         Picture(
@@ -148,6 +172,18 @@ def run(progress: Progress) -> Item:
             fine(loops(beside(wild, wild_forces), LOOPS, window=(15.0, 25.0))),
         ),
     )
+
+
+def run(progress: Progress) -> Item:
+    """Make the item."""
+    rng = np.random.default_rng(SEED)
+    progress("202 harmonic tests", 0.05)
+    campaign = harmonic_campaign(rng)
+    progress("one slow test", 0.8)
+    slow = _slow_test(rng)
+    progress("random motion", 0.85)
+    wild = random_record(rng)
+    trust = check_design_model(wild.time, wild.displacement, wild.velocity, wild.force)
     text = (
         "A synthetic damper of the printed size: a power-law dashpot in series with a spring, with seal "
         "friction, a small stiffness and a moving mass beside it. C and n of each test are drawn from "
@@ -159,4 +195,4 @@ def run(progress: Progress) -> Item:
         "answer with a C that means nothing, which widens the spread: these tests fail the check of "
         "trust."
     )
-    return Item(text, tuple(rows), pictures)
+    return Item(text, _rows(campaign, slow, trust), _pictures(campaign, slow, wild, trust))

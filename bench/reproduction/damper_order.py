@@ -9,7 +9,7 @@ from bench.figures import COLOURS, style
 from bench.figures.look import axes_grid
 from bench.identification.damper_study import OrderStudy, order_study, random_record
 from bench.reproduction.estimates import REFERENCE
-from bench.reproduction.item import Item, Picture, Progress, fact_row, value_row
+from bench.reproduction.item import Item, Picture, Progress, Row, fact_row, value_row
 
 SEED = 33
 HIGHEST = 35
@@ -82,18 +82,12 @@ def indicators(study: OrderStudy) -> Figure:
     return figure
 
 
-def run(progress: Progress) -> Item:
-    """Make the item."""
-    progress("random tests", 0.02)
-    rng = np.random.default_rng(SEED)
-    training, validation = random_record(rng), random_record(rng)
-    progress(f"fitting all {(HIGHEST + 1) ** 2} pairs of orders", 0.1)
-    study = order_study(training, validation, highest=HIGHEST)
+def _rows(study: OrderStudy) -> tuple[Row, ...]:
     error = np.diag(study.validation)
     by_x = float(np.ptp(np.log10(study.validation[1:11, FIXED])))
     by_v = float(np.ptp(np.log10(study.validation[FIXED, 0:11])))
     last = float(error[-1])
-    rows = (
+    return (
         value_row(
             "optimum common order, found automatically",
             "1",
@@ -136,7 +130,10 @@ def run(progress: Progress) -> Item:
             study.mass_plateau,
         ),
     )
-    pictures = (
+
+
+def _pictures(study: OrderStudy) -> tuple[Picture, ...]:
+    return (
         Picture(
             "map", "Error over both orders, and along each with the other at 5 (Fig 3.11).", error_map(study)
         ),
@@ -144,6 +141,15 @@ def run(progress: Progress) -> Item:
             "indicators", "Estimated mass and error over the common order (Fig 3.12 a, f).", indicators(study)
         ),
     )
+
+
+def run(progress: Progress) -> Item:
+    """Make the item."""
+    progress("random tests", 0.02)
+    rng = np.random.default_rng(SEED)
+    training, validation = random_record(rng), random_record(rng)
+    progress(f"fitting all {(HIGHEST + 1) ** 2} pairs of orders", 0.1)
+    study = order_study(training, validation, highest=HIGHEST)
     text = (
         "Polynomials of all pairs of orders 0 to 35 in displacement and velocity, with the mass, fitted "
         "to one random record of 60 s and judged on another of the same kind. Chebyshev columns span the "
@@ -153,4 +159,4 @@ def run(progress: Progress) -> Item:
         "tonnes, and the 20 kg that move are lost beside it; that it stays the same until the model has "
         "too many terms is what counts."
     )
-    return Item(text, rows, pictures)
+    return Item(text, _rows(study), _pictures(study))

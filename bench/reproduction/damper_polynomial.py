@@ -18,7 +18,7 @@ from bench.identification.damper_study import (
 from bench.recording import nmse
 from bench.reproduction.damper_records import LOOPS, beside
 from bench.reproduction.estimates import REFERENCE, fine
-from bench.reproduction.item import Item, Picture, Progress, fact_row, value_row
+from bench.reproduction.item import Item, Picture, Progress, Row, fact_row, value_row
 from bench.rig import Element, simulate
 from bench.rig.library import damper_rig, prescribe, starting
 
@@ -95,21 +95,10 @@ def _contributions(experiment: PolynomialExperiment) -> Figure:
     return figure
 
 
-def run(progress: Progress) -> Item:
-    """Make the item."""
-    progress("random tests and on-line identification", 0.1)
-    experiment = polynomial_experiment(np.random.default_rng(SEED))
-    progress("the same motion on the MuJoCo rig", 0.6)
-    difference = rig_difference(experiment)
-    progress("drawing", 0.7)
-    ours = {
-        "on line": experiment.online,
-        "half amplitude": experiment.half_amplitude,
-        "other segment": experiment.other_segment,
-    }
+def _rows(experiment: PolynomialExperiment, ours: dict[str, float], difference: float) -> tuple[Row, ...]:
     figures = {"on line": "Fig 3.5", "half amplitude": "Fig 3.8", "other segment": "Fig 3.9"}
     # Same order: within a factor of three either way, less than half a decade.
-    rows = [
+    errors = [
         value_row(
             f"{name} ({figures[name]}): NMSE",
             "%",
@@ -123,7 +112,8 @@ def run(progress: Progress) -> Item:
     ]
     order = sorted(ours, key=lambda name: ours[name])
     printed = sorted(PRINTED_NMSE, key=lambda name: PRINTED_NMSE[name])
-    rows += [
+    return (
+        *errors,
         fact_row(
             "ordering of the errors",
             " < ".join(order),
@@ -140,12 +130,15 @@ def run(progress: Progress) -> Item:
             difference,
             high=0.01,
         ),
-    ]
+    )
+
+
+def _pictures(experiment: PolynomialExperiment, ours: dict[str, float]) -> tuple[Picture, ...]:
     training = beside(experiment.training, {"identified": np.nan_to_num(experiment.predicted)})
     half = beside(experiment.validation_half, {"estimated": experiment.predicted_half})
     segment = beside(experiment.validation_segment, {"estimated": experiment.predicted_segment})
     window = (20.0, 28.0)
-    pictures = (
+    return (
         Picture(
             "identified",
             "Identification record, force on line (Fig 3.5 a).",
@@ -178,6 +171,20 @@ def run(progress: Progress) -> Item:
             bar_table({"printed": PRINTED_NMSE, "ours": ours}, limit=5.0, limit_label="good fit"),
         ),
     )
+
+
+def run(progress: Progress) -> Item:
+    """Make the item."""
+    progress("random tests and on-line identification", 0.1)
+    experiment = polynomial_experiment(np.random.default_rng(SEED))
+    progress("the same motion on the MuJoCo rig", 0.6)
+    difference = rig_difference(experiment)
+    progress("drawing", 0.7)
+    ours = {
+        "on line": experiment.online,
+        "half amplitude": experiment.half_amplitude,
+        "other segment": experiment.other_segment,
+    }
     text = (
         "The synthetic damper of B1 under random motion of ±0.0254 m, band 0.1 to 1 Hz. Orders 5 and 5 "
         "in displacement and velocity and the mass make 37 parameters, identified on line; the estimates "
@@ -185,4 +192,4 @@ def run(progress: Progress) -> Item:
         "error on line includes the first seconds, in which the estimates are still found; that is why "
         "the unseen segment does better, as printed."
     )
-    return Item(text, tuple(rows), pictures)
+    return Item(text, _rows(experiment, ours, difference), _pictures(experiment, ours))

@@ -58,12 +58,8 @@ def dead_space(test: Recording) -> tuple[float, float, float]:
     return edges[0], edges[1], float(np.mean(slopes))
 
 
-def run(progress: Progress) -> Item:
-    """Make the item."""
-    progress("simulating", 0.1)
-    test = record()
+def _rows(test: Recording) -> tuple[Row, ...]:
     shown = test.slice_time(*WINDOW)
-    progress("surface", 0.4)
     x, v, r = (test[name] for name in ("displacement", "velocity", "restoring_force"))
     half = len(x) // 2
     fit = fit_surface(x[:half], v[:half], r[:half], orders=(9, 3))
@@ -71,7 +67,8 @@ def run(progress: Progress) -> Item:
     by_x = float(np.corrcoef(x, r)[0, 1] ** 2)
     by_v = float(np.corrcoef(v, r)[0, 1] ** 2)
     left, right, slope = dead_space(test)
-    rows = (
+    peaks = [float(np.abs(record(seed).slice_time(*WINDOW)["restoring_force"]).max()) for seed in SEEDS]
+    return (
         range_row("displacement, 20 to 50 s", "in", 0.8, shown["displacement"]),
         range_row("velocity, 20 to 50 s", "in/s", 20.0, shown["velocity"]),
         range_row("restoring force, 20 to 50 s", "lbf", 20.0, shown["restoring_force"]),
@@ -104,17 +101,19 @@ def run(progress: Progress) -> Item:
         value_row(
             "surface r(x, v), order 9 x 3, fitted to 0-30 s: NMSE on 30-60 s", "%", None, unseen, high=5.0
         ),
+        Row("largest restoring force over eight seeds", "lbf", "20", f"{min(peaks):.3g} … {max(peaks):.3g}"),
     )
-    peaks = [float(np.abs(record(seed).slice_time(*WINDOW)["restoring_force"]).max()) for seed in SEEDS]
-    spread = f"{min(peaks):.3g} … {max(peaks):.3g}"
-    rows = (*rows, Row("largest restoring force over eight seeds", "lbf", "20", spread))
+
+
+def _pictures(test: Recording) -> tuple[Picture, ...]:
     records = {"rig": test}
     pairs = [
         ("displacement", "restoring_force"),
         ("displacement", "velocity"),
         ("velocity", "restoring_force"),
     ]
-    pictures = (
+    x, v, r = (test[name] for name in ("displacement", "velocity", "restoring_force"))
+    return (
         Picture(
             "histories",
             "Displacement, velocity and restoring force: nothing betrays the gap (Fig 2.7).",
@@ -131,6 +130,14 @@ def run(progress: Progress) -> Item:
             surface(x, v, r, labels=("displacement [in]", "velocity [in/s]", "restoring force [lbf]")),
         ),
     )
+
+
+def run(progress: Progress) -> Item:
+    """Make the item."""
+    progress("simulating", 0.1)
+    test = record()
+    progress("surface", 0.4)
+    rows = _rows(test)
     text = (
         f"Carriage of {MASS:g} lbf s²/in between two springs of {CONTACT:g} lbf/in with {CLEARANCE:g} in "
         f"of free travel to each side, under noise from {BAND[0]:g} to {BAND[1]:g} Hz of {FORCE_RMS:g} "
@@ -138,4 +145,4 @@ def run(progress: Progress) -> Item:
         "such a record scatter, as the last row tells. The restoring force is what a laboratory "
         "computes, r = F - m a."
     )
-    return Item(text, rows, pictures)
+    return Item(text, rows, _pictures(test))

@@ -156,15 +156,12 @@ def _joint(record: Recording) -> Recording:
     return shown(record, np.stack([record["joint/force_1"], record["joint/force_2"]], axis=1))
 
 
-def run(progress: Progress) -> Item:
-    """Make the item."""
-    progress("measuring and identifying", 0.05)
-    records, fitted = models()
-    progress("unseen tests", 0.7)
-    true = tests(UNSEEN_SEEDS)
-    rng = np.random.default_rng(80)
-    unseen = {name: measured(record, rng) for name, record in true.items()}
-    views = {name: shown(record, view(record).forces) for name, record in records.items()}
+def _rows(
+    views: dict[str, Recording],
+    unseen: JointData,
+    fitted: dict[str, Model],
+    swapped: dict[str, InPlace],
+) -> tuple[Row, ...]:
     pooled = {
         name: np.concatenate([record[name] for record in views.values()])
         for name in ("axial", "torsional", "axial force", "torsional force")
@@ -175,18 +172,14 @@ def run(progress: Progress) -> Item:
         range_row("axial restoring force", "lbf", 60.0, pooled["axial force"]),
         range_row("torsional restoring force", "lbf in", 60.0, pooled["torsional force"]),
     ]
-    both = view(unseen["both"])
-    swapped = {}
     for label, model in fitted.items():
-        predicted = model.predict(both.states)
+        limit = 5.0 if label.startswith("network") else math.inf
+        predicted = model.predict(unseen.states)
         for i, axis in enumerate(AXES):
-            score = nmse(both.forces[:, i], predicted[:, i])
-            limit = 5.0 if label.startswith("network") else math.inf
+            score = nmse(unseen.forces[:, i], predicted[:, i])
             rows.append(
                 value_row(f"unseen, both loaded, {axis} force: NMSE, {label}", "%", None, score, high=limit)
             )
-        swapped[label] = in_place(model, true)
-        limit = 5.0 if label.startswith("network") else math.inf
         row = value_row(
             f"in the joint's place, three unseen loadings: worst NMSE of a force, {label}",
             "%",
@@ -195,18 +188,18 @@ def run(progress: Progress) -> Item:
             high=limit,
         )
         rows.append(row._replace(ours=swapped[label].note or row.ours))
-    progress("drawing", 0.9)
-    window = (10.0, 20.0)
+    return tuple(rows)
+
+
+def _pictures(
+    views: dict[str, Recording], compared: dict[str, Recording], exchanged: dict[str, Recording]
+) -> tuple[Picture, ...]:
     named = {"both": views["both"], "x only": views["axial"], "θ only": views["torsional"]}
-    compared = {"measured": shown(unseen["both"], both.forces)} | {
-        label: shown(unseen["both"], model.predict(both.states)) for label, model in fitted.items()
-    }
-    exchanged = {"laboratory joint": _joint(true["both"])} | {
-        label: _joint(found.both) for label, found in swapped.items() if found.both is not None
-    }
-    pictures = (
+    return (
         Picture(
-            "training", "Measured training records (Fig 4.14).", fine(loops(named, PAIRS, window=window))
+            "training",
+            "Measured training records (Fig 4.14).",
+            fine(loops(named, PAIRS, window=(10.0, 20.0))),
         ),
         Picture(
             "unseen",
@@ -219,6 +212,27 @@ def run(progress: Progress) -> Item:
             fine(loops(exchanged, PAIRS, window=(12.0, 15.0))),
         ),
     )
+
+
+def run(progress: Progress) -> Item:
+    """Make the item."""
+    progress("measuring and identifying", 0.05)
+    records, fitted = models()
+    progress("unseen tests", 0.7)
+    true = tests(UNSEEN_SEEDS)
+    rng = np.random.default_rng(80)
+    unseen = {name: measured(record, rng) for name, record in true.items()}
+    views = {name: shown(record, view(record).forces) for name, record in records.items()}
+    both = view(unseen["both"])
+    swapped = {label: in_place(model, true) for label, model in fitted.items()}
+    rows = _rows(views, both, fitted, swapped)
+    progress("drawing", 0.9)
+    compared = {"measured": shown(unseen["both"], both.forces)} | {
+        label: shown(unseen["both"], model.predict(both.states)) for label, model in fitted.items()
+    }
+    exchanged = {"laboratory joint": _joint(true["both"])} | {
+        label: _joint(found.both) for label, found in swapped.items() if found.both is not None
+    }
     text = (
         "The laboratory rig with a joint chosen to give the printed ranges: 60 lbf/in, beyond 0.08 in "
         "420 lbf/in more, and alike in torsion, with coupling by damping. Load cells, accelerometers and "
@@ -226,4 +240,4 @@ def run(progress: Progress) -> Item:
         "identification, which sees nothing else. Models are judged on measured forces of unseen tests, "
         "and in the joint's place against the true joint, for loads on x only, on θ only and on both."
     )
-    return Item(text, tuple(rows), pictures)
+    return Item(text, rows, _pictures(views, compared, exchanged))

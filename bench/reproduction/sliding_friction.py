@@ -16,7 +16,7 @@ from bench.figures import loops, time_histories
 from bench.recording import Recording
 from bench.reproduction.estimates import fine
 from bench.reproduction.imperial import STIFFNESS, imperial
-from bench.reproduction.item import Item, Picture, Progress, fact_row, range_row, value_row
+from bench.reproduction.item import Item, Picture, Progress, Row, fact_row, range_row, value_row
 from bench.rig import Element, simulate
 from bench.rig.library import INCH, POUND_FORCE, sdof_rig
 from bench.signals import Constant, Excitation, Harmonic, Signal, Tapered
@@ -28,6 +28,7 @@ COIL = 18.5  # amplitude of the coil's force [lbf]
 FREQUENCY = 3.2  # [Hz]
 FRICTION_COEFFICIENT = 0.2
 GRIP = (7.5, 70.0)  # smallest and largest normal force [lbf]
+STEADY_GRIP = 25.0  # normal force of the test without modulation [lbf]
 MODULATION = 2.0 / 30.0  # two periods in 30 s [Hz]
 CREEP = 0.3  # velocity that rounds the friction law [in/s]
 DURATION = 30.0
@@ -72,11 +73,7 @@ def envelope(values: np.ndarray, time: np.ndarray, at: float) -> float:
     return float(np.max(np.abs(values[np.abs(time - at) <= 0.5 / FREQUENCY])))
 
 
-def run(progress: Progress) -> Item:
-    """Make the item."""
-    progress("simulating", 0.1)
-    test = record(modulated())
-    constant = record(Constant(25.0 * POUND_FORCE))
+def _rows(test: Recording, constant: Recording) -> tuple[Row, ...]:
     loose, tight = 1.0 / MODULATION, 1.5 / MODULATION
     swing = {
         name: (envelope(test[name], test.time, loose), envelope(test[name], test.time, tight))
@@ -85,7 +82,7 @@ def run(progress: Progress) -> Item:
     last = constant.slice_time(20.0, 20.0 + 1.0 / FREQUENCY)
     area = float(np.sum(last["slide/force"] * last["velocity"]) / constant.sample_rate)
     stroke = 2.0 * float(np.ptp(last["displacement"]))
-    rows = (
+    return (
         range_row("displacement", "in", 1.0, test["displacement"]),
         range_row("velocity", "in/s", 20.0, test["velocity"]),
         range_row("acceleration", "in/s^2", 400.0, test["acceleration"]),
@@ -109,13 +106,16 @@ def run(progress: Progress) -> Item:
             "constant grip: area of the slide's loop over friction limit times path",
             "1",
             None,
-            area / (FRICTION_COEFFICIENT * 25.0 * stroke),
+            area / (FRICTION_COEFFICIENT * STEADY_GRIP * stroke),
             low=0.95,
             high=1.0,
             requirement="0.95 … 1 (rounded by the creep velocity)",
         ),
     )
-    pictures = (
+
+
+def _pictures(test: Recording, constant: Recording) -> tuple[Picture, ...]:
+    return (
         Picture(
             "histories",
             "Modulated friction: motion, force gauge and normal force; the motion dies where the grip is strong (Fig 2.9).",
@@ -136,6 +136,13 @@ def run(progress: Progress) -> Item:
             fine(loops({"rig": test}, [("displacement", "restoring_force")], window=(7.5, 15.0))),
         ),
     )
+
+
+def run(progress: Progress) -> Item:
+    """Make the item."""
+    progress("simulating", 0.1)
+    test = record(modulated())
+    constant = record(Constant(STEADY_GRIP * POUND_FORCE))
     text = (
         f"Carriage of {MASS:g} lbf s²/in, spring of {SPRING:g} lbf/in, friction coefficient "
         f"{FRICTION_COEFFICIENT:g}, normal force between {GRIP[0]:g} and {GRIP[1]:g} lbf, coil force of "
@@ -143,4 +150,4 @@ def run(progress: Progress) -> Item:
         "would make the gauge read the same throughout; the printed gauge reads more when the grip is "
         "strong, which the back-EMF of a shaker on a voltage amplifier explains."
     )
-    return Item(text, rows, pictures)
+    return Item(text, _rows(test, constant), _pictures(test, constant))

@@ -93,36 +93,28 @@ def log_comparison(
     pairs = _loops(records, first_rig) if loops is None else list(loops)
     for pair in pairs:
         holder_of(records, *pair)
-    lanes = _lanes(
-        [*(b for element in (first_rig.elements if first_rig else ()) for b in bands_of(element)), *bands],
-        records,
-    )
+    own = [band for element in (first_rig.elements if first_rig else ()) for band in bands_of(element)]
+    lanes = _lanes([*own, *bands], records)
+    scenes = {key: variant for variant, key in _keys(records).items() if variant in rigs}
+    page = Page.of(records, scenes, pairs, lanes=len(lanes))
+    if first_rig is not None:
+        page = page._replace(eye=eye_of(first_rig.scene, camera))
 
     with replacing(path) if path is not None else nullcontext() as target:
         stream = rr.RecordingStream(APPLICATION)
         try:
-            keys = _keys(records)
-            scenes = {keys[variant]: variant for variant in records if variant in rigs}
-            page = Page.of(records, scenes, pairs, lanes=len(lanes))
-            if first_rig is not None:
-                page = page._replace(eye=eye_of(first_rig.scene, camera))
             if target is None:
                 _open_viewer(stream, blueprint(page))
             else:
                 stream.save(target, default_blueprint=blueprint(page))
             stream.send_recording_name(title or " · ".join(records))
-            for variant, rig in rigs.items():
-                qpos = (
-                    np.asarray(poses[variant]) if variant in poses else joint_positions(rig, records[variant])
-                )
-                _log_rig(stream, keys[variant], rig, clock, qpos)
+            _log_rigs(stream, rigs, records, poses, clock)
             _log_channels(stream, records, clock)
             _log_errors(stream, records, page.errors, clock)
             _log_loops(stream, records, pairs, clock)
             _log_bands(stream, records, lanes, clock)
-            stream.log(
-                "scores", rr.TextDocument(_scores(records, clock), media_type="text/markdown"), static=True
-            )
+            scores = rr.TextDocument(_scores(records, clock), media_type="text/markdown")
+            stream.log("scores", scores, static=True)
             stream.flush()
         finally:
             stream.disconnect()
@@ -192,9 +184,18 @@ def _loops(records: Mapping[str, Recording], rig: Rig | None) -> list[tuple[str,
     return [pair for pair in pairs if pair[0] in held]
 
 
-def _log_rig(stream: rr.RecordingStream, variant: str, rig: Rig, clock: _Clock, qpos: NDArray) -> None:
-    shown = body_poses(rig.scene, qpos[clock.frames])
-    log_scene(stream, ["rig", variant], rig.scene, clock.time[clock.frames], shown)
+def _log_rigs(
+    stream: rr.RecordingStream,
+    rigs: Mapping[str, Rig],
+    records: Mapping[str, Recording],
+    poses: Mapping[str, ArrayLike],
+    clock: _Clock,
+) -> None:
+    keys = _keys(records)
+    for variant, rig in rigs.items():
+        qpos = np.asarray(poses[variant]) if variant in poses else joint_positions(rig, records[variant])
+        moved = body_poses(rig.scene, qpos[clock.frames])
+        log_scene(stream, ["rig", keys[variant]], rig.scene, clock.time[clock.frames], moved)
 
 
 def _keys(records: Mapping[str, Recording]) -> dict[str, str]:
