@@ -7,6 +7,7 @@ nothing that a bench computes depends on how many stand beside it.
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -16,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.errors import ParameterError, UnknownNameError
-from bench.excitation import Contrast, Draw, Ensemble, RigPrior, Rivals, expected_log_bayes_factor
-from bench.excitation.bayes_factor import accumulate_contrast
+from bench.excitation import Contrast, Draw, Ensemble, RigPrior, Rivals
+from bench.excitation.bayes_factor import accumulate_contrast, weigh_contrast
 from bench.excitation.experiment import fan
 from bench.excitation.information import STEP, accumulate, misfit
 from bench.excitation.station import Desk
@@ -70,6 +71,143 @@ class Outcome(NamedTuple):
     info: dict[str, Any]  # arrays (m,)
 
 
+class Ran(NamedTuple):
+    """What a window on several benches gave and told; m of them."""
+
+    measured: NDArray[np.float64]  # (m, n_steps, n_channels)
+    lost: NDArray[np.bool_]  # (m,) whether the simulation diverged
+    gain: NDArray[np.float64]  # (m,) growth of the merit [nat]
+    effective: NDArray[np.float64]  # (m,) effective number of draws
+
+
+def sensed(ideal: NDArray, disturbance: NDArray) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """What sensors show in a window, and which simulations diverged, of which nothing more can be measured.
+
+    Args:
+        ideal: What perfect sensors show ``(m, n_steps, n_channels)``; zeroed where a simulation diverged.
+        disturbance: What the sensors add ``(m, n_steps, n_channels)``.
+    """
+    lost = np.logical_not(np.isfinite(ideal).all(axis=(1, 2)))
+    ideal[lost] = 0.0
+    return ideal + disturbance, lost
+
+
+class SteppedBenches(ABC):
+    """Benches that are stepped a window at a time, and the experimenter's books on them.
+
+    How a window is run, and what it tells, is left to the kind of bench.
+
+    Attributes:
+        setup: The laboratory and its questions.
+        options: What was asked for.
+        n: Number of benches.
+        timestep: Interval of commands and measurements [s].
+        n_steps: Steps a window.
+        n_windows: Windows an episode.
+        station: What is measured and allowed.
+        desk: The experimenter's books.
+        truth: The hidden rigs.
+        question: Question asked of each bench ``(n,)``.
+    """
+
+    question: NDArray[np.int64]
+    _values: NDArray[np.float64]  # worth of the records so far, by bench (and draw, or pair of rivals) [nat]
+
+    def __init__(self, setup: Setup, options: Options, n: int) -> None:
+        """Set up the books; each bench must be `reset` before it is stepped.
+
+        Raises:
+            ParameterError: A window is shorter than a step, or an episode shorter than a window.
+        """
+        self.setup, self.options, self.n = setup, options, n
+        self.timestep = setup.rig.timestep
+        self.n_steps = round((options.window or setup.window) / self.timestep)
+        self.n_windows = (
+            round((options.duration or setup.duration) / (self.n_steps * self.timestep))
+            if self.n_steps
+            else 0
+        )
+        if self.n_steps < 1 or self.n_windows < 1:
+            raise ParameterError(
+                f"a window of {options.window} s and an episode of {options.duration} s came; a window takes at least one step "
+                f"of {self.timestep:g} s and an episode at least one window"
+            )
+        self.station = setup.station(
+            self.n_steps, self.n_windows, shaping=options.shaping, n_knots=options.n_knots
+        )
+        self.desk = Desk(self.station, n)
+        self.truth: list[Draw | None] = [None] * n
+        self._rivals = isinstance(setup.questions[0], Rivals)
+        self._merit = np.zeros(n)
+        # The sensors' noise of an episode and, last, of the rest before it: drawn at once, which is faster.
+        self._disturbance = np.zeros((n, self.n_windows + 1, self.n_steps, len(self.station.channels)))
+
+    @property
+    def width(self) -> int:
+        """Length of an action."""
+        return self.desk.shaping.width
+
+    @property
+    def n_observations(self) -> int:
+        """Length of an observation."""
+        return self.desk.n_observations
+
+    @abstractmethod
+    def effective_draws(self, places: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Effective number of the draws that the reward is averaged over, at the start of an episode ``(m,)``."""
+
+    @abstractmethod
+    def _run(self, places: NDArray[np.int64], commands: NDArray[np.float64]) -> Ran:
+        """Run the next window under commands ``(m, n_steps, n_actuators)``, and book what it tells."""
+
+    def step(self, places: NDArray[np.int64], actions: NDArray) -> Outcome:
+        """Run the next window on some benches.
+
+        Args:
+            places: Benches, ascending ``(m,)``.
+            actions: Actions ``(m, width)``; clipped to −1 … 1.
+        """
+        actions = np.clip(np.asarray(actions, dtype=float).reshape(len(places), -1), -1.0, 1.0)
+        commands, exhausted = self.desk.commands(places, actions)
+        measured, lost, gain, effective = self._run(places, commands)
+        reached = self.desk.book(places, measured)
+        reached[lost] = LOST
+        self.desk.window[places] += 1
+        over = reached > 1.0
+        stop = lost | (over[:, 0] & (self.options.enforcement == "terminate"))
+        excess = np.minimum(np.maximum(reached - 1.0, 0.0), 1.0).sum(axis=1)
+        cost = self.options.penalty * np.where(stop, 1.0, excess)
+        separated = self._separated(places)
+        certain = (separated >= 1.0) & self.options.terminate_when_certain
+        terminated = stop | exhausted | certain
+        truncated = ~terminated & (self.desk.window[places] >= self.n_windows)
+        info: dict[str, Any] = {
+            "merit": self._merit[places],
+            "gain": gain,
+            "cost": cost,
+            "stroke": reached[:, 0],
+            "velocity": reached[:, 1],
+            "force": np.max(np.abs(commands) / self.desk.force, axis=(1, 2)),
+            "energy": np.max(self.desk.energy[places] / self.desk.budget, axis=1),
+            "time": self.desk.window[places] * (self.n_steps * self.timestep),
+            "effective_draws": effective,
+            "separated": separated,
+            "violation": over.any(axis=1),
+        }
+        observation = self.desk.observe(places, measured, commands, actions, self.question)
+        return Outcome(observation, gain - cost, terminated, truncated, info)
+
+    def _separated(self, places: NDArray) -> NDArray[np.float64]:
+        """Share of a bench's pairs of rivals that are expected to be told apart with 99 % certainty ``(m,)``."""
+        if not self._rivals:
+            return np.zeros(len(places))
+        return np.mean(self._values[places].reshape(len(places), -1) >= math.log1p(CERTAIN), axis=1)
+
+    def _clock(self, places: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Time at which the next window begins ``(m,)`` [s]."""
+        return (self.n_steps * self.timestep) * self.desk.window[places].astype(float)
+
+
 class _Panel(NamedTuple):
     """The prior draws of all questions as one ensemble, and where each question's lie in it."""
 
@@ -107,36 +245,14 @@ def _panel(setup: Setup, threads: int) -> _Panel:
     return _Panel(ensemble, members, sizes, counts, places, weights)
 
 
-class Benches:
-    """Laboratories with hidden rigs, and the experimenter's books on them.
-
-    Attributes:
-        setup: The laboratory and its questions.
-        options: What was asked for.
-        n: Number of benches.
-    """
+class Benches(SteppedBenches):
+    """Laboratories with hidden rigs, and the experimenter's books on them; the merit is averaged over prior draws."""
 
     def __init__(self, setup: Setup, options: Options, n: int, threads: int = 1) -> None:
         """Set up benches; each must be `reset` before it is stepped."""
-        self.setup, self.options, self.n, self.threads = setup, options, n, threads
-        limits = setup.limits
-        self.channels, self.actuators = tuple(setup.noise), limits.actuators
-        self.timestep = setup.rig.timestep
-        self.n_steps = round((options.window or setup.window) / self.timestep)
-        self.n_windows = (
-            round((options.duration or setup.duration) / (self.n_steps * self.timestep))
-            if self.n_steps
-            else 0
-        )
-        if self.n_steps < 1 or self.n_windows < 1:
-            raise ParameterError(
-                f"a window of {options.window} s and an episode of {options.duration} s came; a window takes at least one step "
-                f"of {self.timestep:g} s and an episode at least one window"
-            )
-        self.station = setup.station(
-            self.n_steps, self.n_windows, shaping=options.shaping, n_knots=options.n_knots
-        )
-        self.desk = Desk(self.station, n)
+        super().__init__(setup, options, n)
+        self.threads = threads
+        self.channels, self.actuators = self.station.channels, self.station.actuators
         hypotheses = [
             h
             for q in setup.questions
@@ -145,30 +261,15 @@ class Benches:
         self._laboratories = Laboratories(
             tuple(hypotheses), n, channels=self.channels, actuators=self.actuators, threads=threads
         )
-        self._rivals = isinstance(setup.questions[0], Rivals)
         self._noise = self.desk.noise
         panel = _panel(setup, threads)
         draws, p = panel.counts.shape[1], int(panel.counts.max())
-        self.truth: list[Draw | None] = [None] * n
         self.question = np.zeros(n, dtype=np.int64)
-        self._merit = np.zeros(n)
         self._states = np.zeros((n, panel.members.shape[1], panel.ensemble.n_states))
         self._fisher, self._score = np.zeros((n, draws, p, p)), np.zeros((n, draws, p))
         self._square = np.zeros((n, draws))
-        # The sensors' noise of an episode and, last, of the rest before it: drawn at once, which is faster.
-        self._disturbance = np.zeros((n, self.n_windows + 1, self.n_steps, len(self.channels)))
         self._contrast = Contrast.zeros(n, draws // 2, parameters=p) if self._rivals else None
         self._values = np.zeros((n, draws // 2 if self._rivals else draws))
-
-    @property
-    def width(self) -> int:
-        """Length of an action."""
-        return self.desk.shaping.width
-
-    @property
-    def n_observations(self) -> int:
-        """Length of an observation."""
-        return self.desk.n_observations
 
     def reset(self, places: NDArray[np.int64], rngs: Sequence[np.random.Generator]) -> NDArray[np.float32]:
         """Put new hidden rigs, at rest, into some benches; return what their sensors show at rest.
@@ -202,47 +303,11 @@ class Benches:
         rest = np.zeros((m, self.n_steps, len(self.actuators)))
         return self.desk.observe(places, measured, rest, np.zeros((m, self.width)), self.question)
 
-    def step(self, places: NDArray[np.int64], actions: NDArray) -> Outcome:
-        """Run the next window on some benches.
-
-        Args:
-            places: Benches, ascending ``(m,)``.
-            actions: Actions ``(m, width)``; clipped to −1 … 1.
-        """
-        actions = np.clip(np.asarray(actions, dtype=float).reshape(len(places), -1), -1.0, 1.0)
-        commands, exhausted = self.desk.commands(places, actions)
+    def _run(self, places: NDArray[np.int64], commands: NDArray[np.float64]) -> Ran:
         ideal = self._laboratories.run(places, commands)
-        lost = np.logical_not(np.isfinite(ideal).all(axis=(1, 2)))
-        if lost.any():  # the simulation diverged: nothing more can be measured
-            ideal[lost] = 0.0
-        measured = ideal + self._noise * self._disturbance[places, self.desk.window[places] % self.n_windows]
-        reached = self.desk.book(places, measured)
-        reached[lost] = LOST
-        gain, effective = self._account(places, commands, measured)
-        self.desk.window[places] += 1
-        over = reached > 1.0
-        excess = np.maximum(reached - 1.0, 0.0)
-        stop = lost | (over[:, 0] & (self.options.enforcement == "terminate"))
-        cost = self.options.penalty * np.where(stop, 1.0, np.minimum(excess, 1.0).sum(axis=1))
-        separated = self._separated(places)
-        certain = (separated >= 1.0) & self.options.terminate_when_certain
-        terminated = stop | exhausted | certain
-        truncated = ~terminated & (self.desk.window[places] >= self.n_windows)
-        info: dict[str, Any] = {
-            "merit": self._merit[places],
-            "gain": gain,
-            "cost": cost,
-            "stroke": reached[:, 0],
-            "velocity": reached[:, 1],
-            "force": np.max(np.abs(commands) / self.desk.force, axis=(1, 2)),
-            "energy": np.max(self.desk.energy[places] / self.desk.budget, axis=1),
-            "time": self.desk.window[places] * (self.n_steps * self.timestep),
-            "effective_draws": effective,
-            "separated": separated,
-            "violation": over.any(axis=1),
-        }
-        observation = self.desk.observe(places, measured, commands, actions, self.question)
-        return Outcome(observation, gain - cost, terminated, truncated, info)
+        noise = self._noise * self._disturbance[places, self.desk.window[places] % self.n_windows]
+        measured, lost = sensed(ideal, noise)
+        return Ran(measured, lost, *self._account(places, commands, measured))
 
     def _account(self, places: NDArray, commands: NDArray, measured: NDArray) -> tuple[NDArray, NDArray]:
         """Book the window on all prior draws; return the growth of the merit and the effective number of draws."""
@@ -259,7 +324,7 @@ class Benches:
             states,
             members=panel.members[asked],
             counts=panel.n_members[asked],
-            clock=(self.n_steps * self.timestep) * self.desk.window[places].astype(float),
+            clock=self._clock(places),
         )
         weights = 1.0 / self._noise
         follow = self.options.average == "posterior"
@@ -275,10 +340,14 @@ class Benches:
             sums = Contrast(*contrast)
             pairs = counts.reshape(m, -1, 2)
             at = panel.places[asked].reshape(m, -1, 2)
-            panel.ensemble.spread(
-                lambda a, b: accumulate_contrast(a, b, outputs, at, pairs, STEP, weights, sums), m
-            )
-            values = np.log1p(np.maximum(expected_log_bayes_factor(sums), 0.0))
+            values = np.zeros(pairs.shape[:2])
+
+            def contrast_cases(a: int, b: int) -> None:
+                accumulate_contrast(a, b, outputs, at, pairs, STEP, weights, sums)
+                weigh_contrast(a, b, sums, values)
+
+            panel.ensemble.spread(contrast_cases, m)
+            values = np.log1p(np.maximum(values, 0.0))
         values = np.where(
             np.isfinite(values), values, self._values[places]
         )  # of a draw that diverged: no more
@@ -310,12 +379,6 @@ class Benches:
         logarithm = np.log(np.maximum(prior, 1e-300)) - 0.5 * windows[:, None] * remainder
         weight = np.exp(logarithm - logarithm.max(axis=1, keepdims=True)) * (prior > 0.0)
         return weight / weight.sum(axis=1, keepdims=True)
-
-    def _separated(self, places: NDArray) -> NDArray[np.float64]:
-        """Share of the pairs of prior draws that are expected to be told apart with 99 % certainty."""
-        if not self._rivals:
-            return np.zeros(len(places))
-        return np.mean(self._values[places] >= math.log1p(CERTAIN), axis=1)
 
     def effective_draws(self, places: NDArray[np.int64]) -> NDArray[np.float64]:
         """One over the sum of the squared prior weights of the draws (of the pairs, for rivals) ``(m,)``."""

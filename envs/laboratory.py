@@ -152,13 +152,14 @@ class Laboratories:
         m, n_steps, _ = controls.shape
         full = np.zeros((m, n_steps, self._rig.model.nu))
         full[:, :, self._driven] = controls
-        record = self._batch.rollout(
-            n_steps,
-            full,
-            mujoco.mjtState.mjSTATE_CTRL,
-            ["sensordata"],
-            ids=None if m == self.n else places,
-        )
+        with native.untimed():
+            record = self._batch.rollout(
+                n_steps,
+                full,
+                mujoco.mjtState.mjSTATE_CTRL,
+                ["sensordata"],
+                ids=None if m == self.n else places,
+            )
         return record["sensordata"][:, :, self._columns]
 
     def positions(self, place: int) -> NDArray[np.float64]:

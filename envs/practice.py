@@ -24,7 +24,7 @@ from bench.excitation.ensemble import Packed, integrate_cases
 from bench.excitation.information import STEP, accumulate
 from bench.excitation.station import Desk
 from envs.base import options_of, setup_of
-from envs.benches import CERTAIN, LOST, Options, Outcome
+from envs.benches import Options, Ran, SteppedBenches, sensed
 from envs.setups import Setup, made, rival_experiment
 from envs.vector import BenchVectorEnv
 
@@ -153,27 +153,12 @@ class _Pairs:
         return truth, np.log1p(np.maximum(factor, 0.0))
 
 
-class PracticeBenches:
-    """In the place of `envs.benches.Benches`, with the reward at each rig itself.
-
-    Attributes:
-        setup: The laboratory and its questions.
-        options: What was asked for; `average` means nothing here.
-        desk: The experimenter's books.
-        truth: The hidden rigs.
-    """
+class PracticeBenches(SteppedBenches):
+    """In the place of `envs.benches.Benches`, with the reward at each rig itself; the option `average` means nothing here."""
 
     def __init__(self, setup: Setup, options: Options, n: int, *, question: int | None = None) -> None:
         """Set up benches; only one of the setup's questions is asked where `question` is given."""
-        self.setup, self.options, self.n = setup, options, n
-        self.timestep = setup.rig.timestep
-        self.n_steps = round((options.window or setup.window) / self.timestep)
-        self.n_windows = round((options.duration or setup.duration) / (self.n_steps * self.timestep))
-        self.station = setup.station(
-            self.n_steps, self.n_windows, shaping=options.shaping, n_knots=options.n_knots
-        )
-        self.desk = Desk(self.station, n)
-        self.rivals = isinstance(setup.questions[0], Rivals)
+        super().__init__(setup, options, n)
         kinds: list[tuple[int, Any]] = []
         for i, asked in enumerate(setup.questions):
             if question is None or i == question:
@@ -187,20 +172,7 @@ class PracticeBenches:
         ]
         self._asked = np.array([i for i, _ in kinds])
         self.question = self._asked[np.arange(n) % len(kinds)]
-        self.truth: list[Draw | None] = [None] * n
-        self._values, self._merit = np.zeros(n), np.zeros(n)
-        channels = len(self.station.channels)
-        self._disturbance = np.zeros((n, self.n_windows + 1, self.n_steps, channels))
-
-    @property
-    def width(self) -> int:
-        """Length of an action."""
-        return self.desk.shaping.width
-
-    @property
-    def n_observations(self) -> int:
-        """Length of an observation."""
-        return self.desk.n_observations
+        self._values = np.zeros(n)
 
     def effective_draws(self, places: NDArray[np.int64]) -> NDArray[np.float64]:
         """One: the reward knows one rig ``(m,)``."""
@@ -219,11 +191,8 @@ class PracticeBenches:
         still = np.zeros((len(places), self.width))
         return self.desk.observe(places, self._disturbance[places, -1], rest, still, self.question)
 
-    def step(self, places: NDArray[np.int64], actions: NDArray) -> Outcome:
-        """As `envs.benches.Benches.step`."""
-        actions = np.clip(np.asarray(actions, dtype=float).reshape(len(places), -1), -1.0, 1.0)
-        commands, exhausted = self.desk.commands(places, actions)
-        clock = self.n_steps * self.timestep * self.desk.window[places].astype(float)
+    def _run(self, places: NDArray[np.int64], commands: NDArray[np.float64]) -> Ran:
+        clock = self._clock(places)
         ideal = np.zeros((len(places), self.n_steps, len(self.station.channels)))
         values = np.zeros(len(places))
         for g, group in enumerate(self._groups):
@@ -231,39 +200,12 @@ class PracticeBenches:
             if mine.size:
                 rows = places[mine] // len(self._groups)
                 ideal[mine], values[mine] = group.run(rows, commands[mine], clock[mine])
-        lost = ~np.isfinite(ideal).all(axis=(1, 2))
-        ideal[lost] = 0.0
-        measured = ideal + self._disturbance[places, self.desk.window[places]]
-        reached = self.desk.book(places, measured)
-        reached[lost] = LOST
+        measured, lost = sensed(ideal, self._disturbance[places, self.desk.window[places]])
         values = np.where(np.isfinite(values), values, self._values[places])
         gain = values - self._values[places]
         self._values[places] = values
         self._merit[places] += gain
-        self.desk.window[places] += 1
-        over = reached > 1.0
-        stop = lost | (over[:, 0] & (self.options.enforcement == "terminate"))
-        excess = np.minimum(np.maximum(reached - 1.0, 0.0), 1.0).sum(axis=1)
-        cost = self.options.penalty * np.where(stop, 1.0, excess)
-        separated = (values >= np.log1p(CERTAIN)).astype(float) if self.rivals else np.zeros(len(places))
-        certain = (separated >= 1.0) & self.options.terminate_when_certain
-        terminated = stop | exhausted | certain
-        truncated = ~terminated & (self.desk.window[places] >= self.n_windows)
-        info: dict[str, Any] = {
-            "merit": self._merit[places],
-            "gain": gain,
-            "cost": cost,
-            "stroke": reached[:, 0],
-            "velocity": reached[:, 1],
-            "force": np.max(np.abs(commands) / self.desk.force, axis=(1, 2)),
-            "energy": np.max(self.desk.energy[places] / self.desk.budget, axis=1),
-            "time": self.desk.window[places] * (self.n_steps * self.timestep),
-            "effective_draws": np.ones(len(places)),
-            "separated": separated,
-            "violation": over.any(axis=1),
-        }
-        observation = self.desk.observe(places, measured, commands, actions, self.question)
-        return Outcome(observation, gain - cost, terminated, truncated, info)
+        return Ran(measured, lost, gain, self.effective_draws(places))
 
 
 class PracticeVectorEnv(BenchVectorEnv):

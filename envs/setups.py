@@ -15,9 +15,7 @@ from types import MappingProxyType
 import numpy as np
 
 from bench.errors import UnknownNameError
-from bench.excitation import Experiment, Hypothesis, Limits, RigPrior, Rivals, Uncertain, design
-from bench.excitation.information import noise_vector
-from bench.excitation.methods import controls_from
+from bench.excitation import Experiment, Hypothesis, Limits, RigPrior, Rivals, Uncertain, paired_experiment
 from bench.excitation.station import Station
 from bench.laws import find_law
 from bench.rig import Element, Rig
@@ -258,27 +256,16 @@ def discrimination_setup(rig: str = "joint", pairs: tuple[str, ...] = PAIRS, n_d
 
 
 def rival_experiment(place: Place, rivals: Rivals, n_draws: int) -> Experiment:
-    """A question on pairs of draws that imitate each other under a middling test.
-
-    Args:
-        place: The laboratory.
-        rivals: The question.
-        n_draws: Pairs.
-    """
-    rng = np.random.default_rng(DRAWS_SEED)
-    pilot = Experiment(rivals.prior, place.noise, place.limits, rivals.prior.draws(2, rng))
-    reference = controls_from(
-        design("schroeder", pilot, duration=REFERENCE_SECONDS, band=place.band, rng=rng)
+    """A question on pairs of draws that imitate each other, always the same."""
+    return paired_experiment(
+        rivals,
+        place.noise,
+        place.limits,
+        pairs=n_draws,
+        duration=REFERENCE_SECONDS,
+        band=place.band,
+        rng=np.random.default_rng(DRAWS_SEED),
     )
-    draws = rivals.draws(
-        n_draws,
-        rng,
-        reference=reference,
-        channels=tuple(place.noise),
-        actuators=place.limits.actuators,
-        noise=noise_vector(place.noise, tuple(place.noise)),
-    )
-    return Experiment(rivals, place.noise, place.limits, draws)
 
 
 _RIVALS = {

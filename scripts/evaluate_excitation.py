@@ -33,6 +33,7 @@ from bench.excitation import (
     Family,
     Policy,
     RigPrior,
+    RivalPlanner,
     Rivals,
     controls_from,
     design,
@@ -40,15 +41,17 @@ from bench.excitation import (
     policy_names,
 )
 from bench.excitation.closed_loop import Runs, disturbances, run_commands, run_policy
+from bench.excitation.ensemble import Packed
 from bench.excitation.estimation import Records, estimate
 from bench.excitation.planner import Planner
+from bench.excitation.sequential import SequentialPlanner
 from envs.setups import Setup, discrimination_setup, joint_setup, rival_experiment, sdof_setup
 
 HELD_OUT = 7_000_000  # seeds of rigs and noise; no training draws from them
 DESIGN_DRAWS = {"sdof": 24, "joint": 16, "rivals": 16, "joint_rivals": 16}
 """Prior draws that designs are made for: enough that designs keep the stroke on rigs never seen."""
 CERTAIN = float(np.log(99.0))
-TIMES = (0.4, 0.6, 0.8, 1.0, 1.25, 1.5, 1.75, 2.0, 2.5, 3.0, 3.5, 4.0, 5.0, 6.0, 7.0, 8.0)
+TIMES = (*np.arange(0.1, 1.95, 0.1), *np.arange(2.0, 3.0, 0.25), *np.arange(3.0, 8.25, 0.5))
 """Times at which rivals are judged, as parts of an eighth of the test."""
 RESAMPLES = 2000
 
@@ -60,7 +63,7 @@ class Args:
     Attributes:
         task: sdof, joint, rivals (on the SDOF rig) or joint_rivals.
         policies: Policies by name or file; by default the one that comes with the task, if there is one.
-        planner: Also the planner (tasks without rivals).
+        planner: Also the planner.
         methods: Baselines.
         seeds: Seeds.
         rigs: Rigs a seed.
@@ -146,7 +149,7 @@ def hidden(setup: Setup, seed: int, rigs: int) -> Iterator[tuple[int, str, NDArr
         )
 
 
-Source = Policy | Planner | list[NDArray[np.float64]]
+Source = Policy | Planner | list[RivalPlanner] | list[NDArray[np.float64]]
 
 
 class Judge:
@@ -173,13 +176,7 @@ class Judge:
             rng = np.random.default_rng([HELD_OUT + seed, question])
             noise = disturbances(self.station, len(coordinates), rng)
             packed = family.packed(coordinates)
-            runs = (
-                run_policy(source, packed, noise, question=question)
-                if isinstance(source, Policy)
-                else source.run(packed, noise, seed=seed)
-                if isinstance(source, Planner)
-                else run_commands(self.station, source[question], packed, noise)
-            )
+            runs = self._run(source, question, packed, noise, seed)
             asked = self.setup.questions[question]
             found = (
                 self._seconds(asked, hypothesis, runs)
@@ -200,6 +197,17 @@ class Judge:
                     }
                 )
         return result
+
+    def _run(
+        self, source: Source, question: int, packed: Packed, noise: NDArray[np.float64], seed: int
+    ) -> Runs:
+        """Tests on rigs of which a question is asked."""
+        if isinstance(source, Policy):
+            return run_policy(source, packed, noise, question=question)
+        own = source if isinstance(source, Planner) else source[question]
+        if isinstance(own, SequentialPlanner):
+            return own.run(packed, noise, seed=seed)
+        return run_commands(self.station, own, packed, noise)
 
     def _error(self, family: Family, truth: NDArray[np.float64], runs: Runs) -> list[dict[str, Any]]:
         found = estimate(family, runs.records, self.noise)
@@ -352,6 +360,9 @@ def evaluate(args: Args) -> dict[str, Any]:
     if args.planner and isinstance(question, RigPrior):
         opening = designed(args, "d_optimal", setup, experiments)[0]
         sources["planner"] = Planner(question, setup.station(), opening)
+    elif args.planner:
+        asked: list[Any] = experiments  # of rivals, on pairs of draws
+        sources["planner"] = [RivalPlanner(e.question, setup.station(), e.draws) for e in asked]
     results: dict[str, list[dict[str, Any]]] = {}
     columns = (
         TextColumn("{task.description}"),
@@ -387,9 +398,14 @@ def fingerprint(source: Source) -> str:
         arrays = [*source.weights, *source.biases, source.mean, source.deviation, source.schedule]
     elif isinstance(source, Planner):
         arrays = [source.opening, np.array([*source.decisions, source.generations])]
+    elif isinstance(source[0], RivalPlanner):
+        first = source[0]
+        settings = (first.interval, first.horizon, first.knot, first.generations, first.samples)
+        arrays = [np.array([*settings, *(len(planner.draws) for planner in source)])]
     else:
         arrays = source
-    return hashlib.sha256(b"".join(np.ascontiguousarray(a).tobytes() for a in arrays)).hexdigest()[:12]
+    judged = [*arrays, np.array(TIMES)]
+    return hashlib.sha256(b"".join(np.ascontiguousarray(a).tobytes() for a in judged)).hexdigest()[:12]
 
 
 if __name__ == "__main__":

@@ -176,6 +176,32 @@ def test_install_twice_is_the_same_as_once():
     assert native.installed()
 
 
+def test_without_its_clock_mujoco_steps_the_same_and_a_foreign_clock_stays():
+    rig = Rig("r", MJCF, (Element.of("bouc_wen", "x"),))
+
+    def stepped() -> mujoco.MjData:
+        data = mujoco.MjData(rig.model)
+        data.qvel[0] = 1.0
+        mujoco.mj_step(rig.model, data, 50)
+        return data
+
+    timed = stepped()
+    with native.untimed(), native.untimed():
+        untimed = stepped()
+    np.testing.assert_array_equal(untimed.qpos, timed.qpos)
+    assert untimed.timer[mujoco.mjtTimer.mjTIMER_STEP].duration == 0.0
+    assert timed.timer[mujoco.mjtTimer.mjTIMER_STEP].duration > 0.0
+    assert mujoco.get_mjcb_time() is None
+    mujoco.set_mjcb_time(lambda: 1.0)
+    try:
+        theirs = mujoco.get_mjcb_time()
+        with native.untimed():
+            assert mujoco.get_mjcb_time() is theirs
+        assert mujoco.get_mjcb_time() is theirs
+    finally:
+        mujoco.set_mjcb_time(None)
+
+
 def test_model_of_another_process_shows_nan_until_bound():
     rig = Rig("r", MJCF, (Element.of("bouc_wen", "x"),))
     foreign = mujoco.MjModel.from_xml_string(rig.to_xml())

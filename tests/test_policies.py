@@ -22,6 +22,8 @@ from bench.excitation import (
     Hypothesis,
     Planner,
     Policy,
+    RivalPlanner,
+    Rivals,
     Station,
     Uncertain,
     estimate,
@@ -35,7 +37,7 @@ from bench.excitation.information import STEP
 from bench.signals import Excitation
 from envs.benches import Options
 from envs.practice import PracticeBenches
-from envs.setups import sdof_setup
+from envs.setups import discrimination_setup, sdof_setup
 
 SETUP = sdof_setup()
 STATION = SETUP.station()
@@ -203,6 +205,40 @@ def test_planning_knows_more_than_its_opening_and_keeps_the_limits() -> None:
 
 
 @pytest.mark.slow
+def test_planning_tells_rivals_apart_within_the_limits_and_from_what_is_measured_only() -> None:
+    setup = discrimination_setup("sdof", ("gap_cubic",))
+    asked, station = setup.questions[0], setup.station(n_windows=30)
+    assert isinstance(asked, Rivals)
+    family = Family(asked.first, station.channels, station.actuators)
+    x = np.array([[0.3, -0.5, 0.4, -0.2], [-0.4, 0.2, -0.5, 0.5]])
+    noise = disturbances(station, 2, np.random.default_rng(5))
+    plans: list[tuple] = []
+    planner = RivalPlanner(asked, station, setup.experiments[0].draws, generations=4)  # type: ignore[arg-type]
+    runs = planner.run(family.packed(x), noise, told=lambda place, plan: plans.append((place, plan)))
+    assert np.max(runs.reached) <= 1.0
+    assert np.max(runs.energy) <= 1.0 + 1e-9
+    np.testing.assert_array_equal(
+        runs.records.controls[0, :10], runs.records.controls[1, :10]
+    )  # nothing known
+    assert np.any(runs.records.controls[0, 10:] != runs.records.controls[1, 10:])
+    for place in range(2):  # certain of the truth, soon
+        known = [plan for i, plan in plans if i == place and plan.log_odds > np.log(99.0)]
+        assert known[0].time <= 1.0  # found: 0.5 and 0.6 s
+    alone = planner.run(family.packed(x[:1]), noise[:1])
+    np.testing.assert_array_equal(alone.records.controls[0], runs.records.controls[0])
+
+
+def test_rival_planners_say_what_they_cannot_take() -> None:
+    setup = discrimination_setup("sdof", ("gap_cubic",))
+    draws = setup.experiments[0].draws
+    for arguments in ({"interval": 5.0}, {"knot": 0.01}, {"generations": 0}):
+        with pytest.raises(ParameterError, match="timestep"):
+            RivalPlanner(setup.questions[0], setup.station(), draws, **arguments)  # type: ignore[arg-type]
+    with pytest.raises(ParameterError, match="pairs"):
+        RivalPlanner(setup.questions[0], setup.station(), ())  # type: ignore[arg-type]
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("algorithm", ["ppo", "sac"])
 def test_exported_policies_are_the_trained_networks(algorithm: str, tmp_path: Path) -> None:
     import torch
@@ -305,6 +341,30 @@ def test_excite_by_a_policy_and_by_planning(tmp_path: Path, capsys: pytest.Captu
     told = json.loads(capsys.readouterr().out)
     assert any("gap.clearance" in note for note in told["notes"])
     assert max(share for entries in told["peaks"].values() for share in entries.values()) <= 1.0 + 1e-9
+
+
+RIVAL = """
+[experiment.rival]
+elements = [{ law = "cubic_stiffness", joints = ["carriage"], name = "cubic", parameters = { k3 = 3e5 } }]
+uncertain = { "cubic.k3" = [5e4, 2e6] }
+"""
+
+
+@pytest.mark.slow
+def test_excite_between_rivals(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path, out = tmp_path / "rig.toml", str(tmp_path / "e.csv")
+    path.write_text(EXAMPLE.read_text().replace("duration = 8.0", "duration = 1.2") + RIVAL)
+    merits = {}
+    for method in ("sweep", "planner"):
+        assert main(["excite", str(path), "--method", method, "--draws", "4", "-o", out, "--json"]) == 0
+        told = json.loads(capsys.readouterr().out)
+        merits[method] = told["merit"]
+        assert max(share for entries in told["peaks"].values() for share in entries.values()) <= 1.0 + 1e-9
+    assert any("log Bayes factor" in note for note in told["notes"])
+    assert merits["planner"] > merits["sweep"]
+    path.write_text(path.read_text().replace('uncertain = { "cubic', 'unknown = { "cubic'))
+    assert main(["excite", str(path), "-o", out]) == 2
+    assert "entry of a rival" in " ".join(capsys.readouterr().err.split())
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
-from bench.cli.console import emit, finite, progress_bar
+from bench.cli.console import emit, progress_bar
 
 METHODS = {
     "dopt": "d_optimal",
@@ -61,25 +61,12 @@ class Excite:
         """Run the command."""
         import numpy as np
 
-        from bench.errors import ParameterError, UnknownNameError
-        from bench.excitation import design
+        from bench.errors import ParameterError
+        from bench.excitation import Rivals, design
         from bench.excitation.request import request
         from bench.rig.configuration import read_document, rig_from_configuration
 
-        if self.method not in METHODS:
-            raise UnknownNameError("method", self.method, METHODS)
-        if self.out.suffix not in {".csv", ".json"}:
-            raise ParameterError(
-                f"the excitation is to be written to '{self.out}'; a name ending in .csv or .json is expected"
-            )
-        if bool(self.policy) != (self.method == "policy"):
-            raise ParameterError(
-                "--policy NAME and --method policy go together; trained policies are listed by an unknown name"
-            )
-        if self.method in {"dopt", "planner"} and importlib.util.find_spec("cmaes") is None:
-            raise ParameterError(
-                f"--method {self.method} needs the extra rl (pip install 'jointbench[rl]'); the other methods do without"
-            )
+        self._check()
         document = dict(read_document(self.configuration))
         rig = rig_from_configuration(document, folder=self.configuration.parent)
         if "experiment" not in document:
@@ -92,6 +79,9 @@ class Excite:
         with progress_bar(quiet=self.json) as show:
             if self.method == "policy":
                 made, notes = _from_policy(asked, self.policy, rng)
+            elif self.method == "planner" and isinstance(asked.experiment.question, Rivals):
+                show("planning", 0.0)
+                made, notes = _from_rival_planner(asked, rng)
             else:
                 made = design(
                     METHODS[self.method] or "d_optimal",
@@ -102,9 +92,9 @@ class Excite:
                     evaluations=self.evaluations,
                     progress=lambda n, merit: show(f"{n} signals, {merit:.2f} nat", n / self.evaluations),
                 )
-            if self.method == "planner":
-                show("planning", 1.0)
-                made, notes = _from_planner(asked, made, rng)
+                if self.method == "planner":
+                    show("planning", 1.0)
+                    made, notes = _from_planner(asked, made, rng)
         _write(self.out, made.excitation, rig)
         result = {
             "file": str(self.out),
@@ -120,6 +110,25 @@ class Excite:
             emit(result)
             return
         _tell(result)
+
+    def _check(self) -> None:
+        """Raise an error for arguments that do not go together."""
+        from bench.errors import ParameterError, UnknownNameError
+
+        if self.method not in METHODS:
+            raise UnknownNameError("method", self.method, METHODS)
+        if self.out.suffix not in {".csv", ".json"}:
+            raise ParameterError(
+                f"the excitation is to be written to '{self.out}'; a name ending in .csv or .json is expected"
+            )
+        if bool(self.policy) != (self.method == "policy"):
+            raise ParameterError(
+                "--policy NAME and --method policy go together; trained policies are listed by an unknown name"
+            )
+        if self.method in {"dopt", "planner"} and importlib.util.find_spec("cmaes") is None:
+            raise ParameterError(
+                f"--method {self.method} needs the extra rl (pip install 'jointbench[rl]'); the other methods do without"
+            )
 
 
 def _tell(result: dict[str, Any]) -> None:
@@ -163,28 +172,57 @@ def _from_policy(asked: Any, name: str, rng: Any) -> tuple[Any, list[str]]:
 
 def _from_planner(asked: Any, opening: Any, rng: Any) -> tuple[Any, list[str]]:
     """What the planner does on the rig as it is described, from a D-optimal opening."""
-    from bench.excitation import Ensemble, Planner, Station
-    from bench.excitation.closed_loop import disturbances
+    from bench.excitation import Planner
     from bench.excitation.methods import controls_from
 
-    experiment = asked.experiment
-    scale = dict.fromkeys(experiment.channels, 1.0) | experiment.limits.watched
     controls = controls_from(opening)
-    station = Station(
-        experiment.noise, scale, experiment.limits, experiment.timestep, 1, len(controls), asked.band
-    )
-    planner = Planner(experiment.question, station, controls)
-    plans: list[Any] = []
-    one = Ensemble((asked.rig,), station.channels, station.actuators)
-    runs = planner.run(one.packed, disturbances(station, 1, rng), told=lambda _, plan: plans.append(plan))
-    notes = [CLOSED_LOOP]
-    notes += [
+    planner = Planner(asked.experiment.question, _station(asked, 1, len(controls)), controls)
+    made, plans = _planned(asked, planner, rng)
+    notes = [
         f"at {plan.time:g} s: "
         + ", ".join(f"{name} {value:.4g}" for name, value in plan.values.items())
         + f"; expected error at the end {plan.predicted:.2g} prior standard deviations"
         for plan in plans
     ]
-    return _closed_loop(asked, "the planner", runs.records.controls[0]), notes
+    return made, [CLOSED_LOOP, *notes]
+
+
+def _from_rival_planner(asked: Any, rng: Any) -> tuple[Any, list[str]]:
+    """What the planner for rivals does on the rig as it is described, and how sure it is of that rig on the way."""
+    from bench.excitation import RivalPlanner
+
+    experiment = asked.experiment
+    station = _station(asked, 1, round(asked.duration / experiment.timestep))
+    planner = RivalPlanner(experiment.question, station, experiment.draws)
+    made, plans = _planned(asked, planner, rng)
+    notes = [
+        f"at {plan.time:.2f} s: log Bayes factor in favour of the rig of the file {plan.log_odds:.1f} nat "
+        "(certain with 99 % from 4.6 on)"
+        for plan in plans[1:]
+    ]
+    return made, [CLOSED_LOOP, *notes]
+
+
+def _station(asked: Any, n_steps: int, n_windows: int) -> Any:
+    from bench.excitation import Station
+
+    experiment = asked.experiment
+    scale = dict.fromkeys(experiment.channels, 1.0) | experiment.limits.watched
+    return Station(
+        experiment.noise, scale, experiment.limits, experiment.timestep, n_steps, n_windows, asked.band
+    )
+
+
+def _planned(asked: Any, planner: Any, rng: Any) -> tuple[Any, list[Any]]:
+    """What a planner does on the rig as it is described, and its plans."""
+    from bench.excitation import Ensemble
+    from bench.excitation.closed_loop import disturbances
+
+    plans: list[Any] = []
+    station = planner.station
+    one = Ensemble((asked.rig,), station.channels, station.actuators)
+    runs = planner.run(one.packed, disturbances(station, 1, rng), told=lambda _, plan: plans.append(plan))
+    return _closed_loop(asked, "the planner", runs.records.controls[0]), plans
 
 
 def _closed_loop(asked: Any, what: str, controls: Any) -> Any:
@@ -217,10 +255,10 @@ def _closed_loop(asked: Any, what: str, controls: Any) -> Any:
 def _write(path: Path, excitation: Any, rig: Any) -> None:
     import numpy as np
 
-    from bench.files import replacing, write_text
+    from bench.files import json_values, replacing, write_text
 
     if path.suffix == ".json":
-        write_text(path, json.dumps(finite(excitation.to_dict()), ensure_ascii=False))
+        write_text(path, json.dumps(json_values(excitation.to_dict()), ensure_ascii=False))
         return
     loads = excitation.sample()
     units = {channel.name: channel.unit for channel in rig.channels}

@@ -32,10 +32,11 @@ from bench.excitation.information import (
 )
 from bench.excitation.limits import Limits, Peaks, feasible
 from bench.excitation.linear_structure import LinearStructure, linear_structure
-from bench.excitation.methods import METHODS, Design, controls_from, design
+from bench.excitation.methods import METHODS, Design, controls_from, design, paired_experiment
 from bench.excitation.planner import Plan, Planner
 from bench.excitation.policy import Policy, find_policy, policy_names
 from bench.excitation.prior import Draw, Hypothesis, RigPrior, Uncertain
+from bench.excitation.rival_planner import RivalPlan, RivalPlanner
 from bench.excitation.rivals import RivalDraws, Rivals
 from bench.excitation.station import Desk, Station
 
@@ -60,6 +61,8 @@ __all__ = [
     "Records",
     "RigPrior",
     "RivalDraws",
+    "RivalPlan",
+    "RivalPlanner",
     "Rivals",
     "Sensitivity",
     "Station",
@@ -77,6 +80,7 @@ __all__ = [
     "linear_structure",
     "log_det",
     "misfit",
+    "paired_experiment",
     "policy_names",
     "sensitivity",
 ]

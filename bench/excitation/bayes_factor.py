@@ -46,34 +46,83 @@ class Contrast(NamedTuple):
 
 def expected_log_bayes_factor(contrast: Contrast) -> NDArray[np.float64]:
     """Expected log Bayes factor [nat] in favour of the true one of two rivals ``(…)``, each as likely to be true."""
-    forward = _divergence(
-        contrast.square, contrast.score_second, contrast.fisher_first, contrast.fisher_second, contrast.cross
+    shape = contrast.square.shape
+    flat = Contrast(
+        *(np.ascontiguousarray(sums).reshape(1, -1, *sums.shape[len(shape) :]) for sums in contrast)
     )
-    backward = _divergence(
-        contrast.square,
-        contrast.score_first,
-        contrast.fisher_second,
-        contrast.fisher_first,
-        np.swapaxes(contrast.cross, -1, -2),
-    )
-    return 0.5 * (forward + backward)
+    values = np.empty(flat.square.shape)
+    weigh_contrast(0, 1, flat, values)
+    return values.reshape(shape)
 
 
-def _divergence(square: NDArray, score: NDArray, true: NDArray, rival: NDArray, cross: NDArray) -> NDArray:
-    """``KL(true | rival)``; `score` is ``J_rival' r`` and `cross` is ``J_true' J_rival``."""
-    eye = np.eye(true.shape[-1])
-    inner = eye + rival
-    solved = np.linalg.solve(
-        inner, np.concatenate([score[..., None], rival, np.swapaxes(cross, -1, -2)], axis=-1)
-    )
-    p = true.shape[-1]
-    quadratic = square - np.einsum("...i,...i->...", score, solved[..., 0])
-    trace = (
-        np.trace(true, axis1=-2, axis2=-1)
-        - np.trace(solved[..., 1 : 1 + p], axis1=-2, axis2=-1)
-        - np.einsum("...ij,...ji->...", cross, solved[..., 1 + p :])
-    )
-    return 0.5 * (quadratic + trace - np.linalg.slogdet(eye + true)[1] + np.linalg.slogdet(inner)[1])
+@numba.njit(cache=True, error_model="numpy", nogil=True)
+def weigh_contrast(first, last, contrast, values):
+    """Write the expected log Bayes factors [nat] of the pairs of the cases ``first … last − 1``; NaN where a rig diverged.
+
+    Args:
+        first: First case.
+        last: One past the last case.
+        contrast: Sums with leading axes (n_cases, n_pairs).
+        values: ``(n_cases, n_pairs)``, written.
+    """
+    p = contrast.cross.shape[2]
+    triangle = np.zeros((p, p))
+    row = np.zeros(p)
+    for case in range(first, last):
+        for pair in range(values.shape[1]):
+            cross = contrast.cross[case, pair]
+            fisher_a, fisher_b = contrast.fisher_first[case, pair], contrast.fisher_second[case, pair]
+            _factorise(fisher_b, triangle)
+            forward = _one_way(triangle, fisher_a, contrast.score_second[case, pair], cross, row)
+            _factorise(fisher_a, triangle)
+            backward = _one_way(triangle, fisher_b, contrast.score_first[case, pair], cross.T, row)
+            # The logarithms of the determinants have opposite signs in the two divergences.
+            values[case, pair] = 0.25 * (2.0 * contrast.square[case, pair] + forward + backward)
+
+
+@numba.njit(error_model="numpy")
+def _one_way(triangle, true, score, cross, row):
+    """``tr(S^-1 S_true) - n - r'r + r' S^-1 r`` with S of the rival.
+
+    Args:
+        triangle: Cholesky's factor of ``I + J' J`` of the rival ``(p, p)``.
+        true: ``J' J`` of the true one ``(p, p)``.
+        score: ``J_rival' r`` ``(p,)``.
+        cross: ``J_true' J_rival`` ``(p, p)``.
+        row: Scratch ``(p,)``.
+    """
+    p = row.size
+    total = -_quadratic(triangle, score, row)
+    for i in range(p):
+        total += true[i, i] - _quadratic(triangle, cross[i], row)
+        row[:] = 0.0
+        row[i] = 1.0
+        total += _quadratic(triangle, row, row) - 1.0  # less the trace of (I + J'J)^-1 J'J
+    return total
+
+
+@numba.njit(error_model="numpy")
+def _factorise(fisher, triangle):
+    """Write Cholesky's factor of ``I + F``."""
+    for j in range(fisher.shape[0]):
+        for i in range(j, fisher.shape[0]):
+            value = fisher[i, j] + (1.0 if i == j else 0.0)
+            for k in range(j):
+                value -= triangle[i, k] * triangle[j, k]
+            triangle[i, j] = np.sqrt(value) if i == j else value / triangle[j, j]
+
+
+@numba.njit(error_model="numpy")
+def _quadratic(triangle, vector, row):
+    """``v' (L L')^-1 v``, by forward substitution in the scratch `row`, which may be the vector itself."""
+    total = 0.0
+    for i in range(row.size):
+        value = vector[i]
+        for k in range(i):
+            value -= triangle[i, k] * row[k]
+        row[i] = value / triangle[i, i]
+        total += row[i] * row[i]
+    return total
 
 
 def contrast_of(first: Sensitivity, second: Sensitivity, noise: NDArray[np.float64]) -> Contrast:

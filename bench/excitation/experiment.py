@@ -14,7 +14,7 @@ from bench.errors import ParameterError
 from bench.excitation.bayes_factor import Contrast, accumulate_contrast, expected_log_bayes_factor
 from bench.excitation.ensemble import Ensemble
 from bench.excitation.information import STEP, accumulate, noise_vector
-from bench.excitation.limits import Limits, motion_ratio
+from bench.excitation.limits import Instrumented, Limits, motion_ratio
 from bench.excitation.prior import Draw, RigPrior
 from bench.excitation.rivals import RivalDraws, Rivals
 
@@ -34,7 +34,7 @@ def fan(draws: tuple[Draw, ...], step: float) -> tuple[tuple, NDArray[np.int64],
 
 
 @dataclass(frozen=True, eq=False)
-class Experiment:
+class Experiment(Instrumented):
     """A question about a rig, and the means of answering it.
 
     Attributes:
@@ -62,16 +62,6 @@ class Experiment:
 
     def __reduce__(self) -> tuple:
         return (Experiment, (self.question, dict(self.noise), self.limits, self.draws, self.threads))
-
-    @property
-    def channels(self) -> tuple[str, ...]:
-        """The measured channels."""
-        return tuple(self.noise)
-
-    @property
-    def actuators(self) -> tuple[str, ...]:
-        """The driven actuators."""
-        return self.limits.actuators
 
     @property
     def rigs_drawn(self) -> tuple[Draw, ...]:

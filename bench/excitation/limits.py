@@ -89,6 +89,28 @@ class Limits:
         return controls * (scale if fill else np.minimum(scale, 1.0))[..., None, :]
 
 
+class Instrumented:
+    """What is measured and driven, by the names that the noise and the limits are given for; a base of dataclasses.
+
+    Attributes:
+        noise: Standard deviation of each measured channel's noise, in the channel's unit.
+        limits: The limits; the actuators with a force limit are driven.
+    """
+
+    noise: Mapping[str, float]
+    limits: Limits
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """The measured channels."""
+        return tuple(self.noise)
+
+    @property
+    def actuators(self) -> tuple[str, ...]:
+        """The driven actuators."""
+        return self.limits.actuators
+
+
 class Peaks(NamedTuple):
     """What a feasible excitation reaches, as fractions of the limits (1 where a limit binds)."""
 

@@ -20,7 +20,7 @@ References:
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 
@@ -29,7 +29,9 @@ from numpy.typing import NDArray
 
 from bench.errors import ParameterError, UnknownNameError
 from bench.excitation.experiment import Experiment
-from bench.excitation.limits import Peaks, feasible, peaks
+from bench.excitation.information import noise_vector
+from bench.excitation.limits import Limits, Peaks, feasible, peaks
+from bench.excitation.rivals import Rivals
 from bench.signals import PRBS, Excitation, Multisine, Signal, Sweep
 from bench.signals.record import Record
 
@@ -110,6 +112,39 @@ def design(
 def controls_from(design: Design) -> NDArray[np.float64]:
     """Commands ``(n, n_actuators)`` of a design."""
     return design.excitation.sample()
+
+
+def paired_experiment(
+    rivals: Rivals,
+    noise: Mapping[str, float],
+    limits: Limits,
+    *,
+    pairs: int,
+    duration: float,
+    band: tuple[float, float],
+    rng: np.random.Generator,
+) -> Experiment:
+    """A question on pairs of draws that imitate each other under a middling test, a Schroeder multisine.
+
+    Args:
+        rivals: The question.
+        noise: Standard deviation of each measured channel's noise, in the channel's unit.
+        limits: The limits; the actuators with a force limit are driven.
+        pairs: Pairs of draws.
+        duration: Of that test [s].
+        band: Its frequencies [Hz].
+        rng: Source of the draws.
+    """
+    pilot = Experiment(rivals.prior, noise, limits, rivals.prior.draws(2, rng))
+    draws = rivals.draws(
+        pairs,
+        rng,
+        reference=controls_from(design("schroeder", pilot, duration=duration, band=band, rng=rng)),
+        channels=pilot.channels,
+        actuators=pilot.actuators,
+        noise=noise_vector(noise, pilot.channels),
+    )
+    return Experiment(rivals, noise, limits, draws)
 
 
 def _signals(

@@ -22,12 +22,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.errors import ParameterError
-from bench.excitation.closed_loop import Runs, finish
-from bench.excitation.ensemble import Packed, integrate_cases
 from bench.excitation.estimation import Estimates, Records, estimate, normal_equations
 from bench.excitation.family import Family
 from bench.excitation.methods import spectral_lines
 from bench.excitation.prior import RigPrior
+from bench.excitation.sequential import Decide, SequentialPlanner
 from bench.excitation.station import Desk, Station
 
 POPULATION = 16
@@ -46,7 +45,7 @@ class Plan(NamedTuple):
 
 
 @dataclass(eq=False)
-class Planner:
+class Planner(SequentialPlanner):
     """Sequential design for one question.
 
     Attributes:
@@ -80,35 +79,19 @@ class Planner:
         angle = 2.0 * np.pi * np.outer(clock, spectral_lines(station.band, station.duration))
         self.basis = np.concatenate([np.cos(angle), np.sin(angle)], axis=1)
 
-    def run(
-        self, packed: Packed, disturbance: NDArray[np.float64], *, seed: int = 0,
-        told: Callable[[int, Plan], None] | None = None,
-    ) -> Runs:  # fmt: skip
-        """Test rigs from rest, planning for each on its own.
+    def _edges(self) -> list[int]:
+        n = self.station.n_samples
+        return [0, *(round(share * n) for share in self.decisions), n]
 
-        Args:
-            packed: The rigs, one case each; their channels are the station's.
-            disturbance: Noise of the sensors, see `bench.excitation.closed_loop.disturbances`.
-            seed: Seed of the searches.
-            told: Called with the rig's place and each plan.
-        """
-        m, n = len(packed.start), self.station.n_samples
-        controls = np.broadcast_to(self.opening, (m, *self.opening.shape)).copy()
-        states = packed.start[:, None].copy()
-        noise = disturbance[:, : self.station.n_windows].reshape(m, n, -1)
-        ideal = np.zeros_like(noise)
-        edges = [0, *(round(share * n) for share in self.decisions), n]
-        members, counts = np.arange(m)[:, None], np.ones(m, dtype=np.int64)
-        for begin, end in pairwise(edges):
-            if begin:
-                records = Records(controls[:, :begin], ideal[:, :begin] + noise[:, :begin], np.full(m, begin))
-                for i, (k, x) in enumerate(self._found(records)):
-                    controls[i, begin:] = self._continuation(k, x, controls[i], begin, seed + i, i, told)
-            ideal[:, begin:end] = integrate_cases(
-                packed, controls[:, begin:end], states, members=members, counts=counts,
-                timestep=self.station.timestep, clock=np.full(m, begin * self.station.timestep),
-            )[:, 0]  # fmt: skip
-        return finish(self.station, controls, ideal, disturbance)
+    def _decider(self, m: int, seed: int, told: Callable[[int, Plan], None] | None) -> Decide:
+        def decide(records: Records, controls: NDArray[np.float64], begin: int) -> None:
+            if not begin:
+                controls[:] = self.opening
+                return
+            for i, (k, x) in enumerate(self._found(records)):
+                controls[i, begin:] = self._continuation(k, x, controls[i], begin, seed + i, i, told)
+
+        return decide
 
     def _found(self, records: Records) -> list[tuple[int, NDArray[np.float64]]]:
         """The most probable hypothesis and rig of each record."""

@@ -18,6 +18,9 @@ noise = { displacement = 5e-4, velocity = 0.01 } # standard deviations of the me
 [experiment.uncertain]                           # optional: ranges; by default all of the elements' parameters, a factor two
 "gap.clearance" = [0.005, 0.03]
 "stiffness:carriage" = [200.0, 400.0]
+[experiment.rival]                               # optional: another explanation; the question is then which of the two holds
+elements = [{ law = "cubic_stiffness", joints = ["carriage"], name = "cubic", parameters = { k3 = 3e5 } }]
+uncertain = { "cubic.k3" = [5e4, 2e6] } # as above; ranges of the structure are shared
 ```
 """
 
@@ -32,10 +35,16 @@ import numpy as np
 from bench.errors import ParameterError, UnknownNameError
 from bench.excitation.experiment import Experiment
 from bench.excitation.limits import Limits
+from bench.excitation.methods import paired_experiment
 from bench.excitation.prior import Hypothesis, RigPrior, Uncertain
+from bench.excitation.rivals import Rivals
 from bench.rig import Rig
+from bench.rig.configuration import element_from_configuration
 
-ENTRIES = ("duration", "band", "force", "energy", "stroke", "velocity", "noise", "uncertain")
+ENTRIES = ("duration", "band", "force", "energy", "stroke", "velocity", "noise", "uncertain", "rival")
+RIVAL_ENTRIES = ("elements", "uncertain")
+REFERENCE_SHARE = 0.375
+"""Of the duration: the test under which rivals imitate each other."""
 FACTOR = 2.0
 """Range of a parameter about its value in the file, both ways, where no range is given."""
 
@@ -63,7 +72,7 @@ def request(rig: Rig, table: Mapping[str, Any], *, draws: int = 8, rng: np.rando
     Args:
         rig: The rig.
         table: Entries as in the module's example.
-        draws: Prior draws that the excitation is weighed on, and on all of which it keeps the limits.
+        draws: Prior draws that the excitation is weighed on, and on all of which it keeps the limits; of rivals half as many pairs.
         rng: Source of the draws.
 
     Raises:
@@ -89,9 +98,36 @@ def request(rig: Rig, table: Mapping[str, Any], *, draws: int = 8, rng: np.rando
     for name in (*table["noise"], *limits.watched):
         if name not in measured:
             raise UnknownNameError(f"measured channel of rig '{rig.name}'", name, measured)
-    prior = RigPrior((Hypothesis(rig.name, rig, _uncertain(rig, table.get("uncertain", {}))),))
-    experiment = Experiment(prior, table["noise"], limits, prior.draws(draws, rng))
-    return Request(rig, experiment, float(table["duration"]), band)
+    described = Hypothesis(rig.name, rig, _uncertain(rig, table.get("uncertain", {})))
+    duration = float(table["duration"])
+    if "rival" in table:
+        rivals = Rivals(rig.name, described, _rival(rig, table["rival"], table.get("uncertain", {})))
+        experiment = paired_experiment(
+            rivals,
+            table["noise"],
+            limits,
+            pairs=max(1, draws // 2),
+            duration=REFERENCE_SHARE * duration,
+            band=band,
+            rng=rng,
+        )
+    else:
+        prior = RigPrior((described,))
+        experiment = Experiment(prior, table["noise"], limits, prior.draws(draws, rng))
+    return Request(rig, experiment, duration, band)
+
+
+def _rival(rig: Rig, entry: Mapping[str, Any], ranges: Mapping[str, Any]) -> Hypothesis:
+    """The rig with other elements, and its own ranges beside those of the structure."""
+    for key in entry:
+        if key not in RIVAL_ENTRIES:
+            raise UnknownNameError("entry of a rival", key, RIVAL_ENTRIES)
+    if not entry.get("elements"):
+        raise ParameterError("a rival is another explanation of the joint; give its elements")
+    other = rig.with_(elements=tuple(element_from_configuration(item) for item in entry["elements"]))
+    shared = {name: bounds for name, bounds in ranges.items() if "." not in name}
+    structure = _uncertain(other, shared) if shared else ()
+    return Hypothesis("rival", other, (*structure, *_uncertain(other, entry.get("uncertain", {}))))
 
 
 def _uncertain(rig: Rig, ranges: Mapping[str, Any]) -> tuple[Uncertain, ...]:

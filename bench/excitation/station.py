@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 
 from bench.errors import ParameterError
 from bench.excitation.information import noise_vector
-from bench.excitation.limits import Limits
+from bench.excitation.limits import Instrumented, Limits
 from bench.excitation.shaping import Shaping
 
 
 @dataclass(frozen=True)
-class Station:
+class Station(Instrumented):
     """What is measured and allowed, and how time is cut into windows.
 
     Attributes:
@@ -69,16 +69,6 @@ class Station:
 
     def __reduce__(self) -> tuple:
         return (Station.from_dict, (self.to_dict(),))
-
-    @property
-    def channels(self) -> tuple[str, ...]:
-        """The measured channels."""
-        return tuple(self.noise)
-
-    @property
-    def actuators(self) -> tuple[str, ...]:
-        """The driven actuators."""
-        return self.limits.actuators
 
     @property
     def n_samples(self) -> int:

@@ -140,3 +140,9 @@ def act_dyn(model, data, actuator):
     rate = load_int(table + 8 * (FIRST_LAW + 2 * law + 1))
     call_kernel(rate, time, q, v, advance(act, first), advance(row, int(row[5])), rates)
     return rates[0]
+
+
+@numba.cfunc(types.float64(), cache=True, error_model="numpy")
+def no_time():
+    """A clock that stands still, see `bench.native.untimed`."""
+    return 0.0
