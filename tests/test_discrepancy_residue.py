@@ -1,0 +1,107 @@
+"""What an explanation leaves: free models that find a force in it, delays of a fraction of a sample, jumps a sample early."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from planted_cases import SAMPLE_RATE, motion_with, planted_case
+
+from bench.discrepancy import diagnose
+from bench.discrepancy.attribute import placements
+from bench.discrepancy.catalogue import effect_named
+from bench.discrepancy.fit import fit
+from bench.discrepancy.lack_of_fit import lack_of_fit
+from bench.discrepancy.prepared import timed
+from bench.discrepancy.problem import Problem
+from bench.discrepancy.screen import Screen
+from bench.discrepancy.signal_effects import delay, sensor_delay
+from bench.discrepancy.structure import structure_of
+
+STEP = 1.0 / SAMPLE_RATE
+
+
+def fitted(case, name: str, start: list[float]):
+    """A case's problem and its explanation by one effect."""
+    problem = Problem(case, structure_of(case), case.identification)
+    placed = placements(case, problem.structure, [effect_named(name)])[0]
+    vector = np.concatenate([np.zeros(len(problem.nominal)), start])
+    return problem, fit(problem, (placed,), start=vector, iterations=30)
+
+
+def one_relaxation(x, v, z):
+    return z[0], [200.0 * v - z[0] / 0.05]
+
+
+def a_spectrum_of_relaxations(x, v, z):
+    return z[0] + z[1] + z[2], [400.0 * v - z[0] / 0.01, 400.0 * v - z[1] / 0.1, 400.0 * v - z[2] / 1.0]
+
+
+@pytest.mark.slow
+def test_free_models_find_nothing_beside_the_right_law():
+    problem, explained = fitted(
+        planted_case(lambda f: motion_with(f, one_relaxation, 1)), "viscoelastic_relaxation", [-2.2, -3.0]
+    )
+    lack = lack_of_fit(problem, explained)
+    assert not lack.significant(0.0)
+    assert lack.p_value > 1e-3
+
+
+@pytest.mark.slow
+def test_free_models_find_the_memory_that_one_relaxation_lacks():
+    case = planted_case(lambda f: motion_with(f, a_spectrum_of_relaxations, 3))
+    problem, explained = fitted(case, "viscoelastic_relaxation", [-1.5, -2.3])
+    lack = lack_of_fit(problem, explained)
+    assert lack.significant(0.0)
+    assert lack.p_value < 1e-6
+    verdict = diagnose(case, catalogue=[effect_named("viscoelastic_relaxation")]).verdict
+    assert verdict.verdict == "unknown"
+
+
+@pytest.mark.slow
+def test_a_small_memory_is_screened_behind_a_wrong_gain_of_the_accelerometer():
+    case = planted_case(
+        lambda f: motion_with(f, lambda x, v, z: (z[0], [60.0 * v - z[0] / 0.05]), 1),
+        lambda x, a, f: (x, 1.07 * a),
+    )
+    problem, explained = fitted(case, "acceleration_gain_error", [0.07])
+    memory = placements(case, problem.structure, [effect_named("viscoelastic_relaxation")])
+    screen = Screen(problem, memory).beside(explained, simulated=True)
+    screened = screen.ranked(explained, screen.ground(explained, simulated=True))[0].gain
+    start = np.concatenate([explained.vector, [-3.4, -3.0]])
+    found = fit(problem, (*explained.hypothesis, *memory), start=start, iterations=30)
+    # on a grid of relaxation times, and to first order
+    assert screened == pytest.approx(explained.chi2 - found.chi2, rel=0.2)
+
+
+@pytest.mark.parametrize("share", [0.1, 0.5, 3.37])
+def test_a_delayed_sine_is_the_sine_of_the_delayed_time(share):
+    t = STEP * np.arange(2000)
+    for frequency in (0.01, 0.2, 0.44):  # of the sample rate
+        omega = 2.0 * np.pi * frequency * SAMPLE_RATE
+        late = sensor_delay(np.sin(omega * t), np.array([share * STEP]), STEP)
+        np.testing.assert_allclose(late[50:-50], np.sin(omega * (t - share * STEP))[50:-50], atol=2e-3)
+
+
+def test_a_delay_leaves_noise_what_it_was():
+    noise = np.random.default_rng(3).standard_normal(20000)
+    half = np.array([0.5 * STEP])
+    # the interpolation is flat to nine tenths of the Nyquist frequency; that along straight lines halves the power
+    assert np.var(sensor_delay(noise, half, STEP)) == pytest.approx(1.0, abs=0.05)
+    assert np.var(delay(noise, half, STEP)) == pytest.approx(0.5, abs=0.02)
+
+
+def test_a_jump_a_sample_early_is_limited_and_nothing_else_is():
+    t = STEP * np.arange(500)
+    predicted = np.sin(2.0 * np.pi * 3.0 * t) - np.where(t > 0.5, 2.0, 0.0)
+    early = predicted.copy()
+    jump = int(np.argmax(t > 0.5))
+    early[jump - 1] -= 2.0
+    noise = 0.01
+    limited = timed(early - predicted, predicted, noise)
+    assert limited[jump - 1] == pytest.approx(-0.05)
+    assert np.all(limited[np.arange(500) != jump - 1] == 0.0)
+    # the wrong way, away from a jump, and beyond its height, a residual stays what it is
+    for place, wrong in ((jump - 1, 2.0), (100, -2.0), (jump - 1, -2.5)):
+        residual = np.zeros(500)
+        residual[place] = wrong
+        np.testing.assert_array_equal(timed(residual, predicted, noise), residual)
