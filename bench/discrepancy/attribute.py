@@ -32,7 +32,7 @@ LOG_PRIOR_EFFECT = -3.4
 """Log prior odds of one more effect: about one in the number of effects of the catalogue."""
 SIGNIFICANT = 4.0
 """Standard deviations by which chi-squared may exceed its expectation before a hypothesis counts as refuted."""
-IMMATERIAL = 0.002
+IMMATERIAL = 0.001
 """Relative improvement of chi-squared that one more effect has to pay for, since the smoothing of stick-slip and the
 interpolation of loads are themselves only as good as that; records of extreme signal-to-noise ratio would else name trifles."""
 WORTH_A_FIT = 25.0
@@ -203,11 +203,10 @@ def attribute(
         search, screen, points = prepared or prepare(problem, candidates, pool.map)
         nothing = search.ranked(0)[0]
         progress(f"nominal model: chi-squared {nothing.reduced:.3g} of its expectation")
-        if consistent(nothing):
+        if _at_ease(nothing, problem):
             points = _about(screen, nothing).ranked()
-        at_ease = consistent(nothing) and nothing.cost - nothing.chi2 < len(problem.nominal) + WORTH_A_FIT / 2
-        if at_ease and (not points or points[0].gain < WORTH_A_FIT):
-            return search
+            if not points or points[0].gain < WORTH_A_FIT:
+                return search
         _extend(search, screen, [nothing], pool, count=6)
         rare = [p for p in candidates if p.effect.rare]
         if rare and not consistent(search.ranked()[0]):
@@ -244,10 +243,15 @@ def _promising(screen: Screen, best: Fit) -> bool:
     return bool(points) and points[0].gain > max(WORTH_A_FIT, IMMATERIAL * best.n_residuals)
 
 
+def _at_ease(fitted: Fit, problem: Problem) -> bool:
+    """Whether a hypothesis explains the records without nominal parameters far off their values."""
+    return consistent(fitted) and fitted.cost - fitted.chi2 < len(problem.nominal) + WORTH_A_FIT / 2
+
+
 def _about(screen: Screen, base: Fit) -> Screen:
     """The screening that tells what a base lacks."""
     spoilt = any(placed.effect.site == "sensor" for placed in base.hypothesis)
-    explained = consistent(base)
+    explained = consistent(base) if base.hypothesis else _at_ease(base, screen.problem)
     return screen.beside(base, simulated=explained) if spoilt or explained else screen
 
 
@@ -303,8 +307,9 @@ def _extend(
                 start = np.concatenate([base.vector * bool(base.hypothesis), point.eta])
                 tasks.append(((*base.hypothesis, point.placed), start))
         own = {placed.key for placed in base.hypothesis}
+        least = min(SHORT * most, WORTH_A_FIT) if consistent(base) else SHORT * most
         for placed in screen.inertia:
-            if placed.key not in own and inertia.get(placed.key, 0.0) > SHORT * most:
+            if placed.key not in own and inertia.get(placed.key, 0.0) > least:
                 tasks.append(((*base.hypothesis, placed), np.concatenate([base.vector, [0.0]])))
 
     limit = _limit(search, size)
