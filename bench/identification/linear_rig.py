@@ -325,14 +325,14 @@ class LinearRig:
     def _motion(self, given: Mapping[str, tuple[float, float]] | None, positions: Array) -> Array:
         """Positions and velocities (2 n_dof,), those of joints that are not given at `positions` and at rest."""
         n_dof = len(self._kept)
-        motion = np.concatenate([positions, np.zeros(n_dof)])
+        motion = [*positions.tolist(), *[0.0] * n_dof]  # a list: writing single numbers into an array takes longer
         for name, (position, velocity) in (given or {}).items():
             if name not in self._joints:
                 raise UnknownNameError("joint", name, list(self._joints))
             place = self._joints[name]
             if place >= 0:
                 motion[place], motion[n_dof + place] = position, velocity
-        return motion
+        return np.array(motion)
 
 
 def sensor_columns(rig: Rig, channels: Sequence[str]) -> list[int]:
