@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from planted_cases import SAMPLE_RATE, motion_with, planted_case
@@ -9,6 +11,8 @@ from planted_cases import SAMPLE_RATE, motion_with, planted_case
 from bench.discrepancy import diagnose
 from bench.discrepancy.attribute import placements
 from bench.discrepancy.catalogue import effect_named
+from bench.discrepancy.contradiction import contradicted
+from bench.discrepancy.explain import Explanation
 from bench.discrepancy.fit import fit
 from bench.discrepancy.lack_of_fit import lack_of_fit
 from bench.discrepancy.prepared import timed
@@ -105,3 +109,14 @@ def test_a_jump_a_sample_early_is_limited_and_nothing_else_is():
         residual = np.zeros(500)
         residual[place] = wrong
         np.testing.assert_array_equal(timed(residual, predicted, noise), residual)
+
+
+@pytest.mark.slow
+def test_judging_records_contradict_a_law_that_they_do_not_follow():
+    case = planted_case(lambda f: motion_with(f, lambda x, v, z: (1e6 * x**3, [])))
+    problem, explained = fitted(case, "cubic_stiffness", [0.05])
+    found = Explanation(((problem, explained),))
+    assert not contradicted(case, problem, found, np.random.default_rng(1))
+    other = planted_case(lambda f: motion_with(f, lambda x, v, z: (12.0 * np.tanh(x / 0.005), [])))
+    elsewhere = replace(case, validation=other.validation)
+    assert contradicted(elsewhere, problem, found, np.random.default_rng(1))

@@ -19,6 +19,7 @@ from bench.discrepancy.attribute import names
 from bench.discrepancy.case import Case, read_case
 from bench.discrepancy.catalogue import CATALOGUE
 from bench.discrepancy.closure import CLOSURES
+from bench.discrepancy.contradiction import contradicted
 from bench.discrepancy.effect import Effect
 from bench.discrepancy.explain import Explanation, close, explain
 from bench.discrepancy.next_excitation import separate, told_apart
@@ -97,6 +98,9 @@ def diagnose(
     explanations = explain(case, catalogue, most=most, progress=progress)
     best, nothing = explanations[0], next(e for e in explanations if not e.hypothesis)
     kind, probabilities = evidence.judge(explanations)
+    failed = kind == "effect" and contradicted(case, problem, best, rng)
+    if failed:
+        kind, probabilities = "unknown", evidence.OUTSIDE_THE_CATALOGUE
     seen, fitted = recorded(problem, catalogue), kind
     if seen and kind == "none":
         kind = "effect"
@@ -121,7 +125,7 @@ def diagnose(
         gap=widest,
         gaps=found,
         probabilities=probabilities,
-        explanation=_told(evidence.plain_words(fitted, explanations), seen),
+        explanation=_told(evidence.plain_words(fitted, explanations, failed=failed), seen),
         warnings=(*notes(case, problem), *start_warnings(problem, (*case.identification, *case.validation))),
         closure=closure,
         next_excitation=(

@@ -20,6 +20,8 @@ MOSTLY = 0.5
 """Part of the residual power an effect has to explain to be named where the noise is not stated."""
 OUTSIDE = 0.01
 """Prior share of effects that no catalogue holds, kept even when a catalogued effect reaches the noise."""
+OUTSIDE_THE_CATALOGUE = {"effect": OUTSIDE, "none": 0.0, "unknown": 1.0 - OUTSIDE}
+"""Probabilities of the verdicts where the judging records contradict what the others named."""
 
 
 def weights(explanations: Sequence[Explanation]) -> np.ndarray:
@@ -169,9 +171,20 @@ def _short_of_it(best: Explanation) -> str:
     )
 
 
-def plain_words(kind: Kind, explanations: Sequence[Explanation]) -> str:
-    """The verdict in a sentence or two."""
+def plain_words(kind: Kind, explanations: Sequence[Explanation], *, failed: bool = False) -> str:
+    """The verdict in a sentence or two.
+
+    Args:
+        kind: Verdict.
+        explanations: All of them, the best first.
+        failed: Whether the judging records contradict the best.
+    """
     best = explanations[0]
+    if failed:
+        return (
+            f"Something is missing from the model, and no catalogued effect is it: {names(best.hypothesis)} explains the records "
+            "for identification and fails on those for judging."
+        )
     if kind == "none":
         return (
             "The stated uncertainties and the noise explain the records; nothing is missing from the model."

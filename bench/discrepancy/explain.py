@@ -21,6 +21,7 @@ from bench.discrepancy.attribute import (
     QUICK,
     STALLED,
     THREADS,
+    WITHIN_REACH,
     WORTH_A_FIT,
     Search,
     attribute,
@@ -52,6 +53,8 @@ HOPELESS_THIRD = 5.0
 """The same for a pair that a coupling effect belongs to: a third effect then repairs little."""
 PROMISING = 4.0
 """Reduced chi-squared that a screening must promise in every group, if groups are to be searched before couplings."""
+RECONSIDERED = 3
+"""Explanations behind one in which something is left that are asked whether they leave nothing."""
 KEPT = 12
 """Hypotheses of a group that are combined with those of other groups."""
 
@@ -161,7 +164,7 @@ def _explain(
         problem = Problem(case, structure, case.identification)
         search = attribute(problem, placements(case, structure, catalogue), most=most, progress=progress)
         found = [Explanation(((problem, fitted),)) for fitted in search.ranked()]
-        return found if problem.noise_stated else _parsimonious(found)
+        return _nothing_left_first(found) if problem.noise_stated else _parsimonious(found)
     bins = _common_bins(case, structure)
     whole = Problem(case, structure, case.identification, bins)
     prepared = []
@@ -185,7 +188,7 @@ def _explain(
     if odd and not coupled and not found[0].consistent:
         coupled = _coupled(whole, catalogue, most, progress)
     found += [Explanation(((whole, fitted),)) for fitted in coupled]
-    return sorted(found, key=lambda e: -e.log_posterior)
+    return _nothing_left_first(sorted(found, key=lambda e: -e.log_posterior))
 
 
 def _promise(entry: tuple[Search, Screen, list[Point]]) -> float:
@@ -248,6 +251,21 @@ def _best_of_each(points: Sequence[Point]) -> list[Point]:
     for point in points:
         kept.setdefault(point.placed.key, point)
     return list(kept.values())
+
+
+def _nothing_left_first(found: list[Explanation]) -> list[Explanation]:
+    """Put an explanation that leaves nothing before a likelier one in which free models find a force.
+
+    The toll that an effect pays for the inaccuracy of the diagnosis may else let a law win that the records refute.
+    """
+    nothing = next(e for e in found if not e.hypothesis)
+    if not found[0].consistent or not any(found[0].lacking(nothing)):
+        return found
+    near = [e for e in found[1:] if e.log_posterior > found[0].log_posterior - WITHIN_REACH and e.consistent]
+    for other in near[:RECONSIDERED]:
+        if not any(other.lacking(nothing)):
+            return [other, *(e for e in found if e is not other)]
+    return found
 
 
 def _parsimonious(found: list[Explanation]) -> list[Explanation]:

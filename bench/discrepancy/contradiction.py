@@ -1,0 +1,76 @@
+"""Contradiction: an explanation that fits the records it was found on and fails on those it was not shown.
+
+Several wrong laws together can imitate a missing one within the motion of a record; at another amplitude they fall apart. How far
+a right explanation may be off on other records is told by the uncertainty of its parameters: what it was barely shown in
+identification, a stop touched once, say, it predicts poorly without being wrong.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from bench.discrepancy.case import Case
+from bench.discrepancy.explain import Explanation
+from bench.discrepancy.fit import Fit
+from bench.discrepancy.problem import Array, Problem
+from bench.discrepancy.shrink import coordinates, noise_level
+from bench.discrepancy.starts import in_motion
+
+DRAWS = 8
+"""Draws of the parameters from their posterior."""
+CONTRADICTED = 2.0
+"""Error on the judging records over what noise and parameters explain, from which an explanation is contradicted."""
+
+
+def contradicted(case: Case, problem: Problem, best: Explanation, rng: np.random.Generator) -> bool:
+    """Whether the judging records refute an explanation.
+
+    Not asked where their free run does not start from rest, nor of prescribed motions, whose reversals are known to a sample only.
+
+    Args:
+        case: The case.
+        problem: Its problem on all degrees of freedom.
+        best: The explanation.
+        rng: For the draws.
+    """
+    records = case.validation
+    if problem.driven or problem.windowed or not problem.noise_stated or any(in_motion(r) for r in records):
+        return False
+    runs = [best.predict(record) for record in records]
+    drawn: list[list[dict[str, Array]]] = []
+    for _, channels in coordinates(problem.structure):
+
+        def judged(values, channels=channels) -> Array:
+            return np.concatenate([sum(sign * v[c] for c, sign in channels) for v in values])
+
+        simulated = judged(runs)
+        error = _rms(simulated - judged([record.values for record in records]))
+        floor = noise_level(problem, channels, records)
+        if error <= CONTRADICTED * floor:
+            continue
+        if not drawn:
+            others = [_drawn(best, rng) for _ in range(DRAWS)]
+            drawn = [[other.predict(record) for record in records] for other in others]
+        spread = _rms(np.concatenate([judged(other) - simulated for other in drawn]))
+        if error > CONTRADICTED * np.hypot(floor, spread):
+            return True
+    return False
+
+
+def _drawn(best: Explanation, rng: np.random.Generator) -> Explanation:
+    """An explanation whose parameters are drawn from their posterior."""
+
+    def moved(problem: Problem, fitted: Fit) -> Fit:
+        _, _, low, high = problem.prior(fitted.hypothesis)
+        away = np.linalg.solve(
+            np.linalg.cholesky(fitted.precision).T, rng.standard_normal(len(fitted.vector))
+        )
+        return replace(fitted, vector=np.clip(fitted.vector + away, low, high))
+
+    return Explanation(tuple((problem, moved(problem, fitted)) for problem, fitted in best.parts))
+
+
+def _rms(x: Array) -> float:
+    return float(np.sqrt(np.mean(x**2)))
