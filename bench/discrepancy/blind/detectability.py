@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 RIVALS = 3
 """Effects that the screening likes best and that are fitted."""
 ITERATIONS, LAST = 6, 25
-"""Iterations of each, and of the best of them."""
+"""Iterations of each, and of the best of them and of the nominal model."""
 
 
 def detectability(pure: Case, true: Mapping[str, float], truth: Collection[str]) -> dict[str, Any]:
@@ -63,7 +63,7 @@ def _odds_of(pure: Case, true: Mapping[str, float], truth: Collection[str]) -> d
     ]
     cost = float(np.sum(np.square(away)))
     start = np.zeros(len(problem.nominal))
-    nothing = fit(problem, (), start=start, iterations=ITERATIONS)
+    nothing = fit(problem, (), start=start, iterations=LAST)
     coupling = len(structure.groups()) > 1 and any(e.n_coordinates > 1 for e in CATALOGUE if e.name in truth)
     candidates = [
         p
