@@ -166,15 +166,21 @@ class Problem:
     def compiled(self, rig: LinearRig, tolerance: float, speeds: Sequence[float] | None = None) -> Array:
         """The motion by the compiled loop with controlled error."""
         hold = round(rig.rig.timestep / 1e-3)
-        start = zip(np.zeros(4), self.speeds if speeds is None else speeds, strict=True)
-        # what the peer's absolute tolerances tell it
-        size = zip(self.scale[:4], self.scale[4:], strict=True)
+        given = self.speeds if speeds is None else speeds
         return rig.simulate(
             self.commands[::hold],
-            initial=dict(zip(JOINTS, start, strict=True)),
+            initial={joint: (0.0, speed) for joint, speed in zip(JOINTS, given, strict=True)},
             stride=self.every // hold,
             tolerance=tolerance,
-            sizes=dict(zip(JOINTS, size, strict=True)),
+            sizes=self.sizes,
+        )
+
+    @cached_property
+    def sizes(self) -> dict[str, tuple[float, float]]:
+        """Largest position and velocity by joint: what the peer's absolute tolerances tell it."""
+        half = len(self.scale) // 2
+        return dict(
+            zip(JOINTS, zip(self.scale[:half].tolist(), self.scale[half:].tolist(), strict=True), strict=True)
         )
 
 

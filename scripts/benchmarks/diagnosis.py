@@ -2,7 +2,7 @@
 
 The peers are `mujoco.sysid` fitted to every candidate effect and chosen by its BIC (`peer_sysid`), and a global sparse
 regression (`peer_sindy`). The cases are sealed ones made here with a fixed seed, or with ``--data FOLDER`` any folder of
-cases with an ``answers`` folder in it, which only the scoring opens. Ten short cases by default, some four minutes on two
+cases with an ``answers`` folder in it, which only the scoring opens. Ten short cases by default, some fifteen minutes of two
 cores; ``--full`` makes sixty of a release's length, of all kinds, or takes the whole folder, which is hours.
 
     python scripts/benchmark.py diagnosis
