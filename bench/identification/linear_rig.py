@@ -325,7 +325,8 @@ class LinearRig:
     def _motion(self, given: Mapping[str, tuple[float, float]] | None, positions: Array) -> Array:
         """Positions and velocities (2 n_dof,), those of joints that are not given at `positions` and at rest."""
         n_dof = len(self._kept)
-        motion = [*positions.tolist(), *[0.0] * n_dof]  # a list: writing single numbers into an array takes longer
+        # a list: writing single numbers into an array takes longer
+        motion = [*positions.tolist(), *[0.0] * n_dof]
         for name, (position, velocity) in (given or {}).items():
             if name not in self._joints:
                 raise UnknownNameError("joint", name, list(self._joints))
