@@ -382,7 +382,7 @@ def challenge(search: Search, screen: Screen, pool: ThreadPoolExecutor, *, round
         for i, placed in enumerate(best.hypothesis):
             rest = best.hypothesis[:i] + best.hypothesis[i + 1 :]
             vector = np.concatenate([best.vector[:n], *(eta for j, eta in enumerate(etas) if j != i)])
-            base = replace(best, hypothesis=rest, vector=vector) if rest else None
+            base = replace(best, hypothesis=rest, vector=vector)
             points, alone = search.first, search.ranked(0)[0].chi2
             if rest:
                 local = _about(screen, base)
