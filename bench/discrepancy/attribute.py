@@ -204,7 +204,7 @@ def attribute(
         nothing = search.ranked(0)[0]
         progress(f"nominal model: chi-squared {nothing.reduced:.3g} of its expectation")
         if _at_ease(nothing, problem):
-            points = _about(screen, nothing).ranked()
+            points = _about(screen, nothing, explained=True).ranked()
             if not points or points[0].gain < WORTH_A_FIT:
                 return search
         _extend(search, screen, [nothing], pool, count=6)
@@ -238,7 +238,7 @@ def attribute(
 
 def _promising(screen: Screen, best: Fit) -> bool:
     """Whether one more effect could still be in the residual of a hypothesis that is down to the noise."""
-    screen = _about(screen, best)
+    screen = _about(screen, best, explained=True)
     points = screen.ranked(best, screen.ground(best, simulated=True))
     return bool(points) and points[0].gain > max(WORTH_A_FIT, IMMATERIAL * best.n_residuals)
 
@@ -248,10 +248,14 @@ def _at_ease(fitted: Fit, problem: Problem) -> bool:
     return consistent(fitted) and fitted.cost - fitted.chi2 < len(problem.nominal) + WORTH_A_FIT / 2
 
 
-def _about(screen: Screen, base: Fit) -> Screen:
-    """The screening that tells what a base lacks."""
+def _explained(base: Fit, problem: Problem) -> bool:
+    """Whether what a base leaves is noise; of the nominal model alone, whether it is at ease with that."""
+    return consistent(base) if base.hypothesis else _at_ease(base, problem)
+
+
+def _about(screen: Screen, base: Fit, *, explained: bool) -> Screen:
+    """The screening that tells what a base lacks, whether or not it explains the records as it stands."""
     spoilt = any(placed.effect.site == "sensor" for placed in base.hypothesis)
-    explained = consistent(base) if base.hypothesis else _at_ease(base, screen.problem)
     return screen.beside(base, simulated=explained) if spoilt or explained else screen
 
 
@@ -294,7 +298,7 @@ def _extend(
     size = len(bases[0].hypothesis) + 1
     for base in bases:
         named = base if base.hypothesis else None
-        local = _about(screen, base)
+        local = _about(screen, base, explained=_explained(base, problem))
         ground = local.ground(named, simulated=named is not None and consistent(base))
         solved = [p for p in local.ranked(named, ground) if not among or p.placed.key in among]
         points = refined(local, ground, solved, pool)
@@ -385,7 +389,7 @@ def challenge(search: Search, screen: Screen, pool: ThreadPoolExecutor, *, round
             base = replace(best, hypothesis=rest, vector=vector)
             points, alone = search.first, search.ranked(0)[0].chi2
             if rest:
-                local = _about(screen, base)
+                local = _about(screen, base, explained=False)
                 ground = local.ground(base)
                 alone = float(np.sum(ground.left**2))
                 points = refined(local, ground, local.ranked(base, ground), pool)
