@@ -152,7 +152,7 @@ class Screen:
             simulated: Take the motion from its free run, where it explains the records: the noise of the measured
                 motion is that of the residual, and what is small would be found in it.
         """
-        key = repr([placed.key for placed in base.hypothesis]).encode() + base.vector.tobytes()
+        key = repr((simulated, [placed.key for placed in base.hypothesis])).encode() + base.vector.tobytes()
         if self._beside is None or self._beside[0] != key:
             about = About(base, simulated)
             self._beside = key, Screen(self.problem, self.candidates, self.each, about=about)
@@ -235,7 +235,7 @@ class Screen:
         columns = np.column_stack([self.effect_response(placed, point) for point in spanning(placed, eta)])
         if placed.effect.modulated or placed.effect.affine:
             columns[:, 1:] -= columns[:, :1]
-        # products of what a hidden resonance makes of a record can be beyond single precision
+        # a hidden resonance can make more of a record than rounding leaves of anything else
         if not np.abs(columns).max() < LARGEST or not np.any(columns):
             return None
         return Node(placed, eta, columns, columns.T @ columns)
