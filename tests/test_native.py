@@ -261,3 +261,11 @@ def test_compiled_code_is_cached_between_processes():
     subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
     second = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
     assert second.stdout.split() == ["1", "1"]
+
+
+def test_mujocos_clock_stands_still_until_the_last_caller_is_done() -> None:
+    with bench_native.untimed():
+        with bench_native.untimed():
+            assert mujoco.get_mjcb_time() is not None
+        assert mujoco.get_mjcb_time() is not None
+    assert mujoco.get_mjcb_time() is None

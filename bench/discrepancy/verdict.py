@@ -63,12 +63,13 @@ class Location:
         share: Part of the excess residual power of the case that lies in this channel.
         band_hz: Frequency band that holds most of it.
         time_s: Interval that holds most of it.
-        state_region: Interval by coordinate ("displacement", "velocity") where the missing force is significant.
+        state_region: Interval by coordinate ("displacement", "velocity") of the first of `regions`.
         p_value: Probability of such an excess from noise alone, after correction for the number of cells looked at.
         kind: "force" where channels of the same coordinate agree with one another, "sensor" where they contradict each
             other, "undetermined" where there is only one.
-        regions: All regions of the missing force at the places the channel touches, the strongest first: their limits
-            by coordinate, "share" of the squared missing force there, and mean "force".
+        regions: Regions of the state space at the places the channel touches, the strongest first: their limits by
+            coordinate, "share" of the squared force there, and mean "force". Where a named "effect" acts in a part of the state
+            space only, those of that effect's force; else those where the map of the missing force is significant.
     """
 
     channel: str

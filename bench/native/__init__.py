@@ -6,6 +6,7 @@ work in this process. A rig does both by itself.
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
@@ -73,20 +74,42 @@ def uninstall() -> None:
             getattr(mujoco, f"set_mjcb_{name}")(None)
 
 
+class _StoppedClock:
+    """How many callers want MuJoCo's clock to stand still; it goes on when the last of them is done."""
+
+    def __init__(self) -> None:
+        self.lock, self.callers, self.ours = threading.Lock(), 0, False
+
+    def stop(self) -> None:
+        with self.lock:
+            if not self.callers:
+                self.ours = mujoco.get_mjcb_time() is None
+                if self.ours:
+                    mujoco.set_mjcb_time(no_time.ctypes)
+            self.callers += 1
+
+    def go_on(self) -> None:
+        with self.lock:
+            self.callers -= 1
+            if not self.callers and self.ours:
+                mujoco.set_mjcb_time(None)  # MuJoCo's own clock
+
+
+_clock = _StoppedClock()
+
+
 @contextmanager
 def untimed() -> Iterator[None]:
     """Within it MuJoCo does not measure its own time, a third of a step of a small model; `mjData.timer` stands still.
 
-    MuJoCo reads the clock some forty times in a Runge-Kutta step. Another library's clock is left as it is.
+    MuJoCo reads the clock some forty times in a Runge-Kutta step. Another library's clock is left as it is. Safe to enter from
+    several threads at a time.
     """
-    ours = mujoco.get_mjcb_time() is None
-    if ours:
-        mujoco.set_mjcb_time(no_time.ctypes)
+    _clock.stop()
     try:
         yield
     finally:
-        if ours:
-            mujoco.set_mjcb_time(None)  # MuJoCo's own clock
+        _clock.go_on()
 
 
 def bind(model: mujoco.MjModel, laws: Sequence[ForceLaw]) -> None:

@@ -194,7 +194,7 @@ def _roll(
     start = np.concatenate(
         [np.zeros((len(rigs), 1)), batch.bind("qpos"), batch.bind("qvel"), batch.bind("act")], axis=1
     )
-    with _own_report():
+    with _own_report(), native.untimed():
         result = batch.rollout(n, padded, mujoco.mjtState.mjSTATE_CTRL, [STATE, "sensordata"])
     states = np.concatenate([start[:, None, :], result[STATE]], axis=1)
     for i, rig in enumerate(rigs):

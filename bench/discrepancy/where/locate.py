@@ -6,7 +6,8 @@ missing along the measured motion (`missing_force`); it is split by displacement
 and out of contact, band and time (`state_map`). Shares of a split add up to one, and in each the false discovery rate is
 controlled. Channels that contradict one another whatever the force (`redundancy`) make it a fault of a sensor.
 
-No split knows which effect is named later; the regions are those of the force map.
+No split knows which effect is named later. The regions are those of the force map, unless an effect that the records bear out
+acts in a part of the state space only: its law then tells them better than any map (`acting`).
 
 References:
     Y. Benjamini, Y. Hochberg, Journal of the Royal Statistical Society B 57 (1995) 289-300.
@@ -14,8 +15,8 @@ References:
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import stats
@@ -24,6 +25,7 @@ from bench.discrepancy.explain import Explanation
 from bench.discrepancy.prepared import fast_length, whitened_spectrum
 from bench.discrepancy.problem import Array, Problem
 from bench.discrepancy.verdict import Location, Split
+from bench.discrepancy.where.acting import acting_regions
 from bench.discrepancy.where.redundancy import Contradiction, contradictions
 from bench.discrepancy.where.state_map import FALSE_DISCOVERIES, Region, StateMap, state_maps
 from bench.discrepancy.where.state_splits import force_splits
@@ -32,6 +34,8 @@ BANDS = 12
 """Frequency bands, evenly over the logarithm of frequency."""
 INTERVALS = 20
 """Intervals of time a residual is split into."""
+STATES = ("displacement", "velocity")
+"""Coordinates of a region of the state space."""
 HOLDS = (0.05, 0.95)
 """Cumulated parts of the excess between which a band or an interval is said to hold it."""
 
@@ -85,7 +89,9 @@ def locate(problem: Problem, nominal: Explanation, best: Explanation) -> Whereab
     names = problem.structure.channels
     excess = _excess(problem, nominal)
     found = contradictions(problem)
-    maps = state_maps(problem, problem.records, known=known_parameters(best))
+    known = known_parameters(best)
+    maps = state_maps(problem, problem.records, known=known)
+    acting = acting_regions(best) if known is not None else {}
     total = sum(max(e.chi2 - e.count, 0.0) for e in excess.values())
     p_values = [float(stats.chi2.sf(e.chi2, e.count)) for e in excess.values()]
     adjusted = dict(zip(excess, stats.false_discovery_control(p_values), strict=True)) if excess else {}
@@ -97,7 +103,7 @@ def locate(problem: Problem, nominal: Explanation, best: Explanation) -> Whereab
         observer = problem.structure.observers[names.index(name)]
         touched = [m for m in maps if np.any(m.place.rows[0] * observer.row != 0)]
         kind = _kind(name, found)
-        regions = () if kind == "sensor" else tuple(r for m in touched for r in m.regions)
+        regions = () if kind == "sensor" else _regions_at(touched, acting)
         locations.append(
             Location(
                 channel=name,
@@ -105,10 +111,10 @@ def locate(problem: Problem, nominal: Explanation, best: Explanation) -> Whereab
                 share=share,
                 band_hz=_holding(own.frequency, own.power - 2.0),
                 time_s=_holding(own.time, own.signal**2 - 1.0),
-                state_region=box(regions[0]) if regions else {},
+                state_region={k: v for k, v in regions[0].items() if k in STATES} if regions else {},
                 p_value=float(adjusted[name]),
                 kind=kind,
-                regions=tuple({**box(r), "share": r.share, "force": r.force} for r in regions),
+                regions=regions,
             )
         )
     return Whereabouts(
@@ -116,6 +122,16 @@ def locate(problem: Problem, nominal: Explanation, best: Explanation) -> Whereab
         (*_residual_splits(problem, excess), *force_splits(problem, problem.records, maps)),
         maps,
         found,
+    )
+
+
+def _regions_at(
+    touched: Sequence[StateMap], acting: Mapping[str, tuple[dict[str, Any], ...]]
+) -> tuple[dict[str, Any], ...]:
+    """Regions at the places of some maps: of the named effects that are limited to a region, or else of the maps."""
+    limited = tuple(region for m in touched for region in acting.get(m.place.name, ()))
+    return limited or tuple(
+        {**box(r), "share": r.share, "force": r.force} for m in touched for r in m.regions
     )
 
 
