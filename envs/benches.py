@@ -18,10 +18,11 @@ from numpy.typing import NDArray
 
 from bench.errors import ParameterError, UnknownNameError
 from bench.excitation import Contrast, Draw, Ensemble, RigPrior, Rivals
-from bench.excitation.bayes_factor import accumulate_contrast, weigh_contrast
+from bench.excitation.ensemble import run_of
 from bench.excitation.experiment import fan
 from bench.excitation.information import STEP, accumulate, misfit
 from bench.excitation.station import Desk
+from bench.excitation.windows import Window, advance, advance_prior, advance_rivals
 from envs.laboratory import Laboratories
 from envs.setups import Setup
 
@@ -69,15 +70,6 @@ class Outcome(NamedTuple):
     terminated: NDArray[np.bool_]  # (m,)
     truncated: NDArray[np.bool_]  # (m,)
     info: dict[str, Any]  # arrays (m,)
-
-
-class Ran(NamedTuple):
-    """What a window on several benches gave and told; m of them."""
-
-    measured: NDArray[np.float64]  # (m, n_steps, n_channels)
-    lost: NDArray[np.bool_]  # (m,) whether the simulation diverged
-    gain: NDArray[np.float64]  # (m,) growth of the merit [nat]
-    effective: NDArray[np.float64]  # (m,) effective number of draws
 
 
 def sensed(ideal: NDArray, disturbance: NDArray) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
@@ -157,8 +149,20 @@ class SteppedBenches(ABC):
         """Effective number of the draws that the reward is averaged over, at the start of an episode ``(m,)``."""
 
     @abstractmethod
-    def _run(self, places: NDArray[np.int64], commands: NDArray[np.float64]) -> Ran:
-        """Run the next window under commands ``(m, n_steps, n_actuators)``, and book what it tells."""
+    def _measured(
+        self, places: NDArray[np.int64], commands: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        """Run the next window under commands ``(m, n_steps, n_actuators)``.
+
+        Returns:
+            What was measured ``(m, n_steps, n_channels)``, and whether the simulation diverged ``(m,)``.
+        """
+
+    @abstractmethod
+    def _told(
+        self, places: NDArray[np.int64], measured: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Book what the window that was run last tells: growth of the merit [nat] and effective number of draws ``(m,)``."""
 
     def step(self, places: NDArray[np.int64], actions: NDArray) -> Outcome:
         """Run the next window on some benches.
@@ -169,10 +173,12 @@ class SteppedBenches(ABC):
         """
         actions = np.clip(np.asarray(actions, dtype=float).reshape(len(places), -1), -1.0, 1.0)
         commands, exhausted = self.desk.commands(places, actions)
-        measured, lost, gain, effective = self._run(places, commands)
+        measured, lost = self._measured(places, commands)
         reached = self.desk.book(places, measured)
         reached[lost] = LOST
         self.desk.window[places] += 1
+        observation = self.desk.observe(places, measured, commands, actions, self.question)
+        gain, effective = self._told(places, measured)
         over = reached > 1.0
         stop = lost | (over[:, 0] & (self.options.enforcement == "terminate"))
         excess = np.minimum(np.maximum(reached - 1.0, 0.0), 1.0).sum(axis=1)
@@ -194,7 +200,6 @@ class SteppedBenches(ABC):
             "separated": separated,
             "violation": over.any(axis=1),
         }
-        observation = self.desk.observe(places, measured, commands, actions, self.question)
         return Outcome(observation, gain - cost, terminated, truncated, info)
 
     def _separated(self, places: NDArray) -> NDArray[np.float64]:
@@ -217,6 +222,16 @@ class _Panel(NamedTuple):
     counts: NDArray[np.int64]  # (n_questions, n_draws) parameters, −1 for none
     places: NDArray[np.int64]  # (n_questions, n_draws) among a question's members
     weights: NDArray[np.float64]  # (n_questions, n_draws) prior weights
+
+
+class _Account(NamedTuple):
+    """A window on the prior draws under way."""
+
+    window: Window
+    books: list[
+        NDArray[np.float64]
+    ]  # states, information, score, square and contrast of the benches that run
+    values: NDArray[np.float64]  # (m, n_draws) or (m, n_pairs), written
 
 
 @lru_cache(maxsize=16)
@@ -259,8 +274,8 @@ class Benches(SteppedBenches):
             for h in (q.hypotheses if isinstance(q, RigPrior) else (q.first, q.second))
         ]
         self._laboratories = Laboratories(
-            tuple(hypotheses), n, channels=self.channels, actuators=self.actuators, threads=threads
-        )
+            tuple(hypotheses), n, channels=self.channels, actuators=self.actuators, threads=(threads + 1) // 2
+        )  # the other half of the threads runs the prior draws meanwhile
         self._noise = self.desk.noise
         panel = _panel(setup, threads)
         draws, p = panel.counts.shape[1], int(panel.counts.max())
@@ -270,6 +285,7 @@ class Benches(SteppedBenches):
         self._square = np.zeros((n, draws))
         self._contrast = Contrast.zeros(n, draws // 2, parameters=p) if self._rivals else None
         self._values = np.zeros((n, draws // 2 if self._rivals else draws))
+        self._account: _Account | None = None
 
     def reset(self, places: NDArray[np.int64], rngs: Sequence[np.random.Generator]) -> NDArray[np.float32]:
         """Put new hidden rigs, at rest, into some benches; return what their sensors show at rest.
@@ -303,60 +319,73 @@ class Benches(SteppedBenches):
         rest = np.zeros((m, self.n_steps, len(self.actuators)))
         return self.desk.observe(places, measured, rest, np.zeros((m, self.width)), self.question)
 
-    def _run(self, places: NDArray[np.int64], commands: NDArray[np.float64]) -> Ran:
+    def _measured(
+        self, places: NDArray[np.int64], commands: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        self._account = self._opened(places, commands)  # of which other threads take care meanwhile
         ideal = self._laboratories.run(places, commands)
         noise = self._noise * self._disturbance[places, self.desk.window[places] % self.n_windows]
-        measured, lost = sensed(ideal, noise)
-        return Ran(measured, lost, *self._account(places, commands, measured))
+        return sensed(ideal, noise)
 
-    def _account(self, places: NDArray, commands: NDArray, measured: NDArray) -> tuple[NDArray, NDArray]:
-        """Book the window on all prior draws; return the growth of the merit and the effective number of draws."""
-        panel, m = _panel(self.setup, self.threads), len(places)
-        whole = m == self.n
+    def _opened(self, places: NDArray[np.int64], commands: NDArray[np.float64]) -> _Account:
+        """Begin to run the window on all prior draws."""
+        panel = _panel(self.setup, self.threads)
         asked = self.question[places]
-        counts = panel.counts[asked]
         books = [self._states, self._fisher, self._score, self._square, *(self._contrast or ())]
-        states, fisher, score, square, *contrast = (
-            books if whole else [np.ascontiguousarray(book[places]) for book in books]
-        )
-        outputs = panel.ensemble.integrate(
+        if len(places) < self.n:
+            books = [np.ascontiguousarray(book[places]) for book in books]
+        states, fisher, score, square, *contrast = books
+        run = run_of(
+            panel.ensemble.packed,
             commands,
             states,
             members=panel.members[asked],
             counts=panel.n_members[asked],
+            timestep=self.timestep,
             clock=self._clock(places),
         )
-        weights = 1.0 / self._noise
-        follow = self.options.average == "posterior"
-        values = np.zeros(counts.shape)
-        if follow or not self._rivals:
+        weights, counts = 1.0 / self._noise, panel.counts[asked]
+        if self._rivals:
+            pairs = counts.reshape(len(places), -1, 2)
+            at, values = panel.places[asked].reshape(pairs.shape), np.zeros(pairs.shape[:2])
+            window = advance_rivals(panel.ensemble, run, at, pairs, weights, Contrast(*contrast), values)
+        elif self.options.average == "prior":
+            values = np.zeros(counts.shape)
+            window = advance_prior(panel.ensemble, run, counts, weights, (fisher, score, square), values)
+        else:
+            values = np.zeros(counts.shape)
+            window = advance(panel.ensemble, run)
+        return _Account(window, books, values)
+
+    def _told(
+        self, places: NDArray[np.int64], measured: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        panel, m = _panel(self.setup, self.threads), len(places)
+        asked = self.question[places]
+        assert self._account is not None  # `_measured` opened it
+        (window, books, values), self._account = self._account, None
+        _, fisher, score, square, *_ = books
+        window.finish()
+        if self.options.average == "posterior":
+            counts, weights = panel.counts[asked], 1.0 / self._noise
+            logarithms = np.zeros(counts.shape)
             panel.ensemble.spread(
                 lambda a, b: accumulate(
-                    a, b, outputs, counts, STEP, weights, measured, fisher, score, square, values
+                    a, b, window.outputs, counts, STEP, weights, measured, fisher, score, square, logarithms
                 ),
                 m,
             )
+            values = values if self._rivals else logarithms
         if self._rivals:
-            sums = Contrast(*contrast)
-            pairs = counts.reshape(m, -1, 2)
-            at = panel.places[asked].reshape(m, -1, 2)
-            values = np.zeros(pairs.shape[:2])
-
-            def contrast_cases(a: int, b: int) -> None:
-                accumulate_contrast(a, b, outputs, at, pairs, STEP, weights, sums)
-                weigh_contrast(a, b, sums, values)
-
-            panel.ensemble.spread(contrast_cases, m)
             values = np.log1p(np.maximum(values, 0.0))
         values = np.where(
             np.isfinite(values), values, self._values[places]
         )  # of a draw that diverged: no more
-        if not whole:
-            for book, part in zip(books, (states, fisher, score, square, *contrast), strict=True):
+        if m < self.n:
+            whole = (self._states, self._fisher, self._score, self._square, *(self._contrast or ()))
+            for book, part in zip(whole, books, strict=True):
                 book[places] = part
-        probability = self._probability(
-            panel.weights[asked], fisher, score, square, self.desk.window[places] + 1
-        )
+        probability = self._probability(panel.weights[asked], fisher, score, square, self.desk.window[places])
         if self._rivals:
             probability = probability.reshape(m, -1, 2).sum(axis=2)
         gain = np.sum(probability * (values - self._values[places]), axis=1)

@@ -24,7 +24,7 @@ from bench.excitation.ensemble import Packed, integrate_cases
 from bench.excitation.information import STEP, accumulate
 from bench.excitation.station import Desk
 from envs.base import options_of, setup_of
-from envs.benches import Options, Ran, SteppedBenches, sensed
+from envs.benches import Options, SteppedBenches, sensed
 from envs.setups import Setup, made, rival_experiment
 from envs.vector import BenchVectorEnv
 
@@ -173,6 +173,7 @@ class PracticeBenches(SteppedBenches):
         self._asked = np.array([i for i, _ in kinds])
         self.question = self._asked[np.arange(n) % len(kinds)]
         self._values = np.zeros(n)
+        self._latest = np.zeros(n)
 
     def effective_draws(self, places: NDArray[np.int64]) -> NDArray[np.float64]:
         """One: the reward knows one rig ``(m,)``."""
@@ -191,7 +192,9 @@ class PracticeBenches(SteppedBenches):
         still = np.zeros((len(places), self.width))
         return self.desk.observe(places, self._disturbance[places, -1], rest, still, self.question)
 
-    def _run(self, places: NDArray[np.int64], commands: NDArray[np.float64]) -> Ran:
+    def _measured(
+        self, places: NDArray[np.int64], commands: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
         clock = self._clock(places)
         ideal = np.zeros((len(places), self.n_steps, len(self.station.channels)))
         values = np.zeros(len(places))
@@ -200,12 +203,16 @@ class PracticeBenches(SteppedBenches):
             if mine.size:
                 rows = places[mine] // len(self._groups)
                 ideal[mine], values[mine] = group.run(rows, commands[mine], clock[mine])
-        measured, lost = sensed(ideal, self._disturbance[places, self.desk.window[places]])
-        values = np.where(np.isfinite(values), values, self._values[places])
-        gain = values - self._values[places]
-        self._values[places] = values
+        self._latest = np.where(np.isfinite(values), values, self._values[places])
+        return sensed(ideal, self._disturbance[places, self.desk.window[places]])
+
+    def _told(
+        self, places: NDArray[np.int64], measured: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        gain = self._latest - self._values[places]
+        self._values[places] = self._latest
         self._merit[places] += gain
-        return Ran(measured, lost, gain, self.effective_draws(places))
+        return gain, self.effective_draws(places)
 
 
 class PracticeVectorEnv(BenchVectorEnv):

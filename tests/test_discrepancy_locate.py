@@ -7,8 +7,12 @@ import pytest
 from numpy.typing import NDArray
 
 from bench.discrepancy import Case, CaseChannel, NominalParameter, record_from_arrays
+from bench.discrepancy.attribute import attribute, placements
+from bench.discrepancy.catalogue import CATALOGUE
+from bench.discrepancy.explain import Explanation
 from bench.discrepancy.problem import Problem
 from bench.discrepancy.structure import structure_of
+from bench.discrepancy.where.acting import acting_regions
 from bench.discrepancy.where.missing_force import observers
 from bench.discrepancy.where.redundancy import contradictions
 from bench.discrepancy.where.state_map import CELLS, state_maps
@@ -152,3 +156,16 @@ def test_channels_contradict_each_other_where_a_sensor_is_at_fault_and_only_ther
 def test_friction_which_makes_the_acceleration_jump_is_no_fault_of_a_sensor():
     (found,) = contradictions(problem(lambda t, x, v: 3.0 * np.tanh(v / 1e-3)))
     assert not found.found
+
+
+def test_a_named_stop_tells_where_it_begins_better_than_the_map():
+    case = problem(stop, wrong=0.03)
+    candidates = [e for e in CATALOGUE if e.name == "one_sided_stop"]
+    search = attribute(case, placements(case.case, case.structure, candidates), most=1)
+    best = Explanation(((case, search.ranked()[0]),))
+    (region,) = acting_regions(best)[""]
+    assert region["effect"] == "one_sided_stop"
+    # the fit knows the position to some micrometres; a thousandth of the largest force is 10 micrometres further on
+    assert region["displacement"][0] == pytest.approx(0.01, abs=1e-4)
+    assert "velocity" not in region
+    assert region["force"] > 0.0

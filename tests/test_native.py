@@ -264,8 +264,8 @@ def test_compiled_code_is_cached_between_processes():
 
 
 def test_mujocos_clock_stands_still_until_the_last_caller_is_done() -> None:
-    with bench_native.untimed():
-        with bench_native.untimed():
+    with native.untimed():
+        with native.untimed():
             assert mujoco.get_mjcb_time() is not None
         assert mujoco.get_mjcb_time() is not None
     assert mujoco.get_mjcb_time() is None

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bench import Element, joint_rig, sdof_rig
-from bench.errors import UnknownNameError
+from bench.errors import ParameterError, UnknownNameError
 from bench.identification.linear_rig import LinearRig
 
 CHANNELS = ("displacement", "velocity", "acceleration_x")
@@ -78,3 +78,15 @@ def test_divergence_ends():
     rig = LinearRig.of(sdof_rig(Element.of("cubic_stiffness", "carriage", k3=-1e9), mass=1.0), CHANNELS[:1])
     found = rig.simulate(np.zeros((500, 2)), initial={"carriage": (0.1, 0.0)}, tolerance=1e-6)
     assert not np.isfinite(found).all()
+
+
+def test_records_from_many_starts_are_those_one_by_one():
+    rig = _rig(Element.of("gap", "carriage", stiffness=3000.0, clearance=0.003))
+    commands = np.random.default_rng(3).standard_normal((400, 2))
+    starts = [{}, START, {"carriage": (0.0, -0.4)}, {"carriage": (0.01, 0.2)}, {"carriage": (-0.02, 0.0)}]
+    for tolerance in (0.0, 1e-6):
+        together = rig.simulate_batch(commands, initials=starts, stride=2, tolerance=tolerance, threads=2)
+        alone = [rig.simulate(commands, initial=start, stride=2, tolerance=tolerance) for start in starts]
+        np.testing.assert_array_equal(together, alone)
+    with pytest.raises(ParameterError, match="no initial states came"):
+        rig.simulate_batch(commands, initials=[])

@@ -204,7 +204,7 @@ def attribute(
         nothing = search.ranked(0)[0]
         progress(f"nominal model: chi-squared {nothing.reduced:.3g} of its expectation")
         if _at_ease(nothing, problem):
-            points = _about(screen, nothing, explained=True).ranked()
+            points = about(screen, nothing, explained=True).ranked()
             if not points or points[0].gain < WORTH_A_FIT:
                 return search
         _extend(search, screen, [nothing], pool, count=6)
@@ -238,7 +238,7 @@ def attribute(
 
 def _promising(screen: Screen, best: Fit) -> bool:
     """Whether one more effect could still be in the residual of a hypothesis that is down to the noise."""
-    screen = _about(screen, best, explained=True)
+    screen = about(screen, best, explained=True)
     points = screen.ranked(best, screen.ground(best, simulated=True))
     return bool(points) and points[0].gain > max(WORTH_A_FIT, IMMATERIAL * best.n_residuals)
 
@@ -253,7 +253,7 @@ def _explained(base: Fit, problem: Problem) -> bool:
     return consistent(base) if base.hypothesis else _at_ease(base, problem)
 
 
-def _about(screen: Screen, base: Fit, *, explained: bool) -> Screen:
+def about(screen: Screen, base: Fit, *, explained: bool) -> Screen:
     """The screening that tells what a base lacks, whether or not it explains the records as it stands."""
     spoilt = any(placed.effect.site == "sensor" for placed in base.hypothesis)
     return screen.beside(base, simulated=explained) if spoilt or explained else screen
@@ -298,17 +298,18 @@ def _extend(
     size = len(bases[0].hypothesis) + 1
     for base in bases:
         named = base if base.hypothesis else None
-        local = _about(screen, base, explained=_explained(base, problem))
+        local = about(screen, base, explained=_explained(base, problem))
         ground = local.ground(named, simulated=named is not None and consistent(base))
         solved = [p for p in local.ranked(named, ground) if not among or p.placed.key in among]
         points = refined(local, ground, solved, pool)
         if not named:
             search.first = sorted([*search.first, *points] if among else points, key=lambda p: -p.gain)
+        origin = base.vector if named or local is not screen else np.zeros(len(base.vector))
         inertia = {} if among else local.inertia_gains(ground)
         most = max([p.gain for p in points] + list(inertia.values()), default=0.0)
-        for point in _leading(points, count, SHORT * most):
+        for point in leading(points, count, SHORT * most):
             if search.start(base.hypothesis, point):
-                start = np.concatenate([base.vector * bool(base.hypothesis), point.eta])
+                start = np.concatenate([origin, point.eta])
                 tasks.append(((*base.hypothesis, point.placed), start))
         own = {placed.key for placed in base.hypothesis}
         least = min(SHORT * most, WORTH_A_FIT) if consistent(base) else SHORT * most
@@ -389,13 +390,13 @@ def challenge(search: Search, screen: Screen, pool: ThreadPoolExecutor, *, round
             base = replace(best, hypothesis=rest, vector=vector)
             points, alone = search.first, search.ranked(0)[0].chi2
             if rest:
-                local = _about(screen, base, explained=False)
+                local = about(screen, base, explained=False)
                 ground = local.ground(base)
                 alone = float(np.sum(ground.left**2))
                 points = refined(local, ground, local.ranked(base, ground), pool)
             own = max((p.gain for p in points if p.placed.key == placed.key), default=np.inf)
             left = max(alone - own, search.problem.n_residuals)
-            for point in _leading(points, 5, own - left - LEFT * own, starts=REFINED_STARTS):
+            for point in leading(points, 5, own - left - LEFT * own, starts=REFINED_STARTS):
                 if search.start(rest, point):
                     tasks.append(((*rest, point.placed), np.concatenate([vector, point.eta])))
                     continue
@@ -458,7 +459,7 @@ def _apart(point: Point, other: Point) -> float:
     )
 
 
-def _leading(points: Sequence[Point], count: int, least: float, starts: int = 2) -> list[Point]:
+def leading(points: Sequence[Point], count: int, least: float, starts: int = 2) -> list[Point]:
     """Starts of the `count` effects of largest gain: the best of each, and further ones that are nearly as good."""
     grouped: dict[tuple[str, str, str], list[Point]] = {}
     for point in points:

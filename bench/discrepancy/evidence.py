@@ -18,8 +18,9 @@ INDEPENDENT = 50.0
 """Independent pieces of evidence in a record whose residuals are model error rather than noise."""
 MOSTLY = 0.5
 """Part of the residual power an effect has to explain to be named where the noise is not stated."""
-OUTSIDE = 0.01
-"""Prior share of effects that no catalogue holds, kept even when a catalogued effect reaches the noise."""
+OUTSIDE = 0.03
+"""Share of effects that no catalogue holds, kept even when a catalogued effect reaches the noise: about as many of the
+explanations that were sure of themselves were wrong on sealed cases."""
 OUTSIDE_THE_CATALOGUE = {"effect": OUTSIDE, "none": 0.0, "unknown": 1.0 - OUTSIDE}
 """Probabilities of the verdicts where the judging records contradict what the others named."""
 
@@ -77,11 +78,12 @@ def _judge_unscaled(explanations: Sequence[Explanation]) -> tuple[Kind, dict[str
 
 
 def marginal(explanations: Sequence[Explanation]) -> dict[tuple[str, str], float]:
-    """Probability that each (name, place) belongs to the explanation."""
+    """Probability that each (name, place) belongs to the truth."""
     total: dict[tuple[str, str], float] = {}
+    known = 1.0 - OUTSIDE if _noise_stated(explanations) else 1.0
     for share, explanation in zip(weights(explanations), explanations, strict=True):
         for key in {(p.effect.name, p.place.name) for p in explanation.hypothesis}:
-            total[key] = total.get(key, 0.0) + float(share)
+            total[key] = total.get(key, 0.0) + known * float(share)
     return total
 
 

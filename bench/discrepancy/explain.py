@@ -19,14 +19,17 @@ from threadpoolctl import threadpool_limits
 from bench.discrepancy.attribute import (
     IMMATERIAL,
     QUICK,
+    REFINED_STARTS,
     STALLED,
     THREADS,
     WITHIN_REACH,
     WORTH_A_FIT,
     Search,
+    about,
     attribute,
     consistent,
     converge,
+    leading,
     names,
     placements,
     posterior,
@@ -216,8 +219,8 @@ def _coupled(
         ground = screen.ground()
         points = refined(screen, ground, [p for p in screen.ranked() if p.placed.key in coupling], pool)
         zero = np.zeros(len(whole.nominal))
-        carry_all = [((p.placed,), np.append(zero, p.eta)) for p in _best_of_each(points)]
-        converge(kept, pool, carry_all)
+        starts = leading(points, len(coupling), 0.0, starts=REFINED_STARTS)
+        converge(kept, pool, [((p.placed,), np.append(zero, p.eta)) for p in starts])
         for _ in range(1, most):
             if not kept.fits:
                 break
@@ -225,8 +228,9 @@ def _coupled(
             if base.reduced > (HOPELESS_COUPLING if len(base.hypothesis) == 1 else HOPELESS_THIRD):
                 break
             progress(f"{names(base.hypothesis)}, chi-squared {base.reduced:.3g}")
-            ground = screen.ground(base, simulated=consistent(base))
-            points = refined(screen, ground, screen.ranked(base, ground), pool)
+            local = about(screen, base, explained=consistent(base))
+            ground = local.ground(base, simulated=consistent(base))
+            points = refined(local, ground, local.ranked(base, ground), pool)
             worth = [p for p in points if p.gain > max(WORTH_A_FIT, IMMATERIAL * base.n_residuals)]
             if not worth:
                 break
@@ -237,20 +241,12 @@ def _coupled(
                     whole, (*base.hypothesis, point.placed), start=start, iterations=QUICK, exact=False
                 )
 
-            trials = sorted(pool.map(extended, _best_of_each(worth)[:4]), key=lambda f: f.cost)
+            trials = sorted(pool.map(extended, leading(worth, 4, 0.0, starts=1)), key=lambda f: f.cost)
             converge(kept, pool, [(f.hypothesis, f.vector) for f in trials[:2]])
             reduce_best(kept, pool)
             if kept.ranked()[0] is base or kept.ranked()[0].reduced - 1.0 > STALLED * (base.reduced - 1.0):
                 break
     return kept.ranked()
-
-
-def _best_of_each(points: Sequence[Point]) -> list[Point]:
-    """Keep the first point of every effect."""
-    kept: dict[tuple[str, str, str], Point] = {}
-    for point in points:
-        kept.setdefault(point.placed.key, point)
-    return list(kept.values())
 
 
 def _nothing_left_first(found: list[Explanation]) -> list[Explanation]:

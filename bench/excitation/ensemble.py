@@ -14,7 +14,7 @@ from __future__ import annotations
 import os
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
@@ -115,11 +115,26 @@ def _derivative(t, x, nv, nx, n_elements, n_coordinates, n_theta, table, rows, c
         dx[nv + i] = _affine(i, constants, coefficients, rows, columns, x)
 
 
+class Run(NamedTuple):
+    """Cases to be advanced; `states` and `outputs` are written."""
+
+    timestep: float
+    clock: NDArray[np.float64]  # (n_cases,) time at the first command
+    controls: NDArray[np.float64]  # (n_cases, n, n_actuators)
+    members: NDArray[np.int64]  # (n_cases, n_members)
+    counts: NDArray[np.int64]  # (n_cases,) how many of them are real
+    packed: Packed
+    states: NDArray[np.float64]  # (n_cases, n_members, n_states)
+    outputs: NDArray[np.float64]  # (n_cases, n_members, n, n_channels)
+
+
 @numba.njit(cache=True, error_model="numpy", nogil=True)
-def _integrate(first, last, h, clock, controls, members, counts, p, states, outputs, work):
-    """Advance the cases ``first … last − 1``; `states` and `outputs` are written, `work` is scratch (`_scratch_size`)."""
+def advance_cases(first, last, run):
+    """Advance the cases ``first … last − 1`` of a `Run`."""
+    h, clock, controls, members, counts, p, states, outputs = run
     nx = states.shape[2]
     nv = p.motion.shape[3]
+    work = np.zeros(5 * nx + nv + controls.shape[2] + 3 * MAX_COORDINATES)
     nr = p.constants.shape[1]
     nc = nr - nv
     nu = controls.shape[2]
@@ -130,6 +145,7 @@ def _integrate(first, last, h, clock, controls, members, counts, p, states, outp
     n_theta = p.theta.shape[2]
     rows = p.rows.ctypes.data
     columns = p.columns.ctypes.data
+    # the state, generalised forces, commands, four rates; then coordinates, their velocities and forces of a law
     x_now = pointer_at(work.ctypes.data)
     u = advance(x_now, nx + nv)
     rates = advance(u, nu)
@@ -172,11 +188,6 @@ def _integrate(first, last, h, clock, controls, members, counts, p, states, outp
                     )
 
 
-def _scratch_size(nx: int, nv: int, nu: int) -> int:
-    """State, generalised forces, commands, four rates; then coordinates, their velocities and forces of a law."""
-    return 5 * nx + nv + nu + 3 * MAX_COORDINATES
-
-
 def integrate_cases(
     packed: Packed,
     controls: NDArray[np.float64],
@@ -200,22 +211,37 @@ def integrate_cases(
         clock: Time at the first command [s] ``(n_cases,)``; zero by default.
         spread: Called with a task and the number of cases, to spread shares of them over threads; one thread by default.
     """
-    controls = np.ascontiguousarray(controls, dtype=float)
-    n_cases, n_steps, _ = controls.shape
-    nv = packed.motion.shape[3]
-    outputs = np.zeros((n_cases, members.shape[1], n_steps, packed.constants.shape[1] - nv))
-    times = np.zeros(n_cases) if clock is None else np.ascontiguousarray(clock, dtype=float)
-    size = _scratch_size(states.shape[2], nv, controls.shape[2])
-
-    def run(first: int, last: int) -> None:
-        work = np.zeros(size)
-        _integrate(first, last, timestep, times, controls, members, counts, packed, states, outputs, work)
-
+    run = run_of(packed, controls, states, members=members, counts=counts, timestep=timestep, clock=clock)
     if spread is None:
-        run(0, n_cases)
+        advance_cases(0, len(controls), run)
     else:
-        spread(run, n_cases)
-    return outputs
+        spread(lambda first, last: advance_cases(first, last, run), len(controls))
+    return run.outputs
+
+
+def run_of(
+    packed: Packed,
+    controls: NDArray[np.float64],
+    states: NDArray[np.float64],
+    *,
+    members: NDArray[np.int64],
+    counts: NDArray[np.int64],
+    timestep: float,
+    clock: NDArray[np.float64] | None = None,
+) -> Run:
+    """Cases of packed members ready to be advanced, the outputs zero; the arguments are those of `integrate_cases`."""
+    n_cases, n_steps, _ = controls.shape
+    n_channels = packed.constants.shape[1] - packed.motion.shape[3]
+    return Run(
+        timestep,
+        np.zeros(n_cases) if clock is None else np.ascontiguousarray(clock, dtype=float),
+        np.ascontiguousarray(controls, dtype=float),
+        members,
+        counts,
+        packed,
+        states,
+        np.zeros((n_cases, members.shape[1], n_steps, n_channels)),
+    )
 
 
 def available_threads() -> int:
@@ -316,6 +342,11 @@ class Ensemble:
             clock=clock,
             spread=self.spread,
         )
+
+    def begin(self, task: Callable[[], None], n_cases: int) -> list[Future]:
+        """Begin a task on half of the threads, where there are enough cases for them; the caller has the other half meanwhile."""
+        others = min(self.threads // 2, n_cases // CASES_A_THREAD)
+        return [self._pool.submit(task) for _ in range(others)]
 
     def spread(self, task: Callable[[int, int], None], n_cases: int) -> None:
         """Call ``task(first, last)`` for contiguous shares of the cases, over the threads where there are enough cases."""

@@ -184,7 +184,7 @@ def accumulate(first, last, outputs, counts, step, weights, measured, fisher, sc
         counts: Parameters of each draw ``(n_cases, n_draws)``, −1 for no draw.
         step: Step of the differences.
         weights: One over the noise standard deviations ``(n_channels,)``.
-        measured: Measured channels ``(n_cases, n, n_channels)``.
+        measured: Measured channels ``(n_cases, n, n_channels)``; None leaves `score` and `square` as they are.
         fisher: ``sum J'J`` ``(n_cases, n_draws, p, p)``, added to.
         score: ``sum J'r`` with the residual r = measured − drawn ``(n_cases, n_draws, p)``, added to.
         square: ``sum r'r`` ``(n_cases, n_draws)``, added to.
@@ -203,13 +203,15 @@ def accumulate(first, last, outputs, counts, step, weights, measured, fisher, sc
                 for c in range(outputs.shape[3]):
                     w = weights[c]
                     base = outputs[case, member, i, c]
-                    r = w * (measured[case, i, c] - base)
-                    square[case, draw] += r * r
                     for j in range(p):
                         row[j] = w * (outputs[case, member + 1 + j, i, c] - base) / step
-                        score[case, draw, j] += row[j] * r
                         for k in range(j + 1):
                             fisher[case, draw, j, k] += row[j] * row[k]
+                    if measured is not None:
+                        r = w * (measured[case, i, c] - base)
+                        square[case, draw] += r * r
+                        for j in range(p):
+                            score[case, draw, j] += row[j] * r
             for j in range(p):
                 for k in range(j):
                     fisher[case, draw, k, j] = fisher[case, draw, j, k]

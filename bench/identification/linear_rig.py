@@ -12,110 +12,28 @@ rig, and records to a stated accuracy are what this is for.
 
 from __future__ import annotations
 
-import copy
+import os
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
-import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bench.errors import ModelError, ParameterError, UnknownNameError
-from bench.identification.parameter_address import Address, address
+from bench.identification.linear_probe import Matrices, Probe, cut, matrices_at, refuse, slope_of, value_of
+from bench.identification.parameter_address import address
+from bench.identification.record_batch import run_records
 from bench.identification.record_loop import COLUMNS, Sparse, run, work_size
 from bench.rig import Rig
 
 Array = NDArray[np.float64]
 
-_AGREEMENT = (
-    1e-9  # of the largest term: unit probing is exact to some 1e-15, a nonlinearity worth the name far above
-)
-
 
 def current(rig: Rig, name: str) -> float:
     """Value of a free parameter in a rig; raises as `address`."""
-    return _value(rig.model, address(rig, name))
-
-
-class _Matrices(NamedTuple):
-    mass: Array  # (n_dof, n_dof)
-    stiffness: Array  # (n_dof, n_dof)
-    damping: Array  # (n_dof, n_dof)
-    inputs: Array  # (n_dof, n_inputs + 1), the last column constant
-
-    def plus(self, other: _Matrices, factor: float) -> _Matrices:
-        return _Matrices(*(a + factor * b for a, b in zip(self, other, strict=True)))
-
-
-class _Probe:
-    """A MuJoCo model without elements, asked for its matrices."""
-
-    def __init__(self, model: mujoco.MjModel) -> None:
-        self.model = model
-        self.data = mujoco.MjData(model)
-
-    def force(self, q: Array, v: Array, u: Array, applied: Array | None = None) -> tuple[Array, Array, Array]:
-        """``M q''`` without the applied force, the mass matrix, and the sensors."""
-        model, data = self.model, self.data
-        mujoco.mj_resetData(model, data)
-        data.qpos[:], data.qvel[:], data.ctrl[:] = q, v, u
-        if applied is not None:
-            data.qfrc_applied[:] = applied
-        mujoco.mj_forward(model, data)
-        mass = np.zeros((model.nv, model.nv))
-        mujoco.mj_fullM(model, data, mass)
-        return mass @ data.qacc - (0.0 if applied is None else applied), mass, data.sensordata.copy()
-
-    def matrices(self) -> _Matrices:
-        nv, nu = self.model.nv, self.model.nu
-        zero, still, eye = np.zeros(nv), np.zeros(nu), np.eye(nv)
-        rest, mass, _ = self.force(zero, zero, still)
-        stiffness = np.stack([rest - self.force(row, zero, still)[0] for row in eye], axis=1)
-        damping = np.stack([rest - self.force(zero, row, still)[0] for row in eye], axis=1)
-        columns = [self.force(zero, zero, row)[0] - rest for row in np.eye(nu)]
-        return _Matrices(mass, stiffness, damping, np.stack([*columns, rest], axis=1))
-
-    def sensors(self, at: _Matrices) -> Array:
-        """Sensors as a map of position, velocity, acceleration, commands and 1: ``(n, 3 nv + nu + 1)``."""
-        nv, nu = self.model.nv, self.model.nu
-        zero, still = np.zeros(nv), np.zeros(nu)
-
-        def held(q: Array, v: Array, u: Array, a: Array) -> Array:
-            needed = at.mass @ a + at.stiffness @ q + at.damping @ v - at.inputs @ np.append(u, 1.0)
-            return self.force(q, v, u, needed)[2]
-
-        rest = held(zero, zero, still, zero)
-        columns = [held(row, zero, still, zero) - rest for row in np.eye(nv)]
-        columns += [held(zero, row, still, zero) - rest for row in np.eye(nv)]
-        columns += [held(zero, zero, still, row) - rest for row in np.eye(nv)]
-        columns += [held(zero, zero, row, zero) - rest for row in np.eye(nu)]
-        found = np.stack([*columns, rest], axis=1)
-        largest = np.max(np.abs(found), axis=1, initial=0.0, keepdims=True)
-        return np.where(np.abs(found) > 1e-12 * largest, found, 0.0)
-
-    def difference(
-        self, at: _Matrices, sensors: Array, columns: Sequence[int], rng: np.random.Generator
-    ) -> str:
-        """What of the model the matrices, and the map of some sensors, miss at random states; empty for nothing."""
-        nv, nu = self.model.nv, self.model.nu
-        for scale in (1.0, 1e-2):  # a stop or a backlash shows at one of them
-            q, v, u = (scale * rng.standard_normal(size) for size in (nv, nv, nu))
-            force, mass, measured = self.force(q, v, u)
-            one = np.append(u, 1.0)
-            terms = (at.inputs @ one, -at.stiffness @ q, -at.damping @ v)
-            size = max(float(np.max(np.abs(term), initial=1e-12)) for term in terms)
-            if np.max(np.abs(mass - at.mass)) > _AGREEMENT * np.max(np.abs(at.mass)):
-                return "its mass matrix depends on the position"
-            if np.max(np.abs(sum(terms) - force)) > _AGREEMENT * size:
-                return "its forces are not linear in position, velocity and command"
-            acceleration = np.linalg.solve(mass, force)
-            parts = sensors * np.concatenate([q, v, acceleration, one])
-            sizes = np.max(np.abs(parts), axis=1, initial=1e-12)
-            if np.any(np.abs(parts.sum(axis=1) - measured[columns]) > _AGREEMENT * sizes):
-                return "a channel is not linear in the motion"
-        return ""
+    return value_of(rig.model, address(rig, name))
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,8 +49,8 @@ class LinearRig:
     rig: Rig
     channels: tuple[str, ...]
     parameters: tuple[str, ...]
-    _base: _Matrices
-    _slopes: tuple[_Matrices | None, ...]  # by a unit of each parameter; None where it belongs to an element
+    _base: Matrices
+    _slopes: tuple[Matrices | None, ...]  # by a unit of each parameter; None where it belongs to an element
     _places: tuple[int, ...]  # of each parameter in the vector of all thetas; -1 for structure
     _start: Array
     _observe: Array
@@ -160,19 +78,19 @@ class LinearRig:
         addresses = [address(rig, name) for name in parameters]
         columns = sensor_columns(rig, channels)
         bare = rig.with_(elements=()).model
-        _refuse(rig, bare)
+        refuse(rig, bare)
         structural = [entry.field != "numeric_data" for entry in addresses]
-        start = np.array([_value(rig.model, entry) for entry in addresses])
-        base = _Probe(bare).matrices()
+        start = np.array([value_of(rig.model, entry) for entry in addresses])
+        base = Probe(bare).matrices()
         slopes = tuple(
-            _slope(bare, base, entry, value) if free else None
+            slope_of(bare, base, entry, value) if free else None
             for entry, value, free in zip(addresses, start, structural, strict=True)
         )
-        sensors = _Probe(bare).sensors(base)[columns]
+        sensors = Probe(bare).sensors(base)[columns]
         for factor in (1.0, 1.3):
-            at, moved = _at(bare, base, addresses, start, slopes, factor)
+            at, moved = matrices_at(bare, base, addresses, start, slopes, factor)
             # of the places probed only: the verdict must not vary from call to call
-            difference = _Probe(moved).difference(at, sensors, columns, np.random.default_rng(0))
+            difference = Probe(moved).difference(at, sensors, columns, np.random.default_rng(0))
             if difference:
                 raise ModelError(
                     f"rig '{rig.name}' is not of linear structure: {difference}; simulate it with MuJoCo"
@@ -185,8 +103,8 @@ class LinearRig:
             rig,
             tuple(channels),
             tuple(parameters),
-            _cut(base, kept),
-            tuple(None if slope is None else _cut(slope, kept) for slope in slopes),
+            cut(base, kept),
+            tuple(None if slope is None else cut(slope, kept) for slope in slopes),
             tuple(
                 -1 if free else offsets[entry.index]
                 for entry, free in zip(addresses, structural, strict=True)
@@ -256,6 +174,74 @@ class LinearRig:
             ParameterError: Shapes do not fit, or a setting is out of range.
             UnknownNameError: No such joint.
         """
+        commands, theta, solved = self._prepared(controls, values, stride, tolerance)
+        state, least = self._from(initial), self._least(sizes)
+        n_dof, n = len(self._kept), len(least)
+        out = np.empty((-(-len(commands) // stride), len(self.channels)))
+        run(
+            n_dof, n, self.rig.timestep, start_time, tolerance, stride, commands, *solved[:2], self._table,
+            self._rows, self._row_inputs, solved[2], theta, self._observed, state, least,
+            np.zeros(work_size(n, n_dof)), out,
+        )  # fmt: skip
+        return out
+
+    def simulate_batch(
+        self,
+        controls: ArrayLike,
+        values: ArrayLike | None = None,
+        *,
+        initials: Sequence[Mapping[str, tuple[float, float]]],
+        stride: int = 1,
+        tolerance: float = 0.0,
+        sizes: Mapping[str, tuple[float, float]] | None = None,
+        start_time: float = 0.0,
+        threads: int | None = None,
+    ) -> Array:
+        """Simulate records of the same commands from many starts, over threads; to the last bit those of `simulate`.
+
+        Args:
+            controls: As for `simulate`, as all that follows is but for `initials`.
+            values: Free parameters.
+            initials: (position, velocity) by joint at the start, one mapping a record.
+            stride: Steps a sample.
+            tolerance: Local error.
+            sizes: Least peaks.
+            start_time: Time of the first sample [s].
+            threads: Threads; all cores by default.
+
+        Returns:
+            ``(n_records, n_samples, n_channels)``.
+
+        Raises:
+            ParameterError: Shapes do not fit, or a setting is out of range.
+            UnknownNameError: No such joint.
+        """
+        commands, theta, solved = self._prepared(controls, values, stride, tolerance)
+        count, least = len(initials), self._least(sizes)
+        if not count:
+            raise ParameterError("no initial states came; one a record is expected ({} for rest)")
+        states = np.stack([self._from(initial) for initial in initials])
+        constants = (len(self._kept), len(least), self.rig.timestep, start_time, float(tolerance), stride)
+        elements = (self._table, self._rows, self._row_inputs, theta)
+        out = np.empty((count, -(-len(commands) // stride), len(self.channels)))
+
+        def share(first: int, last: int) -> None:
+            run_records(
+                first, last, constants, commands, solved, elements, self._observed, states, least,
+                work_size(len(least), len(self._kept)), out,
+            )  # fmt: skip
+
+        workers = min(threads or os.cpu_count() or 1, count)
+        # records differ in effort: some shares a thread, so that none waits long for the last one
+        edges = np.linspace(0, count, min(4 * workers, count) + 1).astype(int)
+        with ThreadPoolExecutor(workers) as pool:
+            list(pool.map(share, edges[:-1], edges[1:]))
+        return out
+
+    def _prepared(
+        self, controls: ArrayLike, values: ArrayLike | None, stride: int, tolerance: float
+    ) -> tuple[Array, Array, tuple[Sparse, Array, Sparse]]:
+        """Commands with the constant 1, parameters of the elements, and the structure solved for accelerations."""
         commands = np.asarray(controls, dtype=float)
         vector = self._start if values is None else np.asarray(values, dtype=float)
         if commands.ndim != 2 or commands.shape[1] != len(self.rig.actuators):
@@ -278,21 +264,26 @@ class LinearRig:
                 else:
                     theta[place] = value
             solved = self._own if at is self._base else self._solved(at)
-        n_dof = len(self._kept)
         columns = np.empty((len(commands), commands.shape[1] + 1))
         columns[:, :-1], columns[:, -1] = commands, 1.0
-        n = 2 * n_dof + len(self._states)
-        state, least = np.zeros(n + 3), np.zeros(n)  # the loop takes four states at a time
-        state[: 2 * n_dof] = self._motion(initial, self.rig.model.qpos0[self._kept])
-        state[2 * n_dof : n] = self._states
-        least[: 2 * n_dof] = self._motion(sizes, np.zeros(n_dof))
-        out = np.empty((-(-len(commands) // stride), len(self.channels)))
-        run(
-            n_dof, n, self.rig.timestep, start_time, tolerance, stride, columns, *solved[:2], self._table,
-            self._rows, self._row_inputs, solved[2], theta, self._observed, state, least,
-            np.zeros(work_size(n, n_dof)), out,
-        )  # fmt: skip
-        return out
+        return columns, theta, solved
+
+    def _from(self, initial: Mapping[str, tuple[float, float]] | None) -> Array:
+        """State at the start, zeros behind it: the loop takes four states at a time."""
+        motion, n = 2 * len(self._kept), len(self._states)
+        state = np.zeros(motion + n + 3)
+        state[:motion] = self._motion(initial, self._rest)
+        state[motion : motion + n] = self._states
+        return state
+
+    def _least(self, sizes: Mapping[str, tuple[float, float]] | None) -> Array:
+        """Least peaks of all states."""
+        motion = self._motion(sizes, np.zeros(len(self._kept)))
+        return np.concatenate([motion, np.zeros(len(self._states))])
+
+    @cached_property
+    def _rest(self) -> Array:
+        return self.rig.model.qpos0[self._kept]
 
     @cached_property
     def _observed(self) -> Sparse:
@@ -302,7 +293,7 @@ class LinearRig:
     def _own(self) -> tuple[Sparse, Array, Sparse]:
         return self._solved(self._base)
 
-    def _solved(self, at: _Matrices) -> tuple[Sparse, Array, Sparse]:
+    def _solved(self, at: Matrices) -> tuple[Sparse, Array, Sparse]:
         """``M^-1 [K, C]``, ``M^-1 B`` and ``(M^-1 R')'``."""
         solved = np.linalg.solve(
             at.mass, np.hstack([at.stiffness, at.damping, at.inputs, self._coordinates.T])
@@ -350,70 +341,6 @@ def sensor_columns(rig: Rig, channels: Sequence[str]) -> list[int]:
     return [names.index(name) for name in channels]
 
 
-def _value(model: mujoco.MjModel, entry: Address) -> float:
-    return float(np.ravel(getattr(model, entry.field)[entry.index])[0])
-
-
-def _refuse(rig: Rig, model: mujoco.MjModel) -> None:
-    """Raise `ModelError` where a probe at a few states could miss that the rig is not linear."""
-    slides = (int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE))
-    collides = not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CONTACT and np.any(
-        (model.geom_contype != 0) | (model.geom_conaffinity != 0)
-    )
-    reasons = {
-        f"its integrator is {rig.integrator}, and only RK4 is compiled": rig.integrator != "RK4",
-        "it has joints other than slides and hinges": bool(np.any(~np.isin(model.jnt_type, slides))),
-        "its actuators have states or delays of their own": model.na > 0 or model.nhistory > 0,
-        "its actuators or joints are limited": any(
-            np.any(getattr(model, name))
-            for name in ("actuator_ctrllimited", "actuator_forcelimited", "jnt_limited", "tendon_limited")
-        ),
-        "it has dry friction of MuJoCo's own": bool(
-            np.any(model.dof_frictionloss) or np.any(model.tendon_frictionloss)
-        )
-        or any(element.exact for element in rig.elements),
-        "it has constraints or contacts": bool(model.neq or collides),
-    }
-    for reason, present in reasons.items():
-        if present:
-            raise ModelError(
-                f"rig '{rig.name}' is not of linear structure: {reason}; simulate it with MuJoCo"
-            )
-
-
-def _moved(model: mujoco.MjModel, entries: Sequence[Address], values: Sequence[float]) -> mujoco.MjModel:
-    changed = copy.copy(model)
-    for entry, value in zip(entries, values, strict=True):
-        getattr(changed, entry.field)[entry.index] = value
-    mujoco.mj_setConst(changed, mujoco.MjData(changed))
-    return changed
-
-
-def _slope(model: mujoco.MjModel, base: _Matrices, entry: Address, value: float) -> _Matrices:
-    """Change of the matrices with a unit of a structural quantity, which they are affine in."""
-    change = value if value != 0.0 else 1.0
-    moved = _Probe(_moved(model, [entry], [value + change])).matrices()
-    return _Matrices(*((a - b) / change for a, b in zip(moved, base, strict=True)))
-
-
-def _at(
-    model: mujoco.MjModel,
-    base: _Matrices,
-    addresses: Sequence[Address],
-    start: Array,
-    slopes: Sequence[_Matrices | None],
-    factor: float,
-) -> tuple[_Matrices, mujoco.MjModel]:
-    """Matrices and model with all free structural quantities times `factor`."""
-    at, entries, values = base, [], []
-    for entry, value, slope in zip(addresses, start, slopes, strict=True):
-        if slope is not None:
-            at = at.plus(slope, (factor - 1.0) * value)
-            entries.append(entry)
-            values.append(factor * value)
-    return at, _moved(model, entries, values)
-
-
 def _elements(
     rig: Rig,
 ) -> tuple[Array, NDArray[np.int64], NDArray[np.int64], Array, Array, dict[int, int]]:
@@ -450,8 +377,8 @@ def _elements(
 
 
 def _reached(
-    base: _Matrices,
-    slopes: Sequence[_Matrices | None],
+    base: Matrices,
+    slopes: Sequence[Matrices | None],
     elements: tuple[Array, NDArray[np.int64]],
     sensors: Array,
     nv: int,
@@ -471,10 +398,3 @@ def _reached(
         if np.array_equal(wider, reached):
             return np.flatnonzero(reached)
         reached = wider
-
-
-def _cut(matrices: _Matrices, kept: NDArray[np.int64]) -> _Matrices:
-    square = np.ix_(kept, kept)
-    return _Matrices(
-        matrices.mass[square], matrices.stiffness[square], matrices.damping[square], matrices.inputs[kept]
-    )

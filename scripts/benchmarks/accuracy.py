@@ -37,8 +37,6 @@ PEER_SHARE, MUJOCO_SHARE = 4, 16
 each time, and minutes otherwise."""
 METHODS = ("RK45", "DOP853", "LSODA", "Radau", "BDF")
 RTOLS = tuple(factor * 10.0**power for power in range(-4, -11, -1) for factor in (1.0, 0.5, 0.2))
-INNER = 10
-"""Runs of the compiled loop a timing: one alone is shorter than what a task switch costs."""
 SUBSTEPS = (1, 2, 5, 10, 20, 50, 100, 200)
 """MuJoCo's steps a millisecond."""
 CHANNELS = tuple(
@@ -163,16 +161,27 @@ class Problem:
             batch.step(nstep=stride * substeps)
         return out
 
-    def compiled(self, rig: LinearRig, tolerance: float, speeds: Sequence[float] | None = None) -> Array:
+    def compiled(self, rig: LinearRig, tolerance: float) -> Array:
         """The motion by the compiled loop with controlled error."""
         hold = round(rig.rig.timestep / 1e-3)
-        given = self.speeds if speeds is None else speeds
         return rig.simulate(
             self.commands[::hold],
-            initial={joint: (0.0, speed) for joint, speed in zip(JOINTS, given, strict=True)},
+            initial=_moving(self.speeds),
             stride=self.every // hold,
             tolerance=tolerance,
             sizes=self.sizes,
+        )
+
+    def many(self, rig: LinearRig, tolerance: float, speeds: Array) -> Array:
+        """The motions from several starts by the compiled loop, over two threads ``(n_motions, n_samples, 8)``."""
+        hold = round(rig.rig.timestep / 1e-3)
+        return rig.simulate_batch(
+            self.commands[::hold],
+            initials=[_moving(row) for row in speeds.tolist()],
+            stride=self.every // hold,
+            tolerance=tolerance,
+            sizes=self.sizes,
+            threads=2,
         )
 
     @cached_property
@@ -182,6 +191,11 @@ class Problem:
         return dict(
             zip(JOINTS, zip(self.scale[:half].tolist(), self.scale[half:].tolist(), strict=True), strict=True)
         )
+
+
+def _moving(speeds: Sequence[float]) -> dict[str, tuple[float, float]]:
+    """Initial states of the joints."""
+    return {joint: (0.0, speed) for joint, speed in zip(JOINTS, speeds, strict=True)}
 
 
 @cache
@@ -300,7 +314,8 @@ def _rows_of(problem: Problem, repeats: int) -> list[Row]:
             "ours": setting.label, "our_error": setting.error, "peer": peer.label, "peer_error": peer.error,
         }  # fmt: skip
         limit = "≥ 50" if label == "compiled loop" else ""
-        count = INNER if label == "compiled loop" else 1
+        # one run of ours alone is shorter than what a task switch costs: as many as take the peer's time
+        count = max(1, round(peer.seconds / setting.seconds))
         single = interleave({"ours": partial(_times, count, setting.run), "peer": peer.run}, repeats)
         rows.append(
             ratio_row(
@@ -317,7 +332,7 @@ def _rows_of(problem: Problem, repeats: int) -> list[Row]:
         if label == "MuJoCo RK4":
             tasks["ours"] = partial(problem.mujoco, int(value), speeds=speeds[:MUJOCO_SHARE], threads=2)
         else:
-            tasks["ours"] = partial(_pooled, partial(problem.compiled, rig, value), speeds)
+            tasks["ours"] = partial(problem.many, rig, value, speeds)
         many = interleave(tasks, max(3, repeats // 5))
         rows.append(
             ratio_row(
@@ -340,11 +355,6 @@ def _times(count: int, run: Callable[[], Any]) -> None:
 def _loop(solve: Callable[..., Array], speeds: Array) -> None:
     for row in speeds:
         solve(speeds=row)
-
-
-def _pooled(run: Callable[..., Array], speeds: Array) -> None:
-    with ThreadPoolExecutor(2) as pool:
-        list(pool.map(lambda row: run(speeds=row), speeds))
 
 
 def _step(batch: Batch) -> None:

@@ -1,0 +1,133 @@
+"""Windows of many cases, each advanced and booked in one go by whichever thread is free.
+
+The merit of a window depends on the commands only, so that prior draws can run while MuJoCo runs the hidden rigs and while Python
+books what was measured. Cases are claimed one by one from a counter that the threads share: no thread waits for another
+one's share.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import Any
+
+import numba
+import numpy as np
+from numba.core import types
+from numba.extending import intrinsic
+from numpy.typing import NDArray
+
+from bench.excitation.bayes_factor import Contrast, accumulate_contrast, weigh_contrast
+from bench.excitation.ensemble import Ensemble, Run, advance_cases
+from bench.excitation.information import STEP, accumulate
+
+
+@intrinsic
+def _claimed(typing_context, counter):  # numba's signature
+    """The next number of a shared counter ``(1,)`` of int64, which no other thread gets."""
+    if not isinstance(counter, types.Array) or counter.dtype != types.int64:
+        return None
+
+    def generate(context, builder, signature, arguments):
+        array = context.make_array(signature.args[0])(context, builder, arguments[0])
+        return builder.atomic_rmw("add", array.data, context.get_constant(types.int64, 1), "monotonic")
+
+    return types.int64(counter), generate
+
+
+@numba.njit(cache=True, error_model="numpy", nogil=True)
+def _advance(counter, run):
+    """Advance the cases that this thread claims."""
+    case = _claimed(counter)
+    while case < run.controls.shape[0]:
+        advance_cases(case, case + 1, run)
+        case = _claimed(counter)
+
+
+@numba.njit(cache=True, error_model="numpy", nogil=True)
+def _advance_prior(counter, run, counts, weights, fisher, score, square, values):
+    """Advance, and add to the information about each draw; see `bench.excitation.information.accumulate`."""
+    case = _claimed(counter)
+    while case < run.controls.shape[0]:
+        advance_cases(case, case + 1, run)
+        accumulate(case, case + 1, run.outputs, counts, STEP, weights, None, fisher, score, square, values)
+        case = _claimed(counter)
+
+
+@numba.njit(cache=True, error_model="numpy", nogil=True)
+def _advance_rivals(counter, run, places, counts, weights, contrast, values):
+    """Advance, and weigh each pair of rivals; see `bench.excitation.bayes_factor`."""
+    case = _claimed(counter)
+    while case < run.controls.shape[0]:
+        advance_cases(case, case + 1, run)
+        accumulate_contrast(case, case + 1, run.outputs, places, counts, STEP, weights, contrast)
+        weigh_contrast(case, case + 1, contrast, values)
+        case = _claimed(counter)
+
+
+class Window:
+    """A window of all cases under way.
+
+    The other threads of the ensemble begin at once; the one that made it takes part when it calls `finish`.
+    """
+
+    def __init__(self, ensemble: Ensemble, run: Run, work: Callable[..., None], *arguments: Any) -> None:
+        self.outputs = run.outputs
+        counter = np.zeros(1, dtype=np.int64)
+        self._task = lambda: work(counter, run, *arguments)
+        self._others: list[Future] = ensemble.begin(self._task, len(run.controls))
+
+    def finish(self) -> None:
+        """Take part until all cases are done."""
+        self._task()
+        for other in self._others:
+            other.result()
+
+
+def advance(ensemble: Ensemble, run: Run) -> Window:
+    """Begin to advance cases."""
+    return Window(ensemble, run, _advance)
+
+
+def advance_prior(
+    ensemble: Ensemble,
+    run: Run,
+    counts: NDArray[np.int64],
+    weights: NDArray[np.float64],
+    books: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
+    values: NDArray[np.float64],
+) -> Window:
+    """Begin to advance draws from a prior, adding to their information and writing its ``log det(I + F)``.
+
+    Args:
+        ensemble: The draws and their perturbed ones.
+        run: The cases.
+        counts: Parameters of each draw ``(n_cases, n_draws)``, −1 for no draw.
+        weights: One over the noise standard deviations ``(n_channels,)``.
+        books: Fisher information, score and square of `bench.excitation.information.accumulate`; only the first is added to.
+        values: ``(n_cases, n_draws)``, written.
+    """
+    return Window(ensemble, run, _advance_prior, counts, weights, *books, values)
+
+
+def advance_rivals(
+    ensemble: Ensemble,
+    run: Run,
+    places: NDArray[np.int64],
+    counts: NDArray[np.int64],
+    weights: NDArray[np.float64],
+    contrast: Contrast,
+    values: NDArray[np.float64],
+) -> Window:
+    """Begin to advance pairs of rivals, adding to their contrast and writing its expected log Bayes factor [nat].
+
+    Args:
+        ensemble: The rivals and their perturbed ones.
+        run: The cases.
+        places: Members of the two rivals of each pair ``(n_cases, n_pairs, 2)``.
+        counts: Their numbers of parameters ``(n_cases, n_pairs, 2)``; −1 for no pair.
+        weights: One over the noise standard deviations ``(n_channels,)``.
+        contrast: Sums with leading axes (n_cases, n_pairs), added to.
+        values: ``(n_cases, n_pairs)``, written.
+    """
+    return Window(ensemble, run, _advance_rivals, places, counts, weights, contrast, values)
