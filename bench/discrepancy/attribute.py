@@ -37,9 +37,11 @@ IMMATERIAL = 0.001
 interpolation of loads are themselves only as good as that; records of extreme signal-to-noise ratio would else name trifles."""
 WORTH_A_FIT = 25.0
 """Screened gain in chi-squared from which one more effect could overcome its prior and its Occam factor."""
+NOTICEABLE = 15.0
+"""Screened gain from which the first effect is fitted: noise alone lets the best of the catalogue gain so much in few cases."""
 HOPELESS = 3.0
 """A first fit that leaves more than this many times the excess of the best one is not carried on."""
-SHORT = 0.2
+SHORT = 0.15
 """Effects whose screened gain is less than this part of the best one are not fitted."""
 REFINED_EFFECTS = 12
 """Effects whose grid points are refined along the measured motion."""
@@ -205,9 +207,9 @@ def attribute(
         progress(f"nominal model: chi-squared {nothing.reduced:.3g} of its expectation")
         if _at_ease(nothing, problem):
             points = about(screen, nothing, explained=True).ranked()
-            if not points or points[0].gain < WORTH_A_FIT:
+            if not points or points[0].gain < NOTICEABLE:
                 return search
-        _extend(search, screen, [nothing], pool, count=6)
+        _extend(search, screen, [nothing], pool, count=8)
         rare = [p for p in candidates if p.effect.rare]
         if rare and not consistent(search.ranked()[0]):
             progress("rarer effects")
@@ -304,11 +306,14 @@ def _extend(
         points = refined(local, ground, solved, pool)
         if not named:
             search.first = sorted([*search.first, *points] if among else points, key=lambda p: -p.gain)
-        origin = base.vector if named or local is not screen else np.zeros(len(base.vector))
         inertia = {} if among else local.inertia_gains(ground)
         most = max([p.gain for p in points] + list(inertia.values()), default=0.0)
+        most = min(
+            most, max(base.chi2 - base.n_residuals, WORTH_A_FIT)
+        )  # a screening can promise more than there is
         for point in leading(points, count, SHORT * most):
             if search.start(base.hypothesis, point):
+                origin = base.vector if named else local.beginning(point, ground)
                 start = np.concatenate([origin, point.eta])
                 tasks.append(((*base.hypothesis, point.placed), start))
         own = {placed.key for placed in base.hypothesis}

@@ -115,7 +115,7 @@ def diagnose(
     progress("gap on the judging records")
     found = gaps(case, problem, stages=stages, rng=rng)
     widest = max(found, key=lambda gap: gap.before / max(gap.noise_floor, 1e-12))
-    where = locate(problem, nothing, best)
+    where = locate(problem, nothing, best, named=kind == "effect")
     verdict = Verdict(
         verdict=kind,
         named=(*evidence.named(explanations), *seen) if kind == "effect" else (),

@@ -26,8 +26,12 @@ OUTSIDE_THE_CATALOGUE = {"effect": OUTSIDE, "none": 0.0, "unknown": 1.0 - OUTSID
 
 
 def weights(explanations: Sequence[Explanation]) -> np.ndarray:
-    """Posterior probabilities of explanations (n,), as if one of them were true."""
+    """Posterior probabilities of explanations (n,), as if one of them were true; the first one's rivals are less likely.
+
+    What is likelier than the first was passed over because free models still find a force in it.
+    """
     logs = np.array([e.log_posterior for e in explanations])
+    logs[logs > logs[0]] = -np.inf
     if not _noise_stated(explanations):
         # The noise is whatever the first explanation leaves, and hardly more independent than the visits to a state;
         # what has more parameters was passed over because it is not much better.

@@ -99,7 +99,11 @@ def read(node: Node, gram: Array, right: Array) -> Point | None:  # noqa: PLR091
         eta[3] = np.arctan2(c[2], c[1])
     elif effect.affine:
         if c[0] <= 0 or c[1] <= 0:
-            return None
+            # noise in the motion can turn the sign of what comes on top: then as much of it as is usual
+            usual = np.array([1.0, np.exp(parameters[1].mean)])
+            c = usual * (usual @ right) / (usual @ gram @ usual)
+            if c[0] <= 0:
+                return None
         eta[0], eta[1] = np.log(c[0]), np.log(c[1] / c[0])
     else:
         for position, i in enumerate(_amplitudes(node.placed)):

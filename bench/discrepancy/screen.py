@@ -48,12 +48,21 @@ class Ground(NamedTuple):
         prior: (k_prior,) residual of the nominal parameters' priors where the base has them.
         head: (n, k) orthonormal basis of the base's columns, together with `tail`.
         tail: (k_prior, k) the same basis in the rows of the priors.
+        nominal: (n, n_nominal) the base's columns of the nominal parameters.
+        triangle: (k, k) what makes the base's columns of their basis.
     """
 
     residual: Array
     prior: Array
     head: Array
     tail: Array
+    nominal: Array
+    triangle: Array
+
+    def moves(self, response: Array) -> Array:
+        """Changes of the base's parameters (k,) that go with a response (n,) being explained by something else."""
+        seen = self.head.T @ (self.residual - response) + self.tail.T @ self.prior
+        return np.linalg.lstsq(self.triangle, seen, rcond=1e-12)[0]
 
     @property
     def left(self) -> Array:
@@ -253,8 +262,23 @@ class Screen:
         vector = np.zeros(len(self.problem.nominal)) if base is None else base.vector
         residual, columns, deviations = self._base(hypothesis, vector, simulated)
         n = len(self.problem.nominal)
-        basis, _ = np.linalg.qr(np.vstack([columns, np.eye(n, columns.shape[1])]))
-        return Ground(residual, -deviations, basis[: len(residual)], basis[len(residual) :])
+        basis, triangle = np.linalg.qr(np.vstack([columns, np.eye(n, columns.shape[1])]))
+        head, tail = basis[: len(residual)], basis[len(residual) :]
+        return Ground(residual, -deviations, head, tail, columns[:, :n], triangle)
+
+    def beginning(self, point: Point, ground: Ground) -> Array:
+        """Nominal deviations (n_nominal,) from which a fit of one effect starts: those that go with it along the motion.
+
+        Args:
+            point: The effect and its parameters.
+            ground: What the nominal model leaves.
+        """
+        if point.placed.effect.site != "joint":
+            return self.deviations
+        n = len(self.deviations)
+        moved = self.deviations + ground.moves(self.effect_response(point.placed, point.eta))[:n]
+        _, _, low, high = self.problem.prior(())
+        return np.clip(moved, low, high)
 
     def ranked(self, base: Fit | None = None, ground: Ground | None = None) -> list[Point]:
         """Solve all grid points, given a base hypothesis; by decreasing gain.
@@ -284,7 +308,7 @@ class Screen:
         alone = ground.left
         gains = {}
         for placed in self.inertia:
-            column = ground.project(self.nominal[:, self.problem.structure.parameters.index(placed.target)])
+            column = ground.project(ground.nominal[:, self.problem.structure.parameters.index(placed.target)])
             gains[placed.key] = float((column @ alone) ** 2 / max(column @ column, 1e-300))
         return gains
 

@@ -126,8 +126,8 @@ def _attempt(
     odds: dict[str, Any] = {}
     if effects and options.detectability:
         odds = detectability(pure, bench.truth.values, {e.recipe.name for e in effects})
-    told = odds.get("log_odds_rival" if plan.kind == "foreign" else "log_odds_none", np.inf)
-    if told < EXPECTED:
+    against = {"foreign": "log_odds_rival", "double": "log_odds_one"}.get(plan.kind, "log_odds_none")
+    if odds.get(against, np.inf) < EXPECTED:
         return None
     return case, _answer(bench, effects, runs, gaps, options) | {"detectability": odds}
 
@@ -288,6 +288,8 @@ def _answer(
         row = ROWS[plan.rig][e.where][0]
         reach = float(max(np.abs(m.position @ row).max() for _, m in runs[:-1]))
         inside = [(max(a, -reach), min(b, reach)) for a, b in e.drawn.region if a < reach and b > -reach]
+        if not inside:  # a rigid stop, which no sample of the motion is beyond
+            continue
         regions.append(
             {
                 "dof": e.where,

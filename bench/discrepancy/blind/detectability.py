@@ -12,7 +12,8 @@ rival are an upper bound, and a small value is certain while a large one is not.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
+from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,10 +23,11 @@ from bench.errors import BenchError
 
 if TYPE_CHECKING:
     from bench.discrepancy.fit import Fit
+    from bench.discrepancy.grid_points import Point
 
-RIVALS = 3
+RIVALS = 6
 """Effects that the screening likes best and that are fitted."""
-ITERATIONS, LAST = 6, 25
+ITERATIONS, LAST = 8, 25
 """Iterations of each, and of the best of them and of the nominal model."""
 
 
@@ -38,8 +40,9 @@ def detectability(pure: Case, true: Mapping[str, float], truth: Collection[str])
         truth: Names of the withheld effects.
 
     Returns:
-        ``log_odds_none``, ``log_odds_rival`` and ``rival``; infinite values are given as 1e9. Empty where the fits fail: a
-        case is made of the truth, and what the diagnosis cannot do with it is no reason to leave it out.
+        ``log_odds_none``, ``log_odds_rival`` and ``rival``, and for two effects ``log_odds_one``, against the better of them alone;
+        infinite values are given as 1e9. Empty where the fits fail: a case is made of the truth, and what the diagnosis cannot do
+        with it is no reason to leave it out.
     """
     try:
         return _odds_of(pure, true, truth)
@@ -66,24 +69,30 @@ def _odds_of(pure: Case, true: Mapping[str, float], truth: Collection[str]) -> d
     nothing = fit(problem, (), start=start, iterations=LAST)
     coupling = len(structure.groups()) > 1 and any(e.n_coordinates > 1 for e in CATALOGUE if e.name in truth)
     candidates = [
-        p
-        for p in placements(pure, structure, CATALOGUE)
-        if p.effect.name not in truth and (coupling or p.effect.n_coordinates == 1)
+        p for p in placements(pure, structure, CATALOGUE) if coupling or p.effect.n_coordinates == 1
     ]
     starts: dict[tuple[str, str, str], Any] = {}
     for point in Screen(problem, candidates).ranked():
         starts.setdefault(point.placed.key, point)
-    fits: list[Fit] = [
-        fit(problem, (point.placed,), start=np.concatenate([start, point.eta]), iterations=ITERATIONS)
-        for point in list(starts.values())[:RIVALS]
-    ]
-    rival = min(fits, key=lambda f: f.cost, default=nothing)
-    rival = fit(problem, rival.hypothesis, start=rival.vector, iterations=LAST)
-    return {
+
+    def best_of(points: Iterable[Point]) -> Fit:
+        fits = [
+            fit(problem, (p.placed,), start=np.concatenate([start, p.eta]), iterations=ITERATIONS)
+            for p in points
+        ]
+        best = min(fits, key=lambda f: f.cost, default=nothing)
+        return fit(problem, best.hypothesis, start=best.vector, iterations=LAST)
+
+    rival = best_of(islice((p for p in starts.values() if p.placed.effect.name not in truth), RIVALS))
+    odds = {
         "log_odds_none": _odds(nothing, cost),
         "log_odds_rival": min(_odds(rival, cost), _odds(nothing, cost)),
         "rival": rival.hypothesis[0].effect.name if rival.hypothesis else "none",
     }
+    if len(truth) > 1:
+        alone = best_of(p for p in starts.values() if p.placed.effect.name in truth)
+        odds["log_odds_one"] = min(_odds(alone, cost), _odds(nothing, cost))
+    return odds
 
 
 def _odds(fitted: Fit, cost: float) -> float:

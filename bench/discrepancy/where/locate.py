@@ -78,20 +78,21 @@ class _Excess(NamedTuple):
     density: float
 
 
-def locate(problem: Problem, nominal: Explanation, best: Explanation) -> Whereabouts:
+def locate(problem: Problem, nominal: Explanation, best: Explanation, *, named: bool) -> Whereabouts:
     """Locate the residuals of the nominal model.
 
     Args:
         problem: Records and structure on all degrees of freedom.
         nominal: The explanation without effects, its parameters re-estimated.
         best: The best explanation; where it is down to the noise its nominal parameters serve for the force map.
+        named: Whether its effects are named, so that their laws tell where they act.
     """
     names = problem.structure.channels
     excess = _excess(problem, nominal)
     found = contradictions(problem)
     known = known_parameters(best)
     maps = state_maps(problem, problem.records, known=known)
-    acting = acting_regions(best) if known is not None else {}
+    acting = acting_regions(best) if named and known is not None else {}
     total = sum(max(e.chi2 - e.count, 0.0) for e in excess.values())
     p_values = [float(stats.chi2.sf(e.chi2, e.count)) for e in excess.values()]
     adjusted = dict(zip(excess, stats.false_discovery_control(p_values), strict=True)) if excess else {}
