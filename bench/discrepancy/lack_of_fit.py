@@ -35,8 +35,8 @@ SIGNIFICANCE = 1e-4
 """Probability with which noise alone may call an explanation lacking."""
 INACCURACY = 0.0005
 """Part of chi-squared that is laid to the smoothing and integration of the diagnosis itself."""
-EXACTNESS = 1e-5
-"""Part of the chi-squared an explanation takes away that its laws may leave: three thousandths of the missing force."""
+EXACTNESS = 1e-4
+"""Part of the chi-squared an explanation takes away that its laws may leave: a hundredth of the missing force."""
 
 
 class LackOfFit(NamedTuple):
