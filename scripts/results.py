@@ -162,6 +162,7 @@ def _sealed(told: Any) -> Figures:
         ("foreign effects called unknown", share("unknown_caught"), "100 %"),
         ("two effects: both named", share("both_named"), "≥ 80 %"),
         ("declared indistinguishable sets hold the truth", share("sets_hold_truth"), "≥ 98 %"),
+        ("localisation, F1 on regions of the state", number("region_f1"), "≥ 0.9"),
         ("expected calibration error", number("calibration_error"), "≤ 0.05"),
         ("gap after over noise floor, median", number("median_ratio"), "≤ 1.1"),
         ("gap after over noise floor, 90th percentile", number("p90_ratio"), "≤ 1.5"),

@@ -125,7 +125,7 @@ def _attempt(
     case, pure = _measured(name, bench, with_effects, rng)
     odds: dict[str, Any] = {}
     if effects and options.detectability:
-        odds = detectability(pure, bench.truth.values, {e.recipe.name for e in effects})
+        odds = detectability(pure, bench.truth.values, {e.recipe.name: e.where for e in effects})
     against = {"foreign": "log_odds_rival", "double": "log_odds_one"}.get(plan.kind, "log_odds_none")
     if odds.get(against, np.inf) < EXPECTED:
         return None

@@ -12,9 +12,9 @@ rival are an upper bound, and a small value is certain while a large one is not.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from itertools import islice
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -24,20 +24,23 @@ from bench.errors import BenchError
 if TYPE_CHECKING:
     from bench.discrepancy.fit import Fit
     from bench.discrepancy.grid_points import Point
+    from bench.discrepancy.structure import Structure
 
-RIVALS = 6
-"""Effects that the screening likes best and that are fitted."""
+RIVALS, RIVALS_COUPLED = 6, 3
+"""Effects that the screening likes best and that are fitted; fewer where an effect couples the degrees of freedom."""
+MOST = 1e9
+"""Log odds beyond which nobody counts."""
 ITERATIONS, LAST = 8, 25
 """Iterations of each, and of the best of them and of the nominal model."""
 
 
-def detectability(pure: Case, true: Mapping[str, float], truth: Collection[str]) -> dict[str, Any]:
+def detectability(pure: Case, true: Mapping[str, float], truth: Mapping[str, str]) -> dict[str, Any]:
     """Expected log odds of the truth against "none" and against its nearest rival.
 
     Args:
         pure: The case with its stated noise and next to none in the records.
         true: True parameters by name.
-        truth: Names of the withheld effects.
+        truth: Places of the withheld effects by name.
 
     Returns:
         ``log_odds_none``, ``log_odds_rival`` and ``rival``, and for two effects ``log_odds_one``, against the better of them alone;
@@ -50,50 +53,89 @@ def detectability(pure: Case, true: Mapping[str, float], truth: Collection[str])
         return {}
 
 
-def _odds_of(pure: Case, true: Mapping[str, float], truth: Collection[str]) -> dict[str, Any]:
+class _Group(NamedTuple):
+    """Log odds of the truth within degrees of freedom that nothing else is coupled to.
+
+    Attributes:
+        none: Against the nominal model.
+        rival: Against the nearest other single effect.
+        name: Of that effect.
+        alone: Against the better one of two withheld effects; against the nominal model where only one is withheld.
+    """
+
+    none: float
+    rival: float
+    name: str
+    alone: float
+
+
+def _odds_of(pure: Case, true: Mapping[str, float], truth: Mapping[str, str]) -> dict[str, Any]:
     # the diagnosis is imported where it is asked: a maker that was told to leave this out runs without it
+    from bench.discrepancy.structure import structure_of  # noqa: PLC0415
+
+    structure = structure_of(pure)
+    parts = [structure.restricted(group) for group in structure.groups()]
+    if any(len(place.rows) > 1 for place in structure.places if place.name in truth.values()):
+        parts = [structure]  # an effect that couples them
+    held = [part for part in parts if {p.name for p in part.places} & set(truth.values())]
+    groups = [_group(pure, part, true, truth) for part in held]
+    none = sum(group.none for group in groups)
+    # a single other effect explains one group, and leaves the others as they are
+    nearest = min(groups, key=lambda group: group.rival - group.none)
+    odds = {
+        "log_odds_none": min(none, MOST),
+        "log_odds_rival": min(none - nearest.none + nearest.rival, MOST),
+        "rival": nearest.name,
+    }
+    if len(truth) > 1:
+        odds["log_odds_one"] = min([MOST, *(group.alone for group in groups)])
+    return odds
+
+
+def _group(pure: Case, structure: Structure, true: Mapping[str, float], truth: Mapping[str, str]) -> _Group:
     from bench.discrepancy.attribute import placements  # noqa: PLC0415
     from bench.discrepancy.catalogue import CATALOGUE  # noqa: PLC0415
     from bench.discrepancy.fit import fit  # noqa: PLC0415
     from bench.discrepancy.problem import Problem  # noqa: PLC0415
     from bench.discrepancy.screen import Screen  # noqa: PLC0415
-    from bench.discrepancy.structure import structure_of  # noqa: PLC0415
 
-    structure = structure_of(pure)
     problem = Problem(pure, structure, pure.identification)
     away = [
         (true[name] - problem.nominal[i]) / problem.spread[i] for i, name in enumerate(structure.parameters)
     ]
     cost = float(np.sum(np.square(away)))
-    start = np.zeros(len(problem.nominal))
-    nothing = fit(problem, (), start=start, iterations=LAST)
-    coupling = len(structure.groups()) > 1 and any(e.n_coordinates > 1 for e in CATALOGUE if e.name in truth)
-    candidates = [
-        p for p in placements(pure, structure, CATALOGUE) if coupling or p.effect.n_coordinates == 1
-    ]
+    nothing = fit(problem, (), start=np.zeros(len(problem.nominal)), iterations=LAST)
+    own = {name for name, where in truth.items() if where in {p.name for p in structure.places}}
+    coupling = len(structure.groups()) > 1
+    screen = Screen(problem, placements(pure, structure, CATALOGUE))
+    ground = screen.ground()
     starts: dict[tuple[str, str, str], Any] = {}
-    for point in Screen(problem, candidates).ranked():
+    for point in screen.ranked(None, ground):
         starts.setdefault(point.placed.key, point)
 
-    def best_of(points: Iterable[Point]) -> Fit:
+    def best_of(points: Iterable[Point], iterations: int) -> Fit:
         fits = [
-            fit(problem, (p.placed,), start=np.concatenate([start, p.eta]), iterations=ITERATIONS)
+            fit(
+                problem,
+                (p.placed,),
+                start=np.concatenate([screen.beginning(p, ground), p.eta]),
+                iterations=iterations,
+            )
             for p in points
         ]
         best = min(fits, key=lambda f: f.cost, default=nothing)
         return fit(problem, best.hypothesis, start=best.vector, iterations=LAST)
 
-    rival = best_of(islice((p for p in starts.values() if p.placed.effect.name not in truth), RIVALS))
-    odds = {
-        "log_odds_none": _odds(nothing, cost),
-        "log_odds_rival": min(_odds(rival, cost), _odds(nothing, cost)),
-        "rival": rival.hypothesis[0].effect.name if rival.hypothesis else "none",
-    }
-    if len(truth) > 1:
-        alone = best_of(p for p in starts.values() if p.placed.effect.name in truth)
-        odds["log_odds_one"] = min(_odds(alone, cost), _odds(nothing, cost))
-    return odds
-
-
-def _odds(fitted: Fit, cost: float) -> float:
-    return float(min(0.5 * (fitted.cost - cost), 1e9))
+    others = (p for p in starts.values() if p.placed.effect.name not in own)
+    rival = best_of(islice(others, RIVALS_COUPLED if coupling else RIVALS), ITERATIONS)
+    none = 0.5 * (nothing.cost - cost)
+    alone = none
+    if len(own) > 1:
+        mine = best_of((p for p in starts.values() if p.placed.effect.name in own), ITERATIONS)
+        alone = min(none, 0.5 * (mine.cost - cost))
+    return _Group(
+        none,
+        min(0.5 * (rival.cost - cost), none),
+        rival.hypothesis[0].effect.name if rival.hypothesis else "none",
+        alone,
+    )
