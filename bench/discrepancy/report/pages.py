@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from bench.discrepancy.report.application import recipes
 from bench.discrepancy.report.variants import MEASURED, NOMINAL, variants
 from bench.discrepancy.shrink import coordinates
 from bench.discrepancy.verdict import Split
+from bench.discrepancy.where.locate import box
 from bench.discrepancy.where.state_map import StateMap
 from bench.page import Page, Section
 from bench.recording import Recording
@@ -152,6 +154,11 @@ def _location_section(out: Page, diagnosis: Diagnosis, runs: Mapping[str, Record
         section.text(_contradiction_text(found))
     for found in where.maps:
         _map(section, found, runs, verdict.splits, found.place.name or diagnosis.problem.structure.dofs[0])
+        for region in where.acting.get(found.place.name, ()):
+            section.text(
+                f"As named, {region['effect']} acts at {_limits(region, found.place.position_unit)}: {region['force']:+.3g} "
+                f"{found.place.force_unit} on average, {100 * region['share']:.0f} % of its square."
+            )
     main = {location.channel for location in verdict.locations if location.share > WORTH_SHOWING}
     residual = [s for s in verdict.splits if s.kind in {"band_hz", "time_s"} and s.of in main]
     if residual:
@@ -210,16 +217,22 @@ def region_words(found: StateMap) -> str:
         return "no region of the state space stands out."
     parts = []
     for region in found.regions[:4]:
-        limits = []
-        if region.displacement is not None:
-            limits.append(f"displacement {region.displacement[0]:.3g} to {region.displacement[1]:.3g} {unit}")
-        if region.velocity is not None:
-            limits.append(f"velocity {region.velocity[0]:.3g} to {region.velocity[1]:.3g} {unit}/s")
-        where = " and ".join(limits) or "everywhere"
         parts.append(
-            f"{where}: {region.force:+.3g} {found.place.force_unit} on average, {100 * region.share:.0f} % of its square"
+            f"{_limits(box(region), unit)}: {region.force:+.3g} {found.place.force_unit} on average, "
+            f"{100 * region.share:.0f} % of its square"
         )
     return "; ".join(parts) + "."
+
+
+def _limits(region: Mapping[str, Any], unit: str) -> str:
+    """The limits of a region in words."""
+    units = {"displacement": unit, "velocity": f"{unit}/s"}
+    limits = [
+        f"{name} {region[name][0]:.3g} to {region[name][1]:.3g} {units[name]}"
+        for name in units
+        if name in region
+    ]
+    return " and ".join(limits) or "all states"
 
 
 def _ranking_section(out: Page, diagnosis: Diagnosis) -> None:

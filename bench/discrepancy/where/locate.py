@@ -48,12 +48,14 @@ class Whereabouts(NamedTuple):
         splits: Shares by channel, band, time and state.
         maps: Missing force over the state space, for every place with one coordinate.
         contradictions: Pairs of channels held against each other.
+        acting: Regions of the named effects that act in a part of the state space only, by place; see `acting_regions`.
     """
 
     locations: tuple[Location, ...]
     splits: tuple[Split, ...]
     maps: tuple[StateMap, ...]
     contradictions: tuple[Contradiction, ...]
+    acting: Mapping[str, tuple[dict[str, Any], ...]]
 
 
 class _Excess(NamedTuple):
@@ -123,6 +125,7 @@ def locate(problem: Problem, nominal: Explanation, best: Explanation, *, named: 
         (*_residual_splits(problem, excess), *force_splits(problem, problem.records, maps)),
         maps,
         found,
+        acting,
     )
 
 
