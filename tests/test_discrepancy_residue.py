@@ -6,14 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted_cases import SAMPLE_RATE, motion_with, planted_case
+from planted_cases import SAMPLE_RATE, bouc_wen_slope, motion_with, planted_case
 
 from bench.discrepancy import diagnose
-from bench.discrepancy.attribute import placements
+from bench.discrepancy.attribute import attribute, placements
 from bench.discrepancy.catalogue import effect_named
 from bench.discrepancy.contradiction import contradicted
 from bench.discrepancy.explain import Explanation
 from bench.discrepancy.fit import fit
+from bench.discrepancy.grid_points import Point
 from bench.discrepancy.lack_of_fit import lack_of_fit
 from bench.discrepancy.prepared import timed
 from bench.discrepancy.problem import Problem
@@ -120,3 +121,39 @@ def test_judging_records_contradict_a_law_that_they_do_not_follow():
     other = planted_case(lambda f: motion_with(f, lambda x, v, z: (12.0 * np.tanh(x / 0.005), [])))
     elsewhere = replace(case, validation=other.validation)
     assert contradicted(elsewhere, problem, found, np.random.default_rng(1))
+
+
+@pytest.mark.slow
+def test_a_fit_starts_with_the_nominal_parameters_that_go_with_the_effect():
+    problem, explained = fitted(
+        planted_case(lambda f: motion_with(f, one_relaxation, 1)), "viscoelastic_relaxation", [-2.2, -3.0]
+    )
+    (placed,) = explained.hypothesis
+    n = len(problem.nominal)
+    screen = Screen(problem, [placed])
+    ground = screen.ground()
+    alone = fit(problem, (), start=np.zeros(n)).vector
+    start = screen.beginning(Point(placed, 0.0, explained.vector[n:]), ground)
+    # what the nominal model alone takes for a stiffness and a damping is off by the relaxation's share of them
+    assert np.abs(alone - explained.vector[:n]).max() > 2.0
+    assert np.abs(start - explained.vector[:n]).max() < 0.3
+
+
+@pytest.mark.slow
+def test_an_error_of_mass_shows_behind_a_hysteresis_by_what_its_prior_costs():
+    case = planted_case(
+        lambda f: motion_with(f, lambda x, v, z: (z[0], [bouc_wen_slope(v, z[0], 900.0, 200.0, 100.0)]), 1)
+    )
+    mass = case.parameters[0]
+    case = replace(case, parameters=(replace(mass, value=1.06 * mass.value), *case.parameters[1:]))
+    problem = Problem(case, structure_of(case), case.identification)
+    hysteresis = placements(case, problem.structure, [effect_named("bouc_wen_hysteresis")])
+    explained = attribute(problem, hysteresis, most=1).ranked()[0]
+    error = next(p for p in placements(case, problem.structure, [effect_named("mass_error")]))
+    screen = Screen(problem, [error]).beside(explained, simulated=True)
+    screened = screen.inertia_gains(screen.ground(explained, simulated=True))[error.key]
+    start = np.append(explained.vector, 0.0)
+    freed = fit(problem, (*explained.hypothesis, error), start=start, iterations=30)
+    # the prior of the size of the error costs a unit or two
+    assert screened == pytest.approx(explained.cost - freed.cost, rel=0.1, abs=3.0)
+    assert screened > 20.0
