@@ -62,7 +62,7 @@ class Ground(NamedTuple):
     def moves(self, response: Array) -> Array:
         """Changes of the base's parameters (k,) that go with a response (n,) being explained by something else."""
         seen = self.head.T @ (self.residual - response) + self.tail.T @ self.prior
-        return np.linalg.lstsq(self.triangle, seen, rcond=1e-12)[0]
+        return np.asarray(np.linalg.lstsq(self.triangle, seen, rcond=1e-12)[0], dtype=np.float64)
 
     @property
     def left(self) -> Array:

@@ -13,56 +13,42 @@ from typing import Any
 
 import numba
 import numpy as np
-from numba.core import types
-from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from bench.excitation.bayes_factor import Contrast, accumulate_contrast, weigh_contrast
 from bench.excitation.ensemble import Ensemble, Run, advance_cases
 from bench.excitation.information import STEP, accumulate
-
-
-@intrinsic
-def _claimed(typing_context, counter):  # numba's signature
-    """The next number of a shared counter ``(1,)`` of int64, which no other thread gets."""
-    if not isinstance(counter, types.Array) or counter.dtype != types.int64:
-        return None
-
-    def generate(context, builder, signature, arguments):
-        array = context.make_array(signature.args[0])(context, builder, arguments[0])
-        return builder.atomic_rmw("add", array.data, context.get_constant(types.int64, 1), "monotonic")
-
-    return types.int64(counter), generate
+from bench.laws.calling import claim
 
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
 def _advance(counter, run):
     """Advance the cases that this thread claims."""
-    case = _claimed(counter)
+    case = claim(counter)
     while case < run.controls.shape[0]:
         advance_cases(case, case + 1, run)
-        case = _claimed(counter)
+        case = claim(counter)
 
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
 def _advance_prior(counter, run, counts, weights, fisher, score, square, values):
     """Advance, and add to the information about each draw; see `bench.excitation.information.accumulate`."""
-    case = _claimed(counter)
+    case = claim(counter)
     while case < run.controls.shape[0]:
         advance_cases(case, case + 1, run)
         accumulate(case, case + 1, run.outputs, counts, STEP, weights, None, fisher, score, square, values)
-        case = _claimed(counter)
+        case = claim(counter)
 
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
 def _advance_rivals(counter, run, places, counts, weights, contrast, values):
     """Advance, and weigh each pair of rivals; see `bench.excitation.bayes_factor`."""
-    case = _claimed(counter)
+    case = claim(counter)
     while case < run.controls.shape[0]:
         advance_cases(case, case + 1, run)
         accumulate_contrast(case, case + 1, run.outputs, places, counts, STEP, weights, contrast)
         weigh_contrast(case, case + 1, contrast, values)
-        case = _claimed(counter)
+        case = claim(counter)
 
 
 class Window:

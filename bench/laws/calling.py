@@ -92,3 +92,16 @@ def load_int32(typingctx, address):
         return builder.sext(value, ir.IntType(64))
 
     return signature, codegen
+
+
+@intrinsic
+def claim(typingctx, counter):
+    """Take the next number of a counter, an int64 array of one, that several threads share: none gets the same."""
+    if not isinstance(counter, types.Array) or counter.dtype != types.int64:
+        return None
+
+    def codegen(context, builder, signature, args):
+        array = context.make_array(signature.args[0])(context, builder, args[0])
+        return builder.atomic_rmw("add", array.data, context.get_constant(types.int64, 1), "monotonic")
+
+    return types.int64(counter), codegen
