@@ -18,7 +18,7 @@ INDEPENDENT = 50.0
 """Independent pieces of evidence in a record whose residuals are model error rather than noise."""
 MOSTLY = 0.5
 """Part of the residual power an effect has to explain to be named where the noise is not stated."""
-OUTSIDE = 0.03
+OUTSIDE = 0.045
 """Share of effects that no catalogue holds, kept even when a catalogued effect reaches the noise: about as many of the
 explanations that were sure of themselves were wrong on sealed cases."""
 OUTSIDE_THE_CATALOGUE = {"effect": OUTSIDE, "none": 0.0, "unknown": 1.0 - OUTSIDE}

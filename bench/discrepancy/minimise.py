@@ -146,7 +146,8 @@ def minimise(
         normal = jacobian.T @ jacobian + identity
         gradient = jacobian.T @ state.residual + task.deviation(state.vector)
         normal, gradient = _without(task.blocked(state.vector, gradient), normal, gradient)
-        promise = float(gradient @ np.linalg.solve(normal, gradient))
+        # least squares: far off, columns of very unequal size leave a normal matrix singular to working precision
+        promise = float(gradient @ np.linalg.lstsq(normal, gradient, rcond=None)[0])
         trifle = max(tolerance, COARSE * (state.cost - near))
         settled = fresh and promise < trifle
         hopeless = iteration >= PATIENCE and state.cost - OPTIMISM * promise > limit
