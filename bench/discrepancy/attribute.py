@@ -308,9 +308,8 @@ def _extend(
             search.first = sorted([*search.first, *points] if among else points, key=lambda p: -p.gain)
         inertia = {} if among else local.inertia_gains(ground)
         most = max([p.gain for p in points] + list(inertia.values()), default=0.0)
-        most = min(
-            most, max(base.chi2 - base.n_residuals, WORTH_A_FIT)
-        )  # a screening can promise more than there is
+        # a screening can promise more than there is
+        most = min(most, max(base.chi2 - base.n_residuals, WORTH_A_FIT))
         for point in leading(points, count, SHORT * most):
             if search.start(base.hypothesis, point):
                 origin = base.vector if named else local.beginning(point, ground)

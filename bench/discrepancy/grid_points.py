@@ -85,9 +85,8 @@ def read(node: Node, gram: Array, right: Array) -> Point | None:  # noqa: PLR091
     # what is left of a memory beside stiffness and damping is small, but it is all that tells it
     if gram.trace() <= IMITATED * max(node.gram.trace(), 1e-300):
         return None
-    if not (
-        np.isfinite(gram).all() and np.isfinite(right).all()
-    ):  # beside a base whose own run diverges when it is moved
+    # beside a base whose own run diverges when it is moved
+    if not (np.isfinite(gram).all() and np.isfinite(right).all()):
         return None
     c = np.linalg.lstsq(gram, right, rcond=1e-10)[0]
     if effect.site in {"actuator", "sensor"}:

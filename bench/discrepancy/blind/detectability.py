@@ -113,13 +113,13 @@ def _group(pure: Case, structure: Structure, true: Mapping[str, float], truth: M
     for point in screen.ranked(None, ground):
         starts.setdefault(point.placed.key, point)
 
-    def best_of(points: Iterable[Point], iterations: int) -> Fit:
+    def best_of(points: Iterable[Point]) -> Fit:
         fits = [
             fit(
                 problem,
                 (p.placed,),
                 start=np.concatenate([screen.beginning(p, ground), p.eta]),
-                iterations=iterations,
+                iterations=ITERATIONS,
             )
             for p in points
         ]
@@ -127,11 +127,11 @@ def _group(pure: Case, structure: Structure, true: Mapping[str, float], truth: M
         return fit(problem, best.hypothesis, start=best.vector, iterations=LAST)
 
     others = (p for p in starts.values() if p.placed.effect.name not in own)
-    rival = best_of(islice(others, RIVALS_COUPLED if coupling else RIVALS), ITERATIONS)
+    rival = best_of(islice(others, RIVALS_COUPLED if coupling else RIVALS))
     none = 0.5 * (nothing.cost - cost)
     alone = none
     if len(own) > 1:
-        mine = best_of((p for p in starts.values() if p.placed.effect.name in own), ITERATIONS)
+        mine = best_of(p for p in starts.values() if p.placed.effect.name in own)
         alone = min(none, 0.5 * (mine.cost - cost))
     return _Group(
         none,
