@@ -332,12 +332,13 @@ def _rows_of(problem: Problem, repeats: int) -> list[Row]:
         if label == "MuJoCo RK4":
             tasks["ours"] = partial(problem.mujoco, int(value), speeds=speeds[:MUJOCO_SHARE], threads=2)
         else:
-            tasks["ours"] = partial(problem.many, rig, value, speeds)
-        many = interleave(tasks, max(3, repeats // 5))
+            # as often as the peer's loop runs, for a timing of milliseconds
+            tasks["ours"] = partial(_times, PEER_SHARE, partial(problem.many, rig, value, speeds))
+        many = interleave(tasks, max(5, repeats // 3))
         rows.append(
             ratio_row(
                 f"{problem.name}, error 1e-6, {N_BATCH} records, 2 threads: {label}",
-                many["ours"] * (1.0 if label == "compiled loop" else N_BATCH / MUJOCO_SHARE),
+                many["ours"] * (1.0 / PEER_SHARE if label == "compiled loop" else N_BATCH / MUJOCO_SHARE),
                 many["peer"] * (N_BATCH / PEER_SHARE),
                 limit=limit,
                 meaning="seconds of a loop over solve_ivp / ours over two threads, equal error",
