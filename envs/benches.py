@@ -228,9 +228,8 @@ class _Account(NamedTuple):
     """A window on the prior draws under way."""
 
     window: Window
-    books: list[
-        NDArray[np.float64]
-    ]  # states, information, score, square and contrast of the benches that run
+    # states, information, score, square and contrast of the benches that run
+    books: list[NDArray[np.float64]]
     values: NDArray[np.float64]  # (m, n_draws) or (m, n_pairs), written
 
 

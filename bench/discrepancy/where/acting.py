@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from bench.discrepancy.driven import driven_force
 from bench.discrepancy.explain import Explanation
 from bench.discrepancy.problem import Array, Placed, Problem
+from bench.discrepancy.screen import force_along
 
 NOTHING = 1e-3
 """Part of an effect's largest force below which it does not act."""
@@ -47,15 +47,10 @@ def _regions(problem: Problem, placed: Placed, eta: Array) -> list[dict[str, Any
     """Regions of one effect along the measured motion; none where it acts everywhere."""
     row = placed.place.rows[0]
     states, forces = [], []
-    for record in problem.records:
-        motion = problem.motion_of(record)
-        q, v = motion.position @ row, motion.velocity @ row
-        elements, _ = problem.elements((placed,), [eta], record)
-        force = driven_force(
-            elements, position=q[:, None], velocity=v[:, None], step=record.step, start_time=record.start
-        )
-        states.append(np.column_stack([q, v]))
-        forces.append(force[:, 0])
+    for i in range(len(problem.records)):
+        motion = problem.motion(i)
+        states.append(np.column_stack([motion.position @ row, motion.velocity @ row]))
+        forces.append(force_along(problem, placed, eta, i) @ row / (row @ row))
     state, force = np.concatenate(states), np.concatenate(forces)
     acts = np.abs(force) > NOTHING * np.abs(force).max()
     total = float(np.sum(force**2))
