@@ -14,7 +14,7 @@ import json
 import sys
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import tyro
@@ -63,6 +63,7 @@ class Outcome:
         unit: Unit of the errors.
         seconds: Wall time of the whole diagnosis [s].
         parameters: Estimates of every named effect.
+        published: Of every published parameter that the explanation has as well, both values and by how many percent they differ.
     """
 
     case: str
@@ -75,11 +76,20 @@ class Outcome:
     unit: str
     seconds: float
     parameters: dict[str, Any]
+    published: dict[str, dict[str, float]]
 
 
-def gather(data: Path | None, names: tuple[str, ...]) -> dict[str, tuple[Case, Target | None]]:
-    """The wanted cases of every source, with what they are to reach."""
-    found: dict[str, tuple[Case, Target | None]] = {}
+class Wanted(NamedTuple):
+    """A case, what it is to reach, and what others found its parameters to be."""
+
+    case: Case
+    target: Target | None
+    published: dict[str, float]
+
+
+def gather(data: Path | None, names: tuple[str, ...]) -> dict[str, Wanted]:
+    """The wanted cases of every source."""
+    found: dict[str, Wanted] = {}
     for source in SOURCES:
         module = importlib.import_module(f"measured.{source}")
         folder = (data or Path("none")) / getattr(module, "FOLDER", source)
@@ -87,15 +97,29 @@ def gather(data: Path | None, names: tuple[str, ...]) -> dict[str, tuple[Case, T
             continue
         for name, case in module.cases(folder).items():
             if not names or any(name.startswith(wanted) for wanted in names):
-                found[name] = (case, getattr(module, "TARGET", None))
+                found[name] = Wanted(case, getattr(module, "TARGET", None), getattr(module, "PUBLISHED", {}))
     return found
 
 
-def outcomes(diagnosis: Diagnosis, target: Target | None) -> list[Outcome]:
+def against(diagnosis: Diagnosis, published: dict[str, float]) -> dict[str, dict[str, float]]:
+    """Estimates of the first explanation beside the published values."""
+    found = {name: value.value for e in diagnosis.verdict.named for name, value in e.parameters.items()}
+    for problem, fitted in diagnosis.explanations[0].parts:
+        values, _ = problem.split(fitted.hypothesis, fitted.vector)
+        found |= {name: float(x) for name, x in zip(problem.structure.parameters, values, strict=False)}
+    return {
+        name: {"found": found[name], "published": value, "percent": 100.0 * (found[name] / value - 1.0)}
+        for name, value in published.items()
+        if name in found
+    }
+
+
+def outcomes(diagnosis: Diagnosis, wanted: Wanted) -> list[Outcome]:
     """One outcome a judging record."""
     verdict, problem = diagnosis.verdict, diagnosis.problem
     channel = problem.structure.channels[0]
-    target = target or Target(channel, "nrmse", np.nan, "1")
+    target = wanted.target or Target(channel, "nrmse", np.nan, "1")
+    published = against(diagnosis, wanted.published)
     column = problem.structure.channels.index(target.channel)
     zero = np.zeros(len(problem.nominal))
     out = []
@@ -107,7 +131,7 @@ def outcomes(diagnosis: Diagnosis, target: Target | None) -> list[Outcome]:
             Outcome(
                 diagnosis.case.name, record.name, verdict.verdict, tuple(e.name for e in verdict.named), before, after,
                 target.limit if np.isfinite(target.limit) else None, target.unit, verdict.seconds,
-                {e.name: {k: asdict(v) for k, v in e.parameters.items()} for e in verdict.named},
+                {e.name: {k: asdict(v) for k, v in e.parameters.items()} for e in verdict.named}, published,
             )
         )  # fmt: skip
     return out
@@ -115,13 +139,16 @@ def outcomes(diagnosis: Diagnosis, target: Target | None) -> list[Outcome]:
 
 def table(rows: list[Outcome]) -> Table:
     """Outcomes as a table."""
-    out = Table("case", "record", "verdict", "named", "before", "after", "target", "seconds")
+    out = Table(
+        "case", "record", "verdict", "named", "before", "after", "target", "seconds", "off the published"
+    )
     for row in rows:
         reached = "" if row.limit is None else f"≤ {row.limit:g} {'yes' if row.after <= row.limit else 'no'}"
+        off = ", ".join(f"{name} {entry['percent']:+.1f} %" for name, entry in row.published.items())
         unit = "" if row.unit == "1" else f" {row.unit}"
         out.add_row(
             row.case, row.record, row.verdict, " + ".join(row.named) or "-", f"{row.before:.3g}{unit}",
-            f"{row.after:.3g}{unit}", reached, f"{row.seconds:.1f}",
+            f"{row.after:.3g}{unit}", reached, f"{row.seconds:.1f}", off,
         )  # fmt: skip
     return out
 
@@ -131,14 +158,14 @@ def main() -> int:
     args = tyro.cli(Args, description=__doc__)
     console = Console(stderr=True)
     rows: list[Outcome] = []
-    for name, (case, target) in gather(args.data, args.names).items():
-        diagnosis = diagnose(case, progress=lambda text, name=name: console.print(f"{name}: {text}"))
+    for name, wanted in gather(args.data, args.names).items():
+        diagnosis = diagnose(wanted.case, progress=lambda text, name=name: console.print(f"{name}: {text}"))
         if args.html:
             from bench.discrepancy import write_report
 
             args.html.mkdir(parents=True, exist_ok=True)
             write_report(diagnosis, args.html / f"{name}.html")
-        rows += outcomes(diagnosis, target)
+        rows += outcomes(diagnosis, wanted)
     if args.json:
         print(json.dumps([asdict(row) for row in rows], indent=2))
     else:

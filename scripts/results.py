@@ -128,7 +128,7 @@ def _reproduction(told: Any) -> Figures:
 
 
 def _measured(told: Any) -> Figures:
-    return [
+    figures = [
         (
             f"{row['case']}, {row['record']}: error of the nominal model → with "
             + (" + ".join(row["named"]) or row["verdict"]),
@@ -137,6 +137,16 @@ def _measured(told: Any) -> Figures:
         )
         for row in told
     ]
+    figures += [
+        (
+            f"{row['case']}: {name} against the published value",
+            f"{entry['found']:.4g} against {entry['published']:.4g} ({entry['percent']:+.1f} %)",
+            "within 3 %",
+        )
+        for row in told
+        for name, entry in row.get("published", {}).items()
+    ]
+    return figures
 
 
 def _localisation(told: Any) -> Figures:

@@ -12,7 +12,9 @@ to the noise only; the responses of the model to a wrong start are projected out
 is the same as fitting a start to every window under a flat prior, without the hundreds of parameters. They are those of the
 model at hand, friction and all: a wrong velocity before a reversal moves the reversal, and dry friction more than doubles
 the error, which the responses of the linear structure would miss. Residuals are whitened exactly: the noise of a
-measured load, integrated within the window, is correlated and not stationary.
+measured load, integrated within the window, is correlated and not stationary. Where no noise is stated, what the simplest models
+leave is an error of force, not of position, and it is weighed as such: a white force in proportion to the loads. Positions
+weighed alike would let an error that lasts, twice integrated, outweigh everything that reverses with the motion.
 
 References:
     H. G. Bock, Recent advances in parameter identification techniques for ODE, Birkhaeuser 1983 (multiple shooting).
@@ -49,6 +51,9 @@ START = "start "
 """Beginning of the names of initial states among the parameters."""
 SINGULAR = 1e-7
 """Relative size below which the response to one more start is nothing but rounding."""
+MODEL_ERROR = 0.01
+"""White force that stands for model error where no noise is stated, as a part of the loads' RMS: next to the positions' rounding only
+its being a force counts, not its size."""
 LARGEST = 1600
 """Most samples times channels of a window: its whitening is a full matrix of that size."""
 
@@ -131,6 +136,7 @@ def window_weights(
     share: float,
     noise: Array,
     load_noise: Array,
+    model_error: Array,
 ) -> tuple[Array, Array, Array]:
     """Whitening of the residuals of a window, what a start reaches, and the covariance of what noise leaves; see `Windows`.
 
@@ -142,6 +148,7 @@ def window_weights(
         share: Part of the frequencies up to Nyquist in which the records stand above their noise.
         noise: (n_channels,) of the response channels.
         load_noise: (n_loads,).
+        model_error: (n_loads,) white force that is weighed like noise of a load, and is none.
     """
     n_channels, n_dof = len(noise), linear.mass.shape[0]
     n_bins = int(np.clip(np.ceil(share * length / 2), min(16, length // 4), (length - 1) // 2))
@@ -158,9 +165,10 @@ def window_weights(
         )
     spanned = np.stack(states, axis=-1)
     driven = []
-    for j in np.flatnonzero(load_noise > 0):
+    error = np.hypot(load_noise, model_error)
+    for j in np.flatnonzero(error > 0):
         load = quiet.copy()
-        load[1, j] = load_noise[j]
+        load[1, j] = error[j]
         hat = channels_of(structure, free_run(linear, NO_ELEMENTS, loads=load, step=step))[1:]
         hat = np.vstack([hat, np.zeros((1, n_channels))])
         driven += [np.stack([toeplitz(hat[:, c], np.zeros(length)) for c in range(n_channels)], axis=1)]
@@ -172,7 +180,11 @@ def window_weights(
         covariance += passed @ passed.T
     weights = solve_triangular(cholesky(covariance, lower=True), rows, lower=True)
     reachable = orthonormal(weights @ spanned.reshape(length * n_channels, -1))
-    return np.ascontiguousarray(weights), reachable, _left_by_noise(spanned, driven, noise)
+    noisy = [
+        (load_noise / error)[j] * response
+        for j, response in zip(np.flatnonzero(error > 0), driven, strict=True)
+    ]
+    return np.ascontiguousarray(weights), reachable, _left_by_noise(spanned, noisy, noise)
 
 
 def orthonormal(columns: Array) -> Array:
@@ -206,9 +218,17 @@ def windows_of(problem: Problem, record: CaseRecord, n_bins: int, values: Array)
     if key not in cache:
         cache[key] = window_weights(
             problem.structure, problem.structure.at(values), step=record.step, length=length, share=share,
-            noise=problem.noise, load_noise=problem.load_noise,
+            noise=problem.noise, load_noise=problem.load_noise, model_error=_model_error(problem),
         )  # fmt: skip
     return Windows(firsts, length, *cache[key])
+
+
+def _model_error(problem: Problem) -> Array:
+    """White force (n_loads,) that stands for what a model of a measured rig leaves; zero where the noise is stated."""
+    stated = problem.noise_stated or bool(np.any(problem.load_noise > 0.0))
+    loads = [[record.values[name] for name in problem.structure.loads] for record in problem.records]
+    largest = np.max(np.sqrt(np.mean(np.square(np.concatenate(loads, axis=1)), axis=1)), initial=0.0)
+    return np.full(len(problem.load_noise), 0.0 if stated else MODEL_ERROR * largest)
 
 
 def start_responses(
