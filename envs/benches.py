@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 
 from bench.errors import ParameterError, UnknownNameError
 from bench.excitation import Contrast, Draw, Ensemble, RigPrior, Rivals
-from bench.excitation.ensemble import run_of
 from bench.excitation.experiment import fan
 from bench.excitation.information import STEP, accumulate, misfit
 from bench.excitation.station import Desk
+from bench.excitation.stepping import run_of
 from bench.excitation.windows import Window, advance, advance_prior, advance_rivals
 from envs.laboratory import Laboratories
 from envs.setups import Setup

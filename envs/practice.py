@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from bench.errors import UnknownNameError
 from bench.excitation import Contrast, Draw, Family, Hypothesis, Rivals, expected_log_bayes_factor, fans
 from bench.excitation.bayes_factor import accumulate_contrast
-from bench.excitation.ensemble import Packed, integrate_cases
 from bench.excitation.information import STEP, accumulate
 from bench.excitation.station import Desk
+from bench.excitation.stepping import Packed, integrate_cases
 from envs.base import options_of, setup_of
 from envs.benches import Options, SteppedBenches, sensed
 from envs.setups import Setup, made, rival_experiment

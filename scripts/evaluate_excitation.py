@@ -41,10 +41,10 @@ from bench.excitation import (
     policy_names,
 )
 from bench.excitation.closed_loop import Runs, disturbances, run_commands, run_policy
-from bench.excitation.ensemble import Packed
 from bench.excitation.estimation import Records, estimate
 from bench.excitation.planner import Planner
 from bench.excitation.sequential import SequentialPlanner
+from bench.excitation.stepping import Packed
 from envs.setups import Setup, discrimination_setup, joint_setup, rival_experiment, sdof_setup
 
 HELD_OUT = 7_000_000  # seeds of rigs and noise; no training draws from them

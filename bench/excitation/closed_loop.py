@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.errors import ParameterError
-from bench.excitation.ensemble import Packed, integrate_cases
 from bench.excitation.estimation import Records
 from bench.excitation.policy import Policy
 from bench.excitation.station import Desk, Station
+from bench.excitation.stepping import Packed, integrate_cases
 
 
 class Runs(NamedTuple):

@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.errors import ModelError
-from bench.excitation.ensemble import Ensemble, Packed, integrate_cases
+from bench.excitation.ensemble import Ensemble
 from bench.excitation.prior import Hypothesis
+from bench.excitation.stepping import Packed, integrate_cases
 
 AGREEMENT = 1e-9
 """Of the largest coefficient: what is affine agrees to 1e-13."""

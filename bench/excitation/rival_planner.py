@@ -27,7 +27,6 @@ from numpy.typing import NDArray
 
 from bench.errors import ParameterError
 from bench.excitation.bayes_factor import Contrast, accumulate_contrast, weigh_contrast
-from bench.excitation.ensemble import integrate_cases
 from bench.excitation.estimation import BOUND, Records, estimate
 from bench.excitation.family import Family, fans
 from bench.excitation.information import STEP
@@ -35,6 +34,7 @@ from bench.excitation.rivals import RivalDraws, Rivals
 from bench.excitation.sequential import Decide, SequentialPlanner
 from bench.excitation.shaping import Shaping
 from bench.excitation.station import Desk, Station
+from bench.excitation.stepping import integrate_cases
 
 POPULATION = 16
 FIRST_GENERATIONS = 60  # of the first plan, which is made once for all rigs

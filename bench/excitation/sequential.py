@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.excitation.closed_loop import Runs, finish
-from bench.excitation.ensemble import Packed, integrate_cases
 from bench.excitation.estimation import Records
 from bench.excitation.station import Station
+from bench.excitation.stepping import Packed, integrate_cases
 
 Decide = Callable[[Records, NDArray[np.float64], int], None]
 """A decision: given the records so far, writes the commands ``(m, n_samples, n_actuators)`` from a sample on."""

@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.excitation.bayes_factor import Contrast, accumulate_contrast, weigh_contrast
-from bench.excitation.ensemble import Ensemble, Run, advance_cases
+from bench.excitation.ensemble import Ensemble
 from bench.excitation.information import STEP, accumulate
+from bench.excitation.stepping import Run, advance_cases
 from bench.laws.calling import claim
 
 

@@ -27,20 +27,23 @@ from bench.laws.coulomb import LIMIT, REGULARISATION
 @kernel
 def force_load_dependent(t, q, v, z, theta, f):
     """``f = (mu_k |q| + Fc) tanh(v / vr)``."""
-    f[0] += (theta[0] * abs(q[0]) + theta[1]) * math.tanh(v[0] / theta[2])
+    fade = math.exp(-2.0 * abs(v[0]) / theta[2])
+    f[0] += (theta[0] * abs(q[0]) + theta[1]) * math.copysign((1.0 - fade) / (1.0 + fade), v[0])
 
 
 @kernel
 def force_time_varying(t, q, v, z, theta, f):
     """``f = Fc max(1 + depth sin(2 pi frequency t + phase), 0) tanh(v / vr)``."""
     modulation = 1.0 + theta[1] * math.sin(2.0 * math.pi * theta[2] * t + theta[3])
-    f[0] += theta[0] * max(modulation, 0.0) * math.tanh(v[0] / theta[4])
+    fade = math.exp(-2.0 * abs(v[0]) / theta[4])
+    f[0] += theta[0] * max(modulation, 0.0) * math.copysign((1.0 - fade) / (1.0 + fade), v[0])
 
 
 @kernel
 def force_controlled(t, q, v, z, theta, f):
     """``f = mu max(N, 0) tanh(v / vr)``, N = q[1]."""
-    f[0] += theta[0] * max(q[1], 0.0) * math.tanh(v[0] / theta[1])
+    fade = math.exp(-2.0 * abs(v[0]) / theta[1])
+    f[0] += theta[0] * max(q[1], 0.0) * math.copysign((1.0 - fade) / (1.0 + fade), v[0])
 
 
 LOAD_DEPENDENT_FRICTION = ForceLaw(

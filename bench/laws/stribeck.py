@@ -25,7 +25,12 @@ from bench.laws.coulomb import LIMIT, REGULARISATION
 def force(t, q, v, z, theta, f):
     """``f = Fc (1 + s exp(-(v/vs)^2)) tanh(v / vr)``."""
     ratio = v[0] / theta[2]
-    f[0] += theta[0] * (1.0 + theta[1] * math.exp(-ratio * ratio)) * math.tanh(v[0] / theta[3])
+    fade = math.exp(-2.0 * abs(v[0]) / theta[3])
+    f[0] += (
+        theta[0]
+        * (1.0 + theta[1] * math.exp(-ratio * ratio))
+        * math.copysign((1.0 - fade) / (1.0 + fade), v[0])
+    )
 
 
 STRIBECK = ForceLaw(
