@@ -310,7 +310,12 @@ def _extend(
         most = max([p.gain for p in points] + list(inertia.values()), default=0.0)
         # a screening can promise more than there is
         most = min(most, max(base.chi2 - base.n_residuals, WORTH_A_FIT))
-        for point in leading(points, count, SHORT * most):
+        chosen = leading(points, count, SHORT * most)
+        if not named and not among:
+            begun = {p.placed.key for p in chosen}
+            simplest = [p for p in solved if _plain(p.placed.effect) and p.placed.key not in begun]
+            chosen += leading(simplest, count, WORTH_A_FIT, starts=1)
+        for point in chosen:
             if search.start(base.hypothesis, point):
                 origin = base.vector if named else local.beginning(point, ground)
                 start = np.concatenate([origin, point.eta])
@@ -330,6 +335,12 @@ def _extend(
     for fitted in pool.map(quick, tasks):
         search.add(fitted)
     carry_on(search, pool, size, most=4)
+
+
+def _plain(effect: Effect) -> bool:
+    """Whether an effect is a force with nothing but its size to be found: cheap to fit, and never to be lost to a law of seven
+    parameters because its gain along a badly known motion was small."""
+    return effect.site == "joint" and effect.n_coordinates == 1 and len(effect.parameters) == 1
 
 
 def carry_on(search: Search, pool: ThreadPoolExecutor, size: int, *, most: int) -> None:

@@ -105,7 +105,10 @@ class Explanation:
         if not self.consistent or any(problem.windowed for problem, _ in self.parts):
             return (False,) * len(self.parts)
         explained = nothing.chi2 - self.chi2
-        return tuple(lack.significant(explained) for lack in self.lacks)
+        return tuple(
+            lack.significant(explained, effects=len(fitted.hypothesis))
+            for lack, (_, fitted) in zip(self.lacks, self.parts, strict=True)
+        )
 
     @property
     def chi2(self) -> float:

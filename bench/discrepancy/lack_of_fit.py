@@ -31,8 +31,9 @@ PRODUCTS = ((1, 1), (2, 1), (1, 2))
 NEGLIGIBLE = 3e-3
 """Part of a model's columns that has to be its own: less is nothing but the base's inaccuracy."""
 
-SIGNIFICANCE = 1e-4
-"""Probability with which noise alone may call an explanation lacking."""
+SIGNIFICANCE, SEVERAL = 1e-3, 1e-2
+"""Probability with which noise alone may call an explanation lacking: of one effect, and of several. What several laws together
+imitate is as often one law that no catalogue holds, so it takes less to doubt them."""
 INACCURACY = 0.0005
 """Part of chi-squared that is laid to the smoothing and integration of the diagnosis itself."""
 EXACTNESS = 1e-4
@@ -56,14 +57,16 @@ class LackOfFit(NamedTuple):
     p_value: float
     n_residuals: int
 
-    def significant(self, explained: float) -> bool:
+    def significant(self, explained: float, *, effects: int = 1) -> bool:
         """Whether something is left that is neither noise nor inaccuracy, of the diagnosis itself or of the laws it named.
 
         Args:
             explained: Chi-squared that the explanation takes away.
+            effects: Number of effects that the explanation holds.
         """
         inexact = max(INACCURACY * self.n_residuals, EXACTNESS * explained)
-        return self.p_value < SIGNIFICANCE and self.gain - self.freedom > inexact
+        limit = SIGNIFICANCE if effects <= 1 else SEVERAL
+        return self.p_value < limit and self.gain - self.freedom > inexact
 
 
 def lack_of_fit(problem: Problem, fitted: Fit) -> LackOfFit:
