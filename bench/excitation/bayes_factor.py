@@ -24,6 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.excitation.information import Sensitivity
+from bench.excitation.products import difference, dot, tile
+from bench.laws.calling import advance, pointer_at
 
 
 class Contrast(NamedTuple):
@@ -85,7 +87,7 @@ def _one_way(triangle, true, score, cross, row):
     """``tr(S^-1 S_true) - n - r'r + r' S^-1 r`` with S of the rival.
 
     Args:
-        triangle: Cholesky's factor of ``I + J' J`` of the rival ``(p, p)``.
+        triangle: Cholesky's factor of ``I + J' J`` of the rival ``(p, p)``, as `_factorise` writes it.
         true: ``J' J`` of the true one ``(p, p)``.
         score: ``J_rival' r`` ``(p,)``.
         cross: ``J_true' J_rival`` ``(p, p)``.
@@ -103,13 +105,13 @@ def _one_way(triangle, true, score, cross, row):
 
 @numba.njit(error_model="numpy")
 def _factorise(fisher, triangle):
-    """Write Cholesky's factor of ``I + F``."""
+    """Write Cholesky's factor of ``I + F``, its diagonal inverted: multiplying is quicker than dividing."""
     for j in range(fisher.shape[0]):
         for i in range(j, fisher.shape[0]):
             value = fisher[i, j] + (1.0 if i == j else 0.0)
             for k in range(j):
                 value -= triangle[i, k] * triangle[j, k]
-            triangle[i, j] = np.sqrt(value) if i == j else value / triangle[j, j]
+            triangle[i, j] = 1.0 / np.sqrt(value) if i == j else value * triangle[j, j]
 
 
 @numba.njit(error_model="numpy")
@@ -120,7 +122,7 @@ def _quadratic(triangle, vector, row):
         value = vector[i]
         for k in range(i):
             value -= triangle[i, k] * row[k]
-        row[i] = value / triangle[i, i]
+        row[i] = value * triangle[i, i]
         total += row[i] * row[i]
     return total
 
@@ -157,33 +159,41 @@ def accumulate_contrast(first, last, outputs, places, counts, step, weights, con
         weights: One over the noise standard deviations ``(n_channels,)``.
         contrast: Sums with leading axes (n_cases, n_pairs), added to.
     """
-    p_max = contrast.cross.shape[2]
-    a = np.zeros(p_max)
-    b = np.zeros(p_max)
+    outputs = np.ascontiguousarray(outputs)
+    p_max, size = contrast.cross.shape[2], outputs.shape[2] * outputs.shape[3]
+    room = np.empty((2 * p_max + 3, size))
+    rows_a = pointer_at(room.ctypes.data)
+    rows_b, residual = advance(rows_a, p_max * size), advance(rows_a, 2 * p_max * size)
+    scale, weight = advance(residual, size), advance(residual, 2 * size)
+    tile(weights, 1.0 / step, size, scale)
+    tile(weights, 1.0, size, weight)
     for case in range(first, last):
+        record = pointer_at(outputs.ctypes.data + 8 * size * outputs.shape[1] * case)
         for pair in range(places.shape[1]):
             pa, pb = counts[case, pair, 0], counts[case, pair, 1]
             if pa < 0:
                 break
-            at, bt = places[case, pair, 0], places[case, pair, 1]
-            for i in range(outputs.shape[2]):
-                for c in range(outputs.shape[3]):
-                    ya, yb = outputs[case, at, i, c], outputs[case, bt, i, c]
-                    r = weights[c] * (ya - yb)
-                    contrast.square[case, pair] += r * r
-                    for j in range(pa):
-                        a[j] = weights[c] * (outputs[case, at + 1 + j, i, c] - ya) / step
-                        contrast.score_first[case, pair, j] += a[j] * r
-                        for k in range(j + 1):
-                            contrast.fisher_first[case, pair, j, k] += a[j] * a[k]
-                    for j in range(pb):
-                        b[j] = weights[c] * (outputs[case, bt + 1 + j, i, c] - yb) / step
-                        contrast.score_second[case, pair, j] += b[j] * r
-                        for k in range(j + 1):
-                            contrast.fisher_second[case, pair, j, k] += b[j] * b[k]
-                        for k in range(pa):
-                            contrast.cross[case, pair, k, j] += a[k] * b[j]
-            for j in range(p_max):
-                for k in range(j):
-                    contrast.fisher_first[case, pair, k, j] = contrast.fisher_first[case, pair, j, k]
-                    contrast.fisher_second[case, pair, k, j] = contrast.fisher_second[case, pair, j, k]
+            ya = advance(record, size * places[case, pair, 0])
+            yb = advance(record, size * places[case, pair, 1])
+            difference(ya, yb, weight, size, residual)
+            contrast.square[case, pair] += dot(residual, residual, size)
+            score, fisher = contrast.score_first[case, pair], contrast.fisher_first[case, pair]
+            _add_rival(ya, residual, scale, size, pa, rows_a, score, fisher)
+            score, fisher = contrast.score_second[case, pair], contrast.fisher_second[case, pair]
+            _add_rival(yb, residual, scale, size, pb, rows_b, score, fisher)
+            cross = contrast.cross[case, pair]
+            for k in range(pa):
+                for j in range(pb):
+                    cross[k, j] += dot(advance(rows_a, k * size), advance(rows_b, j * size), size)
+
+
+@numba.njit(error_model="numpy", nogil=True)
+def _add_rival(record, residual, scale, size, p, rows, score, fisher):
+    """Write the derivatives of one rival into `rows`, and add its score and information."""
+    for j in range(p):
+        row = advance(rows, j * size)
+        difference(advance(record, (1 + j) * size), record, scale, size, row)
+        score[j] += dot(row, residual, size)
+        for k in range(j + 1):
+            fisher[j, k] += dot(row, advance(rows, k * size), size)
+            fisher[k, j] = fisher[j, k]

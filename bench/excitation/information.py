@@ -30,6 +30,8 @@ from numpy.typing import NDArray
 from bench.errors import ParameterError, UnknownNameError
 from bench.excitation.ensemble import Ensemble
 from bench.excitation.prior import Draw
+from bench.excitation.products import difference, dot, tile
+from bench.laws.calling import advance, pointer_at
 from bench.rig import Drive, controls_of, simulate_batch
 
 STEP = 1e-4
@@ -190,33 +192,35 @@ def accumulate(first, last, outputs, counts, step, weights, measured, fisher, sc
         square: ``sum r'r`` ``(n_cases, n_draws)``, added to.
         values: ``log det(I + F)`` ``(n_cases, n_draws)``, written.
     """
-    p_max = fisher.shape[2]
-    row = np.zeros(p_max)
-    triangle = np.zeros((p_max, p_max))
+    outputs = np.ascontiguousarray(outputs)
+    p_max, size = fisher.shape[2], outputs.shape[2] * outputs.shape[3]
+    triangle, room = np.zeros((p_max, p_max)), np.empty((p_max + 3, size))
+    rows = pointer_at(room.ctypes.data)
+    residual = advance(rows, p_max * size)
+    scale, weight = advance(residual, size), advance(residual, 2 * size)
+    tile(weights, 1.0 / step, size, scale)
+    tile(weights, 1.0, size, weight)
     for case in range(first, last):
-        member = 0
+        record = pointer_at(outputs.ctypes.data + 8 * size * outputs.shape[1] * case)
         for draw in range(counts.shape[1]):
             p = counts[case, draw]
             if p < 0:
                 break
-            for i in range(outputs.shape[2]):
-                for c in range(outputs.shape[3]):
-                    w = weights[c]
-                    base = outputs[case, member, i, c]
-                    for j in range(p):
-                        row[j] = w * (outputs[case, member + 1 + j, i, c] - base) / step
-                        for k in range(j + 1):
-                            fisher[case, draw, j, k] += row[j] * row[k]
-                    if measured is not None:
-                        r = w * (measured[case, i, c] - base)
-                        square[case, draw] += r * r
-                        for j in range(p):
-                            score[case, draw, j] += row[j] * r
+            own = fisher[case, draw]
             for j in range(p):
-                for k in range(j):
-                    fisher[case, draw, k, j] = fisher[case, draw, j, k]
-            values[case, draw] = _log_det(fisher[case, draw], p, triangle)
-            member += 1 + p
+                row = advance(rows, j * size)
+                difference(advance(record, (1 + j) * size), record, scale, size, row)
+                for k in range(j + 1):
+                    own[j, k] += dot(row, advance(rows, k * size), size)
+                    own[k, j] = own[j, k]
+            if measured is not None:
+                seen = np.ascontiguousarray(measured[case])
+                difference(pointer_at(seen.ctypes.data), record, weight, size, residual)
+                square[case, draw] += dot(residual, residual, size)
+                for j in range(p):
+                    score[case, draw, j] += dot(advance(rows, j * size), residual, size)
+            values[case, draw] = _log_det(own, p, triangle)
+            record = advance(record, (1 + p) * size)
 
 
 def misfit(
