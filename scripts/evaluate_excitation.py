@@ -13,8 +13,10 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass, field
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -41,10 +43,12 @@ from bench.excitation import (
     policy_names,
 )
 from bench.excitation.closed_loop import Runs, disturbances, run_commands, run_policy
+from bench.excitation.ensemble import available_threads
 from bench.excitation.estimation import Records, estimate
 from bench.excitation.planner import Planner
 from bench.excitation.sequential import SequentialPlanner
 from bench.excitation.stepping import Packed
+from bench.files import write_text
 from envs.setups import Setup, discrimination_setup, joint_setup, rival_experiment, sdof_setup
 
 HELD_OUT = 7_000_000  # seeds of rigs and noise; no training draws from them
@@ -68,6 +72,7 @@ class Args:
         seeds: Seeds.
         rigs: Rigs a seed.
         evaluations: Signals that the D-optimal search weighs.
+        workers: Processes; every core by default.
         out: Folder of designs and partial results.
         json: File for the figures; "-" prints them.
     """
@@ -79,6 +84,7 @@ class Args:
     seeds: int = 10
     rigs: int = 50
     evaluations: int = 1600
+    workers: int = field(default_factory=available_threads)
     out: Annotated[Path, tyro.conf.arg(aliases=["-o"])] = Path("out/excitation")
     json: Path | None = None
 
@@ -348,13 +354,33 @@ def main() -> int:
     return 0
 
 
-def evaluate(args: Args) -> dict[str, Any]:
-    """All figures; partial results are kept in `args.out`."""
+@dataclass(frozen=True)
+class Contest:
+    """What every process that tests rigs works with; made once in each.
+
+    Attributes:
+        judge: Runs and identifies.
+        sources: Methods by name: commands of each question, a policy, or a planner.
+    """
+
+    judge: Judge
+    sources: dict[str, Source]
+
+
+def contest_of(args: Args, tell: Callable[[str], None] = lambda name: None) -> Contest:
+    """Design what is not designed yet, and set up the laboratory.
+
+    Args:
+        args: What was asked for.
+        tell: Called with the name of each method that is designed.
+    """
     setup = setup_of(args.task)
-    judge = Judge(setup)
     experiments = wide_experiments(setup, args.task)
     names = args.policies or tuple({args.task} & set(policy_names()))
-    sources: dict[str, Any] = dict.fromkeys(args.methods)
+    sources: dict[str, Source] = {}
+    for name in args.methods:
+        tell(name)
+        sources[name] = designed(args, name, setup, experiments)
     sources |= {f"policy {Path(name).stem}": find_policy(name) for name in names}
     question = setup.questions[0]
     if args.planner and isinstance(question, RigPrior):
@@ -363,7 +389,11 @@ def evaluate(args: Args) -> dict[str, Any]:
     elif args.planner:
         asked: list[Any] = experiments  # of rivals, on pairs of draws
         sources["planner"] = [RivalPlanner(e.question, setup.station(), e.draws) for e in asked]
-    results: dict[str, list[dict[str, Any]]] = {}
+    return Contest(Judge(setup), sources)
+
+
+def evaluate(args: Args) -> dict[str, Any]:
+    """All figures; partial results are kept in `args.out`."""
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
@@ -371,23 +401,46 @@ def evaluate(args: Args) -> dict[str, Any]:
         TimeElapsedColumn(),
     )
     with Progress(*columns, console=Console(stderr=True), disable=args.json == Path("-")) as bar:
-        task = bar.add_task("designing", total=len(sources) * args.seeds)
-        for name, source in sources.items():
-            bar.update(task, description=name)
-            commands = designed(args, name, setup, experiments) if source is None else source
-            stamp = f"{name.replace('/', '_')}-{fingerprint(commands)}-{args.rigs}"
-            results[name] = []
-            for seed in range(args.seeds):
-                path = args.out / args.task / f"{stamp}-{seed}.json"
-                if not path.is_file():
-                    path.parent.mkdir(parents=True, exist_ok=True)
-                    rows = judge.rows(commands, seed, args.rigs)
-                    temporary = path.with_suffix(".part")
-                    temporary.write_text(json.dumps(rows), encoding="utf-8")
-                    temporary.replace(path)
-                results[name] += json.loads(path.read_text(encoding="utf-8"))
-                bar.advance(task)
+        task = bar.add_task("designing")
+        contest = contest_of(args, lambda name: bar.update(task, description=f"designing {name}"))
+        paths = {
+            (name, seed): args.out
+            / args.task
+            / f"{name.replace('/', '_')}-{fingerprint(source)}-{args.rigs}-{seed}.json"
+            for name, source in contest.sources.items()
+            for seed in range(args.seeds)
+        }
+        missing = [(name, seed, path) for (name, seed), path in paths.items() if not path.is_file()]
+        bar.update(task, description="testing", total=len(paths), completed=len(paths) - len(missing))
+        workers = max(1, min(args.workers, len(missing)))
+        with ProcessPoolExecutor(workers, get_context("spawn"), _begin, (args,)) as pool:
+            for finished in as_completed([pool.submit(_tested, *item) for item in missing]):
+                bar.update(task, advance=1, description=finished.result())
+    results = {
+        name: [
+            row
+            for seed in range(args.seeds)
+            for row in json.loads(paths[name, seed].read_text(encoding="utf-8"))
+        ]
+        for name in contest.sources
+    }
     return {"task": args.task, "seeds": args.seeds, "rigs": args.rigs, **summary(results, args.methods)}
+
+
+_own: list[tuple[Args, Contest]] = []  # of a process that tests rigs
+
+
+def _begin(args: Args) -> None:
+    _own[:] = [(args, contest_of(args))]
+
+
+def _tested(name: str, seed: int, path: Path) -> str:
+    """Test a seed's rigs by a method, keep the rows, and return the name."""
+    args, contest = _own[0]
+    rows = contest.judge.rows(contest.sources[name], seed, args.rigs)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_text(path, json.dumps(rows))
+    return name
 
 
 def fingerprint(source: Source) -> str:
