@@ -9,13 +9,13 @@ import pytest
 from planted_cases import SAMPLE_RATE, bouc_wen_slope, motion_with, planted_case
 
 from bench.discrepancy import diagnose
-from bench.discrepancy.attribute import attribute, placements
-from bench.discrepancy.catalogue import effect_named
+from bench.discrepancy.attribute import WORTH_A_FIT, attribute, placements
+from bench.discrepancy.catalogue import CATALOGUE, effect_named
 from bench.discrepancy.contradiction import contradicted
 from bench.discrepancy.explain import Explanation
 from bench.discrepancy.fit import fit
 from bench.discrepancy.grid_points import Point
-from bench.discrepancy.lack_of_fit import lack_of_fit
+from bench.discrepancy.lack_of_fit import LackOfFit, lack_of_fit
 from bench.discrepancy.prepared import timed
 from bench.discrepancy.problem import Problem
 from bench.discrepancy.screen import Screen
@@ -49,6 +49,31 @@ def test_free_models_find_nothing_beside_the_right_law():
     lack = lack_of_fit(problem, explained)
     assert not lack.significant(0.0)
     assert lack.p_value > 1e-3
+
+
+def test_several_effects_are_doubted_sooner_than_one():
+    lack = LackOfFit("memory", gain=20.0, freedom=3, p_value=4e-3, n_residuals=5000)
+    assert not lack.significant(0.0)
+    assert lack.significant(0.0, effects=2)
+    assert not lack.significant(1e6, effects=2)  # laws are held to a hundredth of the force, however many
+
+
+@pytest.mark.slow
+def test_forces_of_one_parameter_are_fitted_whatever_others_promise():
+    case = planted_case(
+        lambda f: motion_with(f, lambda x, v, z: (z[0], [bouc_wen_slope(v, z[0], 900.0, 200.0, 100.0)]), 1)
+    )
+    problem = Problem(case, structure_of(case), case.identification)
+    chosen = placements(case, problem.structure, [e for e in CATALOGUE if e.site == "joint" and not e.rare])
+    screen = Screen(problem, chosen)
+    gains: dict[str, float] = {}
+    for point in screen.ranked():
+        gains.setdefault(point.placed.effect.name, point.gain)
+    weak = [name for name, gain in gains.items() if WORTH_A_FIT < gain < 0.05 * max(gains.values())]
+    simple = [name for name in weak if len(effect_named(name).parameters) == 1]
+    assert simple
+    fits = attribute(problem, chosen, most=1).fits.values()
+    assert set(simple) <= {f.hypothesis[0].effect.name for f in fits if f.hypothesis}
 
 
 @pytest.mark.slow
