@@ -54,6 +54,8 @@ HOPELESS_COUPLING = 50.0
 """Reduced chi-squared of a coupling effect alone above which no further effect is added to it."""
 HOPELESS_THIRD = 5.0
 """The same for a pair that a coupling effect belongs to: a third effect then repairs little."""
+HOPELESS_PAIR = 8.0
+"""Reduced chi-squared that the screening beside a coupling effect must promise to go below: pairs that explain promise 1 to 2."""
 PROMISING = 4.0
 """Reduced chi-squared that a screening must promise in every group, if groups are to be searched before couplings."""
 RECONSIDERED = 3
@@ -235,7 +237,8 @@ def _coupled(
             ground = local.ground(base, simulated=consistent(base))
             points = refined(local, ground, local.ranked(base, ground), pool)
             worth = [p for p in points if p.gain > max(WORTH_A_FIT, IMMATERIAL * base.n_residuals)]
-            if not worth:
+            left = float(np.sum(ground.left**2)) - max((p.gain for p in worth), default=0.0)
+            if not worth or left > HOPELESS_PAIR * base.n_residuals:
                 break
 
             def extended(point: Point, base: Fit = base) -> Fit:
