@@ -185,6 +185,7 @@ def accumulate_contrast(first, last, outputs, places, counts, step, weights, con
             for k in range(pa):
                 for j in range(pb):
                     cross[k, j] += dot(advance(rows_a, k * size), advance(rows_b, j * size), size)
+    room[0, 0] = 0.0  # an array of which only the address is in use would be freed before
 
 
 @numba.njit(error_model="numpy", nogil=True)

@@ -194,12 +194,11 @@ def accumulate(first, last, outputs, counts, step, weights, measured, fisher, sc
     """
     outputs = np.ascontiguousarray(outputs)
     p_max, size = fisher.shape[2], outputs.shape[2] * outputs.shape[3]
-    triangle, room = np.zeros((p_max, p_max)), np.empty((p_max + 3, size))
+    triangle, room = np.zeros((p_max, p_max)), np.empty((p_max + 2, size))
     rows = pointer_at(room.ctypes.data)
     residual = advance(rows, p_max * size)
-    scale, weight = advance(residual, size), advance(residual, 2 * size)
+    scale = advance(residual, size)
     tile(weights, 1.0 / step, size, scale)
-    tile(weights, 1.0, size, weight)
     for case in range(first, last):
         record = pointer_at(outputs.ctypes.data + 8 * size * outputs.shape[1] * case)
         for draw in range(counts.shape[1]):
@@ -214,13 +213,16 @@ def accumulate(first, last, outputs, counts, step, weights, measured, fisher, sc
                     own[j, k] += dot(row, advance(rows, k * size), size)
                     own[k, j] = own[j, k]
             if measured is not None:
-                seen = np.ascontiguousarray(measured[case])
-                difference(pointer_at(seen.ctypes.data), record, weight, size, residual)
+                for i in range(outputs.shape[2]):
+                    for c in range(weights.size):
+                        at = i * weights.size + c
+                        residual[at] = weights[c] * (measured[case, i, c] - record[at])
                 square[case, draw] += dot(residual, residual, size)
                 for j in range(p):
                     score[case, draw, j] += dot(advance(rows, j * size), residual, size)
             values[case, draw] = _log_det(own, p, triangle)
             record = advance(record, (1 + p) * size)
+    room[0, 0] = 0.0  # an array of which only the address is in use would be freed before
 
 
 def misfit(

@@ -256,6 +256,7 @@ def advance_cases(first, last, run):
                 _advance_single(case, m, d, run)
             else:
                 _advance_any(case, m, d, run, work)
+    room[0] = 0.0  # an array of which only the address is in use would be freed before
 
 
 def integrate_cases(
