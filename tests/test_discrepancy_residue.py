@@ -11,8 +11,9 @@ from planted_cases import SAMPLE_RATE, bouc_wen_slope, motion_with, planted_case
 from bench.discrepancy import diagnose
 from bench.discrepancy.attribute import WORTH_A_FIT, attribute, placements
 from bench.discrepancy.catalogue import CATALOGUE, effect_named
+from bench.discrepancy.closure import CLOSURES
 from bench.discrepancy.contradiction import contradicted
-from bench.discrepancy.explain import Explanation
+from bench.discrepancy.explain import Explanation, close
 from bench.discrepancy.fit import fit
 from bench.discrepancy.grid_points import Point
 from bench.discrepancy.lack_of_fit import LackOfFit, lack_of_fit
@@ -135,6 +136,37 @@ def test_a_jump_a_sample_early_is_limited_and_nothing_else_is():
         residual = np.zeros(500)
         residual[place] = wrong
         np.testing.assert_array_equal(timed(residual, predicted, noise), residual)
+
+
+def snap(x, v, z):
+    """A negative stiffness within a window about rest, as a buckled leaf gives."""
+    u = min(abs(x) / 0.006, 1.0)
+    return -700.0 * x * (1.0 - u * u) ** 2, []
+
+
+def drag(x, v, z):
+    """A force of the velocity that levels off and falls again."""
+    return 4.0 * v / 0.05 / (1.0 + (v / 0.05) ** 2), []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("law", "hidden", "closure"),
+    [
+        (snap, 0, "free_displacement"),
+        (drag, 0, "free_velocity"),
+        (a_spectrum_of_relaxations, 3, "free_memory"),
+    ],
+)
+def test_closures_follow_any_force_of_one_variable_and_any_linear_memory(law, hidden, closure):
+    case = planted_case(lambda f: motion_with(f, law, hidden))
+    problem = Problem(case, structure_of(case), case.identification)
+    nothing = Explanation(((problem, fit(problem, (), start=np.zeros(len(problem.nominal)))),))
+    closed, used = close(nothing, nothing, CLOSURES)
+    assert closure in used.split(" + ")
+    (record,) = case.validation
+    before, after = nothing.reduced_on(record), closed.reduced_on(record)
+    assert after - 1.0 < 0.05 * (before - 1.0)
 
 
 @pytest.mark.slow

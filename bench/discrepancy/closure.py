@@ -1,12 +1,17 @@
 """Nonparametric closures: what an effect outside the catalogue looks like, and how far a free model of it gets.
 
 A closure is an effect like any other, except that its law promises nothing: a polynomial surface in displacement and
-velocity. It is fitted on top of the best catalogued explanation, by the same fits, and serves only to state how much of
-the gap a free model closes and what the missing force looks like. It knows no effect in particular, and nothing of time:
-a force that depends on the clock stays outside it, and the gap then says so.
+velocity, any force of the displacement, any force of the velocity, any linear memory. It is fitted on top of the best catalogued
+explanation, by the same fits, and serves only to state how much of the gap a free model closes and what the missing force
+looks like. Beyond the motion it was fitted to it stays what it is at the edge: a polynomial that is followed out there throws a
+free run off. It knows no effect in particular, and nothing of time: a force that depends on the clock stays outside it,
+and the gap then says so.
 """
 
 from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -15,13 +20,20 @@ from bench.laws.base import ForceLaw, Parameter, kernel
 
 POWERS = ((0, 0), (2, 0), (1, 1), (0, 2), (3, 0), (2, 1), (1, 2), (0, 3), (5, 0), (4, 1), (0, 5))
 """Powers of displacement and velocity of the surface; (1, 0) and (0, 1) are the nominal stiffness and damping."""
+KNOTS = 17
+"""Values of a force of one variable."""
+WARP = 3.0
+WARPED = math.sinh(WARP)
+"""How much denser they are about rest, where gaps, friction and snaps happen: equal steps of asinh(WARPED x) / WARP."""
+MEMORY = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)
+"""Relaxation times of a free linear memory, by the time of one radian of the motion."""
 
 
 @kernel
 def surface_force(t, q, v, z, theta, f):
     """``f = sum c_ij x^i v^j`` over the powers of `POWERS`, x and v scaled by the first two parameters."""
-    x = q[0] / theta[0]
-    y = v[0] / theta[1]
+    x = min(max(q[0] / theta[0], -1.0), 1.0)
+    y = min(max(v[0] / theta[1], -1.0), 1.0)
     x2 = x * x
     y2 = y * y
     f[0] += (
@@ -51,19 +63,90 @@ _SURFACE = ForceLaw(
 )
 
 
+@kernel
+def curve_force(t, q, v, z, theta, f):
+    """A force of one variable: Catmull and Rom's curve through `KNOTS` values from -1 to 1, denser about rest."""
+    x = min(max(q[0] * theta[0] + v[0] * theta[1], -1.0), 1.0)
+    u = 0.5 * (KNOTS - 1) * (1.0 + math.asinh(x * WARPED) / WARP)
+    k = min(max(int(u), 0), KNOTS - 2)
+    s = u - k
+    before, here = theta[2 + max(k - 1, 0)], theta[2 + k]
+    ahead, beyond = theta[3 + k], theta[2 + min(k + 2, KNOTS - 1)]
+    leave, arrive = 0.5 * (ahead - before), 0.5 * (beyond - here)
+    rise = ahead - here
+    f[0] += here + s * (leave + s * (3.0 * rise - 2.0 * leave - arrive + s * (leave + arrive - 2.0 * rise)))
+
+
+_CURVE = ForceLaw(
+    "free_curve",
+    (
+        Parameter("per_position", "1/m", 1.0, rotational="1/rad"),
+        Parameter("per_velocity", "s/m", 0.0, rotational="s/rad"),
+        *(Parameter(f"f{k}", "N", 0.0, rotational="N m") for k in range(KNOTS)),
+    ),
+    curve_force,
+    equation="f = curve through f_k over q/Q, or over v/V",
+)
+
+
+@kernel
+def memory_force(t, q, v, z, theta, f):
+    """``f = sum c_i z_i``."""
+    for i in range(len(MEMORY)):
+        f[0] += theta[2 + i] * z[i]
+
+
+@kernel
+def memory_rate(t, q, v, z, theta, zdot):
+    """``z_i' = (v/V - z_i) / tau_i``, the times spread over decades about that of one radian of the motion."""
+    for i in range(len(MEMORY)):
+        zdot[i] = (v[0] / theta[0] - z[i]) / (MEMORY[i] * theta[1])
+
+
+_MEMORY = ForceLaw(
+    "free_memory",
+    (
+        Parameter("velocity_scale", "m/s", 1.0, rotational="rad/s"),
+        Parameter("time_scale", "s", 1.0, (1e-12, math.inf)),
+        *(Parameter(f"c{i}", "N", 0.0, rotational="N m") for i in range(len(MEMORY))),
+    ),
+    memory_force,
+    memory_rate,
+    tuple(f"z{i} [1]" for i in range(len(MEMORY))),
+    equation="f = sum c_i z_i, z_i' = (v/V - z_i) / tau_i",
+)
+
+
 def _surface_theta(values: Values, scales: Scales) -> Values:
     return np.concatenate([[scales.position, scales.velocity], values])
 
 
+def _over_position(values: Values, scales: Scales) -> Values:
+    return np.concatenate([[1.0 / scales.position, 0.0], values])
+
+
+def _over_velocity(values: Values, scales: Scales) -> Values:
+    return np.concatenate([[0.0, 1.0 / scales.velocity], values])
+
+
+def _memory_theta(values: Values, scales: Scales) -> Values:
+    return np.concatenate([[scales.velocity, scales.position / scales.velocity], values])
+
+
+def _closure(
+    name: str, law: ForceLaw, coefficients: Sequence[str], theta: Callable[[Values, Scales], Values]
+) -> Effect:
+    """A closure that is linear in its coefficients, forces all of them."""
+    return Effect(
+        name, "closure", "joint", tuple(FreeParameter(c, "force", signed=True, std=1.0) for c in coefficients), law.equation,
+        law=law, theta=theta, n_linear=len(coefficients),
+    )  # fmt: skip
+
+
+_KNOTS = [f"f{k}" for k in range(KNOTS)]
 CLOSURES = (
-    Effect(
-        "polynomial_surface",
-        "closure",
-        "joint",
-        tuple(FreeParameter(f"c{i}{j}", "force", signed=True, std=1.0) for i, j in POWERS),
-        _SURFACE.equation,
-        law=_SURFACE,
-        theta=_surface_theta,
-        n_linear=len(POWERS),
-    ),
+    _closure("polynomial_surface", _SURFACE, [f"c{i}{j}" for i, j in POWERS], _surface_theta),
+    _closure("free_displacement", _CURVE, _KNOTS, _over_position),
+    _closure("free_velocity", _CURVE, _KNOTS, _over_velocity),
+    _closure("free_memory", _MEMORY, [f"c{i}" for i in range(len(MEMORY))], _memory_theta),
 )

@@ -37,6 +37,9 @@ from bench.errors import UnknownNameError
 SEED = 20060501
 """Seed of the bootstrap where no generator is given, so that a diagnosis repeats exactly."""
 
+WORSE = 1.1
+"""Gap with a closure over that without, on any judged coordinate, from which the closure is withdrawn."""
+
 Progress = Callable[[str], None]
 
 
@@ -49,7 +52,8 @@ class Diagnosis:
         problem: Records and priors on all degrees of freedom.
         explanations: All fitted explanations by decreasing posterior.
         verdict: The verdict.
-        final: The explanation behind `verdict.gap.after`: the best one, or for an unknown effect its closure.
+        final: The explanation behind `verdict.gap.after`: the best one, or for an unknown effect its closure; the nominal
+            model with its parameters re-estimated where a closure predicts the judging records worse than that.
         where: Where the gap lies, with the maps behind `verdict.locations`.
     """
 
@@ -114,6 +118,11 @@ def diagnose(
     stages.append((names(best.hypothesis) + (f" + {closure}" if closure else ""), final.predict))
     progress("gap on the judging records")
     found = gaps(case, problem, stages=stages, rng=rng)
+    if kind == "unknown" and any(gap.after > WORSE * gap.parameters_only for gap in found):
+        # what imitates an unknown force on some records can be worse than nothing on others: nobody should build that in
+        final, closure = nothing, ""
+        stages[-1] = ("no closure helps", nothing.predict)
+        found = gaps(case, problem, stages=stages, rng=rng)
     widest = max(found, key=lambda gap: gap.before / max(gap.noise_floor, 1e-12))
     where = locate(problem, nothing, best, named=kind == "effect")
     verdict = Verdict(

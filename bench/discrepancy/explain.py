@@ -58,6 +58,8 @@ HOPELESS_PAIR = 8.0
 """Reduced chi-squared that the screening beside a coupling effect must promise to go below: pairs that explain promise 1 to 2."""
 PROMISING = 4.0
 """Reduced chi-squared that a screening must promise in every group, if groups are to be searched before couplings."""
+CLOSED, TRIED = 3, 2
+"""Most closures of a group of degrees of freedom, and of those tried for each."""
 RECONSIDERED = 3
 """Explanations behind one in which something is left that are asked whether they leave nothing."""
 KEPT = 12
@@ -324,17 +326,27 @@ def close(best: Explanation, nothing: Explanation, closures: Sequence[Effect]) -
             current = fit(problem, (), start=np.zeros(len(problem.nominal)))
             if fitted.reduced - 1.0 < HELPFUL * (current.reduced - 1.0):
                 current = fitted
-            for _ in candidates:
-                points = screen.ranked(current)
-                if not points:
-                    break
-                start = np.concatenate([current.vector, points[0].eta])
-                closed = fit(problem, (*current.hypothesis, points[0].placed), start=start, iterations=12)
-                if closed.log_evidence <= current.log_evidence:
+            for _ in range(CLOSED):
+                closed = _closed(problem, screen, current)
+                if closed is None:
                     break
                 current = closed
-                used.append(points[0].placed.effect.name)
+                used.append(closed.hypothesis[-1].effect.name)
                 if consistent(current) and not lacks:
                     break
         parts.append((problem, current))
     return Explanation(tuple(parts)), " + ".join(dict.fromkeys(used))
+
+
+def _closed(problem: Problem, screen: Screen, current: Fit) -> Fit | None:
+    """One more closure on top of a fit: of those that the screening likes best the first that pays; None where none does."""
+    own = {placed.key for placed in current.hypothesis}
+    for point in leading(
+        [p for p in screen.ranked(current) if p.placed.key not in own], TRIED, 0.0, starts=1
+    ):
+        start = np.concatenate([current.vector, point.eta])
+        closed = fit(problem, (*current.hypothesis, point.placed), start=start, iterations=12)
+        idle = not consistent(current) and closed.reduced - 1.0 > STALLED * (current.reduced - 1.0)
+        if not idle and closed.log_evidence > current.log_evidence:
+            return closed
+    return None

@@ -17,6 +17,7 @@ import numpy as np
 from scipy.signal import lfilter
 from scipy.stats import chi2
 
+from bench.discrepancy.closure import MEMORY
 from bench.discrepancy.fit import Fit
 from bench.discrepancy.problem import Array, Problem
 from bench.discrepancy.screen import Ground, Screen
@@ -24,8 +25,6 @@ from bench.discrepancy.structure import Place
 
 KNOTS = 12
 """Knots of a free force of one coordinate; between them it is straight."""
-MEMORY = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)
-"""Relaxation times of a free linear memory, by the time of one radian of the motion."""
 PRODUCTS = ((1, 1), (2, 1), (1, 2))
 """Powers of displacement and velocity that a sum of two forces of one coordinate lacks."""
 NEGLIGIBLE = 3e-3
