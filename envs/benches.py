@@ -206,7 +206,8 @@ class SteppedBenches(ABC):
         """Share of a bench's pairs of rivals that are expected to be told apart with 99 % certainty ``(m,)``."""
         if not self._rivals:
             return np.zeros(len(places))
-        return np.mean(self._values[places].reshape(len(places), -1) >= math.log1p(CERTAIN), axis=1)
+        certain = self._values[places].reshape(len(places), -1) >= math.log1p(CERTAIN)
+        return np.count_nonzero(certain, axis=1) / certain.shape[1]
 
     def _clock(self, places: NDArray[np.int64]) -> NDArray[np.float64]:
         """Time at which the next window begins ``(m,)`` [s]."""
