@@ -43,10 +43,10 @@ class Args:
 
     task: tyro.conf.Positional[str] = "sdof"
     algorithm: str = "ppo"
-    steps: int = 1_500_000
+    steps: int = 4_000_000
     seconds: float = math.inf
     seed: int = 0
-    n_envs: int = 96
+    n_envs: int = 192
     start: str = "pump"
     reward: str = "practice"
     learning_rate: float = 4e-4
