@@ -31,7 +31,7 @@ from envs.vector import BenchVectorEnv
 FLOOR = 0.005
 """Error in prior standard deviations that the value takes for nothing, root mean square over the parameters. Sensitivities grow without
 bound where motion is chaotic (a rig that keeps grazing its gap's edges), and no identification gets that from a record: without the floor
-policies were trained to claim errors of 1e-5 in the gap and left 0.018."""
+policies learn to claim errors in the gap a hundred times smaller than what identification leaves."""
 PAIRS_KEPT = 24
 """Pairs of rivals, each the other's best imitation, that a question's rigs are taken from."""
 
@@ -75,8 +75,8 @@ class _Fan:
 class _Priors:
     """Benches of one hypothesis of a prior; the value is ``-p log(tr((I + F)^-1) / p + FLOOR^2)``.
 
-    Above the floor it is ``log det(I + F)`` where all directions are known equally well, and less where one lags behind: minus 2 p times the logarithm
-    of the expected error, root mean square over the parameters. Trained for the determinant, policies went for sensitive
+    Above the floor it is ``log det(I + F)`` where all directions are known equally well, and less where one lags behind: minus 2 p times
+    the logarithm of the expected error, root mean square over the parameters. Trained for the determinant, policies went for sensitive
     motions that multiply what is known well already (Bouc-Wen's weakest direction stayed at a quarter of the prior).
     """
 

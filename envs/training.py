@@ -51,7 +51,7 @@ LOG_STD = -1.2
 """Logarithm of the exploration's standard deviation at the start."""
 GAE_LAMBDA = 1.0
 """Advantages of PPO are whole returns less the value, never bootstrapped from it: what a test has told about the hidden rig so far is not
-in the observation, so that the value is a poor guess; with 0.95 policies grew quieter and scored less the longer they were trained."""
+in the observation, so that the value is a poor guess; with 0.95 some seeds score less the longer they are trained."""
 
 
 @dataclass(frozen=True)

@@ -202,6 +202,19 @@ def _excitation(told: Any) -> Figures:
     return figures
 
 
+def _training(told: Any) -> Figures:
+    curve, shipped = told["curve"], told["shipped"]
+    best = max(curve, key=lambda row: row["score"])
+    reached = min((row["seconds"] for row in curve if row["score"] >= shipped["score"]), default=None)
+    return [
+        ("score on held-out rigs, before training", f"{curve[0]['score']:.2f}", ""),
+        ("of the best policy", f"{best['score']:.2f}", ""),
+        ("of the policy that comes with the bench", f"{shipped['score']:.2f}", ""),
+        ("time to that score", "not reached" if reached is None else f"{reached:.0f} s", "≤ 3600 s"),
+        ("windows that violate a limit", f"{100 * best['violations']:.2f} %", "≤ 0.75 %"),
+    ]
+
+
 def _excitation_task(task: str, title: str) -> Capability:
     command = ("python", "scripts/evaluate_excitation.py", task, "--json", "-")
     return Capability(f"excitation_{task}", title, command, _excitation, hours=True)
@@ -255,6 +268,18 @@ CAPABILITIES: Sequence[Capability] = (
     ),
     _excitation_task("rivals", "Excitation that tells rivals apart: trained policy against the baselines"),
     _benchmark_group("campaign", "Campaigns"),
+    *(
+        Capability(
+            f"training_{task}",
+            f"Training from scratch of the policy `{task}`",
+            ("python", "scripts/train_excitation.py", task, *options, "--fresh", "--json"),
+            _training,
+        )
+        for task, options in (
+            ("sdof", ()),
+            ("rivals", ("--steps", "2000000", "--n-envs", "96", "--discount", "0.98")),
+        )
+    ),
     Capability(
         "bouc_wen",
         "Published Bouc-Wen benchmark, its own parameters",

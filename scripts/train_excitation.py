@@ -13,11 +13,14 @@ import math
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+if TYPE_CHECKING:
+    from envs.training import Score
 
 
 @dataclass
@@ -38,7 +41,7 @@ class Args:
         out: Folder for checkpoint, curve and best policy; by default out/policies/TASK.
         fresh: Start anew where there is a checkpoint.
         export: File to write the best policy to (.npz).
-        json: Print the curve as JSON.
+        json: Print the curve, and the score of the policy that comes with the bench, as JSON.
     """
 
     task: tyro.conf.Positional[str] = "sdof"
@@ -61,7 +64,8 @@ def main() -> int:
     """Train, tell, export."""
     args = tyro.cli(Args, description=__doc__)
     from bench.errors import BenchError
-    from envs.training import Plan, Trainer
+    from bench.excitation import find_policy, policy_names
+    from envs.training import Plan, Trainer, evaluate
 
     folder = args.out or Path("out/policies") / args.task
     columns = (
@@ -87,16 +91,29 @@ def main() -> int:
         return 2
     if args.export is not None:
         policy.save(args.export)
+    shipped = None
+    if args.task in policy_names():
+        known = find_policy(args.task)
+        shipped = evaluate(known, args.task, n=plan.n_held_out)._replace(
+            steps=known.about["steps"], seconds=known.about["seconds"]
+        )
     if args.json:
-        print(json.dumps([row._asdict() for row in trainer.curve], indent=1))
+        curve = [row._asdict() for row in trainer.curve]
+        print(json.dumps({"curve": curve, "shipped": shipped and shipped._asdict()}, indent=1))
         return 0
     for row in trainer.curve:
-        print(
-            f"{row.steps:>9} windows {row.seconds:6.0f} s: {row.merit:6.2f} nat, score {row.score:6.2f}, "
-            f"violations {100 * row.violations:.2f} %, certain after {row.certain:.2f} s"
-        )
+        print(_line(row))
     print(f"best policy: {args.export or folder / 'best.npz'}")
+    if shipped is not None:
+        print(f"the one that comes with the bench, on the same rigs:\n{_line(shipped)}")
     return 0
+
+
+def _line(row: Score) -> str:
+    return (
+        f"{row.steps:>9} windows {row.seconds:6.0f} s: {row.merit:6.2f} nat, score {row.score:6.2f}, "
+        f"violations {100 * row.violations:.2f} %, certain after {row.certain:.2f} s"
+    )
 
 
 if __name__ == "__main__":
