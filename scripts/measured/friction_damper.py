@@ -4,9 +4,9 @@ Two cases a band tension: the test at one frequency serves to find what is missi
 each of the eight tests is judged once, unseen. The nominal friction force is what a person reads off the loop of the first:
 the median of the force against the direction of motion, and how it scatters.
 
-At 1 Hz the band grips with a jolt that rings at some 25 Hz, hardly seen at 0.5 Hz. No law of the catalogue rings so: of the
-test at 1 Hz and 20 lb an elastic-slip element with backlash leaves 0.23 even when fitted to that test itself. Neither a resonance between force and sensor nor a sliding mass behind the play,
-fitted to the test at 0.5 Hz, brings the other below 0.23.
+At 1 Hz the band grips with a jolt that rings at some 40 to 50 Hz, hardly seen at 0.5 Hz. No law of the catalogue rings so: of the
+test at 1 Hz and 20 lb an elastic-slip element with backlash leaves 0.23 even when fitted to that test itself. Neither a
+resonance between force and sensor nor a sliding mass behind the play, fitted to the test at 0.5 Hz, brings the other below 0.23.
 """
 
 from __future__ import annotations
