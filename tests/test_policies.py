@@ -178,9 +178,8 @@ def test_shipped_policies_keep_the_limits_of_their_station(name: str) -> None:
         while not done:
             observation, _, terminated, truncated, info = env.step(policy.act(observation))
             violations, steps, done = violations + info["violation"], steps + 1, terminated or truncated
-    assert (
-        violations <= 0.0075 * steps
-    )  # the aim over all rigs, which scripts/evaluate_excitation.py measures
+    # the aim over all rigs, which scripts/evaluate_excitation.py measures
+    assert violations <= 0.0075 * steps
     assert steps > 100
 
 
