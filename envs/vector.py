@@ -170,7 +170,11 @@ class BenchVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray
         self, infos: dict[str, Any], places: NDArray[np.int64], entries: dict[str, NDArray]
     ) -> dict[str, Any]:
         """Enter values of some benches into arrays over all, with gymnasium's masks."""
+        every = len(places) == self.num_envs and not infos
         for name, values in entries.items():
+            if every:
+                infos[name], infos["_" + name] = values, np.ones(self.num_envs, dtype=bool)
+                continue
             if name not in infos:
                 infos[name] = np.zeros(self.num_envs, dtype=values.dtype)
                 infos["_" + name] = np.zeros(self.num_envs, dtype=bool)
