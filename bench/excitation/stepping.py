@@ -120,12 +120,12 @@ class _Work(NamedTuple):
     scratch: Any  # coordinates, velocities and forces of a law
 
 
-@numba.njit(error_model="numpy", nogil=True)
-def _advance_any(case, m, d, run, work):
-    """Advance one member of a case, whatever it is."""
+@numba.njit(error_model="numpy", nogil=True, inline="always")
+def _advance_any(case, m, d, run, work, nv):
+    """Advance one member of a case, whatever it is; `nv` is its number of degrees of freedom."""
     h, clock, controls, _, _, p, states, outputs = run
     x_now, u, rates, scratch = work
-    nx, nv, nu, n_steps = states.shape[2], p.motion.shape[3], controls.shape[2], controls.shape[1]
+    nx, nu, n_steps = states.shape[2], controls.shape[2], controls.shape[1]
     nr, n_terms = p.constants.shape[1], p.coefficients.shape[1]
     n_elements, n_coordinates, n_theta = p.kernels.shape[1], p.motion.shape[2], p.theta.shape[2]
     nc = nr - nv
@@ -254,8 +254,10 @@ def advance_cases(first, last, run):
             d = run.members[case, m]
             if single and p.inputs[d, 0, 0] == MOTION:
                 _advance_single(case, m, d, run)
+            elif nv == 4:  # known to the compiler: its loops are unrolled
+                _advance_any(case, m, d, run, work, 4)
             else:
-                _advance_any(case, m, d, run, work)
+                _advance_any(case, m, d, run, work, nv)
     room[0] = 0.0  # an array of which only the address is in use would be freed before
 
 
