@@ -56,7 +56,8 @@ def test_several_effects_are_doubted_sooner_than_one():
     lack = LackOfFit("memory", gain=20.0, freedom=3, p_value=4e-3, n_residuals=5000)
     assert not lack.significant(0.0)
     assert lack.significant(0.0, effects=2)
-    assert not lack.significant(1e6, effects=2)  # laws are held to a hundredth of the force, however many
+    assert not lack.significant(1e6, effects=2)  # laws are held to a hundredth of the force
+    assert lack.significant(1e6, effects=3)  # but three of them imitate nearly any
 
 
 @pytest.mark.slow
@@ -190,10 +191,10 @@ def test_a_fit_starts_with_the_nominal_parameters_that_go_with_the_effect():
     screen = Screen(problem, [placed])
     ground = screen.ground()
     alone = fit(problem, (), start=np.zeros(n)).vector
-    start = screen.beginning(Point(placed, 0.0, explained.vector[n:]), ground)
+    (start,) = screen.starts(Point(placed, 0.0, explained.vector[n:]), ground)
     # what the nominal model alone takes for a stiffness and a damping is off by the relaxation's share of them
     assert np.abs(alone - explained.vector[:n]).max() > 2.0
-    assert np.abs(start - explained.vector[:n]).max() < 0.3
+    assert np.abs(start[:n] - explained.vector[:n]).max() < 0.3
 
 
 @pytest.mark.slow
@@ -214,3 +215,31 @@ def test_an_error_of_mass_shows_behind_a_hysteresis_by_what_its_prior_costs():
     # the prior of the size of the error costs a unit or two
     assert screened == pytest.approx(explained.cost - freed.cost, rel=0.1, abs=3.0)
     assert screened > 20.0
+    # although the hysteresis explains the records, the search goes on to the error
+    best = attribute(problem, [*hysteresis, error], most=2).ranked()[0]
+    assert {placed.effect.name for placed in best.hypothesis} == {"bouc_wen_hysteresis", "mass_error"}
+
+
+@pytest.mark.slow
+def test_behind_a_sensor_that_clips_an_effect_is_screened_by_its_small_changes():
+    def measured(x, a, f):
+        return np.clip(x, -0.01, 0.01), a
+
+    case = planted_case(lambda f: motion_with(f, lambda x, v, z: (-3e5 * x**3, [])), measured)
+    problem, clipped = fitted(case, "displacement_clipping", [0.0])
+    cubic = placements(case, problem.structure, [effect_named("cubic_stiffness")])
+    assert clipped.reduced > 1.1
+    screen = Screen(problem, cubic).beside(clipped, simulated=False)
+    # a unit of the effect would clip all of the motion
+    np.testing.assert_allclose(
+        screen.effect_response(cubic[0], np.array([1.0])),
+        1e3 * screen.effect_response(cubic[0], np.array([1e-3])),
+        rtol=1e-6, atol=1e-9,
+    )  # fmt: skip
+    ground = screen.ground(clipped)
+    point = screen.ranked(clipped, ground)[0]
+    freed = fit(
+        problem, (*clipped.hypothesis, cubic[0]), start=screen.starts(point, ground, clipped), iterations=30
+    )
+    assert freed.reduced < 1.05
+    assert point.gain > 0.5 * (clipped.chi2 - freed.chi2)

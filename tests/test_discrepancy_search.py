@@ -84,6 +84,20 @@ def test_a_minimisation_without_prospects_is_given_up():
     assert few < 0.7 * (len(calls) - few)  # without the limit it goes on to the minimum
 
 
+def test_a_cost_that_is_rough_on_a_small_scale_is_followed_by_coarse_differences():
+    def stairs(x: np.ndarray) -> np.ndarray:
+        return residual(np.round(x / 0.005) * 0.005)  # flat between the steps
+
+    options = {"prior": broad(3), "free": np.arange(3), "reach": np.full(3, 2.0), "iterations": 40}
+    start = np.array([1.9, 1.2, 3.95])
+    found = minimise(stairs, start, **options)
+    assert float(stairs(start) @ stairs(start)) > 50.0
+    assert (
+        float(found.residual @ found.residual) < 5.0
+    )  # two steps of the stairs from the smooth minimum, 0, leave as much
+    np.testing.assert_array_equal(minimise(stairs, start, exact=False, **options).vector, start)
+
+
 def test_a_start_that_diverges_has_infinite_cost():
     found = minimise(
         lambda x: np.array([np.inf]),

@@ -61,6 +61,8 @@ REFUTED = 2.0
 """Reduced chi-squared from which the best hypothesis is so far off that its rivals are not fitted again: none of them will do."""
 STALLED = 0.7
 """If one more effect leaves more than this part of the excess of chi-squared, a further one is not tried."""
+UNPROMISING = 0.25
+"""Part of the excess of a base that one more effect must promise to take away, or none is fitted beside it."""
 MODEL_ERROR = 0.02
 """Relative excess of chi-squared that is laid to the smoothing and integration of the diagnosis itself."""
 
@@ -241,8 +243,11 @@ def attribute(
 def _promising(screen: Screen, best: Fit) -> bool:
     """Whether one more effect could still be in the residual of a hypothesis that is down to the noise."""
     screen = about(screen, best, explained=True)
-    points = screen.ranked(best, screen.ground(best, simulated=True))
-    return bool(points) and points[0].gain > max(WORTH_A_FIT, IMMATERIAL * best.n_residuals)
+    ground = screen.ground(best, simulated=True)
+    own = {placed.key for placed in best.hypothesis}
+    gains = [gain for key, gain in screen.inertia_gains(ground).items() if key not in own]
+    gains += [point.gain for point in screen.ranked(best, ground)[:1]]
+    return max(gains, default=0.0) > max(WORTH_A_FIT, IMMATERIAL * best.n_residuals)
 
 
 def _at_ease(fitted: Fit, problem: Problem) -> bool:
@@ -308,8 +313,11 @@ def _extend(
             search.first = sorted([*search.first, *points] if among else points, key=lambda p: -p.gain)
         inertia = {} if among else local.inertia_gains(ground)
         most = max([p.gain for p in points] + list(inertia.values()), default=0.0)
+        excess = base.chi2 - base.n_residuals
+        if named and problem.noise_stated and not consistent(base) and most < UNPROMISING * excess:
+            continue
         # a screening can promise more than there is
-        most = min(most, max(base.chi2 - base.n_residuals, WORTH_A_FIT))
+        most = min(most, max(excess, WORTH_A_FIT))
         chosen = leading(points, count, SHORT * most)
         if not named and not among:
             begun = {p.placed.key for p in chosen}
@@ -317,14 +325,12 @@ def _extend(
             chosen += leading(simplest, count, WORTH_A_FIT, starts=1)
         for point in chosen:
             if search.start(base.hypothesis, point):
-                origin = base.vector if named else local.beginning(point, ground)
-                start = np.concatenate([origin, point.eta])
-                tasks.append(((*base.hypothesis, point.placed), start))
+                tasks.append(((*base.hypothesis, point.placed), local.starts(point, ground, named)))
         own = {placed.key for placed in base.hypothesis}
         least = min(SHORT * most, WORTH_A_FIT) if consistent(base) else SHORT * most
         for placed in screen.inertia:
             if placed.key not in own and inertia.get(placed.key, 0.0) > least:
-                tasks.append(((*base.hypothesis, placed), np.concatenate([base.vector, [0.0]])))
+                tasks.append(((*base.hypothesis, placed), np.append(base.vector, 0.0)))
 
     limit = _limit(search, size)
 
@@ -403,8 +409,9 @@ def challenge(search: Search, screen: Screen, pool: ThreadPoolExecutor, *, round
             rest = best.hypothesis[:i] + best.hypothesis[i + 1 :]
             vector = np.concatenate([best.vector[:n], *(eta for j, eta in enumerate(etas) if j != i)])
             base = replace(best, hypothesis=rest, vector=vector)
-            points, alone = search.first, search.ranked(0)[0].chi2
-            if rest:
+            if not rest:
+                points, alone = search.first, search.ranked(0)[0].chi2
+            else:
                 local = about(screen, base, explained=False)
                 ground = local.ground(base)
                 alone = float(np.sum(ground.left**2))

@@ -1,8 +1,8 @@
 """Explanations: hypotheses for all degrees of freedom together, and how well they predict.
 
 A rig may fall apart into groups of degrees of freedom that its linear structure does not couple: the axial and the torsional
-motion of a joint. Each group is searched on its own; effects that couple groups are searched on the whole, when
-the groups alone do not reach the noise. Chi-squared and evidence add over groups, so all explanations can be compared.
+motion of a joint. Each group is searched on its own; effects that couple groups are searched on the whole, when the groups
+alone leave more than noise, or a force. Chi-squared and evidence add over groups, so all explanations can be compared.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from bench.discrepancy.attribute import (
     IMMATERIAL,
     QUICK,
     REFINED_STARTS,
+    REFUTED,
     STALLED,
     THREADS,
     WITHIN_REACH,
@@ -27,6 +28,7 @@ from bench.discrepancy.attribute import (
     Search,
     about,
     attribute,
+    challenge,
     consistent,
     converge,
     leading,
@@ -51,11 +53,13 @@ from bench.discrepancy.structure import Structure, structure_of
 HELPFUL = 0.3
 """A catalogued explanation that leaves less than this part of the excess is kept under a closure; others only disturb it."""
 HOPELESS_COUPLING = 50.0
-"""Reduced chi-squared of a coupling effect alone above which no further effect is added to it."""
+"""Reduced chi-squared of a coupling effect alone above which only a second coupling is added to it."""
 HOPELESS_THIRD = 5.0
-"""The same for a pair that a coupling effect belongs to: a third effect then repairs little."""
+"""Reduced chi-squared of a pair that a coupling effect belongs to above which no third effect is added: it would repair little."""
 HOPELESS_PAIR = 8.0
-"""Reduced chi-squared that the screening beside a coupling effect must promise to go below: pairs that explain promise 1 to 2."""
+"""Reduced chi-squared that the screening beside a coupling effect must promise to go below: pairs that explain promise 1 to 2.
+Of couplings, which are few, less is asked: that they take away a good part (`STALLED`), since a fit without the other coupling may
+have ended far from the motion."""
 PROMISING = 4.0
 """Reduced chi-squared that a screening must promise in every group, if groups are to be searched before couplings."""
 CLOSED, TRIED = 3, 2
@@ -194,8 +198,8 @@ def _explain(
             progress(f"degrees of freedom {', '.join(problem.structure.dofs)}")
             chosen = placements(case, problem.structure, catalogue)
             attribute(problem, chosen, most=2, progress=progress, prepared=entry)
-    found = _combined(searches)
-    if odd and not coupled and not found[0].consistent:
+    found = _nothing_left_first(_combined(searches))
+    if odd and not coupled and not _leaves_nothing(found):
         coupled = _coupled(whole, catalogue, most, progress)
     found += [Explanation(((whole, fitted),)) for fitted in coupled]
     return _nothing_left_first(sorted(found, key=lambda e: -e.log_posterior))
@@ -232,25 +236,34 @@ def _coupled(
             if not kept.fits:
                 break
             base = kept.ranked()[0]
-            if base.reduced > (HOPELESS_COUPLING if len(base.hypothesis) == 1 else HOPELESS_THIRD):
+            if len(base.hypothesis) > 1 and base.reduced > HOPELESS_THIRD:
                 break
             progress(f"{names(base.hypothesis)}, chi-squared {base.reduced:.3g}")
             local = about(screen, base, explained=consistent(base))
             ground = local.ground(base, simulated=consistent(base))
-            points = refined(local, ground, local.ranked(base, ground), pool)
+            solved = local.ranked(base, ground)
+            if base.reduced > HOPELESS_COUPLING:
+                solved = [p for p in solved if p.placed.key in coupling]
+            points = refined(local, ground, solved, pool)
             worth = [p for p in points if p.gain > max(WORTH_A_FIT, IMMATERIAL * base.n_residuals)]
-            left = float(np.sum(ground.left**2)) - max((p.gain for p in worth), default=0.0)
-            if not worth or left > HOPELESS_PAIR * base.n_residuals:
+            alone = float(np.sum(ground.left**2))
+            if alone - max((p.gain for p in worth), default=0.0) > HOPELESS_PAIR * base.n_residuals:
+                worth = [p for p in worth if p.placed.key in coupling and alone - p.gain < STALLED * alone]
+            if not worth:
                 break
 
-            def extended(point: Point, base: Fit = base) -> Fit:
-                start = np.append(base.vector, point.eta)
+            def extended(point: Point, base: Fit = base, local=local, ground=ground) -> Fit:
+                start = local.starts(point, ground, base)
                 return fit(
                     whole, (*base.hypothesis, point.placed), start=start, iterations=QUICK, exact=False
                 )
 
             trials = sorted(pool.map(extended, leading(worth, 4, 0.0, starts=1)), key=lambda f: f.cost)
-            converge(kept, pool, [(f.hypothesis, f.vector) for f in trials[:2]])
+            converge(kept, pool, [(f.hypothesis, f.vector) for f in trials])
+            best = kept.ranked()[0]
+            if best is not base and best.reduced < REFUTED:
+                progress(f"rivals of {names(best.hypothesis)}")
+                challenge(kept, screen, pool, rounds=1)
             reduce_best(kept, pool)
             if kept.ranked()[0] is base or kept.ranked()[0].reduced - 1.0 > STALLED * (base.reduced - 1.0):
                 break
@@ -262,14 +275,20 @@ def _nothing_left_first(found: list[Explanation]) -> list[Explanation]:
 
     The toll that an effect pays for the inaccuracy of the diagnosis may else let a law win that the records refute.
     """
-    nothing = next(e for e in found if not e.hypothesis)
-    if not found[0].consistent or not any(found[0].lacking(nothing)):
+    if not found[0].consistent or _leaves_nothing(found):
         return found
+    nothing = next(e for e in found if not e.hypothesis)
     near = [e for e in found[1:] if e.log_posterior > found[0].log_posterior - WITHIN_REACH and e.consistent]
     for other in near[:RECONSIDERED]:
         if not any(other.lacking(nothing)):
             return [other, *(e for e in found if e is not other)]
     return found
+
+
+def _leaves_nothing(found: Sequence[Explanation]) -> bool:
+    """Whether the first explanation is down to the noise, and free models find nothing in what it leaves."""
+    nothing = next(e for e in found if not e.hypothesis)
+    return found[0].consistent and not any(found[0].lacking(nothing))
 
 
 def _parsimonious(found: list[Explanation]) -> list[Explanation]:

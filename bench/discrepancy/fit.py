@@ -78,12 +78,12 @@ def fit(
     exact: bool = True,
     each: Callable = map,
 ) -> Fit:
-    """Fit a hypothesis from one start.
+    """Fit a hypothesis.
 
     Args:
         problem: Records and priors.
         hypothesis: Effects.
-        start: Start vector.
+        start: Start vector (n,), or several (k, n): the fit begins at the one of least cost.
         iterations: Most iterations.
         tolerance: Decrease of the cost below which the iteration ends; costs differ meaningfully from about one.
         fixed: (n,) boolean, entries held at their start.
@@ -101,9 +101,15 @@ def fit(
     names = [p for placed in hypothesis for p in placed.effect.parameters]
     held[n:] |= np.array([p.fixed for p in names], dtype=bool)
     free = np.flatnonzero(np.logical_not(held))
+
+    def cost(vector: Array) -> float:
+        residual = problem.residual(hypothesis, vector)
+        return float(residual @ residual + np.sum(((vector - prior.mean) / prior.std)[free] ** 2))
+
+    starts = list(np.clip(np.atleast_2d(start), prior.low, prior.high))
     found = minimise(
         lambda vector: problem.residual(hypothesis, vector),
-        np.clip(start, prior.low, prior.high),
+        min(starts, key=cost) if len(starts) > 1 else starts[0],
         prior=prior,
         free=free,
         reach=np.where(free < n, NOMINAL_REACH, EFFECT_REACH),

@@ -90,7 +90,11 @@ def read(node: Node, gram: Array, right: Array) -> Point | None:  # noqa: PLR091
         return None
     c = np.linalg.lstsq(gram, right, rcond=1e-10)[0]
     if effect.site in {"actuator", "sensor"}:
-        if parameters[0].signed:
+        if parameters[0].fixed:  # all of it or nothing
+            c = np.ones(1)
+            if 2.0 * right[0] <= gram[0, 0]:
+                return None
+        elif parameters[0].signed:
             eta[0] = np.clip(SIGNAL_STEP * c[0], *parameters[0].bounds)
         elif c[0] <= 0:
             return None

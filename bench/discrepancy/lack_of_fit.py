@@ -37,6 +37,8 @@ INACCURACY = 0.0005
 """Part of chi-squared that is laid to the smoothing and integration of the diagnosis itself."""
 EXACTNESS = 1e-4
 """Part of the chi-squared an explanation takes away that its laws may leave: a hundredth of the missing force."""
+IMITATING, STRICTNESS = 3, 1e-5
+"""Number of effects that together imitate nearly any force, and how exactly these have to: what they leave of it is small."""
 
 
 class LackOfFit(NamedTuple):
@@ -63,7 +65,8 @@ class LackOfFit(NamedTuple):
             explained: Chi-squared that the explanation takes away.
             effects: Number of effects that the explanation holds.
         """
-        inexact = max(INACCURACY * self.n_residuals, EXACTNESS * explained)
+        exactness = EXACTNESS if effects < IMITATING else STRICTNESS
+        inexact = max(INACCURACY * self.n_residuals, exactness * explained)
         limit = SIGNIFICANCE if effects <= 1 else SEVERAL
         return self.p_value < limit and self.gain - self.freedom > inexact
 

@@ -27,6 +27,7 @@ from bench.discrepancy.linear_run import linear_run
 from bench.discrepancy.minimise import Prior, minimise
 from bench.discrepancy.prepared import whitened
 from bench.discrepancy.problem import COULOMB, Array, Hypothesis, Placed, Problem
+from bench.discrepancy.signal_effects import quantise
 from bench.discrepancy.starts import channels_of, in_motion
 from bench.discrepancy.system import Elements, LinearStructure
 
@@ -36,6 +37,8 @@ REFINING_REACH = 1.5
 """Longest step of a refinement, in prior standard deviations."""
 LARGEST = 1e15
 """Whitened response beyond which a grid point counts as diverged."""
+SMALL_CHANGE = 1e-3
+"""Change of the channels, over their peak, whose effect behind a sensor is taken."""
 SHAPE_STEP = 0.02
 """Finite difference in the shape parameters of a base effect, in units of their prior standard deviation."""
 
@@ -171,10 +174,18 @@ class Screen:
         """Change of the channels (n, n_channels) of a record behind the sensor effects that this screening is about."""
         if not self.sensors:
             return channels
-        placed, etas = tuple(p for p, _ in self.sensors), [eta for _, eta in self.sensors]
+        # steps pass changes on average, and their noise is in the residual already
+        smooth = [(p, eta) for p, eta in self.sensors if p.effect.signal is not quantise]
+        placed, etas = tuple(p for p, _ in smooth), [eta for _, eta in smooth]
         step, free = self.problem.records[index].step, self._unspoilt[index]
-        with_change = self.problem.sensed(placed, etas, free + channels, step)
-        return with_change - self.problem.sensed(placed, etas, free.copy(), step)
+        # a unit of an effect may be many times the motion: a sensor that clips would clip all of it
+        peaks, changes = np.abs(free).max(axis=0), np.abs(channels).max(axis=0)
+        moved = changes > 0.0
+        small = SMALL_CHANGE * np.min(peaks[moved] / changes[moved], initial=np.inf)
+        if not np.isfinite(small) or small == 0.0:
+            return channels
+        with_change = self.problem.sensed(placed, etas, free + small * channels, step)
+        return (with_change - self.problem.sensed(placed, etas, free.copy(), step)) / small
 
     def _deviation(self, index: int, parameter: int) -> Array:
         """Force that a deviation of one nominal parameter by its uncertainty takes from the structure."""
@@ -266,19 +277,28 @@ class Screen:
         head, tail = basis[: len(residual)], basis[len(residual) :]
         return Ground(residual, -deviations, head, tail, columns[:, :n], triangle)
 
-    def beginning(self, point: Point, ground: Ground) -> Array:
-        """Nominal deviations (n_nominal,) from which a fit of one effect starts: those that go with it along the motion.
+    def starts(self, point: Point, ground: Ground, base: Fit | None = None) -> Array:
+        """Starts of a fit of one more effect.
 
         Args:
             point: The effect and its parameters.
-            ground: What the nominal model leaves.
+            ground: What the base leaves.
+            base: Fitted hypothesis that stays in the model; None for the nominal model alone.
+
+        Returns:
+            (k, n): the base's parameters that go with the effect along the motion, and beside a fitted base those it has.
         """
         if point.placed.effect.site != "joint":
-            return self.deviations
+            return np.append(self.deviations if base is None else base.vector, point.eta)[None]
+        hypothesis: Hypothesis = () if base is None else base.hypothesis
         n = len(self.deviations)
-        moved = self.deviations + ground.moves(self.effect_response(point.placed, point.eta))[:n]
-        _, _, low, high = self.problem.prior(())
-        return np.clip(moved, low, high)
+        own = [not p.fixed for placed in hypothesis for p in placed.effect.parameters]
+        free = np.concatenate([np.ones(n, dtype=bool), np.array(own, dtype=bool)])
+        moved = self.deviations.copy() if base is None else np.append(self.deviations, base.vector[n:])
+        moved[free] += ground.moves(self.effect_response(point.placed, point.eta))
+        _, _, low, high = self.problem.prior(hypothesis)
+        origins = [np.clip(moved, low, high)] + ([] if base is None else [base.vector])
+        return np.array([np.append(origin, point.eta) for origin in origins])
 
     def ranked(self, base: Fit | None = None, ground: Ground | None = None) -> list[Point]:
         """Solve all grid points, given a base hypothesis; by decreasing gain.

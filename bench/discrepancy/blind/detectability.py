@@ -118,7 +118,7 @@ def _group(pure: Case, structure: Structure, true: Mapping[str, float], truth: M
             fit(
                 problem,
                 (p.placed,),
-                start=np.concatenate([screen.beginning(p, ground), p.eta]),
+                start=screen.starts(p, ground),
                 iterations=ITERATIONS,
             )
             for p in points
