@@ -234,18 +234,21 @@ class Screen:
 
     def response(self, force_on_dofs: Callable[[int], Array]) -> Array:
         """Whitened response of all records to forces on the degrees of freedom, given by record index."""
-        parts = []
-        for i, data in enumerate(self.problem.data):
-            if self.problem.driven:
-                parts.append(whitened(self._sensed(-force_on_dofs(i), i), data))
-                continue
-            force, lead = force_on_dofs(i), self.problem.lead_in(data.record)
-            firsts = self.problem.firsts(data.record)[1:]
-            loads = np.vstack([force] * (1 + lead // len(force)))
-            motion = linear_run(self.linear, loads=loads, step=data.record.step, restarts=firsts)
-            channels = self._sensed(channels_of(self.problem.structure, motion)[lead:], i)
-            parts.append(whitened(self.problem.acquired(channels, data.record), data))
-        return np.concatenate(parts)
+        with np.errstate(over="ignore", invalid="ignore"):  # forces that diverge: their nodes are left out
+            return np.concatenate(
+                [self._responses(force_on_dofs(i), i) for i in range(len(self.problem.data))]
+            )
+
+    def _responses(self, force: Array, index: int) -> Array:
+        data = self.problem.data[index]
+        if self.problem.driven:
+            return whitened(self._sensed(-force, index), data)
+        lead = self.problem.lead_in(data.record)
+        firsts = self.problem.firsts(data.record)[1:]
+        loads = np.vstack([force] * (1 + lead // len(force)))
+        motion = linear_run(self.linear, loads=loads, step=data.record.step, restarts=firsts)
+        channels = self._sensed(channels_of(self.problem.structure, motion)[lead:], index)
+        return whitened(self.problem.acquired(channels, data.record), data)
 
     def effect_response(self, placed: Placed, eta: Array) -> Array:
         """Whitened response to an effect along the measured motion."""

@@ -11,7 +11,8 @@ The published model (Coulomb friction and a constant offset) is not all there is
 below 5 Hz leave 1.6 N with it, but 0.76 N with a term in the magnitude of the velocity, beside which the offset shrinks from
 -3.2 N to -0.2 N: the viscous damping depends on the direction. The diagnosis finds that (`asymmetric_damping`) beside
 friction, and predicts the rest of the record several times better than the published pair; the catalogue learned the effect,
-which every vehicle damper has, after it was seen here.
+which every vehicle damper has, after it was seen here. No third effect of the catalogue beside friction and the offset leaves as
+little as these two do.
 
 References:
     A. Janot, M. Gautier, M. Brunot, Data set and reference models of EMPS, Workshop on Nonlinear System Identification
