@@ -409,9 +409,8 @@ def challenge(search: Search, screen: Screen, pool: ThreadPoolExecutor, *, round
             rest = best.hypothesis[:i] + best.hypothesis[i + 1 :]
             vector = np.concatenate([best.vector[:n], *(eta for j, eta in enumerate(etas) if j != i)])
             base = replace(best, hypothesis=rest, vector=vector)
-            if not rest:
-                points, alone = search.first, search.ranked(0)[0].chi2
-            else:
+            points, alone = search.first, search.ranked(0)[0].chi2
+            if rest:
                 local = about(screen, base, explained=False)
                 ground = local.ground(base)
                 alone = float(np.sum(ground.left**2))

@@ -20,7 +20,6 @@ from bench.discrepancy.attribute import (
     IMMATERIAL,
     QUICK,
     REFINED_STARTS,
-    REFUTED,
     STALLED,
     THREADS,
     WITHIN_REACH,
@@ -28,7 +27,6 @@ from bench.discrepancy.attribute import (
     Search,
     about,
     attribute,
-    challenge,
     consistent,
     converge,
     leading,
@@ -60,6 +58,8 @@ HOPELESS_PAIR = 8.0
 """Reduced chi-squared that the screening beside a coupling effect must promise to go below: pairs that explain promise 1 to 2.
 Of couplings, which are few, less is asked: that they take away a good part (`STALLED`), since a fit without the other coupling may
 have ended far from the motion."""
+CONVERGED = {1: 4, 2: 2}
+"""Pairs and triples with a coupling effect that are carried on to convergence, by the number of effects before."""
 PROMISING = 4.0
 """Reduced chi-squared that a screening must promise in every group, if groups are to be searched before couplings."""
 CLOSED, TRIED = 3, 2
@@ -259,11 +259,9 @@ def _coupled(
                 )
 
             trials = sorted(pool.map(extended, leading(worth, 4, 0.0, starts=1)), key=lambda f: f.cost)
-            converge(kept, pool, [(f.hypothesis, f.vector) for f in trials])
-            best = kept.ranked()[0]
-            if best is not base and best.reduced < REFUTED:
-                progress(f"rivals of {names(best.hypothesis)}")
-                challenge(kept, screen, pool, rounds=1)
+            converge(
+                kept, pool, [(f.hypothesis, f.vector) for f in trials[: CONVERGED[len(base.hypothesis)]]]
+            )
             reduce_best(kept, pool)
             if kept.ranked()[0] is base or kept.ranked()[0].reduced - 1.0 > STALLED * (base.reduced - 1.0):
                 break
