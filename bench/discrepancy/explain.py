@@ -58,8 +58,8 @@ HOPELESS_PAIR = 8.0
 """Reduced chi-squared that the screening beside a coupling effect must promise to go below: pairs that explain promise 1 to 2.
 Of couplings, which are few, less is asked: that they take away a good part (`STALLED`), since a fit without the other coupling may
 have ended far from the motion."""
-CONVERGED = {1: 4, 2: 2}
-"""Pairs and triples with a coupling effect that are carried on to convergence, by the number of effects before."""
+CONVERGED_PAIRS, CONVERGED_BEYOND = 4, 2
+"""Pairs that hold a coupling effect, and larger hypotheses, that are carried on to convergence."""
 PROMISING = 4.0
 """Reduced chi-squared that a screening must promise in every group, if groups are to be searched before couplings."""
 CLOSED, TRIED = 3, 2
@@ -259,9 +259,8 @@ def _coupled(
                 )
 
             trials = sorted(pool.map(extended, leading(worth, 4, 0.0, starts=1)), key=lambda f: f.cost)
-            converge(
-                kept, pool, [(f.hypothesis, f.vector) for f in trials[: CONVERGED[len(base.hypothesis)]]]
-            )
+            some = trials[: CONVERGED_PAIRS if len(base.hypothesis) == 1 else CONVERGED_BEYOND]
+            converge(kept, pool, [(f.hypothesis, f.vector) for f in some])
             reduce_best(kept, pool)
             if kept.ranked()[0] is base or kept.ranked()[0].reduced - 1.0 > STALLED * (base.reduced - 1.0):
                 break
