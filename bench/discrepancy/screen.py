@@ -167,6 +167,7 @@ class Screen:
         key = repr((simulated, [placed.key for placed in base.hypothesis])).encode() + base.vector.tobytes()
         if self._beside is None or self._beside[0] != key:
             about = About(base, simulated)
+            self._beside = None  # a screening is large
             self._beside = key, Screen(self.problem, self.candidates, self.each, about=about)
         return self._beside[1]
 
