@@ -92,9 +92,8 @@ def test_a_cost_that_is_rough_on_a_small_scale_is_followed_by_coarse_differences
     start = np.array([1.9, 1.2, 3.95])
     found = minimise(stairs, start, **options)
     assert float(stairs(start) @ stairs(start)) > 50.0
-    assert (
-        float(found.residual @ found.residual) < 5.0
-    )  # two steps of the stairs from the smooth minimum, 0, leave as much
+    # two steps of the stairs from the smooth minimum, 0, leave as much
+    assert float(found.residual @ found.residual) < 5.0
     np.testing.assert_array_equal(minimise(stairs, start, exact=False, **options).vector, start)
 
 

@@ -101,15 +101,9 @@ def fit(
     names = [p for placed in hypothesis for p in placed.effect.parameters]
     held[n:] |= np.array([p.fixed for p in names], dtype=bool)
     free = np.flatnonzero(np.logical_not(held))
-
-    def cost(vector: Array) -> float:
-        residual = problem.residual(hypothesis, vector)
-        return float(residual @ residual + np.sum(((vector - prior.mean) / prior.std)[free] ** 2))
-
-    starts = list(np.clip(np.atleast_2d(start), prior.low, prior.high))
     found = minimise(
         lambda vector: problem.residual(hypothesis, vector),
-        min(starts, key=cost) if len(starts) > 1 else starts[0],
+        np.clip(start, prior.low, prior.high),
         prior=prior,
         free=free,
         reach=np.where(free < n, NOMINAL_REACH, EFFECT_REACH),

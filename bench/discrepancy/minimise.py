@@ -127,7 +127,7 @@ def minimise(
 
     Args:
         residual_at: Vector (n,) to residuals; any other shape than at the start stands for "diverged".
-        start: Within the bounds.
+        start: Within the bounds, (n,), or several (k, n): the one of least cost is taken.
         prior: Prior and bounds.
         free: Indices of the entries that move.
         reach: (n_free,) longest step, in prior standard deviations.
@@ -139,7 +139,7 @@ def minimise(
     """
     own = Prior(prior.mean[free], prior.std[free], prior.low[free], prior.high[free])
     task = _Task(residual_at, free, *own, reach, each, tolerance, limit)
-    state = task.state(start.copy())
+    state = min((task.state(vector.copy()) for vector in np.atleast_2d(start)), key=lambda at: at.cost)
     identity = np.eye(len(free))
     if not np.isfinite(state.cost):
         return Minimum(state.vector, state.residual, np.inf, identity, False)
