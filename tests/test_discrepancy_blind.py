@@ -15,7 +15,7 @@ from bench.discrepancy import friction_limits as limits
 from bench.discrepancy import make_blind, read_case, run_blind, score_blind
 from bench.discrepancy.blind import foreign
 from bench.discrepancy.blind.benches import SIGNALS, BlindOptions, Plan, draw_bench, load, reach_of
-from bench.discrepancy.blind.cases import ALIKE, CLOSE, draw_case
+from bench.discrepancy.blind.cases import ALIKE, CLOSE, draw_case, draw_plan
 from bench.discrepancy.blind.effects import RECIPES, Reach, recipe_named
 from bench.discrepancy.blind.score_report import markdown, page, tables
 from bench.discrepancy.blind.scoring import calibration_error, region_scores, score_cases, wilson
@@ -271,6 +271,29 @@ def test_a_double_case_is_made_on_every_rig(rig):
     assert case.rig == rig
     assert len(answer["effects"]) == 2
     assert ALIKE[0] < max(answer["gap_nrmse_validation"]) / answer["wanted_gap"] < ALIKE[1]
+
+
+def test_no_effect_is_drawn_beside_one_that_holds_it():
+    options = BlindOptions(
+        shares=(0.0, 0.0, 1.0, 0.0),
+        rigs=(0.0, 0.0, 1.0),
+        effects=("coulomb_friction", "stribeck_friction", "time_varying_friction"),
+    )
+    rng = np.random.default_rng(8)
+    plans = [draw_plan(rng, options) for _ in range(200)]
+    alike = [p for p in plans if len(set(p.places)) == 1]
+    assert {r.name for p in alike for r in p.recipes} == {"stribeck_friction", "time_varying_friction"}
+    assert any("coulomb_friction" in {r.name for r in p.recipes} for p in plans)
+
+
+def test_options_that_allow_no_case_are_refused():
+    options = BlindOptions(
+        shares=(0.0, 0.0, 1.0, 0.0),
+        rigs=(1.0, 0.0, 0.0),
+        effects=("coulomb_friction", "stribeck_friction"),
+    )
+    with pytest.raises(ParameterError, match="no case can be drawn from effects coulomb_friction, stribeck"):
+        draw_plan(np.random.default_rng(1), options)
 
 
 def test_options_are_checked():

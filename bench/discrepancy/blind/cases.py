@@ -4,7 +4,8 @@ Everything is drawn from one generator, so a case is a function of its seed. A d
 until the gap of the identification records is the wanted one, and the draw is thrown away where the judging
 record then shows less than half or more than twice of that, or where one of two effects hides behind the other.
 What the stated uncertainties of the nominal model explain is no gap and is thrown away too, since the right answer would be
-"none"; so is a foreign effect that a single catalogued one explains, since "unknown" would be wrong.
+"none"; so are a foreign effect and a pair of effects that a single catalogued one explains, since "unknown" and two names would
+be wrong.
 Nothing else is thrown away for being hard to tell: how well a record can tell at all is computed beside the
 case instead (`bench.discrepancy.blind.detectability`) and stands in the answer.
 """
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 
 from bench.discrepancy.blind.benches import Bench, BlindOptions, Plan, draw_bench, reach_of
 from bench.discrepancy.blind.detectability import detectability
-from bench.discrepancy.blind.effects import RECIPES, Drawn, Shape
+from bench.discrepancy.blind.effects import RECIPES, Drawn, Recipe, Shape
 from bench.discrepancy.blind.time_stepping import TrueMotion
 from bench.discrepancy.blind.truth import ROWS, STEPS, Placed, Truth
 from bench.discrepancy.case import Case, CaseChannel, NominalParameter, record_from_arrays
@@ -32,6 +33,8 @@ BISECTIONS = 14
 """Halvings of the logarithm of a strength between e^-7 and e^3: to a tenth of a percent."""
 ATTEMPTS = 200
 """Draws before the maker gives up; a handful is usual."""
+PLANS = 10_000
+"""Draws of a plan before the maker says that there is none: the rarest kind of case is drawn every few hundred times."""
 PERSISTENCE = 40
 """Draws of one plan: some ask for what cannot be, a stop that makes a gap of 4 % only, say."""
 CLOSE = (0.85, 1.18)
@@ -44,7 +47,13 @@ BEYOND = 4.0
 """An error of a nominal parameter is an effect from so many of its stated standard deviations on."""
 EXPECTED = 10.0
 """Expected log odds against the nominal model, re-estimated within its uncertainty, from which there is a gap; and those
-against the nearest catalogued effect from which a foreign one is foreign to the records."""
+against the nearest single effect of the catalogue from which a foreign one is foreign to the records, and two effects are two."""
+WRONG = {
+    "single": ("log_odds_none",),
+    "foreign": ("log_odds_rival",),
+    "double": ("log_odds_one", "log_odds_rival"),
+}
+"""Odds by kind of case against what the right answer would be if they were small."""
 
 
 def draw_case(name: str, rng: np.random.Generator, options: BlindOptions) -> tuple[Case, dict[str, Any]]:
@@ -68,8 +77,12 @@ def draw_case(name: str, rng: np.random.Generator, options: BlindOptions) -> tup
 
 
 def draw_plan(rng: np.random.Generator, options: BlindOptions) -> Plan:
-    """Draw the kind of a case, its rig, effects, sensors, gap and noise."""
-    while True:
+    """Draw the kind of a case, its rig, effects, sensors, gap and noise.
+
+    Raises:
+        ParameterError: The options allow none.
+    """
+    for _ in range(PLANS):
         kind = "single" if options.leave_one_out else str(rng.choice(KINDS, p=options.shares))
         rig = str(rng.choice(["sdof", "damper", "joint"], p=options.rigs))
         pool = [
@@ -85,9 +98,6 @@ def draw_plan(rng: np.random.Generator, options: BlindOptions) -> Plan:
         weights = np.array([r.weight for r in pool])
         picked = rng.choice(len(pool), size=count, replace=False, p=weights / weights.sum()) if count else []
         recipes = tuple(pool[int(i)] for i in picked)
-        # two channels spoiled at once, or two errors of one number, are a calibration to be repeated, no diagnosis
-        if sum(r.site != "joint" for r in recipes) > 1:
-            continue
         sets = [s for s in options.sensors if all(not r.sensors or s in r.sensors for r in recipes)]
         if not sets:
             continue
@@ -97,11 +107,29 @@ def draw_plan(rng: np.random.Generator, options: BlindOptions) -> Plan:
             else ("joint" if r.n_coordinates == 2 else str(rng.choice(["axial", "torsional"])))
             for r in recipes
         )
+        if not _apart(recipes, places):
+            continue
         commanded = any(r.site == "actuator" for r in recipes) or (rig == "sdof" and rng.random() < 0.1)
         return Plan(
             kind, rig, recipes, places, "" if rig == "damper" else str(rng.choice(sets)), commanded,
             float(np.exp(rng.uniform(*np.log(options.gap)))), float(np.exp(rng.uniform(*np.log(options.noise)))),
         )  # fmt: skip
+    raise ParameterError(
+        f"no case can be drawn from effects {', '.join(options.effects) or 'of every kind'} with shares {options.shares} (none, "
+        f"single, double, foreign), rigs {options.rigs} and sensors {', '.join(options.sensors)}; allow more of them"
+    )
+
+
+def _apart(recipes: Sequence[Recipe], places: Sequence[str]) -> bool:
+    """Whether effects can be told to be several.
+
+    Two channels spoiled at once, or two errors of one number, are a calibration to be repeated, no diagnosis; and what holds
+    another effect at the same place is itself, with other parameters.
+    """
+    here = {r.name: place for r, place in zip(recipes, places, strict=True)}
+    return sum(r.site != "joint" for r in recipes) <= 1 and not any(
+        here.get(name) == here[r.name] for r in recipes for name in r.holds
+    )
 
 
 def _attempt(
@@ -126,8 +154,7 @@ def _attempt(
     odds: dict[str, Any] = {}
     if effects and options.detectability:
         odds = detectability(pure, bench.truth.values, {e.recipe.name: e.where for e in effects})
-    against = {"foreign": "log_odds_rival", "double": "log_odds_one"}.get(plan.kind, "log_odds_none")
-    if odds.get(against, np.inf) < EXPECTED:
+    if any(odds.get(against, np.inf) < EXPECTED for against in WRONG.get(plan.kind, ())):
         return None
     return case, _answer(bench, effects, runs, gaps, options) | {"detectability": odds}
 

@@ -93,6 +93,7 @@ class Recipe:
         target: Quantity a sensor effect acts on.
         weight: How often it is drawn.
         sensors: Sensor sets in which it means something; all where empty.
+        holds: Effects that it makes part of itself: both at one place are this effect again, with other parameters.
     """
 
     name: str
@@ -104,6 +105,7 @@ class Recipe:
     target: str = ""
     weight: float = 1.0
     sensors: tuple[str, ...] = ()
+    holds: tuple[str, ...] = ()
 
     @property
     def n_coordinates(self) -> int:
@@ -350,7 +352,9 @@ SHAKEN = ("sdof",)
 
 RECIPES: tuple[Recipe, ...] = (
     Recipe("coulomb_friction", "joint", _one("friction_force", _force, _slow), law=COULOMB, limit=limits.coulomb_limit),
-    Recipe("stribeck_friction", "joint", _stribeck, law=STRIBECK, limit=limits.stribeck_limit),
+    Recipe(
+        "stribeck_friction", "joint", _stribeck, law=STRIBECK, limit=limits.stribeck_limit, holds=("coulomb_friction",),
+    ),
     Recipe("presliding_friction", "joint", _presliding, law=LUGRE),
     Recipe("bouc_wen_hysteresis", "joint", _bouc_wen, law=BOUC_WEN),
     Recipe("gap", "joint", _gap, law=GAP),
@@ -365,7 +369,10 @@ RECIPES: tuple[Recipe, ...] = (
         _one("friction_per_displacement", lambda r: r.force / r.position, lambda r: 0.0, _slow),
         law=LOAD_DEPENDENT_FRICTION, limit=limits.load_dependent_limit,
     ),
-    Recipe("time_varying_friction", "joint", _time_varying, law=TIME_VARYING_FRICTION, limit=limits.time_varying_limit),
+    Recipe(
+        "time_varying_friction", "joint", _time_varying, law=TIME_VARYING_FRICTION, limit=limits.time_varying_limit,
+        holds=("coulomb_friction",),
+    ),
     Recipe(
         "stiffness_drift", "joint",
         _one("stiffness_rate", lambda r: r.stiffness / r.duration, lambda r: 0.0, signed=True), law=STIFFNESS_DRIFT,
