@@ -53,7 +53,7 @@ def test_free_models_find_nothing_beside_the_right_law():
 
 
 def test_several_effects_are_doubted_sooner_than_one():
-    lack = LackOfFit("memory", gain=20.0, freedom=3, p_value=4e-3, n_residuals=5000)
+    lack = LackOfFit("memory", gain=20.0, freedom=3, expected=3.0, p_value=4e-3, n_residuals=5000)
     assert not lack.significant(0.0)
     assert lack.significant(0.0, effects=2)
     assert not lack.significant(1e6, effects=2)  # laws are held to a hundredth of the force

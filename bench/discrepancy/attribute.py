@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -21,26 +21,27 @@ from bench.discrepancy.fit import Fit, fit
 from bench.discrepancy.grid_points import Point
 from bench.discrepancy.problem import FROM, Hypothesis, Placed, Problem
 from bench.discrepancy.screen import Ground, Screen
+from bench.discrepancy.search import (
+    IMMATERIAL,
+    SAME,
+    THREADS,
+    Search,
+    carry_on,
+    consistent,
+    converge,
+    key_of,
+    limit_of,
+    names,
+    shake,
+)
 from bench.discrepancy.structure import Structure
 
-THREADS = 2
 QUICK = 6
 """Iterations of a first fit; the best are carried on to convergence."""
-THOROUGH = 30
-"""Iterations of a fit that is carried on to convergence."""
-LOG_PRIOR_EFFECT = -3.4
-"""Log prior odds of one more effect: about one in the number of effects of the catalogue."""
-SIGNIFICANT = 4.0
-"""Standard deviations by which chi-squared may exceed its expectation before a hypothesis counts as refuted."""
-IMMATERIAL = 0.001
-"""Relative improvement of chi-squared that one more effect has to pay for, since the smoothing of stick-slip and the
-interpolation of loads are themselves only as good as that; records of extreme signal-to-noise ratio would else name trifles."""
 WORTH_A_FIT = 25.0
 """Screened gain in chi-squared from which one more effect could overcome its prior and its Occam factor."""
 NOTICEABLE = 15.0
 """Screened gain from which the first effect is fitted: noise alone lets the best of the catalogue gain so much in few cases."""
-HOPELESS = 3.0
-"""A first fit that leaves more than this many times the excess of the best one is not carried on."""
 SHORT = 0.15
 """Effects whose screened gain is less than this part of the best one are not fitted."""
 REFINED_EFFECTS = 12
@@ -49,22 +50,16 @@ REFINED_STARTS = 3
 """Grid points refined of each."""
 APART = 0.8
 """Distance of starts of an effect, in prior standard deviations of its grid parameters."""
-SAME = 0.3
-"""Distance within which two refined starts of an effect count as one."""
 NEARLY = 0.9
 """Further starts of an effect are worth a fit if they gain this part of what its best one does."""
 LEFT = 0.02
 """Part of a named effect's gain along the measured motion that a challenger may lack, besides twice what the effect leaves."""
-WITHIN_REACH = 30.0
-"""Difference in log posterior that carrying a first fit on to convergence may still make up."""
 REFUTED = 2.0
 """Reduced chi-squared from which the best hypothesis is so far off that its rivals are not fitted again: none of them will do."""
 STALLED = 0.7
 """If one more effect leaves more than this part of the excess of chi-squared, a further one is not tried."""
 UNPROMISING = 0.25
 """Part of the excess of a base that one more effect must promise to take away, or none is fitted beside it."""
-MODEL_ERROR = 0.02
-"""Relative excess of chi-squared that is laid to the smoothing and integration of the diagnosis itself."""
 
 OTHER_AXIS = {
     "displacement": "rotation",
@@ -75,63 +70,6 @@ OTHER_AXIS = {
     "angular_acceleration": "acceleration",
 }
 """Channels of the joint rig that one sensor measures along its two axes."""
-
-
-@dataclass
-class Search:
-    """What an attribution has found so far, for one problem.
-
-    Attributes:
-        problem: Records and priors.
-        fits: Fitted hypotheses by their set of keys.
-        converged: Keys of the fits carried on to convergence.
-        started: Where fits have begun.
-        first: Refined starts of single effects.
-    """
-
-    problem: Problem
-    fits: dict[frozenset, Fit] = field(default_factory=dict)
-    converged: set[frozenset] = field(default_factory=set)
-    started: set[tuple] = field(default_factory=set)
-    first: list[Point] = field(default_factory=list)
-
-    def start(self, base: Hypothesis, point: Point) -> bool:
-        """Note that a fit begins here; False where one has begun so near before."""
-        spread = [p.std for p in point.placed.effect.parameters]
-        place = tuple(int(x) for x in np.round(point.eta / spread / SAME))
-        mark = (key_of((*base, point.placed)), point.placed.key, place)
-        if mark in self.started:
-            return False
-        self.started.add(mark)
-        return True
-
-    def add(self, fitted: Fit) -> None:
-        """Keep a fit if it is the best of its hypothesis."""
-        key = key_of(fitted.hypothesis)
-        if key not in self.fits or fitted.cost < self.fits[key].cost:
-            self.fits[key] = fitted
-
-    def ranked(self, size: int | None = None) -> list[Fit]:
-        """Fits by decreasing posterior, of one number of effects or of all."""
-        chosen = [f for f in self.fits.values() if size is None or len(f.hypothesis) == size]
-        return sorted(chosen, key=lambda f: -posterior(f))
-
-
-def key_of(hypothesis: Hypothesis) -> frozenset:
-    """Key of a hypothesis, regardless of the order of its effects."""
-    return frozenset(placed.key for placed in hypothesis)
-
-
-def posterior(fitted: Fit) -> float:
-    """Log posterior of a hypothesis up to a constant."""
-    tolerance = 0.5 * IMMATERIAL * fitted.n_residuals
-    return fitted.log_evidence + (LOG_PRIOR_EFFECT - tolerance) * len(fitted.hypothesis)
-
-
-def consistent(fitted: Fit) -> bool:
-    """Whether the residuals of a fit are as small as the stated noise lets them be."""
-    spread = np.sqrt(2.0 / fitted.n_residuals)
-    return fitted.reduced < 1.0 + SIGNIFICANT * spread + MODEL_ERROR
 
 
 def placements(case: Case, structure: Structure, catalogue: Iterable[Effect]) -> list[Placed]:
@@ -237,6 +175,7 @@ def attribute(
         if problem.noise_stated and best.reduced < REFUTED:
             progress(f"rivals of {names(best.hypothesis)}")
             challenge(search, screen, pool)
+            shake(search, pool)
     return search
 
 
@@ -282,14 +221,6 @@ def prepare(
     return search, screen, screen.ranked()
 
 
-def names(hypothesis: Hypothesis) -> str:
-    """Readable names of a hypothesis."""
-    return (
-        " + ".join(p.effect.name + (f" ({p.place.name})" if p.place.name else "") for p in hypothesis)
-        or "nothing"
-    )
-
-
 def _extend(
     search: Search,
     screen: Screen,
@@ -332,7 +263,7 @@ def _extend(
             if placed.key not in own and inertia.get(placed.key, 0.0) > least:
                 tasks.append(((*base.hypothesis, placed), np.append(base.vector, 0.0)))
 
-    limit = _limit(search, size)
+    limit = limit_of(search, size)
 
     def quick(task: tuple[Hypothesis, np.ndarray]) -> Fit:
         iterations = QUICK if task[0][-1].effect.site == "joint" else 2 * QUICK
@@ -347,44 +278,6 @@ def _plain(effect: Effect) -> bool:
     """Whether an effect is a force with nothing but its size to be found: cheap to fit, and never to be lost to a law of seven
     parameters because its gain along a badly known motion was small."""
     return effect.site == "joint" and effect.n_coordinates == 1 and len(effect.parameters) == 1
-
-
-def carry_on(search: Search, pool: ThreadPoolExecutor, size: int, *, most: int) -> None:
-    """Carry the fits of one size that may still become the best on to convergence."""
-    for share in (HOPELESS, 0.0):
-        ranked = [f for f in search.ranked(size) if np.isfinite(f.cost)]
-        if not ranked:
-            return
-        limit = 1.5 * bool(share) + share * (ranked[0].reduced - 1.0)
-        chosen = [
-            f
-            for f in ranked[:most]
-            if key_of(f.hypothesis) not in search.converged
-            and (f.reduced < limit or posterior(f) > posterior(ranked[0]) - WITHIN_REACH)
-        ]
-        converge(search, pool, [(f.hypothesis, f.vector) for f in chosen])
-
-
-def converge(
-    search: Search, pool: ThreadPoolExecutor, tasks: Sequence[tuple[Hypothesis, np.ndarray]]
-) -> None:
-    """Fit hypotheses from starts to convergence, but for those that cannot come near the best."""
-
-    limits = {size: _limit(search, size) for size in {len(hypothesis) for hypothesis, _ in tasks}}
-
-    def thorough(task: tuple[Hypothesis, np.ndarray]) -> Fit:
-        limit = limits[len(task[0])]
-        return fit(search.problem, task[0], start=task[1], iterations=THOROUGH, limit=limit)
-
-    for fitted in pool.map(thorough, tasks):
-        search.add(fitted)
-        search.converged.add(key_of(fitted.hypothesis))
-
-
-def _limit(search: Search, size: int) -> float:
-    """Cost beyond which a fit of so many effects is of no more interest."""
-    best = min((f.cost for f in search.fits.values() if len(f.hypothesis) == size), default=np.inf)
-    return best + 4.0 * WITHIN_REACH + max(best - search.problem.n_residuals, 0.0)
 
 
 def challenge(search: Search, screen: Screen, pool: ThreadPoolExecutor, *, rounds: int = 2) -> None:

@@ -15,7 +15,6 @@ from pathlib import Path
 import numpy as np
 
 from bench.discrepancy import evidence
-from bench.discrepancy.attribute import names
 from bench.discrepancy.case import Case, read_case
 from bench.discrepancy.catalogue import CATALOGUE
 from bench.discrepancy.closure import CLOSURES
@@ -27,6 +26,7 @@ from bench.discrepancy.nominal_file import check_units
 from bench.discrepancy.problem import Problem
 from bench.discrepancy.quality import notes, refuse
 from bench.discrepancy.quantisation import recorded
+from bench.discrepancy.search import names
 from bench.discrepancy.shrink import gaps, nominal_prediction
 from bench.discrepancy.start_estimates import start_warnings
 from bench.discrepancy.structure import structure_of

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bench.discrepancy.attribute import names
 from bench.discrepancy.effect import unit_of
 from bench.discrepancy.explain import Explanation
 from bench.discrepancy.problem import Placed
+from bench.discrepancy.search import names
 from bench.discrepancy.verdict import Estimate, Kind, NamedEffect, Ranked
 
 RIVAL = 4.6
@@ -173,7 +173,7 @@ def _short_of_it(best: Explanation) -> str:
     }
     return (
         f"and no catalogued effect is it: {nearest} comes near, but a force {free.get(lack.model, f'of {lack.model}')} on top of "
-        f"it lowers chi-squared by {lack.gain:.0f}, where noise would let it gain {lack.freedom}."
+        f"it lowers chi-squared by {lack.gain:.0f}, where noise would let it gain {lack.expected:.0f}."
     )
 
 

@@ -17,22 +17,14 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from bench.discrepancy.attribute import (
-    IMMATERIAL,
     QUICK,
     REFINED_STARTS,
     STALLED,
-    THREADS,
-    WITHIN_REACH,
     WORTH_A_FIT,
-    Search,
     about,
     attribute,
-    consistent,
-    converge,
     leading,
-    names,
     placements,
-    posterior,
     prepare,
     reduce_best,
     refined,
@@ -45,6 +37,16 @@ from bench.discrepancy.lack_of_fit import LackOfFit, lack_of_fit
 from bench.discrepancy.prepared import whitened
 from bench.discrepancy.problem import Array, Hypothesis, Problem, band_bins
 from bench.discrepancy.screen import Screen
+from bench.discrepancy.search import (
+    IMMATERIAL,
+    THREADS,
+    WITHIN_REACH,
+    Search,
+    consistent,
+    converge,
+    names,
+    posterior,
+)
 from bench.discrepancy.start_estimates import predict
 from bench.discrepancy.structure import Structure, structure_of
 

@@ -66,6 +66,13 @@ def start_vector(problem: Problem, etas: Sequence[Array], deviations: Array | No
     return np.concatenate([head, *etas])
 
 
+def free_entries(problem: Problem, hypothesis: Hypothesis, fixed: Array | None = None) -> NDArray[np.int64]:
+    """Indices of the entries of a vector that move, but for those `fixed` (n,) besides."""
+    shapes = [p.fixed for placed in hypothesis for p in placed.effect.parameters]
+    held = np.append(problem.spread == 0, np.array(shapes, dtype=bool))
+    return np.flatnonzero(np.logical_not(held if fixed is None else held | fixed))
+
+
 def fit(
     problem: Problem,
     hypothesis: Hypothesis,
@@ -96,11 +103,7 @@ def fit(
     """
     prior = Prior(*problem.prior(hypothesis))
     n = len(problem.nominal)
-    held = np.zeros(len(prior.mean), dtype=bool) if fixed is None else fixed.copy()
-    held[:n] |= problem.spread == 0
-    names = [p for placed in hypothesis for p in placed.effect.parameters]
-    held[n:] |= np.array([p.fixed for p in names], dtype=bool)
-    free = np.flatnonzero(np.logical_not(held))
+    free = free_entries(problem, hypothesis, fixed)
     found = minimise(
         lambda vector: problem.residual(hypothesis, vector),
         np.clip(start, prior.low, prior.high),

@@ -18,7 +18,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.linalg import block_diag
 
-from bench.discrepancy.attribute import names
 from bench.discrepancy.case import CaseRecord
 from bench.discrepancy.effect import Effect
 from bench.discrepancy.evidence import weights
@@ -27,6 +26,7 @@ from bench.discrepancy.prepared import RecordData, whitened
 from bench.discrepancy.problem import Array, Placed, Problem
 from bench.discrepancy.proposals import LEVELS, Proposal, candidates, feasible, limits_of
 from bench.discrepancy.reasons import why_alike, why_none
+from bench.discrepancy.search import names
 from bench.excitation.bayes_factor import Contrast, expected_log_bayes_factor
 
 ODDS = 99.0

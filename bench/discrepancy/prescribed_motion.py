@@ -14,8 +14,9 @@ from bench.discrepancy.system import Motion
 
 Array = NDArray[np.float64]
 
-DOUBT = 3.0
-"""Standard deviations of the velocity of a prescribed motion below which its direction is in doubt."""
+DOUBT = 4.5
+"""Standard deviations of the velocity of a prescribed motion below which its direction is in doubt: a record has dozens of
+reversals, and a single sample on the wrong side of one is off by all of the friction."""
 MOST_IN_DOUBT = 0.7
 """Part of a record that may be in doubt; a motion so slow or so noisy is compared as it is."""
 REVERSAL = 2.0

@@ -7,6 +7,7 @@ and leaves residuals at the resonance, correlated between channels, which a plai
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -351,6 +352,13 @@ class Problem:
                 return np.full_like(force, np.nan)
             force += driven @ elements.rows
         return self.sensed(hypothesis, etas, force, record.step)
+
+    def forgetful(self) -> Problem:
+        """A copy without what is kept by the name of a record: for records of the same names with other samples."""
+        out = copy.copy(self)
+        out.motions = {}
+        out.__dict__["_loads"] = {}
+        return out
 
     def observe(self, hypothesis: Hypothesis, etas: list[Array], motion: Motion, step: float) -> Array:
         """Channels (n, n_channels) of a motion, sensor effects included."""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from bench.discrepancy.attribute import names
 from bench.discrepancy.effect import unit_of
 from bench.discrepancy.explain import Explanation
 from bench.discrepancy.problem import Array, Placed, Problem
+from bench.discrepancy.search import names
 
 BARELY = 0.9
 """Part of the largest displacement from which on a clearance counts as hardly exceeded."""

@@ -1,0 +1,214 @@
+"""The state of a search for explanations: fitted hypotheses, how they rank, and fits carried on to their end."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.discrepancy.fit import Fit, fit, free_entries
+from bench.discrepancy.grid_points import Point
+from bench.discrepancy.minimise import DIFFERENCES
+from bench.discrepancy.problem import Array, Hypothesis, Problem
+
+THREADS = 2
+THOROUGH = 30
+"""Iterations of a fit that is carried on to convergence."""
+LOG_PRIOR_EFFECT = -3.4
+"""Log prior odds of one more effect: about one in the number of effects of the catalogue."""
+SIGNIFICANT = 4.0
+"""Standard deviations by which chi-squared may exceed its expectation before a hypothesis counts as refuted."""
+IMMATERIAL = 0.001
+"""Relative improvement of chi-squared that one more effect has to pay for, since the smoothing of stick-slip and the
+interpolation of loads are themselves only as good as that; records of extreme signal-to-noise ratio would else name trifles."""
+HOPELESS = 3.0
+"""A first fit that leaves more than this many times the excess of the best one is not carried on."""
+WITHIN_REACH = 30.0
+"""Difference in log posterior that carrying a first fit on to convergence may still make up."""
+MODEL_ERROR = 0.02
+"""Relative excess of chi-squared that is laid to the smoothing and integration of the diagnosis itself."""
+SAME = 0.3
+"""Distance within which two refined starts of an effect count as one."""
+SHAKEN = 4
+"""Hypotheses that are shaken, at most."""
+SHAKES, IN_VAIN, DRAWS = 6, 2, 48
+"""Rounds, those in vain after which there is no further one, and draws of a round."""
+SCALES = ((1.0,), (2.0,), (4.0,))
+"""Sizes of the draws' moves, in posterior standard deviations."""
+DENT = 1.0
+"""Decrease of the cost below which a round was in vain."""
+
+
+@dataclass
+class Search:
+    """What an attribution has found so far, for one problem.
+
+    Attributes:
+        problem: Records and priors.
+        fits: Fitted hypotheses by their set of keys.
+        converged: Keys of the fits carried on to convergence.
+        started: Where fits have begun.
+        first: Refined starts of single effects.
+    """
+
+    problem: Problem
+    fits: dict[frozenset, Fit] = field(default_factory=dict)
+    converged: set[frozenset] = field(default_factory=set)
+    started: set[tuple] = field(default_factory=set)
+    first: list[Point] = field(default_factory=list)
+
+    def start(self, base: Hypothesis, point: Point) -> bool:
+        """Note that a fit begins here; False where one has begun so near before."""
+        spread = [p.std for p in point.placed.effect.parameters]
+        place = tuple(int(x) for x in np.round(point.eta / spread / SAME))
+        mark = (key_of((*base, point.placed)), point.placed.key, place)
+        if mark in self.started:
+            return False
+        self.started.add(mark)
+        return True
+
+    def add(self, fitted: Fit) -> None:
+        """Keep a fit if it is the best of its hypothesis."""
+        key = key_of(fitted.hypothesis)
+        if key not in self.fits or fitted.cost < self.fits[key].cost:
+            self.fits[key] = fitted
+
+    def ranked(self, size: int | None = None) -> list[Fit]:
+        """Fits by decreasing posterior, of one number of effects or of all."""
+        chosen = [f for f in self.fits.values() if size is None or len(f.hypothesis) == size]
+        return sorted(chosen, key=lambda f: -posterior(f))
+
+
+def key_of(hypothesis: Hypothesis) -> frozenset:
+    """Key of a hypothesis, regardless of the order of its effects."""
+    return frozenset(placed.key for placed in hypothesis)
+
+
+def posterior(fitted: Fit) -> float:
+    """Log posterior of a hypothesis up to a constant."""
+    tolerance = 0.5 * IMMATERIAL * fitted.n_residuals
+    return fitted.log_evidence + (LOG_PRIOR_EFFECT - tolerance) * len(fitted.hypothesis)
+
+
+def consistent(fitted: Fit) -> bool:
+    """Whether the residuals of a fit are as small as the stated noise lets them be."""
+    spread = np.sqrt(2.0 / fitted.n_residuals)
+    return fitted.reduced < 1.0 + SIGNIFICANT * spread + MODEL_ERROR
+
+
+def names(hypothesis: Hypothesis) -> str:
+    """Readable names of a hypothesis."""
+    return (
+        " + ".join(p.effect.name + (f" ({p.place.name})" if p.place.name else "") for p in hypothesis)
+        or "nothing"
+    )
+
+
+def carry_on(search: Search, pool: ThreadPoolExecutor, size: int, *, most: int) -> None:
+    """Carry the fits of one size that may still become the best on to convergence."""
+    for share in (HOPELESS, 0.0):
+        ranked = [f for f in search.ranked(size) if np.isfinite(f.cost)]
+        if not ranked:
+            return
+        limit = 1.5 * bool(share) + share * (ranked[0].reduced - 1.0)
+        chosen = [
+            f
+            for f in ranked[:most]
+            if key_of(f.hypothesis) not in search.converged
+            and (f.reduced < limit or posterior(f) > posterior(ranked[0]) - WITHIN_REACH)
+        ]
+        converge(search, pool, [(f.hypothesis, f.vector) for f in chosen])
+
+
+def converge(
+    search: Search, pool: ThreadPoolExecutor, tasks: Sequence[tuple[Hypothesis, np.ndarray]]
+) -> None:
+    """Fit hypotheses from starts to convergence, but for those that cannot come near the best."""
+
+    limits = {size: limit_of(search, size) for size in {len(hypothesis) for hypothesis, _ in tasks}}
+
+    def thorough(task: tuple[Hypothesis, np.ndarray]) -> Fit:
+        limit = limits[len(task[0])]
+        return fit(search.problem, task[0], start=task[1], iterations=THOROUGH, limit=limit)
+
+    for fitted in pool.map(thorough, tasks):
+        search.add(fitted)
+        search.converged.add(key_of(fitted.hypothesis))
+
+
+def limit_of(search: Search, size: int) -> float:
+    """Cost beyond which a fit of so many effects is of no more interest."""
+    best = min((f.cost for f in search.fits.values() if len(f.hypothesis) == size), default=np.inf)
+    return best + 4.0 * WITHIN_REACH + max(best - search.problem.n_residuals, 0.0)
+
+
+def shake(search: Search, pool: ThreadPoolExecutor) -> None:
+    """Fit hypotheses near the best again, from draws about where they ended, if friction sticks in them.
+
+    Whether a slider stops at a reversal hangs on trifles, so the cost is rough: a descent ends in the first of many dents, some
+    tens above the deepest one, and which of two laws has found the deeper dent says nothing of the laws.
+
+    Args:
+        search: Fits so far; better ones take their places.
+        pool: Threads.
+    """
+    ranked = search.ranked()
+    for fitted in ranked[:SHAKEN]:
+        if posterior(fitted) > posterior(ranked[0]) - WITHIN_REACH and _sticks(fitted):
+            _shaken(search, fitted, pool)
+
+
+def _sticks(fitted: Fit) -> bool:
+    return any(placed.effect.limit is not None for placed in fitted.hypothesis)
+
+
+def _shaken(search: Search, fitted: Fit, pool: ThreadPoolExecutor) -> None:
+    problem, hypothesis = search.problem, fitted.hypothesis
+    mean, std, low, high = problem.prior(hypothesis)
+    free = free_entries(problem, hypothesis)
+    rng = np.random.default_rng(0)
+
+    def cost(vector: Array) -> float:
+        residual = problem.residual(hypothesis, vector)
+        return float(residual @ residual + np.sum(((vector - mean) / std) ** 2))
+
+    def again_from(start: Array) -> Fit:
+        return fit(problem, hypothesis, start=start, iterations=THOROUGH)
+
+    in_vain = 0
+    for _ in range(SHAKES):
+        spread = np.linalg.cholesky(_coarse_covariance(problem, fitted, free, pool))
+        moves = rng.standard_normal((DRAWS, len(free))) @ spread.T * np.resize(SCALES, (DRAWS, 1))
+        draws = np.repeat(fitted.vector[None], DRAWS, axis=0)
+        draws[:, free] += moves
+        draws = np.clip(draws, low, high)
+        best = draws[np.argsort(list(pool.map(cost, draws)))[:THREADS]]
+        again = min(pool.map(again_from, best), key=lambda f: f.cost)
+        search.add(again)
+        in_vain = in_vain + 1 if fitted.cost - again.cost < DENT else 0
+        if in_vain == IN_VAIN:
+            return
+        fitted = min(fitted, again, key=lambda f: f.cost)
+
+
+def _coarse_covariance(
+    problem: Problem, fitted: Fit, free: NDArray[np.int64], pool: ThreadPoolExecutor
+) -> Array:
+    """Posterior covariance (n_free, n_free) of a fit by differences that see over the dents."""
+    _, std, _, high = problem.prior(fitted.hypothesis)
+    residual = problem.residual(fitted.hypothesis, fitted.vector)
+
+    def column(k: int) -> Array:
+        moved = fitted.vector.copy()
+        step = DIFFERENCES[1] * std[k]
+        moved[k] += step if moved[k] + step <= high[k] else -step
+        changed = problem.residual(fitted.hypothesis, moved)
+        if changed.shape != residual.shape:
+            return np.zeros(len(residual))
+        return (changed - residual) / (moved[k] - fitted.vector[k])
+
+    jacobian = np.column_stack(list(pool.map(column, free)))
+    return np.linalg.inv(jacobian.T @ jacobian + np.diag(std[free] ** -2.0))
