@@ -169,8 +169,18 @@ def test_scoring_counts_what_the_protocol_asks(tmp_path):
     write("c", "effect", [("gap", "")], "single", [("cubic_stiffness", "")], [["cubic_stiffness", "gap"]])
     write("d", "effect", [("gap", "")], "none", [])
     write("e", "unknown", [], "foreign", [("strange", "")])
-    write("f", "effect", [("gap", "")], "double", [("gap", ""), ("coulomb_friction", "")])
+    write(
+        "f",
+        "effect",
+        [("gap", "")],
+        "double",
+        [("gap", ""), ("coulomb_friction", "")],
+        [["gap", "cubic_stiffness"]],
+    )
+    either = [["coulomb_friction + gap", "gap"]]
+    write("g", "effect", [("gap", "")], "double", [("gap", ""), ("coulomb_friction", "")], either)
     score = score_blind(tmp_path / "r", tmp_path / "a")
+    assert score.sets_hold_truth == pytest.approx(2 / 3)  # of "c", "f" and "g"
     assert score.exact == pytest.approx(2 / 3)
     assert score.family == 1.0
     assert score.false_alarms == 1.0
@@ -178,7 +188,7 @@ def test_scoring_counts_what_the_protocol_asks(tmp_path):
     assert score.both_named == 0.0
     assert score.place == pytest.approx(0.5)
     assert score.median_ratio == pytest.approx(2.0)
-    assert len(score.wrong) == 3
+    assert len(score.wrong) == 4
 
 
 def test_calibration_error_of_honest_and_of_boastful_probabilities():

@@ -98,18 +98,25 @@ def ranking(explanations: Sequence[Explanation]) -> tuple[Ranked, ...]:
 
 
 def indistinguishable(explanations: Sequence[Explanation]) -> tuple[tuple[str, ...], ...]:
-    """Sets of effect names that may stand for one another in the best explanation."""
+    """Sets of effect names that may stand for one another in the best explanation.
+
+    Where the records cannot tell how many effects there are, whole explanations stand for one another: "gap" and
+    "gap + cubic_stiffness". The nominal model alone is not among them; the probability of "none" speaks for it.
+    """
     best = explanations[0]
     own = {p.key: p for p in best.hypothesis}
     sets: dict[str, set[str]] = {}
     for other in explanations[1:]:
-        if _behind(explanations, other) > RIVAL:
+        if not other.hypothesis or _behind(explanations, other) > RIVAL:
             continue
         theirs = {p.key: p for p in other.hypothesis}
         lost = [own[key] for key in own.keys() - theirs.keys()]
         gained = [theirs[key] for key in theirs.keys() - own.keys()]
-        if len(lost) == 1 and len(gained) == 1 and lost[0].effect.name != gained[0].effect.name:
-            sets.setdefault(lost[0].effect.name, {lost[0].effect.name}).add(gained[0].effect.name)
+        if len(lost) != 1 or len(gained) != 1:
+            lost, gained = list(best.hypothesis), list(other.hypothesis)
+        label, instead = (" + ".join(sorted(p.effect.name for p in part)) for part in (lost, gained))
+        if label != instead:
+            sets.setdefault(label, {label}).add(instead)
     return tuple(tuple(sorted(entry)) for entry in sets.values())
 
 

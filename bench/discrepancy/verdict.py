@@ -142,7 +142,8 @@ class Verdict:
         verdict: "effect", "none" or "unknown".
         named: Effects that explain the record; empty unless the verdict is "effect".
         ranking: Effects by probability.
-        indistinguishable: Sets of names that the records cannot tell apart.
+        indistinguishable: Sets of names that the records cannot tell apart; of whole explanations, "gap + cubic_stiffness", where
+            they cannot tell how many effects there are.
         locations: Where the residuals gather, by decreasing share.
         gap: The gap, of the degree of freedom where it is widest.
         gaps: The gap of every degree of freedom.

@@ -354,7 +354,8 @@ def _places(scored: Sequence[Scored]) -> list[bool]:
 
 def _held(s: Scored) -> bool:
     """Whether the named effects and the sets they stand in hold all withheld effects."""
-    held = {n for n, _ in s.said}.union(*(set(entry) for entry in s.result["indistinguishable"]))
+    declared = (label.split(" + ") for entry in s.result["indistinguishable"] for label in entry)
+    held = {n for n, _ in s.said}.union(*declared)
     return {n for n, _ in s.truth} <= held
 
 
