@@ -44,6 +44,8 @@ NOTICEABLE = 15.0
 """Screened gain from which the first effect is fitted: noise alone lets the best of the catalogue gain so much in few cases."""
 SHORT = 0.15
 """Effects whose screened gain is less than this part of the best one are not fitted."""
+TRUSTED = 0.5
+"""The same part where one more effect is screened about a free run that follows the motion: gains are what they seem then."""
 REFINED_EFFECTS = 12
 """Effects whose grid points are refined along the measured motion."""
 REFINED_STARTS = 3
@@ -55,7 +57,8 @@ NEARLY = 0.9
 LEFT = 0.02
 """Part of a named effect's gain along the measured motion that a challenger may lack, besides twice what the effect leaves."""
 REFUTED = 2.0
-"""Reduced chi-squared from which the best hypothesis is so far off that its rivals are not fitted again: none of them will do."""
+"""Reduced chi-squared from which the best hypothesis is so far off that its rivals are not fitted again: none of them will do.
+Below it, free runs miss the motion by less than the noise, and tell it better than the records do."""
 STALLED = 0.7
 """If one more effect leaves more than this part of the excess of chi-squared, a further one is not tried."""
 UNPROMISING = 0.25
@@ -172,7 +175,7 @@ def attribute(
             _extend(search, screen, ranked[: 4 - size], pool, count=6 - size)
             reduce_best(search, pool)
         best = search.ranked()[0]
-        if problem.noise_stated and best.reduced < REFUTED:
+        if problem.noise_stated and near(best):
             progress(f"rivals of {names(best.hypothesis)}")
             challenge(search, screen, pool)
             shake(search, pool)
@@ -194,13 +197,19 @@ def _at_ease(fitted: Fit, problem: Problem) -> bool:
     return consistent(fitted) and fitted.cost - fitted.chi2 < len(problem.nominal) + WORTH_A_FIT / 2
 
 
-def _explained(base: Fit, problem: Problem) -> bool:
-    """Whether what a base leaves is noise; of the nominal model alone, whether it is at ease with that."""
-    return consistent(base) if base.hypothesis else _at_ease(base, problem)
+def _followed(base: Fit, problem: Problem) -> bool:
+    """Whether the free run of a base follows the motion better than the records tell it; the nominal model alone is only
+    asked whether it is at ease with what it leaves."""
+    return near(base) if base.hypothesis else _at_ease(base, problem)
+
+
+def near(fitted: Fit) -> bool:
+    """Whether the free run of a fit is off by less than the noise."""
+    return fitted.reduced < REFUTED
 
 
 def about(screen: Screen, base: Fit, *, explained: bool) -> Screen:
-    """The screening that tells what a base lacks, whether or not it explains the records as it stands."""
+    """The screening that tells what a base lacks: about its free run where that follows the motion, else about the measured one."""
     spoilt = any(placed.effect.site == "sensor" for placed in base.hypothesis)
     return screen.beside(base, simulated=explained) if spoilt or explained else screen
 
@@ -236,8 +245,9 @@ def _extend(
     size = len(bases[0].hypothesis) + 1
     for base in bases:
         named = base if base.hypothesis else None
-        local = about(screen, base, explained=_explained(base, problem))
-        ground = local.ground(named, simulated=named is not None and consistent(base))
+        followed = _followed(base, problem)
+        local = about(screen, base, explained=followed)
+        ground = local.ground(named, simulated=named is not None and followed)
         solved = [p for p in local.ranked(named, ground) if not among or p.placed.key in among]
         points = refined(local, ground, solved, pool)
         if not named:
@@ -249,16 +259,17 @@ def _extend(
             continue
         # a screening can promise more than there is
         most = min(most, max(excess, WORTH_A_FIT))
-        chosen = leading(points, count, SHORT * most)
+        short = TRUSTED if named and followed else SHORT
+        chosen = leading(points, count, short * most)
         if not named and not among:
             begun = {p.placed.key for p in chosen}
-            simplest = [p for p in solved if _plain(p.placed.effect) and p.placed.key not in begun]
+            simplest = [p for p in solved if plain(p.placed.effect) and p.placed.key not in begun]
             chosen += leading(simplest, count, WORTH_A_FIT, starts=1)
         for point in chosen:
             if search.start(base.hypothesis, point):
                 tasks.append(((*base.hypothesis, point.placed), local.starts(point, ground, named)))
         own = {placed.key for placed in base.hypothesis}
-        least = min(SHORT * most, WORTH_A_FIT) if consistent(base) else SHORT * most
+        least = min(short * most, WORTH_A_FIT) if consistent(base) else short * most
         for placed in screen.inertia:
             if placed.key not in own and inertia.get(placed.key, 0.0) > least:
                 tasks.append(((*base.hypothesis, placed), np.append(base.vector, 0.0)))
@@ -274,7 +285,7 @@ def _extend(
     carry_on(search, pool, size, most=4)
 
 
-def _plain(effect: Effect) -> bool:
+def plain(effect: Effect) -> bool:
     """Whether an effect is a force with nothing but its size to be found: cheap to fit, and never to be lost to a law of seven
     parameters because its gain along a badly known motion was small."""
     return effect.site == "joint" and effect.n_coordinates == 1 and len(effect.parameters) == 1

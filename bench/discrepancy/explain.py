@@ -20,11 +20,14 @@ from bench.discrepancy.attribute import (
     QUICK,
     REFINED_STARTS,
     STALLED,
+    TRUSTED,
     WORTH_A_FIT,
     about,
     attribute,
     leading,
+    near,
     placements,
+    plain,
     prepare,
     reduce_best,
     refined,
@@ -241,8 +244,8 @@ def _coupled(
             if len(base.hypothesis) > 1 and base.reduced > HOPELESS_THIRD:
                 break
             progress(f"{names(base.hypothesis)}, chi-squared {base.reduced:.3g}")
-            local = about(screen, base, explained=consistent(base))
-            ground = local.ground(base, simulated=consistent(base))
+            local = about(screen, base, explained=near(base))
+            ground = local.ground(base, simulated=near(base))
             solved = local.ranked(base, ground)
             if base.reduced > HOPELESS_COUPLING:
                 solved = [p for p in solved if p.placed.key in coupling]
@@ -260,7 +263,12 @@ def _coupled(
                     whole, (*base.hypothesis, point.placed), start=start, iterations=QUICK, exact=False
                 )
 
-            trials = sorted(pool.map(extended, leading(worth, 4, 0.0, starts=1)), key=lambda f: f.cost)
+            least = TRUSTED * worth[0].gain if near(base) else WORTH_A_FIT
+            chosen = leading(worth, 4, least, starts=1)
+            begun = {p.placed.key for p in chosen}
+            simplest = [p for p in solved if plain(p.placed.effect) and p.placed.key not in begun]
+            chosen += leading(simplest, 4, least, starts=1)
+            trials = sorted(pool.map(extended, chosen), key=lambda f: f.cost)
             some = trials[: CONVERGED_PAIRS if len(base.hypothesis) == 1 else CONVERGED_BEYOND]
             converge(kept, pool, [(f.hypothesis, f.vector) for f in some])
             reduce_best(kept, pool)
