@@ -33,6 +33,7 @@ from bench.discrepancy.search import (
     limit_of,
     names,
     shake,
+    sticks,
 )
 from bench.discrepancy.structure import Structure
 
@@ -197,10 +198,15 @@ def _at_ease(fitted: Fit, problem: Problem) -> bool:
     return consistent(fitted) and fitted.cost - fitted.chi2 < len(problem.nominal) + WORTH_A_FIT / 2
 
 
-def _followed(base: Fit, problem: Problem) -> bool:
-    """Whether the free run of a base follows the motion better than the records tell it; the nominal model alone is only
-    asked whether it is at ease with what it leaves."""
-    return near(base) if base.hypothesis else _at_ease(base, problem)
+def followed(base: Fit, problem: Problem) -> bool:
+    """Whether one more effect is best screened along the free run of a base, since that tells the motion better than the records.
+
+    Where friction sticks it is not, unless all is explained: a small force more moves the stops, which no linear response does.
+    The nominal model alone is asked whether it is at ease with what it leaves.
+    """
+    if not base.hypothesis:
+        return _at_ease(base, problem)
+    return consistent(base) or (near(base) and not sticks(base))
 
 
 def near(fitted: Fit) -> bool:
@@ -245,9 +251,9 @@ def _extend(
     size = len(bases[0].hypothesis) + 1
     for base in bases:
         named = base if base.hypothesis else None
-        followed = _followed(base, problem)
-        local = about(screen, base, explained=followed)
-        ground = local.ground(named, simulated=named is not None and followed)
+        along = followed(base, problem)
+        local = about(screen, base, explained=along)
+        ground = local.ground(named, simulated=named is not None and along)
         solved = [p for p in local.ranked(named, ground) if not among or p.placed.key in among]
         points = refined(local, ground, solved, pool)
         if not named:
@@ -259,7 +265,7 @@ def _extend(
             continue
         # a screening can promise more than there is
         most = min(most, max(excess, WORTH_A_FIT))
-        short = TRUSTED if named and followed else SHORT
+        short = TRUSTED if named and along else SHORT
         chosen = leading(points, count, short * most)
         if not named and not among:
             begun = {p.placed.key for p in chosen}

@@ -24,8 +24,8 @@ from bench.discrepancy.attribute import (
     WORTH_A_FIT,
     about,
     attribute,
+    followed,
     leading,
-    near,
     placements,
     plain,
     prepare,
@@ -244,8 +244,9 @@ def _coupled(
             if len(base.hypothesis) > 1 and base.reduced > HOPELESS_THIRD:
                 break
             progress(f"{names(base.hypothesis)}, chi-squared {base.reduced:.3g}")
-            local = about(screen, base, explained=near(base))
-            ground = local.ground(base, simulated=near(base))
+            along = followed(base, whole)
+            local = about(screen, base, explained=along)
+            ground = local.ground(base, simulated=along)
             solved = local.ranked(base, ground)
             if base.reduced > HOPELESS_COUPLING:
                 solved = [p for p in solved if p.placed.key in coupling]
@@ -263,7 +264,7 @@ def _coupled(
                     whole, (*base.hypothesis, point.placed), start=start, iterations=QUICK, exact=False
                 )
 
-            least = TRUSTED * worth[0].gain if near(base) else WORTH_A_FIT
+            least = TRUSTED * worth[0].gain if along else WORTH_A_FIT
             chosen = leading(worth, 4, least, starts=1)
             begun = {p.placed.key for p in chosen}
             simplest = [p for p in solved if plain(p.placed.effect) and p.placed.key not in begun]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bench.discrepancy.problem import Array, Placed
 
@@ -22,13 +23,13 @@ class Node(NamedTuple):
     Attributes:
         placed: The effect.
         eta: Parameters with unit amplitude.
-        columns: (n, k) whitened responses that span the effect at this shape.
+        columns: (n, k) whitened responses that span the effect at this shape, in single precision.
         gram: (k, k) their products.
     """
 
     placed: Placed
     eta: Array
-    columns: Array
+    columns: NDArray[np.floating]
     gram: Array
 
 

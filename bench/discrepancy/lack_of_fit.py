@@ -20,6 +20,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.signal import lfilter
 from scipy.stats import chi2
 
@@ -91,51 +92,72 @@ def lack_of_fit(problem: Problem, fitted: Fit) -> LackOfFit:
     """
     screen = Screen(problem, ()).beside(fitted, simulated=True)
     ground = screen.ground(fitted, simulated=True)
-    rest = ground.left[: len(ground.residual)]
-    parts: dict[str, list[Array]] = {}
-    for place in (p for p in problem.structure.places if len(p.rows) == 1):
-        for model, columns in free_responses(screen, place).items():
-            parts.setdefault(model, []).append(columns)
-    models = {model: np.column_stack(columns) for model, columns in parts.items()}
-    models["any"] = np.column_stack(list(models.values()))
-    bases = {model: _basis(columns, ground) for model, columns in models.items()}
+    free = _free(screen, ground)
+    seen = free.columns.T @ ground.left[: len(ground.residual)]
 
     def telling(expected: Mapping[str, float]) -> LackOfFit:
-        tests = [_tested(model, basis, rest, expected[model], len(bases)) for model, basis in bases.items()]
+        tests = []
+        for model, gain in free.gains(seen).items():
+            freedom, mean = free.freedom(model), expected[model]
+            p_value = len(free.bases) * float(chi2.sf(gain * freedom / mean, freedom))
+            tests.append(LackOfFit(model, gain, freedom, mean, min(p_value, 1.0), len(ground.residual)))
         return min(tests, key=lambda test: (test.p_value, -test.gain))
 
-    found = telling({model: basis.shape[1] for model, basis in bases.items()})
+    found = telling({model: max(free.freedom(model), 1) for model in free.bases})
     if found.p_value < SEVERAL and np.any(problem.load_noise > 0.0):
-        found = telling(_expected(problem, fitted, bases))
+        found = telling(_expected(problem, fitted, free))
     return found
 
 
-def _basis(columns: Array, ground: Ground) -> Array:
-    """Orthonormal basis (n_residuals, freedom) of what a free model can change and the explanation's parameters cannot."""
-    size = np.linalg.norm(columns, axis=0)
-    columns = columns[:, size > 0.0] / size[size > 0.0]
+class _Free(NamedTuple):
+    """Free models of a force, as what they can change and an explanation's parameters cannot.
+
+    Attributes:
+        columns: (n_residuals, k) responses to the coefficients of all models.
+        bases: Model to the indices of its columns, and the matrix (k_model, freedom) that makes an orthonormal basis of them.
+    """
+
+    columns: Array
+    bases: dict[str, tuple[NDArray[np.int64], Array]]
+
+    def freedom(self, model: str) -> int:
+        """Number of coefficients of a model that records can tell."""
+        return self.bases[model][1].shape[1]
+
+    def gains(self, seen: Array) -> dict[str, float]:
+        """Decrease of chi-squared with each model, from the products (k,) of the columns and the residuals."""
+        return {m: float(np.sum((basis.T @ seen[own]) ** 2)) for m, (own, basis) in self.bases.items()}
+
+
+def _free(screen: Screen, ground: Ground) -> _Free:
+    """Free models at all places of one coordinate, and all of them at once, beside what an explanation leaves."""
+    models: list[str] = []
+    parts: list[Array] = []
+    for place in (p for p in screen.problem.structure.places if len(p.rows) == 1):
+        for model, responses in free_responses(screen, place).items():
+            models += [model] * responses.shape[1]
+            parts.append(responses)
+    columns = np.column_stack(parts)
+    columns /= np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
     columns -= ground.head @ (ground.head.T @ columns)
-    basis, singular, _ = np.linalg.svd(columns, full_matrices=False)
-    return basis[:, singular > NEGLIGIBLE * np.sqrt(len(singular))]
+    products = columns.T @ columns
+    bases = {}
+    for model in (*dict.fromkeys(models), "any"):
+        own = np.flatnonzero([model in (m, "any") for m in models])
+        squares, vectors = np.linalg.eigh(products[np.ix_(own, own)])
+        kept = squares > NEGLIGIBLE**2 * len(own)
+        bases[model] = own, vectors[:, kept] / np.sqrt(squares[kept])
+    return _Free(columns, bases)
 
 
-def _tested(model: str, basis: Array, rest: Array, expected: float, count: int) -> LackOfFit:
-    """Score test of one free model out of `count`, whose coefficients noise makes gain so much."""
-    gain, freedom = float(np.sum((basis.T @ rest) ** 2)), basis.shape[1]
-    scaled = gain * freedom / max(expected, 1e-300)
-    return LackOfFit(
-        model, gain, freedom, expected, min(count * float(chi2.sf(scaled, freedom)), 1.0), len(rest)
-    )
-
-
-def _expected(problem: Problem, fitted: Fit, bases: Mapping[str, Array]) -> dict[str, float]:
+def _expected(problem: Problem, fitted: Fit, free: _Free) -> dict[str, float]:
     """What each free model gains on average from noise that has passed an explanation; at least a unit for every coefficient.
 
     The same draws pass the linear model as well, from which it is known what they gain on average.
     """
     rng = np.random.default_rng(0)
     n = len(problem.nominal)
-    gains = {model: np.zeros(2) for model in bases}
+    gains = dict.fromkeys(free.bases, 0.0), dict.fromkeys(free.bases, 0.0)
     clean = [
         (problem.simulate(fitted.hypothesis, fitted.vector, r), problem.simulate((), fitted.vector[:n], r))
         for r in problem.records
@@ -156,14 +178,16 @@ def _expected(problem: Problem, fitted: Fit, bases: Mapping[str, Array]) -> dict
             )
             for parts, run, without in zip(passed, noisy, runs, strict=True):
                 parts.append(whitened(own + run - without, data))
-        residuals = np.column_stack([np.concatenate(parts) for parts in passed])
-        if not np.isfinite(residuals).all():
+        residuals = [np.concatenate(parts) for parts in passed]
+        if not all(np.isfinite(residual).all() for residual in residuals):
             continue
-        for model, basis in bases.items():
-            gains[model] += np.sum((basis.T @ residuals) ** 2, axis=0)
+        for total, residual in zip(gains, residuals, strict=True):
+            for model, gain in free.gains(free.columns.T @ residual).items():
+                total[model] += gain
+    behind, linear = gains
     return {
-        model: basis.shape[1] * max(float(gains[model][0] / gains[model][1]), 1.0)
-        for model, basis in bases.items()
+        model: max(free.freedom(model), 1) * max(behind[model] / max(linear[model], 1e-300), 1.0)
+        for model in free.bases
     }
 
 

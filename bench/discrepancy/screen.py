@@ -262,7 +262,9 @@ class Screen:
         # a hidden resonance can make more of a record than rounding leaves of anything else
         if not np.abs(columns).max() < LARGEST or not np.any(columns):
             return None
-        return Node(placed, eta, columns, columns.T @ columns)
+        # hundreds of grid points are kept: seven digits are enough, if the products are those of the rounded columns
+        columns = columns.astype(np.float32).astype(np.float64)
+        return Node(placed, eta, columns.astype(np.float32), columns.T @ columns)
 
     def ground(self, base: Fit | None = None, *, simulated: bool = False) -> Ground:
         """What a base hypothesis leaves.

@@ -157,11 +157,12 @@ def shake(search: Search, pool: ThreadPoolExecutor) -> None:
     """
     ranked = search.ranked()
     for fitted in ranked[:SHAKEN]:
-        if posterior(fitted) > posterior(ranked[0]) - WITHIN_REACH and _sticks(fitted):
+        if posterior(fitted) > posterior(ranked[0]) - WITHIN_REACH and sticks(fitted):
             _shaken(search, fitted, pool)
 
 
-def _sticks(fitted: Fit) -> bool:
+def sticks(fitted: Fit) -> bool:
+    """Whether a hypothesis holds friction that is set-valued at rest."""
     return any(placed.effect.limit is not None for placed in fitted.hypothesis)
 
 
