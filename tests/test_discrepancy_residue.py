@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from planted_cases import SAMPLE_RATE, bouc_wen_slope, motion_with, planted_case
 
-from bench.discrepancy import diagnose
-from bench.discrepancy.attribute import WORTH_A_FIT, attribute, placements
+from bench.discrepancy import BlindOptions, diagnose
+from bench.discrepancy.attribute import WORTH_A_FIT, attribute, followed, placements
+from bench.discrepancy.blind.cases import draw_case
 from bench.discrepancy.catalogue import CATALOGUE, effect_named
 from bench.discrepancy.closure import CLOSURES
 from bench.discrepancy.contradiction import contradicted
@@ -20,6 +22,7 @@ from bench.discrepancy.lack_of_fit import LackOfFit, lack_of_fit
 from bench.discrepancy.prepared import timed
 from bench.discrepancy.problem import Problem
 from bench.discrepancy.screen import Screen
+from bench.discrepancy.search import Search, shake
 from bench.discrepancy.signal_effects import delay, sensor_delay
 from bench.discrepancy.structure import structure_of
 
@@ -50,6 +53,53 @@ def test_free_models_find_nothing_beside_the_right_law():
     lack = lack_of_fit(problem, explained)
     assert not lack.significant(0.0)
     assert lack.p_value > 1e-3
+
+
+def sealed(index: int):
+    """A case of the seed whose 300 cases were published on 2026-11-22, and its true parameters by name."""
+    seed = int(np.random.default_rng([20261125, 0]).integers(2**62))
+    rng = np.random.default_rng([seed, index])
+    rng.bytes(16)
+    case, answer = draw_case("sealed", rng, BlindOptions(detectability=False))
+    return case, answer
+
+
+@pytest.mark.slow
+def test_noise_of_the_load_that_a_softening_spring_amplifies_is_no_missing_force():
+    case, answer = sealed(246)
+    assert [e["name"] for e in answer["effects"]] == ["cubic_stiffness"]
+    problem, explained = fitted(case, "cubic_stiffness", [-0.17])
+    taken_away = fit(problem, (), start=np.zeros(3)).chi2 - explained.chi2
+    assert not lack_of_fit(problem, explained).significant(taken_away)
+    problem.load_noise[:] = (
+        0.0  # as if a free model gained a unit for every coefficient, which it does behind a linear rig
+    )
+    lack = lack_of_fit(problem, explained)
+    assert lack.expected == lack.freedom
+    assert lack.significant(taken_away)
+
+
+@pytest.mark.slow
+def test_friction_that_sticks_is_shaken_out_of_the_dent_that_its_fit_ended_in():
+    case, answer = sealed(256)
+    assert [e["name"] for e in answer["effects"]] == ["coulomb_friction"]
+    problem, coulomb = fitted(case, "coulomb_friction", [-2.0])
+    search = Search(problem)
+    search.add(coulomb)
+    with ThreadPoolExecutor(2) as pool:
+        shake(search, pool)
+    assert search.ranked()[0].cost < coulomb.cost - 10.0
+
+
+def test_one_more_effect_is_screened_along_a_free_run_that_follows_the_motion_and_does_not_stick():
+    case = planted_case(lambda f: motion_with(f, one_relaxation, 1))
+    problem, relaxing = fitted(case, "viscoelastic_relaxation", [-2.2, -3.0])
+    friction = placements(case, problem.structure, [effect_named("coulomb_friction")])
+    assert followed(replace(relaxing, chi2=1.5 * relaxing.n_residuals), problem)
+    assert not followed(replace(relaxing, chi2=2.5 * relaxing.n_residuals), problem)
+    sticking = replace(relaxing, hypothesis=tuple(friction))
+    assert not followed(replace(sticking, chi2=1.5 * relaxing.n_residuals), problem)
+    assert followed(replace(sticking, chi2=relaxing.n_residuals), problem)
 
 
 def test_several_effects_are_doubted_sooner_than_one():

@@ -6,8 +6,8 @@ force of the velocity, their lowest products, any linear memory. All are linear 
 test costs linear runs only, and the explanation's own parameters are projected out to first order.
 
 The noise of measured loads passes the true laws on its way into the responses, not the linear model that whitens them: behind a
-softening spring at full swing a resonance answers it several times as strongly. Before an explanation is doubted, noise is
-drawn and sent through it, and what the free models find in that is no evidence.
+softening spring at full swing free models find a sixth more in it. Before an explanation is doubted, noise is drawn and sent
+through it, and what they find in that is no evidence.
 
 References:
     C. R. Rao, Large sample tests of statistical hypotheses, Proc. Cambridge Phil. Soc. 44 (1948) 50-57 (score test).

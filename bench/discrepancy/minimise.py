@@ -252,19 +252,53 @@ def _step(
     return None, damping
 
 
-def _jacobian(task: _Task, state: _State, difference: float) -> Array | None:
-    """Finite differences (n_residuals, n_free) by prior standard deviations; None where a run diverged."""
-    residual = state.residual
+def differences(
+    residual_at: Callable[[Array], Array],
+    vector: Array,
+    residual: Array,
+    *,
+    free: NDArray[np.int64],
+    steps: Array,
+    high: Array,
+    each: Callable = map,
+) -> Array | None:
+    """Finite differences of the residuals.
+
+    Args:
+        residual_at: Vector (n,) to residuals.
+        vector: Where they are taken, (n,).
+        residual: (n_residuals,) there.
+        free: (n_free,) indices of the entries that move.
+        steps: (n_free,) how far; backwards from a bound.
+        high: (n_free,) upper bounds.
+        each: Maps a function over the columns.
+
+    Returns:
+        (n_residuals, n_free) changes by the steps; None where a run diverged.
+    """
 
     def column(k: int) -> Array:
-        at = state.vector[task.free[k]]
-        delta = difference if at + difference * task.std[k] <= task.high[k] else -difference
-        moved = state.vector.copy()
-        moved[task.free[k]] += delta * task.std[k]
-        shifted = task.residual_at(moved)
-        return (shifted - residual) / delta if shifted.shape == residual.shape else np.full(1, np.nan)
+        moved = vector.copy()
+        sign = 1.0 if moved[free[k]] + steps[k] <= high[k] else -1.0
+        moved[free[k]] += sign * steps[k]
+        shifted = residual_at(moved)
+        return sign * (shifted - residual) if shifted.shape == residual.shape else np.full(1, np.nan)
 
-    columns = list(task.each(column, range(len(task.free))))
+    columns = list(each(column, range(len(free))))
     if any(c.shape != residual.shape for c in columns):
         return None
     return np.column_stack(columns) if columns else np.zeros((len(residual), 0))
+
+
+def _jacobian(task: _Task, state: _State, difference: float) -> Array | None:
+    """Finite differences (n_residuals, n_free) by prior standard deviations; None where a run diverged."""
+    changes = differences(
+        task.residual_at,
+        state.vector,
+        state.residual,
+        free=task.free,
+        steps=difference * task.std,
+        high=task.high,
+        each=task.each,
+    )
+    return None if changes is None else changes / difference

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from bench.discrepancy.fit import Fit, fit, free_entries
 from bench.discrepancy.grid_points import Point
-from bench.discrepancy.minimise import DIFFERENCES
+from bench.discrepancy.minimise import DIFFERENCES, differences
 from bench.discrepancy.problem import Array, Hypothesis, Problem
 
 THREADS = 2
@@ -181,10 +181,11 @@ def _shaken(search: Search, fitted: Fit, pool: ThreadPoolExecutor) -> None:
 
     in_vain = 0
     for _ in range(SHAKES):
-        spread = np.linalg.cholesky(_coarse_covariance(problem, fitted, free, pool))
-        moves = rng.standard_normal((DRAWS, len(free))) @ spread.T * np.resize(SCALES, (DRAWS, 1))
+        spread = _spread(fitted, problem, free, pool)
+        if spread is None:
+            return
         draws = np.repeat(fitted.vector[None], DRAWS, axis=0)
-        draws[:, free] += moves
+        draws[:, free] += rng.standard_normal((DRAWS, len(free))) @ spread * np.resize(SCALES, (DRAWS, 1))
         draws = np.clip(draws, low, high)
         best = draws[np.argsort(list(pool.map(cost, draws)))[:THREADS]]
         again = min(pool.map(again_from, best), key=lambda f: f.cost)
@@ -195,21 +196,20 @@ def _shaken(search: Search, fitted: Fit, pool: ThreadPoolExecutor) -> None:
         fitted = min(fitted, again, key=lambda f: f.cost)
 
 
-def _coarse_covariance(
-    problem: Problem, fitted: Fit, free: NDArray[np.int64], pool: ThreadPoolExecutor
-) -> Array:
-    """Posterior covariance (n_free, n_free) of a fit by differences that see over the dents."""
+def _spread(fitted: Fit, problem: Problem, free: NDArray[np.int64], pool: ThreadPoolExecutor) -> Array | None:
+    """What makes draws of the posterior (n_free, n_free) out of normal ones, by differences that see over the dents."""
     _, std, _, high = problem.prior(fitted.hypothesis)
-    residual = problem.residual(fitted.hypothesis, fitted.vector)
-
-    def column(k: int) -> Array:
-        moved = fitted.vector.copy()
-        step = DIFFERENCES[1] * std[k]
-        moved[k] += step if moved[k] + step <= high[k] else -step
-        changed = problem.residual(fitted.hypothesis, moved)
-        if changed.shape != residual.shape:
-            return np.zeros(len(residual))
-        return (changed - residual) / (moved[k] - fitted.vector[k])
-
-    jacobian = np.column_stack(list(pool.map(column, free)))
-    return np.linalg.inv(jacobian.T @ jacobian + np.diag(std[free] ** -2.0))
+    changes = differences(
+        lambda vector: problem.residual(fitted.hypothesis, vector),
+        fitted.vector,
+        problem.residual(fitted.hypothesis, fitted.vector),
+        free=free,
+        steps=DIFFERENCES[1] * std[free],
+        high=high[free],
+        each=pool.map,
+    )
+    if changes is None:
+        return None
+    jacobian = changes / DIFFERENCES[1]
+    covariance = np.linalg.inv(jacobian.T @ jacobian + np.eye(len(free)))
+    return np.linalg.cholesky(covariance).T * std[free]
