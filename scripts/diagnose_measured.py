@@ -26,6 +26,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 from measured.target import Target
 
 from bench.discrepancy import Case, Diagnosis, diagnose
+from bench.errors import BenchError
 
 SOURCES = tuple(
     sorted(
@@ -91,6 +92,9 @@ def gather(data: Path | None, names: tuple[str, ...]) -> dict[str, Wanted]:
     """The wanted cases of every source."""
     found: dict[str, Wanted] = {}
     for source in SOURCES:
+        # the names of cases begin with their source's: what nobody asked for need not be readable
+        if names and not any(source.startswith(wanted) or wanted.startswith(source) for wanted in names):
+            continue
         module = importlib.import_module(f"measured.{source}")
         folder = (data or Path("none")) / getattr(module, "FOLDER", source)
         if getattr(module, "SHIPPED", False) is False and not folder.is_dir():
@@ -157,6 +161,20 @@ def main() -> int:
     """Diagnose and print."""
     args = tyro.cli(Args, description=__doc__)
     console = Console(stderr=True)
+    try:
+        rows = diagnosed(args, console)
+    except BenchError as error:
+        console.print(f"error: {error}", style="red", markup=False, highlight=False)
+        return 2
+    if args.json:
+        print(json.dumps([asdict(row) for row in rows], indent=2))
+    else:
+        Console(width=None if sys.stdout.isatty() else 140).print(table(rows))
+    return 0
+
+
+def diagnosed(args: Args, console: Console) -> list[Outcome]:
+    """Diagnose the wanted cases."""
     rows: list[Outcome] = []
     for name, wanted in gather(args.data, args.names).items():
         diagnosis = diagnose(wanted.case, progress=lambda text, name=name: console.print(f"{name}: {text}"))
@@ -166,11 +184,7 @@ def main() -> int:
             args.html.mkdir(parents=True, exist_ok=True)
             write_report(diagnosis, args.html / f"{name}.html")
         rows += outcomes(diagnosis, wanted)
-    if args.json:
-        print(json.dumps([asdict(row) for row in rows], indent=2))
-    else:
-        Console(width=None if sys.stdout.isatty() else 140).print(table(rows))
-    return 0
+    return rows
 
 
 if __name__ == "__main__":

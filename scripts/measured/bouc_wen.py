@@ -21,6 +21,7 @@ from scipy.io import loadmat
 
 from bench.discrepancy import Case, CaseChannel, NominalParameter, record_from_arrays
 from bench.discrepancy.acquisition import Antialias
+from bench.record_files.arrays import read_hdf5
 from measured.target import Target
 
 FOLDER = "bouc_wen_benchmark"
@@ -41,10 +42,9 @@ NOMINAL = (
 
 def cases(data: Path) -> dict[str, Case]:
     """The benchmark as a case, from the folder of its files."""
-    import h5py
-
-    with h5py.File(data / "train.h5") as file:
-        u, y = (np.asarray(file[f"multisine/{name}"])[:, 0].reshape(-1, PERIOD) for name in "uy")
+    wanted = [f"multisine/{name}" for name in "uy"]
+    train = read_hdf5(data / "train.h5", wanted)
+    u, y = (train[name].values[:, 0].reshape(-1, PERIOD) for name in wanted)
     mat = {
         name: loadmat(data / f"{name}.mat")[name].ravel()
         for name in ("uval_multisine", "yval_multisine", "uval_sinesweep", "yval_sinesweep")
