@@ -75,6 +75,9 @@ OTHER_AXIS = {
 }
 """Channels of the joint rig that one sensor measures along its two axes."""
 
+Prepared = tuple[Search, Screen, list[Point]]
+"""A search before its first step: the nominal model fitted, the catalogue screened, its grid points by decreasing gain."""
+
 
 def placements(case: Case, structure: Structure, catalogue: Iterable[Effect]) -> list[Placed]:
     """Return every effect of a catalogue at every place of a structure where it can sit."""
@@ -131,7 +134,7 @@ def attribute(
     *,
     most: int = 3,
     progress: Callable[[str], None] = lambda text: None,
-    prepared: tuple[Search, Screen, list[Point]] | None = None,
+    prepared: Prepared | None = None,
 ) -> Search:
     """Search the hypotheses of up to `most` effects.
 
@@ -220,9 +223,7 @@ def about(screen: Screen, base: Fit, *, explained: bool) -> Screen:
     return screen.beside(base, simulated=explained) if spoilt or explained else screen
 
 
-def prepare(
-    problem: Problem, candidates: Sequence[Placed], each: Callable = map
-) -> tuple[Search, Screen, list[Point]]:
+def prepare(problem: Problem, candidates: Sequence[Placed], each: Callable = map) -> Prepared:
     """Fit the nominal model and screen the catalogue: the cheap part of an attribution.
 
     Args:

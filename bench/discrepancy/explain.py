@@ -22,6 +22,7 @@ from bench.discrepancy.attribute import (
     STALLED,
     TRUSTED,
     WORTH_A_FIT,
+    Prepared,
     about,
     attribute,
     followed,
@@ -194,28 +195,38 @@ def _explain(
         prepared.append(prepare(problem, placements(case, part, catalogue)))
     odd = [entry for entry in prepared if not consistent(entry[0].ranked(0)[0])]
     coupled: list[Fit] = []
-    if len(odd) > 1 and max(_promise(entry) for entry in odd) > PROMISING:
-        coupled = _coupled(whole, catalogue, most, progress)
-    searches = [entry[0] for entry in prepared]
-    if not (coupled and consistent(coupled[0])):
+    # a coupling alone is soon tried; other effects beside it, before each group is searched, where those promise little
+    coupled_first = len(odd) > 1 and max(_promise(entry) for entry in odd) > PROMISING
+    if len(odd) > 1:
+        coupled = _coupled(whole, catalogue, most if coupled_first else 1, progress)
+    settled = bool(coupled) and consistent(coupled[0]) and (coupled_first or _beyond(coupled[0], prepared))
+    if not settled:
         for entry in prepared:
             problem = entry[0].problem
             progress(f"degrees of freedom {', '.join(problem.structure.dofs)}")
             chosen = placements(case, problem.structure, catalogue)
             attribute(problem, chosen, most=2, progress=progress, prepared=entry)
-    found = _nothing_left_first(_combined(searches))
-    if odd and not coupled and not _leaves_nothing(found):
+    found = _nothing_left_first(_combined([entry[0] for entry in prepared]))
+    if odd and not settled and not coupled_first and not _leaves_nothing(found):
         coupled = _coupled(whole, catalogue, most, progress)
     found += [Explanation(((whole, fitted),)) for fitted in coupled]
     return _nothing_left_first(sorted(found, key=lambda e: -e.log_posterior))
 
 
-def _promise(entry: tuple[Search, Screen, list[Point]]) -> float:
-    """Reduced chi-squared that the best grid point of a screening promises."""
+def _promised(entry: Prepared) -> float:
+    """Chi-squared that the best grid point of a screening promises to leave."""
     search, _, points = entry
-    nothing = search.ranked(0)[0]
-    gain = points[0].gain if points else 0.0
-    return (nothing.chi2 - gain) / nothing.n_residuals
+    return search.ranked(0)[0].chi2 - (points[0].gain if points else 0.0)
+
+
+def _promise(entry: Prepared) -> float:
+    """Reduced chi-squared that the best grid point of a screening promises."""
+    return _promised(entry) / entry[0].problem.n_residuals
+
+
+def _beyond(coupled: Fit, prepared: Sequence[Prepared]) -> bool:
+    """Whether an effect on each group of degrees of freedom promises far less than a coupling has kept."""
+    return sum(_promised(entry) for entry in prepared) > coupled.chi2 + 4.0 * WITHIN_REACH
 
 
 def _coupled(
