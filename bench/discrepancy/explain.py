@@ -195,11 +195,13 @@ def _explain(
         prepared.append(prepare(problem, placements(case, part, catalogue)))
     odd = [entry for entry in prepared if not consistent(entry[0].ranked(0)[0])]
     coupled: list[Fit] = []
-    # a coupling alone is soon tried; other effects beside it, before each group is searched, where those promise little
-    coupled_first = len(odd) > 1 and max(_promise(entry) for entry in odd) > PROMISING
+    deep = settled = False
     if len(odd) > 1:
-        coupled = _coupled(whole, catalogue, most if coupled_first else 1, progress)
-    settled = bool(coupled) and consistent(coupled[0]) and (coupled_first or _beyond(coupled[0], prepared))
+        little = max(_promise(entry) for entry in odd) > PROMISING
+        coupled, deep = _coupled(
+            whole, catalogue, most, progress, lambda alone: little or _beyond(alone, prepared)
+        )
+        settled = deep and consistent(coupled[0])
     if not settled:
         for entry in prepared:
             problem = entry[0].problem
@@ -207,8 +209,8 @@ def _explain(
             chosen = placements(case, problem.structure, catalogue)
             attribute(problem, chosen, most=2, progress=progress, prepared=entry)
     found = _nothing_left_first(_combined([entry[0] for entry in prepared]))
-    if odd and not settled and not coupled_first and not _leaves_nothing(found):
-        coupled = _coupled(whole, catalogue, most, progress)
+    if odd and not deep and not _leaves_nothing(found):
+        coupled, _ = _coupled(whole, catalogue, most, progress)
     found += [Explanation(((whole, fitted),)) for fitted in coupled]
     return _nothing_left_first(sorted(found, key=lambda e: -e.log_posterior))
 
@@ -230,9 +232,24 @@ def _beyond(coupled: Fit, prepared: Sequence[Prepared]) -> bool:
 
 
 def _coupled(
-    whole: Problem, catalogue: Sequence[Effect], most: int, progress: Callable[[str], None]
-) -> list[Fit]:
-    """Search explanations that hold an effect which couples the groups; by decreasing posterior."""
+    whole: Problem,
+    catalogue: Sequence[Effect],
+    most: int,
+    progress: Callable[[str], None],
+    deeper: Callable[[Fit], bool] = lambda alone: True,
+) -> tuple[list[Fit], bool]:
+    """Search explanations that hold an effect which couples the groups.
+
+    Args:
+        whole: Records and priors on all degrees of freedom.
+        catalogue: Effects to consider.
+        most: Largest number of effects.
+        progress: Called with a line of text at every stage.
+        deeper: Whether the best coupling alone is worth a search for other effects beside it.
+
+    Returns:
+        The fits by decreasing posterior, and whether other effects were searched beside a coupling.
+    """
     progress("effects that couple the degrees of freedom")
     candidates = [
         p
@@ -248,9 +265,8 @@ def _coupled(
         zero = np.zeros(len(whole.nominal))
         starts = leading(points, len(coupling), 0.0, starts=REFINED_STARTS)
         converge(kept, pool, [((p.placed,), np.append(zero, p.eta)) for p in starts])
-        for _ in range(1, most):
-            if not kept.fits:
-                break
+        deep = bool(kept.fits) and deeper(kept.ranked()[0])
+        for _ in range(1, most if deep else 1):
             base = kept.ranked()[0]
             if len(base.hypothesis) > 1 and base.reduced > HOPELESS_THIRD:
                 break
@@ -286,7 +302,7 @@ def _coupled(
             reduce_best(kept, pool)
             if kept.ranked()[0] is base or kept.ranked()[0].reduced - 1.0 > STALLED * (base.reduced - 1.0):
                 break
-    return kept.ranked()
+    return kept.ranked(), deep
 
 
 def _nothing_left_first(found: list[Explanation]) -> list[Explanation]:
