@@ -268,7 +268,7 @@ def _extend(
         most = min(most, max(excess, WORTH_A_FIT))
         short = TRUSTED if named and along else SHORT
         chosen = leading(points, count, short * most)
-        if not named and not among:
+        if not among:
             begun = {p.placed.key for p in chosen}
             simplest = [p for p in solved if plain(p.placed.effect) and p.placed.key not in begun]
             chosen += leading(simplest, count, WORTH_A_FIT, starts=1)

@@ -325,7 +325,7 @@ FORCES: tuple[Effect, ...] = (
         "force_offset",
         "actuator",
         "joint",
-        (FreeParameter("offset", "force", **SIGNED),),
+        (FreeParameter("offset", "force", signed=True, mean=0.0, std=2.0, bounds=(-50.0, 50.0)),),
         "f = F0",
         law=CONSTANT_FORCE,
         log_prior=-1.0,

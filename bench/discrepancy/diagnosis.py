@@ -21,9 +21,10 @@ from bench.discrepancy.closure import CLOSURES
 from bench.discrepancy.contradiction import contradicted
 from bench.discrepancy.effect import Effect
 from bench.discrepancy.explain import Explanation, close, explain
+from bench.discrepancy.idle_loads import without_idle_noise
 from bench.discrepancy.next_excitation import separate, told_apart
 from bench.discrepancy.nominal_file import check_units
-from bench.discrepancy.problem import Problem
+from bench.discrepancy.problem import Hypothesis, Problem
 from bench.discrepancy.quality import notes, refuse
 from bench.discrepancy.quantisation import recorded
 from bench.discrepancy.search import names
@@ -97,8 +98,9 @@ def diagnose(
     catalogue = [effect for effect in catalogue if effect.name not in exclude]
     progress("looking at the records")
     check_units(case)
+    refuse(Problem(case, structure_of(case), case.identification))
+    case = without_idle_noise(case)
     problem = Problem(case, structure_of(case), case.identification)
-    refuse(problem)
     explanations = explain(case, catalogue, most=most, progress=progress)
     best, nothing = explanations[0], next(e for e in explanations if not e.hypothesis)
     kind, probabilities = evidence.judge(explanations)
@@ -117,12 +119,12 @@ def diagnose(
     stages += [(label, e.predict) for label, e in _path(explanations)]
     stages.append((names(best.hypothesis) + (f" + {closure}" if closure else ""), final.predict))
     progress("gap on the judging records")
-    found = gaps(case, problem, stages=stages, rng=rng)
+    found = gaps(case, problem, stages=stages, rng=rng, final=_model(final))
     if kind == "unknown" and any(gap.after > WORSE * gap.parameters_only for gap in found):
         # what imitates an unknown force on some records can be worse than nothing on others: nobody should build that in
         final, closure = nothing, ""
         stages[-1] = ("no closure helps", nothing.predict)
-        found = gaps(case, problem, stages=stages, rng=rng)
+        found = gaps(case, problem, stages=stages, rng=rng, final=_model(final))
     widest = max(found, key=lambda gap: gap.before / max(gap.noise_floor, 1e-12))
     where = locate(problem, nothing, best, named=kind == "effect")
     verdict = Verdict(
@@ -144,6 +146,12 @@ def diagnose(
         seconds=time.perf_counter() - began,
     )
     return Diagnosis(case, problem, tuple(explanations), verdict, final, where)
+
+
+def _model(explanation: Explanation) -> tuple[Hypothesis, np.ndarray] | None:
+    """Effects and vector of an explanation in one part; None where it has several."""
+    fits = [fitted for _, fitted in explanation.parts]
+    return (fits[0].hypothesis, fits[0].vector) if len(fits) == 1 else None
 
 
 def _told(words: str, seen: Sequence[NamedEffect]) -> str:

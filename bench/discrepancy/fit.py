@@ -116,13 +116,29 @@ def fit(
         exact=exact,
         each=each,
     )
-    precision = np.diag(1.0 / prior.std**2)
-    precision[np.ix_(free, free)] = found.curvature / np.outer(prior.std[free], prior.std[free])
-    evidence = -np.inf
-    if np.isfinite(found.cost):
-        log_prior = sum(placed.effect.log_prior for placed in hypothesis)
-        evidence = -0.5 * found.cost - 0.5 * np.linalg.slogdet(found.curvature)[1] + log_prior
+    precision, evidence = laplace(problem, hypothesis, found.cost, found.curvature, free)
     return Fit(
         hypothesis, found.vector, float(found.residual @ found.residual), found.cost, problem.n_residuals,
-        precision, float(evidence), found.settled,
+        precision, evidence, found.settled,
     )  # fmt: skip
+
+
+def laplace(
+    problem: Problem, hypothesis: Hypothesis, cost: float, curvature: Array, free: NDArray[np.int64]
+) -> tuple[Array, float]:
+    """Posterior precision (n, n) of a vector, and log evidence, from the cost at its minimum.
+
+    Args:
+        problem: Records and priors.
+        hypothesis: Effects.
+        cost: At the minimum.
+        curvature: (n_free, n_free) of half the cost in units of the prior's standard deviations, the prior included.
+        free: (n_free,) indices of the entries that moved.
+    """
+    _, std, _, _ = problem.prior(hypothesis)
+    precision = np.diag(1.0 / std**2)
+    precision[np.ix_(free, free)] = curvature / np.outer(std[free], std[free])
+    if not np.isfinite(cost):
+        return precision, -np.inf
+    log_prior = sum(placed.effect.log_prior for placed in hypothesis)
+    return precision, float(-0.5 * cost - 0.5 * np.linalg.slogdet(curvature)[1] + log_prior)

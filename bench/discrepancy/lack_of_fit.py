@@ -168,7 +168,9 @@ def _expected(problem: Problem, fitted: Fit, free: _Free) -> dict[str, float]:
         for data, runs in zip(problem.data, clean, strict=True):
             values = {
                 name: data.record.values[name] + level * rng.standard_normal(len(data.record))
-                for name, level in zip(problem.structure.loads, problem.load_noise, strict=True)
+                for name, level in zip(
+                    problem.structure.loads, problem.load_noise_of(data.record), strict=True
+                )
             }
             record = replace(data.record, values={**data.record.values, **values})
             own = problem.noise * rng.standard_normal(data.responses.shape)

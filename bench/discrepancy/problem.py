@@ -168,11 +168,16 @@ class Problem:
         )
         if self.driven:
             noise = noise + self.motion_noise(record, values)[:n_bins, None, None]
-        elif np.any(self.load_noise > 0):
+        elif np.any(load_noise := self.load_noise_of(record)):
             response = self.structure.transfer(self.structure.at(values), np.asarray(omega, dtype=np.float64))
-            scaled = response * self.load_noise
+            scaled = response * load_noise
             noise = noise + scaled @ np.conj(np.swapaxes(scaled, 1, 2))
         return np.asarray(np.linalg.inv(np.linalg.cholesky(noise)), dtype=np.complex128)
+
+    def load_noise_of(self, record: CaseRecord) -> Array:
+        """Noise (n_loads,) of the loads of a record; one that is zero throughout has none."""
+        driven = [bool(np.any(record.values[name])) for name in self.structure.loads]
+        return np.where(driven, self.load_noise, 0.0)
 
     def motion_noise(self, record: CaseRecord, values: Array) -> Array:
         """Power (n_frequencies,) of the force that the noise of a prescribed motion makes in the component at `values`.

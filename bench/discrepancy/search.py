@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.discrepancy.fit import Fit, fit, free_entries
+from bench.discrepancy.fit import Fit, fit, free_entries, laplace
 from bench.discrepancy.grid_points import Point
 from bench.discrepancy.minimise import DIFFERENCES, differences
 from bench.discrepancy.problem import Array, Hypothesis, Problem
@@ -181,23 +181,24 @@ def _shaken(search: Search, fitted: Fit, pool: ThreadPoolExecutor) -> None:
 
     in_vain = 0
     for _ in range(SHAKES):
-        spread = _spread(fitted, problem, free, pool)
-        if spread is None:
-            return
+        fitted = _overlooking_dents(fitted, problem, free, pool)
+        spread = np.linalg.cholesky(fitted.covariance[np.ix_(free, free)])
         draws = np.repeat(fitted.vector[None], DRAWS, axis=0)
-        draws[:, free] += rng.standard_normal((DRAWS, len(free))) @ spread * np.resize(SCALES, (DRAWS, 1))
+        draws[:, free] += rng.standard_normal((DRAWS, len(free))) @ spread.T * np.resize(SCALES, (DRAWS, 1))
         draws = np.clip(draws, low, high)
         best = draws[np.argsort(list(pool.map(cost, draws)))[:THREADS]]
         again = min(pool.map(again_from, best), key=lambda f: f.cost)
-        search.add(again)
         in_vain = in_vain + 1 if fitted.cost - again.cost < DENT else 0
         if in_vain == IN_VAIN:
-            return
+            break
         fitted = min(fitted, again, key=lambda f: f.cost)
+    search.fits[key_of(hypothesis)] = _overlooking_dents(fitted, problem, free, pool)
 
 
-def _spread(fitted: Fit, problem: Problem, free: NDArray[np.int64], pool: ThreadPoolExecutor) -> Array | None:
-    """What makes draws of the posterior (n_free, n_free) out of normal ones, by differences that see over the dents."""
+def _overlooking_dents(
+    fitted: Fit, problem: Problem, free: NDArray[np.int64], pool: ThreadPoolExecutor
+) -> Fit:
+    """A fit whose precision and evidence are those of the landscape, not of the dent it lies in: by coarse differences."""
     _, std, _, high = problem.prior(fitted.hypothesis)
     changes = differences(
         lambda vector: problem.residual(fitted.hypothesis, vector),
@@ -209,7 +210,7 @@ def _spread(fitted: Fit, problem: Problem, free: NDArray[np.int64], pool: Thread
         each=pool.map,
     )
     if changes is None:
-        return None
-    jacobian = changes / DIFFERENCES[1]
-    covariance = np.linalg.inv(jacobian.T @ jacobian + np.eye(len(free)))
-    return np.linalg.cholesky(covariance).T * std[free]
+        return fitted
+    curvature = np.eye(len(free)) + changes.T @ changes / DIFFERENCES[1] ** 2
+    precision, evidence = laplace(problem, fitted.hypothesis, fitted.cost, curvature, free)
+    return replace(fitted, precision=precision, log_evidence=evidence)

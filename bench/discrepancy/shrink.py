@@ -9,11 +9,12 @@ Records that start in motion, and windows of records that would drift, begin at 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from bench.discrepancy.case import Case, CaseRecord
-from bench.discrepancy.problem import Array, Problem
+from bench.discrepancy.problem import Array, Hypothesis, Problem
 from bench.discrepancy.start_estimates import predict as predicted
 from bench.discrepancy.start_estimates import run_kind
 from bench.discrepancy.structure import Structure
@@ -22,6 +23,8 @@ from bench.discrepancy.verdict import Gap
 Prediction = Callable[[CaseRecord], Mapping[str, Array]]
 DIVERGED_GAP = 1e3
 """Gap that stands for a simulation that diverged."""
+DRAWS = 16
+"""Draws of the noise of a prescribed motion."""
 BLOCKS = 24
 """Blocks of a judging record for the bootstrap: some periods each, so that blocks are nearly independent."""
 
@@ -63,6 +66,7 @@ def gaps(
     *,
     stages: Sequence[tuple[str, Prediction]],
     rng: np.random.Generator,
+    final: tuple[Hypothesis, Array] | None = None,
 ) -> tuple[Gap, ...]:
     """Gap of every judged coordinate over the validation records.
 
@@ -71,6 +75,8 @@ def gaps(
         problem: Its problem on all degrees of freedom, for the noise.
         stages: (label, prediction) in order: nominal model, parameters only, after each effect, final.
         rng: For the bootstrap.
+        final: Effects and vector behind the last stage, which the noise of a prescribed motion passes; the nominal model where
+            None.
     """
     predictions = [[predict(record) for record in case.validation] for _, predict in stages]
     out = []
@@ -79,7 +85,7 @@ def gaps(
         simulated = [[_combine(p, channels) for p in stage] for stage in predictions]
         whole = np.concatenate(measured)
         values = [nrmse(whole, np.concatenate(stage)) for stage in simulated]
-        floor = noise_level(problem, channels, case.validation) / max(float(np.std(whole)), 1e-300)
+        floor = noise_level(problem, channels, case.validation, final) / max(float(np.std(whole)), 1e-300)
         interval = _bootstrap(measured, simulated[0], simulated[-1], floor * float(np.std(whole)), rng)
         out.append(
             Gap(
@@ -105,16 +111,28 @@ def closed_share(before: float, after: float, floor: float) -> float:
 
 
 def noise_level(
-    problem: Problem, channels: Sequence[tuple[str, float]], records: Sequence[CaseRecord]
+    problem: Problem,
+    channels: Sequence[tuple[str, float]],
+    records: Sequence[CaseRecord],
+    final: tuple[Hypothesis, Array] | None = None,
 ) -> float:
-    """RMS that the noise of the channels, and of the measured loads passed through the structure, leaves [channel unit]."""
+    """RMS that the noise of the channels, and of the measured loads passed through the structure, leaves [channel unit].
+
+    Args:
+        problem: Problem on all degrees of freedom.
+        channels: Names and signs of the channels that make the judged coordinate.
+        records: Judging records.
+        final: Effects and vector of a model of a component whose motion is prescribed: what the noise of the motion makes of its
+            force.
+    """
     index = [problem.structure.channels.index(name) for name, _ in channels]
     signs = np.array([sign for _, sign in channels])
     own = float(np.sum(signs**2 * problem.noise[index] ** 2))
     record = records[0]
     if problem.driven:
-        return float(np.sqrt(own + np.mean(problem.motion_noise(record, problem.nominal))))
-    if not np.any(problem.load_noise > 0):
+        return float(np.sqrt(own + _forces_of_noise(problem, records, final or ((), _nominal(problem)))))
+    load_noise = problem.load_noise_of(record)
+    if not np.any(load_noise):
         return float(np.sqrt(own))
     if problem.windowed:
         windows = problem.prepare(record, problem.nominal).windows
@@ -122,8 +140,33 @@ def noise_level(
         return float(np.sqrt(signs @ windows.floor[np.ix_(index, index)] @ signs))
     omega = np.asarray(2.0 * np.pi * np.fft.rfftfreq(len(record), record.step)[1:], dtype=np.float64)
     response = problem.structure.transfer(problem.structure.at(problem.nominal), omega)[:, index]
-    combined = np.abs(np.einsum("fcu,c->fu", response, signs)) ** 2 @ problem.load_noise**2
+    combined = np.abs(np.einsum("fcu,c->fu", response, signs)) ** 2 @ load_noise**2
     return float(np.sqrt(own + np.mean(combined)))
+
+
+def _nominal(problem: Problem) -> Array:
+    return np.zeros(len(problem.nominal))
+
+
+def _forces_of_noise(
+    problem: Problem, records: Sequence[CaseRecord], model: tuple[Hypothesis, Array]
+) -> float:
+    """Mean square of the force that the noise of a prescribed motion makes in a component.
+
+    Friction makes most of it: the noise decides at which sample a reversal falls.
+    """
+    rng = np.random.default_rng(0)
+    squares = []
+    for record in records:
+        clean = problem.simulate(*model, record)
+        for _ in range(DRAWS):
+            moved = {
+                name: record.values[name] + level * rng.standard_normal(len(record))
+                for name, level in zip(problem.structure.loads, problem.load_noise, strict=True)
+            }
+            noisy = problem.forgetful().simulate(*model, replace(record, values={**record.values, **moved}))
+            squares.append(np.mean((noisy - clean) ** 2))
+    return float(np.mean(squares))
 
 
 def _label(channels: Sequence[tuple[str, float]]) -> str:
@@ -176,7 +219,7 @@ def nominal_prediction(problem: Problem) -> Prediction:
     """Prediction of the untouched nominal model, for `gaps`."""
 
     def predict(record: CaseRecord) -> Mapping[str, Array]:
-        samples = predicted(problem, (), np.zeros(len(problem.nominal)), record)
+        samples = predicted(problem, (), _nominal(problem), record)
         return {name: samples[:, c] for c, name in enumerate(problem.structure.channels)}
 
     return predict

@@ -17,6 +17,8 @@ from scipy.linalg import solve_discrete_are
 
 from bench.errors import IdentificationError
 
+REST = 1e-6
+"""Part of the noise below which a channel is at rest."""
 CANDIDATES = 10.0 ** np.arange(-2.0, 3.1, 1.0)
 """Multiples of a first guess of the jerk intensity that are compared by likelihood."""
 
@@ -100,6 +102,8 @@ def smooth_motion(
         (n, 3) position, velocity, acceleration. Without a position channel the position is the double integral of
         what was measured, from zero.
     """
+    if np.all(np.abs(samples).max(axis=0) < REST * noise_std):  # a free run that nothing drives
+        return np.zeros((len(samples), 3))
     powers = step ** np.array(orders, dtype=float)
     y = np.ascontiguousarray(samples * powers)
     noise_scaled = noise_std * powers

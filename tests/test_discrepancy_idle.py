@@ -1,0 +1,56 @@
+"""Loads that read nothing but their noise drive nothing."""
+
+import numpy as np
+import pytest
+
+from bench.discrepancy import BlindOptions, diagnose
+from bench.discrepancy.blind.cases import draw_case
+from bench.discrepancy.catalogue import CATALOGUE
+from bench.discrepancy.idle_loads import idle, without_idle_noise
+from bench.discrepancy.problem import Problem
+from bench.discrepancy.structure import structure_of
+
+T = np.arange(5000) / 500.0
+
+
+@pytest.mark.parametrize(
+    ("load", "is_idle"),
+    [
+        (0.0 * T, True),
+        (0.02 * np.sin(2 * np.pi * 3.0 * T), True),  # a line far below the noise is not seen
+        (0.3 * np.sin(2 * np.pi * 3.0 * T), False),
+        (0.5 * np.exp(-(((T - 5.0) / 0.02) ** 2)) * 10.0, False),
+        (1.5 + 0.0 * T, False),
+    ],
+    ids=["nothing", "a trifle", "a line", "a blow", "an offset"],
+)
+def test_a_load_is_idle_if_it_reads_nothing_but_its_noise(load, is_idle, rng):
+    assert idle(load + rng.standard_normal(len(T)), 1.0) == is_idle
+
+
+def test_more_noise_than_stated_is_a_load(rng):
+    assert not idle(1.5 * rng.standard_normal(len(T)), 1.0)
+
+
+@pytest.fixture(scope="module")
+def joint():
+    options = BlindOptions(shares=(1.0, 0.0, 0.0, 0.0), rigs=(0.0, 0.0, 1.0), sensors=("position",))
+    return draw_case("joint", np.random.default_rng(3), options)[0]
+
+
+def test_the_load_of_an_axis_that_nobody_drives_is_zero_and_has_no_noise(joint):
+    case = without_idle_noise(joint)
+    axial, torsional, both = case.identification
+    assert not np.any(axial.values["torque"])
+    assert not np.any(torsional.values["force"])
+    assert np.array_equal(both.values["torque"], joint.identification[2].values["torque"])
+    problem = Problem(case, structure_of(case), case.identification)
+    assert problem.load_noise_of(axial)[1] == 0.0
+    assert problem.load_noise_of(axial)[0] == problem.load_noise[0] > 0.0
+
+
+@pytest.mark.slow
+def test_friction_that_would_hold_an_idle_axis_still_is_not_called_an_effect(joint):
+    """Driven by the noise of its load cell, the model of an axis moves; the axis does not."""
+    friction = [e for e in CATALOGUE if e.family == "friction"]
+    assert diagnose(joint, catalogue=friction).verdict.verdict == "none"
