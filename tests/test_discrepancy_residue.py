@@ -22,7 +22,7 @@ from bench.discrepancy.lack_of_fit import LackOfFit, lack_of_fit
 from bench.discrepancy.prepared import timed
 from bench.discrepancy.problem import Problem
 from bench.discrepancy.screen import Screen
-from bench.discrepancy.search import Search, shake
+from bench.discrepancy.search import Search, consistent, shake
 from bench.discrepancy.signal_effects import delay, sensor_delay
 from bench.discrepancy.structure import structure_of
 
@@ -55,10 +55,9 @@ def test_free_models_find_nothing_beside_the_right_law():
     assert lack.p_value > 1e-3
 
 
-def sealed(index: int):
-    """A case of the seed whose 300 cases were published on 2026-11-22, and its true parameters by name."""
-    seed = int(np.random.default_rng([20261125, 0]).integers(2**62))
-    rng = np.random.default_rng([seed, index])
+def sealed(seed: int, index: int):
+    """A case that was sealed once and diagnosed wrongly, and its answer."""
+    rng = np.random.default_rng([int(np.random.default_rng([seed, 0]).integers(2**62)), index])
     rng.bytes(16)
     case, answer = draw_case("sealed", rng, BlindOptions(detectability=False))
     return case, answer
@@ -66,7 +65,7 @@ def sealed(index: int):
 
 @pytest.mark.slow
 def test_noise_of_the_load_that_a_softening_spring_amplifies_is_no_missing_force():
-    case, answer = sealed(246)
+    case, answer = sealed(20261125, 246)
     assert [e["name"] for e in answer["effects"]] == ["cubic_stiffness"]
     problem, explained = fitted(case, "cubic_stiffness", [-0.17])
     taken_away = fit(problem, (), start=np.zeros(3)).chi2 - explained.chi2
@@ -81,7 +80,7 @@ def test_noise_of_the_load_that_a_softening_spring_amplifies_is_no_missing_force
 
 @pytest.mark.slow
 def test_friction_that_sticks_is_shaken_out_of_the_dent_that_its_fit_ended_in():
-    case, answer = sealed(256)
+    case, answer = sealed(20261125, 256)
     assert [e["name"] for e in answer["effects"]] == ["coulomb_friction"]
     problem, coulomb = fitted(case, "coulomb_friction", [-2.0])
     search = Search(problem)
@@ -89,6 +88,17 @@ def test_friction_that_sticks_is_shaken_out_of_the_dent_that_its_fit_ended_in():
     with ThreadPoolExecutor(2) as pool:
         shake(search, pool)
     assert search.ranked()[0].cost < coulomb.cost - 10.0
+
+
+@pytest.mark.slow
+def test_a_stop_that_shifts_the_middle_of_a_motion_is_found_by_accelerations_alone():
+    case, answer = sealed(20261127, 83)
+    assert ([e["name"] for e in answer["effects"]], answer["sensors"]) == (["one_sided_stop"], "acceleration")
+    chosen = [effect_named(name) for name in ("one_sided_stop", "backlash_friction", "bouc_wen_hysteresis")]
+    problem = Problem(case, structure_of(case), case.identification)
+    best = attribute(problem, placements(case, problem.structure, chosen), most=1).ranked()[0]
+    assert [placed.effect.name for placed in best.hypothesis] == ["one_sided_stop"]
+    assert consistent(best)
 
 
 def test_one_more_effect_is_screened_along_a_free_run_that_follows_the_motion_and_does_not_stick():

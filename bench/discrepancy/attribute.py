@@ -47,6 +47,10 @@ SHORT = 0.15
 """Effects whose screened gain is less than this part of the best one are not fitted."""
 TRUSTED = 0.5
 """The same part where one more effect is screened about a free run that follows the motion: gains are what they seem then."""
+LEVELS = (-2.0, -1.0, 0.0, 1.0)
+"""Sizes of contacts that are simulated on their grid, in prior standard deviations from their mean."""
+SIMULATED = 2
+"""Starts of each that are fitted."""
 REFINED_EFFECTS = 12
 """Effects whose grid points are refined along the measured motion."""
 REFINED_STARTS = 3
@@ -157,6 +161,8 @@ def attribute(
             if not points or points[0].gain < NOTICEABLE:
                 return search
         _extend(search, screen, [nothing], pool, count=8)
+        if not consistent(search.ranked()[0]) and all(o.order > 0 for o in problem.structure.observers):
+            _simulated(search, candidates, pool)
         rare = [p for p in candidates if p.effect.rare]
         if rare and not consistent(search.ranked()[0]):
             progress("rarer effects")
@@ -290,6 +296,40 @@ def _extend(
     for fitted in pool.map(quick, tasks):
         search.add(fitted)
     carry_on(search, pool, size, most=4)
+
+
+def _simulated(search: Search, candidates: Sequence[Placed], pool: ThreadPoolExecutor) -> None:
+    """Fit contacts from the best of their grid by free runs.
+
+    Where only velocities or accelerations are measured, the middle of the motion is unknown, and a stop that shifts it is screened
+    at the wrong place. Contacts have few shapes and cost little to simulate.
+    """
+    problem = search.problem
+    still = np.zeros(len(problem.nominal))
+    tasks: list[tuple[Hypothesis, np.ndarray]] = []
+    for placed in candidates:
+        effect = placed.effect
+        if effect.rare or not _contact(effect):
+            continue
+        first = effect.parameters[0]
+        starts = [np.append(still, eta) for eta in effect.grid() for _ in LEVELS]
+        for start, level in zip(starts, np.tile(LEVELS, len(starts)), strict=False):
+            start[len(still)] = first.mean + level * first.std
+
+        def cost(start: np.ndarray, placed: Placed = placed) -> float:
+            residual = problem.residual((placed,), start)
+            return float(residual @ residual)
+
+        costs = np.array(list(pool.map(cost, starts)))
+        tasks += [((placed,), starts[i]) for i in np.argsort(costs)[:SIMULATED] if np.isfinite(costs[i])]
+    converge(search, pool, tasks)
+
+
+def _contact(effect: Effect) -> bool:
+    """Whether an effect is a force of the displacement with a position to be found."""
+    return (
+        effect.family == "stiffness" and any(p.grid for p in effect.parameters) and effect.rate_bound is None
+    )
 
 
 def plain(effect: Effect) -> bool:
