@@ -7,7 +7,7 @@ from bench.discrepancy import BlindOptions
 from bench.discrepancy.attribute import placements
 from bench.discrepancy.blind.cases import draw_case
 from bench.discrepancy.catalogue import effect_named
-from bench.discrepancy.idle_loads import idle, without_idle_noise
+from bench.discrepancy.idle_loads import idle, idle_notes, without_idle_noise
 from bench.discrepancy.problem import Problem
 from bench.discrepancy.structure import structure_of
 
@@ -45,6 +45,12 @@ def test_the_load_of_an_axis_that_nobody_drives_is_zero_and_has_no_noise(joint):
     assert not np.any(axial.values["torque"])
     assert not np.any(torsional.values["force"])
     assert np.array_equal(both.values["torque"], joint.identification[2].values["torque"])
+    notes = idle_notes(joint, case)
+    assert (
+        notes[0]
+        == "'torque' reads nothing but its stated noise in 'identification_axial': it counts as zero there"
+    )
+    assert len(notes) == 2
     problem = Problem(case, structure_of(case), case.identification)
     assert problem.load_noise_of(axial)[1] == 0.0
     assert problem.load_noise_of(axial)[0] == problem.load_noise[0] > 0.0

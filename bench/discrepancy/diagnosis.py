@@ -21,7 +21,7 @@ from bench.discrepancy.closure import CLOSURES
 from bench.discrepancy.contradiction import contradicted
 from bench.discrepancy.effect import Effect
 from bench.discrepancy.explain import Explanation, close, explain
-from bench.discrepancy.idle_loads import without_idle_noise
+from bench.discrepancy.idle_loads import idle_notes, without_idle_noise
 from bench.discrepancy.next_excitation import separate, told_apart
 from bench.discrepancy.nominal_file import check_units
 from bench.discrepancy.problem import Hypothesis, Problem
@@ -99,7 +99,8 @@ def diagnose(
     progress("looking at the records")
     check_units(case)
     refuse(Problem(case, structure_of(case), case.identification))
-    case = without_idle_noise(case)
+    told = case
+    case = without_idle_noise(told)
     problem = Problem(case, structure_of(case), case.identification)
     explanations = explain(case, catalogue, most=most, progress=progress)
     best, nothing = explanations[0], next(e for e in explanations if not e.hypothesis)
@@ -137,7 +138,11 @@ def diagnose(
         gaps=found,
         probabilities=probabilities,
         explanation=_told(evidence.plain_words(fitted, explanations, failed=failed), seen),
-        warnings=(*notes(case, problem), *start_warnings(problem, (*case.identification, *case.validation))),
+        warnings=(
+            *notes(case, problem),
+            *idle_notes(told, case),
+            *start_warnings(problem, (*case.identification, *case.validation)),
+        ),
         closure=closure,
         next_excitation=(
             separate(problem, explanations) if fitted == "effect" else told_apart(problem, fitted, catalogue)

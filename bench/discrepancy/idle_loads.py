@@ -39,6 +39,20 @@ def without_idle_noise(case: Case) -> Case:
     )
 
 
+def idle_notes(case: Case, quiet: Case) -> tuple[str, ...]:
+    """What `without_idle_noise` made of a case, in words."""
+    silent: dict[str, list[str]] = {}
+    before, after = ((*c.identification, *c.validation) for c in (case, quiet))
+    for record, without in zip(before, after, strict=True):
+        for name, samples in record.values.items():
+            if np.any(samples) and not np.any(without.values[name]):
+                silent.setdefault(name, []).append(f"'{record.name}'")
+    return tuple(
+        f"'{name}' reads nothing but its stated noise in {', '.join(records)}: it counts as zero there"
+        for name, records in silent.items()
+    )
+
+
 def idle(samples: NDArray[np.float64], noise: float) -> bool:
     """Whether samples (n,) are white noise of a standard deviation at most that stated, in every band of frequencies."""
     power = np.abs(np.fft.rfft(samples)[1:-1]) ** 2 / (0.5 * len(samples) * noise**2)
