@@ -311,10 +311,12 @@ def _simulated(search: Search, candidates: Sequence[Placed], pool: ThreadPoolExe
         effect = placed.effect
         if effect.rare or not _contact(effect):
             continue
-        first = effect.parameters[0]
-        starts = [np.append(still, eta) for eta in effect.grid() for _ in LEVELS]
-        for start, level in zip(starts, np.tile(LEVELS, len(starts)), strict=False):
-            start[len(still)] = first.mean + level * first.std
+        size = effect.parameters[0]
+        starts = [
+            np.concatenate([still, [size.mean + level * size.std], eta[1:]])
+            for eta in effect.grid()
+            for level in LEVELS
+        ]
 
         def cost(start: np.ndarray, placed: Placed = placed) -> float:
             residual = problem.residual((placed,), start)

@@ -83,6 +83,15 @@ def driving_loads(
     return driving
 
 
+def with_load_noise(problem: Problem, record: CaseRecord, rng: np.random.Generator) -> CaseRecord:
+    """A record with one more draw of the stated noise on its loads."""
+    noisy = {
+        name: record.values[name] + level * rng.standard_normal(len(record))
+        for name, level in zip(problem.structure.loads, problem.load_noise_of(record), strict=True)
+    }
+    return replace(record, values={**record.values, **noisy})
+
+
 def fewest_steps(problem: Problem, most: int) -> int:
     """Fewest steps a sample at which the integration stays below the noise; one where loads are read as straight lines.
 

@@ -1,8 +1,9 @@
 """Explanations: hypotheses for all degrees of freedom together, and how well they predict.
 
 A rig may fall apart into groups of degrees of freedom that its linear structure does not couple: the axial and the torsional
-motion of a joint. Each group is searched on its own; effects that couple groups are searched on the whole, when the groups
-alone leave more than noise, or a force. Chi-squared and evidence add over groups, so all explanations can be compared.
+motion of a joint. Each group is searched on its own. Effects that couple groups are tried alone before; other effects are searched
+beside them at once where the groups promise far less than a coupling does, else when the groups alone leave more than noise, or a
+force. Chi-squared and evidence add over groups, so all explanations can be compared.
 """
 
 from __future__ import annotations

@@ -16,7 +16,6 @@ References:
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -25,6 +24,7 @@ from scipy.signal import lfilter
 from scipy.stats import chi2
 
 from bench.discrepancy.closure import MEMORY
+from bench.discrepancy.driving import with_load_noise
 from bench.discrepancy.fit import Fit
 from bench.discrepancy.prepared import whitened
 from bench.discrepancy.problem import Array, Problem
@@ -99,11 +99,14 @@ def lack_of_fit(problem: Problem, fitted: Fit) -> LackOfFit:
         tests = []
         for model, gain in free.gains(seen).items():
             freedom, mean = free.freedom(model), expected[model]
+            if freedom == 0:
+                continue
             p_value = len(free.bases) * float(chi2.sf(gain * freedom / mean, freedom))
             tests.append(LackOfFit(model, gain, freedom, mean, min(p_value, 1.0), len(ground.residual)))
-        return min(tests, key=lambda test: (test.p_value, -test.gain))
+        nothing = LackOfFit("any", 0.0, 0, 0.0, 1.0, len(ground.residual))
+        return min(tests, key=lambda test: (test.p_value, -test.gain), default=nothing)
 
-    found = telling({model: max(free.freedom(model), 1) for model in free.bases})
+    found = telling({model: free.freedom(model) for model in free.bases})
     if found.p_value < SEVERAL and np.any(problem.load_noise > 0.0):
         found = telling(_expected(problem, fitted, free))
     return found
@@ -166,13 +169,7 @@ def _expected(problem: Problem, fitted: Fit, free: _Free) -> dict[str, float]:
         drawn = problem.forgetful()
         passed: tuple[list[Array], list[Array]] = [], []
         for data, runs in zip(problem.data, clean, strict=True):
-            values = {
-                name: data.record.values[name] + level * rng.standard_normal(len(data.record))
-                for name, level in zip(
-                    problem.structure.loads, problem.load_noise_of(data.record), strict=True
-                )
-            }
-            record = replace(data.record, values={**data.record.values, **values})
+            record = with_load_noise(problem, data.record, rng)
             own = problem.noise * rng.standard_normal(data.responses.shape)
             noisy = (
                 drawn.simulate(fitted.hypothesis, fitted.vector, record),
@@ -188,7 +185,7 @@ def _expected(problem: Problem, fitted: Fit, free: _Free) -> dict[str, float]:
                 total[model] += gain
     behind, linear = gains
     return {
-        model: max(free.freedom(model), 1) * max(behind[model] / max(linear[model], 1e-300), 1.0)
+        model: free.freedom(model) * max(behind[model] / max(linear[model], 1e-300), 1.0)
         for model in free.bases
     }
 

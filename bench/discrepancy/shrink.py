@@ -9,11 +9,11 @@ Records that start in motion, and windows of records that would drift, begin at 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from bench.discrepancy.case import Case, CaseRecord
+from bench.discrepancy.driving import with_load_noise
 from bench.discrepancy.problem import Array, Hypothesis, Problem
 from bench.discrepancy.start_estimates import predict as predicted
 from bench.discrepancy.start_estimates import run_kind
@@ -155,16 +155,14 @@ def _forces_of_noise(
 
     Friction makes most of it: the noise decides at which sample a reversal falls.
     """
+    if not np.any(problem.load_noise):
+        return 0.0
     rng = np.random.default_rng(0)
     squares = []
     for record in records:
         clean = problem.simulate(*model, record)
         for _ in range(DRAWS):
-            moved = {
-                name: record.values[name] + level * rng.standard_normal(len(record))
-                for name, level in zip(problem.structure.loads, problem.load_noise, strict=True)
-            }
-            noisy = problem.forgetful().simulate(*model, replace(record, values={**record.values, **moved}))
+            noisy = problem.forgetful().simulate(*model, with_load_noise(problem, record, rng))
             squares.append(np.mean((noisy - clean) ** 2))
     return float(np.mean(squares))
 
