@@ -43,3 +43,7 @@ def test_where_the_number_of_effects_cannot_be_told_whole_explanations_stand_in_
             "presliding_friction",
         ),
     )
+
+
+def test_the_nominal_model_alone_stands_in_no_set():
+    assert indistinguishable([explanation(-10.0), explanation(-11.0, "gap")]) == ()

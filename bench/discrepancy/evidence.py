@@ -104,6 +104,8 @@ def indistinguishable(explanations: Sequence[Explanation]) -> tuple[tuple[str, .
     "gap + cubic_stiffness". The nominal model alone is not among them; the probability of "none" speaks for it.
     """
     best = explanations[0]
+    if not best.hypothesis:
+        return ()
     own = {p.key: p for p in best.hypothesis}
     sets: dict[str, set[str]] = {}
     for other in explanations[1:]:
