@@ -275,9 +275,7 @@ def _extend(
         short = TRUSTED if named and along else SHORT
         chosen = leading(points, count, short * most)
         if not among:
-            begun = {p.placed.key for p in chosen}
-            simplest = [p for p in solved if plain(p.placed.effect) and p.placed.key not in begun]
-            chosen += leading(simplest, count, WORTH_A_FIT, starts=1)
+            chosen += passed_over(solved, chosen, count, WORTH_A_FIT)
         for point in chosen:
             if search.start(base.hypothesis, point):
                 tasks.append(((*base.hypothesis, point.placed), local.starts(point, ground, named)))
@@ -334,9 +332,17 @@ def _contact(effect: Effect) -> bool:
     )
 
 
-def plain(effect: Effect) -> bool:
-    """Whether an effect is a force with nothing but its size to be found: cheap to fit, and never to be lost to a law of seven
-    parameters because its gain along a badly known motion was small."""
+def passed_over(solved: Sequence[Point], chosen: Sequence[Point], count: int, least: float) -> list[Point]:
+    """Starts of forces with nothing but their size to be found that are not among the chosen ones.
+
+    They are cheap to fit, and never to be lost to a law of seven parameters because their gain along a badly known motion was small.
+    """
+    begun = {point.placed.key for point in chosen}
+    simplest = [p for p in solved if _plain(p.placed.effect) and p.placed.key not in begun]
+    return leading(simplest, count, least, starts=1)
+
+
+def _plain(effect: Effect) -> bool:
     return effect.site == "joint" and effect.n_coordinates == 1 and len(effect.parameters) == 1
 
 

@@ -28,8 +28,8 @@ from bench.discrepancy.attribute import (
     attribute,
     followed,
     leading,
+    passed_over,
     placements,
-    plain,
     prepare,
     reduce_best,
     refined,
@@ -294,9 +294,7 @@ def _coupled(
 
             least = TRUSTED * worth[0].gain if along else WORTH_A_FIT
             chosen = leading(worth, 4, least, starts=1)
-            begun = {p.placed.key for p in chosen}
-            simplest = [p for p in solved if plain(p.placed.effect) and p.placed.key not in begun]
-            chosen += leading(simplest, 4, least, starts=1)
+            chosen += passed_over(solved, chosen, 4, least)
             trials = sorted(pool.map(extended, chosen), key=lambda f: f.cost)
             some = trials[: CONVERGED_PAIRS if len(base.hypothesis) == 1 else CONVERGED_BEYOND]
             converge(kept, pool, [(f.hypothesis, f.vector) for f in some])
