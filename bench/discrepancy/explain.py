@@ -28,6 +28,7 @@ from bench.discrepancy.attribute import (
     attribute,
     followed,
     leading,
+    near,
     passed_over,
     placements,
     prepare,
@@ -40,7 +41,7 @@ from bench.discrepancy.fit import Fit, fit
 from bench.discrepancy.grid_points import Point
 from bench.discrepancy.lack_of_fit import LackOfFit, lack_of_fit
 from bench.discrepancy.prepared import whitened
-from bench.discrepancy.problem import Array, Hypothesis, Problem, band_bins
+from bench.discrepancy.problem import Array, Hypothesis, Placed, Problem, band_bins
 from bench.discrepancy.screen import Screen
 from bench.discrepancy.search import (
     IMMATERIAL,
@@ -71,6 +72,8 @@ PROMISING = 4.0
 """Reduced chi-squared that a screening must promise in every group, if groups are to be searched before couplings."""
 CLOSED, TRIED = 3, 2
 """Most closures of a group of degrees of freedom, and of those tried for each."""
+NOISIER = 0.01
+"""Change of the reduced chi-squared with the noise behind an explanation from which the search is repeated."""
 RECONSIDERED = 3
 """Explanations behind one in which something is left that are asked whether they leave nothing."""
 KEPT = 12
@@ -147,7 +150,7 @@ class Explanation:
         """Chi-squared over its expectation on a record that the fit has not seen."""
         chi2 = count = 0.0
         for problem, fitted in self.parts:
-            data = problem.prepare(record, problem.split(fitted.hypothesis, fitted.vector)[0])
+            data = problem.prepare(record, (fitted.hypothesis, fitted.vector))
             residual = whitened(
                 data.responses - predict(problem, fitted.hypothesis, fitted.vector, record), data
             )
@@ -182,8 +185,13 @@ def _explain(
     structure = structure_of(case)
     groups = structure.groups()
     if len(groups) == 1:
-        problem = Problem(case, structure, case.identification)
-        search = attribute(problem, placements(case, structure, catalogue), most=most, progress=progress)
+        search = _attributed(
+            Problem(case, structure, case.identification),
+            placements(case, structure, catalogue),
+            most=most,
+            progress=progress,
+        )
+        problem = search.problem
         found = [Explanation(((problem, fitted),)) for fitted in search.ranked()]
         return _nothing_left_first(found) if problem.noise_stated else _parsimonious(found)
     bins = _common_bins(case, structure)
@@ -214,6 +222,24 @@ def _explain(
         coupled, _ = _coupled(whole, catalogue, most, progress)
     found += [Explanation(((whole, fitted),)) for fitted in coupled]
     return _nothing_left_first(sorted(found, key=lambda e: -e.log_posterior))
+
+
+def _attributed(
+    problem: Problem, candidates: Sequence[Placed], *, most: int, progress: Callable[[str], None]
+) -> Search:
+    """`attribute`, and once more where the best explanation makes more of the noise of a prescribed motion than the nominal model.
+
+    A law that the velocity enters strongly passes much of that noise on, and the right one would be refuted by it.
+    """
+    search = attribute(problem, candidates, most=most, progress=progress)
+    best = search.ranked()[0]
+    if problem.driven and problem.noise_stated and best.hypothesis and near(best):
+        behind = problem.behind(best.hypothesis, best.vector)
+        left = float(np.sum(behind.residual(best.hypothesis, best.vector) ** 2))
+        if abs(left - best.chi2) > NOISIER * best.n_residuals:
+            progress(f"the noise of the motion behind {names(best.hypothesis)}")
+            return attribute(behind, candidates, most=most, progress=progress)
+    return search
 
 
 def _promised(entry: Prepared) -> float:

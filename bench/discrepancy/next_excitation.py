@@ -225,7 +225,7 @@ def outlook(
     # the responses decide how wide the band is: the present record's may lack what the new one shows
     simulated = dict(zip(problem.structure.channels, responses[0].T, strict=True))
     filled = CaseRecord(record.name, record.step, record.start, {**record.values, **simulated})
-    data = problem.prepare(filled, problem.nominal)
+    data = problem.prepare(filled)
     bases = [whitened(r, data) for r in responses]
     a, b = (
         rival.sensitivity(problem, data, base) / scale

@@ -123,12 +123,17 @@ def projected(residual: Array, moved: Sequence[Array], data: RecordData) -> Arra
     return white.ravel()
 
 
+def masked(samples: Array, compared: Array | None) -> Array:
+    """Samples (n, k) of a record, those that are not compared set to zero, the others scaled to keep the power of white noise."""
+    return samples if compared is None else samples * (compared / np.sqrt(compared.mean()))[:, None]
+
+
 def whitened_spectrum(residual: Array, data: RecordData) -> Array:
     """Whitened spectrum of time-domain residuals (n, n_channels) of a whole record, real parts before imaginary ones."""
     n = len(residual)
-    if data.compared is not None:
-        residual = residual * (data.compared / np.sqrt(data.compared.mean()))[:, None]
-    spectrum = fft.rfft(residual, fast_length(n), axis=0)[: data.n_bins] / np.sqrt(n / 2.0)
+    spectrum = fft.rfft(masked(residual, data.compared), fast_length(n), axis=0)[: data.n_bins] / np.sqrt(
+        n / 2.0
+    )
     white = whiten(spectrum, data.whitening)
     white[:, 0] /= np.sqrt(2.0)
     return white.ravel()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numba
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +11,7 @@ from scipy import ndimage
 
 from bench.discrepancy.case import Case, CaseRecord
 from bench.discrepancy.prepared import noise_floor
-from bench.discrepancy.smoothing import smooth_motion
+from bench.discrepancy.smoothing import smoother_of
 from bench.discrepancy.system import Motion
 
 Array = NDArray[np.float64]
@@ -21,41 +23,65 @@ MOST_IN_DOUBT = 0.7
 """Part of a record that may be in doubt; a motion so slow or so noisy is compared as it is."""
 REVERSAL = 2.0
 """Way back of a prescribed motion, in units of its noise, from which it counts as a reversal."""
+UNUSUAL, EDGE_WIDTH = 1.5, 9
+"""Error of a prescribed velocity, over its median, from which samples at an end of a record are not compared; and the number of
+samples over which it is averaged."""
 CHANNELS = ("displacement", "velocity", "acceleration")
 
 
 def prescribed_motion(case: Case, record: CaseRecord) -> Motion:
     """Motion that drives a component: its measured displacement, and velocity where there is one, smoothed."""
-    orders, samples, noise = _prescribing(case, record)
-    out = smooth_motion(samples, orders, noise, record.step)
-    out[:, 1] = held(out[:, 0], out[:, 1], REVERSAL * noise[0])
-    return Motion(*(out[:, [i]] for i in range(3)))
+    return motion_draws(case, record, 0)[0]
 
 
-def motion_error(case: Case, record: CaseRecord) -> Array:
-    """Error (n, 2) of a prescribed position and velocity: what smoothing makes of one more draw of the noise."""
-    orders, samples, noise = _prescribing(case, record)
-    drawn = np.random.default_rng(0).standard_normal(samples.shape) * noise
-    moved = smooth_motion(samples + drawn, orders, noise, record.step)
-    return np.asarray((moved - smooth_motion(samples, orders, noise, record.step))[:, :2], dtype=np.float64)
+def motion_draws(case: Case, record: CaseRecord, draws: int) -> list[Motion]:
+    """The smoothed motion of a record, and the same with as many more draws of its noise.
+
+    Args:
+        case: The case.
+        record: Record of the motion.
+        draws: Number of draws.
+    """
+    orders, samples, noise = _samples(case, record)
+    smoother = smoother_of(samples, orders, noise, record.step)
+    rng = np.random.default_rng(0)
+    smooth = smoother.smooth(samples)
+    errors = [smoother.smooth(noise * rng.standard_normal(samples.shape)) for _ in range(draws)]
+    out = [smooth, *(smooth + error for error in errors)]
+    for moved in out:
+        moved[:, 1] = held(moved[:, 0], moved[:, 1], REVERSAL * noise[0])
+    return [Motion(*(moved[:, [i]] for i in range(3))) for moved in out]
 
 
-def decided(motion: Motion, error: Array) -> Array | None:
+def decided(motion: Motion, draws: Sequence[Motion]) -> Array | None:
     """Samples (n,) of a prescribed motion whose direction the noise leaves in no doubt, as ones and zeros.
 
     Dry friction changes its sign at a reversal, and the moment of the reversal is known to the noise only: a few
-    samples there would outweigh all the others. None where hardly anything would be left.
+    samples there would outweigh all the others. So would the first and last ones, where the smoother knows but one side.
+    None where hardly anything would be left.
 
     Args:
         motion: The motion of one coordinate.
-        error: What `motion_error` gave for it.
+        draws: The same with more noise, see `motion_draws`.
     """
-    sure = np.abs(motion.velocity[:, 0]) > DOUBT * float(np.std(error[:, 1]))
+    error = np.sqrt(np.mean([(drawn.velocity[:, 0] - motion.velocity[:, 0]) ** 2 for drawn in draws], axis=0))
+    usual = float(np.sqrt(np.mean(error**2)))
+    sure = np.abs(motion.velocity[:, 0]) > DOUBT * usual
     sure = ndimage.binary_erosion(sure, iterations=2, border_value=1)
+    sure[_edges(error)] = False
     return np.asarray(sure, dtype=np.float64) if sure.mean() > 1.0 - MOST_IN_DOUBT else None
 
 
-def _prescribing(case: Case, record: CaseRecord) -> tuple[tuple[int, ...], Array, Array]:
+def _edges(error: Array) -> NDArray[np.bool_]:
+    """Samples (n,) at both ends up to where the error of a motion has become the usual one."""
+    local = np.sqrt(ndimage.convolve1d(error**2, np.full(EDGE_WIDTH, 1.0 / EDGE_WIDTH), mode="nearest"))
+    usual = np.flatnonzero(local <= UNUSUAL * float(np.median(local)))
+    out = np.ones(len(error), dtype=bool)
+    out[usual[0] : usual[-1] + 1] = False
+    return out
+
+
+def _samples(case: Case, record: CaseRecord) -> tuple[tuple[int, ...], Array, Array]:
     """Orders, samples (n, n_channels) and noise of the channels that tell a prescribed motion."""
     have = [name for name in CHANNELS if case.has(name) and name in record.values]
     noise = [case.channel(name).noise_std or noise_floor(record.values[name]) for name in have]

@@ -14,16 +14,16 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from bench.discrepancy.case import Case, CaseRecord
 from bench.discrepancy.driven import driven_force
 from bench.discrepancy.driving import driving_loads, fewest_steps, run_in
 from bench.discrepancy.effect import Effect, Scales
 from bench.discrepancy.measured_motion import measured_motion
-from bench.discrepancy.prepared import RecordData, band_bins, fast_length, noise_floor, projected, timed
-from bench.discrepancy.prescribed_motion import decided, motion_error, prescribed_motion
+from bench.discrepancy.prepared import RecordData, band_bins, noise_floor, projected, timed
+from bench.discrepancy.prescribed_motion import decided, motion_draws
 from bench.discrepancy.quantisation import raised_noise
+from bench.discrepancy.residual_noise import whitening_behind
 from bench.discrepancy.starts import (
     cut,
     drifts,
@@ -41,8 +41,8 @@ from bench.discrepancy.system import Elements, Motion
 
 Array = NDArray[np.float64]
 MAX_SUBSTEPS, ACCELERATION = 16, 2
-SMOOTHED_BINS = 65
-"""Bins over which the spectrum of one draw is averaged."""
+MOTION_DRAWS = 8
+"""Draws of the noise of a prescribed motion."""
 COULOMB = "coulomb"
 """Nominal friction force of a component under prescribed motion."""
 FROM = " from "
@@ -99,6 +99,7 @@ class Problem:
         load_noise: (n_loads,).
         n_physical: Number of parameters of the structure proper.
         windowed: Whether free runs would drift, so that records are cut into windows.
+        passed: Effects and vector of the model that the noise of what drives it passes into the residuals.
     """
 
     case: Case
@@ -114,6 +115,7 @@ class Problem:
     motions: dict[str, Motion] = field(init=False, default_factory=dict)
     n_physical: int = field(init=False)
     windowed: bool = field(init=False)
+    passed: tuple[Hypothesis, Array] = field(init=False)
 
     def __post_init__(self) -> None:
         self.structure = without_starts(self.structure)
@@ -131,7 +133,8 @@ class Problem:
             self.structure = with_starts(self.structure, self.records)
             mean, std = start_priors([self.motion_of(r) for r in self.records if in_motion(r)])
             self.nominal, self.spread = np.append(self.nominal, mean), np.append(self.spread, std)
-        self.data = tuple(self.prepare(record, self.nominal) for record in self.records)
+        self.passed = ((), np.zeros(len(self.nominal)))
+        self.data = tuple(self.prepare(record) for record in self.records)
 
     def _noise_of(self, name: str) -> float:
         stated = self.case.channel(name).noise_std
@@ -139,8 +142,14 @@ class Problem:
             return max(raised_noise(stated, record.values[name]) for record in self.records)
         return max(noise_floor(record.values[name]) for record in self.records)
 
-    def prepare(self, record: CaseRecord, values: Array) -> RecordData:
-        """Prepare a record for comparison, the whitening for the structure at parameter `values`."""
+    def prepare(self, record: CaseRecord, passed: tuple[Hypothesis, Array] | None = None) -> RecordData:
+        """Prepare a record for comparison.
+
+        Args:
+            record: The record.
+            passed: Effects and vector of the model that noise passes on its way into the residuals; `passed` where None.
+        """
+        passed = passed or self.passed
         loads = np.column_stack([record.values[name] for name in self.structure.loads])
         responses = np.column_stack([record.values[name] for name in self.structure.channels])
         n_bins = (
@@ -148,50 +157,29 @@ class Problem:
             if self.bins and record.name in self.bins
             else band_bins(responses, self.noise)
         )
-        windows = windows_of(self, record, n_bins, values)
-        whitening = self.whitening(record, n_bins, values)
-        compared = decided(self.motion_of(record), self.motion_error(record)) if self.driven else None
+        windows = windows_of(self, record, n_bins, self.split(*passed)[0])
+        compared = decided(self.motion_of(record), self.motions_drawn(record)[1:]) if self.driven else None
+        whitening = whitening_behind(self, record, n_bins, passed, compared)
         return RecordData(record, loads, responses, n_bins, whitening, windows, compared)
 
-    def motion_error(self, record: CaseRecord) -> Array:
-        """Cached `prescribed_motion.motion_error` of a record."""
-        cache = self.__dict__.setdefault("_motion_errors", {})
-        if record.name not in cache:
-            cache[record.name] = motion_error(self.case, record)
-        return cache[record.name]
+    def behind(self, hypothesis: Hypothesis, vector: Array) -> Problem:
+        """The same records, their noise as an explanation passes it on."""
+        out = copy.copy(self)
+        out.passed = (hypothesis, vector)
+        out.data = tuple(out.prepare(record) for record in self.records)
+        return out
 
-    def whitening(self, record: CaseRecord, n_bins: int, values: Array) -> NDArray[np.complex128]:
-        """Return the whitening matrices of a record, the loads' noise passed through the linear structure at `values`."""
-        omega = 2.0 * np.pi * np.arange(n_bins) / (fast_length(len(record)) * record.step)
-        noise = np.broadcast_to(
-            np.diag(self.noise**2).astype(complex), (n_bins, len(self.noise), len(self.noise))
-        )
-        if self.driven:
-            noise = noise + self.motion_noise(record, values)[:n_bins, None, None]
-        elif np.any(load_noise := self.load_noise_of(record)):
-            response = self.structure.transfer(self.structure.at(values), np.asarray(omega, dtype=np.float64))
-            scaled = response * load_noise
-            noise = noise + scaled @ np.conj(np.swapaxes(scaled, 1, 2))
-        return np.asarray(np.linalg.inv(np.linalg.cholesky(noise)), dtype=np.complex128)
+    def motions_drawn(self, record: CaseRecord) -> list[Motion]:
+        """Cached prescribed motion of a record, and draws of its noise after it, see `prescribed_motion.motion_draws`."""
+        cache = self.__dict__.setdefault("_motions_drawn", {})
+        if record.name not in cache:
+            cache[record.name] = motion_draws(self.case, record, MOTION_DRAWS)
+        return cache[record.name]
 
     def load_noise_of(self, record: CaseRecord) -> Array:
         """Noise (n_loads,) of the loads of a record; one that is zero throughout has none."""
         driven = [bool(np.any(record.values[name])) for name in self.structure.loads]
         return np.where(driven, self.load_noise, 0.0)
-
-    def motion_noise(self, record: CaseRecord, values: Array) -> Array:
-        """Power (n_frequencies,) of the force that the noise of a prescribed motion makes in the component at `values`.
-
-        Only what the linear part makes of it is counted. Zero where that noise is not stated.
-        """
-        n = fast_length(len(record))
-        if self.load_noise[0] == 0.0:
-            return np.zeros(n // 2 + 1)
-        linear = self.structure.at(values)
-        error = self.motion_error(record)
-        force = linear.stiffness[0, 0] * error[:, 0] + linear.damping[0, 0] * error[:, 1]
-        power = np.abs(np.fft.rfft(force, n)) ** 2 / len(record)
-        return np.asarray(ndimage.uniform_filter1d(power, SMOOTHED_BINS, mode="nearest"), dtype=np.float64)
 
     def acquired(self, channels: Array, record: CaseRecord) -> Array:
         """Channels (n, n_channels) behind the filters they passed on their way into a record; changed in place."""
@@ -220,7 +208,7 @@ class Problem:
         """Smoothed measured motion of any record of the case."""
         if record.name not in self.motions:
             self.motions[record.name] = (
-                prescribed_motion(self.case, record) if self.driven else self.smoothed(record)
+                self.motions_drawn(record)[0] if self.driven else self.smoothed(record)
             )
         return self.motions[record.name]
 
@@ -363,6 +351,7 @@ class Problem:
         out = copy.copy(self)
         out.motions = {}
         out.__dict__["_loads"] = {}
+        out.__dict__["_motions_drawn"] = {}
         return out
 
     def observe(self, hypothesis: Hypothesis, etas: list[Array], motion: Motion, step: float) -> Array:

@@ -155,10 +155,10 @@ def shake(search: Search, pool: ThreadPoolExecutor) -> None:
         search: Fits so far; better ones take their places.
         pool: Threads.
     """
-    ranked = search.ranked()
-    for fitted in ranked[:SHAKEN]:
-        if posterior(fitted) > posterior(ranked[0]) - WITHIN_REACH and sticks(fitted):
-            _shaken(search, fitted, pool)
+    for fitted in search.ranked()[:SHAKEN]:
+        behind = posterior(search.ranked()[0]) - posterior(fitted)
+        if behind < WITHIN_REACH and sticks(fitted):
+            _shaken(search, fitted, pool, 2.0 * behind)
 
 
 def sticks(fitted: Fit) -> bool:
@@ -166,7 +166,8 @@ def sticks(fitted: Fit) -> bool:
     return any(placed.effect.limit is not None for placed in fitted.hypothesis)
 
 
-def _shaken(search: Search, fitted: Fit, pool: ThreadPoolExecutor) -> None:
+def _shaken(search: Search, fitted: Fit, pool: ThreadPoolExecutor, behind: float) -> None:
+    """Shake one fit, while rounds like the last one could make up the cost by which it is `behind`."""
     problem, hypothesis = search.problem, fitted.hypothesis
     mean, std, low, high = problem.prior(hypothesis)
     free = free_entries(problem, hypothesis)
@@ -180,7 +181,7 @@ def _shaken(search: Search, fitted: Fit, pool: ThreadPoolExecutor) -> None:
         return fit(problem, hypothesis, start=start, iterations=THOROUGH)
 
     in_vain = 0
-    for _ in range(SHAKES):
+    for further in reversed(range(SHAKES)):
         fitted = _overlooking_dents(fitted, problem, free, pool)
         spread = np.linalg.cholesky(fitted.covariance[np.ix_(free, free)])
         draws = np.repeat(fitted.vector[None], DRAWS, axis=0)
@@ -188,10 +189,12 @@ def _shaken(search: Search, fitted: Fit, pool: ThreadPoolExecutor) -> None:
         draws = np.clip(draws, low, high)
         best = draws[np.argsort(list(pool.map(cost, draws)))[:THREADS]]
         again = min(pool.map(again_from, best), key=lambda f: f.cost)
-        in_vain = in_vain + 1 if fitted.cost - again.cost < DENT else 0
-        if in_vain == IN_VAIN:
-            break
+        gained = fitted.cost - again.cost
+        in_vain = in_vain + 1 if gained < DENT else 0
         fitted = min(fitted, again, key=lambda f: f.cost)
+        behind -= max(gained, 0.0)
+        if in_vain == IN_VAIN or behind > further * max(gained, DENT):
+            break
     search.fits[key_of(hypothesis)] = _overlooking_dents(fitted, problem, free, pool)
 
 

@@ -13,8 +13,8 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from bench.discrepancy.case import Case, CaseRecord
-from bench.discrepancy.driving import with_load_noise
 from bench.discrepancy.problem import Array, Hypothesis, Problem
+from bench.discrepancy.residual_noise import forces_of_noise
 from bench.discrepancy.start_estimates import predict as predicted
 from bench.discrepancy.start_estimates import run_kind
 from bench.discrepancy.structure import Structure
@@ -23,8 +23,6 @@ from bench.discrepancy.verdict import Gap
 Prediction = Callable[[CaseRecord], Mapping[str, Array]]
 DIVERGED_GAP = 1e3
 """Gap that stands for a simulation that diverged."""
-DRAWS = 16
-"""Draws of the noise of a prescribed motion."""
 BLOCKS = 24
 """Blocks of a judging record for the bootstrap: some periods each, so that blocks are nearly independent."""
 
@@ -135,7 +133,7 @@ def noise_level(
     if not np.any(load_noise):
         return float(np.sqrt(own))
     if problem.windowed:
-        windows = problem.prepare(record, problem.nominal).windows
+        windows = problem.prepare(record).windows
         assert windows is not None
         return float(np.sqrt(signs @ windows.floor[np.ix_(index, index)] @ signs))
     omega = np.asarray(2.0 * np.pi * np.fft.rfftfreq(len(record), record.step)[1:], dtype=np.float64)
@@ -155,16 +153,8 @@ def _forces_of_noise(
 
     Friction makes most of it: the noise decides at which sample a reversal falls.
     """
-    if not np.any(problem.load_noise):
-        return 0.0
-    rng = np.random.default_rng(0)
-    squares = []
-    for record in records:
-        clean = problem.simulate(*model, record)
-        for _ in range(DRAWS):
-            noisy = problem.forgetful().simulate(*model, with_load_noise(problem, record, rng))
-            squares.append(np.mean((noisy - clean) ** 2))
-    return float(np.mean(squares))
+    forces = [forces_of_noise(problem, record, model) for record in records]
+    return float(np.mean([float(np.mean(force**2)) for force in forces]))
 
 
 def _label(channels: Sequence[tuple[str, float]]) -> str:

@@ -10,6 +10,8 @@ References:
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numba
 import numpy as np
 from numpy.typing import NDArray
@@ -87,10 +89,40 @@ def _stationary(
     return covariance, gain, innovation
 
 
+class Smoother(NamedTuple):
+    """A smoother of one coordinate with stationary gains: linear in the samples it is given.
+
+    Attributes:
+        step: Time between samples [s].
+        powers: (n_channels,) powers of the step that make the channels alike in size.
+        observed: (n_channels, 3) ones where a channel measures position, velocity or acceleration.
+        transition: (3, 3) from one sample to the next.
+        gain: (3, n_channels) of the innovations.
+        back: (3, 3) gain of the way back.
+    """
+
+    step: float
+    powers: NDArray
+    observed: NDArray
+    transition: NDArray
+    gain: NDArray
+    back: NDArray
+
+    def smooth(self, samples: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Position, velocity and acceleration (n, 3) from samples (n, n_channels)."""
+        y = np.ascontiguousarray(samples * self.powers)
+        if len(self.observed) > y.shape[1]:  # the mean position, which nothing measures
+            y = np.column_stack([y, np.zeros(len(y))])
+        filtered, predicted = np.zeros((len(y), 3)), np.zeros((len(y), 3))
+        _filter(y, self.observed, self.transition, self.gain, filtered, predicted)
+        _smooth(filtered, predicted, self.back)
+        return filtered / self.step ** np.arange(3.0)
+
+
 def smooth_motion(
     samples: NDArray[np.float64], orders: tuple[int, ...], noise_std: NDArray[np.float64], step: float
 ) -> NDArray[np.float64]:
-    """Fuse the channels of one coordinate.
+    """Fuse the channels of one coordinate: `smoother_of` them, applied to them.
 
     Args:
         samples: (n, n_channels) measured.
@@ -104,6 +136,17 @@ def smooth_motion(
     """
     if np.all(np.abs(samples).max(axis=0) < REST * noise_std):  # a free run that nothing drives
         return np.zeros((len(samples), 3))
+    return smoother_of(samples, orders, noise_std, step).smooth(samples)
+
+
+def smoother_of(
+    samples: NDArray[np.float64], orders: tuple[int, ...], noise_std: NDArray[np.float64], step: float
+) -> Smoother:
+    """The likeliest smoother of the channels of one coordinate; arguments as of `smooth_motion`.
+
+    Raises:
+        IdentificationError: The channels cannot be fused.
+    """
     powers = step ** np.array(orders, dtype=float)
     y = np.ascontiguousarray(samples * powers)
     noise_scaled = noise_std * powers
@@ -124,27 +167,25 @@ def smooth_motion(
     transition = np.array([[1.0, 1.0, 0.5], [0.0, 1.0, 1.0], [0.0, 0.0, 1.0]])
     shape = np.array([[1 / 20, 1 / 8, 1 / 6], [1 / 8, 1 / 3, 1 / 2], [1 / 6, 1 / 2, 1.0]])
     noise = np.diag(noise_scaled**2)
-    best: tuple[float, NDArray, NDArray, NDArray] | None = None
+    best: tuple[float, Smoother] | None = None
     for multiple in CANDIDATES:
         process = shape * guess * multiple
         try:
             covariance, gain, innovation = _stationary(transition, process, h, noise)
         except (np.linalg.LinAlgError, ValueError):
             continue
-        filtered = np.zeros((len(y), 3))
-        predicted = np.zeros((len(y), 3))
-        observed = _filter(y, h, transition, np.ascontiguousarray(gain), filtered, predicted)
+        gain = np.ascontiguousarray(gain)
+        observed = _filter(y, h, transition, gain, np.zeros((len(y), 3)), np.zeros((len(y), 3)))
         score = np.linalg.slogdet(innovation)[1] + np.trace(np.linalg.solve(innovation, observed))
         if np.isfinite(score) and (best is None or score < best[0]):
             posterior = covariance - gain @ h @ covariance
-            best = (score, filtered, predicted, posterior @ transition.T @ np.linalg.inv(covariance))
+            back = np.ascontiguousarray(posterior @ transition.T @ np.linalg.inv(covariance))
+            best = (score, Smoother(step, powers, h, transition, gain, back))
     if best is None:
         raise IdentificationError(
             "the channels of one coordinate could not be fused; check the noise stated for them and their units"
         )
-    _, filtered, predicted, back = best
-    _smooth(filtered, predicted, np.ascontiguousarray(back))
-    return filtered / step ** np.arange(3.0)
+    return best[1]
 
 
 def _jerk_guess(samples: NDArray, orders: tuple[int, ...], noise_std: NDArray, step: float) -> float:
