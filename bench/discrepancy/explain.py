@@ -68,6 +68,9 @@ Of couplings, which are few, less is asked: that they take away a good part (`ST
 have ended far from the motion."""
 CONVERGED_PAIRS, CONVERGED_BEYOND = 4, 2
 """Pairs that hold a coupling effect, and larger hypotheses, that are carried on to convergence."""
+HOPELESS_GROUP = 5.0
+"""Reduced chi-squared of a group of degrees of freedom above which no second effect is searched on the others: whatever it is, the
+whole stays unexplained."""
 PROMISING = 4.0
 """Reduced chi-squared that a screening must promise in every group, if groups are to be searched before couplings."""
 CLOSED, TRIED = 3, 2
@@ -212,11 +215,13 @@ def _explain(
         )
         settled = deep and consistent(coupled[0])
     if not settled:
+        hopeless = False
         for entry in prepared:
             problem = entry[0].problem
             progress(f"degrees of freedom {', '.join(problem.structure.dofs)}")
             chosen = placements(case, problem.structure, catalogue)
-            attribute(problem, chosen, most=2, progress=progress, prepared=entry)
+            search = attribute(problem, chosen, most=1 if hopeless else 2, progress=progress, prepared=entry)
+            hopeless = hopeless or search.ranked()[0].reduced > HOPELESS_GROUP
     found = _nothing_left_first(_combined([entry[0] for entry in prepared]))
     if odd and not deep and not _leaves_nothing(found):
         coupled, _ = _coupled(whole, catalogue, most, progress)
@@ -405,26 +410,27 @@ def close(best: Explanation, nothing: Explanation, closures: Sequence[Effect]) -
             current = fit(problem, (), start=np.zeros(len(problem.nominal)))
             if fitted.reduced - 1.0 < HELPFUL * (current.reduced - 1.0):
                 current = fitted
-            for _ in range(CLOSED):
-                closed = _closed(problem, screen, current)
-                if closed is None:
-                    break
-                current = closed
-                used.append(closed.hypothesis[-1].effect.name)
-                if consistent(current) and not lacks:
-                    break
+            with ThreadPoolExecutor(THREADS) as pool, threadpool_limits(1, user_api="blas"):
+                for _ in range(CLOSED):
+                    closed = _closed(problem, screen, current, pool.map)
+                    if closed is None:
+                        break
+                    current = closed
+                    used.append(closed.hypothesis[-1].effect.name)
+                    if consistent(current) and not lacks:
+                        break
         parts.append((problem, current))
     return Explanation(tuple(parts)), " + ".join(dict.fromkeys(used))
 
 
-def _closed(problem: Problem, screen: Screen, current: Fit) -> Fit | None:
+def _closed(problem: Problem, screen: Screen, current: Fit, each: Callable) -> Fit | None:
     """One more closure on top of a fit: of those that the screening likes best the first that pays; None where none does."""
     own = {placed.key for placed in current.hypothesis}
     for point in leading(
         [p for p in screen.ranked(current) if p.placed.key not in own], TRIED, 0.0, starts=1
     ):
         start = np.concatenate([current.vector, point.eta])
-        closed = fit(problem, (*current.hypothesis, point.placed), start=start, iterations=12)
+        closed = fit(problem, (*current.hypothesis, point.placed), start=start, iterations=12, each=each)
         idle = not consistent(current) and closed.reduced - 1.0 > STALLED * (current.reduced - 1.0)
         if not idle and closed.log_evidence > current.log_evidence:
             return closed
