@@ -29,6 +29,7 @@ from bench.discrepancy.search import (
     carry_on,
     consistent,
     converge,
+    integrate_finer,
     key_of,
     limit_of,
     names,
@@ -169,6 +170,8 @@ def attribute(
             screen.add(rare, pool.map)
             _extend(search, screen, [nothing], pool, count=6, among={p.key for p in rare})
         for size in range(1, most):
+            if near(search.ranked()[0]):
+                integrate_finer(search, pool)
             best = search.ranked()[0]
             progress(
                 f"{len(best.hypothesis)} effect(s): {names(best.hypothesis)}, chi-squared {best.reduced:.3g}"

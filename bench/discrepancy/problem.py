@@ -93,6 +93,7 @@ class Problem:
         records: Records to be explained.
         bins: Frequency bins of every record, where they have to agree with those of another problem.
         substeps: Integration steps a sample; chosen by the fastest rate where None.
+        refinement: Multiple of the steps so chosen.
         nominal: (n_nominal,) values of the structure's parameters, initial states of records in motion after them.
         spread: (n_nominal,) their one-sigma uncertainties.
         noise: (n_channels,) noise of the response channels.
@@ -107,6 +108,7 @@ class Problem:
     records: tuple[CaseRecord, ...]
     bins: Mapping[str, int] | None = None
     substeps: int | None = None
+    refinement: int = 1
     nominal: Array = field(init=False)
     spread: Array = field(init=False)
     noise: Array = field(init=False)
@@ -285,7 +287,7 @@ class Problem:
         # The rate of a law is that at its largest velocity, where a step of one time constant is still accurate enough.
         fastest = max(0.6 * rate, np.sqrt(np.max(np.abs(linear.stiffness).sum(1) / np.diag(linear.mass))))
         # RK4 with h * rate = 0.6 leaves a relative error of 1e-4 over one time constant, below any noise considered
-        substeps = self.substeps or int(
+        substeps = self.substeps or self.refinement * int(
             np.clip(np.ceil(record.step * fastest / 0.6), self.finest, MAX_SUBSTEPS)
         )
         loads, factor = driving_loads(self, (hypothesis, etas), record, substeps)
@@ -345,6 +347,12 @@ class Problem:
                 return np.full_like(force, np.nan)
             force += driven @ elements.rows
         return self.sensed(hypothesis, etas, force, record.step)
+
+    def finer(self, refinement: int) -> Problem:
+        """A copy that is integrated in other steps."""
+        out = copy.copy(self)
+        out.refinement = refinement
+        return out
 
     def forgetful(self) -> Problem:
         """A copy without what is kept by the name of a record: for records of the same names with other samples."""
