@@ -33,6 +33,7 @@ from bench.discrepancy.search import (
     key_of,
     limit_of,
     names,
+    near,
     shake,
     sticks,
 )
@@ -62,9 +63,6 @@ NEARLY = 0.9
 """Further starts of an effect are worth a fit if they gain this part of what its best one does."""
 LEFT = 0.02
 """Part of a named effect's gain along the measured motion that a challenger may lack, besides twice what the effect leaves."""
-REFUTED = 2.0
-"""Reduced chi-squared from which the best hypothesis is so far off that its rivals are not fitted again: none of them will do.
-Below it, free runs miss the motion by less than the noise, and tell it better than the records do."""
 STALLED = 0.7
 """If one more effect leaves more than this part of the excess of chi-squared, a further one is not tried."""
 UNPROMISING = 0.25
@@ -219,11 +217,6 @@ def followed(base: Fit, problem: Problem) -> bool:
     if not base.hypothesis:
         return _at_ease(base, problem)
     return consistent(base) or (near(base) and not sticks(base))
-
-
-def near(fitted: Fit) -> bool:
-    """Whether the free run of a fit is off by less than the noise."""
-    return fitted.reduced < REFUTED
 
 
 def about(screen: Screen, base: Fit, *, explained: bool) -> Screen:

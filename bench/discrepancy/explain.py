@@ -28,7 +28,6 @@ from bench.discrepancy.attribute import (
     attribute,
     followed,
     leading,
-    near,
     passed_over,
     placements,
     prepare,
@@ -51,6 +50,7 @@ from bench.discrepancy.search import (
     consistent,
     converge,
     names,
+    near,
     posterior,
 )
 from bench.discrepancy.start_estimates import predict

@@ -32,11 +32,13 @@ MODEL_ERROR = 0.02
 """Relative excess of chi-squared that is laid to the smoothing and integration of the diagnosis itself."""
 SAME = 0.3
 """Distance within which two refined starts of an effect count as one."""
-INTEGRATED, FINEST = 2.5e-3, 8
-"""Mean square of whitened residuals that halving the integration steps may change: a twentieth of the noise; and the largest multiple
-of the steps."""
-SHAKEN = 4
-"""Hypotheses that are shaken, at most."""
+NEAR = 2.0
+"""Reduced chi-squared up to which a free run is off by less than the noise, and tells the motion better than the records do."""
+INTEGRATED, FINEST = 4.0, 8
+"""Sum of squares by which halving the integration steps may change the whitened residuals, so that evidence stays the same to a unit
+or two; and the largest multiple of the steps."""
+SHAKEN, SHAKEN_REACH = 4, 100.0
+"""Hypotheses that are shaken, at most, and the difference in log posterior that this may still make up."""
 SHAKES, IN_VAIN, DRAWS = 6, 2, 48
 """Rounds, those in vain after which there is no further one, and draws of a round."""
 SCALES = ((1.0,), (2.0,), (4.0,))
@@ -102,6 +104,11 @@ def consistent(fitted: Fit) -> bool:
     return fitted.reduced < 1.0 + SIGNIFICANT * spread + MODEL_ERROR
 
 
+def near(fitted: Fit) -> bool:
+    """Whether the free run of a fit is off by less than the noise."""
+    return fitted.reduced < NEAR
+
+
 def names(hypothesis: Hypothesis) -> str:
     """Readable names of a hypothesis."""
     return (
@@ -143,10 +150,10 @@ def converge(
 
 
 def integrate_finer(search: Search, pool: ThreadPoolExecutor) -> None:
-    """Halve the integration steps while the best fit tells the difference, and fit those near it again.
+    """Halve the integration steps while the best fit tells the difference, and fit the best ones again.
 
-    The steps are chosen for smooth laws. Where one switches, an error of the integration may stand out of the noise of a very good
-    record, and one more effect would be found that does nothing but undo it.
+    The steps are chosen for smooth laws. Where one switches, an error of the integration may stand out of the noise of a good
+    record, and one more effect would be found, or a law of more parameters preferred, that does nothing but undo it.
 
     Args:
         search: Fits so far; its problem is integrated in finer steps from here on.
@@ -158,13 +165,12 @@ def integrate_finer(search: Search, pool: ThreadPoolExecutor) -> None:
     refinement, coarse = problem.refinement, problem.residual(best.hypothesis, best.vector)
     while problem.refinement < FINEST:
         fine = problem.finer(2 * problem.refinement).residual(best.hypothesis, best.vector)
-        if not np.mean((fine - coarse) ** 2) > INTEGRATED:
+        if not np.sum((fine - coarse) ** 2) > INTEGRATED:
             break
         problem.refinement, coarse = 2 * problem.refinement, fine
     if problem.refinement == refinement:
         return
-    near = [f for f in search.ranked() if posterior(f) > posterior(best) - WITHIN_REACH]
-    for fitted in near[:SHAKEN]:
+    for fitted in [f for f in search.ranked() if near(f)][:SHAKEN]:
         search.fits[key_of(fitted.hypothesis)] = fit(
             problem, fitted.hypothesis, start=fitted.vector, iterations=THOROUGH, each=pool.map
         )
@@ -186,10 +192,22 @@ def shake(search: Search, pool: ThreadPoolExecutor) -> None:
         search: Fits so far; better ones take their places.
         pool: Threads.
     """
-    for fitted in search.ranked()[:SHAKEN]:
-        behind = posterior(search.ranked()[0]) - posterior(fitted)
-        if behind < WITHIN_REACH and sticks(fitted):
-            _shaken(search, fitted, pool, 2.0 * behind)
+    for fitted in [f for f in search.ranked() if near(f) and sticks(f)][:SHAKEN]:
+        begun = _beside_the_best(search, fitted, pool)
+        behind = posterior(search.ranked()[0]) - posterior(begun)
+        if behind < SHAKEN_REACH:
+            _shaken(search, begun, pool, 2.0 * behind)
+
+
+def _beside_the_best(search: Search, fitted: Fit, pool: ThreadPoolExecutor) -> Fit:
+    """The better of a fit and the same begun with the nominal parameters of the best one, which may have got over its dents."""
+    best, n = search.ranked()[0], len(search.problem.nominal)
+    if fitted is best:
+        return fitted
+    start = np.concatenate([best.vector[:n], fitted.vector[n:]])
+    again = fit(search.problem, fitted.hypothesis, start=start, iterations=THOROUGH, each=pool.map)
+    search.add(again)
+    return min(fitted, again, key=lambda f: f.cost)
 
 
 def sticks(fitted: Fit) -> bool:
