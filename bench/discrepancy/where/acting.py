@@ -14,8 +14,8 @@ from bench.discrepancy.explain import Explanation
 from bench.discrepancy.problem import Array, Placed, Problem
 from bench.discrepancy.screen import force_along
 
-NOTHING = 1e-3
-"""Part of an effect's largest force below which it does not act."""
+NOTHING = 1e-5
+"""Part of an effect's largest force below which it does not act: less than a cubic spring exerts in the cells about its middle."""
 CELLS = 64
 """Cells of the reach of a coordinate; what acts anywhere in a cell acts in it."""
 

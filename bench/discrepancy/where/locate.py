@@ -106,7 +106,7 @@ def locate(problem: Problem, nominal: Explanation, best: Explanation, *, named: 
         observer = problem.structure.observers[names.index(name)]
         touched = [m for m in maps if np.any(m.place.rows[0] * observer.row != 0)]
         kind = _kind(name, found)
-        regions = () if kind == "sensor" else _regions_at(touched, acting)
+        regions = _regions_at(() if kind == "sensor" else touched, touched, acting)
         locations.append(
             Location(
                 channel=name,
@@ -130,12 +130,13 @@ def locate(problem: Problem, nominal: Explanation, best: Explanation, *, named: 
 
 
 def _regions_at(
-    touched: Sequence[StateMap], acting: Mapping[str, tuple[dict[str, Any], ...]]
+    trusted: Sequence[StateMap], touched: Sequence[StateMap], acting: Mapping[str, tuple[dict[str, Any], ...]]
 ) -> tuple[dict[str, Any], ...]:
-    """Regions at the places of some maps: of the named effects that are limited to a region, or else of the maps."""
+    """Regions at the places of the maps that a channel touches: of the named effects that are limited to a region, or else of the
+    trusted maps; what a faulty sensor tells of a force is not."""
     limited = tuple(region for m in touched for region in acting.get(m.place.name, ()))
     return limited or tuple(
-        {**box(r), "share": r.share, "force": r.force} for m in touched for r in m.regions
+        {**box(r), "share": r.share, "force": r.force} for m in trusted for r in m.regions
     )
 
 
