@@ -13,6 +13,7 @@ from bench.discrepancy.explain import Explanation
 from bench.discrepancy.problem import Problem
 from bench.discrepancy.structure import structure_of
 from bench.discrepancy.where.acting import acting_regions
+from bench.discrepancy.where.locate import locate
 from bench.discrepancy.where.missing_force import observers
 from bench.discrepancy.where.redundancy import contradictions
 from bench.discrepancy.where.state_map import CELLS, state_maps
@@ -165,7 +166,23 @@ def test_a_named_stop_tells_where_it_begins_better_than_the_map():
     best = Explanation(((case, search.ranked()[0]),))
     (region,) = acting_regions(best)[""]
     assert region["effect"] == "one_sided_stop"
-    # the fit knows the position to some micrometres; a thousandth of the largest force is 10 micrometres further on
+    # the fit knows the position to some micrometres
     assert region["displacement"][0] == pytest.approx(0.01, abs=1e-4)
     assert "velocity" not in region
     assert region["force"] > 0.0
+
+
+def test_a_named_stop_tells_its_region_beside_a_faulty_sensor_and_a_smooth_spring_has_none():
+    case = problem(stop, spoil=lambda x: 1.1 * x)
+    names = ("one_sided_stop", "displacement_gain_error", "cubic_stiffness")
+    candidates = placements(case.case, case.structure, [e for e in CATALOGUE if e.name in names])
+    search = attribute(case, candidates, most=2)
+    best, nothing = (Explanation(((case, f),)) for f in (search.ranked()[0], search.ranked(0)[0]))
+    assert {placed.effect.name for placed in best.hypothesis} == set(names[:2])
+    for location in locate(case, nothing, best, named=True).locations:
+        assert location.kind == "sensor"
+        assert location.state_region["displacement"][0] == pytest.approx(0.01, abs=5e-4)  # 1 to 2 cells
+    cubic = next(
+        f for f in search.fits.values() if [p.effect.name for p in f.hypothesis] == ["cubic_stiffness"]
+    )
+    assert acting_regions(Explanation(((case, cubic),))) == {}

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted_cases import SAMPLE_RATE, bouc_wen_slope, motion_with, planted_case
+from planted_cases import NOISE, SAMPLE_RATE, bouc_wen_slope, motion_with, planted_case
 
 from bench.discrepancy import BlindOptions, diagnose
 from bench.discrepancy.attribute import WORTH_A_FIT, attribute, followed, placements
@@ -22,7 +22,7 @@ from bench.discrepancy.lack_of_fit import LackOfFit, lack_of_fit
 from bench.discrepancy.prepared import timed
 from bench.discrepancy.problem import Problem
 from bench.discrepancy.screen import Screen
-from bench.discrepancy.search import Search, consistent, shake
+from bench.discrepancy.search import Search, consistent, integrate_finer, shake
 from bench.discrepancy.signal_effects import delay, sensor_delay
 from bench.discrepancy.structure import structure_of
 
@@ -88,6 +88,30 @@ def test_friction_that_sticks_is_shaken_out_of_the_dent_that_its_fit_ended_in():
     with ThreadPoolExecutor(2) as pool:
         shake(search, pool)
     assert search.ranked()[0].cost < coulomb.cost - 10.0
+
+
+@pytest.mark.parametrize(("quieter", "refined"), [(300.0, True), (1.0, False)])
+def test_integration_is_as_fine_as_the_law_found_needs_it(quieter, refined):
+    """A record that is known to some millionths shows where a law switches between two steps; usual noise hides it."""
+    noise = {name: level / quieter for name, level in NOISE.items()}
+    case = planted_case(noise=noise | {"force": 0.0})
+    problem = Problem(case, structure_of(case), case.identification)
+    law = placements(case, problem.structure, [effect_named("bouc_wen_hysteresis")])[0]
+    truth = np.array([0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0])
+    (record,) = case.identification
+    made = problem.finer(16).simulate((law,), truth, record)
+    made += problem.noise * np.random.default_rng(0).standard_normal(made.shape)
+    values = record.values | dict(zip(problem.structure.channels, made.T, strict=True))
+    problem = Problem(case, problem.structure, (replace(record, values=values),))
+    search = Search(problem)
+    search.add(fit(problem, (law,), start=truth, iterations=30))
+    (coarse,) = search.ranked()
+    with ThreadPoolExecutor(2) as pool:
+        integrate_finer(search, pool)
+    (fine,) = search.ranked()
+    assert consistent(fine)
+    assert (problem.refinement > 1) == refined
+    assert consistent(coarse) != refined
 
 
 @pytest.mark.slow
