@@ -1,9 +1,9 @@
 """Explanations: hypotheses for all degrees of freedom together, and how well they predict.
 
 A rig may fall apart into groups of degrees of freedom that its linear structure does not couple: the axial and the torsional
-motion of a joint. Each group is searched on its own. Effects that couple groups are tried alone before; other effects are searched
-beside them at once where the groups promise far less than a coupling does, else when the groups alone leave more than noise, or a
-force. Chi-squared and evidence add over groups, so all explanations can be compared.
+motion of a joint. Each group is searched on its own. Effects that couple groups (`coupled`) are tried alone before; other effects
+are searched beside them at once where the groups promise far less than a coupling does, else when the groups alone leave more than
+noise, or a force. Chi-squared and evidence add over groups, so all explanations can be compared.
 """
 
 from __future__ import annotations
@@ -17,57 +17,21 @@ from itertools import product
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from bench.discrepancy.attribute import (
-    QUICK,
-    REFINED_STARTS,
-    STALLED,
-    TRUSTED,
-    WORTH_A_FIT,
-    Prepared,
-    about,
-    attribute,
-    followed,
-    leading,
-    passed_over,
-    placements,
-    prepare,
-    reduce_best,
-    refined,
-)
+from bench.discrepancy.attribute import STALLED, Prepared, attribute, leading, placements, prepare
 from bench.discrepancy.case import Case, CaseRecord
+from bench.discrepancy.coupled import coupled_fits
 from bench.discrepancy.effect import Effect
 from bench.discrepancy.fit import Fit, fit
-from bench.discrepancy.grid_points import Point
 from bench.discrepancy.lack_of_fit import LackOfFit, lack_of_fit
 from bench.discrepancy.prepared import whitened
 from bench.discrepancy.problem import Array, Hypothesis, Placed, Problem, band_bins
 from bench.discrepancy.screen import Screen
-from bench.discrepancy.search import (
-    IMMATERIAL,
-    THREADS,
-    WITHIN_REACH,
-    Search,
-    consistent,
-    converge,
-    names,
-    near,
-    posterior,
-)
+from bench.discrepancy.search import THREADS, WITHIN_REACH, Search, consistent, names, near, posterior
 from bench.discrepancy.start_estimates import predict
 from bench.discrepancy.structure import Structure, structure_of
 
 HELPFUL = 0.3
 """A catalogued explanation that leaves less than this part of the excess is kept under a closure; others only disturb it."""
-HOPELESS_COUPLING = 50.0
-"""Reduced chi-squared of a coupling effect alone above which only a second coupling is added to it."""
-HOPELESS_THIRD = 5.0
-"""Reduced chi-squared of a pair that a coupling effect belongs to above which no third effect is added: it would repair little."""
-HOPELESS_PAIR = 8.0
-"""Reduced chi-squared that the screening beside a coupling effect must promise to go below: pairs that explain promise 1 to 2.
-Of couplings, which are few, less is asked: that they take away a good part (`STALLED`), since a fit without the other coupling may
-have ended far from the motion."""
-CONVERGED_PAIRS, CONVERGED_BEYOND = 4, 2
-"""Pairs that hold a coupling effect, and larger hypotheses, that are carried on to convergence."""
 HOPELESS_GROUP = 5.0
 """Reduced chi-squared of a group of degrees of freedom above which no second effect is searched on the others: whatever it is, the
 whole stays unexplained."""
@@ -210,7 +174,7 @@ def _explain(
     deep = settled = False
     if len(odd) > 1:
         little = max(_promise(entry) for entry in odd) > PROMISING
-        coupled, deep = _coupled(
+        coupled, deep = coupled_fits(
             whole, catalogue, most, progress, lambda alone: little or _beyond(alone, prepared)
         )
         settled = deep and consistent(coupled[0])
@@ -224,7 +188,7 @@ def _explain(
             hopeless = hopeless or search.ranked()[0].reduced > HOPELESS_GROUP
     found = _nothing_left_first(_combined([entry[0] for entry in prepared]))
     if odd and not deep and not _leaves_nothing(found):
-        coupled, _ = _coupled(whole, catalogue, most, progress)
+        coupled, _ = coupled_fits(whole, catalogue, most, progress)
     found += [Explanation(((whole, fitted),)) for fitted in coupled]
     return _nothing_left_first(sorted(found, key=lambda e: -e.log_posterior))
 
@@ -261,78 +225,6 @@ def _promise(entry: Prepared) -> float:
 def _beyond(coupled: Fit, prepared: Sequence[Prepared]) -> bool:
     """Whether an effect on each group of degrees of freedom promises far less than a coupling has kept."""
     return sum(_promised(entry) for entry in prepared) > coupled.chi2 + 4.0 * WITHIN_REACH
-
-
-def _coupled(
-    whole: Problem,
-    catalogue: Sequence[Effect],
-    most: int,
-    progress: Callable[[str], None],
-    deeper: Callable[[Fit], bool] = lambda alone: True,
-) -> tuple[list[Fit], bool]:
-    """Search explanations that hold an effect which couples the groups.
-
-    Args:
-        whole: Records and priors on all degrees of freedom.
-        catalogue: Effects to consider.
-        most: Largest number of effects.
-        progress: Called with a line of text at every stage.
-        deeper: Whether the best coupling alone is worth a search for other effects beside it.
-
-    Returns:
-        The fits by decreasing posterior, and whether other effects were searched beside a coupling.
-    """
-    progress("effects that couple the degrees of freedom")
-    candidates = [
-        p
-        for p in placements(whole.case, whole.structure, catalogue)
-        if p.effect.site == "joint" and not p.effect.rare
-    ]
-    kept = Search(whole)
-    with ThreadPoolExecutor(THREADS) as pool:
-        screen = Screen(whole, candidates, pool.map)
-        coupling = {p.key for p in candidates if p.effect.n_coordinates > 1}
-        ground = screen.ground()
-        points = refined(screen, ground, [p for p in screen.ranked() if p.placed.key in coupling], pool)
-        zero = np.zeros(len(whole.nominal))
-        starts = leading(points, len(coupling), 0.0, starts=REFINED_STARTS)
-        converge(kept, pool, [((p.placed,), np.append(zero, p.eta)) for p in starts])
-        deep = bool(kept.fits) and deeper(kept.ranked()[0])
-        for _ in range(1, most if deep else 1):
-            base = kept.ranked()[0]
-            if len(base.hypothesis) > 1 and base.reduced > HOPELESS_THIRD:
-                break
-            progress(f"{names(base.hypothesis)}, chi-squared {base.reduced:.3g}")
-            along = followed(base, whole)
-            local = about(screen, base, explained=along)
-            ground = local.ground(base, simulated=along)
-            solved = local.ranked(base, ground)
-            if base.reduced > HOPELESS_COUPLING:
-                solved = [p for p in solved if p.placed.key in coupling]
-            points = refined(local, ground, solved, pool)
-            worth = [p for p in points if p.gain > max(WORTH_A_FIT, IMMATERIAL * base.n_residuals)]
-            alone = float(np.sum(ground.left**2))
-            if alone - max((p.gain for p in worth), default=0.0) > HOPELESS_PAIR * base.n_residuals:
-                worth = [p for p in worth if p.placed.key in coupling and alone - p.gain < STALLED * alone]
-            if not worth:
-                break
-
-            def extended(point: Point, base: Fit = base, local=local, ground=ground) -> Fit:
-                start = local.starts(point, ground, base)
-                return fit(
-                    whole, (*base.hypothesis, point.placed), start=start, iterations=QUICK, exact=False
-                )
-
-            least = TRUSTED * worth[0].gain if along else WORTH_A_FIT
-            chosen = leading(worth, 4, least, starts=1)
-            chosen += passed_over(solved, chosen, 4, least)
-            trials = sorted(pool.map(extended, chosen), key=lambda f: f.cost)
-            some = trials[: CONVERGED_PAIRS if len(base.hypothesis) == 1 else CONVERGED_BEYOND]
-            converge(kept, pool, [(f.hypothesis, f.vector) for f in some])
-            reduce_best(kept, pool)
-            if kept.ranked()[0] is base or kept.ranked()[0].reduced - 1.0 > STALLED * (base.reduced - 1.0):
-                break
-    return kept.ranked(), deep
 
 
 def _nothing_left_first(found: list[Explanation]) -> list[Explanation]:

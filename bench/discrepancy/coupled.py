@@ -1,0 +1,131 @@
+"""Explanations that hold an effect which couples groups of degrees of freedom: the two axes of a joint."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+
+from bench.discrepancy.attribute import (
+    QUICK,
+    REFINED_STARTS,
+    STALLED,
+    TRUSTED,
+    WORTH_A_FIT,
+    about,
+    followed,
+    leading,
+    passed_over,
+    placements,
+    reduce_best,
+    refined,
+)
+from bench.discrepancy.effect import Effect
+from bench.discrepancy.fit import Fit, fit
+from bench.discrepancy.grid_points import Point
+from bench.discrepancy.problem import Problem
+from bench.discrepancy.screen import Ground, Screen
+from bench.discrepancy.search import IMMATERIAL, THREADS, Search, converge, names
+
+HOPELESS_COUPLING = 50.0
+"""Reduced chi-squared of a coupling effect alone above which only a second coupling is added to it."""
+HOPELESS_THIRD = 5.0
+"""Reduced chi-squared of a pair that a coupling effect belongs to above which no third effect is added: it would repair little."""
+HOPELESS_PAIR = 8.0
+"""Reduced chi-squared that the screening beside a coupling effect must promise to go below: pairs that explain promise 1 to 2.
+Of couplings, which are few, less is asked: that they take away a good part (`STALLED`), since a fit without the other coupling may
+have ended far from the motion."""
+CONVERGED_PAIRS, CONVERGED_BEYOND = 4, 2
+"""Pairs that hold a coupling effect, and larger hypotheses, that are carried on to convergence."""
+TRIALS = 4
+"""Effects that are fitted beside a coupling, but for plain forces that the screening passes over."""
+
+Keys = Collection[tuple[str, str, str]]
+
+
+def coupled_fits(
+    whole: Problem,
+    catalogue: Sequence[Effect],
+    most: int,
+    progress: Callable[[str], None],
+    deeper: Callable[[Fit], bool] = lambda alone: True,
+) -> tuple[list[Fit], bool]:
+    """Search explanations that hold an effect which couples the groups.
+
+    Args:
+        whole: Records and priors on all degrees of freedom.
+        catalogue: Effects to consider.
+        most: Largest number of effects.
+        progress: Called with a line of text at every stage.
+        deeper: Whether the best coupling alone is worth a search for other effects beside it.
+
+    Returns:
+        The fits by decreasing posterior, and whether other effects were searched beside a coupling.
+    """
+    progress("effects that couple the degrees of freedom")
+    candidates = [
+        p
+        for p in placements(whole.case, whole.structure, catalogue)
+        if p.effect.site == "joint" and not p.effect.rare
+    ]
+    kept = Search(whole)
+    with ThreadPoolExecutor(THREADS) as pool:
+        screen = Screen(whole, candidates, pool.map)
+        coupling = {p.key for p in candidates if p.effect.n_coordinates > 1}
+        _alone(kept, screen, coupling, pool)
+        deep = bool(kept.fits) and deeper(kept.ranked()[0])
+        size = 1
+        while deep and size < most and _one_more(kept, screen, coupling, pool, progress):
+            size += 1
+    return kept.ranked(), deep
+
+
+def _alone(kept: Search, screen: Screen, coupling: Keys, pool: ThreadPoolExecutor) -> None:
+    """Fit every coupling alone."""
+    points = refined(screen, screen.ground(), [p for p in screen.ranked() if p.placed.key in coupling], pool)
+    zero = np.zeros(len(kept.problem.nominal))
+    starts = leading(points, len(coupling), 0.0, starts=REFINED_STARTS)
+    converge(kept, pool, [((p.placed,), np.append(zero, p.eta)) for p in starts])
+
+
+def _one_more(
+    kept: Search, screen: Screen, coupling: Keys, pool: ThreadPoolExecutor, progress: Callable[[str], None]
+) -> bool:
+    """Fit one more effect beside the best hypothesis; whether that has brought it far enough for another."""
+    base = kept.ranked()[0]
+    if len(base.hypothesis) > 1 and base.reduced > HOPELESS_THIRD:
+        return False
+    progress(f"{names(base.hypothesis)}, chi-squared {base.reduced:.3g}")
+    along = followed(base, kept.problem)
+    local = about(screen, base, explained=along)
+    ground = local.ground(base, simulated=along)
+    solved = local.ranked(base, ground)
+    if base.reduced > HOPELESS_COUPLING:
+        solved = [p for p in solved if p.placed.key in coupling]
+    worth = _worth(refined(local, ground, solved, pool), base, ground, coupling)
+    if not worth:
+        return False
+
+    def extended(point: Point) -> Fit:
+        start = local.starts(point, ground, base)
+        return fit(kept.problem, (*base.hypothesis, point.placed), start=start, iterations=QUICK, exact=False)
+
+    least = TRUSTED * worth[0].gain if along else WORTH_A_FIT
+    chosen = leading(worth, TRIALS, least, starts=1)
+    chosen += passed_over(solved, chosen, TRIALS, least)
+    trials = sorted(pool.map(extended, chosen), key=lambda f: f.cost)
+    some = trials[: CONVERGED_PAIRS if len(base.hypothesis) == 1 else CONVERGED_BEYOND]
+    converge(kept, pool, [(f.hypothesis, f.vector) for f in some])
+    reduce_best(kept, pool)
+    best = kept.ranked()[0]
+    return best is not base and best.reduced - 1.0 <= STALLED * (base.reduced - 1.0)
+
+
+def _worth(points: Sequence[Point], base: Fit, ground: Ground, coupling: Keys) -> list[Point]:
+    """Points that are worth a fit beside a base; only couplings where none promises to explain the records."""
+    worth = [p for p in points if p.gain > max(WORTH_A_FIT, IMMATERIAL * base.n_residuals)]
+    alone = float(np.sum(ground.left**2))
+    if alone - max((p.gain for p in worth), default=0.0) > HOPELESS_PAIR * base.n_residuals:
+        worth = [p for p in worth if p.placed.key in coupling and alone - p.gain < STALLED * alone]
+    return worth
