@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -13,6 +15,7 @@ from bench.discrepancy.prescribed_motion import decided, held, motion_draws
 from bench.discrepancy.problem import Placed, Problem
 from bench.discrepancy.search import consistent
 from bench.discrepancy.structure import structure_of
+from bench.errors import RecordingError
 
 STEP = 0.002
 TIME = np.arange(5000) * STEP
@@ -110,3 +113,14 @@ def test_only_reversals_and_dwells_are_in_doubt(rng: np.random.Generator) -> Non
     made = motion.velocity[:, 0] - true
     drawn = [draw.velocity[:, 0] - motion.velocity[:, 0] for draw in draws]
     assert 0.5 < np.std(np.array(drawn)[:, 200:-200]) / np.std(made[200:-200]) < 2.0
+
+
+@pytest.mark.parametrize("position", [0.0, 3e-3])
+def test_a_motion_that_stands_still_is_said_to_excite_nothing(
+    rng: np.random.Generator, position: float
+) -> None:
+    known = case(rng, friction=FRICTION)
+    (record,) = known.identification
+    still = replace(record, values=record.values | {"displacement": np.full(len(TIME), position)})
+    with pytest.raises(RecordingError, match="'displacement' never changes"):
+        diagnose(replace(known, identification=(still,)))

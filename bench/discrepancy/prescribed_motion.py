@@ -11,7 +11,7 @@ from scipy import ndimage
 
 from bench.discrepancy.case import Case, CaseRecord
 from bench.discrepancy.prepared import noise_floor
-from bench.discrepancy.smoothing import smoother_of
+from bench.discrepancy.smoothing import resting, smoother_of
 from bench.discrepancy.system import Motion
 
 Array = NDArray[np.float64]
@@ -29,13 +29,10 @@ samples over which it is averaged."""
 CHANNELS = ("displacement", "velocity", "acceleration")
 
 
-def prescribed_motion(case: Case, record: CaseRecord) -> Motion:
-    """Motion that drives a component: its measured displacement, and velocity where there is one, smoothed."""
-    return motion_draws(case, record, 0)[0]
-
-
 def motion_draws(case: Case, record: CaseRecord, draws: int) -> list[Motion]:
-    """The smoothed motion of a record, and the same with as many more draws of its noise.
+    """The motion that drives a component, and the same with as many more draws of its noise.
+
+    It is the measured displacement, and velocity where there is one, smoothed.
 
     Args:
         case: The case.
@@ -43,10 +40,13 @@ def motion_draws(case: Case, record: CaseRecord, draws: int) -> list[Motion]:
         draws: Number of draws.
     """
     orders, samples, noise = _samples(case, record)
-    smoother = smoother_of(samples, orders, noise, record.step)
-    rng = np.random.default_rng(0)
-    smooth = smoother.smooth(samples)
-    errors = [smoother.smooth(noise * rng.standard_normal(samples.shape)) for _ in range(draws)]
+    smooth = resting(samples, orders, noise)
+    errors: list[Array] = [np.zeros((len(samples), 3))] * draws
+    if smooth is None:
+        smoother = smoother_of(samples, orders, noise, record.step)
+        rng = np.random.default_rng(0)
+        smooth = smoother.smooth(samples)
+        errors = [smoother.smooth(noise * rng.standard_normal(samples.shape)) for _ in range(draws)]
     out = [smooth, *(smooth + error for error in errors)]
     for moved in out:
         moved[:, 1] = held(moved[:, 0], moved[:, 1], REVERSAL * noise[0])

@@ -134,9 +134,20 @@ def smooth_motion(
         (n, 3) position, velocity, acceleration. Without a position channel the position is the double integral of
         what was measured, from zero.
     """
-    if np.all(np.abs(samples).max(axis=0) < REST * noise_std):  # a free run that nothing drives
-        return np.zeros((len(samples), 3))
-    return smoother_of(samples, orders, noise_std, step).smooth(samples)
+    still = resting(samples, orders, noise_std)  # a free run that nothing drives
+    return smoother_of(samples, orders, noise_std, step).smooth(samples) if still is None else still
+
+
+def resting(
+    samples: NDArray[np.float64], orders: tuple[int, ...], noise_std: NDArray[np.float64]
+) -> NDArray[np.float64] | None:
+    """The motion (n, 3) where channels show none, not even noise; None otherwise. Arguments as of `smooth_motion`."""
+    where = samples[0] * (np.array(orders) == 0)
+    if np.any(np.abs(samples - where).max(axis=0) >= REST * noise_std):
+        return None
+    out = np.zeros((len(samples), 3))
+    out[:, 0] = where.sum() / max(orders.count(0), 1)
+    return out
 
 
 def smoother_of(
