@@ -93,7 +93,7 @@ class Problem:
         records: Records to be explained.
         bins: Frequency bins of every record, where they have to agree with those of another problem.
         substeps: Integration steps a sample; chosen by the fastest rate where None.
-        refinement: Multiple of the steps so chosen.
+        refinement: Multiple of the steps so chosen, as far as `MAX_SUBSTEPS` lets it.
         nominal: (n_nominal,) values of the structure's parameters, initial states of records in motion after them.
         spread: (n_nominal,) their one-sigma uncertainties.
         noise: (n_channels,) noise of the response channels.
@@ -287,9 +287,8 @@ class Problem:
         # The rate of a law is that at its largest velocity, where a step of one time constant is still accurate enough.
         fastest = max(0.6 * rate, np.sqrt(np.max(np.abs(linear.stiffness).sum(1) / np.diag(linear.mass))))
         # RK4 with h * rate = 0.6 leaves a relative error of 1e-4 over one time constant, below any noise considered
-        substeps = self.substeps or self.refinement * int(
-            np.clip(np.ceil(record.step * fastest / 0.6), self.finest, MAX_SUBSTEPS)
-        )
+        needed = max(np.ceil(record.step * fastest / 0.6), self.finest)
+        substeps = self.substeps or int(min(self.refinement * needed, MAX_SUBSTEPS))
         loads, factor = driving_loads(self, (hypothesis, etas), record, substeps)
         motion = restarted(
             linear,

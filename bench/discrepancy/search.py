@@ -38,7 +38,8 @@ INTEGRATED, FINEST = 4.0, 8
 """Sum of squares by which halving the integration steps may change the whitened residuals, so that evidence stays the same to a unit
 or two; and the largest multiple of the steps."""
 SHAKEN, SHAKEN_REACH = 4, 100.0
-"""Hypotheses that are shaken, at most, and the difference in log posterior that this may still make up."""
+"""Hypotheses that are shaken, at most, and the difference in log posterior that this may still make up where the best one sticks
+too: two laws of friction then differ by what dents they lie in."""
 SHAKES, IN_VAIN, DRAWS = 6, 2, 48
 """Rounds, those in vain after which there is no further one, and draws of a round."""
 SCALES = ((1.0,), (2.0,), (4.0,))
@@ -192,10 +193,11 @@ def shake(search: Search, pool: ThreadPoolExecutor) -> None:
         search: Fits so far; better ones take their places.
         pool: Threads.
     """
+    reach = SHAKEN_REACH if sticks(search.ranked()[0]) else WITHIN_REACH
     for fitted in [f for f in search.ranked() if near(f) and sticks(f)][:SHAKEN]:
-        begun = _beside_the_best(search, fitted, pool)
+        begun = _beside_the_best(search, fitted, pool) if reach > WITHIN_REACH else fitted
         behind = posterior(search.ranked()[0]) - posterior(begun)
-        if behind < SHAKEN_REACH:
+        if behind < reach:
             _shaken(search, begun, pool, 2.0 * behind)
 
 
