@@ -286,9 +286,7 @@ class Problem:
             elements = with_frictions(elements, self.structure, values)
         # The rate of a law is that at its largest velocity, where a step of one time constant is still accurate enough.
         fastest = max(0.6 * rate, np.sqrt(np.max(np.abs(linear.stiffness).sum(1) / np.diag(linear.mass))))
-        # RK4 with h * rate = 0.6 leaves a relative error of 1e-4 over one time constant, below any noise considered
-        needed = max(np.ceil(record.step * fastest / 0.6), self.finest)
-        substeps = self.substeps or int(min(self.refinement * needed, MAX_SUBSTEPS))
+        substeps = self.substeps or self._substeps(record.step * fastest)
         loads, factor = driving_loads(self, (hypothesis, etas), record, substeps)
         motion = restarted(
             linear,
@@ -305,6 +303,11 @@ class Problem:
         motion = Motion(*(samples[lead:] for samples in motion))
         channels = self.observe(hypothesis, etas, motion, record.step)
         return self.acquired(self.picked_up(hypothesis, etas, channels, record), record)
+
+    def _substeps(self, phase: float) -> int:
+        """Integration steps a sample in which the fastest law changes by a `phase`."""
+        # RK4 with h * rate = 0.6 leaves a relative error of 1e-4 over one time constant, below any noise considered
+        return int(min(self.refinement * max(np.ceil(phase / 0.6), self.finest), MAX_SUBSTEPS))
 
     def firsts(self, record: CaseRecord) -> NDArray[np.int64]:
         """First samples (n_windows,) of the runs that a simulation of a record is made of."""

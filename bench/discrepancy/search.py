@@ -37,6 +37,8 @@ NEAR = 2.0
 INTEGRATED, FINEST = 4.0, 8
 """Sum of squares by which halving the integration steps may change the whitened residuals, so that evidence stays the same to a unit
 or two; and the largest multiple of the steps."""
+CONVERGING = 0.5
+"""Part of the last change that a further halving may make; more is no error of the integration but friction that stops elsewhere."""
 SHAKEN, SHAKEN_REACH = 4, 100.0
 """Hypotheses that are shaken, at most, and the difference in log posterior that this may still make up where the best one sticks
 too: two laws of friction then differ by what dents they lie in."""
@@ -164,11 +166,13 @@ def integrate_finer(search: Search, pool: ThreadPoolExecutor) -> None:
     if problem.driven or problem.windowed:
         return
     refinement, coarse = problem.refinement, problem.residual(best.hypothesis, best.vector)
+    before = np.inf
     while problem.refinement < FINEST:
         fine = problem.finer(2 * problem.refinement).residual(best.hypothesis, best.vector)
-        if not np.sum((fine - coarse) ** 2) > INTEGRATED:
+        change = float(np.sum((fine - coarse) ** 2))
+        if not INTEGRATED < change < CONVERGING * before:
             break
-        problem.refinement, coarse = 2 * problem.refinement, fine
+        problem.refinement, coarse, before = 2 * problem.refinement, fine, change
     if problem.refinement == refinement:
         return
     for fitted in [f for f in search.ranked() if near(f)][:SHAKEN]:
