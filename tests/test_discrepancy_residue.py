@@ -15,6 +15,7 @@ from bench.discrepancy.blind.cases import draw_case
 from bench.discrepancy.catalogue import CATALOGUE, effect_named
 from bench.discrepancy.closure import CLOSURES
 from bench.discrepancy.contradiction import contradicted
+from bench.discrepancy.driving import driving_loads
 from bench.discrepancy.explain import Explanation, close
 from bench.discrepancy.fit import fit
 from bench.discrepancy.grid_points import Point
@@ -327,3 +328,29 @@ def test_behind_a_sensor_that_clips_an_effect_is_screened_by_its_small_changes()
     )
     assert freed.reduced < 1.05
     assert point.gain > 0.5 * (clipped.chi2 - freed.chi2)
+
+
+def test_the_corners_of_a_delayed_load_move_with_it():
+    case = planted_case(role="command")
+    problem = Problem(case, structure_of(case), case.identification)
+    (record,) = case.identification
+    late = placements(case, problem.structure, [effect_named("actuator_delay")])[0]
+    eta = np.array([late.effect.parameters[0].mean + 0.3])
+    tau = late.effect.values(eta, problem.scales_of(late))[0]
+    assert 0.1 < tau / record.step % 1.0 < 0.9
+    loads, rows = driving_loads(problem, ((late,), [eta]), record, 1)
+    clock = np.arange(len(record)) * record.step
+    fine = np.arange(len(loads)) * record.step / rows
+    chords = np.interp(fine - tau, clock, record.values["force"], left=0.0)
+    sampled = np.interp(fine, clock, delay(record.values["force"], np.array([tau]), record.step))
+    inside = slice(rows * int(tau / record.step + 2), None)  # the load may begin with a jump
+    error, by_samples = (np.abs(x[inside] - chords[inside]).max() for x in (loads[:, 0], sampled))
+    assert error < 2.0 * by_samples / rows  # what is left is a corner's way within an eighth of a sample
+
+
+def test_a_delayed_load_is_that_of_a_delay_on_samples_where_it_is_held():
+    case = replace(planted_case(role="command"), options={"load_interpolation": "zero_order_hold"})
+    problem = Problem(case, structure_of(case), case.identification)
+    late = placements(case, problem.structure, [effect_named("actuator_delay")])[0]
+    loads, rows = driving_loads(problem, ((late,), [np.zeros(1)]), case.identification[0], 1)
+    assert (rows, len(loads)) == (0, len(case.identification[0]))

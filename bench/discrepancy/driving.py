@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from bench.discrepancy.acquisition import upsampled
 from bench.discrepancy.case import CaseRecord
+from bench.discrepancy.signal_effects import delay
 from bench.discrepancy.system import LinearStructure
 
 if TYPE_CHECKING:
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+CORNERS = 8
+"""Rows a sample of a load that is delayed: between samples of straight lines lie corners, and those move with the delay."""
 FORGOTTEN = 14.0
 """Time constants of the slowest decay after which a start is forgotten: one part in a million."""
 MAX_PERIODS = 20
@@ -69,12 +72,15 @@ def driving_loads(
         return cache[key]
     loads = np.column_stack([record.values[name] for name in problem.structure.loads])
     loads = np.vstack([loads] * (1 + lead // len(record)))
-    for placed, signal, eta in acting:
+    interpolation = problem.case.load_interpolation
+    rows = 0 if interpolation == "zero_order_hold" else 1
+    for placed, signal, eta in sorted(acting, key=lambda entry: entry[1] is delay):
         j = problem.structure.loads.index(placed.target)
         values = placed.effect.values(eta, problem.scales_of(placed))
-        loads[:, j] = signal(loads[:, j], values, record.step)
-    interpolation = problem.case.load_interpolation
-    driving = (loads, 0 if interpolation == "zero_order_hold" else 1)
+        if signal is delay and interpolation == "linear" and rows == 1:
+            loads, rows = upsampled(loads, CORNERS), CORNERS
+        loads[:, j] = signal(loads[:, j], values, record.step / max(rows, 1))
+    driving = (loads, rows)
     if interpolation == "band_limited":
         fine = upsampled(loads, 2 * substeps, interpolation=interpolation, periodic=record.periodic)
         driving = (fine, 2 * substeps)
