@@ -42,6 +42,9 @@ CONVERGING = 0.5
 SHAKEN, SHAKEN_REACH = 4, 100.0
 """Hypotheses that are shaken, at most, and the difference in log posterior that this may still make up where the best one sticks
 too: two laws of friction then differ by what dents they lie in."""
+BEGUN_AGAIN = 500.0
+"""Difference in log posterior that a start with the nominal parameters of the best fit may make up: dents of one law against another's
+have come to half of that."""
 SHAKES, IN_VAIN, DRAWS = 6, 2, 48
 """Rounds, those in vain after which there is no further one, and draws of a round."""
 SCALES = ((1.0,), (2.0,), (4.0,))
@@ -197,9 +200,10 @@ def shake(search: Search, pool: ThreadPoolExecutor) -> None:
         search: Fits so far; better ones take their places.
         pool: Threads.
     """
-    reach = SHAKEN_REACH if sticks(search.ranked()[0]) else WITHIN_REACH
+    both_stick = sticks(search.ranked()[0])
+    reach = SHAKEN_REACH if both_stick else WITHIN_REACH
     for fitted in [f for f in search.ranked() if near(f) and sticks(f)][:SHAKEN]:
-        begun = _beside_the_best(search, fitted, pool) if reach > WITHIN_REACH else fitted
+        begun = _beside_the_best(search, fitted, pool) if both_stick else fitted
         behind = posterior(search.ranked()[0]) - posterior(begun)
         if behind < reach:
             _shaken(search, begun, pool, 2.0 * behind)
@@ -208,7 +212,7 @@ def shake(search: Search, pool: ThreadPoolExecutor) -> None:
 def _beside_the_best(search: Search, fitted: Fit, pool: ThreadPoolExecutor) -> Fit:
     """The better of a fit and the same begun with the nominal parameters of the best one, which may have got over its dents."""
     best, n = search.ranked()[0], len(search.problem.nominal)
-    if fitted is best:
+    if fitted is best or posterior(best) - posterior(fitted) > BEGUN_AGAIN:
         return fitted
     start = np.concatenate([best.vector[:n], fitted.vector[n:]])
     again = fit(search.problem, fitted.hypothesis, start=start, iterations=THOROUGH, each=pool.map)
