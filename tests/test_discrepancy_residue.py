@@ -294,7 +294,8 @@ def test_an_error_of_mass_shows_behind_a_hysteresis_by_what_its_prior_costs():
     explained = attribute(problem, hysteresis, most=1).ranked()[0]
     error = next(p for p in placements(case, problem.structure, [effect_named("mass_error")]))
     screen = Screen(problem, [error]).beside(explained, simulated=True)
-    screened = screen.inertia_gains(screen.ground(explained, simulated=True))[error.key]
+    points = screen.inertia_points(explained, screen.ground(explained, simulated=True))
+    screened = next(point.gain for point in points if point.placed.key == error.key)
     start = np.append(explained.vector, 0.0)
     freed = fit(problem, (*explained.hypothesis, error), start=start, iterations=30)
     # the prior of the size of the error costs a unit or two

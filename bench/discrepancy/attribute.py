@@ -197,10 +197,8 @@ def _promising(screen: Screen, best: Fit) -> bool:
     """Whether one more effect could still be in the residual of a hypothesis that is down to the noise."""
     screen = about(screen, best, explained=True)
     ground = screen.ground(best, simulated=True)
-    own = {placed.key for placed in best.hypothesis}
-    gains = [gain for key, gain in screen.inertia_gains(ground).items() if key not in own]
-    gains += [point.gain for point in screen.ranked(best, ground)[:1]]
-    return max(gains, default=0.0) > max(WORTH_A_FIT, IMMATERIAL * best.n_residuals)
+    points = screen.ranked(best, ground)[:1] + screen.inertia_points(best, ground)[:1]
+    return max((p.gain for p in points), default=0.0) > max(WORTH_A_FIT, IMMATERIAL * best.n_residuals)
 
 
 def _at_ease(fitted: Fit, problem: Problem) -> bool:
@@ -261,8 +259,8 @@ def _extend(
         points = refined(local, ground, solved, pool)
         if not named:
             search.first = sorted([*search.first, *points] if among else points, key=lambda p: -p.gain)
-        inertia = {} if among else local.inertia_gains(ground)
-        most = max([p.gain for p in points] + list(inertia.values()), default=0.0)
+        inertia = [] if among else local.inertia_points(base, ground)
+        most = max((p.gain for p in [*points, *inertia]), default=0.0)
         excess = base.chi2 - base.n_residuals
         if named and problem.noise_stated and not consistent(base) and most < UNPROMISING * excess:
             continue
@@ -275,21 +273,29 @@ def _extend(
         for point in chosen:
             if search.start(base.hypothesis, point):
                 tasks.append(((*base.hypothesis, point.placed), local.starts(point, ground, named)))
-        own = {placed.key for placed in base.hypothesis}
         least = min(short * most, WORTH_A_FIT) if consistent(base) else short * most
-        for placed in screen.inertia:
-            if placed.key not in own and inertia.get(placed.key, 0.0) > least:
-                tasks.append(((*base.hypothesis, placed), np.append(base.vector, 0.0)))
+        for point in inertia:
+            if point.gain > least:
+                tasks.append(((*base.hypothesis, point.placed), np.append(base.vector, point.eta)))
 
     limit = limit_of(search, size)
 
-    def quick(task: tuple[Hypothesis, np.ndarray]) -> Fit:
-        iterations = QUICK if task[0][-1].effect.site == "joint" else 2 * QUICK
-        return fit(problem, task[0], start=task[1], iterations=iterations, exact=False, limit=limit)
-
-    for fitted in pool.map(quick, tasks):
+    for fitted in pool.map(lambda task: first_fit(problem, *task, limit=limit), tasks):
         search.add(fitted)
     carry_on(search, pool, size, most=4)
+
+
+def first_fit(problem: Problem, hypothesis: Hypothesis, start: np.ndarray, *, limit: float = np.inf) -> Fit:
+    """A few iterations with one more effect, the last one; of channels and inertia, which the screening begins farther off, more.
+
+    Args:
+        problem: Records and priors.
+        hypothesis: Effects.
+        start: Start vector (n,), or several (k, n).
+        limit: Cost that has to be within sight, see `minimise`.
+    """
+    iterations = QUICK if hypothesis[-1].effect.site == "joint" else 2 * QUICK
+    return fit(problem, hypothesis, start=start, iterations=iterations, exact=False, limit=limit)
 
 
 def _simulated(search: Search, candidates: Sequence[Placed], pool: ThreadPoolExecutor) -> None:

@@ -8,12 +8,12 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from bench.discrepancy.attribute import (
-    QUICK,
     REFINED_STARTS,
     STALLED,
     TRUSTED,
     WORTH_A_FIT,
     about,
+    first_fit,
     followed,
     leading,
     passed_over,
@@ -22,7 +22,7 @@ from bench.discrepancy.attribute import (
     refined,
 )
 from bench.discrepancy.effect import Effect
-from bench.discrepancy.fit import Fit, fit
+from bench.discrepancy.fit import Fit
 from bench.discrepancy.grid_points import Point
 from bench.discrepancy.problem import Problem
 from bench.discrepancy.screen import Ground, Screen
@@ -64,17 +64,16 @@ def coupled_fits(
         The fits by decreasing posterior, and whether other effects were searched beside a coupling.
     """
     progress("effects that couple the degrees of freedom")
-    candidates = [
-        p
-        for p in placements(whole.case, whole.structure, catalogue)
-        if p.effect.site == "joint" and not p.effect.rare
-    ]
+    candidates = [p for p in placements(whole.case, whole.structure, catalogue) if not p.effect.rare]
+    forces = [p for p in candidates if p.effect.site == "joint"]
     kept = Search(whole)
     with ThreadPoolExecutor(THREADS) as pool:
-        screen = Screen(whole, candidates, pool.map)
-        coupling = {p.key for p in candidates if p.effect.n_coordinates > 1}
+        screen = Screen(whole, forces, pool.map)
+        coupling = {p.key for p in forces if p.effect.n_coordinates > 1}
         _alone(kept, screen, coupling, pool)
         deep = bool(kept.fits) and deeper(kept.ranked()[0])
+        if deep:
+            screen.add([p for p in candidates if p.effect.site != "joint"], pool.map)
         size = 1
         while deep and size < most and _one_more(kept, screen, coupling, pool, progress):
             size += 1
@@ -103,13 +102,14 @@ def _one_more(
     solved = local.ranked(base, ground)
     if base.reduced > HOPELESS_COUPLING:
         solved = [p for p in solved if p.placed.key in coupling]
-    worth = _worth(refined(local, ground, solved, pool), base, ground, coupling)
+    points = refined(local, ground, solved, pool) + local.inertia_points(base, ground)
+    worth = _worth(sorted(points, key=lambda p: -p.gain), base, ground, coupling)
     if not worth:
         return False
 
     def extended(point: Point) -> Fit:
         start = local.starts(point, ground, base)
-        return fit(kept.problem, (*base.hypothesis, point.placed), start=start, iterations=QUICK, exact=False)
+        return first_fit(kept.problem, (*base.hypothesis, point.placed), start)
 
     least = TRUSTED * worth[0].gain if along else WORTH_A_FIT
     chosen = leading(worth, TRIALS, least, starts=1)

@@ -329,14 +329,19 @@ class Screen:
         points.sort(key=lambda point: -point.gain)
         return points
 
-    def inertia_gains(self, ground: Ground) -> dict[tuple[str, str, str], float]:
-        """Decrease of chi-squared if the prior of one nominal parameter fell, for every inertia effect."""
+    def inertia_points(self, base: Fit, ground: Ground) -> list[Point]:
+        """Errors of nominal parameters that a base does not hold, by the chi-squared that goes if the prior of one falls.
+
+        They start where the parameter is, so that a fit moves it from there.
+        """
         alone = ground.left
-        gains = {}
-        for placed in self.inertia:
+        own = {placed.key for placed in base.hypothesis}
+        points = []
+        for placed in [placed for placed in self.inertia if placed.key not in own]:
             column = ground.project(ground.nominal[:, self.problem.structure.parameters.index(placed.target)])
-            gains[placed.key] = float((column @ alone) ** 2 / max(column @ column, 1e-300))
-        return gains
+            gain = float((column @ alone) ** 2 / max(column @ column, 1e-300))
+            points.append(Point(placed, gain, np.zeros(1)))
+        return sorted(points, key=lambda point: -point.gain)
 
     def refine(self, point: Point, ground: Ground, iterations: int = 6) -> Point:
         """Move a grid point of a joint effect to the nearest optimum along the measured motion.
