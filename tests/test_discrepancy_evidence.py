@@ -6,7 +6,7 @@ import numpy as np
 
 from bench.discrepancy.catalogue import effect_named
 from bench.discrepancy.evidence import RIVAL, indistinguishable
-from bench.discrepancy.problem import Placed
+from bench.discrepancy.placed import Placed
 from bench.discrepancy.structure import Place
 
 AXIAL = Place("axial", np.eye(1), "m", "N")

@@ -19,7 +19,8 @@ from bench.discrepancy import (
 )
 from bench.discrepancy.catalogue import effect_named
 from bench.discrepancy.fit import fit
-from bench.discrepancy.problem import Placed, Problem
+from bench.discrepancy.placed import Placed
+from bench.discrepancy.problem import Problem
 from bench.discrepancy.screen import Screen
 from bench.discrepancy.shrink import nrmse
 from bench.discrepancy.start_estimates import predict, run_kind, start_warnings

@@ -10,7 +10,8 @@ from bench.discrepancy.catalogue import effect_named
 from bench.discrepancy.explain import Explanation
 from bench.discrepancy.fit import fit
 from bench.discrepancy.next_excitation import Rival, outlook, propose, separate, told_apart
-from bench.discrepancy.problem import Placed, Problem
+from bench.discrepancy.placed import Placed
+from bench.discrepancy.problem import Problem
 from bench.discrepancy.proposals import limits_of
 from bench.discrepancy.reasons import why_none
 from bench.discrepancy.report.application import element_code, element_toml

@@ -11,8 +11,9 @@ from bench.discrepancy.case import Case, CaseChannel, NominalParameter, record_f
 from bench.discrepancy.catalogue import effect_named
 from bench.discrepancy.diagnosis import diagnose
 from bench.discrepancy.fit import fit
+from bench.discrepancy.placed import Placed
 from bench.discrepancy.prescribed_motion import decided, held, motion_draws
-from bench.discrepancy.problem import Placed, Problem
+from bench.discrepancy.problem import Problem
 from bench.discrepancy.search import consistent
 from bench.discrepancy.structure import structure_of
 from bench.errors import RecordingError

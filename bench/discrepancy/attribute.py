@@ -19,7 +19,8 @@ from bench.discrepancy.case import Case
 from bench.discrepancy.effect import Effect
 from bench.discrepancy.fit import Fit, fit
 from bench.discrepancy.grid_points import Point
-from bench.discrepancy.problem import FROM, Hypothesis, Placed, Problem
+from bench.discrepancy.placed import FROM, Hypothesis, Placed
+from bench.discrepancy.problem import Problem
 from bench.discrepancy.screen import Ground, Screen
 from bench.discrepancy.search import (
     IMMATERIAL,

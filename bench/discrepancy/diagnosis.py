@@ -24,7 +24,8 @@ from bench.discrepancy.explain import Explanation, close, explain
 from bench.discrepancy.idle_loads import idle_notes, without_idle_noise
 from bench.discrepancy.next_excitation import separate, told_apart
 from bench.discrepancy.nominal_file import check_units
-from bench.discrepancy.problem import Hypothesis, Problem
+from bench.discrepancy.placed import Hypothesis
+from bench.discrepancy.problem import Problem
 from bench.discrepancy.quality import notes, refuse
 from bench.discrepancy.quantisation import recorded
 from bench.discrepancy.search import names

@@ -21,6 +21,7 @@ from bench.discrepancy.system import (
     STATE,
     THETA,
     Elements,
+    steps_of_each,
 )
 from bench.laws.calling import advance, call_kernel, pointer_at
 
@@ -38,9 +39,9 @@ def _driven(dt, t0, substeps, q, v, table, theta, z, force):
     theta_pointer = pointer_at(theta.ctypes.data)
     z_pointer = pointer_at(z.ctypes.data)
     stage_pointer = pointer_at(stage.ctypes.data)
-    share = 1.0 / substeps
     for k in range(q.shape[0]):
         t = t0 + k * dt
+        share = 1.0 / substeps[k]
         for e in range(table.shape[0]):
             first = table[e, ROW]
             rows = table[e, N_ROWS]
@@ -61,7 +62,7 @@ def _driven(dt, t0, substeps, q, v, table, theta, z, force):
             if table[e, RATE] == 0 or k == q.shape[0] - 1:
                 continue
             first_state = table[e, STATE]
-            for s in range(substeps):
+            for s in range(substeps[k]):
                 for i in range(4):
                     at = (s + (0.0 if i == 0 else (1.0 if i == 3 else 0.5))) * share
                     ahead = 0.0 if i == 0 else (dt * share if i == 3 else 0.5 * dt * share)
@@ -86,15 +87,14 @@ def driven_force(
     position: NDArray[np.float64],
     velocity: NDArray[np.float64],
     step: float,
-    substeps: int = 1,
+    substeps: int | NDArray[np.int64] = 1,
     start_time: float = 0.0,
 ) -> NDArray[np.float64]:
     """Force of elements whose coordinates follow a given motion (n, n_rows); friction takes the sign of the velocity."""
     force = np.zeros_like(position)
-    _driven(
-        step, start_time, substeps, np.ascontiguousarray(position), np.ascontiguousarray(velocity), elements.table,
-        elements.theta, elements.start.copy(), force,
-    )  # fmt: skip
+    counts = steps_of_each(substeps, len(position))
+    q, v = np.ascontiguousarray(position), np.ascontiguousarray(velocity)
+    _driven(step, start_time, counts, q, v, elements.table, elements.theta, elements.start.copy(), force)
     return force
 
 
@@ -105,18 +105,20 @@ def driven_states(
     velocity: NDArray[np.float64],
     step: float,
     at: NDArray[np.int64],
-    substeps: int = 1,
+    substeps: int | NDArray[np.int64] = 1,
     start_time: float = 0.0,
 ) -> NDArray[np.float64]:
     """Hidden states (n_at, n_states) at increasing samples `at`, of elements whose coordinates follow a given motion."""
     z = elements.start.copy()
     out = np.zeros((len(at), len(z)))
     before = 0
+    counts = steps_of_each(substeps, len(position))
     for i, sample in enumerate(at):
         q = np.ascontiguousarray(position[before : sample + 1])
         v = np.ascontiguousarray(velocity[before : sample + 1])
         time = start_time + before * step
-        _driven(step, time, substeps, q, v, elements.table, elements.theta, z, np.zeros_like(q))
+        own = counts[before : sample + 1]
+        _driven(step, time, own, q, v, elements.table, elements.theta, z, np.zeros_like(q))
         out[i] = z
         before = int(sample)
     return out

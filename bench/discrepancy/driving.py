@@ -14,11 +14,13 @@ from numpy.typing import NDArray
 
 from bench.discrepancy.acquisition import upsampled
 from bench.discrepancy.case import CaseRecord
+from bench.discrepancy.pace import MAX_SUBSTEPS
 from bench.discrepancy.signal_effects import delay
 from bench.discrepancy.system import LinearStructure
 
 if TYPE_CHECKING:
-    from bench.discrepancy.problem import Hypothesis, Problem
+    from bench.discrepancy.placed import Hypothesis
+    from bench.discrepancy.problem import Problem
 
 Array = NDArray[np.float64]
 
@@ -98,7 +100,7 @@ def with_load_noise(problem: Problem, record: CaseRecord, rng: np.random.Generat
     return replace(record, values={**record.values, **noisy})
 
 
-def fewest_steps(problem: Problem, most: int) -> int:
+def fewest_steps(problem: Problem) -> int:
     """Fewest steps a sample at which the integration stays below the noise; one where loads are read as straight lines.
 
     Straight lines between samples are themselves only as good as the step rule; a load that is known between its samples
@@ -106,13 +108,12 @@ def fewest_steps(problem: Problem, most: int) -> int:
 
     Args:
         problem: Records and nominal model, whose response to the first record is tried.
-        most: Largest number.
     """
     if problem.case.load_interpolation == "linear" or problem.driven:
         return 1
     zero, steps = np.zeros(len(problem.nominal)), 1
     coarse = replace(problem, substeps=steps).simulate((), zero, problem.records[0])
-    while steps < most:
+    while steps < MAX_SUBSTEPS:
         fine = replace(problem, substeps=2 * steps).simulate((), zero, problem.records[0])
         error = np.sqrt(np.mean((fine - coarse) ** 2, axis=0))
         enough = np.maximum(INTEGRATION * problem.noise, EXACT * np.std(fine, axis=0))

@@ -8,7 +8,7 @@ import numpy as np
 
 from bench.discrepancy.effect import unit_of
 from bench.discrepancy.explain import Explanation
-from bench.discrepancy.problem import Placed
+from bench.discrepancy.placed import Placed
 from bench.discrepancy.search import names
 from bench.discrepancy.verdict import Estimate, Kind, NamedEffect, Ranked
 

@@ -23,8 +23,9 @@ from bench.discrepancy.coupled import coupled_fits
 from bench.discrepancy.effect import Effect
 from bench.discrepancy.fit import Fit, fit
 from bench.discrepancy.lack_of_fit import LackOfFit, lack_of_fit
+from bench.discrepancy.placed import Hypothesis, Placed
 from bench.discrepancy.prepared import whitened
-from bench.discrepancy.problem import Array, Hypothesis, Placed, Problem, band_bins
+from bench.discrepancy.problem import Array, Problem, band_bins
 from bench.discrepancy.screen import Screen
 from bench.discrepancy.search import THREADS, WITHIN_REACH, Search, consistent, names, near, posterior
 from bench.discrepancy.start_estimates import predict

@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.discrepancy.minimise import Prior, minimise
-from bench.discrepancy.problem import Hypothesis, Problem
+from bench.discrepancy.placed import Hypothesis
+from bench.discrepancy.problem import Problem
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.discrepancy.problem import Array, Placed
+from bench.discrepancy.placed import Placed
+from bench.discrepancy.problem import Array
 
 SIGNAL_STEP = 0.1
 """Value of eta at which a signed channel effect without grid is tried."""

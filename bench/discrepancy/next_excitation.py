@@ -22,8 +22,9 @@ from bench.discrepancy.case import CaseRecord
 from bench.discrepancy.effect import Effect
 from bench.discrepancy.evidence import weights
 from bench.discrepancy.explain import Explanation
+from bench.discrepancy.placed import Placed
 from bench.discrepancy.prepared import RecordData, whitened
-from bench.discrepancy.problem import Array, Placed, Problem
+from bench.discrepancy.problem import Array, Problem
 from bench.discrepancy.proposals import LEVELS, Proposal, candidates, feasible, limits_of
 from bench.discrepancy.reasons import why_alike, why_none
 from bench.discrepancy.search import names

@@ -18,8 +18,10 @@ from numpy.typing import NDArray
 from bench.discrepancy.case import Case, CaseRecord
 from bench.discrepancy.driven import driven_force
 from bench.discrepancy.driving import driving_loads, fewest_steps, run_in
-from bench.discrepancy.effect import Effect, Scales
+from bench.discrepancy.effect import Scales
 from bench.discrepancy.measured_motion import measured_motion
+from bench.discrepancy.pace import rates, speeds, steps
+from bench.discrepancy.placed import Hypothesis, Placed
 from bench.discrepancy.prepared import RecordData, band_bins, noise_floor, projected, timed
 from bench.discrepancy.prescribed_motion import decided, motion_draws
 from bench.discrepancy.quantisation import raised_noise
@@ -40,47 +42,11 @@ from bench.discrepancy.structure import Place, Structure, with_frictions
 from bench.discrepancy.system import Elements, Motion
 
 Array = NDArray[np.float64]
-MAX_SUBSTEPS, ACCELERATION = 16, 2
+ACCELERATION = 2
 MOTION_DRAWS = 8
 """Draws of the noise of a prescribed motion."""
 COULOMB = "coulomb"
 """Nominal friction force of a component under prescribed motion."""
-FROM = " from "
-"""Between the channel and the source of cross-talk."""
-
-
-@dataclass(frozen=True)
-class Placed:
-    """An effect at a place.
-
-    Attributes:
-        effect: The effect.
-        place: Where it sits.
-        target: Nominal parameter, load channel or response channel of an inertia, actuator or sensor effect; for
-            cross-talk "channel from source".
-    """
-
-    effect: Effect
-    place: Place
-    target: str = ""
-
-    @property
-    def key(self) -> tuple[str, str, str]:
-        """Name, place and target: what tells two placed effects apart."""
-        return (self.effect.name, self.place.name, self.target)
-
-    @property
-    def channel(self) -> str:
-        """Channel that a sensor effect acts on."""
-        return self.target.partition(FROM)[0]
-
-    @property
-    def source(self) -> str:
-        """Channel that cross-talk comes from; empty for other effects."""
-        return self.target.partition(FROM)[2]
-
-
-Hypothesis = tuple[Placed, ...]
 
 
 @dataclass
@@ -93,7 +59,7 @@ class Problem:
         records: Records to be explained.
         bins: Frequency bins of every record, where they have to agree with those of another problem.
         substeps: Integration steps a sample; chosen by the fastest rate where None.
-        refinement: Multiple of the steps so chosen, as far as `MAX_SUBSTEPS` lets it.
+        refinement: Multiple of the steps so chosen, as far as `pace` lets it.
         nominal: (n_nominal,) values of the structure's parameters, initial states of records in motion after them.
         spread: (n_nominal,) their one-sigma uncertainties.
         noise: (n_channels,) noise of the response channels.
@@ -200,7 +166,7 @@ class Problem:
     @cached_property
     def finest(self) -> int:
         """Fewest integration steps a sample, see `driving.fewest_steps`."""
-        return fewest_steps(self, MAX_SUBSTEPS)
+        return fewest_steps(self)
 
     def motion(self, index: int) -> Motion:
         """Smoothed measured motion of every degree of freedom in record `index`."""
@@ -281,13 +247,15 @@ class Problem:
             return self._driven_response(hypothesis, etas, values, record)
         lead = self.lead_in(record)
         linear = self.structure.at(values)
-        elements, rate = self.elements(hypothesis, etas, record)
+        elements, rates = self.elements(hypothesis, etas, record)
         if friction and self.structure.frictions:
             elements = with_frictions(elements, self.structure, values)
         # The rate of a law is that at its largest velocity, where a step of one time constant is still accurate enough.
-        fastest = max(0.6 * rate, np.sqrt(np.max(np.abs(linear.stiffness).sum(1) / np.diag(linear.mass))))
-        substeps = self.substeps or self._substeps(record.step * fastest)
-        loads, factor = driving_loads(self, (hypothesis, etas), record, substeps)
+        own = np.sqrt(np.max(np.abs(linear.stiffness).sum(1) / np.diag(linear.mass)))
+        substeps = self._substeps(record.step * np.maximum(0.6 * rates, own))
+        if lead and len(substeps) > 1:
+            substeps = np.resize(substeps, lead + len(record))
+        loads, factor = driving_loads(self, (hypothesis, etas), record, int(substeps.max()))
         motion = restarted(
             linear,
             elements,
@@ -304,10 +272,13 @@ class Problem:
         channels = self.observe(hypothesis, etas, motion, record.step)
         return self.acquired(self.picked_up(hypothesis, etas, channels, record), record)
 
-    def _substeps(self, phase: float) -> int:
-        """Integration steps a sample in which the fastest law changes by a `phase`."""
-        # RK4 with h * rate = 0.6 leaves a relative error of 1e-4 over one time constant, below any noise considered
-        return int(min(self.refinement * max(np.ceil(phase / 0.6), self.finest), MAX_SUBSTEPS))
+    def _substeps(self, phase: Array) -> NDArray[np.int64]:
+        """Integration steps of samples in which the fastest law changes by a `phase` (n,), or (1,) of all of them."""
+        if self.substeps is not None:
+            return np.array([self.substeps])
+        # loads known between their samples are given at the steps of the finest sample
+        halving = self.case.load_interpolation == "band_limited"
+        return steps(phase, fewest=self.finest, multiple=self.refinement, halving=halving)
 
     def firsts(self, record: CaseRecord) -> NDArray[np.int64]:
         """First samples (n_windows,) of the runs that a simulation of a record is made of."""
@@ -333,16 +304,15 @@ class Problem:
         force = motion.position @ linear.stiffness + motion.velocity @ linear.damping
         if COULOMB in self.structure.parameters:
             force += values[self.structure.parameters.index(COULOMB)] * np.sign(motion.velocity)
-        elements, rate = self.elements(hypothesis, etas, record)
+        elements, rates = self.elements(hypothesis, etas, record)
         if len(elements.table):
             row = elements.rows.T
-            substeps = int(np.clip(np.ceil(record.step * rate / 0.6), 1, MAX_SUBSTEPS))
             driven = driven_force(
                 elements,
                 position=motion.position @ row,
                 velocity=motion.velocity @ row,
                 step=record.step,
-                substeps=substeps,
+                substeps=steps(record.step * rates),
                 start_time=record.start,
             )
             if not np.isfinite(driven).all():
@@ -362,6 +332,7 @@ class Problem:
         out.motions = {}
         out.__dict__["_loads"] = {}
         out.__dict__["_motions_drawn"] = {}
+        out.__dict__["_speeds_along"] = {}
         return out
 
     def observe(self, hypothesis: Hypothesis, etas: list[Array], motion: Motion, step: float) -> Array:
@@ -417,11 +388,11 @@ class Problem:
 
     def elements(
         self, hypothesis: Hypothesis, etas: list[Array], record: CaseRecord
-    ) -> tuple[Elements, float]:
-        """Force laws of a hypothesis, and the fastest rate among them [1/s]."""
+    ) -> tuple[Elements, Array]:
+        """Force laws of a hypothesis, and the fastest rate among them [1/s] at every sample (n,), or (1,) for all samples."""
         rows, theta, table = [], [], []
         n_rows = n_theta = n_states = 0
-        fastest = 0.0
+        fastest = np.zeros(1)
         for placed, eta in zip(hypothesis, etas, strict=True):
             effect = placed.effect
             if effect.site != "joint" or effect.law is None:
@@ -433,7 +404,8 @@ class Problem:
                     *effect.addresses, effect.n_coordinates, n_rows, n_theta, n_states, len(effect.law.states),
                 ]
             )  # fmt: skip
-            fastest = max(fastest, effect.fastest(effect.values(eta, scales), scales))
+            own = rates(effect, effect.values(eta, scales), scales, self._speeds(placed, record))
+            fastest = np.maximum(fastest, own)
             rows.append(placed.place.rows)
             theta.append(parameters)
             n_rows += effect.n_coordinates
@@ -449,6 +421,16 @@ class Problem:
             ),
             fastest,
         )
+
+    def _speeds(self, placed: Placed, record: CaseRecord) -> Array:
+        """Cached speeds along the coordinate of an effect, see `pace.speeds`; (1,) where the record was not measured."""
+        if not any(own is record for own in self.records):
+            return np.array([self.scales_of(placed).velocity])
+        cache = self.__dict__.setdefault("_speeds_along", {})
+        if (record.name, placed.place.name) not in cache:
+            velocity = self.motion_of(record).velocity @ placed.place.rows[0]
+            cache[record.name, placed.place.name] = speeds(velocity, prescribed=self.driven)
+        return cache[record.name, placed.place.name]
 
     def residual(self, hypothesis: Hypothesis, vector: Array) -> Array:
         """Whitened residuals of all records, real and imaginary parts stacked; their sum of squares is chi-squared."""

@@ -55,7 +55,7 @@ def hysteretic_rate(values: Values, scales: Scales) -> float:
     b = beta * scales.position ** (1.0 - n)
     stroke = 2.0 * scales.position
     level = min((b * (1.0 + ratio)) ** (-1.0 / n), stroke) if ratio > -1.0 else stroke
-    return float(n * scales.velocity * b * (1.0 + abs(ratio)) * level ** (n - 1.0))
+    return n * scales.velocity * b * (1.0 + abs(ratio)) * level ** (n - 1.0)
 
 
 HYSTERESIS = (

@@ -6,7 +6,8 @@ import numpy as np
 
 from bench.discrepancy.effect import unit_of
 from bench.discrepancy.explain import Explanation
-from bench.discrepancy.problem import Array, Placed, Problem
+from bench.discrepancy.placed import Placed
+from bench.discrepancy.problem import Array, Problem
 from bench.discrepancy.search import names
 
 BARELY = 0.9

@@ -18,7 +18,8 @@ from bench.discrepancy.prepared import fast_length, masked
 from bench.discrepancy.system import Motion
 
 if TYPE_CHECKING:
-    from bench.discrepancy.problem import Hypothesis, Problem
+    from bench.discrepancy.placed import Hypothesis
+    from bench.discrepancy.problem import Problem
 
 Array = NDArray[np.float64]
 SMOOTHED_BINS = 9

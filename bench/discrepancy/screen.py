@@ -25,8 +25,10 @@ from bench.discrepancy.fit import Fit
 from bench.discrepancy.grid_points import SIGNAL_STEP, Node, Point, read, spanning
 from bench.discrepancy.linear_run import linear_run
 from bench.discrepancy.minimise import Prior, minimise
+from bench.discrepancy.pace import steps
+from bench.discrepancy.placed import Hypothesis, Placed
 from bench.discrepancy.prepared import whitened
-from bench.discrepancy.problem import COULOMB, Array, Hypothesis, Placed, Problem
+from bench.discrepancy.problem import COULOMB, Array, Problem
 from bench.discrepancy.signal_effects import quantise
 from bench.discrepancy.starts import channels_of, in_motion
 from bench.discrepancy.system import Elements, LinearStructure
@@ -453,15 +455,14 @@ def force_along(problem: Problem, placed: Placed, eta: Array, index: int) -> Arr
     motion = problem.motion(index)
     record = problem.records[index]
     rows = placed.place.rows
-    elements, rate = problem.elements((placed,), [eta], record)
+    elements, rates = problem.elements((placed,), [eta], record)
     local = Elements(elements.table, rows, elements.theta, elements.start)
-    substeps = int(np.clip(np.ceil(record.step * rate / 0.6), 1, 16))
     force = driven_force(
         local,
         position=motion.position @ rows.T,
         velocity=motion.velocity @ rows.T,
         step=record.step,
-        substeps=substeps,
+        substeps=steps(record.step * rates),
         start_time=record.start,
     )
     return force @ rows

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from bench.discrepancy.fit import Fit, fit, free_entries, laplace
 from bench.discrepancy.grid_points import Point
 from bench.discrepancy.minimise import DIFFERENCES, differences
-from bench.discrepancy.problem import Array, Hypothesis, Problem
+from bench.discrepancy.placed import Hypothesis
+from bench.discrepancy.problem import Array, Problem
 
 THREADS = 2
 THOROUGH = 30

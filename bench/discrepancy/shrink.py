@@ -13,7 +13,8 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from bench.discrepancy.case import Case, CaseRecord
-from bench.discrepancy.problem import Array, Hypothesis, Problem
+from bench.discrepancy.placed import Hypothesis
+from bench.discrepancy.problem import Array, Problem
 from bench.discrepancy.residual_noise import forces_of_noise
 from bench.discrepancy.start_estimates import predict as predicted
 from bench.discrepancy.start_estimates import run_kind

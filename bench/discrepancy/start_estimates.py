@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.discrepancy.case import CaseRecord
-from bench.discrepancy.problem import Hypothesis, Problem
+from bench.discrepancy.placed import Hypothesis
+from bench.discrepancy.problem import Problem
 from bench.discrepancy.starts import DIFFERENCE, cut, in_motion
 
 Array = NDArray[np.float64]

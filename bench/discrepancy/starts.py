@@ -34,10 +34,11 @@ from scipy.linalg import cholesky, solve_triangular, toeplitz
 from bench.discrepancy.case import Case, CaseRecord
 from bench.discrepancy.driven import driven_states
 from bench.discrepancy.structure import Structure
-from bench.discrepancy.system import NO_ELEMENTS, Elements, LinearStructure, Motion, free_run
+from bench.discrepancy.system import NO_ELEMENTS, Elements, LinearStructure, Motion, free_run, steps_of_each
 
 if TYPE_CHECKING:
-    from bench.discrepancy.problem import Hypothesis, Problem
+    from bench.discrepancy.placed import Hypothesis
+    from bench.discrepancy.problem import Problem
 
 Array = NDArray[np.float64]
 
@@ -272,7 +273,7 @@ def restarted(
     firsts: NDArray[np.int64],
     starts: Array,
     motion: Motion | None = None,
-    substeps: int = 1,
+    substeps: int | NDArray[np.int64] = 1,
     load_factor: int = 1,
     start_time: float = 0.0,
 ) -> Motion:
@@ -286,7 +287,7 @@ def restarted(
         firsts: (n_windows,) first sample of each window, the first one zero.
         starts: (n_windows, 2 n_dof) positions and velocities.
         motion: Measured motion, along which hidden states are carried to the start of each window; zero where None.
-        substeps: Runge-Kutta steps a sample.
+        substeps: Runge-Kutta steps a sample, or (n,) of each.
         load_factor: As of `free_run`.
         start_time: Time of the first sample [s].
 
@@ -301,12 +302,13 @@ def restarted(
             elements, position=motion.position @ elements.rows.T, velocity=motion.velocity @ elements.rows.T,
             step=step, at=firsts, substeps=substeps, start_time=start_time,
         )  # fmt: skip
+    counts = steps_of_each(substeps, n)
     parts = []
     for first, end, start, z in zip(firsts, np.append(firsts[1:], n), starts, hidden, strict=True):
         part = loads[first * factor : (end - 1) * factor + 1]
         parts.append(
             free_run(
-                linear, elements._replace(start=z), loads=part, step=step, substeps=substeps,
+                linear, elements._replace(start=z), loads=part, step=step, substeps=counts[first:end],
                 load_factor=load_factor, start=start, start_time=start_time + first * step,
             )
         )  # fmt: skip

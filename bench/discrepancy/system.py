@@ -323,7 +323,7 @@ def _pass_event(p, u, k, t, dt, event, fraction, first, rest):
 def _free_run(clock, u, start, scratch, n_dof, matrices, table, rows, spread, theta, out):  # noqa: PLR0912  (one compiled loop)
     """Integrate over all samples from `start`; write position, velocity, acceleration to `out`.
 
-    `clock` is the time between samples, the time of the first, the steps a sample and the rows of `u` a sample (zero: held).
+    `clock` is the time between samples, the time of the first, the steps of every sample and the rows of `u` a sample (zero: held).
 
     `scratch` belongs to the caller: memory reached only through pointers would be freed here after its last mention.
     """
@@ -352,10 +352,10 @@ def _free_run(clock, u, start, scratch, n_dof, matrices, table, rows, spread, th
                 mode[e] = 1.0 if rate > 0.0 else -1.0
             else:
                 _settle(p, e, t0, load)
-    share = 1.0 / substeps
     n_samples = position.shape[0]
     for k in range(n_samples):
         t = t0 + k * dt
+        share = 1.0 / substeps[k]
         for j in range(u.shape[1]):
             work[load + j] = u[k * max(load_factor, 1), j]
         _derivative(p, t, 0, 3 * n, load)
@@ -368,7 +368,7 @@ def _free_run(clock, u, start, scratch, n_dof, matrices, table, rows, spread, th
             return
         if k == n_samples - 1:
             return
-        for s in range(substeps):
+        for s in range(substeps[k]):
             fraction = s * share
             rest = share
             events = 0
@@ -389,13 +389,18 @@ def _free_run(clock, u, start, scratch, n_dof, matrices, table, rows, spread, th
                 rest -= used
 
 
+def steps_of_each(substeps: int | NDArray[np.int64], n: int) -> NDArray[np.int64]:
+    """Steps of every sample (n,), where one number may stand for all."""
+    return np.ascontiguousarray(np.broadcast_to(substeps, n), dtype=np.int64)
+
+
 def free_run(
     structure: LinearStructure,
     elements: Elements,
     *,
     loads: NDArray[np.float64],
     step: float,
-    substeps: int = 1,
+    substeps: int | NDArray[np.int64] = 1,
     load_factor: int = 1,
     start: NDArray[np.float64] | None = None,
     start_time: float = 0.0,
@@ -407,7 +412,7 @@ def free_run(
         elements: Force laws.
         loads: ((n - 1) load_factor + 1, n_inputs) [N or N m], piecewise linear between its rows.
         step: Time between samples [s].
-        substeps: Runge-Kutta steps a sample.
+        substeps: Runge-Kutta steps a sample, or (n,) of each.
         load_factor: Rows of `loads` a sample; 0: one row a sample, held until the next.
         start: Positions and velocities at the first sample (2 n_dof,); at rest where None.
         start_time: Time of the first sample [s].
@@ -429,7 +434,7 @@ def free_run(
     scratch = np.zeros(3 * len(elements.table) + 7 * len(y) + 3 * MAX_ROWS + 1 + 3 * n_inputs)
     motion = Motion(np.zeros((n, n_dof)), np.zeros((n, n_dof)), np.zeros((n, n_dof)))
     _free_run(
-        (step, start_time, substeps, load_factor), np.ascontiguousarray(loads), y, scratch, n_dof, matrices,
+        (step, start_time, steps_of_each(substeps, n), load_factor), np.ascontiguousarray(loads), y, scratch, n_dof, matrices,
         elements.table, rows,
         np.ascontiguousarray(inverse @ rows.T), elements.theta, tuple(motion),
     )  # fmt: skip

@@ -25,8 +25,9 @@ from bench.discrepancy.attribute import placements
 from bench.discrepancy.case import Case, CaseRecord
 from bench.discrepancy.catalogue import CATALOGUE
 from bench.discrepancy.effect import Effect
+from bench.discrepancy.placed import Placed
 from bench.discrepancy.prepared import whitened
-from bench.discrepancy.problem import Placed, Problem
+from bench.discrepancy.problem import Problem
 from bench.discrepancy.structure import Structure, structure_of
 from bench.discrepancy.system import Motion
 from benchmarks.peer_model import Compiled

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from bench.discrepancy.explain import Explanation
-from bench.discrepancy.problem import Array, Placed, Problem
+from bench.discrepancy.placed import Placed
+from bench.discrepancy.problem import Array, Problem
 from bench.discrepancy.screen import force_along
 
 NOTHING = 1e-5
