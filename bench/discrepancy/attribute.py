@@ -25,6 +25,7 @@ from bench.discrepancy.screen import Ground, Screen
 from bench.discrepancy.search import (
     IMMATERIAL,
     SAME,
+    SIGHT,
     THREADS,
     Search,
     carry_on,
@@ -393,7 +394,7 @@ def challenge(search: Search, screen: Screen, pool: ThreadPoolExecutor, *, round
 
 
 def reduce_best(search: Search, pool: ThreadPoolExecutor) -> None:
-    """Strike each effect in turn from the best hypothesis, the fit starting from what the others have become."""
+    """Strike each effect in turn from the best hypothesis: is it still needed beside what the others have become?"""
     best = search.ranked()[0]
     if len(best.hypothesis) < 2:
         return
@@ -405,7 +406,7 @@ def reduce_best(search: Search, pool: ThreadPoolExecutor) -> None:
         tasks.append(
             (rest, np.concatenate([best.vector[:n], *(eta for j, eta in enumerate(etas) if j != i)]))
         )
-    converge(search, pool, tasks)
+    converge(search, pool, tasks, limit=best.cost + SIGHT)
 
 
 def refined(screen: Screen, ground: Ground, points: Sequence[Point], pool: ThreadPoolExecutor) -> list[Point]:

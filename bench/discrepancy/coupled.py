@@ -24,7 +24,6 @@ from bench.discrepancy.attribute import (
 from bench.discrepancy.effect import Effect
 from bench.discrepancy.fit import Fit
 from bench.discrepancy.grid_points import Point
-from bench.discrepancy.problem import Problem
 from bench.discrepancy.screen import Ground, Screen
 from bench.discrepancy.search import IMMATERIAL, THREADS, Search, converge, names
 
@@ -45,39 +44,40 @@ Keys = Collection[tuple[str, str, str]]
 
 
 def coupled_fits(
-    whole: Problem,
+    kept: Search,
     catalogue: Sequence[Effect],
     most: int,
     progress: Callable[[str], None],
     deeper: Callable[[Fit], bool] = lambda alone: True,
-) -> tuple[list[Fit], bool]:
+) -> bool:
     """Search explanations that hold an effect which couples the groups.
 
     Args:
-        whole: Records and priors on all degrees of freedom.
+        kept: Search on all degrees of freedom; couplings that it holds alone already are not fitted again.
         catalogue: Effects to consider.
         most: Largest number of effects.
         progress: Called with a line of text at every stage.
         deeper: Whether the best coupling alone is worth a search for other effects beside it.
 
     Returns:
-        The fits by decreasing posterior, and whether other effects were searched beside a coupling.
+        Whether other effects were searched beside a coupling.
     """
     progress("effects that couple the degrees of freedom")
-    candidates = [p for p in placements(whole.case, whole.structure, catalogue) if not p.effect.rare]
+    problem = kept.problem
+    candidates = [p for p in placements(problem.case, problem.structure, catalogue) if not p.effect.rare]
     forces = [p for p in candidates if p.effect.site == "joint"]
-    kept = Search(whole)
     with ThreadPoolExecutor(THREADS) as pool:
-        screen = Screen(whole, forces, pool.map)
+        screen = Screen(problem, forces, pool.map)
         coupling = {p.key for p in forces if p.effect.n_coordinates > 1}
-        _alone(kept, screen, coupling, pool)
+        if not kept.fits:
+            _alone(kept, screen, coupling, pool)
         deep = bool(kept.fits) and deeper(kept.ranked()[0])
         if deep:
             screen.add([p for p in candidates if p.effect.site != "joint"], pool.map)
         size = 1
         while deep and size < most and _one_more(kept, screen, coupling, pool, progress):
             size += 1
-    return kept.ranked(), deep
+    return deep
 
 
 def _alone(kept: Search, screen: Screen, coupling: Keys, pool: ThreadPoolExecutor) -> None:

@@ -27,7 +27,7 @@ from bench.discrepancy.placed import Hypothesis, Placed
 from bench.discrepancy.prepared import whitened
 from bench.discrepancy.problem import Array, Problem, band_bins
 from bench.discrepancy.screen import Screen
-from bench.discrepancy.search import THREADS, WITHIN_REACH, Search, consistent, names, near, posterior
+from bench.discrepancy.search import SIGHT, THREADS, WITHIN_REACH, Search, consistent, names, near, posterior
 from bench.discrepancy.start_estimates import predict
 from bench.discrepancy.structure import Structure, structure_of
 
@@ -171,14 +171,14 @@ def _explain(
         progress(f"screening of {', '.join(part.dofs)}")
         prepared.append(prepare(problem, placements(case, part, catalogue)))
     odd = [entry for entry in prepared if not consistent(entry[0].ranked(0)[0])]
-    coupled: list[Fit] = []
+    coupled = Search(whole)
     deep = settled = False
     if len(odd) > 1:
         little = max(_promise(entry) for entry in odd) > PROMISING
-        coupled, deep = coupled_fits(
-            whole, catalogue, most, progress, lambda alone: little or _beyond(alone, prepared)
+        deep = coupled_fits(
+            coupled, catalogue, most, progress, lambda alone: little or _beyond(alone, prepared)
         )
-        settled = deep and consistent(coupled[0])
+        settled = deep and consistent(coupled.ranked()[0])
     if not settled:
         hopeless = False
         for entry in prepared:
@@ -189,8 +189,8 @@ def _explain(
             hopeless = hopeless or search.ranked()[0].reduced > HOPELESS_GROUP
     found = _nothing_left_first(_combined([entry[0] for entry in prepared]))
     if odd and not deep and not _leaves_nothing(found):
-        coupled, _ = coupled_fits(whole, catalogue, most, progress)
-    found += [Explanation(((whole, fitted),)) for fitted in coupled]
+        coupled_fits(coupled, catalogue, most, progress)
+    found += [Explanation(((whole, fitted),)) for fitted in coupled.ranked()]
     return _nothing_left_first(sorted(found, key=lambda e: -e.log_posterior))
 
 
@@ -225,7 +225,7 @@ def _promise(entry: Prepared) -> float:
 
 def _beyond(coupled: Fit, prepared: Sequence[Prepared]) -> bool:
     """Whether an effect on each group of degrees of freedom promises far less than a coupling has kept."""
-    return sum(_promised(entry) for entry in prepared) > coupled.chi2 + 4.0 * WITHIN_REACH
+    return sum(_promised(entry) for entry in prepared) > coupled.chi2 + SIGHT
 
 
 def _nothing_left_first(found: list[Explanation]) -> list[Explanation]:

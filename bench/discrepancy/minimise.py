@@ -27,7 +27,7 @@ PATIENCE = 3
 """Steps after which a minimisation may be given up."""
 OPTIMISM = 4.0
 """How many times the decrease that the linearisation promises may still come."""
-NOISE = 2.0
+NOISE = 1.2
 """Squared residuals, over their number, up to which a minimisation is carried to its end."""
 COARSE = 1e-3
 """Part of what lies beyond that is not worth a step: a wrong model is no less wrong for it."""

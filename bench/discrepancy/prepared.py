@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
@@ -83,18 +84,36 @@ def timed(residual: Array, predicted: Array, noise: float) -> Array:
         predicted: The free run.
         noise: Standard deviation of the channel's noise.
     """
-    rise = np.diff(predicted)
-    around = np.stack([np.roll(rise, shift) for shift in (-2, -1, 1, 2)])
-    slope = np.median(around, axis=0)
-    jump = rise - slope
-    sharp = np.abs(jump) > np.maximum(2.0 * TIMED * noise, 2.0 * np.abs(around[1:3] - slope).max(axis=0))
-    k = np.flatnonzero(sharp[2:-2]) + 2
     out = residual.copy()
-    for samples, reach in ((k, jump[k]), (k + 1, -jump[k])):
-        part = residual[samples] * np.sign(reach)
-        excused = (part > TIMED * noise) & (part < np.abs(reach) + TIMED * noise)
-        out[samples[excused]] = TIMED * noise * np.sign(reach[excused])
+    _excuse(residual, predicted, TIMED * noise, out)
     return out
+
+
+@numba.njit(cache=True, error_model="numpy", nogil=True)
+def _excuse(residual, predicted, most, out):
+    """Limit to `most` in `out` what a jump between two samples explains, that of the sample before first."""
+    before = 0.0
+    for k in range(2, len(predicted) - 1):
+        jump = _jump(predicted, k, most) if k < len(predicted) - 3 else 0.0
+        for reach in (-before, jump):
+            part = residual[k] * np.sign(reach)
+            if part > most and part < abs(reach) + most:
+                out[k] = most * np.sign(reach)
+                break
+        before = jump
+
+
+@numba.njit(cache=True, error_model="numpy", nogil=True)
+def _jump(predicted, k, most):
+    """What the rise from sample k to the next is more than the median of four about it; zero where that is no jump."""
+    rise = predicted[k + 1] - predicted[k]
+    left, right = predicted[k] - predicted[k - 1], predicted[k + 2] - predicted[k + 1]
+    far_left, far_right = predicted[k - 1] - predicted[k - 2], predicted[k + 3] - predicted[k + 2]
+    least = min(left, right, far_left, far_right)
+    largest = max(left, right, far_left, far_right)
+    slope = 0.5 * (left + right + far_left + far_right - least - largest)
+    around = max(abs(left - slope), abs(right - slope))
+    return rise - slope if abs(rise - slope) > 2.0 * max(most, around) else 0.0
 
 
 def whitened(residual: Array, data: RecordData) -> Array:

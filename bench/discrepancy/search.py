@@ -29,6 +29,8 @@ HOPELESS = 3.0
 """A first fit that leaves more than this many times the excess of the best one is not carried on."""
 WITHIN_REACH = 30.0
 """Difference in log posterior that carrying a first fit on to convergence may still make up."""
+SIGHT = 4.0 * WITHIN_REACH
+"""Cost above that of an explanation at which another one is still in sight of it."""
 MODEL_ERROR = 0.02
 """Relative excess of chi-squared that is laid to the smoothing and integration of the diagnosis itself."""
 SAME = 0.3
@@ -141,15 +143,19 @@ def carry_on(search: Search, pool: ThreadPoolExecutor, size: int, *, most: int) 
 
 
 def converge(
-    search: Search, pool: ThreadPoolExecutor, tasks: Sequence[tuple[Hypothesis, np.ndarray]]
+    search: Search,
+    pool: ThreadPoolExecutor,
+    tasks: Sequence[tuple[Hypothesis, np.ndarray]],
+    *,
+    limit: float | None = None,
 ) -> None:
-    """Fit hypotheses from starts to convergence, but for those that cannot come near the best."""
+    """Fit hypotheses from starts to convergence, but for those that cannot come near a cost: that of the best of their size."""
 
-    limits = {size: limit_of(search, size) for size in {len(hypothesis) for hypothesis, _ in tasks}}
+    sizes = {len(hypothesis) for hypothesis, _ in tasks}
+    limits = {size: limit_of(search, size) if limit is None else limit for size in sizes}
 
     def thorough(task: tuple[Hypothesis, np.ndarray]) -> Fit:
-        limit = limits[len(task[0])]
-        return fit(search.problem, task[0], start=task[1], iterations=THOROUGH, limit=limit)
+        return fit(search.problem, task[0], start=task[1], iterations=THOROUGH, limit=limits[len(task[0])])
 
     for fitted in pool.map(thorough, tasks):
         search.add(fitted)
@@ -188,7 +194,7 @@ def integrate_finer(search: Search, pool: ThreadPoolExecutor) -> None:
 def limit_of(search: Search, size: int) -> float:
     """Cost beyond which a fit of so many effects is of no more interest."""
     best = min((f.cost for f in search.fits.values() if len(f.hypothesis) == size), default=np.inf)
-    return best + 4.0 * WITHIN_REACH + max(best - search.problem.n_residuals, 0.0)
+    return best + SIGHT + max(best - search.problem.n_residuals, 0.0)
 
 
 def shake(search: Search, pool: ThreadPoolExecutor) -> None:
