@@ -10,9 +10,11 @@ from bench.discrepancy import Case, CaseChannel, NominalParameter, record_from_a
 from bench.discrepancy.attribute import attribute, placements
 from bench.discrepancy.catalogue import CATALOGUE
 from bench.discrepancy.explain import Explanation
+from bench.discrepancy.fit import fit
 from bench.discrepancy.problem import Problem
 from bench.discrepancy.structure import structure_of
 from bench.discrepancy.where.acting import acting_regions
+from bench.discrepancy.where.limited import limited_regions
 from bench.discrepancy.where.locate import locate
 from bench.discrepancy.where.missing_force import observers
 from bench.discrepancy.where.redundancy import contradictions
@@ -73,6 +75,46 @@ def nothing(t: float, x: float, v: float) -> float:
 
 def stop(t: float, x: float, v: float) -> float:
     return 2000.0 * max(x - 0.01, 0.0)
+
+
+def snap(t: float, x: float, v: float) -> float:
+    inside = max(1.0 - (x / 0.06) ** 2, 0.0)
+    return -400.0 * x * inside**2
+
+
+def dry(t: float, x: float, v: float) -> float:
+    return 2.0 * np.tanh(v / 0.001)
+
+
+def unexplained(case: Problem) -> Explanation:
+    return Explanation(((case, fit(case, (), start=np.zeros(len(case.nominal)))),))
+
+
+@pytest.mark.parametrize("wrong", [-0.04, 0.04])
+def test_a_force_within_a_window_is_told_from_one_outside_it_by_free_runs(wrong):
+    # a stiffness that is off makes a force of opposite sign outside the window of the one within
+    found = limited_regions(unexplained(problem(snap, wrong=wrong)))
+    ((region,),) = found.values()
+    low, high = region["displacement"]
+    # a cell is a 24th of a stroke of some 310 mm, and the force has all but gone at the last fifth of the window
+    assert -0.06 - 0.013 < low < -0.048 + 0.013
+    assert 0.048 - 0.013 < high < 0.06 + 0.013
+    assert region["share"] == pytest.approx(1.0)
+
+
+def test_a_force_on_one_side_has_one_region_that_ends_where_the_motion_does():
+    case = problem(stop)
+    ((region,),) = limited_regions(unexplained(case)).values()
+    reach = np.abs(case.motion(0).position).max()
+    # a cell and a half, a 24th of the stroke each: straight lines between cells bend early
+    assert region["displacement"][0] == pytest.approx(0.01, abs=1.5 * reach / 12)
+    assert region["displacement"][1] == pytest.approx(reach, rel=1e-6)
+    assert region["force"] > 0.0
+
+
+@pytest.mark.parametrize("force_of", [nothing, dry])
+def test_no_region_where_nothing_is_missing_or_something_everywhere(force_of):
+    assert limited_regions(unexplained(problem(force_of))) == {}
 
 
 def test_the_missing_force_is_estimated_sample_by_sample():
@@ -179,7 +221,7 @@ def test_a_named_stop_tells_its_region_beside_a_faulty_sensor_and_a_smooth_sprin
     search = attribute(case, candidates, most=2)
     best, nothing = (Explanation(((case, f),)) for f in (search.ranked()[0], search.ranked(0)[0]))
     assert {placed.effect.name for placed in best.hypothesis} == set(names[:2])
-    for location in locate(case, nothing, best, named=True).locations:
+    for location in locate(case, nothing, best, verdict="effect").locations:
         assert location.kind == "sensor"
         assert location.state_region["displacement"][0] == pytest.approx(0.01, abs=5e-4)  # 1 to 2 cells
     cubic = next(

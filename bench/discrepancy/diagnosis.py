@@ -128,7 +128,7 @@ def diagnose(
         stages[-1] = ("no closure helps", nothing.predict)
         found = gaps(case, problem, stages=stages, rng=rng, final=_model(final))
     widest = max(found, key=lambda gap: gap.before / max(gap.noise_floor, 1e-12))
-    where = locate(problem, nothing, best, named=kind == "effect")
+    where = locate(problem, nothing, best, verdict=kind)
     verdict = Verdict(
         verdict=kind,
         named=(*evidence.named(explanations), *seen) if kind == "effect" else (),

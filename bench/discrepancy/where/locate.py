@@ -7,7 +7,8 @@ and out of contact, band and time (`state_map`). Shares of a split add up to one
 controlled. Channels that contradict one another whatever the force (`redundancy`) make it a fault of a sensor.
 
 No split knows which effect is named later. The regions are those of the force map, unless an effect that the records bear out
-acts in a part of the state space only: its law then tells them better than any map (`acting`).
+acts in a part of the state space only: its law then tells them better than any map (`acting`). So does a free force, where the
+effect is unknown and the records tell that it has limits (`limited`).
 
 References:
     Y. Benjamini, Y. Hochberg, Journal of the Royal Statistical Society B 57 (1995) 289-300.
@@ -26,6 +27,7 @@ from bench.discrepancy.prepared import fast_length, whitened_spectrum
 from bench.discrepancy.problem import Array, Problem
 from bench.discrepancy.verdict import Location, Split
 from bench.discrepancy.where.acting import acting_regions
+from bench.discrepancy.where.limited import limited_regions
 from bench.discrepancy.where.redundancy import Contradiction, contradictions
 from bench.discrepancy.where.state_map import FALSE_DISCOVERIES, Region, StateMap, state_maps
 from bench.discrepancy.where.state_splits import force_splits
@@ -48,7 +50,8 @@ class Whereabouts(NamedTuple):
         splits: Shares by channel, band, time and state.
         maps: Missing force over the state space, for every place with one coordinate.
         contradictions: Pairs of channels held against each other.
-        acting: Regions of the named effects that act in a part of the state space only, by place; see `acting_regions`.
+        acting: Regions of the named effects that act in a part of the state space only, or of an unknown one that does, by place;
+            see `acting_regions` and `limited_regions`.
     """
 
     locations: tuple[Location, ...]
@@ -80,21 +83,25 @@ class _Excess(NamedTuple):
     density: float
 
 
-def locate(problem: Problem, nominal: Explanation, best: Explanation, *, named: bool) -> Whereabouts:
+def locate(problem: Problem, nominal: Explanation, best: Explanation, *, verdict: str) -> Whereabouts:
     """Locate the residuals of the nominal model.
 
     Args:
         problem: Records and structure on all degrees of freedom.
         nominal: The explanation without effects, its parameters re-estimated.
         best: The best explanation; where it is down to the noise its nominal parameters serve for the force map.
-        named: Whether its effects are named, so that their laws tell where they act.
+        verdict: "effect", so that the laws of its effects tell where they act, "none" or "unknown".
     """
     names = problem.structure.channels
     excess = _excess(problem, nominal)
     found = contradictions(problem)
     known = known_parameters(best)
     maps = state_maps(problem, problem.records, known=known)
-    acting = acting_regions(best) if named and known is not None else {}
+    acting: Mapping[str, tuple[dict[str, Any], ...]] = {}
+    if verdict == "unknown":
+        acting = limited_regions(nominal)
+    elif verdict == "effect" and known is not None:
+        acting = acting_regions(best)
     total = sum(max(e.chi2 - e.count, 0.0) for e in excess.values())
     p_values = [float(stats.chi2.sf(e.chi2, e.count)) for e in excess.values()]
     adjusted = dict(zip(excess, stats.false_discovery_control(p_values), strict=True)) if excess else {}
@@ -132,7 +139,7 @@ def locate(problem: Problem, nominal: Explanation, best: Explanation, *, named: 
 def _regions_at(
     trusted: Sequence[StateMap], touched: Sequence[StateMap], acting: Mapping[str, tuple[dict[str, Any], ...]]
 ) -> tuple[dict[str, Any], ...]:
-    """Regions at the places of the maps that a channel touches: of the named effects that are limited to a region, or else of the
+    """Regions at the places of the maps that a channel touches: of the effects that are limited to a region, or else of the
     trusted maps; what a faulty sensor tells of a force is not."""
     limited = tuple(region for m in touched for region in acting.get(m.place.name, ()))
     return limited or tuple(
