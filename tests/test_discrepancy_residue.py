@@ -264,6 +264,12 @@ def test_judging_records_contradict_a_law_that_they_do_not_follow():
     other = planted_case(lambda f: motion_with(f, lambda x, v, z: (12.0 * np.tanh(x / 0.005), [])))
     elsewhere = replace(case, validation=other.validation)
     assert contradicted(elsewhere, problem, found, np.random.default_rng(1))
+    # a softening spring that the judging loads tear through does not follow them either
+    (record,) = case.validation
+    wild = replace(record, values=record.values | {"force": 1e4 * record.values["force"]})
+    torn = Explanation(((problem, replace(explained, vector=-explained.vector)),))
+    assert not np.isfinite(torn.predict(wild)["displacement"]).all()
+    assert contradicted(replace(case, validation=(wild,)), problem, torn, np.random.default_rng(1))
 
 
 @pytest.mark.slow

@@ -48,6 +48,8 @@ def contradicted(case: Case, problem: Problem, best: Explanation, rng: np.random
         simulated = judged(runs)
         error = _rms(simulated - judged([record.values for record in records]))
         floor = noise_level(problem, channels, records)
+        if not np.isfinite(error):
+            return True
         if error <= CONTRADICTED * floor:
             continue
         if not drawn:

@@ -17,7 +17,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import logsumexp
 
 from bench.discrepancy.explain import Explanation
 from bench.discrepancy.problem import Array, Problem
@@ -118,8 +117,8 @@ def _regions(problem: Problem, place: Place, screen: Screen, ground: Ground) -> 
     everything = _Part(np.arange(CELLS), ((0, CELLS),))
     whole = [_evidence(f, everything, excess) for f in free]
     limited = [np.array([_evidence(f, part, excess) for part in parts]) for f in free]
-    weight = logsumexp(np.concatenate(limited)) - math.log(2 * len(parts))
-    if weight < max(0.0, logsumexp(whole) - math.log(2.0)) + SURE:
+    weight = float(np.logaddexp.reduce(np.concatenate(limited))) - math.log(2 * len(parts))
+    if weight < max(0.0, float(np.logaddexp.reduce(whole)) - math.log(2.0)) + SURE:
         return ()
     over = int(np.argmax([own.max() for own in limited]))
     best = limited[over].max()
@@ -132,7 +131,7 @@ def _free(place: Place, states: list[Array], over: int, screen: Screen, ground: 
     reach, other = (float(max(np.abs(s[:, i]).max() for s in states)) or 1.0 for i in (over, 1 - over))
     per_record = []
     for state in states:
-        at: Array = np.add(state[:, over] / reach, 1.0) * 0.5 * CELLS - 0.5
+        at = np.asarray(0.5 * CELLS * (state[:, over] / reach + 1.0) - 0.5, dtype=np.float64)
         hats = np.clip(1.0 - np.abs(at[:, None] - np.arange(CELLS)), 0.0, None)
         # beyond the middle of the outermost cells the force stays what it is there
         hats[at < 0.0, 0], hats[at > CELLS - 1.0, -1] = 1.0, 1.0
