@@ -12,7 +12,7 @@ from bench.discrepancy.catalogue import effect_named
 from bench.discrepancy.diagnosis import diagnose
 from bench.discrepancy.fit import fit
 from bench.discrepancy.placed import Placed
-from bench.discrepancy.prescribed_motion import decided, held, motion_draws
+from bench.discrepancy.prescribed_motion import decided, held, prescribed_motion
 from bench.discrepancy.problem import Problem
 from bench.discrepancy.search import consistent
 from bench.discrepancy.structure import structure_of
@@ -100,8 +100,8 @@ def test_reversals_smaller_than_the_noise_do_not_count() -> None:
 def test_only_reversals_and_dwells_are_in_doubt(rng: np.random.Generator) -> None:
     known = case(rng, friction=FRICTION)
     record = known.identification[0]
-    motion, *draws = motion_draws(known, record, 8)
-    compared = decided(motion, draws)
+    prescribed = prescribed_motion(known, record, 8)
+    compared = decided(prescribed)
     assert compared is not None
     true = np.gradient(strokes(0.8, 0.3), STEP)
     fast = np.abs(true) > 0.3 * np.abs(true).max()
@@ -111,6 +111,7 @@ def test_only_reversals_and_dwells_are_in_doubt(rng: np.random.Generator) -> Non
     assert not compared[:3].any()
     assert not compared[-3:].any()
     # drawn errors are as large as the one that was made, to within the spread of some hundred independent values
+    motion, draws = prescribed
     made = motion.velocity[:, 0] - true
     drawn = [draw.velocity[:, 0] - motion.velocity[:, 0] for draw in draws]
     assert 0.5 < np.std(np.array(drawn)[:, 200:-200]) / np.std(made[200:-200]) < 2.0

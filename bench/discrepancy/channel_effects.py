@@ -55,6 +55,7 @@ CHANNELS: tuple[Effect, ...] = (
         ),
         "F(t - tau)",
         signal=signals.delay,
+        between_samples=True,
     ),
     Effect(
         "actuator_lag",

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from bench.discrepancy.acquisition import upsampled
 from bench.discrepancy.case import CaseRecord
 from bench.discrepancy.pace import MAX_SUBSTEPS
-from bench.discrepancy.signal_effects import delay
 from bench.discrepancy.system import LinearStructure
 
 if TYPE_CHECKING:
@@ -64,7 +63,9 @@ def driving_loads(
     """
     acting = [
         (placed, placed.effect.signal, eta)
-        for placed, eta in zip(*effects, strict=True)
+        for placed, eta in sorted(
+            zip(*effects, strict=True), key=lambda entry: entry[0].effect.between_samples
+        )
         if placed.effect.site == "actuator" and placed.effect.signal is not None
     ]
     lead = problem.lead_in(record)
@@ -76,10 +77,10 @@ def driving_loads(
     loads = np.vstack([loads] * (1 + lead // len(record)))
     interpolation = problem.case.load_interpolation
     rows = 0 if interpolation == "zero_order_hold" else 1
-    for placed, signal, eta in sorted(acting, key=lambda entry: entry[1] is delay):
+    for placed, signal, eta in acting:
         j = problem.structure.loads.index(placed.target)
         values = placed.effect.values(eta, problem.scales_of(placed))
-        if signal is delay and interpolation == "linear" and rows == 1:
+        if placed.effect.between_samples and interpolation == "linear" and rows == 1:
             loads, rows = upsampled(loads, CORNERS), CORNERS
         loads[:, j] = signal(loads[:, j], values, record.step / max(rows, 1))
     driving = (loads, rows)

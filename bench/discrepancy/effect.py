@@ -147,6 +147,7 @@ class Effect:
         modulated: Parameters 1 to 3 are depth, frequency and phase of a modulation of the amplitude.
         affine: The force is affine in parameter 1.
         signal: For actuator and sensor effects, the operation on a channel.
+        between_samples: That operation moves samples in time, and needs what the channel does between them.
         quantity: For sensor effects the kind of channel ("position", "acceleration"); for inertia the parameter kind.
         pickup: The sensor adds a share of another measured channel: a load, or the response of the other axis.
         log_prior: Log prior odds against an effect of the README's list.
@@ -166,6 +167,7 @@ class Effect:
     modulated: bool = False
     affine: bool = False
     signal: Callable[[Values, Values, float], Values] | None = None
+    between_samples: bool = False
     quantity: str = ""
     pickup: bool = False
     log_prior: float = 0.0

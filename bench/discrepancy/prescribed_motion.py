@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -29,8 +29,20 @@ samples over which it is averaged."""
 CHANNELS = ("displacement", "velocity", "acceleration")
 
 
-def motion_draws(case: Case, record: CaseRecord, draws: int) -> list[Motion]:
-    """The motion that drives a component, and the same with as many more draws of its noise.
+class Prescribed(NamedTuple):
+    """A motion that drives a component.
+
+    Attributes:
+        motion: As measured, smoothed.
+        noisy: The same, each with one more draw of its noise.
+    """
+
+    motion: Motion
+    noisy: tuple[Motion, ...]
+
+
+def prescribed_motion(case: Case, record: CaseRecord, draws: int) -> Prescribed:
+    """The motion that drives a component, with draws of its noise.
 
     It is the measured displacement, and velocity where there is one, smoothed.
 
@@ -50,10 +62,11 @@ def motion_draws(case: Case, record: CaseRecord, draws: int) -> list[Motion]:
     out = [smooth, *(smooth + error for error in errors)]
     for moved in out:
         moved[:, 1] = held(moved[:, 0], moved[:, 1], REVERSAL * noise[0])
-    return [Motion(*(moved[:, [i]] for i in range(3))) for moved in out]
+    motion, *noisy = (Motion(*(moved[:, [i]] for i in range(3))) for moved in out)
+    return Prescribed(motion, tuple(noisy))
 
 
-def decided(motion: Motion, draws: Sequence[Motion]) -> Array | None:
+def decided(prescribed: Prescribed) -> Array | None:
     """Samples (n,) of a prescribed motion whose direction the noise leaves in no doubt, as ones and zeros.
 
     Dry friction changes its sign at a reversal, and the moment of the reversal is known to the noise only: a few
@@ -61,9 +74,9 @@ def decided(motion: Motion, draws: Sequence[Motion]) -> Array | None:
     None where hardly anything would be left.
 
     Args:
-        motion: The motion of one coordinate.
-        draws: The same with more noise, see `motion_draws`.
+        prescribed: The motion of one coordinate.
     """
+    motion, draws = prescribed
     error = np.sqrt(np.mean([(drawn.velocity[:, 0] - motion.velocity[:, 0]) ** 2 for drawn in draws], axis=0))
     usual = float(np.sqrt(np.mean(error**2)))
     sure = np.abs(motion.velocity[:, 0]) > DOUBT * usual

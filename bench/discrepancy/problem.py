@@ -23,7 +23,7 @@ from bench.discrepancy.measured_motion import measured_motion
 from bench.discrepancy.pace import rates, speeds, steps
 from bench.discrepancy.placed import Hypothesis, Placed
 from bench.discrepancy.prepared import RecordData, band_bins, noise_floor, projected, timed
-from bench.discrepancy.prescribed_motion import decided, motion_draws
+from bench.discrepancy.prescribed_motion import Prescribed, decided, prescribed_motion
 from bench.discrepancy.quantisation import raised_noise
 from bench.discrepancy.residual_noise import whitening_behind
 from bench.discrepancy.starts import (
@@ -126,7 +126,7 @@ class Problem:
             else band_bins(responses, self.noise)
         )
         windows = windows_of(self, record, n_bins, self.split(*passed)[0])
-        compared = decided(self.motion_of(record), self.motions_drawn(record)[1:]) if self.driven else None
+        compared = decided(self.prescribed(record)) if self.driven else None
         whitening = whitening_behind(self, record, n_bins, passed, compared)
         return RecordData(record, loads, responses, n_bins, whitening, windows, compared)
 
@@ -137,11 +137,11 @@ class Problem:
         out.data = tuple(out.prepare(record) for record in self.records)
         return out
 
-    def motions_drawn(self, record: CaseRecord) -> list[Motion]:
-        """Cached prescribed motion of a record, and draws of its noise after it, see `prescribed_motion.motion_draws`."""
-        cache = self.__dict__.setdefault("_motions_drawn", {})
+    def prescribed(self, record: CaseRecord) -> Prescribed:
+        """Cached prescribed motion of a record, with draws of its noise."""
+        cache = self.__dict__.setdefault("_prescribed", {})
         if record.name not in cache:
-            cache[record.name] = motion_draws(self.case, record, MOTION_DRAWS)
+            cache[record.name] = prescribed_motion(self.case, record, MOTION_DRAWS)
         return cache[record.name]
 
     def load_noise_of(self, record: CaseRecord) -> Array:
@@ -176,7 +176,7 @@ class Problem:
         """Smoothed measured motion of any record of the case."""
         if record.name not in self.motions:
             self.motions[record.name] = (
-                self.motions_drawn(record)[0] if self.driven else self.smoothed(record)
+                self.prescribed(record).motion if self.driven else self.smoothed(record)
             )
         return self.motions[record.name]
 
@@ -331,7 +331,7 @@ class Problem:
         out = copy.copy(self)
         out.motions = {}
         out.__dict__["_loads"] = {}
-        out.__dict__["_motions_drawn"] = {}
+        out.__dict__["_prescribed"] = {}
         out.__dict__["_speeds_along"] = {}
         return out
 

@@ -72,8 +72,8 @@ def forces_of_noise(problem: Problem, record: CaseRecord, model: tuple[Hypothesi
         moved.motions[record.name] = motion
         return moved.simulate(*model, record)[:, 0]
 
-    clean, *noisy = map(force, problem.motions_drawn(record))
-    return np.stack(noisy) - clean
+    prescribed = problem.prescribed(record)
+    return np.stack([force(motion) for motion in prescribed.noisy]) - force(prescribed.motion)
 
 
 def _power(forces: Array, compared: Array | None) -> Array:
