@@ -97,6 +97,15 @@ def test_hysteresis_that_changes_or_pinches_is_named(name, effect, hidden):
 
 
 @pytest.mark.slow
+def test_slack_hysteresis_is_pinched_from_the_first_motion_on():
+    verdict = named(planted_case(lambda f: motion_with(f, pinched, 1)), "pinching_hysteresis")
+    # noise of 1e-4 m under motions of 1e-2 m, two hundred times the samples of a cycle: a few per cent
+    assert estimate(verdict, "severity") == pytest.approx(0.8, rel=0.05)
+    assert estimate(verdict, "level") == pytest.approx(0.1, abs=0.02)
+    assert verdict.gap.after < 1.05 * verdict.gap.noise_floor
+
+
+@pytest.mark.slow
 def test_a_base_on_a_spring_is_named_with_its_frequency():
     verdict = named(
         planted_case(base_motion),

@@ -169,7 +169,6 @@ def test_free_models_find_the_memory_that_one_relaxation_lacks():
     problem, explained = fitted(case, "viscoelastic_relaxation", [-2.7, -1.9])
     lack = lack_of_fit(problem, explained)
     assert lack.significant(0.0)
-    assert lack.p_value < 1e-6
     verdict = diagnose(case, catalogue=[effect_named("viscoelastic_relaxation")]).verdict
     assert verdict.verdict == "unknown"
 

@@ -33,9 +33,9 @@ def _degrading_theta(values: Values, scales: Scales) -> Values:
 
 
 def _pinching_theta(values: Values, scales: Scales) -> Values:
-    # p is large: the slack is there from the first cycle, as in a joint that has been used
-    work = scales.force * scales.position
-    spread = [1e4 / work, PINCH_SPREAD, 0.0, 0.5]
+    # p is large: the slack is there from the first motion, however small, as in a joint that has been used
+    onset = 1e9 / (scales.force * scales.position)
+    spread = [onset, PINCH_SPREAD, 0.0, 0.5]
     return np.array([*bouc_wen_theta(values, scales), 0.0, 0.0, values[5], values[4], *spread])
 
 
