@@ -69,7 +69,8 @@ class Location:
             other, "undetermined" where there is only one.
         regions: Regions of the state space at the places the channel touches, the strongest first: their limits by
             coordinate, "share" of the squared force there, and mean "force". Where a named "effect" acts in a part of the state
-            space only, those of that effect's force; else those where the map of the missing force is significant.
+            space only, those of that effect's force; where an unknown one does, as free runs tell, its limits; else those where
+            the map of the missing force is significant.
     """
 
     channel: str
