@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,8 +27,10 @@ from bench.discrepancy.search import (
     IMMATERIAL,
     SAME,
     SIGHT,
+    THOROUGH,
     THREADS,
     Search,
+    Task,
     carry_on,
     consistent,
     converge,
@@ -67,6 +70,8 @@ LEFT = 0.02
 """Part of a named effect's gain along the measured motion that a challenger may lack, besides twice what the effect leaves."""
 STALLED = 0.7
 """If one more effect leaves more than this part of the excess of chi-squared, a further one is not tried."""
+CONSIDERED, PROMISED = 12, 2
+"""Hypotheses that are asked what they promise together with one more effect, and those that are extended for that alone."""
 UNPROMISING = 0.25
 """Part of the excess of a base that one more effect must promise to take away, or none is fitted beside it."""
 
@@ -185,7 +190,7 @@ def attribute(
             ranked = search.ranked(size)
             if not ranked or ranked[0].reduced - 1.0 > STALLED * (search.ranked(size - 1)[0].reduced - 1.0):
                 break
-            _extend(search, screen, ranked[: 4 - size], pool, count=6 - size)
+            _extend(search, screen, _bases(search, screen, size, 4 - size), pool, count=6 - size)
             reduce_best(search, pool)
         best = search.ranked()[0]
         if problem.noise_stated and near(best):
@@ -193,6 +198,23 @@ def attribute(
             challenge(search, screen, pool)
             shake(search, pool)
     return search
+
+
+def _bases(search: Search, screen: Screen, size: int, most: int) -> list[Fit]:
+    """Hypotheses beside which one more effect is searched: the best ones, and those that promise most together with another effect.
+
+    Alone, a flexible law is bent to what two forces do, and the one that was right about half of it lies far behind.
+    """
+    problem, ranked = search.problem, search.ranked(size)
+
+    def promised(base: Fit) -> float:
+        ground = screen.ground(base)
+        points = screen.ranked(base, ground)[:1]
+        return float(np.sum(ground.left**2)) - sum(point.gain for point in points)
+
+    far = [f for f in ranked[:CONSIDERED] if np.isfinite(f.cost) and not followed(f, problem)]
+    chosen = ranked[:most] + sorted(far, key=promised)[:PROMISED]
+    return [f for f in ranked if any(f is own for own in chosen)]
 
 
 def _promising(screen: Screen, best: Fit) -> bool:
@@ -234,9 +256,23 @@ def prepare(problem: Problem, candidates: Sequence[Placed], each: Callable = map
         each: Maps a function over items, in threads where wanted.
     """
     search = Search(problem)
-    search.add(fit(problem, (), start=np.zeros(len(problem.nominal))))
+    search.add(fit(problem, (), start=np.zeros(len(problem.nominal)), iterations=THOROUGH))
     screen = Screen(problem, [p for p in candidates if not p.effect.rare], each)
     return search, screen, screen.ranked()
+
+
+class _Offers(NamedTuple):
+    """What a screening offers beside a base; the screening itself is large, and let go.
+
+    Attributes:
+        base: Fitted hypothesis.
+        tasks: Fits of what promises most.
+        spare: Further starts and their fits, for the case that those do not keep what they promise.
+    """
+
+    base: Fit
+    tasks: list[Task]
+    spare: list[tuple[Point, Task]]
 
 
 def _extend(
@@ -249,42 +285,74 @@ def _extend(
     among: Collection[tuple[str, str, str]] = (),
 ) -> None:
     """Add one effect to every base, of those `among` where some are given: screen, refine, fit quickly, carry the best on."""
-    problem = search.problem
-    tasks: list[tuple[Hypothesis, np.ndarray]] = []
     size = len(bases[0].hypothesis) + 1
-    for base in bases:
-        named = base if base.hypothesis else None
-        along = followed(base, problem)
-        local = about(screen, base, explained=along)
-        ground = local.ground(named, simulated=named is not None and along)
-        solved = [p for p in local.ranked(named, ground) if not among or p.placed.key in among]
-        points = refined(local, ground, solved, pool)
-        if not named:
-            search.first = sorted([*search.first, *points] if among else points, key=lambda p: -p.gain)
-        inertia = [] if among else local.inertia_points(base, ground)
-        most = max((p.gain for p in [*points, *inertia]), default=0.0)
-        excess = base.chi2 - base.n_residuals
-        if named and problem.noise_stated and not consistent(base) and most < UNPROMISING * excess:
-            continue
-        # a screening can promise more than there is
-        most = min(most, max(excess, WORTH_A_FIT))
-        short = TRUSTED if named and along else SHORT
-        chosen = leading(points, count, short * most)
-        if not among:
-            chosen += passed_over(solved, chosen, count, WORTH_A_FIT)
-        for point in chosen:
-            if search.start(base.hypothesis, point):
-                tasks.append(((*base.hypothesis, point.placed), local.starts(point, ground, named)))
-        least = min(short * most, WORTH_A_FIT) if consistent(base) else short * most
-        for point in inertia:
-            if point.gain > least:
-                tasks.append(((*base.hypothesis, point.placed), np.append(base.vector, point.eta)))
-
+    offers = [_offers(search, screen, base, pool, count=count, among=among) for base in bases]
     limit = limit_of(search, size)
 
-    for fitted in pool.map(lambda task: first_fit(problem, *task, limit=limit), tasks):
-        search.add(fitted)
+    def fit_all(tasks: Iterable[Task]) -> None:
+        for fitted in pool.map(lambda task: first_fit(search.problem, *task, limit=limit), tasks):
+            search.add(fitted)
+
+    fit_all(task for found in offers for task in found.tasks)
+    for base, _, spare in offers:
+        kept = _kept(search, base)
+        fit_all(task for p, task in spare if p.gain > kept and search.start(base.hypothesis, p))
     carry_on(search, pool, size, most=4)
+
+
+def _offers(
+    search: Search,
+    screen: Screen,
+    base: Fit,
+    pool: ThreadPoolExecutor,
+    *,
+    count: int,
+    among: Collection[tuple[str, str, str]],
+) -> _Offers:
+    """Screen one more effect beside a base, of those `among` where some are given."""
+    problem = search.problem
+    named = base if base.hypothesis else None
+    along = followed(base, problem)
+    local = about(screen, base, explained=along)
+    ground = local.ground(named, simulated=named is not None and along)
+    solved = [p for p in local.ranked(named, ground) if not among or p.placed.key in among]
+    points = refined(local, ground, solved, pool)
+    if not named:
+        search.first = sorted([*search.first, *points] if among else points, key=lambda p: -p.gain)
+    inertia = [] if among else local.inertia_points(base, ground)
+    most = max((p.gain for p in [*points, *inertia]), default=0.0)
+    excess = base.chi2 - base.n_residuals
+    if named and problem.noise_stated and not consistent(base) and most < UNPROMISING * excess:
+        return _Offers(base, [], [])
+
+    def task(point: Point) -> Task:
+        return (*base.hypothesis, point.placed), local.starts(point, ground, named)
+
+    # a screening can promise more than there is
+    most = min(most, max(excess, WORTH_A_FIT))
+    short = (TRUSTED if named and along else SHORT) * most
+    chosen = leading(points, count, short)
+    if not among:
+        chosen += passed_over(solved, chosen, count, WORTH_A_FIT)
+    begun = {point.placed.key for point in chosen}
+    rest = [p for p in points if p.placed.key not in begun] if named and along else []
+    spare = [(p, task(p)) for p in leading(rest, count, WORTH_A_FIT, starts=1)]
+    tasks = [task(p) for p in chosen if search.start(base.hypothesis, p)]
+    least = min(short, WORTH_A_FIT) if consistent(base) else short
+    tasks += [
+        ((*base.hypothesis, p.placed), np.append(base.vector, p.eta)) for p in inertia if p.gain > least
+    ]
+    return _Offers(base, tasks, spare)
+
+
+def _kept(search: Search, base: Fit) -> float:
+    """How much one more effect has taken from the cost of a base so far: what was promised may not have been kept."""
+    own = key_of(base.hypothesis)
+    size = len(base.hypothesis) + 1
+    best = min(
+        (f.cost for key, f in search.fits.items() if len(key) == size and own < key), default=base.cost
+    )
+    return base.cost - best
 
 
 def first_fit(problem: Problem, hypothesis: Hypothesis, start: np.ndarray, *, limit: float = np.inf) -> Fit:
@@ -308,7 +376,7 @@ def _simulated(search: Search, candidates: Sequence[Placed], pool: ThreadPoolExe
     """
     problem = search.problem
     still = np.zeros(len(problem.nominal))
-    tasks: list[tuple[Hypothesis, np.ndarray]] = []
+    tasks: list[Task] = []
     for placed in candidates:
         effect = placed.effect
         if effect.rare or not _contact(effect):

@@ -2,7 +2,8 @@
 
 Several wrong laws together can imitate a missing one within the motion of a record; at another amplitude they fall apart. How far
 a right explanation may be off on other records is told by the uncertainty of its parameters: what it was barely shown in
-identification, a stop touched once, say, it predicts poorly without being wrong.
+identification, a stop touched once, say, it predicts poorly without being wrong. So is one that makes much of the noise of a measured
+load: a softening spring near its limit.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from bench.discrepancy.case import Case
+from bench.discrepancy.driving import with_load_noise
 from bench.discrepancy.explain import Explanation
 from bench.discrepancy.fit import Fit
 from bench.discrepancy.problem import Array, Problem
@@ -19,7 +21,7 @@ from bench.discrepancy.shrink import coordinates, noise_level
 from bench.discrepancy.starts import in_motion
 
 DRAWS = 8
-"""Draws of the parameters from their posterior."""
+"""Draws of the parameters from their posterior, and of the noise of the loads."""
 CONTRADICTED = 2.0
 """Error on the judging records over what noise and parameters explain, from which an explanation is contradicted."""
 
@@ -54,7 +56,7 @@ def contradicted(case: Case, problem: Problem, best: Explanation, rng: np.random
             continue
         if not drawn:
             others = [_drawn(best, rng) for _ in range(DRAWS)]
-            drawn = [[other.predict(record) for record in records] for other in others]
+            drawn = [[other.predict(with_load_noise(problem, r, rng)) for r in records] for other in others]
         spread = _rms(np.concatenate([judged(other) - simulated for other in drawn]))
         if error > CONTRADICTED * np.hypot(floor, spread):
             return True
@@ -62,16 +64,16 @@ def contradicted(case: Case, problem: Problem, best: Explanation, rng: np.random
 
 
 def _drawn(best: Explanation, rng: np.random.Generator) -> Explanation:
-    """An explanation whose parameters are drawn from their posterior."""
+    """An explanation whose parameters are drawn from their posterior, for records with noise drawn on their loads."""
 
-    def moved(problem: Problem, fitted: Fit) -> Fit:
+    def moved(problem: Problem, fitted: Fit) -> tuple[Problem, Fit]:
         _, _, low, high = problem.prior(fitted.hypothesis)
         away = np.linalg.solve(
             np.linalg.cholesky(fitted.precision).T, rng.standard_normal(len(fitted.vector))
         )
-        return replace(fitted, vector=np.clip(fitted.vector + away, low, high))
+        return problem.forgetful(), replace(fitted, vector=np.clip(fitted.vector + away, low, high))
 
-    return Explanation(tuple((problem, moved(problem, fitted)) for problem, fitted in best.parts))
+    return Explanation(tuple(moved(*part) for part in best.parts))
 
 
 def _rms(x: Array) -> float:

@@ -27,7 +27,17 @@ from bench.discrepancy.placed import Hypothesis, Placed
 from bench.discrepancy.prepared import whitened
 from bench.discrepancy.problem import Array, Problem, band_bins
 from bench.discrepancy.screen import Screen
-from bench.discrepancy.search import SIGHT, THREADS, WITHIN_REACH, Search, consistent, names, near, posterior
+from bench.discrepancy.search import (
+    SIGHT,
+    THOROUGH,
+    THREADS,
+    WITHIN_REACH,
+    Search,
+    consistent,
+    names,
+    near,
+    posterior,
+)
 from bench.discrepancy.start_estimates import predict
 from bench.discrepancy.structure import Structure, structure_of
 
@@ -197,17 +207,19 @@ def _explain(
 def _attributed(
     problem: Problem, candidates: Sequence[Placed], *, most: int, progress: Callable[[str], None]
 ) -> Search:
-    """`attribute`, and once more where the best explanation makes more of the noise of a prescribed motion than the nominal model.
+    """`attribute`, and once more where the best explanation makes more of the noise of what drives it than the nominal model.
 
-    A law that the velocity enters strongly passes much of that noise on, and the right one would be refuted by it.
+    A law that the velocity enters strongly passes much of the noise of a prescribed motion on, and a sensor of twice the gain that of
+    a measured load; the right one would be refuted by it.
     """
     search = attribute(problem, candidates, most=most, progress=progress)
     best = search.ranked()[0]
-    if problem.driven and problem.noise_stated and best.hypothesis and near(best):
+    sensors = any(placed.effect.site == "sensor" for placed in best.hypothesis)
+    if (problem.driven or sensors) and problem.noise_stated and best.hypothesis and near(best):
         behind = problem.behind(best.hypothesis, best.vector)
         left = float(np.sum(behind.residual(best.hypothesis, best.vector) ** 2))
         if abs(left - best.chi2) > NOISIER * best.n_residuals:
-            progress(f"the noise of the motion behind {names(best.hypothesis)}")
+            progress(f"the noise behind {names(best.hypothesis)}")
             return attribute(behind, candidates, most=most, progress=progress)
     return search
 
@@ -300,7 +312,7 @@ def close(best: Explanation, nothing: Explanation, closures: Sequence[Effect]) -
         if lacks or not consistent(fitted):
             candidates = placements(problem.case, problem.structure, closures)
             screen = Screen(problem, candidates)
-            current = fit(problem, (), start=np.zeros(len(problem.nominal)))
+            current = fit(problem, (), start=np.zeros(len(problem.nominal)), iterations=THOROUGH)
             if fitted.reduced - 1.0 < HELPFUL * (current.reduced - 1.0):
                 current = fitted
             with ThreadPoolExecutor(THREADS) as pool, threadpool_limits(1, user_api="blas"):

@@ -118,10 +118,11 @@ def fit(
         each=each,
     )
     precision, evidence = laplace(problem, hypothesis, found.cost, found.curvature, free)
+    with np.errstate(over="ignore"):  # a run on its way to divergence
+        chi2 = float(found.residual @ found.residual)
     return Fit(
-        hypothesis, found.vector, float(found.residual @ found.residual), found.cost, problem.n_residuals,
-        precision, evidence, found.settled,
-    )  # fmt: skip
+        hypothesis, found.vector, chi2, found.cost, problem.n_residuals, precision, evidence, found.settled
+    )
 
 
 def laplace(

@@ -158,8 +158,10 @@ def minimise(
     if jacobian is None or (exact and not found.fresh and state.excess <= 0.0):
         anew = _jacobian(task, state, DIFFERENCES[0])
         jacobian = jacobian if anew is None else anew
-    curvature = identity if jacobian is None else identity + jacobian.T @ jacobian
-    return Minimum(state.vector, state.residual, state.cost, curvature, found.ended)
+    curvature = None if jacobian is None else _squared(jacobian)
+    return Minimum(
+        state.vector, state.residual, state.cost, identity if curvature is None else curvature, found.ended
+    )
 
 
 class _Descent(NamedTuple):
@@ -192,7 +194,12 @@ def _descend(task: _Task, state: _State, difference: float, steps: range) -> _De
             jacobian, fresh = _jacobian(task, state, difference), True
             if jacobian is None:
                 break
-        normal = jacobian.T @ jacobian + np.eye(len(task.free))
+        normal = _squared(jacobian)
+        if normal is None:
+            if fresh:
+                break
+            jacobian = None
+            continue
         gradient = jacobian.T @ state.residual + task.deviation(state.vector)
         normal, gradient = _without(task.blocked(state.vector, gradient), normal, gradient)
         # least squares: far off, columns of very unequal size leave a normal matrix singular to working precision
@@ -223,6 +230,13 @@ def _descend(task: _Task, state: _State, difference: float, steps: range) -> _De
         else:
             jacobian, fresh = jacobian + np.outer(surprise, move / (move @ move)), False
     return _Descent(state, jacobian, fresh, False, progressed, steps.stop)
+
+
+def _squared(jacobian: Array) -> Array | None:
+    """Curvature (n_free, n_free) of half the cost; None on the way to divergence, where squares overflow."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        normal = np.eye(jacobian.shape[1]) + jacobian.T @ jacobian
+    return normal if np.isfinite(normal).all() else None
 
 
 def _without(blocked: NDArray[np.bool_], normal: Array, gradient: Array) -> tuple[Array, Array]:

@@ -1,8 +1,8 @@
 """The noise that residuals have: that of the response channels, and what a model makes of the noise of what drives it.
 
-The noise of a measured load passes the linear structure on its way into the responses. The noise of a prescribed motion
-becomes a force in the component, by its stiffness and damping first; a law that makes more of it, such as damping that grows with
-the velocity, is unknown before it is found, and its noise is counted once it is (`Problem.behind`).
+The noise of a measured load passes the linear structure on its way into the responses, and the sensors. The noise of a prescribed
+motion becomes a force in the component, by its stiffness and damping first. A law that makes more of it, such as damping that grows
+with the velocity, or a sensor of a wrong gain, is unknown before it is found, and its noise is counted once it is (`Problem.behind`).
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def whitening_behind(
         record: The record.
         n_bins: Number of frequency bins in its band.
         model: Effects and vector, see `Problem.simulate`, that the noise of a prescribed motion passes. The noise of
-            loads passes the linear structure at that vector.
+            loads passes the linear structure at that vector, and the sensors.
         compared: (n,) ones and zeros: samples that are compared; None for all.
     """
     own = np.diag(problem.noise**2).astype(complex)
@@ -52,8 +52,25 @@ def whitening_behind(
         omega = 2.0 * np.pi * np.arange(n_bins) / (fast_length(len(record)) * record.step)
         linear = problem.structure.at(problem.split(*model)[0])
         scaled = problem.structure.transfer(linear, np.asarray(omega, dtype=np.float64)) * load_noise
+        scaled = scaled * _gains(problem, record, model)[:, None]
         noise = noise + scaled @ np.conj(np.swapaxes(scaled, 1, 2))
     return np.asarray(np.linalg.inv(np.linalg.cholesky(noise)), dtype=np.complex128)
+
+
+def _gains(problem: Problem, record: CaseRecord, model: tuple[Hypothesis, Array]) -> Array:
+    """How many times what moves a channel is recorded (n_channels,), behind the sensor effects of a model."""
+    hypothesis, vector = model
+    _, etas = problem.split(hypothesis, vector)
+    own = [
+        (placed, eta) for placed, eta in zip(hypothesis, etas, strict=True) if placed.effect.site == "sensor"
+    ]
+    moved = np.column_stack([record.values[name] for name in problem.structure.channels])
+    if not own:
+        return np.ones(moved.shape[1])
+    sensors = tuple(placed for placed, _ in own), [eta for _, eta in own]
+    still = problem.sensed(*sensors, np.zeros_like(moved), record.step)
+    recorded = problem.sensed(*sensors, moved.copy(), record.step) - still
+    return np.std(recorded, axis=0) / np.maximum(np.std(moved, axis=0), 1e-300)
 
 
 def forces_of_noise(problem: Problem, record: CaseRecord, model: tuple[Hypothesis, Array]) -> Array:

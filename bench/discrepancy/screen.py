@@ -43,6 +43,8 @@ SMALL_CHANGE = 1e-3
 """Change of the channels, over their peak, whose effect behind a sensor is taken."""
 SHAPE_STEP = 0.02
 """Finite difference in the shape parameters of a base effect, in units of their prior standard deviation."""
+RUN_STEP = 1e-3
+"""The same in all parameters where free runs are compared, which are smoother than the measured motion."""
 
 
 class Ground(NamedTuple):
@@ -382,9 +384,9 @@ class Screen:
             for i in range(len(vector)):
                 if i >= len(self.problem.nominal) and fixed[i - len(self.problem.nominal)]:
                     continue
-                moved = vector.copy()
-                moved[i] += 1e-3 * std[i] * (1.0 if moved[i] + 1e-3 * std[i] <= high[i] else -1.0)
-                columns.append((residual - self.problem.residual(hypothesis, moved)) / (moved[i] - vector[i]))
+                columns.append(
+                    self._simulated_column(hypothesis, vector, residual, i, RUN_STEP * std[i], high[i])
+                )
             return residual, np.column_stack(columns), vector[: len(self.problem.nominal)]
         residual = self.zero.copy()
         columns = [self.nominal]
@@ -406,6 +408,20 @@ class Screen:
                     ((self.effect_response(placed, moved) - response) / (moved[k] - eta[k]))[:, None]
                 )
         return residual, np.hstack(columns), self.deviations
+
+    def _simulated_column(
+        self, hypothesis: Hypothesis, vector: Array, residual: Array, entry: int, step: float, high: float
+    ) -> Array:
+        """Response (n,) of a free run to one entry of its vector; zero where a step either way lets the run diverge."""
+        for change in (step, -step):
+            moved = vector.copy()
+            moved[entry] += change
+            if moved[entry] > high:
+                continue
+            away = self.problem.residual(hypothesis, moved)
+            if away.shape == residual.shape:
+                return np.asarray((residual - away) / change, dtype=np.float64)
+        return np.zeros_like(residual)
 
     def _signal_nodes(self, hypothesis: Hypothesis, vector: Array) -> list[Node]:
         """Changes that actuator and sensor effects make to the simulated channels of a base."""

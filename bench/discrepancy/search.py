@@ -16,7 +16,7 @@ from bench.discrepancy.placed import Hypothesis
 from bench.discrepancy.problem import Array, Problem
 
 THREADS = 2
-THOROUGH = 30
+THOROUGH = 60
 """Iterations of a fit that is carried on to convergence."""
 LOG_PRIOR_EFFECT = -3.4
 """Log prior odds of one more effect: about one in the number of effects of the catalogue."""
@@ -54,6 +54,9 @@ SCALES = ((1.0,), (2.0,), (4.0,))
 """Sizes of the draws' moves, in posterior standard deviations."""
 DENT = 1.0
 """Decrease of the cost below which a round was in vain."""
+
+Task = tuple[Hypothesis, np.ndarray]
+"""Effects, and the vector or vectors that a fit of them starts from."""
 
 
 @dataclass
@@ -145,7 +148,7 @@ def carry_on(search: Search, pool: ThreadPoolExecutor, size: int, *, most: int) 
 def converge(
     search: Search,
     pool: ThreadPoolExecutor,
-    tasks: Sequence[tuple[Hypothesis, np.ndarray]],
+    tasks: Sequence[Task],
     *,
     limit: float | None = None,
 ) -> None:
@@ -154,7 +157,7 @@ def converge(
     sizes = {len(hypothesis) for hypothesis, _ in tasks}
     limits = {size: limit_of(search, size) if limit is None else limit for size in sizes}
 
-    def thorough(task: tuple[Hypothesis, np.ndarray]) -> Fit:
+    def thorough(task: Task) -> Fit:
         return fit(search.problem, task[0], start=task[1], iterations=THOROUGH, limit=limits[len(task[0])])
 
     for fitted in pool.map(thorough, tasks):
