@@ -109,6 +109,18 @@ def test_a_start_that_diverges_has_infinite_cost():
     assert found.cost == np.inf
 
 
+def test_slopes_whose_squares_overflow_end_a_minimisation_where_it_is():
+    def steep(x: np.ndarray) -> np.ndarray:
+        return 1e152 * np.cos(1e8 * x)
+
+    start = np.array([0.3])
+    found = minimise(steep, start, prior=broad(1), free=np.arange(1), reach=np.ones(1), iterations=5)
+    np.testing.assert_array_equal(found.vector, start)
+    assert np.isfinite(found.cost)
+    assert np.isfinite(found.curvature).all()
+    assert not found.settled
+
+
 @pytest.mark.parametrize("factor", [0, 1, 2])
 def test_exact_linear_runs_agree_with_the_integrator(factor):
     rng = np.random.default_rng(3)

@@ -190,7 +190,7 @@ def attribute(
             ranked = search.ranked(size)
             if not ranked or ranked[0].reduced - 1.0 > STALLED * (search.ranked(size - 1)[0].reduced - 1.0):
                 break
-            _extend(search, screen, _bases(search, screen, size, 4 - size), pool, count=6 - size)
+            _extend(search, screen, worth_extending(search, screen, size, 4 - size), pool, count=6 - size)
             reduce_best(search, pool)
         best = search.ranked()[0]
         if problem.noise_stated and near(best):
@@ -200,10 +200,19 @@ def attribute(
     return search
 
 
-def _bases(search: Search, screen: Screen, size: int, most: int) -> list[Fit]:
+def worth_extending(search: Search, screen: Screen, size: int, most: int) -> list[Fit]:
     """Hypotheses beside which one more effect is searched: the best ones, and those that promise most together with another effect.
 
     Alone, a flexible law is bent to what two forces do, and the one that was right about half of it lies far behind.
+
+    Args:
+        search: Fits so far.
+        screen: Screening of the same problem.
+        size: Number of effects of the hypotheses.
+        most: Number of the best ones.
+
+    Returns:
+        The hypotheses by decreasing posterior.
     """
     problem, ranked = search.problem, search.ranked(size)
 

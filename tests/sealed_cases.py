@@ -1,0 +1,30 @@
+"""Cases that were sealed once, and fits of one effect, for tests of what went wrong with them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from bench.discrepancy import BlindOptions, Case
+from bench.discrepancy.attribute import placements
+from bench.discrepancy.blind.cases import draw_case
+from bench.discrepancy.catalogue import effect_named
+from bench.discrepancy.fit import Fit, fit
+from bench.discrepancy.problem import Problem
+from bench.discrepancy.structure import structure_of
+
+
+def sealed(seed: int, index: int) -> tuple[Case, dict[str, Any]]:
+    """A case that was sealed once and diagnosed wrongly, and its answer."""
+    rng = np.random.default_rng([int(np.random.default_rng([seed, 0]).integers(2**62)), index])
+    rng.bytes(16)
+    return draw_case("sealed", rng, BlindOptions(detectability=False))
+
+
+def fitted(case: Case, name: str, start: list[float]) -> tuple[Problem, Fit]:
+    """A case's problem and its explanation by one effect."""
+    problem = Problem(case, structure_of(case), case.identification)
+    placed = placements(case, problem.structure, [effect_named(name)])[0]
+    vector = np.concatenate([np.zeros(len(problem.nominal)), start])
+    return problem, fit(problem, (placed,), start=vector, iterations=30)

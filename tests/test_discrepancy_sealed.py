@@ -1,0 +1,138 @@
+"""Sealed cases that were diagnosed wrongly, or not to the end, and why: each for what it taught."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from sealed_cases import fitted, sealed
+
+from bench.discrepancy import diagnose
+from bench.discrepancy.attribute import attribute, placements, prepare, worth_extending
+from bench.discrepancy.catalogue import effect_named
+from bench.discrepancy.contradiction import contradicted
+from bench.discrepancy.explain import Explanation
+from bench.discrepancy.fit import fit
+from bench.discrepancy.lack_of_fit import lack_of_fit
+from bench.discrepancy.problem import Problem
+from bench.discrepancy.screen import Screen
+from bench.discrepancy.search import Search, consistent, shake
+from bench.discrepancy.structure import structure_of
+
+
+def best_names(case, *catalogue, most=2):
+    """Names of the best hypothesis out of a part of the catalogue."""
+    problem = Problem(case, structure_of(case), case.identification)
+    chosen = placements(case, problem.structure, [effect_named(name) for name in catalogue])
+    best = attribute(problem, chosen, most=most).ranked()[0]
+    return {placed.effect.name for placed in best.hypothesis}
+
+
+@pytest.mark.slow
+def test_noise_of_the_load_that_a_softening_spring_amplifies_is_no_missing_force():
+    case, answer = sealed(20261125, 246)
+    assert [e["name"] for e in answer["effects"]] == ["cubic_stiffness"]
+    problem, explained = fitted(case, "cubic_stiffness", [-0.17])
+    taken_away = fit(problem, (), start=np.zeros(3)).chi2 - explained.chi2
+    assert not lack_of_fit(problem, explained).significant(taken_away)
+    problem.load_noise[:] = (
+        0.0  # as if a free model gained a unit for every coefficient, which it does behind a linear rig
+    )
+    lack = lack_of_fit(problem, explained)
+    assert lack.expected == lack.freedom
+    assert lack.significant(taken_away)
+
+
+@pytest.mark.slow
+def test_friction_that_sticks_is_shaken_out_of_the_dent_that_its_fit_ended_in():
+    case, answer = sealed(20261125, 256)
+    assert [e["name"] for e in answer["effects"]] == ["coulomb_friction"]
+    problem, coulomb = fitted(case, "coulomb_friction", [-2.0])
+    search = Search(problem)
+    search.add(coulomb)
+    with ThreadPoolExecutor(2) as pool:
+        shake(search, pool)
+    assert search.ranked()[0].cost < coulomb.cost - 10.0
+
+
+@pytest.mark.slow
+def test_a_stop_that_shifts_the_middle_of_a_motion_is_found_by_accelerations_alone():
+    case, answer = sealed(20261127, 83)
+    assert ([e["name"] for e in answer["effects"]], answer["sensors"]) == (["one_sided_stop"], "acceleration")
+    chosen = [effect_named(name) for name in ("one_sided_stop", "backlash_friction", "bouc_wen_hysteresis")]
+    problem = Problem(case, structure_of(case), case.identification)
+    best = attribute(problem, placements(case, problem.structure, chosen), most=1).ranked()[0]
+    assert [placed.effect.name for placed in best.hypothesis] == ["one_sided_stop"]
+    assert consistent(best)
+
+
+@pytest.mark.slow
+def test_the_nominal_model_is_fitted_to_the_end_before_anything_is_called_missing():
+    case, answer = sealed(20261130, 264)
+    assert answer["class"] == "none"
+    structure = structure_of(case)
+    for group in structure.groups():
+        problem = Problem(case, structure.restricted(group), case.identification)
+        search, _, _ = prepare(problem, [])
+        (nothing,) = search.ranked(0)
+        assert nothing.settled
+        true = np.array([answer["true"][name] for name in problem.structure.parameters])
+        at_truth = (true - problem.nominal) / problem.spread
+        left = problem.residual((), at_truth)
+        # half a unit for each of eight parameters is what a fit gains on the truth, on average
+        assert nothing.cost < left @ left + at_truth @ at_truth
+
+
+@pytest.mark.slow
+def test_beside_what_promises_most_with_another_effect_pairs_are_searched_however_far_behind_it_is_alone():
+    case, answer = sealed(20261130, 3)
+    assert {e["name"] for e in answer["effects"]} == {"bouc_wen_hysteresis", "stribeck_friction"}
+    problem = Problem(case, structure_of(case), case.identification)
+    names = ("bouc_wen_hysteresis", "stribeck_friction", "presliding_friction", "backlash_friction")
+    chosen = placements(case, problem.structure, [effect_named(name) for name in names])
+    search = attribute(problem, chosen, most=1)
+    found = [f.hypothesis[0].effect.name for f in worth_extending(search, Screen(problem, chosen), 1, 3)]
+    assert [f.hypothesis[0].effect.name for f in search.ranked(1)] == found
+    assert found[-1] == "stribeck_friction"
+    first, last = search.ranked(1)[0], search.ranked(1)[-1]
+    assert last.chi2 > 1.5 * first.chi2
+
+
+@pytest.mark.slow
+def test_what_a_screening_promised_and_a_fit_did_not_keep_leaves_room_for_others():
+    case, answer = sealed(20261130, 153)
+    truth = {e["name"] for e in answer["effects"]}
+    # the screening promises more of the delay than of the relaxation that is there
+    assert best_names(case, *truth, "acceleration_delay") == truth
+
+
+@pytest.mark.slow
+def test_noise_of_the_load_is_recorded_with_the_gain_of_the_sensor():
+    case, answer = sealed(20261130, 139)
+    (withheld,) = answer["effects"]
+    gain = 1.0 + withheld["parameters"][0]
+    assert gain > 1.9
+    problem, explained = fitted(case, "acceleration_gain_error", [gain - 1.0])
+    assert not consistent(explained)
+    behind = problem.behind(explained.hypothesis, explained.vector)
+    left = behind.residual(explained.hypothesis, explained.vector)
+    # chi-squared of n residuals scatters by the root of 2/n: four times that
+    assert left @ left / len(left) == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / len(left)))
+    gains = [effect_named(name) for name in ("acceleration_gain_error", "displacement_gain_error")]
+    (named,) = diagnose(case, catalogue=gains).verdict.named
+    assert named.name == "acceleration_gain_error"
+
+
+@pytest.mark.slow
+def test_noise_of_the_load_that_a_spring_near_its_limit_amplifies_contradicts_nothing():
+    case, answer = sealed(20261130, 288)
+    (withheld,) = answer["effects"]
+    found = diagnose(case, catalogue=[effect_named("quadratic_stiffness")])
+    (named,) = found.verdict.named
+    assert named.name == withheld["name"]
+    silent = found.problem.forgetful()
+    silent.load_noise = np.zeros_like(silent.load_noise)
+    ((_, explained),) = found.explanations[0].parts
+    unnoticed = Explanation(((silent, explained),))
+    assert contradicted(case, silent, unnoticed, np.random.default_rng(1))
