@@ -1,7 +1,8 @@
 """Attribution: which effects, out of the catalogue, explain the records.
 
 Screening proposes, output-error fits decide, and hypotheses are compared by their evidence. Effects are added one at
-a time as long as the residuals do not look like noise: to the best few hypotheses so far, the screening conditioned on each.
+a time as long as the residuals do not look like noise: to the best few hypotheses so far and to those that promise most together
+with another effect, the screening conditioned on each. What promised most and was not kept by its fit makes room for the next.
 An effect that a larger hypothesis does not need any more loses to the smaller one by its Occam factor. In the end every effect
 of the best hypothesis is challenged by those that do nearly as well along the measured motion, each fitted from several
 starts, so that no flexible law wins because a simpler one was fitted carelessly.
