@@ -490,6 +490,10 @@ def test_regions_are_compared_cell_by_cell():
     ]  # twice too much
     assert f1({"dof": "x", "state_region": {"displacement": [-0.4, 0.4]}}) == [0.0]
     assert f1() == [0.0]
+    # the forces of two effects at one place add up, so they are found together
+    two = [planted, planted | {"intervals": [[-0.5, 0.0]]}]
+    all_of_it = exact["regions"] + [{"displacement": [-0.5, 0.0]}]
+    assert region_scores({"locations": [exact | {"regions": all_of_it}]}, {"regions": two}) == [1.0]
     joint = {"regions": [planted | {"dof": "axial"}]}
     assert region_scores({"locations": [exact | {"dof": "theta1"}]}, joint) == [0.0]
     assert region_scores({"locations": [exact | {"dof": "x2"}]}, joint) == [1.0]

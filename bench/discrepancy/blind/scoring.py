@@ -373,27 +373,29 @@ def _quantile(values: Sequence[float], q: float) -> float:
 
 
 def region_scores(result: Mapping[str, Any], answer: Mapping[str, Any]) -> list[float]:
-    """F1 of the found regions of displacement, for every planted one, in cells of the coordinate's reach.
+    """F1 of the found regions of displacement, for every place where some are planted, in cells of the coordinate's reach.
 
-    Found is what the locations of the degree of freedom (or of the place) mark: all their regions, or the strongest one where
-    only that is given.
+    Planted is what the effects of the place cover together, since the force that is missing there is their sum. Found is
+    what the locations of the degree of freedom (or of the place) mark: all their regions, or the strongest one where only that is
+    given.
     """
+    planted: dict[tuple[str, str, float], list[Sequence[float]]] = {}
+    for region in answer.get("regions") or ():
+        key = (region["dof"], region["coordinate"], region["reach"])
+        planted.setdefault(key, []).extend(region["intervals"])
     out = []
-    for planted in answer.get("regions") or ():
-        reach = planted["reach"]
+    for (place, coordinate, reach), intervals in planted.items():
         edges = np.linspace(-reach, reach, CELLS + 1)
         middle = 0.5 * (edges[1:] + edges[:-1])
-        truth = _inside(middle, planted["intervals"])
+        truth = _inside(middle, intervals)
         found = np.zeros(CELLS, dtype=bool)
         for location in result.get("locations") or ():
             dof = str(location.get("dof", ""))
-            if planted["dof"] and not dof.startswith(
-                {"axial": ("x", "axial"), "torsional": ("th", "tor")}[planted["dof"]]
-            ):
+            if place and not dof.startswith({"axial": ("x", "axial"), "torsional": ("th", "tor")}[place]):
                 continue
             for region in location.get("regions") or [location.get("state_region") or {}]:
                 if region:  # a region that does not depend on the coordinate lies everywhere along it
-                    found |= _inside(middle, [region.get(planted["coordinate"], (-reach, reach))])
+                    found |= _inside(middle, [region.get(coordinate, (-reach, reach))])
         both = np.sum(truth & found)
         out.append(float(2.0 * both / max(np.sum(truth) + np.sum(found), 1)))
     return out
