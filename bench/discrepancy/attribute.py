@@ -428,8 +428,11 @@ def _plain(effect: Effect) -> bool:
     return effect.site == "joint" and effect.n_coordinates == 1 and len(effect.parameters) == 1
 
 
-def challenge(search: Search, screen: Screen, pool: ThreadPoolExecutor, *, rounds: int = 2) -> None:
+def challenge(search: Search, screen: Screen, pool: ThreadPoolExecutor, *, rounds: int = 3) -> None:
     """Fit the rivals of every effect of the best hypothesis, and that effect itself, from several starts.
+
+    The rivals are screened along the free run of that hypothesis where it follows the motion: a run driven through accelerations
+    alone knows its middle, which no record told. What a rival makes superfluous is struck.
 
     Args:
         search: Fits so far; the new ones are added.
@@ -445,17 +448,19 @@ def challenge(search: Search, screen: Screen, pool: ThreadPoolExecutor, *, round
             return
         challenged.add(key_of(best.hypothesis))
         _, etas = search.problem.split(best.hypothesis, best.vector)
+        along = followed(best, search.problem)
         tasks = []
         for i, placed in enumerate(best.hypothesis):
             rest = best.hypothesis[:i] + best.hypothesis[i + 1 :]
             vector = np.concatenate([best.vector[:n], *(eta for j, eta in enumerate(etas) if j != i)])
             base = replace(best, hypothesis=rest, vector=vector)
             points, alone = search.first, search.ranked(0)[0].chi2
-            if rest:
-                local = about(screen, base, explained=False)
-                ground = local.ground(base)
+            if rest or along:
+                local = screen.beside(best, simulated=True) if along else about(screen, base, explained=False)
+                named = base if rest else None
+                ground = local.ground(named)
                 alone = float(np.sum(ground.left**2))
-                points = refined(local, ground, local.ranked(base, ground), pool)
+                points = refined(local, ground, local.ranked(named, ground), pool)
             own = max((p.gain for p in points if p.placed.key == placed.key), default=np.inf)
             left = max(alone - own, search.problem.n_residuals)
             for point in leading(points, 5, own - left - LEFT * own, starts=REFINED_STARTS):
@@ -469,6 +474,7 @@ def challenge(search: Search, screen: Screen, pool: ThreadPoolExecutor, *, round
                     tasks.append((begun.hypothesis, begun.vector))
         converge(search, pool, tasks)
         carry_on(search, pool, len(best.hypothesis), most=6)
+        reduce_best(search, pool)
 
 
 def reduce_best(search: Search, pool: ThreadPoolExecutor) -> None:

@@ -245,6 +245,21 @@ class Problem:
         values, etas = self.split(hypothesis, vector)
         if self.driven:
             return self._driven_response(hypothesis, etas, values, record)
+        motion = self.free_motion(hypothesis, vector, record, starts=starts, friction=friction)
+        channels = self.observe(hypothesis, etas, motion, record.step)
+        return self.acquired(self.picked_up(hypothesis, etas, channels, record), record)
+
+    def free_motion(
+        self,
+        hypothesis: Hypothesis,
+        vector: Array,
+        record: CaseRecord,
+        *,
+        starts: Array | None = None,
+        friction: bool = True,
+    ) -> Motion:
+        """Motion of a free run, of which `simulate` returns what is measured; the arguments are the same."""
+        values, etas = self.split(hypothesis, vector)
         lead = self.lead_in(record)
         linear = self.structure.at(values)
         elements, rates = self.elements(hypothesis, etas, record)
@@ -268,9 +283,7 @@ class Problem:
             starts=self.starts_of(record, values) if starts is None else starts,
             motion=self.motion_of(record) if self.windowed else None,
         )
-        motion = Motion(*(samples[lead:] for samples in motion))
-        channels = self.observe(hypothesis, etas, motion, record.step)
-        return self.acquired(self.picked_up(hypothesis, etas, channels, record), record)
+        return Motion(*(samples[lead:] for samples in motion))
 
     def _substeps(self, phase: Array) -> NDArray[np.int64]:
         """Integration steps of samples in which the fastest law changes by a `phase` (n,), or (1,) of all of them."""

@@ -452,13 +452,14 @@ def _unspoilt(problem: Problem, base: Fit, record: CaseRecord) -> Array:
 
 def _moving(problem: Problem, about: About, unspoilt: Sequence[Array]) -> Problem:
     """A problem whose motion is that of a base's free run, or the measured one less what its sensor effects change."""
+    hypothesis, vector = about.base.hypothesis, about.base.vector
     motions = {}
     for record, free in zip(problem.records, unspoilt, strict=True):
-        channels = free
-        if not about.simulated:
-            spoilt = problem.simulate(about.base.hypothesis, about.base.vector, record)
-            measured = np.column_stack([record.values[name] for name in problem.structure.channels])
-            channels = measured - spoilt + free
+        if about.simulated:
+            motions[record.name] = problem.free_motion(hypothesis, vector, record)
+            continue
+        measured = np.column_stack([record.values[name] for name in problem.structure.channels])
+        channels = measured - problem.simulate(hypothesis, vector, record) + free
         values = dict(zip(problem.structure.channels, channels.T, strict=True))
         motions[record.name] = problem.smoothed(replace(record, values={**record.values, **values}))
     moving = copy.copy(problem)
