@@ -11,7 +11,7 @@ from planted_cases import NOISE, SAMPLE_RATE, bouc_wen_slope, motion_with, plant
 from sealed_cases import fitted
 
 from bench.discrepancy import diagnose
-from bench.discrepancy.attribute import WORTH_A_FIT, attribute, followed, placements
+from bench.discrepancy.attribute import WORTH_A_FIT, attribute, challenge, followed, placements
 from bench.discrepancy.catalogue import CATALOGUE, effect_named
 from bench.discrepancy.closure import CLOSURES
 from bench.discrepancy.contradiction import contradicted
@@ -329,3 +329,27 @@ def test_a_base_at_the_edge_of_divergence_is_screened_all_the_same(monkeypatch, 
         assert np.isfinite(ground.moves(response)).all()
     if walls == (1.0,):  # a column from the other side is the same to first order
         assert np.sum(ground.left**2) == pytest.approx(np.sum(plain.left**2), rel=1e-3)
+
+
+@pytest.mark.slow
+def test_what_is_superfluous_beside_rivals_is_struck():
+    """Of a best hypothesis that got there by rivals, as of one that grew effect by effect."""
+
+    def two_forces(x, v, z):
+        return 900.0 * (max(x - 0.004, 0.0) + min(x + 0.004, 0.0)) + 10.0 * v * abs(v), []
+
+    case = planted_case(lambda f: motion_with(f, two_forces))
+    problem = Problem(case, structure_of(case), case.identification)
+    names = ("gap", "quadratic_damping", "cubic_stiffness")
+    chosen = placements(case, problem.structure, [effect_named(name) for name in names])
+    screen = Screen(problem, chosen)
+    search = Search(problem)
+    still = np.zeros(len(problem.nominal))
+    search.add(fit(problem, (), start=still))
+    search.add(fit(problem, tuple(chosen), start=np.append(still, [-0.7, -1.5, -2.0, 0.0]), iterations=60))
+    assert len(search.ranked()[0].hypothesis) == 3
+    with ThreadPoolExecutor(2) as pool:
+        challenge(search, screen, pool)
+    best = search.ranked()[0]
+    assert {placed.effect.name for placed in best.hypothesis} == {"gap", "quadratic_damping"}
+    assert consistent(best)

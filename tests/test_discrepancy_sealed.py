@@ -12,6 +12,7 @@ from bench.discrepancy import diagnose
 from bench.discrepancy.attribute import attribute, placements, prepare, worth_extending
 from bench.discrepancy.catalogue import effect_named
 from bench.discrepancy.contradiction import contradicted
+from bench.discrepancy.coupled import coupled_fits
 from bench.discrepancy.explain import Explanation
 from bench.discrepancy.fit import fit
 from bench.discrepancy.lack_of_fit import lack_of_fit
@@ -136,3 +137,27 @@ def test_noise_of_the_load_that_a_spring_near_its_limit_amplifies_contradicts_no
     ((_, explained),) = found.explanations[0].parts
     unnoticed = Explanation(((silent, explained),))
     assert contradicted(case, silent, unnoticed, np.random.default_rng(1))
+
+
+@pytest.mark.slow
+def test_a_rival_at_a_place_that_accelerations_do_not_tell_is_found_along_the_free_run():
+    """An offset holds the motion against one side of a gap: a stop there does the same, and both are named as alike."""
+    case, answer = sealed(20261201, 237)
+    assert ([e["name"] for e in answer["effects"]], answer["sensors"]) == (
+        ["force_offset", "gap"],
+        "acceleration",
+    )
+    catalogue = [effect_named(name) for name in ("force_offset", "gap", "one_sided_stop", "cubic_stiffness")]
+    verdict = diagnose(case, catalogue=catalogue).verdict
+    assert {"gap", "one_sided_stop"} in [set(alike) for alike in verdict.indistinguishable]
+    assert "force_offset" in [e.name for e in verdict.named]
+
+
+@pytest.mark.slow
+def test_couplings_begin_wherever_the_measured_motion_has_a_minimum():
+    case, answer = sealed(20261201, 147)
+    assert [e["name"] for e in answer["effects"]] == ["gap_coupling"]
+    search = Search(Problem(case, structure_of(case), case.identification))
+    coupled_fits(search, [effect_named("gap_coupling")], 1, lambda text: None)
+    # the start of largest gain ends in a dent that leaves a tenth of a per cent too much for the noise
+    assert not lack_of_fit(search.problem, search.ranked()[0]).significant(0.0)
