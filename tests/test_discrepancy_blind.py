@@ -494,6 +494,10 @@ def test_regions_are_compared_cell_by_cell():
     two = [planted, planted | {"intervals": [[-0.5, 0.0]]}]
     all_of_it = exact["regions"] + [{"displacement": [-0.5, 0.0]}]
     assert region_scores({"locations": [exact | {"regions": all_of_it}]}, {"regions": two}) == [1.0]
+    narrow = {"regions": [planted | {"intervals": [[0.999, 1.0]]}]}
+    assert region_scores(
+        {"locations": [{"dof": "x", "regions": [{"displacement": [0.95, 1.0]}]}]}, narrow
+    ) == [1.0]
     joint = {"regions": [planted | {"dof": "axial"}]}
     assert region_scores({"locations": [exact | {"dof": "theta1"}]}, joint) == [0.0]
     assert region_scores({"locations": [exact | {"dof": "x2"}]}, joint) == [1.0]

@@ -387,7 +387,12 @@ def region_scores(result: Mapping[str, Any], answer: Mapping[str, Any]) -> list[
     for (place, coordinate, reach), intervals in planted.items():
         edges = np.linspace(-reach, reach, CELLS + 1)
         middle = 0.5 * (edges[1:] + edges[:-1])
-        truth = _inside(middle, intervals)
+        width = 2.0 * reach / CELLS
+        # what is narrower than a cell, as the contact with a hard stop, lies in the cell that holds its middle
+        wide = [
+            (min(a, c - 0.5 * width), max(b, c + 0.5 * width)) for a, b in intervals for c in [0.5 * (a + b)]
+        ]
+        truth = _inside(middle, wide)
         found = np.zeros(CELLS, dtype=bool)
         for location in result.get("locations") or ():
             dof = str(location.get("dof", ""))

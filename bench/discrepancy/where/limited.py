@@ -2,9 +2,10 @@
 
 A map of the missing force sees what rises above the noise sample by sample, and cannot tell a force within a window from one of
 opposite sign outside it, as a stiffness a little off makes of it. Here the force is free: straight lines between the corners of a
-grid over the displacement or the velocity, each with a part in proportion to the other one of them. It drives the linear structure
-along the measured motion, as in the screening, nominal parameters re-estimated; so its coefficients follow from one linear problem, and
-the evidence of a force that is limited to a part of the grid needs no further run. All parts are weighed against no limit at all.
+grid over the displacement or the velocity, each with a part in proportion to the other one of them and a part in proportion to its
+magnitude, as the impulses of a stop have. It drives the linear structure along the measured motion, as in the screening, nominal
+parameters re-estimated; so its coefficients follow from one linear problem, and the evidence of a force that is limited to a part
+of the grid needs no further run. All parts are weighed against no limit at all.
 
 References:
     D. J. C. MacKay, Bayesian interpolation, Neural Computation 4 (1992) 415-447 (evidence of linear models).
@@ -35,6 +36,8 @@ ENDING = 0.01
 SURE = math.log(10.0)
 """Log odds of a limit from which its region is told."""
 COORDINATES = ("displacement", "velocity")
+SHAPES = 3
+"""Coefficients of a cell: of the force itself, and of the parts in proportion to the other coordinate and to its magnitude."""
 
 
 class _Part(NamedTuple):
@@ -48,6 +51,11 @@ class _Part(NamedTuple):
     cells: NDArray[np.int64]
     intervals: tuple[tuple[int, int], ...]
 
+    @property
+    def coefficients(self) -> NDArray[np.int64]:
+        """Numbers of the coefficients of its cells."""
+        return np.concatenate([self.cells + shape * CELLS for shape in range(SHAPES)])
+
 
 class _Free(NamedTuple):
     """A free force over one coordinate of a place.
@@ -55,9 +63,9 @@ class _Free(NamedTuple):
     Attributes:
         coordinate: "displacement" or "velocity".
         reach: Largest value of the coordinate.
-        forces: (n_samples, 2 CELLS) of unit coefficients along the motion of all records.
-        gram: (2 CELLS, 2 CELLS) products of its whitened responses.
-        seen: (2 CELLS,) their products with what the nominal model leaves.
+        forces: (n_samples, SHAPES CELLS) of unit coefficients along the motion of all records.
+        gram: (SHAPES CELLS, SHAPES CELLS) products of its whitened responses.
+        seen: (SHAPES CELLS,) their products with what the nominal model leaves.
         left: Chi-squared that the unlimited force leaves.
     """
 
@@ -80,7 +88,7 @@ class _Free(NamedTuple):
 
     @property
     def coefficients(self) -> Array:
-        """Those of the unlimited force (2 CELLS,)."""
+        """Those of the unlimited force (SHAPES CELLS,)."""
         return np.asarray(np.linalg.lstsq(self.gram, self.seen, rcond=1e-9)[0], dtype=np.float64)
 
 
@@ -135,13 +143,14 @@ def _free(place: Place, states: list[Array], over: int, screen: Screen, ground: 
         hats = np.clip(1.0 - np.abs(at[:, None] - np.arange(CELLS)), 0.0, None)
         # beyond the middle of the outermost cells the force stays what it is there
         hats[at < 0.0, 0], hats[at > CELLS - 1.0, -1] = 1.0, 1.0
-        per_record.append(np.hstack([hats, hats * (state[:, [1 - over]] / other)]))
+        along = state[:, [1 - over]] / other
+        per_record.append(np.hstack([hats, hats * along, hats * np.abs(along)]))
     row = place.rows[0]
 
     def response(k: int) -> Array:
         return screen.response(lambda i: -np.outer(per_record[i][:, k], row))
 
-    columns = np.column_stack([ground.project(response(k)) for k in range(2 * CELLS)])
+    columns = np.column_stack([ground.project(response(k)) for k in range(SHAPES * CELLS)])
     alone = ground.left
     gram, seen = columns.T @ columns, columns.T @ alone
     free = _Free(COORDINATES[over], reach, np.vstack(per_record), gram, seen, 0.0)
@@ -163,7 +172,7 @@ def _parts() -> list[_Part]:
 
 def _evidence(free: _Free, part: _Part, excess: float) -> float:
     """Log evidence of a force limited to a part, against no force; `excess`: power of the residuals, one for noise."""
-    own = np.concatenate([part.cells, part.cells + CELLS])
+    own = part.coefficients
     powers, axes = np.linalg.eigh(free.gram[np.ix_(own, own)])
     powers = np.maximum(powers, 0.0) / excess
     squares = (axes.T @ free.seen[own]) ** 2 / excess**2
@@ -176,8 +185,8 @@ def _evidence(free: _Free, part: _Part, excess: float) -> float:
 
 def _described(free: _Free, part: _Part) -> tuple[dict[str, Any], ...]:
     """The intervals of a part with the force in them, by decreasing share."""
-    own = np.concatenate([part.cells, part.cells + CELLS])
-    coefficients = np.zeros(2 * CELLS)
+    own = part.coefficients
+    coefficients = np.zeros(SHAPES * CELLS)
     coefficients[own] = np.linalg.lstsq(free.gram[np.ix_(own, own)], free.seen[own], rcond=1e-9)[0]
     force = free.forces @ coefficients
     at = free.cells
