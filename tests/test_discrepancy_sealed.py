@@ -161,3 +161,12 @@ def test_couplings_begin_wherever_the_measured_motion_has_a_minimum():
     coupled_fits(search, [effect_named("gap_coupling")], 1, lambda text: None)
     # the start of largest gain ends in a dent that leaves a tenth of a per cent too much for the noise
     assert not lack_of_fit(search.problem, search.ranked()[0]).significant(0.0)
+
+
+def test_a_wrong_mass_pays_nothing_for_an_inaccuracy_that_linear_runs_do_not_have():
+    case, answer = sealed(20261130, 172)
+    assert [e["name"] for e in answer["effects"]] == ["mass_error"]
+    verdict = diagnose(case).verdict
+    (named,) = verdict.named
+    assert named.name == "mass_error"
+    assert verdict.probabilities["none"] < 0.1

@@ -21,6 +21,7 @@ CHANNELS: tuple[Effect, ...] = (
         (FreeParameter("relative_error", signed=True, std=0.3, bounds=(-0.9, 5.0)),),
         "m = m_nominal (1 + e)",
         quantity="mass",
+        exact=True,
     ),
     Effect(
         "stiffness_error",
@@ -29,6 +30,7 @@ CHANNELS: tuple[Effect, ...] = (
         (FreeParameter("relative_error", signed=True, std=0.3, bounds=(-0.95, 5.0)),),
         "k = k_nominal (1 + e)",
         quantity="stiffness",
+        exact=True,
         log_prior=-2.0,
     ),
     Effect(
@@ -38,6 +40,7 @@ CHANNELS: tuple[Effect, ...] = (
         (FreeParameter("relative_error", signed=True, std=1.0, bounds=(-0.95, 20.0)),),
         "c = c_nominal (1 + e)",
         quantity="damping",
+        exact=True,
         log_prior=-2.0,
     ),
     Effect(
@@ -80,6 +83,7 @@ CHANNELS: tuple[Effect, ...] = (
         (FreeParameter("relative_error", signed=True, std=0.3, bounds=(-3.0, 5.0), grid=(0.0,)),),
         "F = (1 + e) command",
         signal=signals.gain,
+        exact=True,
     ),
     Effect(
         "actuator_saturation",
@@ -101,6 +105,7 @@ CHANNELS: tuple[Effect, ...] = (
         (FreeParameter("drift", "position", signed=True, std=0.5),),
         "x + d t / T",
         signal=signals.drift,
+        exact=True,
         quantity="position",
     ),
     Effect(
@@ -127,6 +132,7 @@ CHANNELS: tuple[Effect, ...] = (
         (FreeParameter("relative_error", signed=True, std=0.3, bounds=(-3.0, 5.0)),),
         "(1 + e) x",
         signal=signals.gain,
+        exact=True,
         quantity="position",
     ),
     Effect(
@@ -136,6 +142,7 @@ CHANNELS: tuple[Effect, ...] = (
         (FreeParameter("bias", "position", signed=True, std=0.5),),
         "x + b",
         signal=signals.offset,
+        exact=True,
         quantity="position",
         log_prior=-1.0,
     ),
@@ -165,6 +172,7 @@ CHANNELS: tuple[Effect, ...] = (
         (FreeParameter("relative_error", signed=True, std=0.3, bounds=(-3.0, 5.0)),),
         "(1 + e) a",
         signal=signals.gain,
+        exact=True,
         quantity="acceleration",
         log_prior=-1.0,
     ),
@@ -193,6 +201,7 @@ CHANNELS: tuple[Effect, ...] = (
         (FreeParameter("bias", "acceleration", signed=True, std=0.5),),
         "a + b",
         signal=signals.offset,
+        exact=True,
         quantity="acceleration",
         log_prior=-1.0,
     ),
@@ -224,6 +233,7 @@ CHANNELS: tuple[Effect, ...] = (
             f"{symbol} + e s, s another measured channel: a load, or the other axis",
             quantity=quantity,
             pickup=True,
+            exact=True,
             log_prior=RARE,
         )
         for channel, quantity, symbol in POSITION_AND_ACCELERATION
@@ -236,6 +246,7 @@ CHANNELS: tuple[Effect, ...] = (
             (REVERSAL,),
             f"-{symbol}",
             signal=signals.reverse,
+            exact=True,
             quantity=quantity,
             log_prior=REVERSED,
         )
@@ -248,6 +259,7 @@ CHANNELS: tuple[Effect, ...] = (
         (REVERSAL,),
         "F = -command",
         signal=signals.reverse,
+        exact=True,
         log_prior=REVERSED,
     ),
     *(

@@ -148,6 +148,8 @@ class Effect:
         affine: The force is affine in parameter 1.
         signal: For actuator and sensor effects, the operation on a channel.
         between_samples: That operation moves samples in time, and needs what the channel does between them.
+        exact: A free run with it is as exact as one of the nominal model: a number is wrong, and nothing is smoothed, switched or
+            interpolated.
         quantity: For sensor effects the kind of channel ("position", "acceleration"); for inertia the parameter kind.
         pickup: The sensor adds a share of another measured channel: a load, or the response of the other axis.
         log_prior: Log prior odds against an effect of the README's list.
@@ -168,6 +170,7 @@ class Effect:
     affine: bool = False
     signal: Callable[[Values, Values, float], Values] | None = None
     between_samples: bool = False
+    exact: bool = False
     quantity: str = ""
     pickup: bool = False
     log_prior: float = 0.0

@@ -24,7 +24,8 @@ SIGNIFICANT = 4.0
 """Standard deviations by which chi-squared may exceed its expectation before a hypothesis counts as refuted."""
 IMMATERIAL = 0.001
 """Relative improvement of chi-squared that one more effect has to pay for, since the smoothing of stick-slip and the
-interpolation of loads are themselves only as good as that; records of extreme signal-to-noise ratio would else name trifles."""
+interpolation of loads are themselves only as good as that; records of extreme signal-to-noise ratio would else name trifles. Effects
+that are exact by themselves pay nothing where they are alone."""
 HOPELESS = 3.0
 """A first fit that leaves more than this many times the excess of the best one is not carried on."""
 WITHIN_REACH = 30.0
@@ -106,7 +107,9 @@ def key_of(hypothesis: Hypothesis) -> frozenset:
 
 def posterior(fitted: Fit) -> float:
     """Log posterior of a hypothesis up to a constant."""
-    tolerance = 0.5 * IMMATERIAL * fitted.n_residuals
+    # the inaccuracy of one effect may be made good by any other
+    exact = all(placed.effect.exact for placed in fitted.hypothesis)
+    tolerance = 0.0 if exact else 0.5 * IMMATERIAL * fitted.n_residuals
     return fitted.log_evidence + (LOG_PRIOR_EFFECT - tolerance) * len(fitted.hypothesis)
 
 
