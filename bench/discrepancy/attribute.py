@@ -4,7 +4,7 @@ Screening proposes, output-error fits decide, and hypotheses are compared by the
 a time as long as the residuals do not look like noise: to the best few hypotheses so far and to those that promise most together
 with another effect, the screening conditioned on each. What promised most and was not kept by its fit makes room for the next.
 An effect that a larger hypothesis does not need any more loses to the smaller one by its Occam factor. In the end every effect
-of the best hypothesis is challenged by those that do nearly as well along the measured motion, each fitted from several
+of the best hypothesis is challenged by those that do nearly as well along the motion it explains, each fitted from several
 starts, so that no flexible law wins because a simpler one was fitted carelessly.
 """
 
@@ -68,7 +68,7 @@ APART = 0.8
 NEARLY = 0.9
 """Further starts of an effect are worth a fit if they gain this part of what its best one does."""
 LEFT = 0.02
-"""Part of a named effect's gain along the measured motion that a challenger may lack, besides twice what the effect leaves."""
+"""Part of a named effect's gain along the motion that a challenger may lack, besides twice what the effect leaves."""
 STALLED = 0.7
 """If one more effect leaves more than this part of the excess of chi-squared, a further one is not tried."""
 CONSIDERED, PROMISED = 12, 2

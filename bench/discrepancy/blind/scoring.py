@@ -387,12 +387,7 @@ def region_scores(result: Mapping[str, Any], answer: Mapping[str, Any]) -> list[
     for (place, coordinate, reach), intervals in planted.items():
         edges = np.linspace(-reach, reach, CELLS + 1)
         middle = 0.5 * (edges[1:] + edges[:-1])
-        width = 2.0 * reach / CELLS
-        # what is narrower than a cell, as the contact with a hard stop, lies in the cell that holds its middle
-        wide = [
-            (min(a, c - 0.5 * width), max(b, c + 0.5 * width)) for a, b in intervals for c in [0.5 * (a + b)]
-        ]
-        truth = _inside(middle, wide)
+        truth = _inside(middle, [_widened(interval, 2.0 * reach / CELLS) for interval in intervals])
         found = np.zeros(CELLS, dtype=bool)
         for location in result.get("locations") or ():
             dof = str(location.get("dof", ""))
@@ -404,6 +399,13 @@ def region_scores(result: Mapping[str, Any], answer: Mapping[str, Any]) -> list[
         both = np.sum(truth & found)
         out.append(float(2.0 * both / max(np.sum(truth) + np.sum(found), 1)))
     return out
+
+
+def _widened(interval: Sequence[float], width: float) -> tuple[float, float]:
+    """An interval, at least a cell wide: what is narrower, as the contact with a hard stop, lies in the cell that holds its middle."""
+    low, high = interval
+    margin = max(0.5 * (width - (high - low)), 0.0)
+    return low - margin, high + margin
 
 
 def _inside(middle: np.ndarray, intervals: Iterable[Sequence[float]]) -> np.ndarray:
