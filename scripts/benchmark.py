@@ -47,6 +47,7 @@ class Args:
         compare: Two saved files to compare instead of running.
         full: More and longer cases, for the groups that draw cases.
         data: Folder of cases with their answers, for the groups that draw cases, in place of drawn ones.
+        work: Folder that keeps what is done, for the groups that take long: the same command goes on from there.
     """
 
     groups: tyro.conf.Positional[tuple[str, ...]] = ()
@@ -56,6 +57,7 @@ class Args:
     compare: Annotated[tuple[Path, Path] | None, tyro.conf.arg(metavar="A B")] = field(default=None)
     full: bool = False
     data: Path | None = None
+    work: Path | None = None
 
 
 def main() -> int:
@@ -72,10 +74,10 @@ def main() -> int:
     console = Console(stderr=args.json)
     holds = True
     for group in args.groups or GROUPS:
-        with console.status(f"running {group}"):
+        with console.status(f"running {group}") as status:
             run = importlib.import_module(f"benchmarks.{group}").rows
             taken = inspect.signature(run).parameters
-            settings = {"full": args.full, "data": args.data}
+            settings = {"full": args.full, "data": args.data, "work": args.work, "progress": status.update}
             rows: list[Row] = run(args.repeats, **{k: v for k, v in settings.items() if k in taken})
         document["groups"][group] = [row.to_dict() for row in rows]
         holds &= all(row.holds is not False for row in rows)

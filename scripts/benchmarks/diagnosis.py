@@ -3,10 +3,11 @@
 The peers are `mujoco.sysid` fitted to every candidate effect and chosen by its BIC (`peer_sysid`), and a global sparse
 regression (`peer_sindy`). The cases are sealed ones made here with a fixed seed, or with ``--data FOLDER`` any folder of
 cases with an ``answers`` folder in it, which only the scoring opens. Ten short cases by default, some fifteen minutes of two
-cores; ``--full`` makes sixty of a release's length, of all kinds, or takes the whole folder, which is hours.
+cores; ``--full`` makes sixty of a release's length, of all kinds, or takes the whole folder, which is hours. Stopped, it goes
+on where it was with ``--work FOLDER``.
 
     python scripts/benchmark.py diagnosis
-    python scripts/benchmark.py diagnosis --data FOLDER --full --save diagnosis.json
+    python scripts/benchmark.py diagnosis --data FOLDER --full --work out/peers --save diagnosis.json
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from bench.discrepancy.case import Case, CaseRecord
 from bench.discrepancy.problem import Problem
 from bench.discrepancy.shrink import DIVERGED_GAP, coordinates, noise_level, nrmse
 from bench.discrepancy.structure import structure_of
+from bench.files import write_text
 from benchmarks.timing import Row
 
 SEED = 20061
@@ -96,39 +98,50 @@ class Outcome:
     seconds: float
 
 
-def outcomes(cases: Sequence[Path], answers: Path, folder: Path) -> dict[str, list[Outcome]]:
-    """Run every tool on every case, one after the other, and score each."""
+def outcomes(
+    cases: Sequence[Path], answers: Path, folder: Path, progress: Callable[[str], None] = lambda text: None
+) -> dict[str, list[Outcome]]:
+    """Run every tool on every case, one after the other, and score each; what the folder holds already is not run again."""
     ours(read_case(cases[0]))  # compiled code and native callbacks are loaded before anything is timed
     found: dict[str, list[Outcome]] = {name: [] for name in TOOLS}
     for path in cases:
         case = read_case(path)
         for number, (name, tool) in enumerate(TOOLS.items()):
-            begun = time.perf_counter()
-            answer = tool(case)
-            seconds = time.perf_counter() - begun
-            results = folder / str(number) / path.name
-            results.mkdir(parents=True)
-            (results / f"{path.name}.json").write_text(json.dumps(answer), encoding="utf-8")
-            found[name].append(Outcome(score_blind(results, answers, cases=path.parent), seconds))
+            told = folder / str(number) / path.name / f"{path.name}.json"
+            if not told.exists():
+                progress(f"{path.name}: {name}")
+                begun = time.perf_counter()
+                answer = tool(case)
+                answer["seconds"] = time.perf_counter() - begun
+                write_text(told, json.dumps(answer))
+            seconds = json.loads(told.read_text(encoding="utf-8"))["seconds"]
+            found[name].append(Outcome(score_blind(told.parent, answers, cases=path.parent), seconds))
     return found
 
 
-def rows(repeats: int = 15, *, full: bool = False, data: Path | None = None) -> list[Row]:
+def rows(
+    repeats: int = 15,
+    *,
+    full: bool = False,
+    data: Path | None = None,
+    work: Path | None = None,
+    progress: Callable[[str], None] = lambda text: None,
+) -> list[Row]:
     """Rows of the group; a run of each tool a case, whatever `repeats`, and the spread is that over cases."""
     with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
+        folder = Path(name) if work is None else work
         if data is None:
             rng = np.random.default_rng(SEED)
             count, options = (ALL_CASES, LONG) if full else (CASES, SHORT)
-            make_blind(folder / "cases", folder / "answers", n=count, rng=rng, options=options)
             home, answers = folder / "cases", folder / "answers"
+            make_blind(home, answers, n=count, rng=rng, options=options, progress=progress)
         else:
             home, answers = data, data / "answers"
         found = sorted(path.parent for path in home.glob("*/nominal.json"))
         cases = [path for path in found if read_case(path).rig in RIGS]
         if data is not None and not full:
             cases = cases[:: -(-len(cases) // CASES)]
-        told = outcomes(cases, answers, folder / "results")
+        told = outcomes(cases, answers, folder / "results", progress)
     return [row for peer in list(TOOLS)[1:] for row in _against(peer, told["ours"], told[peer])]
 
 
