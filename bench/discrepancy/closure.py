@@ -144,9 +144,10 @@ def _closure(
 
 
 _KNOTS = [f"f{k}" for k in range(KNOTS)]
+FREE_MEMORY = _closure("free_memory", _MEMORY, [f"c{i}" for i in range(len(MEMORY))], _memory_theta)
 CLOSURES = (
     _closure("polynomial_surface", _SURFACE, [f"c{i}{j}" for i, j in POWERS], _surface_theta),
     _closure("free_displacement", _CURVE, _KNOTS, _over_position),
     _closure("free_velocity", _CURVE, _KNOTS, _over_velocity),
-    _closure("free_memory", _MEMORY, [f"c{i}" for i in range(len(MEMORY))], _memory_theta),
+    FREE_MEMORY,
 )

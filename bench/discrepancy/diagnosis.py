@@ -17,10 +17,11 @@ import numpy as np
 from bench.discrepancy import evidence
 from bench.discrepancy.case import Case, read_case
 from bench.discrepancy.catalogue import CATALOGUE
-from bench.discrepancy.closure import CLOSURES
+from bench.discrepancy.closure import CLOSURES, FREE_MEMORY
 from bench.discrepancy.contradiction import contradicted
 from bench.discrepancy.effect import Effect
 from bench.discrepancy.explain import Explanation, close, explain
+from bench.discrepancy.free_rival import likelier_memory
 from bench.discrepancy.idle_loads import idle_notes, without_idle_noise
 from bench.discrepancy.next_excitation import separate, told_apart
 from bench.discrepancy.nominal_file import check_units
@@ -106,20 +107,25 @@ def diagnose(
     explanations = explain(case, catalogue, most=most, progress=progress)
     best, nothing = explanations[0], next(e for e in explanations if not e.hypothesis)
     kind, probabilities = evidence.judge(explanations)
-    failed = kind == "effect" and contradicted(case, problem, best, rng)
-    if failed:
+    doubt, rival = "", None
+    if kind == "effect":
+        progress(f"doubts about {names(best.hypothesis)}")
+        doubt, rival = _doubt(case, problem, best, rng)
+    if doubt:
         kind, probabilities = "unknown", evidence.OUTSIDE_THE_CATALOGUE
     seen, fitted = recorded(problem, catalogue), kind
     if seen and kind == "none":
         kind = "effect"
         probabilities |= {"effect": 1.0 - probabilities["unknown"], "none": 0.0}
     final, closure = best, ""
-    if kind == "unknown":
+    if rival is not None:
+        final, closure = rival, FREE_MEMORY.name
+    elif kind == "unknown":
         progress("nonparametric closure")
         final, closure = close(best, nothing, CLOSURES)
     stages = [("nominal", nominal_prediction(problem)), ("parameters only", nothing.predict)]
     stages += [(label, e.predict) for label, e in _path(explanations)]
-    stages.append((names(best.hypothesis) + (f" + {closure}" if closure else ""), final.predict))
+    stages.append((names(final.hypothesis), final.predict))
     progress("gap on the judging records")
     found = gaps(case, problem, stages=stages, rng=rng, final=_model(final))
     if kind == "unknown" and any(gap.after > WORSE * gap.parameters_only for gap in found):
@@ -138,7 +144,7 @@ def diagnose(
         gap=widest,
         gaps=found,
         probabilities=probabilities,
-        explanation=_told(evidence.plain_words(fitted, explanations, failed=failed), seen),
+        explanation=_told(evidence.plain_words(fitted, explanations, doubt=doubt), seen),
         warnings=(
             *notes(case, problem),
             *idle_notes(told, case),
@@ -152,6 +158,16 @@ def diagnose(
         seconds=time.perf_counter() - began,
     )
     return Diagnosis(case, problem, tuple(explanations), verdict, final, where)
+
+
+def _doubt(
+    case: Case, problem: Problem, best: Explanation, rng: np.random.Generator
+) -> tuple[str, Explanation | None]:
+    """What speaks against an explanation that leaves nothing but noise, empty where nothing does; and what is likelier."""
+    rival = likelier_memory(best)
+    if rival is not None:
+        return evidence.SIMPLER, rival
+    return (evidence.FAILS if contradicted(case, problem, best, rng) else ""), None
 
 
 def _model(explanation: Explanation) -> tuple[Hypothesis, np.ndarray] | None:

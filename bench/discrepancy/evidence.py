@@ -22,7 +22,10 @@ OUTSIDE = 0.045
 """Share of effects that no catalogue holds, kept even when a catalogued effect reaches the noise: about as many of the
 explanations that were sure of themselves were wrong on sealed cases."""
 OUTSIDE_THE_CATALOGUE = {"effect": OUTSIDE, "none": 0.0, "unknown": 1.0 - OUTSIDE}
-"""Probabilities of the verdicts where the judging records contradict what the others named."""
+"""Probabilities of the verdicts where there is a doubt about an explanation that leaves nothing but noise."""
+FAILS = "explains the records for identification and fails on those for judging"
+SIMPLER = "explains the records, but a single force with a memory of its own explains them more simply"
+"""Doubts about an explanation."""
 
 
 def weights(explanations: Sequence[Explanation]) -> np.ndarray:
@@ -186,20 +189,17 @@ def _short_of_it(best: Explanation) -> str:
     )
 
 
-def plain_words(kind: Kind, explanations: Sequence[Explanation], *, failed: bool = False) -> str:
+def plain_words(kind: Kind, explanations: Sequence[Explanation], *, doubt: str = "") -> str:
     """The verdict in a sentence or two.
 
     Args:
         kind: Verdict.
         explanations: All of them, the best first.
-        failed: Whether the judging records contradict the best.
+        doubt: What speaks against the best although it explains the records for identification; empty where nothing does.
     """
     best = explanations[0]
-    if failed:
-        return (
-            f"Something is missing from the model, and no catalogued effect is it: {names(best.hypothesis)} explains the records "
-            "for identification and fails on those for judging."
-        )
+    if doubt:
+        return f"Something is missing from the model, and no catalogued effect is it: {names(best.hypothesis)} {doubt}."
     if kind == "none":
         return (
             "The stated uncertainties and the noise explain the records; nothing is missing from the model."

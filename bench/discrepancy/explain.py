@@ -34,6 +34,7 @@ from bench.discrepancy.search import (
     WITHIN_REACH,
     Search,
     consistent,
+    key_of,
     names,
     near,
     posterior,
@@ -200,7 +201,9 @@ def _explain(
     found = _nothing_left_first(_combined([entry[0] for entry in prepared]))
     if odd and not deep and not _leaves_nothing(found):
         coupled_fits(coupled, catalogue, most, progress)
-    found += [Explanation(((whole, fitted),)) for fitted in coupled.ranked()]
+    # what falls apart is doubted better group by group
+    known = {key_of(e.hypothesis) for e in found}
+    found += [Explanation(((whole, f),)) for f in coupled.ranked() if key_of(f.hypothesis) not in known]
     return _nothing_left_first(sorted(found, key=lambda e: -e.log_posterior))
 
 

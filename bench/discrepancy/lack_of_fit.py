@@ -35,7 +35,7 @@ KNOTS = 12
 """Knots of a free force of one coordinate; between them it is straight."""
 PRODUCTS = ((1, 1), (2, 1), (1, 2))
 """Powers of displacement and velocity that a sum of two forces of one coordinate lacks."""
-NEGLIGIBLE = 3e-3
+NEGLIGIBLE = 1e-3
 """Part of a model's columns that has to be its own: less is nothing but the base's inaccuracy."""
 
 SIGNIFICANCE, SEVERAL = 1e-3, 1e-2
