@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from bench.discrepancy import BlindOptions, Case
-from bench.discrepancy.attribute import placements
 from bench.discrepancy.blind.cases import draw_case
 from bench.discrepancy.catalogue import effect_named
 from bench.discrepancy.fit import Fit, fit
+from bench.discrepancy.placements import placements
 from bench.discrepancy.problem import Problem
 from bench.discrepancy.structure import structure_of
 

@@ -136,8 +136,8 @@ def _case(effect: str, seed: int):
 def test_sysid_is_given_the_same_problem(effect, tolerance):
     from benchmarks.peer_sysid import Candidate
 
-    from bench.discrepancy.attribute import placements
     from bench.discrepancy.catalogue import CATALOGUE
+    from bench.discrepancy.placements import placements
     from bench.discrepancy.problem import Problem
     from bench.discrepancy.structure import structure_of
 

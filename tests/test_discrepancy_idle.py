@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from bench.discrepancy import BlindOptions
-from bench.discrepancy.attribute import placements
 from bench.discrepancy.blind.cases import draw_case
 from bench.discrepancy.catalogue import effect_named
 from bench.discrepancy.idle_loads import idle, idle_notes, without_idle_noise
+from bench.discrepancy.placements import placements
 from bench.discrepancy.problem import Problem
 from bench.discrepancy.structure import structure_of
 

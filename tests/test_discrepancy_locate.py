@@ -7,10 +7,11 @@ import pytest
 from numpy.typing import NDArray
 
 from bench.discrepancy import Case, CaseChannel, NominalParameter, record_from_arrays
-from bench.discrepancy.attribute import attribute, placements
+from bench.discrepancy.attribute import attribute
 from bench.discrepancy.catalogue import CATALOGUE
 from bench.discrepancy.explain import Explanation
 from bench.discrepancy.fit import fit
+from bench.discrepancy.placements import placements
 from bench.discrepancy.problem import Problem
 from bench.discrepancy.structure import structure_of
 from bench.discrepancy.where.acting import acting_regions

@@ -11,8 +11,9 @@ from planted_cases import NOISE, SAMPLE_RATE, bouc_wen_slope, motion_with, plant
 from sealed_cases import fitted
 
 from bench.discrepancy import diagnose
-from bench.discrepancy.attribute import WORTH_A_FIT, attribute, challenge, followed, placements
+from bench.discrepancy.attribute import attribute
 from bench.discrepancy.catalogue import CATALOGUE, effect_named
+from bench.discrepancy.challenge import challenge
 from bench.discrepancy.closure import CLOSURES
 from bench.discrepancy.contradiction import contradicted
 from bench.discrepancy.driving import driving_loads
@@ -20,6 +21,8 @@ from bench.discrepancy.explain import Explanation, close
 from bench.discrepancy.fit import fit
 from bench.discrepancy.grid_points import Point
 from bench.discrepancy.lack_of_fit import LackOfFit, lack_of_fit
+from bench.discrepancy.nominate import WORTH_A_FIT, followed
+from bench.discrepancy.placements import placements
 from bench.discrepancy.prepared import timed
 from bench.discrepancy.problem import Problem
 from bench.discrepancy.screen import Screen

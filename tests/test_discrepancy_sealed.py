@@ -8,14 +8,17 @@ import numpy as np
 import pytest
 from sealed_cases import fitted, sealed
 
-from bench.discrepancy import diagnose
-from bench.discrepancy.attribute import attribute, placements, prepare, worth_extending
+from bench.discrepancy import BlindOptions, diagnose
+from bench.discrepancy.attribute import attribute, prepare, worth_extending
+from bench.discrepancy.blind.cases import draw_case
 from bench.discrepancy.catalogue import effect_named
 from bench.discrepancy.contradiction import contradicted
 from bench.discrepancy.coupled import coupled_fits
 from bench.discrepancy.explain import Explanation
 from bench.discrepancy.fit import fit
+from bench.discrepancy.free_rival import likelier_memory
 from bench.discrepancy.lack_of_fit import lack_of_fit
+from bench.discrepancy.placements import placements
 from bench.discrepancy.problem import Problem
 from bench.discrepancy.screen import Screen
 from bench.discrepancy.search import Search, consistent, shake
@@ -161,6 +164,56 @@ def test_couplings_begin_wherever_the_measured_motion_has_a_minimum():
     coupled_fits(search, [effect_named("gap_coupling")], 1, lambda text: None)
     # the start of largest gain ends in a dent that leaves a tenth of a per cent too much for the noise
     assert not lack_of_fit(search.problem, search.ranked()[0]).significant(0.0)
+
+
+@pytest.mark.slow
+def test_one_free_memory_is_likelier_than_the_laws_that_imitate_it():
+    case, answer = sealed(20261202, 184)
+    assert [e["name"] for e in answer["effects"]] == ["fractional_damping"]
+    laws = [effect_named(name) for name in ("viscoelastic_relaxation", "base_flexibility", "stiffness_error")]
+    found = diagnose(case, catalogue=laws)
+    best, verdict = found.explanations[0], found.verdict
+    assert best.consistent  # neither chi-squared nor a force on top of them tells that these are not it
+    assert not any(best.lacking(next(e for e in found.explanations if not e.hypothesis)))
+    assert (verdict.verdict, verdict.closure) == ("unknown", "free_memory")
+    assert verdict.explanation.endswith("a single force with a memory of its own does so better.")
+    assert found.final.log_posterior > best.log_posterior
+    assert verdict.gap.after < 1.1 * verdict.gap.noise_floor
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_relaxation_is_likelier_than_any_free_memory(seed):
+    options = BlindOptions(
+        effects=("viscoelastic_relaxation",), shares=(0.0, 1.0, 0.0, 0.0), rigs=(0.0, 1.0, 0.0), detectability=False
+    )  # fmt: skip
+    case, _ = draw_case("relaxation", np.random.default_rng(seed), options)
+    starts = effect_named("viscoelastic_relaxation").grid()
+    problem, explained = min(
+        (fitted(case, "viscoelastic_relaxation", list(eta)) for eta in starts),
+        key=lambda found: found[1].cost,
+    )
+    assert consistent(explained)
+    assert likelier_memory(Explanation(((problem, explained),))) is None
+
+
+@pytest.mark.slow
+def test_a_memory_of_decades_is_told_from_one_relaxation_on_one_axis_of_a_joint():
+    case, answer = sealed(20261202, 294)
+    (withheld,) = answer["effects"]
+    assert (withheld["name"], withheld["where"]) == ("fractional_damping", "torsional")
+    found = diagnose(
+        case, catalogue=[effect_named(name) for name in ("viscoelastic_relaxation", "gap_coupling")]
+    )
+    best = found.explanations[0]
+    assert [(p.effect.name, p.place.name) for p in best.hypothesis] == [
+        ("viscoelastic_relaxation", "torsional")
+    ]
+    assert best.consistent
+    # each axis is asked by itself: on both together the allowance for the integration's own error is twice as large
+    assert [len(problem.structure.dofs) for problem, _ in best.parts] == [2, 2]
+    torsion = best.lacks[1]
+    assert torsion.model == "memory"
+    assert found.verdict.verdict == "unknown"
 
 
 def test_a_wrong_mass_pays_nothing_for_an_inaccuracy_that_linear_runs_do_not_have():

@@ -9,11 +9,12 @@ import pytest
 from scipy.optimize import least_squares
 
 from bench.discrepancy import BlindOptions
-from bench.discrepancy.attribute import placements, refined
 from bench.discrepancy.blind.protocol import draw_case
 from bench.discrepancy.catalogue import effect_named
 from bench.discrepancy.linear_run import linear_run
 from bench.discrepancy.minimise import Prior, minimise
+from bench.discrepancy.nominate import refined
+from bench.discrepancy.placements import placements
 from bench.discrepancy.problem import Problem
 from bench.discrepancy.screen import Screen
 from bench.discrepancy.structure import structure_of

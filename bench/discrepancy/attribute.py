@@ -12,22 +12,29 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from bench.discrepancy.case import Case
+from bench.discrepancy.challenge import challenge, reduce_best
 from bench.discrepancy.effect import Effect
 from bench.discrepancy.fit import Fit, fit
 from bench.discrepancy.grid_points import Point
-from bench.discrepancy.placed import FROM, Hypothesis, Placed
+from bench.discrepancy.nominate import (
+    SHORT,
+    TRUSTED,
+    WORTH_A_FIT,
+    about,
+    followed,
+    leading,
+    passed_over,
+    refined,
+)
+from bench.discrepancy.placed import Hypothesis, Placed
 from bench.discrepancy.problem import Problem
-from bench.discrepancy.screen import Ground, Screen
+from bench.discrepancy.screen import Screen
 from bench.discrepancy.search import (
     IMMATERIAL,
-    SAME,
-    SIGHT,
     THOROUGH,
     THREADS,
     Search,
@@ -41,34 +48,16 @@ from bench.discrepancy.search import (
     names,
     near,
     shake,
-    sticks,
 )
-from bench.discrepancy.structure import Structure
 
 QUICK = 6
 """Iterations of a first fit; the best are carried on to convergence."""
-WORTH_A_FIT = 25.0
-"""Screened gain in chi-squared from which one more effect could overcome its prior and its Occam factor."""
 NOTICEABLE = 15.0
 """Screened gain from which the first effect is fitted: noise alone lets the best of the catalogue gain so much in few cases."""
-SHORT = 0.15
-"""Effects whose screened gain is less than this part of the best one are not fitted."""
-TRUSTED = 0.5
-"""The same part where one more effect is screened about a free run that follows the motion: gains are what they seem then."""
 LEVELS = (-2.0, -1.0, 0.0, 1.0)
 """Sizes of contacts that are simulated on their grid, in prior standard deviations from their mean."""
 SIMULATED = 2
 """Starts of each that are fitted."""
-REFINED_EFFECTS = 12
-"""Effects whose grid points are refined along the measured motion."""
-REFINED_STARTS = 3
-"""Grid points refined of each."""
-APART = 0.8
-"""Distance of starts of an effect, in prior standard deviations of its grid parameters."""
-NEARLY = 0.9
-"""Further starts of an effect are worth a fit if they gain this part of what its best one does."""
-LEFT = 0.02
-"""Part of a named effect's gain along the motion that a challenger may lack, besides twice what the effect leaves."""
 STALLED = 0.7
 """If one more effect leaves more than this part of the excess of chi-squared, a further one is not tried."""
 CONSIDERED, PROMISED = 12, 2
@@ -76,67 +65,8 @@ CONSIDERED, PROMISED = 12, 2
 UNPROMISING = 0.25
 """Part of the excess of a base that one more effect must promise to take away, or none is fitted beside it."""
 
-OTHER_AXIS = {
-    "displacement": "rotation",
-    "rotation": "displacement",
-    "velocity": "angular_velocity",
-    "angular_velocity": "velocity",
-    "acceleration": "angular_acceleration",
-    "angular_acceleration": "acceleration",
-}
-"""Channels of the joint rig that one sensor measures along its two axes."""
-
 Prepared = tuple[Search, Screen, list[Point]]
 """A search before its first step: the nominal model fitted, the catalogue screened, its grid points by decreasing gain."""
-
-
-def placements(case: Case, structure: Structure, catalogue: Iterable[Effect]) -> list[Placed]:
-    """Return every effect of a catalogue at every place of a structure where it can sit."""
-    out: list[Placed] = []
-    for effect in catalogue:
-        for place in structure.places:
-            if effect.site == "joint" and len(place.rows) == effect.n_coordinates:
-                out.append(Placed(effect, place))
-            if len(place.rows) != 1:
-                continue
-            out += [Placed(effect, place, target) for target in _targets(case, effect, structure, place)]
-    return out
-
-
-def _targets(case: Case, effect: Effect, structure: Structure, place) -> list[str]:
-    if effect.site == "inertia":
-        names = {"mass": place.mass, "stiffness": (place.stiffness,), "damping": (place.damping,)}[
-            effect.quantity
-        ]
-        return [name for name in names if name in structure.parameters]
-    dofs = np.abs(place.rows).sum(axis=0) > 0
-    if effect.site == "actuator":
-        commanded = [name for name in structure.loads if case.channel(name).role == "command"]
-        return [
-            name
-            for name in commanded
-            if np.abs(structure.inputs[dofs, structure.loads.index(name)]).sum() > 0
-        ]
-    if effect.site == "sensor":
-        order = {"position": 0, "velocity": 1, "acceleration": 2}[effect.quantity]
-        channels = [
-            o.channel for o in structure.observers if o.order == order and np.abs(o.row[dofs]).sum() > 0
-        ]
-        return _pickups(case, structure, channels) if effect.pickup else channels
-    return []
-
-
-def _pickups(case: Case, structure: Structure, channels: Sequence[str]) -> list[str]:
-    """Cross-talk into response channels: from the loads on their structure, and from the same sensor's other axis."""
-    if case.rig == "damper":  # what the force channel picks up from the displacement is a stiffness
-        return []
-    out = []
-    for channel in channels:
-        kind, _, number = channel.rpartition("_")
-        across = f"{OTHER_AXIS[kind]}_{number}" if kind in OTHER_AXIS else ""
-        sources = [*structure.loads, across] if case.has(across) else structure.loads
-        out += [f"{channel}{FROM}{source}" for source in sources]
-    return out
 
 
 def attribute(
@@ -163,7 +93,7 @@ def attribute(
         search, screen, points = prepared or prepare(problem, candidates, pool.map)
         nothing = search.ranked(0)[0]
         progress(f"nominal model: chi-squared {nothing.reduced:.3g} of its expectation")
-        if _at_ease(nothing, problem):
+        if followed(nothing, problem):
             points = about(screen, nothing, explained=True).ranked()
             if not points or points[0].gain < NOTICEABLE:
                 return search
@@ -233,28 +163,6 @@ def _promising(screen: Screen, best: Fit) -> bool:
     ground = screen.ground(best, simulated=True)
     points = screen.ranked(best, ground)[:1] + screen.inertia_points(best, ground)[:1]
     return max((p.gain for p in points), default=0.0) > max(WORTH_A_FIT, IMMATERIAL * best.n_residuals)
-
-
-def _at_ease(fitted: Fit, problem: Problem) -> bool:
-    """Whether a hypothesis explains the records without nominal parameters far off their values."""
-    return consistent(fitted) and fitted.cost - fitted.chi2 < len(problem.nominal) + WORTH_A_FIT / 2
-
-
-def followed(base: Fit, problem: Problem) -> bool:
-    """Whether one more effect is best screened along the free run of a base, since that tells the motion better than the records.
-
-    Where friction sticks it is not, unless all is explained: a small force more moves the stops, which no linear response does.
-    The nominal model alone is asked whether it is at ease with what it leaves.
-    """
-    if not base.hypothesis:
-        return _at_ease(base, problem)
-    return consistent(base) or (near(base) and not sticks(base))
-
-
-def about(screen: Screen, base: Fit, *, explained: bool) -> Screen:
-    """The screening that tells what a base lacks: about its free run where that follows the motion, else about the measured one."""
-    spoilt = any(placed.effect.site == "sensor" for placed in base.hypothesis)
-    return screen.beside(base, simulated=explained) if spoilt or explained else screen
 
 
 def prepare(problem: Problem, candidates: Sequence[Placed], each: Callable = map) -> Prepared:
@@ -412,134 +320,3 @@ def _contact(effect: Effect) -> bool:
     return (
         effect.family == "stiffness" and any(p.grid for p in effect.parameters) and effect.rate_bound is None
     )
-
-
-def passed_over(solved: Sequence[Point], chosen: Sequence[Point], count: int, least: float) -> list[Point]:
-    """Starts of forces with nothing but their size to be found that are not among the chosen ones.
-
-    They are cheap to fit, and never to be lost to a law of seven parameters because their gain along a badly known motion was small.
-    """
-    begun = {point.placed.key for point in chosen}
-    simplest = [p for p in solved if _plain(p.placed.effect) and p.placed.key not in begun]
-    return leading(simplest, count, least, starts=1)
-
-
-def _plain(effect: Effect) -> bool:
-    return effect.site == "joint" and effect.n_coordinates == 1 and len(effect.parameters) == 1
-
-
-def challenge(search: Search, screen: Screen, pool: ThreadPoolExecutor, *, rounds: int = 3) -> None:
-    """Fit the rivals of every effect of the best hypothesis, and that effect itself, from several starts.
-
-    The rivals are screened along the free run of that hypothesis where it follows the motion: a run driven through accelerations
-    alone knows its middle, which no record told. What a rival makes superfluous is struck.
-
-    Args:
-        search: Fits so far; the new ones are added.
-        screen: Screening of the same problem.
-        pool: Threads.
-        rounds: A rival that wins is challenged in turn, so many times at most.
-    """
-    challenged: set[frozenset] = set()
-    n = len(search.problem.nominal)
-    for _ in range(rounds):
-        best = search.ranked()[0]
-        if not best.hypothesis or key_of(best.hypothesis) in challenged:
-            return
-        challenged.add(key_of(best.hypothesis))
-        _, etas = search.problem.split(best.hypothesis, best.vector)
-        along = followed(best, search.problem)
-        tasks = []
-        for i, placed in enumerate(best.hypothesis):
-            rest = best.hypothesis[:i] + best.hypothesis[i + 1 :]
-            vector = np.concatenate([best.vector[:n], *(eta for j, eta in enumerate(etas) if j != i)])
-            base = replace(best, hypothesis=rest, vector=vector)
-            points, alone = search.first, search.ranked(0)[0].chi2
-            if rest or along:
-                local = screen.beside(best, simulated=True) if along else about(screen, base, explained=False)
-                named = base if rest else None
-                ground = local.ground(named)
-                alone = float(np.sum(ground.left**2))
-                points = refined(local, ground, local.ranked(named, ground), pool)
-            own = max((p.gain for p in points if p.placed.key == placed.key), default=np.inf)
-            left = max(alone - own, search.problem.n_residuals)
-            for point in leading(points, 5, own - left - LEFT * own, starts=REFINED_STARTS):
-                if search.start(rest, point):
-                    tasks.append(((*rest, point.placed), np.concatenate([vector, point.eta])))
-                    continue
-                # begun before, but perhaps left after a few iterations because a more flexible law was ahead by then
-                begun = search.fits.get(key_of((*rest, point.placed)))
-                known = begun is not None and any(begun.vector is start for _, start in tasks)
-                if begun is not None and not known and key_of(begun.hypothesis) not in search.converged:
-                    tasks.append((begun.hypothesis, begun.vector))
-        converge(search, pool, tasks)
-        carry_on(search, pool, len(best.hypothesis), most=6)
-        reduce_best(search, pool)
-
-
-def reduce_best(search: Search, pool: ThreadPoolExecutor) -> None:
-    """Strike each effect in turn from the best hypothesis: is it still needed beside what the others have become?"""
-    best = search.ranked()[0]
-    if len(best.hypothesis) < 2:
-        return
-    tasks = []
-    n = len(search.problem.nominal)
-    _, etas = search.problem.split(best.hypothesis, best.vector)
-    for i in range(len(best.hypothesis)):
-        rest = best.hypothesis[:i] + best.hypothesis[i + 1 :]
-        tasks.append(
-            (rest, np.concatenate([best.vector[:n], *(eta for j, eta in enumerate(etas) if j != i)]))
-        )
-    converge(search, pool, tasks, limit=best.cost + SIGHT)
-
-
-def refined(screen: Screen, ground: Ground, points: Sequence[Point], pool: ThreadPoolExecutor) -> list[Point]:
-    """Refine the leading grid points of the leading effects along the measured motion; by decreasing gain.
-
-    Args:
-        screen: Screening.
-        ground: What the base leaves.
-        points: Solved grid points by decreasing gain.
-        pool: Threads.
-    """
-    chosen: dict[tuple[str, str, str], list[Point]] = {}
-    for point in points:
-        if point.gain < 0.5 * SHORT * points[0].gain:
-            break
-        if point.placed.key not in chosen and len(chosen) == REFINED_EFFECTS:
-            continue
-        starts = chosen.setdefault(point.placed.key, [])
-        if len(starts) < REFINED_STARTS and all(_apart(point, other) > APART for other in starts):
-            starts.append(point)
-    tasks = [point for starts in chosen.values() for point in starts]
-    return sorted(pool.map(lambda point: screen.refine(point, ground), tasks), key=lambda p: -p.gain)
-
-
-def _apart(point: Point, other: Point) -> float:
-    """Distance of two starts of an effect in the parameters that have a grid."""
-    return max(
-        (
-            abs(a - b) / p.std
-            for a, b, p in zip(point.eta, other.eta, point.placed.effect.parameters, strict=True)
-            if p.grid
-        ),
-        default=0.0,
-    )
-
-
-def leading(points: Sequence[Point], count: int, least: float, starts: int = 2) -> list[Point]:
-    """Starts of the `count` effects of largest gain: the best of each, and further ones that are nearly as good."""
-    grouped: dict[tuple[str, str, str], list[Point]] = {}
-    for point in points:
-        if point.gain < least:
-            break
-        if point.placed.key not in grouped and len(grouped) == count:
-            continue
-        own = grouped.setdefault(point.placed.key, [])
-        if not own or (
-            len(own) < starts
-            and point.gain > NEARLY * own[0].gain
-            and all(_apart(point, other) > SAME for other in own)
-        ):
-            own.append(point)
-    return [point for own in grouped.values() for point in own]

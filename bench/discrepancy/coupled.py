@@ -7,22 +7,21 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from bench.discrepancy.attribute import (
-    STALLED,
-    TRUSTED,
-    WORTH_A_FIT,
-    about,
-    first_fit,
-    followed,
-    leading,
-    passed_over,
-    placements,
-    reduce_best,
-    refined,
-)
+from bench.discrepancy.attribute import STALLED, first_fit
+from bench.discrepancy.challenge import reduce_best
 from bench.discrepancy.effect import Effect
 from bench.discrepancy.fit import Fit
 from bench.discrepancy.grid_points import Point
+from bench.discrepancy.nominate import (
+    TRUSTED,
+    WORTH_A_FIT,
+    about,
+    followed,
+    leading,
+    passed_over,
+    refined,
+)
+from bench.discrepancy.placements import placements
 from bench.discrepancy.screen import Ground, Screen
 from bench.discrepancy.search import IMMATERIAL, THREADS, Search, converge, names
 

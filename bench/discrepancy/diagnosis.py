@@ -166,7 +166,7 @@ def _doubt(
     """What speaks against an explanation that leaves nothing but noise, empty where nothing does; and what is likelier."""
     rival = likelier_memory(best)
     if rival is not None:
-        return evidence.SIMPLER, rival
+        return evidence.OUTDONE, rival
     return (evidence.FAILS if contradicted(case, problem, best, rng) else ""), None
 
 

@@ -17,13 +17,15 @@ from itertools import product
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from bench.discrepancy.attribute import STALLED, Prepared, attribute, leading, placements, prepare
+from bench.discrepancy.attribute import STALLED, Prepared, attribute, prepare
 from bench.discrepancy.case import Case, CaseRecord
 from bench.discrepancy.coupled import coupled_fits
 from bench.discrepancy.effect import Effect
 from bench.discrepancy.fit import Fit, fit
 from bench.discrepancy.lack_of_fit import LackOfFit, lack_of_fit
+from bench.discrepancy.nominate import leading
 from bench.discrepancy.placed import Hypothesis, Placed
+from bench.discrepancy.placements import placements
 from bench.discrepancy.prepared import whitened
 from bench.discrepancy.problem import Array, Problem, band_bins
 from bench.discrepancy.screen import Screen

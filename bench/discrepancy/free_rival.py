@@ -13,10 +13,10 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from bench.discrepancy.attribute import placements
 from bench.discrepancy.closure import FREE_MEMORY
 from bench.discrepancy.explain import Explanation
 from bench.discrepancy.fit import Fit, fit
+from bench.discrepancy.placements import placements
 from bench.discrepancy.problem import Problem
 from bench.discrepancy.screen import Screen
 from bench.discrepancy.search import THOROUGH, THREADS, posterior

@@ -21,11 +21,11 @@ from mujoco import sysid
 from numpy.typing import NDArray
 
 from bench import Element, Rig
-from bench.discrepancy.attribute import placements
 from bench.discrepancy.case import Case, CaseRecord
 from bench.discrepancy.catalogue import CATALOGUE
 from bench.discrepancy.effect import Effect
 from bench.discrepancy.placed import Placed
+from bench.discrepancy.placements import placements
 from bench.discrepancy.prepared import whitened
 from bench.discrepancy.problem import Problem
 from bench.discrepancy.structure import Structure, structure_of

@@ -93,9 +93,9 @@ def _odds_of(pure: Case, true: Mapping[str, float], truth: Mapping[str, str]) ->
 
 
 def _group(pure: Case, structure: Structure, true: Mapping[str, float], truth: Mapping[str, str]) -> _Group:
-    from bench.discrepancy.attribute import placements  # noqa: PLC0415
     from bench.discrepancy.catalogue import CATALOGUE  # noqa: PLC0415
     from bench.discrepancy.fit import fit  # noqa: PLC0415
+    from bench.discrepancy.placements import placements  # noqa: PLC0415
     from bench.discrepancy.problem import Problem  # noqa: PLC0415
     from bench.discrepancy.screen import Screen  # noqa: PLC0415
 

@@ -1,0 +1,80 @@
+"""Challenge: the effects of the best hypothesis against their nearest rivals, and whether each of them is still needed."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import numpy as np
+
+from bench.discrepancy.nominate import REFINED_STARTS, about, followed, leading, refined
+from bench.discrepancy.screen import Screen
+from bench.discrepancy.search import SIGHT, Search, carry_on, converge, key_of
+
+LEFT = 0.02
+"""Part of a named effect's gain along the motion that a challenger may lack, besides twice what the effect leaves."""
+
+
+def challenge(search: Search, screen: Screen, pool: ThreadPoolExecutor, *, rounds: int = 3) -> None:
+    """Fit the rivals of every effect of the best hypothesis, and that effect itself, from several starts.
+
+    The rivals are screened along the free run of that hypothesis where it follows the motion: a run driven through accelerations
+    alone knows its middle, which no record told. What a rival makes superfluous is struck.
+
+    Args:
+        search: Fits so far; the new ones are added.
+        screen: Screening of the same problem.
+        pool: Threads.
+        rounds: A rival that wins is challenged in turn, so many times at most.
+    """
+    challenged: set[frozenset] = set()
+    n = len(search.problem.nominal)
+    for _ in range(rounds):
+        best = search.ranked()[0]
+        if not best.hypothesis or key_of(best.hypothesis) in challenged:
+            return
+        challenged.add(key_of(best.hypothesis))
+        _, etas = search.problem.split(best.hypothesis, best.vector)
+        along = followed(best, search.problem)
+        tasks = []
+        for i, placed in enumerate(best.hypothesis):
+            rest = best.hypothesis[:i] + best.hypothesis[i + 1 :]
+            vector = np.concatenate([best.vector[:n], *(eta for j, eta in enumerate(etas) if j != i)])
+            base = replace(best, hypothesis=rest, vector=vector)
+            points, alone = search.first, search.ranked(0)[0].chi2
+            if rest or along:
+                local = screen.beside(best, simulated=True) if along else about(screen, base, explained=False)
+                named = base if rest else None
+                ground = local.ground(named)
+                alone = float(np.sum(ground.left**2))
+                points = refined(local, ground, local.ranked(named, ground), pool)
+            own = max((p.gain for p in points if p.placed.key == placed.key), default=np.inf)
+            left = max(alone - own, search.problem.n_residuals)
+            for point in leading(points, 5, own - left - LEFT * own, starts=REFINED_STARTS):
+                if search.start(rest, point):
+                    tasks.append(((*rest, point.placed), np.concatenate([vector, point.eta])))
+                    continue
+                # begun before, but perhaps left after a few iterations because a more flexible law was ahead by then
+                begun = search.fits.get(key_of((*rest, point.placed)))
+                known = begun is not None and any(begun.vector is start for _, start in tasks)
+                if begun is not None and not known and key_of(begun.hypothesis) not in search.converged:
+                    tasks.append((begun.hypothesis, begun.vector))
+        converge(search, pool, tasks)
+        carry_on(search, pool, len(best.hypothesis), most=6)
+        reduce_best(search, pool)
+
+
+def reduce_best(search: Search, pool: ThreadPoolExecutor) -> None:
+    """Strike each effect in turn from the best hypothesis: is it still needed beside what the others have become?"""
+    best = search.ranked()[0]
+    if len(best.hypothesis) < 2:
+        return
+    tasks = []
+    n = len(search.problem.nominal)
+    _, etas = search.problem.split(best.hypothesis, best.vector)
+    for i in range(len(best.hypothesis)):
+        rest = best.hypothesis[:i] + best.hypothesis[i + 1 :]
+        tasks.append(
+            (rest, np.concatenate([best.vector[:n], *(eta for j, eta in enumerate(etas) if j != i)]))
+        )
+    converge(search, pool, tasks, limit=best.cost + SIGHT)
