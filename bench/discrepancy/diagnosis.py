@@ -20,7 +20,7 @@ from bench.discrepancy.catalogue import CATALOGUE
 from bench.discrepancy.closure import CLOSURES, FREE_MEMORY
 from bench.discrepancy.contradiction import contradicted
 from bench.discrepancy.effect import Effect
-from bench.discrepancy.explain import Explanation, close, explain
+from bench.discrepancy.explain import Explanation, close, explain, nominal_alone
 from bench.discrepancy.free_rival import likelier_memory
 from bench.discrepancy.idle_loads import idle_notes, without_idle_noise
 from bench.discrepancy.next_excitation import separate, told_apart
@@ -33,7 +33,7 @@ from bench.discrepancy.search import names
 from bench.discrepancy.shrink import gaps, nominal_prediction
 from bench.discrepancy.start_estimates import start_warnings
 from bench.discrepancy.structure import structure_of
-from bench.discrepancy.verdict import NamedEffect, Ranked, Verdict
+from bench.discrepancy.verdict import Gap, Kind, NamedEffect, Ranked, Verdict
 from bench.discrepancy.where.locate import Whereabouts, locate
 from bench.errors import UnknownNameError
 
@@ -105,7 +105,7 @@ def diagnose(
     case = without_idle_noise(told)
     problem = Problem(case, structure_of(case), case.identification)
     explanations = explain(case, catalogue, most=most, progress=progress)
-    best, nothing = explanations[0], next(e for e in explanations if not e.hypothesis)
+    best = explanations[0]
     kind, probabilities = evidence.judge(explanations)
     doubt, rival = "", None
     if kind == "effect":
@@ -117,24 +117,10 @@ def diagnose(
     if seen and kind == "none":
         kind = "effect"
         probabilities |= {"effect": 1.0 - probabilities["unknown"], "none": 0.0}
-    final, closure = best, ""
-    if rival is not None:
-        final, closure = rival, FREE_MEMORY.name
-    elif kind == "unknown":
-        progress("nonparametric closure")
-        final, closure = close(best, nothing, CLOSURES)
-    stages = [("nominal", nominal_prediction(problem)), ("parameters only", nothing.predict)]
-    stages += [(label, e.predict) for label, e in _path(explanations)]
-    stages.append((names(final.hypothesis), final.predict))
     progress("gap on the judging records")
-    found = gaps(case, problem, stages=stages, rng=rng, final=_model(final))
-    if kind == "unknown" and any(gap.after > WORSE * gap.parameters_only for gap in found):
-        # what imitates an unknown force on some records can be worse than nothing on others: nobody should build that in
-        final, closure = nothing, ""
-        stages[-1] = ("no closure helps", nothing.predict)
-        found = gaps(case, problem, stages=stages, rng=rng, final=_model(final))
+    final, closure, found = _shrunk(case, problem, explanations, kind, rival, rng)
     widest = max(found, key=lambda gap: gap.before / max(gap.noise_floor, 1e-12))
-    where = locate(problem, nothing, best, verdict=kind)
+    where = locate(problem, nominal_alone(explanations), best, verdict=kind)
     verdict = Verdict(
         verdict=kind,
         named=(*evidence.named(explanations), *seen) if kind == "effect" else (),
@@ -168,6 +154,33 @@ def _doubt(
     if rival is not None:
         return evidence.OUTDONE, rival
     return (evidence.FAILS if contradicted(case, problem, best, rng) else ""), None
+
+
+def _shrunk(
+    case: Case,
+    problem: Problem,
+    explanations: Sequence[Explanation],
+    kind: Kind,
+    rival: Explanation | None,
+    rng: np.random.Generator,
+) -> tuple[Explanation, str, tuple[Gap, ...]]:
+    """How far the gap shrinks: the explanation behind `Gap.after`, the closure in it if any, and the gaps."""
+    best, nothing = explanations[0], nominal_alone(explanations)
+    final, closure = best, ""
+    if rival is not None:
+        final, closure = rival, FREE_MEMORY.name
+    elif kind == "unknown":
+        final, closure = close(best, nothing, CLOSURES)
+    stages = [("nominal", nominal_prediction(problem)), ("parameters only", nothing.predict)]
+    stages += [(label, e.predict) for label, e in _path(explanations)]
+    stages.append((names(final.hypothesis), final.predict))
+    found = gaps(case, problem, stages=stages, rng=rng, final=_model(final))
+    if kind == "unknown" and any(gap.after > WORSE * gap.parameters_only for gap in found):
+        # what imitates an unknown force on some records can be worse than nothing on others: nobody should build that in
+        final, closure = nothing, ""
+        stages[-1] = ("no closure helps", nothing.predict)
+        found = gaps(case, problem, stages=stages, rng=rng, final=_model(final))
+    return final, closure, found
 
 
 def _model(explanation: Explanation) -> tuple[Hypothesis, np.ndarray] | None:

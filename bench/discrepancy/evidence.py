@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from bench.discrepancy.effect import unit_of
-from bench.discrepancy.explain import Explanation
+from bench.discrepancy.explain import Explanation, nominal_alone
 from bench.discrepancy.placed import Placed
 from bench.discrepancy.search import names
 from bench.discrepancy.verdict import Estimate, Kind, NamedEffect, Ranked
@@ -56,17 +56,12 @@ def judge(explanations: Sequence[Explanation]) -> tuple[Kind, dict[str, float]]:
         return _judge_unscaled(explanations)
     shares = weights(explanations)
     none = float(sum(w for w, e in zip(shares, explanations, strict=True) if not e.hypothesis))
-    complete = best.consistent and not any(best.lacking(_nothing(explanations)))
+    complete = best.consistent and not any(best.lacking(nominal_alone(explanations)))
     known = 1.0 - OUTSIDE if complete else OUTSIDE
     probabilities = {"effect": known * (1.0 - none), "none": known * none, "unknown": 1.0 - known}
     if not complete:
         return "unknown", probabilities
     return ("none" if not best.hypothesis else "effect"), probabilities
-
-
-def _nothing(explanations: Sequence[Explanation]) -> Explanation:
-    """The nominal model alone."""
-    return next(e for e in explanations if not e.hypothesis)
 
 
 def _noise_stated(explanations: Sequence[Explanation]) -> bool:
@@ -76,7 +71,7 @@ def _noise_stated(explanations: Sequence[Explanation]) -> bool:
 def _judge_unscaled(explanations: Sequence[Explanation]) -> tuple[Kind, dict[str, float]]:
     """Verdict where the noise is not stated: by the part of the residual power that the best explanation takes away."""
     best = explanations[0]
-    nothing = _nothing(explanations)
+    nothing = nominal_alone(explanations)
     explained = 1.0 - best.reduced / nothing.reduced
     if not best.hypothesis:
         return "none", {"effect": 0.0, "none": 1.0, "unknown": 0.0}
@@ -208,7 +203,7 @@ def plain_words(kind: Kind, explanations: Sequence[Explanation], *, doubt: str =
         return f"Something is missing from the model, {_short_of_it(best)}"
     missing = f"Missing from the model: {names(best.hypothesis)}."
     if not _noise_stated(explanations):
-        nothing = _nothing(explanations)
+        nothing = nominal_alone(explanations)
         share = 100.0 * (1.0 - best.reduced / nothing.reduced)
         taken = f"It takes away {share:.3g} % of the power of the residuals"
         return f"{missing} {taken}; without the noise being stated nobody can say whether that is all."

@@ -252,7 +252,7 @@ def _nothing_left_first(found: list[Explanation]) -> list[Explanation]:
     """
     if not found[0].consistent or _leaves_nothing(found):
         return found
-    nothing = next(e for e in found if not e.hypothesis)
+    nothing = nominal_alone(found)
     near = [e for e in found[1:] if e.log_posterior > found[0].log_posterior - WITHIN_REACH and e.consistent]
     for other in near[:RECONSIDERED]:
         if not any(other.lacking(nothing)):
@@ -260,9 +260,14 @@ def _nothing_left_first(found: list[Explanation]) -> list[Explanation]:
     return found
 
 
+def nominal_alone(explanations: Sequence[Explanation]) -> Explanation:
+    """The explanation without any effect."""
+    return next(e for e in explanations if not e.hypothesis)
+
+
 def _leaves_nothing(found: Sequence[Explanation]) -> bool:
     """Whether the first explanation is down to the noise, and free models find nothing in what it leaves."""
-    nothing = next(e for e in found if not e.hypothesis)
+    nothing = nominal_alone(found)
     return found[0].consistent and not any(found[0].lacking(nothing))
 
 
