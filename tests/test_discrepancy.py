@@ -22,7 +22,7 @@ from bench.discrepancy import (
     write_report,
 )
 from bench.discrepancy.blind.protocol import draw_case, write_case
-from bench.discrepancy.blind.scoring import calibration_error
+from bench.discrepancy.blind.shares import calibration_error
 from bench.discrepancy.catalogue import CATALOGUE, effect_named
 from bench.discrepancy.effect import Scales
 from bench.discrepancy.shrink import closed_share, nrmse

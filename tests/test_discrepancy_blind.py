@@ -17,8 +17,10 @@ from bench.discrepancy.blind import foreign
 from bench.discrepancy.blind.benches import SIGNALS, BlindOptions, Plan, draw_bench, load, reach_of
 from bench.discrepancy.blind.cases import ALIKE, CLOSE, draw_case, draw_plan
 from bench.discrepancy.blind.effects import RECIPES, Reach, recipe_named
+from bench.discrepancy.blind.region_score import region_scores
 from bench.discrepancy.blind.score_report import markdown, page, tables
-from bench.discrepancy.blind.scoring import calibration_error, region_scores, score_cases, wilson
+from bench.discrepancy.blind.scoring import score_cases
+from bench.discrepancy.blind.shares import calibration_error, share_of
 from bench.discrepancy.blind.time_stepping import Acting, Matrices, Stop, march
 from bench.discrepancy.blind.truth import ROWS, Placed, Truth, motion_of, played, sensed
 from bench.discrepancy.catalogue import CATALOGUE
@@ -504,12 +506,12 @@ def test_regions_are_compared_cell_by_cell():
 
 
 def test_wilson_and_calibration_have_their_textbook_values():
-    share = wilson([True] * 8 + [False] * 2)
+    share = share_of([True] * 8 + [False] * 2)
     assert share.value == 0.8
     assert (share.low, share.high) == (pytest.approx(0.4902, abs=1e-4), pytest.approx(0.9433, abs=1e-4))
-    assert wilson([True] * 20).high == 1.0
-    assert wilson([False] * 20).low == 0.0
-    assert math.isnan(wilson([]).value)
+    assert share_of([True] * 20).high == 1.0
+    assert share_of([False] * 20).low == 0.0
+    assert math.isnan(share_of([]).value)
     rng = np.random.default_rng(0)
     stated = rng.random(4000)
     honest = [(float(p), bool(rng.random() < p)) for p in stated]

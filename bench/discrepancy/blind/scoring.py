@@ -7,11 +7,6 @@ What counts as right, by the class of a case:
   member of a set that the verdict declares indistinguishable, if the set holds the truth.
 - struck (the true effect was taken out of the catalogue): *unknown*, or an effect of the truth's family: its nearest kin.
 
-Shares come with Wilson's interval, since most bands hold a few dozen cases.
-
-References:
-    E. B. Wilson, J. Am. Stat. Assoc. 22 (1927) 209-212 (interval).
-    M. P. Naeini, G. F. Cooper, M. Hauskrecht, AAAI 2015 (expected calibration error).
 """
 
 from __future__ import annotations
@@ -20,63 +15,26 @@ import hashlib
 import json
 import math
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from itertools import pairwise
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
+from bench.discrepancy.blind.bands import bands_of, by_band
+from bench.discrepancy.blind.region_score import region_scores
+from bench.discrepancy.blind.shares import Share, calibration_error, reliability, share_of
 from bench.discrepancy.catalogue import CATALOGUE
 from bench.errors import FileFormatError
 from bench.files import json_values
 
 FAMILIES = {e.name: e.family for e in CATALOGUE}
-NAN = math.nan
 TELLABLE = 10.0
 """Expected log odds from which a record is said to be able to tell: noise then misleads in a few cases of ten thousand."""
 TELLABLE_UNKNOWN = 30.0
 """The same for what no catalogue holds. No law of it is there to be fitted: a test that is free in some 25 coefficients, and wrong once in
 a thousand cases, finds it in 95 of 100 from so much on."""
-CELLS = 32
-"""Cells of the reach of a coordinate in which planted and found regions are compared."""
-
-BANDS: Mapping[str, tuple[float, ...]] = {
-    "gap": (0.0, 0.06, 0.12, 0.25, math.inf),
-    "noise": (0.0, 0.006, 0.012, math.inf),
-    "log odds against the nearest rival": (-math.inf, 3.0, 10.0, 50.0, math.inf),
-    "log odds against none": (-math.inf, 10.0, 100.0, math.inf),
-}
-"""Edges of the bands that accuracy is reported by."""
-
-
-class Share(NamedTuple):
-    """A share with its 95 % interval.
-
-    Attributes:
-        value: Hits over cases; NaN without cases.
-        n: Number of cases.
-        low, high: Ends of Wilson's interval.
-    """
-
-    value: float
-    n: int
-    low: float
-    high: float
-
-
-def wilson(hits: Iterable[bool]) -> Share:
-    """Share of hits with Wilson's 95 % interval."""
-    flags = list(hits)
-    n = len(flags)
-    if n == 0:
-        return Share(NAN, 0, NAN, NAN)
-    z, p = 1.959964, sum(flags) / n
-    middle = (p + z * z / (2 * n)) / (1 + z * z / n)
-    half = z / (1 + z * z / n) * math.sqrt(p * (1 - p) / n + z * z / (4 * n * n))
-    # at no hits or all hits the end is 0 or 1; rounding may leave it 1e-17 beside
-    return Share(p, n, max(middle - half, 0.0) if p > 0 else 0.0, min(middle + half, 1.0) if p < 1 else 1.0)
 
 
 @dataclass(frozen=True)
@@ -226,7 +184,7 @@ def _scored(name: str, result: Mapping[str, Any], answer: Mapping[str, Any]) -> 
         kind,
         right,
         families,
-        _bands_of(name, answer, kind),
+        bands_of(name, answer, kind),
         truth,
         said,
         str(result["verdict"]),
@@ -276,18 +234,18 @@ def summary(scored: Sequence[Scored]) -> BlindScore:
     tellable = [s for s in scored if s.kind != "struck" and _tellable(s)]
     sizes = [len(entry) for s in declared for entry in s.result["indistinguishable"]]
     shares = {
-        "exact": wilson(s.right for s in singles),
-        "strict": wilson(set(s.said) == set(s.truth) and s.verdict == "effect" for s in singles),
-        "family": wilson(bool(s.family) for s in singles),
-        "place": wilson(_places(scored)),
-        "false_alarms": wilson(not s.right for s in by_kind["none"]),
-        "unknown_caught": wilson(s.right for s in by_kind["foreign"]),
-        "both_named": wilson(s.right for s in by_kind["double"]),
-        "tellable": wilson(s.right for s in tellable),
-        "unknown_tellable": wilson(s.right for s in tellable if s.kind == "foreign"),
-        "struck_right": wilson(s.right for s in by_kind["struck"]),
-        "struck_unknown": wilson(s.verdict == "unknown" for s in by_kind["struck"]),
-        "sets_hold_truth": wilson(_held(s) for s in declared),
+        "exact": share_of(s.right for s in singles),
+        "strict": share_of(set(s.said) == set(s.truth) and s.verdict == "effect" for s in singles),
+        "family": share_of(bool(s.family) for s in singles),
+        "place": share_of(_places(scored)),
+        "false_alarms": share_of(not s.right for s in by_kind["none"]),
+        "unknown_caught": share_of(s.right for s in by_kind["foreign"]),
+        "both_named": share_of(s.right for s in by_kind["double"]),
+        "tellable": share_of(s.right for s in tellable),
+        "unknown_tellable": share_of(s.right for s in tellable if s.kind == "foreign"),
+        "struck_right": share_of(s.right for s in by_kind["struck"]),
+        "struck_unknown": share_of(s.verdict == "unknown" for s in by_kind["struck"]),
+        "sets_hold_truth": share_of(_held(s) for s in declared),
     }
     hits = [
         (float(e["probability"]), e["name"] in {n for n, _ in s.truth})
@@ -307,8 +265,8 @@ def summary(scored: Sequence[Scored]) -> BlindScore:
     return BlindScore(
         n=len(scored),
         **{name: share.value for name, share in shares.items()},
-        mean_set=float(np.mean(sizes)) if sizes else NAN,
-        region_f1=float(np.mean(f1)) if f1 else NAN,
+        mean_set=float(np.mean(sizes)) if sizes else math.nan,
+        region_f1=float(np.mean(f1)) if f1 else math.nan,
         calibration_error=calibration_error(hits),
         verdict_calibration_error=calibration_error(verdicts),
         median_ratio=_quantile(ratios, 0.5),
@@ -317,7 +275,7 @@ def summary(scored: Sequence[Scored]) -> BlindScore:
         p90_seconds=_quantile(seconds, 0.9),
         failed=sum(s.verdict == "failed" for s in scored),
         shares=shares,
-        bands=_by_band(scored),
+        bands=by_band((s.bands, s.right) for s in scored),
         reliability=tuple(reliability(hits)),
         confusion={k: dict(v) for k, v in sorted(confusion.items())},
         wrong=tuple(_complaint(s) for s in scored if not s.right),
@@ -369,131 +327,7 @@ def _ratios(result: Mapping[str, Any]) -> list[float]:
 
 
 def _quantile(values: Sequence[float], q: float) -> float:
-    return float(np.quantile(values, q, method="linear")) if len(values) else NAN
-
-
-def region_scores(result: Mapping[str, Any], answer: Mapping[str, Any]) -> list[float]:
-    """F1 of the found regions of displacement, for every place where some are planted, in cells of the coordinate's reach.
-
-    Planted is what the effects of the place cover together, since the force that is missing there is their sum. Found is
-    what the locations of the degree of freedom (or of the place) mark: all their regions, or the strongest one where only that is
-    given.
-    """
-    planted: dict[tuple[str, str, float], list[Sequence[float]]] = {}
-    for region in answer.get("regions") or ():
-        key = (region["dof"], region["coordinate"], region["reach"])
-        planted.setdefault(key, []).extend(region["intervals"])
-    out = []
-    for (place, coordinate, reach), intervals in planted.items():
-        edges = np.linspace(-reach, reach, CELLS + 1)
-        middle = 0.5 * (edges[1:] + edges[:-1])
-        truth = _inside(middle, [_widened(interval, 2.0 * reach / CELLS) for interval in intervals])
-        found = np.zeros(CELLS, dtype=bool)
-        for location in result.get("locations") or ():
-            dof = str(location.get("dof", ""))
-            if place and not dof.startswith({"axial": ("x", "axial"), "torsional": ("th", "tor")}[place]):
-                continue
-            for region in location.get("regions") or [location.get("state_region") or {}]:
-                if region:  # a region that does not depend on the coordinate lies everywhere along it
-                    found |= _inside(middle, [region.get(coordinate, (-reach, reach))])
-        both = np.sum(truth & found)
-        out.append(float(2.0 * both / max(np.sum(truth) + np.sum(found), 1)))
-    return out
-
-
-def _widened(interval: Sequence[float], width: float) -> tuple[float, float]:
-    """An interval, at least a cell wide: what is narrower, as the contact with a hard stop, lies in the cell that holds its middle."""
-    low, high = interval
-    margin = max(0.5 * (width - (high - low)), 0.0)
-    return low - margin, high + margin
-
-
-def _inside(middle: np.ndarray, intervals: Iterable[Sequence[float]]) -> np.ndarray:
-    return np.any([(middle >= low) & (middle <= high) for low, high in intervals], axis=0)
-
-
-def _bands_of(name: str, answer: Mapping[str, Any], kind: str) -> dict[str, str]:
-    """The band of a case in every dimension that its answer states."""
-    gap = answer.get("gap_nrmse_identification", answer.get("gap_nrmse_validation"))
-    odds = answer.get("detectability") or {}
-    numbers = {
-        "gap": None if gap is None or kind == "none" else float(np.max(gap)),
-        "noise": answer.get("noise"),
-        "log odds against the nearest rival": odds.get("log_odds_rival"),
-        "log odds against none": odds.get("log_odds_none"),
-    }
-    bands = {
-        key: _band(value, BANDS[key], percent=key in {"gap", "noise"})
-        for key, value in numbers.items()
-        if value is not None
-    }
-    bands["class"] = kind
-    bands["rig"] = str(answer.get("rig") or name.partition("-")[0])
-    if answer.get("sensors"):
-        sensors = answer["sensors"]
-        bands["sensors"] = sensors if isinstance(sensors, str) else "+".join(sensors)
-    if answer.get("signals"):
-        bands["identification signal"] = (
-            answer["signals"][0] if bands["rig"] != "joint" else "several (joint)"
-        )
-    if answer["effects"]:
-        bands["effect"] = answer["effects"][0]["name"] if len(answer["effects"]) == 1 else "double"
-    return bands
-
-
-def _band(value: float, edges: Sequence[float], *, percent: bool) -> str:
-    i = int(np.clip(np.searchsorted(edges, value, side="right") - 1, 0, len(edges) - 2))
-    low, high = edges[i], edges[i + 1]
-    scale, unit = (100.0, " %") if percent else (1.0, "")
-    if math.isinf(high):
-        return f"above {scale * low:g}{unit}"
-    if math.isinf(low):
-        return f"below {scale * high:g}{unit}"
-    return f"{scale * low:g} to {scale * high:g}{unit}"
-
-
-def _by_band(scored: Sequence[Scored]) -> dict[str, dict[str, Share]]:
-    flags: dict[str, dict[str, list[bool]]] = defaultdict(lambda: defaultdict(list))
-    for s in scored:
-        for dimension, band in s.bands.items():
-            flags[dimension][band].append(s.right)
-    ordered = ("class", "rig", *BANDS, "sensors", "identification signal", "effect")
-    return {
-        d: {band: wilson(flags[d][band]) for band in sorted(flags[d], key=_order(d))}
-        for d in ordered
-        if d in flags
-    }
-
-
-def _order(dimension: str) -> Callable[[str], Any]:
-    if dimension not in BANDS:
-        return lambda band: band
-    edges = BANDS[dimension]
-    names = [
-        _band(low + 1e-9 if math.isfinite(low) else high - 1e-9, edges, percent=dimension in {"gap", "noise"})
-        for low, high in pairwise(edges)
-    ]
-    return names.index
-
-
-def reliability(hits: Sequence[tuple[float, bool]], bins: int = 10) -> list[tuple[float, float, int]]:
-    """Bins of stated probability that hold a case: mean stated, share true, count."""
-    if not hits:
-        return []
-    stated = np.array([p for p, _ in hits])
-    true = np.array([h for _, h in hits], dtype=float)
-    which = np.minimum((stated * bins).astype(int), bins - 1)
-    return [
-        (float(stated[which == b].mean()), float(true[which == b].mean()), int(np.sum(which == b)))
-        for b in sorted(set(which.tolist()))
-    ]
-
-
-def calibration_error(hits: Sequence[tuple[float, bool]], bins: int = 10) -> float:
-    """Expected calibration error: mean distance between stated and observed frequency, weighed by bin counts."""
-    if not hits:
-        return NAN
-    return float(sum(abs(stated - true) * n for stated, true, n in reliability(hits, bins)) / len(hits))
+    return float(np.quantile(values, q, method="linear")) if len(values) else math.nan
 
 
 def _check_seal(text: str, name: str, cases: str | Path | None) -> None:
