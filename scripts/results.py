@@ -265,6 +265,17 @@ CAPABILITIES: Sequence[Capability] = (
         data=".",
     ),
     _benchmark_group("diagnosis", "Diagnosis against mujoco.sysid and pysindy, side by side"),
+    Capability(
+        "peers",
+        "The same on ten of the development trials",
+        (
+            *("python", "scripts/benchmark.py", "diagnosis", "--data", "{data}/../trials"),
+            *("--work", "out/peers", "--json"),
+        ),
+        _benchmark,
+        data="../trials",
+        hours=True,
+    ),
     _excitation_task(
         "sdof", "Excitation on the SDOF rig: trained policy against the baselines, held-out rigs"
     ),
