@@ -7,7 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from bench.discrepancy.fit import Fit
 from bench.discrepancy.nominate import REFINED_STARTS, about, followed, leading, refined
+from bench.discrepancy.placed import Hypothesis
+from bench.discrepancy.problem import Problem
 from bench.discrepancy.screen import Screen
 from bench.discrepancy.search import SIGHT, Search, carry_on, converge, key_of
 
@@ -28,18 +31,15 @@ def challenge(search: Search, screen: Screen, pool: ThreadPoolExecutor, *, round
         rounds: A rival that wins is challenged in turn, so many times at most.
     """
     challenged: set[frozenset] = set()
-    n = len(search.problem.nominal)
     for _ in range(rounds):
         best = search.ranked()[0]
         if not best.hypothesis or key_of(best.hypothesis) in challenged:
             return
         challenged.add(key_of(best.hypothesis))
-        _, etas = search.problem.split(best.hypothesis, best.vector)
         along = followed(best, search.problem)
         tasks = []
         for i, placed in enumerate(best.hypothesis):
-            rest = best.hypothesis[:i] + best.hypothesis[i + 1 :]
-            vector = np.concatenate([best.vector[:n], *(eta for j, eta in enumerate(etas) if j != i)])
+            rest, vector = _without(i, best, search.problem)
             base = replace(best, hypothesis=rest, vector=vector)
             points, alone = search.first, search.ranked(0)[0].chi2
             if rest or along:
@@ -69,12 +69,12 @@ def reduce_best(search: Search, pool: ThreadPoolExecutor) -> None:
     best = search.ranked()[0]
     if len(best.hypothesis) < 2:
         return
-    tasks = []
-    n = len(search.problem.nominal)
-    _, etas = search.problem.split(best.hypothesis, best.vector)
-    for i in range(len(best.hypothesis)):
-        rest = best.hypothesis[:i] + best.hypothesis[i + 1 :]
-        tasks.append(
-            (rest, np.concatenate([best.vector[:n], *(eta for j, eta in enumerate(etas) if j != i)]))
-        )
+    tasks = [_without(i, best, search.problem) for i in range(len(best.hypothesis))]
     converge(search, pool, tasks, limit=best.cost + SIGHT)
+
+
+def _without(i: int, best: Fit, problem: Problem) -> tuple[Hypothesis, np.ndarray]:
+    """A hypothesis without its effect i, and the vector (n,) of what stays."""
+    _, etas = problem.split(best.hypothesis, best.vector)
+    rest = best.hypothesis[:i] + best.hypothesis[i + 1 :]
+    return rest, np.concatenate([best.vector[: len(problem.nominal)], *etas[:i], *etas[i + 1 :]])
