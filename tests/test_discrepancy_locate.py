@@ -94,7 +94,8 @@ def unexplained(case: Problem) -> Explanation:
 @pytest.mark.parametrize("wrong", [-0.04, 0.04])
 def test_a_force_within_a_window_is_told_from_one_outside_it_by_free_runs(wrong):
     # a stiffness that is off makes a force of opposite sign outside the window of the one within
-    found = limited_regions(unexplained(problem(snap, wrong=wrong)))
+    nominal = unexplained(problem(snap, wrong=wrong))
+    found = limited_regions(nominal, nominal)
     ((region,),) = found.values()
     low, high = region["displacement"]
     # a cell is a 24th of a stroke of some 310 mm, and the force has all but gone at the last fifth of the window
@@ -105,7 +106,8 @@ def test_a_force_within_a_window_is_told_from_one_outside_it_by_free_runs(wrong)
 
 def test_a_force_on_one_side_has_one_region_that_ends_where_the_motion_does():
     case = problem(stop)
-    ((region,),) = limited_regions(unexplained(case)).values()
+    nominal = unexplained(case)
+    ((region,),) = limited_regions(nominal, nominal).values()
     reach = np.abs(case.motion(0).position).max()
     # a cell and a half, a 24th of the stroke each: straight lines between cells bend early
     assert region["displacement"][0] == pytest.approx(0.01, abs=1.5 * reach / 12)
@@ -115,7 +117,8 @@ def test_a_force_on_one_side_has_one_region_that_ends_where_the_motion_does():
 
 @pytest.mark.parametrize("force_of", [nothing, dry])
 def test_no_region_where_nothing_is_missing_or_something_everywhere(force_of):
-    assert limited_regions(unexplained(problem(force_of))) == {}
+    nominal = unexplained(problem(force_of))
+    assert limited_regions(nominal, nominal) == {}
 
 
 def test_the_missing_force_is_estimated_sample_by_sample():
@@ -222,7 +225,7 @@ def test_a_named_stop_tells_its_region_beside_a_faulty_sensor_and_a_smooth_sprin
     search = attribute(case, candidates, most=2)
     best, nothing = (Explanation(((case, f),)) for f in (search.ranked()[0], search.ranked(0)[0]))
     assert {placed.effect.name for placed in best.hypothesis} == set(names[:2])
-    for location in locate(case, nothing, best, verdict="effect").locations:
+    for location in locate(case, nothing, best, borne_out=True, unknown=False).locations:
         assert location.kind == "sensor"
         assert location.state_region["displacement"][0] == pytest.approx(0.01, abs=5e-4)  # 1 to 2 cells
     cubic = next(

@@ -20,6 +20,7 @@ from bench.discrepancy.challenge import challenge, reduce_best
 from bench.discrepancy.effect import Effect
 from bench.discrepancy.fit import Fit, fit
 from bench.discrepancy.grid_points import Point
+from bench.discrepancy.lack_of_fit import lack_of_fit
 from bench.discrepancy.nominate import (
     SHORT,
     TRUSTED,
@@ -60,6 +61,8 @@ SIMULATED = 2
 """Starts of each that are fitted."""
 STALLED = 0.7
 """If one more effect leaves more than this part of the excess of chi-squared, a further one is not tried."""
+SEVERAL = 2
+"""Number of effects as which a force that is lacking is doubted: a second one is looked for at the least suspicion."""
 CONSIDERED, PROMISED = 12, 2
 """Hypotheses that are asked what they promise together with one more effect, and those that are extended for that alone."""
 UNPROMISING = 0.25
@@ -113,9 +116,16 @@ def attribute(
                 f"{len(best.hypothesis)} effect(s): {names(best.hypothesis)}, chi-squared {best.reduced:.3g}"
             )
             if consistent(best):
-                if len(best.hypothesis) != size or not _promising(screen, best):
+                if len(best.hypothesis) != size:
                     break
-                _extend(search, screen, [best], pool, count=4)
+                # what is down to the noise and lacks a force all the same may be neither of two effects
+                lacks = not problem.windowed and lack_of_fit(problem, best).significant(
+                    nothing.chi2 - best.chi2, effects=SEVERAL
+                )
+                if not lacks and not _promising(screen, best):
+                    break
+                bases = worth_extending(search, screen, size, 4 - size) if lacks else [best]
+                _extend(search, screen, bases, pool, count=4)
                 reduce_best(search, pool)
                 continue
             ranked = search.ranked(size)

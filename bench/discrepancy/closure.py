@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -20,11 +21,13 @@ from bench.laws.base import ForceLaw, Parameter, kernel
 
 POWERS = ((0, 0), (2, 0), (1, 1), (0, 2), (3, 0), (2, 1), (1, 2), (0, 3), (5, 0), (4, 1), (0, 5))
 """Powers of displacement and velocity of the surface; (1, 0) and (0, 1) are the nominal stiffness and damping."""
-KNOTS = 17
-"""Values of a force of one variable."""
-WARP = 3.0
+SPANS = 30
+"""Pieces of a force of one variable."""
+WARP = 2.0
 WARPED = math.sinh(WARP)
-"""How much denser they are about rest, where gaps, friction and snaps happen: equal steps of asinh(WARPED x) / WARP."""
+"""How much shorter they are about rest, where gaps, friction and snaps happen: equal steps of asinh(WARPED x) / WARP."""
+JITTER = 1e-6
+"""Part of a smooth curve's variance that is independent from value to value, so that rounding leaves it a covariance."""
 MEMORY = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)
 """Relaxation times of a free linear memory, by the time of one radian of the motion."""
 
@@ -65,16 +68,19 @@ _SURFACE = ForceLaw(
 
 @kernel
 def curve_force(t, q, v, z, theta, f):
-    """A force of one variable: Catmull and Rom's curve through `KNOTS` values from -1 to 1, denser about rest."""
+    """A force of one variable from -1 to 1: a cubic spline of `SPANS` pieces, shorter about rest, by its B-spline coefficients."""
     x = min(max(q[0] * theta[0] + v[0] * theta[1], -1.0), 1.0)
-    u = 0.5 * (KNOTS - 1) * (1.0 + math.asinh(x * WARPED) / WARP)
-    k = min(max(int(u), 0), KNOTS - 2)
+    u = 0.5 * SPANS * (1.0 + math.asinh(x * WARPED) / WARP)
+    k = min(max(int(u), 0), SPANS - 1)
     s = u - k
-    before, here = theta[2 + max(k - 1, 0)], theta[2 + k]
-    ahead, beyond = theta[3 + k], theta[2 + min(k + 2, KNOTS - 1)]
-    leave, arrive = 0.5 * (ahead - before), 0.5 * (beyond - here)
-    rise = ahead - here
-    f[0] += here + s * (leave + s * (3.0 * rise - 2.0 * leave - arrive + s * (leave + arrive - 2.0 * rise)))
+    r = 1.0 - s
+    first, last = r * r * r, s * s * s
+    f[0] += (
+        first * theta[2 + k]
+        + (3.0 * last - 6.0 * s * s + 4.0) * theta[3 + k]
+        + (3.0 * first - 6.0 * r * r + 4.0) * theta[4 + k]
+        + last * theta[5 + k]
+    ) / 6.0
 
 
 _CURVE = ForceLaw(
@@ -82,10 +88,10 @@ _CURVE = ForceLaw(
     (
         Parameter("per_position", "1/m", 1.0, rotational="1/rad"),
         Parameter("per_velocity", "s/m", 0.0, rotational="s/rad"),
-        *(Parameter(f"f{k}", "N", 0.0, rotational="N m") for k in range(KNOTS)),
+        *(Parameter(f"f{k}", "N", 0.0, rotational="N m") for k in range(SPANS + 3)),
     ),
     curve_force,
-    equation="f = curve through f_k over q/Q, or over v/V",
+    equation="f = cubic spline of coefficients f_k over q/Q, or over v/V",
 )
 
 
@@ -143,11 +149,35 @@ def _closure(
     )  # fmt: skip
 
 
-_KNOTS = [f"f{k}" for k in range(KNOTS)]
+_KNOTS = [f"f{k}" for k in range(SPANS + 3)]
+FREE_DISPLACEMENT = _closure("free_displacement", _CURVE, _KNOTS, _over_position)
+FREE_VELOCITY = _closure("free_velocity", _CURVE, _KNOTS, _over_velocity)
 FREE_MEMORY = _closure("free_memory", _MEMORY, [f"c{i}" for i in range(len(MEMORY))], _memory_theta)
+
+
+def smoothing(length: float) -> Values:
+    """What makes the coefficients of a smooth curve (n, n) out of independent ones of unit deviation.
+
+    Args:
+        length: Distance within which the curve keeps its course, over its reach.
+    """
+    middles = np.sinh(WARP * np.linspace(-1.0 - 2.0 / SPANS, 1.0 + 2.0 / SPANS, SPANS + 3)) / WARPED
+    covariance = np.exp(-0.5 * ((middles[:, None] - middles) / length) ** 2)
+    return np.asarray(np.linalg.cholesky(covariance + JITTER * np.eye(len(middles))), dtype=np.float64)
+
+
+def mixed(closure: Effect, mixing: Values) -> Effect:
+    """A closure whose coefficients are mixed of as many independent ones: a prior that knows of neighbours."""
+    inner = closure.theta
+    assert inner is not None
+    return replace(closure, theta=lambda values, scales: inner(mixing @ values, scales))
+
+
+SMOOTH = 0.25
+"""Length of the curves that are fitted on top of an explanation."""
 CLOSURES = (
     _closure("polynomial_surface", _SURFACE, [f"c{i}{j}" for i, j in POWERS], _surface_theta),
-    _closure("free_displacement", _CURVE, _KNOTS, _over_position),
-    _closure("free_velocity", _CURVE, _KNOTS, _over_velocity),
+    mixed(FREE_DISPLACEMENT, smoothing(SMOOTH)),
+    mixed(FREE_VELOCITY, smoothing(SMOOTH)),
     FREE_MEMORY,
 )

@@ -17,11 +17,11 @@ import numpy as np
 from bench.discrepancy import evidence
 from bench.discrepancy.case import Case, read_case
 from bench.discrepancy.catalogue import CATALOGUE
-from bench.discrepancy.closure import CLOSURES, FREE_MEMORY
+from bench.discrepancy.closure import CLOSURES
 from bench.discrepancy.contradiction import contradicted
 from bench.discrepancy.effect import Effect
 from bench.discrepancy.explain import Explanation, close, explain, nominal_alone
-from bench.discrepancy.free_rival import likelier_memory
+from bench.discrepancy.free_rival import Rival, likelier_force
 from bench.discrepancy.idle_loads import idle_notes, without_idle_noise
 from bench.discrepancy.next_excitation import separate, told_apart
 from bench.discrepancy.nominal_file import check_units
@@ -108,9 +108,11 @@ def diagnose(
     best = explanations[0]
     kind, probabilities = evidence.judge(explanations)
     doubt, rival = "", None
-    if kind == "effect":
+    if kind != "none":
         progress(f"doubts about {names(best.hypothesis)}")
-        doubt, rival = _doubt(case, problem, best, rng)
+        rival = likelier_force(explanations)
+    if kind == "effect":
+        doubt = _doubt(case, problem, best, rival, rng)
     if doubt:
         kind, probabilities = "unknown", evidence.OUTSIDE_THE_CATALOGUE
     seen, fitted = recorded(problem, catalogue), kind
@@ -120,7 +122,13 @@ def diagnose(
     progress("gap on the judging records")
     final, closure, found = _shrunk(case, problem, explanations, kind, rival, rng)
     widest = max(found, key=lambda gap: gap.before / max(gap.noise_floor, 1e-12))
-    where = locate(problem, nominal_alone(explanations), best, verdict=kind)
+    where = locate(
+        problem,
+        nominal_alone(explanations),
+        rival.explanation if rival else best,
+        borne_out=rival is not None or kind == "effect",
+        unknown=kind == "unknown",
+    )
     verdict = Verdict(
         verdict=kind,
         named=(*evidence.named(explanations), *seen) if kind == "effect" else (),
@@ -147,13 +155,12 @@ def diagnose(
 
 
 def _doubt(
-    case: Case, problem: Problem, best: Explanation, rng: np.random.Generator
-) -> tuple[str, Explanation | None]:
-    """What speaks against an explanation that leaves nothing but noise, empty where nothing does; and what is likelier."""
-    rival = likelier_memory(best)
+    case: Case, problem: Problem, best: Explanation, rival: Rival | None, rng: np.random.Generator
+) -> str:
+    """What speaks against an explanation that leaves nothing but noise; empty where nothing does."""
     if rival is not None:
-        return evidence.OUTDONE, rival
-    return (evidence.FAILS if contradicted(case, problem, best, rng) else ""), None
+        return evidence.OUTDONE
+    return evidence.FAILS if contradicted(case, problem, best, rng) else ""
 
 
 def _shrunk(
@@ -161,16 +168,14 @@ def _shrunk(
     problem: Problem,
     explanations: Sequence[Explanation],
     kind: Kind,
-    rival: Explanation | None,
+    rival: Rival | None,
     rng: np.random.Generator,
 ) -> tuple[Explanation, str, tuple[Gap, ...]]:
     """How far the gap shrinks: the explanation behind `Gap.after`, the closure in it if any, and the gaps."""
     best, nothing = explanations[0], nominal_alone(explanations)
     final, closure = best, ""
-    if rival is not None:
-        final, closure = rival, FREE_MEMORY.name
-    elif kind == "unknown":
-        final, closure = close(best, nothing, CLOSURES)
+    if kind == "unknown":
+        final, closure = rival or close(best, nothing, CLOSURES)
     stages = [("nominal", nominal_prediction(problem)), ("parameters only", nothing.predict)]
     stages += [(label, e.predict) for label, e in _path(explanations)]
     stages.append((names(final.hypothesis), final.predict))

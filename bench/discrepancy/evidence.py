@@ -24,7 +24,7 @@ explanations that were sure of themselves were wrong on sealed cases."""
 OUTSIDE_THE_CATALOGUE = {"effect": OUTSIDE, "none": 0.0, "unknown": 1.0 - OUTSIDE}
 """Probabilities of the verdicts where there is a doubt about an explanation that leaves nothing but noise."""
 FAILS = "explains the records for identification and fails on those for judging"
-OUTDONE = "explains the records, but a single force with a memory of its own does so better"
+OUTDONE = "explains the records, but a single force that follows no law of the catalogue does so better"
 """Doubts about an explanation."""
 
 

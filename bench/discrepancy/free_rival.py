@@ -1,61 +1,194 @@
-"""A free rival: one force with a linear memory of any shape in place of the laws that an explanation names.
+"""Free rivals: one force that promises no law in place of all that an explanation names.
 
-Rubber remembers over decades of time. Within the band of a record one or two relaxations of the catalogue imitate that, with a
-flexible base or a wrong gain making up for the rest, and what they leave is lost in the noise. But they are more laws, or more
-finely tuned ones, than what they imitate: the evidence of a single memory that promises no law is higher then, while a
-relaxation that is one has the better evidence itself.
+Two or three laws together imitate within the noise what no catalogue holds: relaxations the memory of rubber, which reaches over
+decades of time; a stop and a cubic spring the contact of two spheres. But they are more laws, or more finely tuned ones, than what
+they imitate: the evidence of a single force that is free in the displacement, the velocity or its memory is higher then, while a
+law that is true has the better evidence itself, since it does with one number where a free force needs many.
+
+Curves are free but smooth: their values have the prior of a Gaussian process, whose length and size are averaged over. A stop, too,
+has a rival that the catalogue does not hold: one that throws back less than it takes.
+
+References:
+    C. E. Rasmussen & C. K. I. Williams, Gaussian Processes for Machine Learning, MIT Press 2006, ch. 5 (evidence).
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from itertools import product
+from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+from scipy.special import logsumexp
 from threadpoolctl import threadpool_limits
 
-from bench.discrepancy.closure import FREE_MEMORY
+from bench.discrepancy.closure import FREE_DISPLACEMENT, FREE_MEMORY, FREE_VELOCITY, mixed, smoothing
+from bench.discrepancy.effect import Effect, FreeParameter, Scales, Values
 from bench.discrepancy.explain import Explanation
 from bench.discrepancy.fit import Fit, fit
+from bench.discrepancy.grid_points import Node
+from bench.discrepancy.nominate import along
+from bench.discrepancy.placed import Placed
 from bench.discrepancy.placements import placements
-from bench.discrepancy.problem import Problem
-from bench.discrepancy.screen import Screen
-from bench.discrepancy.search import THOROUGH, THREADS, posterior
+from bench.discrepancy.problem import Array, Problem
+from bench.discrepancy.screen import Ground, Screen
+from bench.discrepancy.search import (
+    IMMATERIAL,
+    LOG_PRIOR_EFFECT,
+    SIGHT,
+    THOROUGH,
+    THREADS,
+    WITHIN_REACH,
+    posterior,
+)
 
-IN_SIGHT = 1.2
-"""Chi-squared that the screening must promise a memory to reach, over that of the explanation: a linear force keeps its promise."""
+CONTACTS = ("one_sided_stop", "gap")
+"""Effects whose law has a damper in the contact, its third parameter, which the catalogue leaves at zero."""
+DAMPING = FreeParameter("damping", "force/velocity", std=1.5)
+LENGTHS = (0.15, 0.25, 0.4, 0.7, 1.2)
+"""Distances within which a smooth curve keeps its course, over the largest displacement or velocity."""
+TRIED = 2
+"""Free forces that are fitted, at most."""
+SIZES = (0.03, 0.1, 0.3, 1.0)
+"""Sizes of a smooth curve, over the RMS load."""
 
 
-def likelier_memory(best: Explanation) -> Explanation | None:
-    """The explanation with a free linear memory in place of all effects of a group of degrees of freedom, where that is likelier.
+class Rival(NamedTuple):
+    """An explanation by free forces, and what these are: names of closures, joined by " + "."""
+
+    explanation: Explanation
+    closure: str
+
+
+class _Promise(NamedTuple):
+    """A free force with its evidence along a motion that is known.
+
+    Attributes:
+        placed: The force, with its likeliest prior.
+        start: Vector (n,) that a fit starts from.
+        log_posterior: As `posterior` states it, averaged over the priors.
+        toll: What the average takes from the log posterior with the likeliest prior.
+    """
+
+    placed: Placed
+    start: Array
+    log_posterior: float
+    toll: float
+
+
+def likelier_force(explanations: Sequence[Explanation]) -> Rival | None:
+    """The best explanation with one free force in place of all effects of a group of degrees of freedom, where that is likelier.
 
     Args:
-        best: An explanation that leaves nothing but noise.
+        explanations: By effects of the catalogue, the best first.
 
     Returns:
-        The likelier explanation; None where the laws are, in every group.
+        The likelier explanation; None where the laws are likelier, in every group.
     """
+    best = explanations[0]
     if any(problem.windowed or not problem.noise_stated for problem, _ in best.parts):
         return None
-    rivals = [_rival(problem, fitted) for problem, fitted in best.parts]
-    if all(rival is None for rival in rivals):
-        return None
-    return Explanation(
-        tuple((p, rival or fitted) for (p, fitted), rival in zip(best.parts, rivals, strict=True))
+    parts, free = [], []
+    for problem, fitted in best.parts:
+        contacts = _contacts(problem, explanations) if fitted.hypothesis else []
+        rival = _rival(problem, fitted, contacts) if fitted.hypothesis else None
+        parts.append((problem, rival or fitted))
+        free += [rival.hypothesis[0].effect.name] if rival else []
+    return Rival(Explanation(tuple(parts)), " + ".join(dict.fromkeys(free))) if free else None
+
+
+def _contacts(problem: Problem, explanations: Sequence[Explanation]) -> list[Fit]:
+    """The likeliest fit of each contact alone."""
+    found: dict[tuple[str, str, str], Fit] = {}
+    for explanation in explanations:
+        for own, fitted in explanation.parts:
+            if own is problem and [p.effect.name in CONTACTS for p in fitted.hypothesis] == [True]:
+                found.setdefault(fitted.hypothesis[0].key, fitted)
+    return list(found.values())
+
+
+def _rival(problem: Problem, fitted: Fit, contacts: Sequence[Fit]) -> Fit | None:
+    """The fit of a single force alone, where it is likelier than a hypothesis; the likeliest one."""
+    best, most = None, posterior(fitted)
+    with ThreadPoolExecutor(THREADS) as pool, threadpool_limits(1, user_api="blas"):
+        tasks = [*_damped(problem, (fitted, *contacts)), *_free(problem, fitted, pool.map)]
+        for placed, start, toll in tasks:
+            rival = fit(
+                problem, (placed,), start=start, iterations=THOROUGH, limit=fitted.cost + SIGHT, each=pool.map
+            )
+            if posterior(rival) + toll > most:
+                best, most = rival, posterior(rival) + toll
+    return best
+
+
+def _damped(problem: Problem, fits: Sequence[Fit]) -> Iterator[tuple[Placed, Array, float]]:
+    """Each contact of some hypotheses with a damper of its own, and where to begin with it alone."""
+    for fitted in fits:
+        _, etas = problem.split(fitted.hypothesis, fitted.vector)
+        for placed, eta in zip(fitted.hypothesis, etas, strict=True):
+            if placed.effect.name in CONTACTS:
+                nominal = fitted.vector[: len(problem.nominal)]
+                start = np.concatenate([nominal, eta, [DAMPING.mean]])
+                yield replace(placed, effect=damped(placed.effect)), start, 0.0
+
+
+def _free(problem: Problem, fitted: Fit, each: Callable) -> Iterator[tuple[Placed, Array, float]]:
+    """Free forces that promise to be likelier than a hypothesis, the likeliest first, and where to begin with them."""
+    families = (FREE_DISPLACEMENT, FREE_VELOCITY, FREE_MEMORY)
+    screen = along(Screen(problem, placements(problem.case, problem.structure, families), each), fitted)
+    ground = screen.ground()
+    promises = sorted(
+        (_promised(screen, ground, node) for node in screen.nodes), key=lambda p: -p.log_posterior
+    )
+    for promise in promises[:TRIED]:
+        if promise.log_posterior > posterior(fitted) - WITHIN_REACH:
+            yield promise.placed, promise.start, promise.toll
+
+
+def damped(contact: Effect) -> Effect:
+    """A contact that throws back less than it takes: its law with the damper that the catalogue leaves out."""
+    spring = contact.theta
+    assert spring is not None
+
+    def theta(values: Values, scales: Scales) -> Values:
+        found = spring(values[:-1], scales)
+        found[2] = values[-1]
+        return found
+
+    return replace(
+        contact, name=f"damped_{contact.name}", parameters=(*contact.parameters, DAMPING), theta=theta
     )
 
 
-def _rival(problem: Problem, fitted: Fit) -> Fit | None:
-    """The fit of a free memory alone, where it is likelier than a hypothesis."""
-    candidates = placements(problem.case, problem.structure, [FREE_MEMORY]) if fitted.hypothesis else []
-    if not candidates:
-        return None
-    with ThreadPoolExecutor(THREADS) as pool, threadpool_limits(1, user_api="blas"):
-        zero = np.zeros(len(problem.nominal))
-        nothing = fit(problem, (), start=zero, iterations=THOROUGH, each=pool.map)
-        points = Screen(problem, candidates, pool.map).ranked(nothing)[:1]
-        promised = nothing.chi2 - sum(point.gain for point in points)
-        if not points or promised > IN_SIGHT * fitted.chi2:
-            return None
-        start = np.concatenate([nothing.vector, points[0].eta])
-        rival = fit(problem, (points[0].placed,), start=start, iterations=THOROUGH, each=pool.map)
-    return rival if posterior(rival) > posterior(fitted) else None
+def _promised(screen: Screen, ground: Ground, node: Node) -> _Promise:
+    """The evidence of a free force, linear in its coefficients along a motion that is known."""
+    left = ground.left
+    inner = ground.head.T @ node.columns
+    gram = node.gram - inner.T @ inner
+    right = node.columns.T @ left[: len(ground.residual)]
+    alone = -0.5 * float(left @ left) - float(np.sum(np.log(np.abs(np.diag(ground.triangle)))))
+    found: list[tuple[float, Array, Array]] = []
+    for mixing in _mixings(node.placed.effect):
+        curvature = np.eye(len(gram)) + mixing.T @ gram @ mixing
+        factor = cho_factor(curvature)
+        eta = cho_solve(factor, mixing.T @ right)
+        occam = float(np.sum(np.log(np.abs(np.diag(factor[0])))))
+        found.append((0.5 * float(right @ mixing @ eta) - occam, mixing, eta))
+    gain, mixing, eta = max(found, key=lambda entry: entry[0])
+    toll = float(logsumexp([entry[0] for entry in found])) - float(np.log(len(found))) - gain
+    prior = LOG_PRIOR_EFFECT - 0.5 * IMMATERIAL * screen.problem.n_residuals
+    moved = screen.deviations + ground.moves(node.columns @ (mixing @ eta))
+    placed = replace(node.placed, effect=mixed(node.placed.effect, mixing))
+    return _Promise(placed, np.concatenate([moved, eta]), alone + gain + toll + prior, toll)
+
+
+def _mixings(effect: Effect) -> Iterator[Array]:
+    """Prior covariances of a free force's coefficients, by what makes them of independent ones of unit deviation."""
+    if effect is FREE_MEMORY:
+        yield np.eye(effect.n_linear)
+        return
+    for length, size in product(LENGTHS, SIZES):
+        yield size * smoothing(length)

@@ -50,6 +50,16 @@ def about(screen: Screen, base: Fit, *, explained: bool) -> Screen:
     return screen.beside(base, simulated=explained) if spoilt or explained else screen
 
 
+def along(screen: Screen, fitted: Fit) -> Screen:
+    """A screening along the free run of an explanation that follows the motion: it tells it better than the records.
+
+    Not where a sensor is part of it; what the sensor told instead would be no residual of another force.
+    """
+    spoilt = any(placed.effect.site == "sensor" for placed in fitted.hypothesis)
+    told = fitted.hypothesis and followed(fitted, screen.problem) and not spoilt
+    return screen.beside(fitted, simulated=True) if told else screen
+
+
 def refined(screen: Screen, ground: Ground, points: Sequence[Point], pool: ThreadPoolExecutor) -> list[Point]:
     """Refine the leading grid points of the leading effects along the measured motion; by decreasing gain.
 

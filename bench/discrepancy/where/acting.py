@@ -76,7 +76,8 @@ def _regions(problem: Problem, placed: Placed, eta: Array) -> list[dict[str, Any
 
 
 def _intervals(coordinate: Array, acts: np.ndarray) -> list[tuple[float, float]]:
-    """Intervals of a coordinate in which something acts; empty where that is all of the visited ones."""
+    """Intervals of a coordinate, out of those between the largest values either way, in which something acts; empty where that is
+    all of the visited ones."""
     reach = float(np.abs(coordinate).max()) or 1.0
     cell = np.clip(((coordinate / reach + 1.0) * 0.5 * CELLS).astype(int), 0, CELLS - 1)
     visited = np.unique(cell)
@@ -87,5 +88,8 @@ def _intervals(coordinate: Array, acts: np.ndarray) -> list[tuple[float, float]]
     for run in np.split(visited, np.flatnonzero(np.diff(active)) + 1):
         inside = acts & (cell >= run[0]) & (cell <= run[-1])
         if inside.any():
-            out.append((float(coordinate[inside].min()), float(coordinate[inside].max())))
+            # where the motion turns back the force does not end
+            low = -reach if run[0] == visited[0] else float(coordinate[inside].min())
+            high = reach if run[-1] == visited[-1] else float(coordinate[inside].max())
+            out.append((low, high))
     return out

@@ -20,7 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.discrepancy.explain import Explanation
-from bench.discrepancy.problem import Array, Problem
+from bench.discrepancy.nominate import along
+from bench.discrepancy.problem import Array
 from bench.discrepancy.screen import Ground, Screen
 from bench.discrepancy.structure import Place
 
@@ -92,11 +93,12 @@ class _Free(NamedTuple):
         return np.asarray(np.linalg.lstsq(self.gram, self.seen, rcond=1e-9)[0], dtype=np.float64)
 
 
-def limited_regions(nominal: Explanation) -> dict[str, tuple[dict[str, Any], ...]]:
+def limited_regions(nominal: Explanation, best: Explanation) -> dict[str, tuple[dict[str, Any], ...]]:
     """Regions of a missing force that acts in a part of the state space only, by name of its place.
 
     Args:
         nominal: The explanation without effects, in one part for each group of coupled degrees of freedom.
+        best: What comes nearest; its free run tells the motion where it is down to the noise, whatever force it takes for that.
 
     Returns:
         For each place with such a force its regions by decreasing share: limits of "displacement" or "velocity", "share" of its
@@ -105,18 +107,21 @@ def limited_regions(nominal: Explanation) -> dict[str, tuple[dict[str, Any], ...
     out = {}
     for problem, _ in nominal.parts:
         screen = Screen(problem, [])
+        for own, fitted in best.parts:
+            if own is problem:
+                screen = along(screen, fitted)
         ground = screen.ground()
         for place in problem.structure.places:
             if len(place.rows) == 1:
-                found = _regions(problem, place, screen, ground)
+                found = _regions(place, screen, ground)
                 if found:
                     out[place.name] = found
     return out
 
 
-def _regions(problem: Problem, place: Place, screen: Screen, ground: Ground) -> tuple[dict[str, Any], ...]:
+def _regions(place: Place, screen: Screen, ground: Ground) -> tuple[dict[str, Any], ...]:
     """Regions of the force that is missing at a place; none where nothing is, or where it has no limits."""
-    motions = [problem.motion(i) for i in range(len(problem.records))]
+    motions = [screen.problem.motion(i) for i in range(len(screen.problem.records))]
     states = [np.column_stack([m.position @ place.rows[0], m.velocity @ place.rows[0]]) for m in motions]
     free = [_free(place, states, over, screen, ground) for over in range(len(COORDINATES))]
     # what not even the better one explains is no less noise to the other

@@ -25,6 +25,7 @@ from scipy import stats
 from bench.discrepancy.explain import Explanation
 from bench.discrepancy.prepared import fast_length, whitened_spectrum
 from bench.discrepancy.problem import Array, Problem
+from bench.discrepancy.search import near
 from bench.discrepancy.verdict import Location, Split
 from bench.discrepancy.where.acting import acting_regions
 from bench.discrepancy.where.limited import limited_regions
@@ -83,14 +84,22 @@ class _Excess(NamedTuple):
     density: float
 
 
-def locate(problem: Problem, nominal: Explanation, best: Explanation, *, verdict: str) -> Whereabouts:
+def locate(
+    problem: Problem,
+    nominal: Explanation,
+    best: Explanation,
+    *,
+    borne_out: bool,
+    unknown: bool,
+) -> Whereabouts:
     """Locate the residuals of the nominal model.
 
     Args:
         problem: Records and structure on all degrees of freedom.
         nominal: The explanation without effects, its parameters re-estimated.
         best: The best explanation; where it is down to the noise its nominal parameters serve for the force map.
-        verdict: "effect", so that the laws of its effects tell where they act, "none" or "unknown".
+        borne_out: Whether the records bear out the forces of `best`, so that these tell where they act.
+        unknown: Whether the gap is due to something unknown.
     """
     names = problem.structure.channels
     excess = _excess(problem, nominal)
@@ -98,10 +107,10 @@ def locate(problem: Problem, nominal: Explanation, best: Explanation, *, verdict
     known = known_parameters(best)
     maps = state_maps(problem, problem.records, known=known)
     acting: Mapping[str, tuple[dict[str, Any], ...]] = {}
-    if verdict == "unknown":
-        acting = limited_regions(nominal)
-    elif verdict == "effect" and known is not None:
+    if borne_out and all(near(fitted) for _, fitted in best.parts):
         acting = acting_regions(best)
+    if unknown and not acting:
+        acting = limited_regions(nominal, best)
     total = sum(max(e.chi2 - e.count, 0.0) for e in excess.values())
     p_values = [float(stats.chi2.sf(e.chi2, e.count)) for e in excess.values()]
     adjusted = dict(zip(excess, stats.false_discovery_control(p_values), strict=True)) if excess else {}
