@@ -12,7 +12,7 @@ from bench.discrepancy.nominate import REFINED_STARTS, about, followed, leading,
 from bench.discrepancy.placed import Hypothesis
 from bench.discrepancy.problem import Problem
 from bench.discrepancy.screen import Screen
-from bench.discrepancy.search import SIGHT, Search, carry_on, converge, key_of
+from bench.discrepancy.search import SIGHT, Search, carry_on, consistent, converge, key_of
 
 LEFT = 0.02
 """Part of a named effect's gain along the motion that a challenger may lack, besides twice what the effect leaves."""
@@ -28,12 +28,14 @@ def challenge(search: Search, screen: Screen, pool: ThreadPoolExecutor, *, round
         search: Fits so far; the new ones are added.
         screen: Screening of the same problem.
         pool: Threads.
-        rounds: A rival that wins is challenged in turn, so many times at most.
+        rounds: A rival that wins is challenged in turn, so many times at most; once where nothing explains the records.
     """
     challenged: set[frozenset] = set()
     for _ in range(rounds):
         best = search.ranked()[0]
-        if not best.hypothesis or key_of(best.hypothesis) in challenged:
+        known = not best.hypothesis or key_of(best.hypothesis) in challenged
+        # which of several insufficient explanations comes nearest is not worth minutes
+        if known or (challenged and not consistent(best)):
             return
         challenged.add(key_of(best.hypothesis))
         along = followed(best, search.problem)
