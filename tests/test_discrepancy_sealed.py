@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from sealed_cases import fitted, sealed
 
-from bench.discrepancy import BlindOptions, diagnose
+from bench.discrepancy import BlindOptions, Case, diagnose
 from bench.discrepancy.attribute import attribute, prepare, worth_extending
 from bench.discrepancy.blind.cases import draw_case
 from bench.discrepancy.catalogue import effect_named
@@ -16,7 +16,7 @@ from bench.discrepancy.contradiction import contradicted
 from bench.discrepancy.coupled import coupled_fits
 from bench.discrepancy.explain import Explanation
 from bench.discrepancy.fit import fit
-from bench.discrepancy.free_rival import likelier_memory
+from bench.discrepancy.free_rival import likelier_force
 from bench.discrepancy.lack_of_fit import lack_of_fit
 from bench.discrepancy.placements import placements
 from bench.discrepancy.problem import Problem
@@ -176,7 +176,9 @@ def test_one_free_memory_is_likelier_than_the_laws_that_imitate_it():
     assert best.consistent  # neither chi-squared nor a force on top of them tells that these are not it
     assert not any(best.lacking(next(e for e in found.explanations if not e.hypothesis)))
     assert (verdict.verdict, verdict.closure) == ("unknown", "free_memory")
-    assert verdict.explanation.endswith("a single force with a memory of its own does so better.")
+    assert verdict.explanation.endswith(
+        "a single force with a memory of its own, which no law of the catalogue describes, does so better."
+    )
     assert found.final.log_posterior > best.log_posterior
     assert verdict.gap.after < 1.1 * verdict.gap.noise_floor
 
@@ -193,7 +195,74 @@ def test_a_relaxation_is_likelier_than_any_free_memory(seed):
         key=lambda found: found[1].cost,
     )
     assert consistent(explained)
-    assert likelier_memory(Explanation(((problem, explained),))) is None
+    assert likelier_force([Explanation(((problem, explained),))]) is None
+
+
+def foreign(name: str, seed: int) -> Case:
+    """A case of the sdof rig with a foreign effect."""
+    options = BlindOptions(
+        effects=(name,), shares=(0.0, 0.0, 0.0, 1.0), rigs=(1.0, 0.0, 0.0), detectability=False
+    )
+    return draw_case(name, np.random.default_rng(seed), options)[0]
+
+
+@pytest.mark.slow
+def test_one_free_curve_is_likelier_than_the_springs_that_imitate_it():
+    springs = [effect_named(name) for name in ("gap", "cubic_stiffness", "one_sided_stop")]
+    found = diagnose(foreign("saturating_spring", 4), catalogue=springs)
+    best, verdict = found.explanations[0], found.verdict
+    assert {p.effect.name for p in best.hypothesis} == {"gap", "cubic_stiffness"}
+    assert best.consistent
+    assert not any(best.lacking(next(e for e in found.explanations if not e.hypothesis)))
+    assert (verdict.verdict, verdict.closure) == ("unknown", "free_displacement")
+    assert verdict.gap.after < 1.1 * verdict.gap.noise_floor
+
+
+@pytest.mark.slow
+def test_a_stop_that_dissipates_is_likelier_than_a_spring_and_a_damper_and_tells_where_it_is():
+    case = foreign("restitution_stop", 5)
+    found = diagnose(case, catalogue=[effect_named(name) for name in ("one_sided_stop", "quadratic_damping")])
+    best, verdict = found.explanations[0], found.verdict
+    assert {p.effect.name for p in best.hypothesis} == {"one_sided_stop", "quadratic_damping"}
+    assert best.consistent
+    assert (verdict.verdict, verdict.closure) == ("unknown", "damped_one_sided_stop")
+    ((region,),) = found.where.acting.values()
+    reach = max(np.abs(r.values["displacement"]).max() for r in case.identification)
+    # a rigid stop at 20.19 mm, and on to where the motion ends; a spring in its place has to begin before it, by its penetration
+    assert region["displacement"] == pytest.approx((0.02019, reach), abs=0.02 * reach)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "cubic_stiffness",
+        "quadratic_stiffness",
+        "one_sided_stop",
+        "gap",
+        "quadratic_damping",
+        "power_law_damping",
+    ],
+)
+def test_a_true_law_is_likelier_than_any_free_curve(name):
+    options = BlindOptions(
+        effects=(name,), shares=(0.0, 1.0, 0.0, 0.0), rigs=(1.0, 0.0, 0.0), detectability=False
+    )
+    for seed in (1, 2):
+        case, _ = draw_case(name, np.random.default_rng(seed), options)
+        found = diagnose(case, catalogue=[effect_named(name)])
+        assert found.explanations[0].consistent
+        assert likelier_force(found.explanations) is None
+
+
+@pytest.mark.slow
+def test_beside_what_lacks_a_force_within_the_noise_other_pairs_are_searched():
+    case, answer = sealed(20261203, 97)
+    truth = {e["name"] for e in answer["effects"]}
+    assert truth == {"one_sided_stop", "bouc_wen_hysteresis"}
+    problem, alone = fitted(case, "quadratic_stiffness", [0.0])
+    assert consistent(alone)
+    assert lack_of_fit(problem, alone).significant(0.0)
+    assert best_names(case, *truth, "quadratic_stiffness") == truth
 
 
 @pytest.mark.slow

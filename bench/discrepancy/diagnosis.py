@@ -159,7 +159,7 @@ def _doubt(
 ) -> str:
     """What speaks against an explanation that leaves nothing but noise; empty where nothing does."""
     if rival is not None:
-        return evidence.OUTDONE
+        return evidence.outdone(rival.closure)
     return evidence.FAILS if contradicted(case, problem, best, rng) else ""
 
 
@@ -175,7 +175,7 @@ def _shrunk(
     best, nothing = explanations[0], nominal_alone(explanations)
     final, closure = best, ""
     if kind == "unknown":
-        final, closure = rival or close(best, nothing, CLOSURES)
+        final, closure = _closed(best, nothing, rival)
     stages = [("nominal", nominal_prediction(problem)), ("parameters only", nothing.predict)]
     stages += [(label, e.predict) for label, e in _path(explanations)]
     stages.append((names(final.hypothesis), final.predict))
@@ -186,6 +186,14 @@ def _shrunk(
         stages[-1] = ("no closure helps", nothing.predict)
         found = gaps(case, problem, stages=stages, rng=rng, final=_model(final))
     return final, closure, found
+
+
+def _closed(best: Explanation, nothing: Explanation, rival: Rival | None) -> tuple[Explanation, str]:
+    """What a free model makes of an unknown gap: alone where that explains the records, else the likelier of alone and on top."""
+    if rival is not None and rival.explanation.consistent:
+        return rival
+    closed = close(best, nothing, CLOSURES)
+    return rival if rival and rival.explanation.log_posterior > closed[0].log_posterior else closed
 
 
 def _model(explanation: Explanation) -> tuple[Hypothesis, np.ndarray] | None:

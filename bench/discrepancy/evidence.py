@@ -24,8 +24,21 @@ explanations that were sure of themselves were wrong on sealed cases."""
 OUTSIDE_THE_CATALOGUE = {"effect": OUTSIDE, "none": 0.0, "unknown": 1.0 - OUTSIDE}
 """Probabilities of the verdicts where there is a doubt about an explanation that leaves nothing but noise."""
 FAILS = "explains the records for identification and fails on those for judging"
-OUTDONE = "explains the records, but a single force that follows no law of the catalogue does so better"
-"""Doubts about an explanation."""
+"""Doubt about an explanation."""
+SINGLE = {
+    "free_displacement": "smooth force of the displacement",
+    "free_velocity": "smooth force of the velocity",
+    "free_memory": "force with a memory of its own",
+    "damped_one_sided_stop": "stop that dissipates",
+    "damped_gap": "gap whose contacts dissipate",
+}
+"""Closures in words, where one of them stands for all that is missing."""
+
+
+def outdone(closure: str) -> str:
+    """The doubt about an explanation that closures, their names joined by " + ", explain better."""
+    forces = " and a single ".join(SINGLE[name] for name in closure.split(" + "))
+    return f"explains the records, but a single {forces}, which no law of the catalogue describes, does so better"
 
 
 def weights(explanations: Sequence[Explanation]) -> np.ndarray:

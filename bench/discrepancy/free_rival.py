@@ -22,7 +22,6 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
-from scipy.special import logsumexp
 from threadpoolctl import threadpool_limits
 
 from bench.discrepancy.closure import FREE_DISPLACEMENT, FREE_MEMORY, FREE_VELOCITY, mixed, smoothing
@@ -178,7 +177,7 @@ def _promised(screen: Screen, ground: Ground, node: Node) -> _Promise:
         occam = float(np.sum(np.log(np.abs(np.diag(factor[0])))))
         found.append((0.5 * float(right @ mixing @ eta) - occam, mixing, eta))
     gain, mixing, eta = max(found, key=lambda entry: entry[0])
-    toll = float(logsumexp([entry[0] for entry in found])) - float(np.log(len(found))) - gain
+    toll = float(np.logaddexp.reduce([entry[0] for entry in found])) - float(np.log(len(found))) - gain
     prior = LOG_PRIOR_EFFECT - 0.5 * IMMATERIAL * screen.problem.n_residuals
     moved = screen.deviations + ground.moves(node.columns @ (mixing @ eta))
     placed = replace(node.placed, effect=mixed(node.placed.effect, mixing))

@@ -327,6 +327,77 @@ def _cone(rng: np.random.Generator, r: Reach) -> Shape:
     return shape
 
 
+def _saturating(rng: np.random.Generator, r: Reach) -> Shape:
+    width = rng.uniform(0.1, 0.5) * r.position
+
+    def shape(a: float) -> Drawn:
+        values = {"stiffness": a * r.stiffness, "width": width}
+        return Drawn(values, tuple(values.values()))
+
+    return shape
+
+
+def _hertz(rng: np.random.Generator, r: Reach) -> Shape:
+    side, position = _sign(rng), rng.uniform(-0.3, 0.7) * r.position
+
+    def shape(a: float) -> Drawn:
+        values = {
+            "stiffness": a * r.stiffness / math.sqrt(r.position),
+            "position": side * position,
+            "side": side,
+        }
+        region = (side * position, math.inf) if side > 0 else (-math.inf, side * position)
+        return Drawn(values, tuple(values.values()), (region,))
+
+    return shape
+
+
+def _resonator(rng: np.random.Generator, r: Reach) -> Shape:
+    omega, damping_ratio = _between(rng, 0.5, 2.0) * r.omega, _between(rng, 0.01, 0.1)
+
+    def shape(a: float) -> Drawn:
+        stiffness = a * r.stiffness
+        mass = stiffness / omega**2
+        values = {"stiffness": stiffness, "mass": mass, "damping": 2.0 * damping_ratio * mass * omega}
+        return Drawn(values, tuple(values.values()))
+
+    return shape
+
+
+def _stress_softening(rng: np.random.Generator, r: Reach) -> Shape:
+    width = rng.uniform(0.3, 0.8) * r.position
+
+    def shape(a: float) -> Drawn:
+        values = {"stiffness": a * r.stiffness, "width": width}
+        return Drawn(values, (*values.values(), 0.05 / r.omega))
+
+    return shape
+
+
+def _wavy(rng: np.random.Generator, r: Reach) -> Shape:
+    depth, width, phase = (
+        rng.uniform(0.5, 1.0),
+        rng.uniform(0.1, 0.4) * r.position,
+        rng.uniform(0.0, 2.0 * np.pi),
+    )
+
+    def shape(a: float) -> Drawn:
+        values = {"friction_force": a * r.force, "depth": depth, "width": width, "phase": phase}
+        return Drawn(values, (*values.values(), 0.02 * r.velocity))
+
+    return shape
+
+
+def _blow(rng: np.random.Generator, r: Reach) -> Shape:
+    moment, width = rng.uniform(0.2, 0.8) * r.duration, _between(rng, 0.1, 1.0) / r.omega
+
+    def shape(a: float) -> Drawn:
+        values = {"force": a * r.force, "moment": moment, "width": width}
+        return Drawn(values, tuple(values.values()))
+
+    return shape
+
+
 def _restitution(rng: np.random.Generator, r: Reach) -> Shape:
     side, restitution = _sign(rng), rng.uniform(0.3, 0.8)
 
@@ -406,6 +477,16 @@ RECIPES: tuple[Recipe, ...] = (
     Recipe("snap_through", "joint", _snap, law=foreign.SNAP_THROUGH),
     Recipe("switching_stiffness", "joint", _switching, rigs=FREE, law=foreign.SWITCHING_STIFFNESS),
     Recipe("friction_cone", "joint", _cone, rigs=("joint",), law=foreign.FRICTION_CONE, weight=3.0),
+    Recipe("saturating_spring", "joint", _saturating, law=foreign.SATURATING_SPRING),
+    Recipe("hertz_contact", "joint", _hertz, law=foreign.HERTZ_CONTACT),
+    Recipe("hidden_resonator", "joint", _resonator, rigs=FREE, law=foreign.HIDDEN_RESONATOR),
+    Recipe(
+        "displacement_dependent_damping", "joint",
+        _one("c", lambda r: r.force / (r.velocity * r.position**2)), law=foreign.DISPLACEMENT_DEPENDENT_DAMPING,
+    ),
+    Recipe("stress_softening", "joint", _stress_softening, law=foreign.STRESS_SOFTENING),
+    Recipe("position_dependent_friction", "joint", _wavy, law=foreign.POSITION_DEPENDENT_FRICTION),
+    Recipe("unmeasured_load", "joint", _blow, rigs=FREE, law=foreign.UNMEASURED_LOAD),
     # the impulse of an impact falls between the samples of an accelerometer: positions only
     Recipe("restitution_stop", "stop", _restitution, rigs=SHAKEN, sensors=("position",)),
 )  # fmt: skip

@@ -1,7 +1,7 @@
 """Effects that stand in no catalogue: what the blind protocol withholds so that *unknown* can be put to the test.
 
-Each is a force that engineers meet and that no law of `bench.laws` describes. None of them may ever enter the catalogue
-or the closures; they are laws all the same, so that MuJoCo's callback integrates them like any other.
+Each is a force that engineers meet and that no law of `bench.laws` describes. None of them may ever enter the catalogue;
+they are laws all the same, so that MuJoCo's callback integrates them like any other.
 
 - `modulated_stiffness`: a stiffness that follows the clock (a gear mesh, a breathing crack); the force depends on time.
 - `fractional_damping`: ``C d^alpha q / dt^alpha``, memory over decades of time, as rubber has; eight relaxations side by
@@ -10,6 +10,13 @@ or the closures; they are laws all the same, so that MuJoCo's callback integrate
 - `switching_stiffness`: a spring that latches in beyond one amplitude and lets go below a smaller one: a state that
   remembers which threshold was passed last.
 - `friction_cone`: friction in two directions with one limit for both together; axial slip lowers the torsional friction.
+- `saturating_spring`: a stiffness about rest that fades with the displacement, as a magnet's or a slipping belt's does.
+- `hertz_contact`: a contact whose force grows with the penetration to 3/2, on one side.
+- `hidden_resonator`: a mass on a spring that nobody modelled: complex memory, where a relaxation's is real.
+- `displacement_dependent_damping`: ``c q^2 v``, a product of two coordinates.
+- `stress_softening`: a spring that gives way with the largest displacement it has ever seen, and never recovers.
+- `position_dependent_friction`: friction that rises and falls along the stroke, as a lead screw's does.
+- `unmeasured_load`: a blow from outside at one moment.
 - `restitution_stop`: a rigid stop that throws back with a coefficient of restitution; an impulse, hence no law: the time
   stepping of `bench.discrepancy.blind.time_stepping` knows it.
 """
@@ -163,6 +170,158 @@ FRICTION_CONE = ForceLaw(
     smoothness="continuous",
 )
 
+
+@kernel
+def saturating_force(t, q, v, z, theta, f):
+    """``f = k w tanh(q/w)``."""
+    f[0] += theta[0] * theta[1] * math.tanh(q[0] / theta[1])
+
+
+SATURATING_SPRING = ForceLaw(
+    "saturating_spring",
+    (
+        Parameter("stiffness", "N/m", 100.0, (0.0, math.inf), "stiffness about rest", "N m/rad"),
+        Parameter("width", "m", 0.002, (1e-12, math.inf), "displacement about which it fades", "rad"),
+    ),
+    saturating_force,
+    equation="f = k w tanh(q/w)",
+    reference="Worden & Tomlinson 2001, Nonlinearity in Structural Dynamics, ch. 2 (saturation)",
+)
+
+
+@kernel
+def hertz_force(t, q, v, z, theta, f):
+    """``f = s k max(s (q - p), 0)^1.5``."""
+    penetration = theta[2] * (q[0] - theta[1])
+    if penetration > 0.0:
+        f[0] += theta[2] * theta[0] * penetration * math.sqrt(penetration)
+
+
+HERTZ_CONTACT = ForceLaw(
+    "hertz_contact",
+    (
+        Parameter("stiffness", "N/m", 100.0, (0.0, math.inf), "in N/m^1.5", "N m/rad"),
+        Parameter("position", "m", 0.0, (-math.inf, math.inf), "where the contact begins", "rad"),
+        Parameter("side", "1", 1.0, (-1.0, 1.0), "1 for larger displacements, -1 for smaller ones"),
+    ),
+    hertz_force,
+    equation="f = s k max(s (q - p), 0)^1.5",
+    reference="Johnson 1985, Contact Mechanics, ch. 4",
+)
+
+
+@kernel
+def resonator_force(t, q, v, z, theta, f):
+    """``f = k (q - y) + c (v - y')``."""
+    f[0] += theta[0] * (q[0] - z[0]) + theta[2] * (v[0] - z[1])
+
+
+@kernel
+def resonator_rate(t, q, v, z, theta, zdot):
+    """``m y'' = k (q - y) + c (v - y')``."""
+    zdot[0] = z[1]
+    zdot[1] = (theta[0] * (q[0] - z[0]) + theta[2] * (v[0] - z[1])) / theta[1]
+
+
+HIDDEN_RESONATOR = ForceLaw(
+    "hidden_resonator",
+    (
+        Parameter("stiffness", "N/m", 100.0, (0.0, math.inf), "of what holds the mass", "N m/rad"),
+        Parameter("mass", "kg", 1.0, (1e-12, math.inf), "hidden mass", "kg m^2"),
+        Parameter("damping", "N s/m", 0.1, (0.0, math.inf), "of what holds the mass", "N m s/rad"),
+    ),
+    resonator_force,
+    resonator_rate,
+    ("y [m]", "y' [m/s]"),
+    equation="f = k (q - y) + c (v - y') = m y''",
+    reference="Den Hartog 1956, Mechanical Vibrations, sec. 3.2 (auxiliary mass)",
+)
+
+
+@kernel
+def product_force(t, q, v, z, theta, f):
+    """``f = c q^2 v``."""
+    f[0] += theta[0] * q[0] * q[0] * v[0]
+
+
+DISPLACEMENT_DEPENDENT_DAMPING = ForceLaw(
+    "displacement_dependent_damping",
+    (Parameter("c", "N s/m^3", 100.0, (0.0, math.inf), "coefficient", "N m s/rad^3"),),
+    product_force,
+    equation="f = c q^2 v",
+    reference="Nayfeh & Mook 1979, Nonlinear Oscillations, sec. 3.1",
+)
+
+
+@kernel
+def softening_force(t, q, v, z, theta, f):
+    """``f = k q exp(-z/w)``, z the largest displacement so far."""
+    f[0] += theta[0] * q[0] * math.exp(-z[0] / theta[1])
+
+
+@kernel
+def softening_rate(t, q, v, z, theta, zdot):
+    """``z' = (|q| - z)/tau`` beyond the largest displacement so far, else 0."""
+    beyond = abs(q[0]) - z[0]
+    zdot[0] = beyond / theta[2] if beyond > 0.0 else 0.0
+
+
+STRESS_SOFTENING = ForceLaw(
+    "stress_softening",
+    (
+        Parameter("stiffness", "N/m", 100.0, (0.0, math.inf), "before anything has moved", "N m/rad"),
+        Parameter("width", "m", 0.002, (1e-12, math.inf), "displacement that takes a factor of e", "rad"),
+        Parameter("time", "s", 0.002, (1e-6, math.inf), "time the softening takes"),
+    ),
+    softening_force,
+    softening_rate,
+    ("largest displacement [m]",),
+    equation="f = k q exp(-max|q|/w)",
+    reference="Mullins 1969, Rubber Chem. Technol. 42(1)",
+    smoothness="continuous",
+)
+
+
+@kernel
+def wavy_force(t, q, v, z, theta, f):
+    """``f = Fc (1 + d cos(q/w + phase)) tanh(v/v0)``."""
+    f[0] += theta[0] * (1.0 + theta[1] * math.cos(q[0] / theta[2] + theta[3])) * math.tanh(v[0] / theta[4])
+
+
+POSITION_DEPENDENT_FRICTION = ForceLaw(
+    "position_dependent_friction",
+    (
+        Parameter("friction_force", "N", 1.0, (0.0, math.inf), "its mean along the stroke", "N m"),
+        Parameter("depth", "1", 0.5, (0.0, 1.0), "part of it that comes and goes"),
+        Parameter("width", "m", 0.002, (1e-12, math.inf), "displacement of one radian of that", "rad"),
+        Parameter("phase", "rad", 0.0, (-math.inf, math.inf), "phase at rest"),
+        Parameter("slow", "m/s", 1e-3, (1e-12, math.inf), "velocity that rounds the reversal", "rad/s"),
+    ),
+    wavy_force,
+    equation="f = Fc (1 + d cos(q/w + phase)) tanh(v/v0)",
+    reference="Armstrong-Helouvry 1991, Control of Machines with Friction, ch. 4 (position dependence)",
+)
+
+
+@kernel
+def blow_force(t, q, v, z, theta, f):
+    """``f = F exp(-((t - t0)/w)^2 / 2)``."""
+    u = (t - theta[1]) / theta[2]
+    f[0] += theta[0] * math.exp(-0.5 * u * u)
+
+
+UNMEASURED_LOAD = ForceLaw(
+    "unmeasured_load",
+    (
+        Parameter("force", "N", 1.0, (0.0, math.inf), "largest", "N m"),
+        Parameter("moment", "s", 1.0, (0.0, math.inf), "when it is largest"),
+        Parameter("width", "s", 0.1, (1e-9, math.inf), "how long it takes"),
+    ),
+    blow_force,
+    equation="f = F exp(-((t - t0)/w)^2 / 2)",
+    reference="Ewins 2000, Modal Testing, ch. 3 (unmeasured excitation)",
+)
+
 RESTITUTION_STOP = "restitution_stop"
 
 FOREIGN_LAWS: tuple[ForceLaw, ...] = (
@@ -171,6 +330,13 @@ FOREIGN_LAWS: tuple[ForceLaw, ...] = (
     SNAP_THROUGH,
     SWITCHING_STIFFNESS,
     FRICTION_CONE,
+    SATURATING_SPRING,
+    HERTZ_CONTACT,
+    HIDDEN_RESONATOR,
+    DISPLACEMENT_DEPENDENT_DAMPING,
+    STRESS_SOFTENING,
+    POSITION_DEPENDENT_FRICTION,
+    UNMEASURED_LOAD,
 )
 """Foreign laws; `restitution_stop` is no law."""
 

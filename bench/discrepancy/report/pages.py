@@ -155,7 +155,8 @@ def _location_section(out: Page, diagnosis: Diagnosis, runs: Mapping[str, Record
     for found in where.maps:
         _map(section, found, runs, verdict.splits, found.place.name or diagnosis.problem.structure.dofs[0])
         for region in where.acting.get(found.place.name, ()):
-            actor = f"As named, {region['effect']}" if "effect" in region else "By free runs, what is missing"
+            fitted = "As named" if verdict.verdict == "effect" else "As the closure has it"
+            actor = f"{fitted}, {region['effect']}" if "effect" in region else "By free runs, what is missing"
             section.text(
                 f"{actor} acts at {_limits(region, found.place.position_unit)}: {region['force']:+.3g} "
                 f"{found.place.force_unit} on average, {100 * region['share']:.0f} % of its square."
