@@ -107,7 +107,7 @@ def locate(
     known = known_parameters(best)
     maps = state_maps(problem, problem.records, known=known)
     acting: Mapping[str, tuple[dict[str, Any], ...]] = {}
-    if borne_out and all(near(fitted) for _, fitted in best.parts):
+    if borne_out and all(part.noise_stated and near(fitted) for part, fitted in best.parts):
         acting = acting_regions(best)
     if unknown and not acting:
         acting = limited_regions(nominal, best)
