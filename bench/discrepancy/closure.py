@@ -173,11 +173,9 @@ def mixed(closure: Effect, mixing: Values) -> Effect:
     return replace(closure, theta=lambda values, scales: inner(mixing @ values, scales))
 
 
-SMOOTH = 0.25
-"""Length of the curves that are fitted on top of an explanation."""
 CLOSURES = (
     _closure("polynomial_surface", _SURFACE, [f"c{i}{j}" for i, j in POWERS], _surface_theta),
-    mixed(FREE_DISPLACEMENT, smoothing(SMOOTH)),
-    mixed(FREE_VELOCITY, smoothing(SMOOTH)),
+    FREE_DISPLACEMENT,
+    FREE_VELOCITY,
     FREE_MEMORY,
 )

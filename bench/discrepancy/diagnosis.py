@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from bench.discrepancy import evidence
+from bench.discrepancy.attribute import STALLED
 from bench.discrepancy.case import Case, read_case
 from bench.discrepancy.catalogue import CATALOGUE
 from bench.discrepancy.closure import CLOSURES
@@ -193,7 +194,9 @@ def _closed(best: Explanation, nothing: Explanation, rival: Rival | None) -> tup
     if rival is not None and rival.explanation.consistent:
         return rival
     closed = close(best, nothing, CLOSURES)
-    return rival if rival and rival.explanation.log_posterior > closed[0].log_posterior else closed
+    if rival is None or rival.explanation.log_posterior < closed[0].log_posterior:
+        return closed
+    return rival if rival.explanation.reduced - 1.0 < STALLED * (best.reduced - 1.0) else closed
 
 
 def _model(explanation: Explanation) -> tuple[Hypothesis, np.ndarray] | None:
