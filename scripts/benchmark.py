@@ -30,7 +30,7 @@ GROUPS = tuple(
     sorted(
         path.stem
         for path in (Path(__file__).parent / "benchmarks").glob("[a-z]*.py")
-        if path.stem != "timing" and not path.stem.startswith("peer_")
+        if path.stem not in ("new_process", "timing") and not path.stem.startswith("peer_")
     )
 )
 

@@ -202,3 +202,16 @@ def test_rows_of_the_diagnosis_come_from_the_scores_of_all_tools():
     assert "clean cases called clean" not in rows  # no case was scored for it
     low, high = rows["single effects named exactly"].spread
     assert low <= 2.0 <= high
+
+
+def test_memory_is_that_of_a_process_of_its_own():
+    from benchmarks.new_process import in_new_process, memory_row
+
+    lines, little = in_new_process("print('told')")
+    _, much = in_new_process("taken = b'x' * 200_000_000")
+    assert lines == ["told"]
+    # the interpreter itself takes the same both times, to a few pages
+    assert much - little == pytest.approx(2e8, rel=0.05)
+    row = memory_row("of both", [little, much])
+    assert row.ratio == pytest.approx(much / 1e9)
+    assert row.holds

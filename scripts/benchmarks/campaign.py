@@ -9,7 +9,6 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
-import subprocess
 import sys
 import tempfile
 import time
@@ -24,11 +23,11 @@ from bench.campaign import Plan, plan_from_dict, run_campaign
 from bench.campaign.execution import cores, generator_of, payload_of
 from bench.campaign.store import Store, part_name
 from bench.campaign.tables import part_contents
+from benchmarks.new_process import in_new_process, memory_row
 from benchmarks.timing import Row, interleave, ratio_row
 
 TARGET_RECORDS = 10_000
 TARGET_SECONDS = 900.0
-TARGET_MEMORY = 1e9
 SLICE = 64
 """Records of one timed run: long enough that opening a folder does not count, short enough for interleaved repeats."""
 
@@ -184,44 +183,21 @@ def _target() -> Row:
 
 
 def _memory() -> list[Row]:
-    made = []
-    for records, part in ((SLICE, 50), (SLICE * 4, 50)):
-        peak = _in_new_process(records, part)["peak"]
-        made.append(
-            Row(
-                f"peak memory, {records} records in parts of {part}",
-                peak / TARGET_MEMORY,
-                (peak / TARGET_MEMORY,) * 2,
-                "≤ 1",
-                "largest resident memory / 1 GB",
-                {"bytes": peak},
-            )
-        )
-    return made
+    return [
+        memory_row(f"{records} records in parts of 50", [_in_new_process(records, 50)["peak"]])
+        for records in (SLICE, SLICE * 4)
+    ]
 
 
-def _in_new_process(records: int, part: int = 0) -> dict[str, Any]:
-    """Run the target's plan in a process of its own; give its result and largest resident memory [bytes]."""
+def _in_new_process(records: int, part: int = 8) -> dict[str, Any]:
+    """Run the target's plan in a process of its own; give its result, seconds and largest resident memory [bytes]."""
     code = (
-        "import json, resource, time; start = time.perf_counter(); from benchmarks.campaign import _campaign, _plan; "
-        f"result = _campaign(_plan(records={records}, records_per_part={part or 8})); "
-        "result['seconds'] = time.perf_counter() - start; "
-        "result['peak'] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024; print(json.dumps(result))"
+        "import json, time; start = time.perf_counter(); from benchmarks.campaign import _campaign, _plan; "
+        f"result = _campaign(_plan(records={records}, records_per_part={part})); "
+        "result['seconds'] = time.perf_counter() - start; print(json.dumps(result))"
     )
-    return json.loads(_python(code))
-
-
-def _python(code: str) -> str:
-    root = Path(__file__).parents[2]
-    path = os.pathsep.join([str(root / "scripts"), str(root), os.environ.get("PYTHONPATH", "")])
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        capture_output=True,
-        text=True,
-        check=True,
-        env={**os.environ, "PYTHONPATH": path},
-    )
-    return done.stdout.splitlines()[-1]
+    lines, peak = in_new_process(code)
+    return json.loads(lines[-1]) | {"peak": peak}
 
 
 def _writing(repeats: int) -> Row:
@@ -260,8 +236,10 @@ def _starting(repeats: int) -> list[Row]:
         "rig = sdof_rig(Element.of('gap', 'carriage'), Element.of('bouc_wen', 'carriage')); "
         "simulate(rig, {'shaker': np.ones(100)}); print(imported, time.perf_counter() - start)"
     )
-    _python(first)  # fills numba's cache, as a second use of the bench finds it
-    taken = np.array([[float(number) for number in _python(first).split()] for _ in range(repeats)])
+    in_new_process(first)  # fills numba's cache, as a second use of the bench finds it
+    taken = np.array(
+        [[float(number) for number in in_new_process(first)[0][-1].split()] for _ in range(repeats)]
+    )
     made = []
     for column, (name, limit) in enumerate(
         (("import bench", "≤ 1"), ("first native simulation of a process", "≤ 3"))

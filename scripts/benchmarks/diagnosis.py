@@ -30,6 +30,7 @@ from bench.discrepancy.problem import Problem
 from bench.discrepancy.shrink import DIVERGED_GAP, coordinates, noise_level, nrmse
 from bench.discrepancy.structure import structure_of
 from bench.files import write_text
+from benchmarks.new_process import in_new_process, memory_row
 from benchmarks.timing import Row
 
 SEED = 20061
@@ -39,6 +40,8 @@ SHORT = BlindOptions(
     rigs=(1.0, 0.0, 0.0), detectability=False,
 )  # fmt: skip
 LONG = BlindOptions(rigs=(0.75, 0.0, 0.25), detectability=False)
+LARGE, LARGE_CASES = BlindOptions(rigs=(0.0, 0.0, 1.0), detectability=False), 3
+"""Cases whose memory is measured where no folder is given: of two degrees of freedom and a release's length."""
 RIGS = ("sdof", "joint")
 """Rigs that the peers are built for; cases of others are passed over."""
 DRAWS = 2000
@@ -136,14 +139,32 @@ def rows(
             count, options = (ALL_CASES, LONG) if full else (CASES, SHORT)
             home, answers = folder / "cases", folder / "answers"
             make_blind(home, answers, n=count, rng=rng, options=options, progress=progress)
+            large = folder / "large"
+            make_blind(large, folder / "unread", n=LARGE_CASES, rng=rng, options=LARGE, progress=progress)
         else:
             home, answers = data, data / "answers"
+            large = data
         found = sorted(path.parent for path in home.glob("*/nominal.json"))
         cases = [path for path in found if read_case(path).rig in (RIGS if full else RIGS[:1])]
         if data is not None and not full:
             cases = cases[:: -(-len(cases) // CASES)]
         told = outcomes(cases, answers, folder / "results", progress)
-    return [row for peer in list(TOOLS)[1:] for row in _against(peer, told["ours"], told[peer])]
+        memory = _memory(large, progress)
+    return [
+        *(row for peer in list(TOOLS)[1:] for row in _against(peer, told["ours"], told[peer])),
+        *([memory] if memory else []),
+    ]
+
+
+def _memory(folder: Path, progress: Callable[[str], None]) -> Row | None:
+    """Largest memory that our diagnosis of the first joint cases of a folder takes, each in a process of its own."""
+    found = sorted(path.parent for path in folder.glob("*/nominal.json"))
+    peaks = []
+    for path in [path for path in found if read_case(path).rig == "joint"][:LARGE_CASES]:
+        progress(f"{path.name}: memory")
+        code = f"from bench.discrepancy import diagnose_folder; diagnose_folder({str(path)!r})"
+        peaks.append(in_new_process(code)[1])
+    return memory_row("a diagnosis of two degrees of freedom", peaks) if peaks else None
 
 
 def _against(peer: str, mine: list[Outcome], theirs: list[Outcome]) -> list[Row]:
