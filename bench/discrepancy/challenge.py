@@ -61,7 +61,7 @@ def challenge(search: Search, screen: Screen, pool: ThreadPoolExecutor, *, round
                 known = begun is not None and any(begun.vector is start for _, start in tasks)
                 if begun is not None and not known and key_of(begun.hypothesis) not in search.converged:
                     tasks.append((begun.hypothesis, begun.vector))
-        converge(search, pool, tasks)
+        converge(search, pool, tasks, limit=best.cost + SIGHT)
         carry_on(search, pool, len(best.hypothesis), most=6)
         reduce_best(search, pool)
 

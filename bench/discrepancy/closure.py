@@ -1,8 +1,8 @@
 """Nonparametric closures: what an effect outside the catalogue looks like, and how far a free model of it gets.
 
 A closure is an effect like any other, except that its law promises nothing: a polynomial surface in displacement and
-velocity, any force of the displacement, any force of the velocity, any linear memory. It is fitted on top of the best catalogued
-explanation, by the same fits, and serves only to state how much of the gap a free model closes and what the missing force
+velocity, any force of the displacement, of the velocity or of both, any linear memory. It is fitted on top of the best catalogued
+explanation or in its place, by the same fits, and serves only to state how much of the gap a free model closes and what the missing force
 looks like. Beyond the motion it was fitted to it stays what it is at the edge: a polynomial that is followed out there throws a
 free run off. It knows no effect in particular, and nothing of time: a force that depends on the clock stays outside it,
 and the gap then says so.
@@ -26,6 +26,10 @@ SPANS = 30
 WARP = 2.0
 WARPED = math.sinh(WARP)
 """How much shorter they are about rest, where gaps, friction and snaps happen: equal steps of asinh(WARPED x) / WARP."""
+PATCHES = (10, 14)
+"""Pieces of a force of displacement and velocity along either."""
+MODES = 48
+"""Independent shapes, at most, that a smooth surface is made of: the likeliest ones of its prior."""
 JITTER = 1e-6
 """Part of a smooth curve's variance that is independent from value to value, so that rounding leaves it a covariance."""
 MEMORY = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)
@@ -109,6 +113,37 @@ def memory_rate(t, q, v, z, theta, zdot):
         zdot[i] = (v[0] / theta[0] - z[i]) / (MEMORY[i] * theta[1])
 
 
+@kernel
+def patch_force(t, q, v, z, theta, f):
+    """A force of displacement and velocity: bicubic spline of `PATCHES` by its B-spline coefficients, the velocity's shorter about rest."""
+    u = 0.5 * PATCHES[0] * (1.0 + min(max(q[0] * theta[0], -1.0), 1.0))
+    y = min(max(v[0] * theta[1], -1.0), 1.0)
+    w = 0.5 * PATCHES[1] * (1.0 + math.asinh(y * WARPED) / WARP)
+    i = min(max(int(u), 0), PATCHES[0] - 1)
+    j = min(max(int(w), 0), PATCHES[1] - 1)
+    for a in range(4):
+        s = u - i if a % 2 else 1.0 - u + i
+        along = s * s * s if a % 3 == 0 else 3.0 * s * s * s - 6.0 * s * s + 4.0
+        for b in range(4):
+            s = w - j if b % 2 else 1.0 - w + j
+            across = s * s * s if b % 3 == 0 else 3.0 * s * s * s - 6.0 * s * s + 4.0
+            f[0] += along * across / 36.0 * theta[2 + (i + a) * (PATCHES[1] + 3) + j + b]
+
+
+_PATCH = ForceLaw(
+    "free_surface",
+    (
+        Parameter("per_position", "1/m", 1.0, rotational="1/rad"),
+        Parameter("per_velocity", "s/m", 1.0, rotational="s/rad"),
+        *(
+            Parameter(f"f{i}_{j}", "N", 0.0, rotational="N m")
+            for i in range(PATCHES[0] + 3)
+            for j in range(PATCHES[1] + 3)
+        ),
+    ),
+    patch_force,
+    equation="f = bicubic spline of coefficients f_ij over q/Q and v/V",
+)
 _MEMORY = ForceLaw(
     "free_memory",
     (
@@ -135,6 +170,10 @@ def _over_velocity(values: Values, scales: Scales) -> Values:
     return np.concatenate([[0.0, 1.0 / scales.velocity], values])
 
 
+def _over_both(values: Values, scales: Scales) -> Values:
+    return np.concatenate([[1.0 / scales.position, 1.0 / scales.velocity], values])
+
+
 def _memory_theta(values: Values, scales: Scales) -> Values:
     return np.concatenate([[scales.velocity, scales.position / scales.velocity], values])
 
@@ -152,6 +191,7 @@ def _closure(
 _KNOTS = [f"f{k}" for k in range(SPANS + 3)]
 FREE_DISPLACEMENT = _closure("free_displacement", _CURVE, _KNOTS, _over_position)
 FREE_VELOCITY = _closure("free_velocity", _CURVE, _KNOTS, _over_velocity)
+FREE_SURFACE = _closure("free_surface", _PATCH, [p.name for p in _PATCH.parameters[2:]], _over_both)
 FREE_MEMORY = _closure("free_memory", _MEMORY, [f"c{i}" for i in range(len(MEMORY))], _memory_theta)
 
 
@@ -161,16 +201,48 @@ def smoothing(length: float) -> Values:
     Args:
         length: Distance within which the curve keeps its course, over its reach.
     """
-    middles = np.sinh(WARP * np.linspace(-1.0 - 2.0 / SPANS, 1.0 + 2.0 / SPANS, SPANS + 3)) / WARPED
-    covariance = np.exp(-0.5 * ((middles[:, None] - middles) / length) ** 2)
+    middles = np.sinh(WARP * _middles(SPANS)) / WARPED
+    covariance = _covariance(middles, length)
     return np.asarray(np.linalg.cholesky(covariance + JITTER * np.eye(len(middles))), dtype=np.float64)
 
 
+def smoothing_both(along: float, across: float) -> Values:
+    """What makes the coefficients of a smooth surface (n, k) out of `MODES` independent ones of unit deviation, or fewer.
+
+    Args:
+        along: Distance of displacements within which the surface keeps its course, over its reach.
+        across: The same of velocities, on their scale that is finer about rest.
+    """
+    parts = [
+        np.linalg.eigh(_covariance(_middles(n), length))
+        for n, length in zip(PATCHES, (along, across), strict=True)
+    ]
+    powers = np.maximum(np.outer(parts[0][0], parts[1][0]), 0.0).ravel()
+    shapes = np.kron(parts[0][1], parts[1][1])
+    kept = np.argsort(-powers)[:MODES]
+    kept = kept[powers[kept] > JITTER * powers.max()]
+    return np.asarray(shapes[:, kept] * np.sqrt(powers[kept]), dtype=np.float64)
+
+
+def _middles(pieces: int) -> Values:
+    """Where the B-splines of so many pieces stand, on the scale on which these are equal."""
+    return np.linspace(-1.0 - 2.0 / pieces, 1.0 + 2.0 / pieces, pieces + 3)
+
+
+def _covariance(middles: Values, length: float) -> Values:
+    return np.exp(-0.5 * ((middles[:, None] - middles) / length) ** 2)
+
+
 def mixed(closure: Effect, mixing: Values) -> Effect:
-    """A closure whose coefficients are mixed of as many independent ones: a prior that knows of neighbours."""
-    inner = closure.theta
+    """A closure whose coefficients (n,) are mixed of independent ones (k,) by (n, k): a prior that knows of neighbours."""
+    inner, count = closure.theta, mixing.shape[1]
     assert inner is not None
-    return replace(closure, theta=lambda values, scales: inner(mixing @ values, scales))
+    return replace(
+        closure,
+        parameters=closure.parameters[:count],
+        n_linear=count,
+        theta=lambda values, scales: inner(mixing @ values, scales),
+    )
 
 
 CLOSURES = (

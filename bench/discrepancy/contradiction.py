@@ -3,20 +3,23 @@
 Several wrong laws together can imitate a missing one within the motion of a record; at another amplitude they fall apart. How far
 a right explanation may be off on other records is told by the uncertainty of its parameters: what it was barely shown in
 identification, a stop touched once, say, it predicts poorly without being wrong. So is one that makes much of the noise of a measured
-load: a softening spring near its limit.
+load: a softening spring near its limit. And so is one whose free run comes by a jump between two motions, which a hair decides: it is no
+more wrong than its parameters if others explain the records of both kinds together.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from bench.discrepancy.case import Case
+from bench.discrepancy.case import Case, CaseRecord
 from bench.discrepancy.driving import with_load_noise
 from bench.discrepancy.explain import Explanation
-from bench.discrepancy.fit import Fit
+from bench.discrepancy.fit import Fit, fit
 from bench.discrepancy.problem import Array, Problem
+from bench.discrepancy.search import THOROUGH, consistent
 from bench.discrepancy.shrink import coordinates, noise_level
 from bench.discrepancy.starts import in_motion
 
@@ -37,6 +40,11 @@ def contradicted(case: Case, problem: Problem, best: Explanation, rng: np.random
         best: The explanation.
         rng: For the draws.
     """
+    return fails(case, problem, best, rng) and not _explains_all(best, case.validation)
+
+
+def fails(case: Case, problem: Problem, best: Explanation, rng: np.random.Generator) -> bool:
+    """Whether an explanation misses the judging records by more than noise and its parameters' uncertainty; as `contradicted`."""
     records = case.validation
     if problem.driven or problem.windowed or not problem.noise_stated or any(in_motion(r) for r in records):
         return False
@@ -61,6 +69,15 @@ def contradicted(case: Case, problem: Problem, best: Explanation, rng: np.random
         if error > CONTRADICTED * np.hypot(floor, spread):
             return True
     return False
+
+
+def _explains_all(best: Explanation, records: Sequence[CaseRecord]) -> bool:
+    """Whether the laws of an explanation, fitted to the judging records as well, bring all records down to their noise."""
+    for problem, fitted in best.parts:
+        wider = problem.beside(records)
+        if not consistent(fit(wider, fitted.hypothesis, start=fitted.vector, iterations=THOROUGH)):
+            return False
+    return True
 
 
 def _drawn(best: Explanation, rng: np.random.Generator) -> Explanation:

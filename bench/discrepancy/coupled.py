@@ -93,10 +93,10 @@ def _one_more(
     base = kept.ranked()[0]
     if len(base.hypothesis) > 1 and base.reduced > HOPELESS_THIRD:
         return False
+    if not any(placed.key in coupling for placed in base.hypothesis):
+        return False  # the groups' own searches know more of such
     progress(f"{names(base.hypothesis)}, chi-squared {base.reduced:.3g}")
-    along = followed(base, kept.problem)
-    local = about(screen, base, explained=along)
-    ground = local.ground(base, simulated=along)
+    along, local, ground = _ground(screen, base)
     solved = local.ranked(base, ground)
     if base.reduced > HOPELESS_COUPLING:
         solved = [p for p in solved if p.placed.key in coupling]
@@ -118,6 +118,20 @@ def _one_more(
     reduce_best(kept, pool)
     best = kept.ranked()[0]
     return best is not base and best.reduced - 1.0 <= STALLED * (base.reduced - 1.0)
+
+
+def _ground(screen: Screen, base: Fit) -> tuple[bool, Screen, Ground]:
+    """What a base leaves, along its free run or the measured motion: whether the former, the screening there, and what is left.
+
+    A free run that misses the noise by far still tells the motion better than accelerations, twice integrated, if it leaves less.
+    """
+    if not followed(base, screen.problem):
+        local = about(screen, base, explained=False)
+        ground = local.ground(base)
+        if float(np.sum(ground.left**2)) < base.chi2:
+            return False, local, ground
+    local = about(screen, base, explained=True)
+    return True, local, local.ground(base, simulated=True)
 
 
 def _worth(points: Sequence[Point], base: Fit, ground: Ground, coupling: Keys) -> list[Point]:

@@ -117,6 +117,9 @@ def diagnose(
     if doubt:
         kind, probabilities = "unknown", evidence.OUTSIDE_THE_CATALOGUE
     seen, fitted = recorded(problem, catalogue), kind
+    words = evidence.plain_words(kind, explanations, doubt=doubt)
+    if rival is not None and not doubt and rival.explanation.consistent:
+        words += evidence.enough(rival.closure)
     if seen and kind == "none":
         kind = "effect"
         probabilities |= {"effect": 1.0 - probabilities["unknown"], "none": 0.0}
@@ -139,7 +142,7 @@ def diagnose(
         gap=widest,
         gaps=found,
         probabilities=probabilities,
-        explanation=_told(evidence.plain_words(fitted, explanations, doubt=doubt), seen),
+        explanation=_told(words, seen),
         warnings=(
             *notes(case, problem),
             *idle_notes(told, case),

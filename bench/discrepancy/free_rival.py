@@ -2,11 +2,11 @@
 
 Two or three laws together imitate within the noise what no catalogue holds: relaxations the memory of rubber, which reaches over
 decades of time; a stop and a cubic spring the contact of two spheres. But they are more laws, or more finely tuned ones, than what
-they imitate: the evidence of a single force that is free in the displacement, the velocity or its memory is higher then, while a
+they imitate: the evidence of a single force that is free in the displacement, the velocity, both or its memory is higher then, while a
 law that is true has the better evidence itself, since it does with one number where a free force needs many.
 
-Curves are free but smooth: their values have the prior of a Gaussian process, whose length and size are averaged over. A stop, too,
-has a rival that the catalogue does not hold: one that throws back less than it takes.
+Curves and surfaces are free but smooth: their values have the prior of a Gaussian process, whose lengths and size are averaged over.
+A stop, too, has a rival that the catalogue does not hold: one that throws back less than it takes.
 
 References:
     C. E. Rasmussen & C. K. I. Williams, Gaussian Processes for Machine Learning, MIT Press 2006, ch. 5 (evidence).
@@ -24,7 +24,15 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 from threadpoolctl import threadpool_limits
 
-from bench.discrepancy.closure import FREE_DISPLACEMENT, FREE_MEMORY, FREE_VELOCITY, mixed, smoothing
+from bench.discrepancy.closure import (
+    FREE_DISPLACEMENT,
+    FREE_MEMORY,
+    FREE_SURFACE,
+    FREE_VELOCITY,
+    mixed,
+    smoothing,
+    smoothing_both,
+)
 from bench.discrepancy.effect import Effect, FreeParameter, Scales, Values
 from bench.discrepancy.explain import Explanation
 from bench.discrepancy.fit import Fit, fit
@@ -41,6 +49,7 @@ from bench.discrepancy.search import (
     THOROUGH,
     THREADS,
     WITHIN_REACH,
+    consistent,
     posterior,
 )
 
@@ -49,6 +58,8 @@ CONTACTS = ("one_sided_stop", "gap")
 DAMPING = FreeParameter("damping", "force/velocity", std=1.5)
 LENGTHS = (0.15, 0.25, 0.4, 0.7, 1.2)
 """Distances within which a smooth curve keeps its course, over the largest displacement or velocity."""
+LENGTHS_ALONG, LENGTHS_ACROSS = (0.2, 0.5, 1.2), (0.15, 0.4, 1.2)
+"""The same of smooth surfaces, along the displacement and across it."""
 TRIED = 2
 """Free forces that are fitted, at most."""
 SIZES = (0.03, 0.1, 0.3, 1.0)
@@ -100,20 +111,21 @@ def likelier_force(explanations: Sequence[Explanation]) -> Rival | None:
 
 
 def _contacts(problem: Problem, explanations: Sequence[Explanation]) -> list[Fit]:
-    """The likeliest fit of each contact alone."""
-    found: dict[tuple[str, str, str], Fit] = {}
+    """The likeliest fits of each contact, alone and beside one or two other effects, where it may stand elsewhere."""
+    found: dict[tuple, Fit] = {}
     for explanation in explanations:
         for own, fitted in explanation.parts:
-            if own is problem and [p.effect.name in CONTACTS for p in fitted.hypothesis] == [True]:
-                found.setdefault(fitted.hypothesis[0].key, fitted)
-    return list(found.values())
+            for placed in fitted.hypothesis if own is problem else ():
+                if placed.effect.name in CONTACTS:
+                    found.setdefault((placed.key, len(fitted.hypothesis)), fitted)
+    return list(dict.fromkeys(found.values()))
 
 
 def _rival(problem: Problem, fitted: Fit, contacts: Sequence[Fit]) -> Fit | None:
     """The fit of a single force alone, where it is likelier than a hypothesis; the likeliest one."""
     best, most = None, posterior(fitted)
     with ThreadPoolExecutor(THREADS) as pool, threadpool_limits(1, user_api="blas"):
-        tasks = [*_damped(problem, (fitted, *contacts)), *_free(problem, fitted, pool.map)]
+        tasks = [*_damped(problem, contacts), *_free(problem, fitted, pool.map)]
         for placed, start, toll in tasks:
             rival = fit(
                 problem, (placed,), start=start, iterations=THOROUGH, limit=fitted.cost + SIGHT, each=pool.map
@@ -136,14 +148,15 @@ def _damped(problem: Problem, fits: Sequence[Fit]) -> Iterator[tuple[Placed, Arr
 
 def _free(problem: Problem, fitted: Fit, each: Callable) -> Iterator[tuple[Placed, Array, float]]:
     """Free forces that promise to be likelier than a hypothesis, the likeliest first, and where to begin with them."""
-    families = (FREE_DISPLACEMENT, FREE_VELOCITY, FREE_MEMORY)
+    families = (FREE_DISPLACEMENT, FREE_VELOCITY, FREE_SURFACE, FREE_MEMORY)
     screen = along(Screen(problem, placements(problem.case, problem.structure, families), each), fitted)
     ground = screen.ground()
     promises = sorted(
         (_promised(screen, ground, node) for node in screen.nodes), key=lambda p: -p.log_posterior
     )
     for promise in promises[:TRIED]:
-        if promise.log_posterior > posterior(fitted) - WITHIN_REACH:
+        # along a motion that no free run told, evidence is less than there is
+        if not consistent(fitted) or promise.log_posterior > posterior(fitted) - WITHIN_REACH:
             yield promise.placed, promise.start, promise.toll
 
 
@@ -171,7 +184,7 @@ def _promised(screen: Screen, ground: Ground, node: Node) -> _Promise:
     alone = -0.5 * float(left @ left) - float(np.sum(np.log(np.abs(np.diag(ground.triangle)))))
     found: list[tuple[float, Array, Array]] = []
     for mixing in _mixings(node.placed.effect):
-        curvature = np.eye(len(gram)) + mixing.T @ gram @ mixing
+        curvature = np.eye(mixing.shape[1]) + mixing.T @ gram @ mixing
         factor = cho_factor(curvature)
         eta = cho_solve(factor, mixing.T @ right)
         occam = float(np.sum(np.log(np.abs(np.diag(factor[0])))))
@@ -189,5 +202,9 @@ def _mixings(effect: Effect) -> Iterator[Array]:
     if effect is FREE_MEMORY:
         yield np.eye(effect.n_linear)
         return
-    for length, size in product(LENGTHS, SIZES):
-        yield size * smoothing(length)
+    if effect is FREE_SURFACE:
+        shapes = [smoothing_both(*lengths) for lengths in product(LENGTHS_ALONG, LENGTHS_ACROSS)]
+    else:
+        shapes = [smoothing(length) for length in LENGTHS]
+    for shape, size in product(shapes, SIZES):
+        yield size * shape

@@ -8,7 +8,7 @@ and leaves residuals at the resonance, correlated between channels, which a plai
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -337,6 +337,13 @@ class Problem:
         """A copy that is integrated in other steps."""
         out = copy.copy(self)
         out.refinement = refinement
+        return out
+
+    def beside(self, records: Sequence[CaseRecord]) -> Problem:
+        """A copy of all records and further ones that start at rest; the scales of the effects stay, and so do vectors."""
+        out = copy.copy(self)
+        out.records = (*self.records, *records)
+        out.data = (*self.data, *(self.prepare(record) for record in records))
         return out
 
     def forgetful(self) -> Problem:
