@@ -12,6 +12,7 @@ from bench.discrepancy import BlindOptions, Case, diagnose
 from bench.discrepancy.attribute import attribute, prepare, worth_extending
 from bench.discrepancy.blind.cases import draw_case
 from bench.discrepancy.catalogue import effect_named
+from bench.discrepancy.challenge import challenge
 from bench.discrepancy.contradiction import contradicted, fails
 from bench.discrepancy.coupled import coupled_fits
 from bench.discrepancy.explain import Explanation
@@ -309,3 +310,25 @@ def test_a_wrong_mass_pays_nothing_for_an_inaccuracy_that_linear_runs_do_not_hav
     (named,) = verdict.named
     assert named.name == "mass_error"
     assert verdict.probabilities["none"] < 0.1
+
+
+@pytest.mark.slow
+def test_an_error_of_one_number_is_held_against_every_other_one():
+    """Twice the load or a sensor that shows twice: a record of positions alone cannot tell, whichever was found first."""
+    options = BlindOptions(
+        effects=("force_gain_error",), shares=(0.0, 1.0, 0.0, 0.0), rigs=(1.0, 0.0, 0.0), detectability=False
+    )
+    case, answer = draw_case("gain", np.random.default_rng(5), options)
+    assert answer["sensors"] == "position"
+    problem = Problem(case, structure_of(case), case.identification)
+    names = ("displacement_gain_error", "force_gain_error", "mass_error", "stiffness_error")
+    chosen = {p.effect.name: p for p in placements(case, problem.structure, [effect_named(n) for n in names])}
+    search = Search(problem)
+    zero = np.zeros(len(problem.nominal))
+    search.add(fit(problem, (), start=zero))
+    search.add(fit(problem, (chosen["displacement_gain_error"],), start=np.append(zero, 0.0)))
+    with ThreadPoolExecutor(2) as pool:
+        challenge(search, Screen(problem, tuple(chosen.values())), pool)
+    found = {f.hypothesis[0].effect.name: f.cost for f in search.ranked(1)}
+    assert set(found) == set(names)
+    assert found["force_gain_error"] == pytest.approx(found["displacement_gain_error"], abs=0.1)

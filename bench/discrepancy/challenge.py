@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
 
+from bench.discrepancy.effect import Effect
 from bench.discrepancy.fit import Fit
 from bench.discrepancy.nominate import REFINED_STARTS, about, followed, leading, refined
-from bench.discrepancy.placed import Hypothesis
+from bench.discrepancy.placed import Hypothesis, Placed
 from bench.discrepancy.problem import Problem
 from bench.discrepancy.screen import Screen
-from bench.discrepancy.search import SIGHT, Search, carry_on, consistent, converge, key_of
+from bench.discrepancy.search import SIGHT, Search, Task, carry_on, consistent, converge, key_of
 
 LEFT = 0.02
 """Part of a named effect's gain along the motion that a challenger may lack, besides twice what the effect leaves."""
@@ -61,9 +63,29 @@ def challenge(search: Search, screen: Screen, pool: ThreadPoolExecutor, *, round
                 known = begun is not None and any(begun.vector is start for _, start in tasks)
                 if begun is not None and not known and key_of(begun.hypothesis) not in search.converged:
                     tasks.append((begun.hypothesis, begun.vector))
+            tasks += _alike(placed, rest, vector, search, screen)
         converge(search, pool, tasks, limit=best.cost + SIGHT)
         carry_on(search, pool, len(best.hypothesis), most=6)
         reduce_best(search, pool)
+
+
+def _alike(
+    placed: Placed, rest: Hypothesis, vector: np.ndarray, search: Search, screen: Screen
+) -> Iterator[Task]:
+    """Fits of every other error of one number in place of one: a gain of a sensor is as good as one of the load, or of a mass.
+
+    The screening, whose base may have moved its parameters to do the same, ranks them by chance.
+    """
+    if not _of_one_number(placed.effect):
+        return
+    for other in (*screen.signals, *screen.inertia):
+        hypothesis = (*rest, other)
+        if _of_one_number(other.effect) and key_of(hypothesis) not in search.converged:
+            yield hypothesis, np.append(vector, 0.0)
+
+
+def _of_one_number(effect: Effect) -> bool:
+    return effect.site != "joint" and len(effect.parameters) == 1 and effect.parameters[0].signed
 
 
 def reduce_best(search: Search, pool: ThreadPoolExecutor) -> None:
