@@ -78,9 +78,11 @@ def _alike(
     """
     if not _of_one_number(placed.effect):
         return
+    known = {own.key for own in (*rest, placed)}
     for other in (*screen.signals, *screen.inertia):
         hypothesis = (*rest, other)
-        if _of_one_number(other.effect) and key_of(hypothesis) not in search.converged:
+        new = other.key not in known and key_of(hypothesis) not in search.converged
+        if new and _of_one_number(other.effect):
             yield hypothesis, np.append(vector, 0.0)
 
 

@@ -213,7 +213,10 @@ def shake(search: Search, pool: ThreadPoolExecutor) -> None:
         search: Fits so far; better ones take their places.
         pool: Threads.
     """
-    both_stick = sticks(search.ranked()[0])
+    best = search.ranked()[0]
+    if not consistent(best) and best.chi2 - best.n_residuals > 2.0 * BEGUN_AGAIN:
+        return  # no dent is that deep: whatever explains the records is not among these
+    both_stick = sticks(best)
     reach = SHAKEN_REACH if both_stick else WITHIN_REACH
     for fitted in [f for f in search.ranked() if near(f) and sticks(f)][:SHAKEN]:
         begun = _beside_the_best(search, fitted, pool) if both_stick else fitted
