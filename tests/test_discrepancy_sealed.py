@@ -18,6 +18,7 @@ from bench.discrepancy.coupled import coupled_fits
 from bench.discrepancy.explain import Explanation
 from bench.discrepancy.fit import fit
 from bench.discrepancy.free_rival import likelier_force
+from bench.discrepancy.idle_loads import without_idle_noise
 from bench.discrepancy.lack_of_fit import lack_of_fit
 from bench.discrepancy.placements import placements
 from bench.discrepancy.problem import Problem
@@ -332,3 +333,16 @@ def test_an_error_of_one_number_is_held_against_every_other_one():
     found = {f.hypothesis[0].effect.name: f.cost for f in search.ranked(1)}
     assert set(found) == set(names)
     assert found["force_gain_error"] == pytest.approx(found["displacement_gain_error"], abs=0.1)
+
+
+@pytest.mark.slow
+def test_friction_beside_a_coupling_is_begun_faint_where_it_would_stop_the_motion():
+    told, answer = sealed(20261206, 60)
+    case = without_idle_noise(told)
+    truth = {e["name"] for e in answer["effects"]}
+    assert truth == {"gap_coupling", "coulomb_friction"}
+    search = Search(Problem(case, structure_of(case), case.identification))
+    assert coupled_fits(search, [effect_named(name) for name in sorted(truth)], 2, lambda text: None)
+    best = search.ranked()[0]
+    assert {placed.effect.name for placed in best.hypothesis} == truth
+    assert consistent(best)

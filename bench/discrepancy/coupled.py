@@ -11,7 +11,7 @@ from bench.discrepancy.attribute import STALLED, first_fit
 from bench.discrepancy.challenge import reduce_best
 from bench.discrepancy.effect import Effect
 from bench.discrepancy.fit import Fit
-from bench.discrepancy.grid_points import Point
+from bench.discrepancy.grid_points import Point, fainter
 from bench.discrepancy.nominate import (
     TRUSTED,
     WORTH_A_FIT,
@@ -37,6 +37,9 @@ CONVERGED_PAIRS, CONVERGED_BEYOND = 4, 2
 """Pairs that hold a coupling effect, and larger hypotheses, that are carried on to convergence."""
 TRIALS = 4
 """Effects that are fitted beside a coupling, but for plain forces that the screening passes over."""
+
+FAINT = (0.3, 0.1)
+"""Parts of the promised size from which an effect is begun as well: friction that sticks at once takes the motion from a coupling."""
 
 Keys = Collection[tuple[str, str, str]]
 
@@ -106,8 +109,11 @@ def _one_more(
         return False
 
     def extended(point: Point) -> Fit:
-        start = local.starts(point, ground, base)
-        return first_fit(kept.problem, (*base.hypothesis, point.placed), start)
+        starts = local.starts(point, ground, base)
+        if point.placed.effect.site == "joint":
+            faint = [fainter(point.placed, point.eta, share) for share in FAINT]
+            starts = np.vstack([starts, *(np.append(base.vector, eta) for eta in faint)])
+        return first_fit(kept.problem, (*base.hypothesis, point.placed), starts)
 
     least = TRUSTED * worth[0].gain if along else WORTH_A_FIT
     chosen = leading(worth, TRIALS, least, starts=1)

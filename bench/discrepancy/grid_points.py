@@ -48,7 +48,8 @@ class Point(NamedTuple):
     eta: Array
 
 
-def _amplitudes(placed: Placed) -> list[int]:
+def amplitudes(placed: Placed) -> list[int]:
+    """Indices of the parameters that an effect's force is linear in, or their logarithms."""
     count = placed.effect.n_linear or placed.effect.n_coordinates
     return [i for i, p in enumerate(placed.effect.parameters) if i < count and not p.grid]
 
@@ -57,8 +58,8 @@ def spanning(placed: Placed, eta: Array) -> list[Array]:
     """Parameter points whose responses span the effect at one shape."""
     effect = placed.effect
     unit = eta.copy()
-    amplitudes = _amplitudes(placed)
-    for i in amplitudes:
+    linear = amplitudes(placed)
+    for i in linear:
         unit[i] = 1.0 if effect.parameters[i].signed else 0.0
     if effect.modulated:
         still, sine, cosine = unit.copy(), unit.copy(), unit.copy()
@@ -70,13 +71,21 @@ def spanning(placed: Placed, eta: Array) -> list[Array]:
         without[1], with_one[1] = TINY, 0.0
         return [without, with_one]
     points = []
-    for i in amplitudes:
+    for i in linear:
         single = unit.copy()
-        for j in amplitudes:
+        for j in linear:
             if j != i:
                 single[j] = 0.0 if effect.parameters[j].signed else TINY
         points.append(single)
     return points
+
+
+def fainter(placed: Placed, eta: Array, share: float) -> Array:
+    """Parameters (n,) of an effect whose force is a `share` of that with others (n,)."""
+    out = eta.copy()
+    for i in amplitudes(placed):
+        out[i] = share * eta[i] if placed.effect.parameters[i].signed else eta[i] + np.log(share)
+    return out
 
 
 def read(node: Node, gram: Array, right: Array) -> Point | None:  # noqa: PLR0912  (one branch a kind of effect)
@@ -115,7 +124,7 @@ def read(node: Node, gram: Array, right: Array) -> Point | None:  # noqa: PLR091
                 return None
         eta[0], eta[1] = np.log(c[0]), np.log(c[1] / c[0])
     else:
-        for position, i in enumerate(_amplitudes(node.placed)):
+        for position, i in enumerate(amplitudes(node.placed)):
             if parameters[i].signed:
                 eta[i] = c[position]
             elif c[position] > 0:
