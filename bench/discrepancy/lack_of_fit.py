@@ -35,9 +35,11 @@ KNOTS = 12
 """Knots of a free force of one coordinate; between them it is straight."""
 PRODUCTS = ((1, 1), (2, 1), (1, 2))
 """Powers of displacement and velocity that a sum of two forces of one coordinate lacks."""
-NEGLIGIBLE = 4e-3
-"""Part of a model's columns that has to be its own: less is nothing but the base's inaccuracy. On 81 clean sealed cases what lies
-below scatters by 1.25 times the noise, by 4.4 at most, and what lies above by 1.0."""
+NEGLIGIBLE = 1e-3
+"""Part of a model's columns that has to be its own: less is nothing but the base's inaccuracy."""
+FAINT, SCATTER = 4e-3, 1.25
+"""Part of its own below which a model finds more than noise in clean records, and by how much its coefficients scatter there: on the 81
+clean sealed cases of seeds 20261205 and 20261206 by 1.25 times the noise, and above it by 1.0."""
 
 SIGNIFICANCE, SEVERAL = 1e-3, 1e-2
 """Probability with which noise alone may call an explanation lacking: of one effect, and of several. What several laws together
@@ -118,7 +120,8 @@ class _Free(NamedTuple):
 
     Attributes:
         columns: (n_residuals, k) responses to the coefficients of all models.
-        bases: Model to the indices of its columns, and the matrix (k_model, freedom) that makes an orthonormal basis of them.
+        bases: Model to the indices of its columns, and the matrix (k_model, freedom) that makes an orthogonal basis of them, whose
+            products with clean residuals have unit deviation.
     """
 
     columns: Array
@@ -150,7 +153,8 @@ def _free(screen: Screen, ground: Ground) -> _Free:
         own = np.flatnonzero([model in (m, "any") for m in models])
         squares, vectors = np.linalg.eigh(products[np.ix_(own, own)])
         kept = squares > NEGLIGIBLE**2 * len(own)
-        bases[model] = own, vectors[:, kept] / np.sqrt(squares[kept])
+        scatter = np.where(squares[kept] < FAINT**2 * len(own), SCATTER, 1.0)
+        bases[model] = own, vectors[:, kept] / np.sqrt(squares[kept]) / scatter
     return _Free(columns, bases)
 
 
