@@ -10,6 +10,7 @@ Stopped, it goes on where it was: what is made and diagnosed stays in the work f
 from __future__ import annotations
 
 import json
+import subprocess
 import sys
 import time
 from dataclasses import dataclass
@@ -60,7 +61,7 @@ def main() -> int:
     """Make, run, score, write."""
     args = tyro.cli(Args, description=__doc__)
     console = Console(stderr=True)
-    scored = []
+    scored, commits = [], set()
     began = time.perf_counter()
     for name, n, options in (
         ("sealed", args.n, BlindOptions()),
@@ -76,24 +77,37 @@ def main() -> int:
             console.print(text, markup=False, highlight=False)
 
         make_blind(cases, answers, n=n, rng=rng, options=options, workers=args.workers, progress=tell)
+        commits.add(_commit(results.parent, again=args.again))
         run_blind(cases, results, again=args.again, workers=args.workers, progress=tell)
         scored += score_cases(results, answers, cases=cases)
-    write(args, summary(scored), time.perf_counter() - began)
+    write(args, summary(scored), sorted(commits), time.perf_counter() - began)
     return 0
 
 
-def write(args: Args, score: BlindScore, seconds: float) -> None:
+def _commit(folder: Path, *, again: bool) -> str:
+    """Commit that diagnosed the cases of a work folder: the present one where they are new, and kept for when they are scored anew."""
+    kept = folder / "commit"
+    if again or not kept.exists():
+        told = subprocess.run(
+            ("git", "describe", "--always", "--dirty"), cwd=ROOT, capture_output=True, text=True, check=False
+        )
+        write_text(kept, told.stdout.strip() or "unknown")
+    return kept.read_text(encoding="utf-8")
+
+
+def write(args: Args, score: BlindScore, commits: list[str], seconds: float) -> None:
     """Write the scores as Markdown, as JSON, and as a page where wanted."""
     document: dict[str, Any] = {
         "command": f"python scripts/sealed_cases.py --n {args.n} --struck {args.struck} --seed {args.seed}",
         "machine": machine(),
-        "provenance": provenance(seed=args.seed),
+        "provenance": provenance(seed=args.seed, commits=commits),
         "seconds": seconds,
         "score": score.to_json(),
     }
     lead = (
         f"Made by `{document['command']}` on {machine()['cores']} cores; what is drawn, and what counts as right, stands in "
-        "[blind.md](blind.md). The cases were made by integrators that the fits do not use, and diagnosed without their answers."
+        "[blind.md](blind.md). The cases were made by integrators that the fits do not use, and diagnosed without their answers "
+        f"by commit {', '.join(commits)}."
     )
     write_text(args.out.with_suffix(".json"), json.dumps(document, indent=1, ensure_ascii=False) + "\n")
     write_text(args.out.with_suffix(".md"), markdown(score, title="Sealed cases", lead=lead))

@@ -520,6 +520,20 @@ def test_wilson_and_calibration_have_their_textbook_values():
     assert calibration_error([(float(p), True) for p in stated]) == pytest.approx(0.5, abs=0.02)
 
 
+@pytest.mark.parametrize(
+    ("said", "share"),
+    [
+        ([("gap", "axial"), ("coulomb_friction", "torsional")], 1.0),
+        ([("gap", "axial"), ("gap", "torsional")], 1.0),  # the second gap stands for the friction
+        ([("gap", "torsional"), ("coulomb_friction", "torsional")], 0.5),
+        ([("gap", "torsional"), ("coulomb_friction", "axial")], 0.0),
+    ],
+)
+def test_a_place_is_held_against_the_effect_of_that_name(tmp_path, said, share):
+    write(tmp_path, "a", "effect", said, "double", [("gap", "axial"), ("coulomb_friction", "torsional")])
+    assert score_blind(tmp_path / "r", tmp_path / "a").place == share
+
+
 def test_scores_are_told_as_tables_markdown_and_a_page(tmp_path, capsys):
     write(
         tmp_path, "a", "effect", [("gap", "")], "single", [("gap", "")], answer={"gap_nrmse_validation": 0.2}

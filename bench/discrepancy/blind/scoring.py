@@ -306,8 +306,16 @@ def _complaint(s: Scored) -> str:
 
 
 def _places(scored: Sequence[Scored]) -> list[bool]:
-    return [where in {w for n, w in s.truth if n == name} for s in scored for name, where in s.said
-            if any(n == name and w for n, w in s.truth)]  # fmt: skip
+    """Whether each effect named rightly stands at its place.
+
+    What stands exactly where it is withheld is taken out first: beside it the same law may be named for another effect.
+    """
+    right: list[bool] = []
+    for s in scored:
+        missed = {n for n, w in s.truth if w and (n, w) not in s.said}
+        right += [True] * sum(bool(w) and (n, w) in s.said for n, w in s.truth)
+        right += [False for n, w in s.said if (n, w) not in s.truth and n in missed]
+    return right
 
 
 def _held(s: Scored) -> bool:
