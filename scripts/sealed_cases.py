@@ -61,7 +61,7 @@ def main() -> int:
     """Make, run, score, write."""
     args = tyro.cli(Args, description=__doc__)
     console = Console(stderr=True)
-    scored, commits = [], set()
+    scored, commits = [], set[str]()
     began = time.perf_counter()
     for name, n, options in (
         ("sealed", args.n, BlindOptions()),
@@ -77,22 +77,25 @@ def main() -> int:
             console.print(text, markup=False, highlight=False)
 
         make_blind(cases, answers, n=n, rng=rng, options=options, workers=args.workers, progress=tell)
-        commits.add(_commit(results.parent, again=args.again))
+        commits |= _commits(cases, results, again=args.again)
         run_blind(cases, results, again=args.again, workers=args.workers, progress=tell)
         scored += score_cases(results, answers, cases=cases)
     write(args, summary(scored), sorted(commits), time.perf_counter() - began)
     return 0
 
 
-def _commit(folder: Path, *, again: bool) -> str:
-    """Commit that diagnosed the cases of a work folder: the present one where they are new, and kept for when they are scored anew."""
-    kept = folder / "commit"
-    if again or not kept.exists():
-        told = subprocess.run(
+def _commits(cases: Path, results: Path, *, again: bool) -> set[str]:
+    """Commits that diagnosed cases: kept beside the results, the present one added where some are still to be diagnosed."""
+    kept = results.parent / "commits"
+    told = set() if again or not kept.exists() else set(kept.read_text(encoding="utf-8").split())
+    made = (path.parent.name for path in cases.glob("*/nominal.json"))
+    if again or any(not (results / f"{name}.json").exists() for name in made):
+        present = subprocess.run(
             ("git", "describe", "--always", "--dirty"), cwd=ROOT, capture_output=True, text=True, check=False
         )
-        write_text(kept, told.stdout.strip() or "unknown")
-    return kept.read_text(encoding="utf-8")
+        told.add(present.stdout.strip() or "unknown")
+        write_text(kept, "\n".join(sorted(told)))
+    return told or {"unknown"}
 
 
 def write(args: Args, score: BlindScore, commits: list[str], seconds: float) -> None:
