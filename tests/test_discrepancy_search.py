@@ -11,6 +11,7 @@ from scipy.optimize import least_squares
 from bench.discrepancy import BlindOptions
 from bench.discrepancy.blind.protocol import draw_case
 from bench.discrepancy.catalogue import effect_named
+from bench.discrepancy.grid_points import ROWS, products
 from bench.discrepancy.linear_run import linear_run
 from bench.discrepancy.minimise import Prior, minimise
 from bench.discrepancy.nominate import refined
@@ -175,3 +176,14 @@ def test_refinement_along_the_measured_motion_nears_the_truth_without_a_nonlinea
     clearance = candidates[0].effect.values(fine[0].eta, scales)[1]
     # the smoothed motion carries some percent of the noise of a record into the force along it
     assert clearance == pytest.approx(answer["effects"][0]["parameters"][1], rel=0.05)
+
+
+def test_products_of_rounded_columns_are_summed_in_double_precision():
+    rng = np.random.default_rng(5)
+    # the last rows do not fill a block
+    rough = (1.0 + rng.standard_normal((2 * ROWS + 17, 3))).astype(np.float32)
+    other = 1.0 + rng.standard_normal((len(rough), 2))
+    found = products(rough, other)
+    assert found.dtype == np.float64
+    # rounding of sums of 2e4 terms of order one; single precision would leave 1e-7 and more
+    np.testing.assert_allclose(found, rough.astype(np.float64).T @ other, rtol=1e-12)

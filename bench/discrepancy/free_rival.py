@@ -36,7 +36,7 @@ from bench.discrepancy.closure import (
 from bench.discrepancy.effect import Effect, FreeParameter, Scales, Values
 from bench.discrepancy.explain import Explanation
 from bench.discrepancy.fit import Fit, fit
-from bench.discrepancy.grid_points import Node
+from bench.discrepancy.grid_points import Node, products
 from bench.discrepancy.nominate import along
 from bench.discrepancy.placed import Placed
 from bench.discrepancy.placements import placements
@@ -149,7 +149,8 @@ def _damped(problem: Problem, fits: Sequence[Fit]) -> Iterator[tuple[Placed, Arr
 def _free(problem: Problem, fitted: Fit, each: Callable) -> Iterator[tuple[Placed, Array, float]]:
     """Free forces that promise to be likelier than a hypothesis, the likeliest first, and where to begin with them."""
     families = (FREE_DISPLACEMENT, FREE_VELOCITY, FREE_SURFACE, FREE_MEMORY)
-    screen = along(Screen(problem, placements(problem.case, problem.structure, families), each), fitted)
+    screen = along(Screen(problem, (), each), fitted)
+    screen.add(placements(problem.case, problem.structure, families), each)
     ground = screen.ground()
     promises = sorted(
         (_promised(screen, ground, node) for node in screen.nodes), key=lambda p: -p.log_posterior
@@ -178,9 +179,9 @@ def damped(contact: Effect) -> Effect:
 def _promised(screen: Screen, ground: Ground, node: Node) -> _Promise:
     """The evidence of a free force, linear in its coefficients along a motion that is known."""
     left = ground.left
-    inner = ground.head.T @ node.columns
+    inner = products(ground.head, node.columns)
     gram = node.gram - inner.T @ inner
-    right = node.columns.T @ left[: len(ground.residual)]
+    right = products(node.columns, left[: len(ground.residual), None])[:, 0]
     alone = -0.5 * float(left @ left) - float(np.sum(np.log(np.abs(np.diag(ground.triangle)))))
     found: list[tuple[float, Array, Array]] = []
     for mixing in _mixings(node.placed.effect):
@@ -192,7 +193,7 @@ def _promised(screen: Screen, ground: Ground, node: Node) -> _Promise:
     gain, mixing, eta = max(found, key=lambda entry: entry[0])
     toll = float(np.logaddexp.reduce([entry[0] for entry in found])) - float(np.log(len(found))) - gain
     prior = LOG_PRIOR_EFFECT - 0.5 * IMMATERIAL * screen.problem.n_residuals
-    moved = screen.deviations + ground.moves(node.columns @ (mixing @ eta))
+    moved = screen.deviations + ground.moves(node.columns @ (mixing @ eta).astype(np.float32))
     placed = replace(node.placed, effect=mixed(node.placed.effect, mixing))
     return _Promise(placed, np.concatenate([moved, eta]), alone + gain + toll + prior, toll)
 

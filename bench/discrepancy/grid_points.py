@@ -16,6 +16,8 @@ TINY = -60.0
 """Value of eta that makes a positive amplitude vanish."""
 IMITATED = 1e-10
 """Part of an effect's squared response that rounding leaves of one that the base imitates altogether."""
+ROWS = 8192
+"""Rows of two matrices that are multiplied at once."""
 
 
 class Node(NamedTuple):
@@ -78,6 +80,15 @@ def spanning(placed: Placed, eta: Array) -> list[Array]:
                 single[j] = 0.0 if effect.parameters[j].signed else TINY
         points.append(single)
     return points
+
+
+def products(a: NDArray[np.floating], b: NDArray[np.floating]) -> Array:
+    """Products (k, m) of the columns of two matrices (n, k) and (n, m), summed in double precision without a copy of either."""
+    total = np.zeros((a.shape[1], b.shape[1]))
+    for first in range(0, len(a), ROWS):
+        rows = slice(first, first + ROWS)
+        total += a[rows].astype(np.float64).T @ b[rows].astype(np.float64)
+    return total
 
 
 def fainter(placed: Placed, eta: Array, share: float) -> Array:

@@ -22,7 +22,7 @@ import numpy as np
 from bench.discrepancy.case import CaseRecord
 from bench.discrepancy.driven import driven_force
 from bench.discrepancy.fit import Fit
-from bench.discrepancy.grid_points import SIGNAL_STEP, Node, Point, read, spanning
+from bench.discrepancy.grid_points import SIGNAL_STEP, Node, Point, products, read, spanning
 from bench.discrepancy.linear_run import linear_run
 from bench.discrepancy.minimise import Prior, minimise
 from bench.discrepancy.pace import steps
@@ -260,15 +260,20 @@ class Screen:
         return self.response(lambda i: -force_along(self.problem, placed, eta, i))
 
     def _node(self, placed: Placed, eta: Array) -> Node | None:
-        columns = np.column_stack([self.effect_response(placed, point) for point in spanning(placed, eta)])
-        if placed.effect.modulated or placed.effect.affine:
-            columns[:, 1:] -= columns[:, :1]
+        # hundreds of grid points are kept, and a free force has dozens of columns: seven digits are enough
+        first, *further = spanning(placed, eta)
+        offset = self.effect_response(placed, first)
+        columns = np.empty((len(offset), 1 + len(further)), dtype=np.float32)
+        with np.errstate(over="ignore", invalid="ignore"):
+            columns[:, 0] = offset
+            for column, point in zip(columns.T[1:], further, strict=True):
+                response = self.effect_response(placed, point)
+                column[:] = response - offset if placed.effect.modulated or placed.effect.affine else response
         # a hidden resonance can make more of a record than rounding leaves of anything else
-        if not np.abs(columns).max() < LARGEST or not np.any(columns):
+        largest = max(columns.max(), -columns.min())
+        if not 0.0 < largest < LARGEST:
             return None
-        # hundreds of grid points are kept: seven digits are enough, if the products are those of the rounded columns
-        columns = columns.astype(np.float32).astype(np.float64)
-        return Node(placed, eta, columns.astype(np.float32), columns.T @ columns)
+        return Node(placed, eta, columns, products(columns, columns))
 
     def ground(self, base: Fit | None = None, *, simulated: bool = False) -> Ground:
         """What a base hypothesis leaves.
@@ -326,8 +331,8 @@ class Screen:
         for node in [node for node in self.nodes if node.placed.key not in own] + self._signal_nodes(
             hypothesis, vector
         ):
-            inner = ground.head.T @ node.columns
-            point = read(node, node.gram - inner.T @ inner, node.columns.T @ rest)
+            inner = products(ground.head, node.columns)
+            point = read(node, node.gram - inner.T @ inner, products(node.columns, rest[:, None])[:, 0])
             if point is not None:
                 points.append(point)
         points.sort(key=lambda point: -point.gain)
