@@ -267,7 +267,7 @@ CAPABILITIES: Sequence[Capability] = (
     _benchmark_group("diagnosis", "Diagnosis against mujoco.sysid and pysindy, side by side"),
     Capability(
         "peers",
-        "The same on ten of the development trials",
+        "The same on the development trials of one degree of freedom",
         (
             *("python", "scripts/benchmark.py", "diagnosis", "--data", "{data}/../trials"),
             *("--work", "out/peers", "--json"),

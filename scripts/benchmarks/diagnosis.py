@@ -1,11 +1,11 @@
 """The diagnosis against what people would otherwise take, on the same cases in one run, all scored by the same code.
 
 The peers are `mujoco.sysid` fitted to every candidate effect and chosen by its BIC (`peer_sysid`), and a global sparse
-regression (`peer_sindy`). The cases are sealed ones made here with a fixed seed, or with ``--data FOLDER`` any folder of
-cases with an ``answers`` folder in it, which only the scoring opens. Ten short cases of one degree of freedom by default, some
-fifteen minutes of two cores, or ten out of the folder, evenly chosen; ``--full`` makes sixty of a release's length, of all kinds,
-or takes the whole folder, which is hours: `mujoco.sysid` fits a case of 30 s at 1 kHz in some five minutes, the joint's in half an
-hour. Stopped, it goes on where it was with ``--work FOLDER``.
+regression (`peer_sindy`). The cases are sealed ones made here with a fixed seed: ten short ones of one degree of freedom, some
+fifteen minutes of two cores, with ``--full`` sixty of a release's length, of all kinds. Or, with ``--data FOLDER``, those of any
+folder with an ``answers`` folder in it, which only the scoring opens: the cases of one degree of freedom, with ``--full`` the
+joint's as well. That is hours: `mujoco.sysid` takes three to five minutes for a case of 30 s at 1 kHz, and half an hour and more
+for one of the joint. Stopped, it goes on where it was with ``--work FOLDER``.
 
     python scripts/benchmark.py diagnosis
     python scripts/benchmark.py diagnosis --data FOLDER --full --work out/peers --save diagnosis.json
@@ -147,8 +147,6 @@ def rows(
         found = sorted(path.parent for path in home.glob("*/nominal.json"))
         # rig by rig: the quick ones are done first
         cases = [path for rig in RIGS[: None if full else 1] for path in found if read_case(path).rig == rig]
-        if data is not None and not full:
-            cases = cases[:: -(-len(cases) // CASES)]
         told = outcomes(cases, answers, folder / "results", progress)
         memory = _memory(large, progress)
     return [
