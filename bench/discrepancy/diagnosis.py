@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from bench.discrepancy import evidence
 from bench.discrepancy.attribute import STALLED
@@ -92,13 +93,21 @@ def diagnose(
         UnknownNameError: A name in `exclude` is not in the catalogue.
         RecordingError: The records cannot be used.
     """
-    began = time.perf_counter()
     rng = np.random.default_rng(SEED) if rng is None else rng
     known = [effect.name for effect in catalogue]
     for name in exclude:
         if name not in known:
             raise UnknownNameError("effect", name, known)
-    catalogue = [effect for effect in catalogue if effect.name not in exclude]
+    chosen = [effect for effect in catalogue if effect.name not in exclude]
+    # fits run in threads of their own; threads of BLAS within them would only get in each other's way
+    with threadpool_limits(1, user_api="blas"):
+        return _diagnose(case, chosen, most, rng, progress)
+
+
+def _diagnose(
+    case: Case, catalogue: Sequence[Effect], most: int, rng: np.random.Generator, progress: Progress
+) -> Diagnosis:
+    began = time.perf_counter()
     progress("looking at the records")
     check_units(case)
     refuse(Problem(case, structure_of(case), case.identification))

@@ -15,7 +15,6 @@ from functools import cached_property
 from itertools import product
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from bench.discrepancy.attribute import STALLED, Prepared, attribute, prepare
 from bench.discrepancy.case import Case, CaseRecord
@@ -155,14 +154,6 @@ def explain(
         most: Largest number of effects in a group.
         progress: Called with a line of text at every stage.
     """
-    # Fits run in threads of their own; threads of BLAS within them would only get in each other's way.
-    with threadpool_limits(1, user_api="blas"):
-        return _explain(case, catalogue, most, progress)
-
-
-def _explain(
-    case: Case, catalogue: Sequence[Effect], most: int, progress: Callable[[str], None]
-) -> list[Explanation]:
     structure = structure_of(case)
     groups = structure.groups()
     if len(groups) == 1:
@@ -325,7 +316,7 @@ def close(best: Explanation, nothing: Explanation, closures: Sequence[Effect]) -
             current = fit(problem, (), start=np.zeros(len(problem.nominal)), iterations=THOROUGH)
             if fitted.reduced - 1.0 < HELPFUL * (current.reduced - 1.0):
                 current = fitted
-            with ThreadPoolExecutor(THREADS) as pool, threadpool_limits(1, user_api="blas"):
+            with ThreadPoolExecutor(THREADS) as pool:
                 for _ in range(CLOSED):
                     closed = _closed(problem, screen, current, pool.map)
                     if closed is None:

@@ -22,7 +22,6 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
-from threadpoolctl import threadpool_limits
 
 from bench.discrepancy.closure import (
     FREE_DISPLACEMENT,
@@ -124,7 +123,7 @@ def _contacts(problem: Problem, explanations: Sequence[Explanation]) -> list[Fit
 def _rival(problem: Problem, fitted: Fit, contacts: Sequence[Fit]) -> Fit | None:
     """The fit of a single force alone, where it is likelier than a hypothesis; the likeliest one."""
     best, most = None, posterior(fitted)
-    with ThreadPoolExecutor(THREADS) as pool, threadpool_limits(1, user_api="blas"):
+    with ThreadPoolExecutor(THREADS) as pool:
         tasks = [*_damped(problem, contacts), *_free(problem, fitted, pool.map)]
         for placed, start, toll in tasks:
             rival = fit(

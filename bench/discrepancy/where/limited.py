@@ -67,6 +67,7 @@ class _Free(NamedTuple):
         forces: (n_samples, SHAPES CELLS) of unit coefficients along the motion of all records.
         gram: (SHAPES CELLS, SHAPES CELLS) products of its whitened responses.
         seen: (SHAPES CELLS,) their products with what the nominal model leaves.
+        coefficients: (SHAPES CELLS,) those of the unlimited force.
         left: Chi-squared that the unlimited force leaves.
     """
 
@@ -75,6 +76,7 @@ class _Free(NamedTuple):
     forces: Array
     gram: Array
     seen: Array
+    coefficients: Array
     left: float
 
     @property
@@ -86,11 +88,6 @@ class _Free(NamedTuple):
         """Share of the samples in a part, and a little for each of its ends within the motion."""
         share = float(np.isin(self.cells, part.cells).mean())
         return share + ENDING * sum((first > 0) + (end < CELLS) for first, end in part.intervals)
-
-    @property
-    def coefficients(self) -> Array:
-        """Those of the unlimited force (SHAPES CELLS,)."""
-        return np.asarray(np.linalg.lstsq(self.gram, self.seen, rcond=1e-9)[0], dtype=np.float64)
 
 
 def limited_regions(nominal: Explanation, best: Explanation) -> dict[str, tuple[dict[str, Any], ...]]:
@@ -158,9 +155,9 @@ def _free(place: Place, states: list[Array], over: int, screen: Screen, ground: 
     columns = np.column_stack([ground.project(response(k)) for k in range(SHAPES * CELLS)])
     alone = ground.left
     gram, seen = columns.T @ columns, columns.T @ alone
-    free = _Free(COORDINATES[over], reach, np.vstack(per_record), gram, seen, 0.0)
-    best = free.coefficients
-    return free._replace(left=float(alone @ alone - 2.0 * seen @ best + best @ gram @ best))
+    best = np.asarray(np.linalg.lstsq(gram, seen, rcond=1e-9)[0], dtype=np.float64)
+    left = float(alone @ alone - 2.0 * seen @ best + best @ gram @ best)
+    return _Free(COORDINATES[over], reach, np.vstack(per_record), gram, seen, best, left)
 
 
 def _parts() -> list[_Part]:
