@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bench.discrepancy.challenge import challenge, reduce_best
+from bench.discrepancy.challenge import challenge, reduce_best, simplify
 from bench.discrepancy.effect import Effect
 from bench.discrepancy.fit import Fit, fit
 from bench.discrepancy.grid_points import Point
@@ -134,7 +134,9 @@ def attribute(
             _extend(search, screen, worth_extending(search, screen, size, 4 - size), pool, count=6 - size)
             reduce_best(search, pool)
         best = search.ranked()[0]
-        if problem.noise_stated and near(best):
+        if not problem.noise_stated:
+            simplify(search, candidates, pool)
+        elif near(best):
             progress(f"rivals of {names(best.hypothesis)}")
             challenge(search, screen, pool)
             shake(search, pool)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
@@ -16,6 +16,10 @@ from bench.discrepancy.problem import Problem
 from bench.discrepancy.screen import Screen
 from bench.discrepancy.search import SIGHT, Search, Task, carry_on, consistent, converge, key_of
 
+SIMPLIFIED = 6
+"""Hypotheses whose effects are tried with fewer parameters."""
+PLAINER = {"hysteresis": "friction", "damping": "friction"}
+"""Families whose laws become those of another one at the limits of their parameters."""
 LEFT = 0.02
 """Part of a named effect's gain along the motion that a challenger may lack, besides twice what the effect leaves."""
 
@@ -88,6 +92,43 @@ def _alike(
 
 def _of_one_number(effect: Effect) -> bool:
     return effect.site != "joint" and len(effect.parameters) == 1 and effect.parameters[0].signed
+
+
+def simplify(search: Search, candidates: Sequence[Placed], pool: ThreadPoolExecutor) -> None:
+    """Fit simpler relatives of the effects of the foremost hypotheses in their stead.
+
+    Where nothing is down to the noise, whatever has most parameters comes foremost, and a law with one may never have been tried
+    beside the others: it is for whoever weighs them to say whether the further parameters are worth it.
+
+    Args:
+        search: Fits so far; the new ones are added.
+        candidates: Effects at their places.
+        pool: Threads.
+    """
+    problem = search.problem
+    tasks: dict[frozenset, Task] = {}
+    for fitted in search.ranked()[:SIMPLIFIED]:
+        for i, placed in enumerate(fitted.hypothesis):
+            rest, vector = _without(i, fitted, problem)
+            for other in candidates:
+                key = key_of((*rest, other))
+                if (
+                    not _simpler(other, placed)
+                    or len(key) < len(fitted.hypothesis)
+                    or key in search.converged
+                ):
+                    continue
+                starts = np.array([np.append(vector, eta) for eta in other.effect.grid()])
+                tasks.setdefault(key, ((*rest, other), starts))
+    converge(search, pool, list(tasks.values()))
+
+
+def _simpler(other: Placed, placed: Placed) -> bool:
+    """Whether an effect is a relative at the same place with fewer parameters."""
+    free, fewer = (sum(not p.fixed for p in e.effect.parameters) for e in (placed, other))
+    same = (other.effect.site, other.place.name) == (placed.effect.site, placed.place.name)
+    families = {placed.effect.family, PLAINER.get(placed.effect.family, "")}
+    return same and other.effect.family in families and fewer < free
 
 
 def reduce_best(search: Search, pool: ThreadPoolExecutor) -> None:

@@ -17,6 +17,7 @@ from threadpoolctl import threadpool_limits
 
 from bench.discrepancy import evidence
 from bench.discrepancy.attribute import STALLED
+from bench.discrepancy.between_samples import promising_readings, reading_notes
 from bench.discrepancy.case import Case, read_case
 from bench.discrepancy.catalogue import CATALOGUE
 from bench.discrepancy.closure import CLOSURES
@@ -25,6 +26,7 @@ from bench.discrepancy.effect import Effect
 from bench.discrepancy.explain import Explanation, close, explain, nominal_alone
 from bench.discrepancy.free_rival import Rival, likelier_force
 from bench.discrepancy.idle_loads import idle_notes, without_idle_noise
+from bench.discrepancy.moving_starts import with_starts_found
 from bench.discrepancy.next_excitation import separate, told_apart
 from bench.discrepancy.nominal_file import check_units
 from bench.discrepancy.placed import Hypothesis
@@ -110,11 +112,11 @@ def _diagnose(
     began = time.perf_counter()
     progress("looking at the records")
     check_units(case)
+    told = case = with_starts_found(case)
     refuse(Problem(case, structure_of(case), case.identification))
-    told = case
-    case = without_idle_noise(told)
+    quiet = without_idle_noise(told)
+    case, explanations = _explained(quiet, catalogue, most, progress)
     problem = Problem(case, structure_of(case), case.identification)
-    explanations = explain(case, catalogue, most=most, progress=progress)
     best = explanations[0]
     kind, probabilities = evidence.judge(explanations)
     doubt, rival = "", None
@@ -135,6 +137,8 @@ def _diagnose(
     progress("gap on the judging records")
     final, closure, found = _shrunk(case, problem, explanations, kind, rival, rng)
     widest = max(found, key=lambda gap: gap.before / max(gap.noise_floor, 1e-12))
+    if kind == "unknown" and best.hypothesis:
+        words += evidence.nearest(names(best.hypothesis), widest)
     where = locate(
         problem,
         nominal_alone(explanations),
@@ -154,7 +158,8 @@ def _diagnose(
         explanation=_told(words, seen),
         warnings=(
             *notes(case, problem),
-            *idle_notes(told, case),
+            *idle_notes(told, quiet),
+            *reading_notes(quiet, case),
             *start_warnings(problem, (*case.identification, *case.validation)),
         ),
         closure=closure,
@@ -165,6 +170,24 @@ def _diagnose(
         seconds=time.perf_counter() - began,
     )
     return Diagnosis(case, problem, tuple(explanations), verdict, final, where)
+
+
+def _explained(
+    case: Case, catalogue: Sequence[Effect], most: int, progress: Progress
+) -> tuple[Case, list[Explanation]]:
+    """The explanations of a case, and the case with what they tell of things that nobody stated: its loads and its starts."""
+    explanations = explain(case, catalogue, most=most, progress=progress)
+    for read in promising_readings(case, explanations):
+        progress(f"once more, the loads read as {read.load_interpolation}")
+        again = explain(read, catalogue, most=most, progress=progress)
+        if again[0].log_posterior > explanations[0].log_posterior:
+            case, explanations = read, again
+            break
+    started = with_starts_found(case, explanations[0].predict)
+    if any(a.at_rest != b.at_rest for a, b in zip(case.identification, started.identification, strict=True)):
+        progress("once more, from the initial states estimated")
+        explanations = explain(started, catalogue, most=most, progress=progress)
+    return started, explanations
 
 
 def _doubt(
@@ -187,10 +210,11 @@ def _shrunk(
     """How far the gap shrinks: the explanation behind `Gap.after`, the closure in it if any, and the gaps."""
     best, nothing = explanations[0], nominal_alone(explanations)
     final, closure = best, ""
-    if kind == "unknown":
-        final, closure = _closed(best, nothing, rival)
     stages = [("nominal", nominal_prediction(problem)), ("parameters only", nothing.predict)]
     stages += [(label, e.predict) for label, e in _path(explanations)]
+    if kind == "unknown":
+        final, closure = _closed(best, nothing, rival)
+        stages += [(names(best.hypothesis), best.predict)] if best.hypothesis else []
     stages.append((names(final.hypothesis), final.predict))
     found = gaps(case, problem, stages=stages, rng=rng, final=_model(final))
     if kind == "unknown" and any(gap.after > WORSE * gap.parameters_only for gap in found):

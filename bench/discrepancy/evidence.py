@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -10,7 +11,8 @@ from bench.discrepancy.effect import unit_of
 from bench.discrepancy.explain import Explanation, nominal_alone
 from bench.discrepancy.placed import Placed
 from bench.discrepancy.search import names
-from bench.discrepancy.verdict import Estimate, Kind, NamedEffect, Ranked
+from bench.discrepancy.shrink import closed_share
+from bench.discrepancy.verdict import Estimate, Gap, Kind, NamedEffect, Ranked
 
 RIVAL = 4.6
 """Difference in log posterior (odds of 100) within which two explanations count as indistinguishable."""
@@ -23,6 +25,8 @@ OUTSIDE = 0.01
 417 effects that were named with certainty on the sealed cases of seeds 20261204 and 20261205, two were wrong."""
 WITHIN = 0.05
 """Share of catalogued effects among what is called unknown: of 104 such verdicts there, six were."""
+WORTH_HAVING = 0.8
+"""Part of the gap on the judging records from which the nearest explanation of something unknown is worth telling."""
 OUTSIDE_THE_CATALOGUE = {"effect": WITHIN, "none": 0.0, "unknown": 1.0 - WITHIN}
 """Probabilities of the verdicts where there is a doubt about an explanation that leaves nothing but noise."""
 FAILS = "explains the records for identification and fails on those for judging"
@@ -50,6 +54,23 @@ def enough(closure: str) -> str:
 
 def _forces(closure: str) -> str:
     return " and ".join(f"a single {SINGLE[name]}" for name in closure.split(" + "))
+
+
+def nearest(label: str, gap: Gap) -> str:
+    """How far the nearest explanation goes on the judging records; empty where it is not worth building in.
+
+    Args:
+        label: Its effects as they stand among the gap's steps.
+        gap: A gap of the case.
+    """
+    left = dict(gap.steps).get(label, math.inf)
+    share = closed_share(gap.before, left, gap.noise_floor)
+    if share < WORTH_HAVING:
+        return ""
+    return (
+        f" On the judging records {label} closes {100.0 * min(share, 1.0):.3g} % of the gap all the same: it is most of what is "
+        "missing, or much like it."
+    )
 
 
 def weights(explanations: Sequence[Explanation]) -> np.ndarray:

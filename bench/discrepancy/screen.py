@@ -383,16 +383,11 @@ class Screen:
         """Residual, parameter columns and nominal deviations of a base: along the measured motion for forces, simulated otherwise."""
         if simulated or any(placed.effect.site in {"actuator", "sensor"} for placed in hypothesis):
             residual = self.problem.residual(hypothesis, vector)
-            columns = []
-            _, std, _, high = self.problem.prior(hypothesis)
-            fixed = [p.fixed for placed in hypothesis for p in placed.effect.parameters]
-            for i in range(len(vector)):
-                if i >= len(self.problem.nominal) and fixed[i - len(self.problem.nominal)]:
-                    continue
-                columns.append(
-                    self._simulated_column(hypothesis, vector, residual, i, RUN_STEP * std[i], high[i])
-                )
-            return residual, np.column_stack(columns), vector[: len(self.problem.nominal)]
+            if np.isfinite(
+                residual
+            ).all():  # what is left of an explanation without one of its effects may diverge
+                columns = self._simulated_columns(hypothesis, vector, residual)
+                return residual, columns, vector[: len(self.problem.nominal)]
         residual = self.zero.copy()
         columns = [self.nominal]
         _, etas = self.problem.split(hypothesis, vector)
@@ -400,6 +395,7 @@ class Screen:
             if placed.effect.site == "inertia":
                 i = self.problem.structure.parameters.index(placed.target)
                 columns.append(1e3 * self.nominal[:, [i]])
+            if placed.effect.site != "joint":
                 continue
             response = self.effect_response(placed, eta)
             residual = residual - response
@@ -413,6 +409,19 @@ class Screen:
                     ((self.effect_response(placed, moved) - response) / (moved[k] - eta[k]))[:, None]
                 )
         return residual, np.hstack(columns), self.deviations
+
+    def _simulated_columns(self, hypothesis: Hypothesis, vector: Array, residual: Array) -> Array:
+        """Responses (n, k) of a free run to the nominal parameters and to the free ones of its effects."""
+        _, std, _, high = self.problem.prior(hypothesis)
+        shapes = [p.fixed for placed in hypothesis for p in placed.effect.parameters]
+        held = [False] * len(self.problem.nominal) + shapes
+        return np.column_stack(
+            [
+                self._simulated_column(hypothesis, vector, residual, i, RUN_STEP * std[i], high[i])
+                for i in range(len(vector))
+                if not held[i]
+            ]
+        )
 
     def _simulated_column(
         self, hypothesis: Hypothesis, vector: Array, residual: Array, entry: int, step: float, high: float
