@@ -1,9 +1,9 @@
 """How the loads ran between their samples, where nobody said so.
 
 Straight lines are taken first. A load that holds a good part of its power near half the sample rate and is read the wrong
-way is another load, and the catalogue spends a cross-talk, a flexible base or a delay on it. So where an explanation has several
-effects, or leaves more than noise, the other readings are tried: one that takes away what it takes several effects
-to take away, or far more than as many, is worth a search of its own.
+way is another load, and the catalogue spends a cross-talk, a flexible base or a delay on it. So where anything is missing, the
+other readings are tried: one that takes away what it takes further effects to take away, or that leaves far less beside as
+many, is worth a search of its own.
 """
 
 from __future__ import annotations
@@ -41,8 +41,7 @@ def promising_readings(case: Case, explanations: Sequence[Explanation]) -> Itera
         explanations: Its explanations, the best first.
     """
     best = explanations[0]
-    plain = best.consistent and len(best.hypothesis) < 2
-    if STATED in case.options or best.parts[0][0].driven or plain:
+    if STATED in case.options or best.parts[0][0].driven or (best.consistent and not best.hypothesis):
         return
     ladder = list(_ladder(explanations))
     for reading in INTERPOLATIONS:

@@ -38,8 +38,8 @@ MATERIAL = 0.05
 """Least part of a channel's standard deviation that the free response to a start has to make."""
 CERTAIN = 6.0
 """Standard deviations by which it has to differ from rest."""
-FORGOTTEN = 0.3
-"""Error of the second half of a record over that of the first from which it has died away."""
+FORGOTTEN = 0.1
+"""Power of the error beyond noise in the second half of a record, over that in the first, from which it has died away."""
 INDEPENDENT = 4
 """Pieces of what no start, force, gain or delay explains that say anything of their own: it runs through the samples."""
 GAIN, SHIFT = 0.3, 5.0
@@ -132,7 +132,7 @@ def _dies_away(case: Case, structure: Structure, record: CaseRecord, predict: Pr
     first = np.abs(error[0])
     begins = (first > CERTAIN * noise) & (first > MATERIAL * np.std(measured, axis=0))
     half = len(error) // 2
-    early, late = (np.sqrt(np.mean(part**2, axis=0)) for part in (error[:half], error[half:]))
+    early, late = (np.mean(part**2, axis=0) - noise**2 for part in (error[:half], error[half:]))
     return bool(np.any(begins & (late < FORGOTTEN * early)))
 
 
