@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -145,3 +148,31 @@ def test_smoothing_recovers_the_velocity_that_was_not_measured():
     # about a hundred independent samples a corner period of 20 Hz: errors fall well below a percent of the signal
     assert np.std(smooth[inside, 1] - v[inside]) < 0.01 * np.std(v)
     assert np.std(smooth[inside, 0] - q[inside]) < 0.3 * noise[0]
+
+
+GUARDED = """
+import ctypes, mmap
+import numpy as np
+from bench.discrepancy.friction_limits import coulomb_limit
+from bench.discrepancy.system import Elements, LinearStructure, free_run
+
+n, factor = 16384, 32
+size = n * factor * 8
+memory = mmap.mmap(-1, 2 * size)
+address = ctypes.addressof(ctypes.c_char.from_buffer(memory))
+ctypes.CDLL(None).mprotect(ctypes.c_void_p(address + size), ctypes.c_size_t(size), 0)
+loads = np.frombuffer(memory, count=n * factor)[factor - 1:][:, None]  # they end where nobody may read
+loads[-len(loads) // 50:] = 20.0  # held until late: an address made of no number then lies far beyond them
+wild = LinearStructure(*(np.array([[x]]) for x in (2.0, -1e160, 900.0, 1.0)))
+table = np.array([[0, 0, coulomb_limit.address, 1, 0, 0, 0, 0]], dtype=np.int64)
+friction = Elements(table, np.ones((1, 1)), np.array([6.0, 0.0]), np.zeros(0))
+motion = free_run(wild, friction, loads=loads, step=1e-3, substeps=4, load_factor=factor)
+assert motion.position[n // 2, 0] == 0.0
+assert np.isnan(motion.position[-1, 0])
+"""
+
+
+def test_a_run_with_friction_that_overflows_reads_no_load_beyond_the_last():
+    """Within one step it may leave all numbers behind; the instant at which friction would end is none then either."""
+    done = subprocess.run([sys.executable, "-c", GUARDED], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr

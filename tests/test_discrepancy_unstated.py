@@ -184,9 +184,7 @@ def test_a_base_whose_free_run_diverges_is_screened_along_the_measured_motion():
     gain = next(p for (name, _), p in found.items() if name == "displacement_gain_error")
     vector = np.concatenate([np.zeros(3), [-25.0], [0.1]])
     assert not np.isfinite(problem.residual((soft, gain), vector)).all()
-    base = replace(
-        fit(problem, (), start=np.zeros(3), iterations=1), hypothesis=(soft, gain), vector=vector
-    )
+    base = replace(fit(problem, (), start=np.zeros(3), iterations=1), hypothesis=(soft, gain), vector=vector)
     screen = Screen(problem, [found["gap", ""]])
     ground = screen.ground(base)
     assert np.isfinite(ground.residual).all()

@@ -24,6 +24,8 @@ STATED = "load_interpolation"
 """Option of a case that says it; where it is given, nothing is looked for."""
 INSTEAD = 0.8
 """Part of what further effects take from chi-squared that a reading has to take in their stead."""
+LIKELY = 0.5
+"""Part of the wanted decrease of chi-squared that a reading has to promise to first order, or it is not fitted."""
 BETTER = 0.5
 """Part of chi-squared, beyond what noise leaves where it is stated, that a reading has to leave with as many effects."""
 IN_WORDS = {
@@ -41,7 +43,7 @@ def promising_readings(case: Case, explanations: Sequence[Explanation]) -> Itera
         explanations: Its explanations, the best first.
     """
     best = explanations[0]
-    if STATED in case.options or best.parts[0][0].driven or (best.consistent and not best.hypothesis):
+    if STATED in case.options or best.parts[0][0].driven:
         return
     ladder = list(_ladder(explanations))
     for reading in INTERPOLATIONS:
@@ -52,32 +54,41 @@ def promising_readings(case: Case, explanations: Sequence[Explanation]) -> Itera
 
 
 def _ladder(explanations: Sequence[Explanation]) -> Iterator[Explanation]:
-    """The likeliest explanations of fewer effects than the best one, those of fewest first, and the best one."""
+    """The likeliest explanations of fewer effects than the best one, those of fewest first, and the best one if it leaves something."""
     best = explanations[0]
     for size in range(len(best.hypothesis)):
         ranked = [e for e in explanations if len(e.hypothesis) == size]
         if ranked:
             yield max(ranked, key=lambda e: e.log_posterior)
-    yield best
+    if not (best.consistent and _stated(best)):
+        yield best
 
 
 def _promises(read: Case, rung: Explanation, best: Explanation) -> bool:
     """Whether the effects of an explanation, fitted in another reading, leave little enough for a search in it."""
-    noise = sum(f.n_residuals for _, f in best.parts) if all(p.noise_stated for p, _ in best.parts) else 0
+    noise = sum(fitted.n_residuals for _, fitted in best.parts) if _stated(best) else 0
     limit = rung.chi2 - INSTEAD * (rung.chi2 - best.chi2)
     if rung is best:
         limit = noise + BETTER * (best.chi2 - noise)
     parts = [(_read(read, problem), problem, fitted) for problem, fitted in rung.parts]
-    change = 0.0
+    able = 0.0
     for problem, before, fitted in parts:
-        changed = problem.residual(fitted.hypothesis, fitted.vector)
-        if not np.isfinite(changed).all():
+        residual, changed = (p.residual(fitted.hypothesis, fitted.vector) for p in (before, problem))
+        if not (np.isfinite(changed).all() and np.isfinite(residual).all()):
             return False
-        change += float(np.sum((changed - before.residual(fitted.hypothesis, fitted.vector)) ** 2))
-    if np.sqrt(change) < np.sqrt(rung.chi2) - np.sqrt(max(limit, 0.0)):
-        return False  # so small a change does not lead so far, whatever its direction
-    fits = (fit(p, f.hypothesis, start=f.vector, iterations=THOROUGH) for p, _, f in parts)
+        # at the optimum the residual is orthogonal to all that parameters could do about the change
+        able += 2.0 * float(residual @ (residual - changed))
+    if able < LIKELY * (rung.chi2 - limit):
+        return False
+    fits = (
+        fit(problem, f.hypothesis, start=f.vector, iterations=THOROUGH, limit=limit, exact=False)
+        for problem, _, f in parts
+    )
     return sum(found.chi2 for found in fits) < limit
+
+
+def _stated(explanation: Explanation) -> bool:
+    return all(problem.noise_stated for problem, _ in explanation.parts)
 
 
 def _read(case: Case, problem: Problem) -> Problem:

@@ -256,7 +256,8 @@ def _fill_loads(p, u, k, fraction, share):
     n_inputs = u.shape[1]
     for i in range(3):
         at = (fraction + 0.5 * i * share) * p.load_factor
-        whole = min(int(at), max(p.load_factor - 1, 0))
+        # the instant of an event in a run that diverges is no number, and must not become an address
+        whole = max(min(int(at), p.load_factor - 1), 0)
         first = k * max(p.load_factor, 1) + whole
         for j in range(n_inputs):
             low = u[first, j]
