@@ -7,7 +7,8 @@ rig, the sample rate, every nominal parameter with its one-sigma uncertainty and
 What is known of the acquisition goes there too: ``"load_interpolation": "linear" | "band_limited" | "zero_order_hold"`` for the
 loads between their samples, ``"starts_in_motion": ["validation", …]`` (or true, for all of them) for records that do not start at
 rest, ``"periodic": ["identification_2", …]`` for records that are whole periods of a steady state, and
-``"antialias": {"kind": "butterworth", "order": 4, "cutoff_hz": 300}`` at a response channel that was filtered on its way.
+``"antialias": {"kind": "butterworth", "order": 4, "cutoff_hz": 300}`` at a response channel that was filtered on its way. Of the
+first two, what is not stated is looked for in the records (`between_samples`, `moving_starts`).
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The diagnosis of a case: where the gap lies, which effect causes it, how far it shrinks.
 
-The steps, each in its own module: read the case (`case`), screen and fit the catalogue (`screen`, `fit`, `attribute`,
-`explain`), weigh the explanations (`evidence`), doubt the best one (`free_rival`, `contradiction`), run the judging records with
+The steps, each in its own module: read the case (`case`), find what it leaves unstated of its records (`moving_starts`,
+`between_samples`), screen and fit the catalogue (`screen`, `fit`, `attribute`, `explain`), weigh the explanations (`evidence`), doubt the best one (`free_rival`, `contradiction`), run the judging records with
 each (`shrink`), and say where the residuals of the nominal model gather (`locate`).
 """
 

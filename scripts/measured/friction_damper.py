@@ -7,6 +7,9 @@ the median of the force against the direction of motion, and how it scatters.
 At 1 Hz the band grips with a jolt that rings at some 40 to 50 Hz, hardly seen at 0.5 Hz. No law of the catalogue rings so: of the
 test at 1 Hz and 20 lb an elastic-slip element with backlash leaves 0.23 even when fitted to that test itself. Neither a
 resonance between force and sensor nor a sliding mass behind the play, fitted to the test at 0.5 Hz, brings the other below 0.23.
+The prescribed displacement rings with it, in antiphase to the force and in the same proportion at every tension: the drive gives
+way to the force, which is why the motion tells the force there although no law of the motion makes it. Predicting the one by the
+other would be reading a second load cell, not a model of the damper.
 """
 
 from __future__ import annotations
