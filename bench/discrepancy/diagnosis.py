@@ -1,8 +1,9 @@
 """The diagnosis of a case: where the gap lies, which effect causes it, how far it shrinks.
 
 The steps, each in its own module: read the case (`case`), find what it leaves unstated of its records (`moving_starts`,
-`between_samples`), screen and fit the catalogue (`screen`, `fit`, `attribute`, `explain`), weigh the explanations (`evidence`), doubt the best one (`free_rival`, `contradiction`), run the judging records with
-each (`shrink`), and say where the residuals of the nominal model gather (`locate`).
+`between_samples`), screen and fit the catalogue (`screen`, `fit`, `attribute`, `explain`), weigh the explanations (`evidence`),
+doubt the best one (`free_rival`, `contradiction`), run the judging records with each (`shrink`), and say where the residuals of
+the nominal model gather (`locate`).
 """
 
 from __future__ import annotations
@@ -137,8 +138,8 @@ def _diagnose(
     progress("gap on the judging records")
     final, closure, found = _shrunk(case, problem, explanations, kind, rival, rng)
     widest = max(found, key=lambda gap: gap.before / max(gap.noise_floor, 1e-12))
-    if kind == "unknown" and best.hypothesis:
-        words += evidence.nearest(names(best.hypothesis), widest)
+    if kind == "unknown":
+        words += evidence.closes(names(evidence.nearest(explanations).hypothesis), widest)
     where = locate(
         problem,
         nominal_alone(explanations),
@@ -214,7 +215,9 @@ def _shrunk(
     stages += [(label, e.predict) for label, e in _path(explanations)]
     if kind == "unknown":
         final, closure = _closed(best, nothing, rival)
-        stages += [(names(best.hypothesis), best.predict)] if best.hypothesis else []
+        nearest = evidence.nearest(explanations)
+        label = names(nearest.hypothesis)
+        stages += [(label, nearest.predict)] if label not in dict(stages) else []
     stages.append((names(final.hypothesis), final.predict))
     found = gaps(case, problem, stages=stages, rng=rng, final=_model(final))
     if kind == "unknown" and any(gap.after > WORSE * gap.parameters_only for gap in found):

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from bench.discrepancy.effect import unit_of
-from bench.discrepancy.explain import Explanation, nominal_alone
+from bench.discrepancy.explain import Explanation, nominal_alone, plainest
 from bench.discrepancy.placed import Placed
 from bench.discrepancy.search import names
 from bench.discrepancy.shrink import closed_share
@@ -19,14 +19,13 @@ RIVAL = 4.6
 INDEPENDENT = 50.0
 """Independent pieces of evidence in a record whose residuals are model error rather than noise."""
 MOSTLY = 0.5
-"""Part of the residual power an effect has to explain to be named where the noise is not stated."""
+"""Part of the residual power an effect has to explain to be named where the noise is not stated, and part of the gap on the judging
+records that the nearest explanation of something unknown has to close to be worth telling."""
 OUTSIDE = 0.01
 """Share of effects that no catalogue holds, kept even when a catalogued effect reaches the noise and no free force does better: of the
 417 effects that were named with certainty on the sealed cases of seeds 20261204 and 20261205, two were wrong."""
 WITHIN = 0.05
 """Share of catalogued effects among what is called unknown: of 104 such verdicts there, six were."""
-WORTH_HAVING = 0.8
-"""Part of the gap on the judging records from which the nearest explanation of something unknown is worth telling."""
 OUTSIDE_THE_CATALOGUE = {"effect": WITHIN, "none": 0.0, "unknown": 1.0 - WITHIN}
 """Probabilities of the verdicts where there is a doubt about an explanation that leaves nothing but noise."""
 FAILS = "explains the records for identification and fails on those for judging"
@@ -56,8 +55,15 @@ def _forces(closure: str) -> str:
     return " and ".join(f"a single {SINGLE[name]}" for name in closure.split(" + "))
 
 
-def nearest(label: str, gap: Gap) -> str:
-    """How far the nearest explanation goes on the judging records; empty where it is not worth building in.
+def nearest(explanations: Sequence[Explanation]) -> Explanation:
+    """The explanation that comes nearest to what is unknown: where none reaches the noise, the plainest, not the likeliest."""
+    best = explanations[0]
+    plain = best if best.consistent else plainest(explanations)
+    return plain if plain.hypothesis else best
+
+
+def closes(label: str, gap: Gap) -> str:
+    """How far the nearest explanation goes on the judging records; empty where that is not far.
 
     Args:
         label: Its effects as they stand among the gap's steps.
@@ -65,10 +71,10 @@ def nearest(label: str, gap: Gap) -> str:
     """
     left = dict(gap.steps).get(label, math.inf)
     share = closed_share(gap.before, left, gap.noise_floor)
-    if share < WORTH_HAVING:
+    if share < MOSTLY:
         return ""
     return (
-        f" On the judging records {label} closes {100.0 * min(share, 1.0):.3g} % of the gap all the same: it is most of what is "
+        f" On the judging records {label} closes {100.0 * min(share, 1.0):.3g} % of the gap all the same: it is much of what is "
         "missing, or much like it."
     )
 
@@ -210,12 +216,12 @@ def _named(problem, placed: Placed, eta: np.ndarray, std: np.ndarray, probabilit
     )
 
 
-def _short_of_it(best: Explanation) -> str:
-    nearest = names(best.hypothesis)
+def _short_of_it(explanations: Sequence[Explanation]) -> str:
+    best, near = explanations[0], nearest(explanations)
     if not _noise_stated([best]) or not best.consistent:
         return (
             "and no catalogued effect brings the records down to their noise. "
-            f"The nearest is {nearest}, which leaves {best.reduced:.3g} times the power of the noise."
+            f"The nearest is {names(near.hypothesis)}, which leaves {near.reduced:.3g} times the power of the noise."
         )
     lack = min(best.lacks, key=lambda lack: lack.p_value)
     free = {
@@ -224,8 +230,9 @@ def _short_of_it(best: Explanation) -> str:
         "any": "of any kind",
     }
     return (
-        f"and no catalogued effect is it: {nearest} comes near, but a force {free.get(lack.model, f'of {lack.model}')} on top of "
-        f"it lowers chi-squared by {lack.gain:.0f}, where noise would let it gain {lack.expected:.0f}."
+        f"and no catalogued effect is it: {names(near.hypothesis)} comes near, "
+        f"but a force {free.get(lack.model, f'of {lack.model}')} on top of it lowers chi-squared by {lack.gain:.0f}, "
+        f"where noise would let it gain {lack.expected:.0f}."
     )
 
 
@@ -245,7 +252,7 @@ def plain_words(kind: Kind, explanations: Sequence[Explanation], *, doubt: str =
             "The stated uncertainties and the noise explain the records; nothing is missing from the model."
         )
     if kind == "unknown":
-        return f"Something is missing from the model, {_short_of_it(best)}"
+        return f"Something is missing from the model, {_short_of_it(explanations)}"
     missing = f"Missing from the model: {names(best.hypothesis)}."
     if not _noise_stated(explanations):
         nothing = nominal_alone(explanations)

@@ -263,19 +263,24 @@ def _leaves_nothing(found: Sequence[Explanation]) -> bool:
 
 
 def _parsimonious(found: list[Explanation]) -> list[Explanation]:
-    """Put first the explanation of fewest parameters that no larger one improves much.
+    """Put the plainest explanation first."""
+    chosen = plainest(found)
+    return [chosen, *(e for e in found if e is not chosen)]
 
-    Where the noise is not stated, chi-squared has no absolute scale and residuals of a measured component are mostly
+
+def plainest(found: Sequence[Explanation]) -> Explanation:
+    """The explanation of fewest parameters that no larger one improves much.
+
+    Where chi-squared has no absolute scale, or all explanations are far from the noise, residuals of a measured component are mostly
     model error, far from independent: differences in evidence then say little about one more effect. Parameters are counted,
     not effects, since a law of seven would else be preferred to two of one each.
     """
-
     ordered = sorted(found, key=lambda e: (e.n_free, e.reduced))
     chosen = ordered[0]
     for larger in ordered[1:]:
         if larger.reduced < STALLED * chosen.reduced:
             chosen = larger
-    return [chosen, *(e for e in found if e is not chosen)]
+    return chosen
 
 
 def _common_bins(case: Case, structure: Structure) -> dict[str, int]:
