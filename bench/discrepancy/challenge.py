@@ -105,21 +105,16 @@ def simplify(search: Search, candidates: Sequence[Placed], pool: ThreadPoolExecu
         candidates: Effects at their places.
         pool: Threads.
     """
-    problem = search.problem
     tasks: dict[frozenset, Task] = {}
     for fitted in search.ranked()[:SIMPLIFIED]:
         for i, placed in enumerate(fitted.hypothesis):
-            rest, vector = _without(i, fitted, problem)
+            rest, vector = _without(i, fitted, search.problem)
             for other in candidates:
                 key = key_of((*rest, other))
-                if (
-                    not _simpler(other, placed)
-                    or len(key) < len(fitted.hypothesis)
-                    or key in search.converged
-                ):
-                    continue
-                starts = np.array([np.append(vector, eta) for eta in other.effect.grid()])
-                tasks.setdefault(key, ((*rest, other), starts))
+                new = len(key) == len(fitted.hypothesis) and key not in search.converged
+                if new and _simpler(other, placed):
+                    starts = np.array([np.append(vector, eta) for eta in other.effect.grid()])
+                    tasks.setdefault(key, ((*rest, other), starts))
     converge(search, pool, list(tasks.values()))
 
 

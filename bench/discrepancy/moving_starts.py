@@ -45,7 +45,6 @@ INDEPENDENT = 4
 GAIN, SHIFT = 0.3, 5.0
 """Prior standard deviations of a channel's gain error and of its delay, in samples."""
 
-
 Prediction = Callable[[CaseRecord], Mapping[str, Array]]
 
 
@@ -119,7 +118,7 @@ def _begins_off_rest(
     )
     position, velocity, force = found[: 3 * n_dof].reshape(3, n_dof)
     forces = force * sizes[2 * n_dof : 3 * n_dof]
-    balance = np.linalg.solve(linear.stiffness, forces) / sizes[:n_dof]
+    balance = np.linalg.lstsq(linear.stiffness, forces, rcond=None)[0] / sizes[:n_dof]
     off_balance = np.minimum(np.abs(position), np.abs(position - balance))
     off = np.append(off_balance, np.abs(velocity))
     return bool(np.any((off > MATERIAL) & (off > CERTAIN * deviation[: 2 * n_dof])))
@@ -155,8 +154,10 @@ def _predicted(structure: Structure, record: CaseRecord, predict: Prediction) ->
 def _samples(linear: LinearStructure, record: CaseRecord) -> int:
     """Samples at the beginning that are looked at."""
     squares = np.linalg.eigvals(np.linalg.solve(linear.mass, linear.stiffness)).real
-    period = 2.0 * np.pi / np.sqrt(squares.min())
-    return int(np.clip(SHARE_OF_A_PERIOD * period / record.step, FEWEST, len(record)))
+    duration = len(record) * record.step
+    slowest = max(float(squares.min()), (2.0 * np.pi / duration) ** 2)
+    samples = SHARE_OF_A_PERIOD * 2.0 * np.pi / np.sqrt(slowest) / record.step
+    return int(np.clip(samples, FEWEST, len(record)))
 
 
 def _estimated(columns: Array, gap: Array) -> tuple[Array, Array]:

@@ -383,9 +383,8 @@ class Screen:
         """Residual, parameter columns and nominal deviations of a base: along the measured motion for forces, simulated otherwise."""
         if simulated or any(placed.effect.site in {"actuator", "sensor"} for placed in hypothesis):
             residual = self.problem.residual(hypothesis, vector)
-            if np.isfinite(
-                residual
-            ).all():  # what is left of an explanation without one of its effects may diverge
+            # what is left of an explanation without one of its effects may diverge, and tells nothing then
+            if np.isfinite(residual).all():
                 columns = self._simulated_columns(hypothesis, vector, residual)
                 return residual, columns, vector[: len(self.problem.nominal)]
         residual = self.zero.copy()
