@@ -2,9 +2,12 @@
 
     python scripts/diagnose_measured.py
     python scripts/diagnose_measured.py --data FOLDER bouc_wen silverbox --json
+    python scripts/diagnose_measured.py --data FOLDER bouc_wen silverbox --unstated
 
 Without FOLDER the friction damper that comes with the bench is diagnosed. FOLDER holds what may not be shipped, in the
 sub-folders that the modules in scripts/measured name. NAMES are cases or beginnings of their names; all where none is given.
+With --unstated the diagnosis is not told what is known of the acquisition (how loads ran between samples, which records are periods
+of a steady state or begin in motion, which filters responses passed), as in a folder with a bare nominal.json; no target is set then.
 """
 
 from __future__ import annotations
@@ -12,7 +15,7 @@ from __future__ import annotations
 import importlib
 import json
 import sys
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -25,7 +28,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 from measured.target import Target
 
-from bench.discrepancy import Case, Diagnosis, diagnose
+from bench.discrepancy import Case, CaseRecord, Diagnosis, diagnose
 from bench.errors import BenchError
 
 SOURCES = tuple(
@@ -45,6 +48,8 @@ class Args:
     """Folder of the records that are not shipped."""
     json: bool = False
     """Print JSON."""
+    unstated: bool = False
+    """Say nothing of the acquisition."""
     html: Path | None = None
     """Folder for a report page of every case."""
 
@@ -103,6 +108,23 @@ def gather(data: Path | None, names: tuple[str, ...]) -> dict[str, Wanted]:
             if not names or any(name.startswith(wanted) for wanted in names):
                 found[name] = Wanted(case, getattr(module, "TARGET", None), getattr(module, "PUBLISHED", {}))
     return found
+
+
+def bare(wanted: Wanted) -> Wanted:
+    """A case of which nothing is said but the nominal model, the channels and the records."""
+
+    def plain(record: CaseRecord) -> CaseRecord:
+        return replace(record, at_rest=True, periodic=False)
+
+    case = replace(
+        wanted.case,
+        channels=tuple(replace(channel, antialias=None) for channel in wanted.case.channels),
+        identification=tuple(plain(record) for record in wanted.case.identification),
+        validation=tuple(plain(record) for record in wanted.case.validation),
+        options={},
+    )
+    target = wanted.target and wanted.target._replace(limit=np.nan)
+    return wanted._replace(case=case, target=target)
 
 
 def against(diagnosis: Diagnosis, published: dict[str, float]) -> dict[str, dict[str, float]]:
@@ -176,7 +198,8 @@ def main() -> int:
 def diagnosed(args: Args, console: Console) -> list[Outcome]:
     """Diagnose the wanted cases."""
     rows: list[Outcome] = []
-    for name, wanted in gather(args.data, args.names).items():
+    for name, stated in gather(args.data, args.names).items():
+        wanted = bare(stated) if args.unstated else stated
         diagnosis = diagnose(wanted.case, progress=lambda text, name=name: console.print(f"{name}: {text}"))
         if args.html:
             from bench.discrepancy import write_report

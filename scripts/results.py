@@ -264,6 +264,16 @@ CAPABILITIES: Sequence[Capability] = (
         _measured,
         data=".",
     ),
+    Capability(
+        "unstated",
+        "The same where nothing is said of the acquisition",
+        (
+            *("python", "scripts/diagnose_measured.py", "--data", "{data}", "bouc_wen", "silverbox"),
+            *("--unstated", "--json"),
+        ),
+        _measured,
+        data=".",
+    ),
     _benchmark_group("diagnosis", "Diagnosis against mujoco.sysid and pysindy, side by side"),
     Capability(
         "peers",

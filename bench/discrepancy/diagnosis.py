@@ -138,7 +138,7 @@ def _diagnose(
     progress("gap on the judging records")
     final, closure, found = _shrunk(case, problem, explanations, kind, rival, rng)
     widest = max(found, key=lambda gap: gap.before / max(gap.noise_floor, 1e-12))
-    if kind == "unknown":
+    if kind == "unknown" and not doubt:
         words += evidence.closes(names(evidence.nearest(explanations).hypothesis), widest)
     where = locate(
         problem,
