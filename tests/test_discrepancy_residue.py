@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -67,8 +66,7 @@ def test_integration_is_as_fine_as_the_law_found_needs_it(quieter, refined):
     search = Search(problem)
     search.add(fit(problem, (law,), start=truth, iterations=30))
     (coarse,) = search.ranked()
-    with ThreadPoolExecutor(2) as pool:
-        integrate_finer(search, pool)
+    integrate_finer(search)
     (fine,) = search.ranked()
     assert consistent(fine)
     assert (problem.refinement > 1) == refined
@@ -351,8 +349,7 @@ def test_what_is_superfluous_beside_rivals_is_struck():
     search.add(fit(problem, (), start=still))
     search.add(fit(problem, tuple(chosen), start=np.append(still, [-0.7, -1.5, -2.0, 0.0]), iterations=60))
     assert len(search.ranked()[0].hypothesis) == 3
-    with ThreadPoolExecutor(2) as pool:
-        challenge(search, screen, pool)
+    challenge(search, screen)
     best = search.ranked()[0]
     assert {placed.effect.name for placed in best.hypothesis} == {"gap", "quadratic_damping"}
     assert consistent(best)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
-
 import numpy as np
 import pytest
 from sealed_cases import fitted, sealed
@@ -57,8 +55,7 @@ def test_friction_that_sticks_is_shaken_out_of_the_dent_that_its_fit_ended_in():
     problem, coulomb = fitted(case, "coulomb_friction", [-2.0])
     search = Search(problem)
     search.add(coulomb)
-    with ThreadPoolExecutor(2) as pool:
-        shake(search, pool)
+    shake(search)
     assert search.ranked()[0].cost < coulomb.cost - 10.0
 
 
@@ -328,8 +325,7 @@ def test_an_error_of_one_number_is_held_against_every_other_one():
     zero = np.zeros(len(problem.nominal))
     search.add(fit(problem, (), start=zero))
     search.add(fit(problem, (chosen["displacement_gain_error"],), start=np.append(zero, 0.0)))
-    with ThreadPoolExecutor(2) as pool:
-        challenge(search, Screen(problem, tuple(chosen.values())), pool)
+    challenge(search, Screen(problem, tuple(chosen.values())))
     found = {f.hypothesis[0].effect.name: f.cost for f in search.ranked(1)}
     assert set(found) == set(names)
     assert found["force_gain_error"] == pytest.approx(found["displacement_gain_error"], abs=0.1)

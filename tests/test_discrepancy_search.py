@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
-
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
@@ -166,11 +164,10 @@ def test_refinement_along_the_measured_motion_nears_the_truth_without_a_nonlinea
     structure = structure_of(case)
     problem = Problem(case, structure, case.identification)
     candidates = placements(case, structure, [effect_named("gap")])
-    with ThreadPoolExecutor(2) as pool:
-        screen = Screen(problem, candidates, pool.map)
-        ground = screen.ground()
-        coarse = screen.ranked(None, ground)
-        fine = refined(screen, ground, coarse, pool)
+    screen = Screen(problem, candidates)
+    ground = screen.ground()
+    coarse = screen.ranked(None, ground)
+    fine = refined(screen, ground, coarse)
     assert fine[0].gain >= coarse[0].gain
     scales = problem.scales_of(candidates[0])
     clearance = candidates[0].effect.values(fine[0].eta, scales)[1]

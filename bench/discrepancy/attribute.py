@@ -11,7 +11,6 @@ starts, so that no flexible law wins because a simpler one was fitted carelessly
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import numpy as np
@@ -37,7 +36,6 @@ from bench.discrepancy.screen import Screen
 from bench.discrepancy.search import (
     IMMATERIAL,
     THOROUGH,
-    THREADS,
     Search,
     Task,
     carry_on,
@@ -50,6 +48,7 @@ from bench.discrepancy.search import (
     near,
     shake,
 )
+from bench.discrepancy.threads import in_threads
 
 QUICK = 6
 """Iterations of a first fit; the best are carried on to convergence."""
@@ -92,54 +91,53 @@ def attribute(
     Returns:
         All fits made.
     """
-    with ThreadPoolExecutor(THREADS) as pool:
-        search, screen, points = prepared or prepare(problem, candidates, pool.map)
-        nothing = search.ranked(0)[0]
-        progress(f"nominal model: chi-squared {nothing.reduced:.3g} of its expectation")
-        if followed(nothing, problem):
-            points = about(screen, nothing, explained=True).ranked()
-            if not points or points[0].gain < NOTICEABLE:
-                return search
-        _extend(search, screen, [nothing], pool, count=8)
-        if not consistent(search.ranked()[0]) and all(o.order > 0 for o in problem.structure.observers):
-            _simulated(search, candidates, pool)
-        rare = [p for p in candidates if p.effect.rare]
-        if rare and not consistent(search.ranked()[0]):
-            progress("rarer effects")
-            screen.add(rare, pool.map)
-            _extend(search, screen, [nothing], pool, count=6, among={p.key for p in rare})
-        for size in range(1, most):
-            if near(search.ranked()[0]):
-                integrate_finer(search, pool)
-            best = search.ranked()[0]
-            progress(
-                f"{len(best.hypothesis)} effect(s): {names(best.hypothesis)}, chi-squared {best.reduced:.3g}"
-            )
-            if consistent(best):
-                if len(best.hypothesis) != size:
-                    break
-                # what is down to the noise and lacks a force all the same may be neither of two effects
-                lacks = not problem.windowed and lack_of_fit(problem, best).significant(
-                    nothing.chi2 - best.chi2, effects=SEVERAL
-                )
-                if not lacks and not _promising(screen, best):
-                    break
-                bases = worth_extending(search, screen, size, 4 - size) if lacks else [best]
-                _extend(search, screen, bases, pool, count=4)
-                reduce_best(search, pool)
-                continue
-            ranked = search.ranked(size)
-            if not ranked or ranked[0].reduced - 1.0 > STALLED * (search.ranked(size - 1)[0].reduced - 1.0):
-                break
-            _extend(search, screen, worth_extending(search, screen, size, 4 - size), pool, count=6 - size)
-            reduce_best(search, pool)
+    search, screen, points = prepared or prepare(problem, candidates)
+    nothing = search.ranked(0)[0]
+    progress(f"nominal model: chi-squared {nothing.reduced:.3g} of its expectation")
+    if followed(nothing, problem):
+        points = about(screen, nothing, explained=True).ranked()
+        if not points or points[0].gain < NOTICEABLE:
+            return search
+    _extend(search, screen, [nothing], count=8)
+    if not consistent(search.ranked()[0]) and all(o.order > 0 for o in problem.structure.observers):
+        _simulated(search, candidates)
+    rare = [p for p in candidates if p.effect.rare]
+    if rare and not consistent(search.ranked()[0]):
+        progress("rarer effects")
+        screen.add(rare)
+        _extend(search, screen, [nothing], count=6, among={p.key for p in rare})
+    for size in range(1, most):
+        if near(search.ranked()[0]):
+            integrate_finer(search)
         best = search.ranked()[0]
-        if not problem.noise_stated:
-            simplify(search, candidates, pool)
-        elif near(best):
-            progress(f"rivals of {names(best.hypothesis)}")
-            challenge(search, screen, pool)
-            shake(search, pool)
+        progress(
+            f"{len(best.hypothesis)} effect(s): {names(best.hypothesis)}, chi-squared {best.reduced:.3g}"
+        )
+        if consistent(best):
+            if len(best.hypothesis) != size:
+                break
+            # what is down to the noise and lacks a force all the same may be neither of two effects
+            lacks = not problem.windowed and lack_of_fit(problem, best).significant(
+                nothing.chi2 - best.chi2, effects=SEVERAL
+            )
+            if not lacks and not _promising(screen, best):
+                break
+            bases = worth_extending(search, screen, size, 4 - size) if lacks else [best]
+            _extend(search, screen, bases, count=4)
+            reduce_best(search)
+            continue
+        ranked = search.ranked(size)
+        if not ranked or ranked[0].reduced - 1.0 > STALLED * (search.ranked(size - 1)[0].reduced - 1.0):
+            break
+        _extend(search, screen, worth_extending(search, screen, size, 4 - size), count=6 - size)
+        reduce_best(search)
+    best = search.ranked()[0]
+    if not problem.noise_stated:
+        simplify(search, candidates)
+    elif near(best):
+        progress(f"rivals of {names(best.hypothesis)}")
+        challenge(search, screen)
+        shake(search)
     return search
 
 
@@ -177,17 +175,16 @@ def _promising(screen: Screen, best: Fit) -> bool:
     return max((p.gain for p in points), default=0.0) > max(WORTH_A_FIT, IMMATERIAL * best.n_residuals)
 
 
-def prepare(problem: Problem, candidates: Sequence[Placed], each: Callable = map) -> Prepared:
+def prepare(problem: Problem, candidates: Sequence[Placed]) -> Prepared:
     """Fit the nominal model and screen the catalogue: the cheap part of an attribution.
 
     Args:
         problem: Records and priors.
         candidates: Effects at their places.
-        each: Maps a function over items, in threads where wanted.
     """
     search = Search(problem)
     search.add(fit(problem, (), start=np.zeros(len(problem.nominal)), iterations=THOROUGH))
-    screen = Screen(problem, [p for p in candidates if not p.effect.rare], each)
+    screen = Screen(problem, [p for p in candidates if not p.effect.rare])
     return search, screen, screen.ranked()
 
 
@@ -209,32 +206,30 @@ def _extend(
     search: Search,
     screen: Screen,
     bases: Sequence[Fit],
-    pool: ThreadPoolExecutor,
     *,
     count: int,
     among: Collection[tuple[str, str, str]] = (),
 ) -> None:
     """Add one effect to every base, of those `among` where some are given: screen, refine, fit quickly, carry the best on."""
     size = len(bases[0].hypothesis) + 1
-    offers = [_offers(search, screen, base, pool, count=count, among=among) for base in bases]
+    offers = [_offers(search, screen, base, count=count, among=among) for base in bases]
     limit = limit_of(search, size)
 
     def fit_all(tasks: Iterable[Task]) -> None:
-        for fitted in pool.map(lambda task: first_fit(search.problem, *task, limit=limit), tasks):
+        for fitted in in_threads(lambda task: first_fit(search.problem, *task, limit=limit), tasks):
             search.add(fitted)
 
     fit_all(task for found in offers for task in found.tasks)
     for base, _, spare in offers:
         kept = _kept(search, base)
         fit_all(task for p, task in spare if p.gain > kept and search.start(base.hypothesis, p))
-    carry_on(search, pool, size, most=4)
+    carry_on(search, size, most=4)
 
 
 def _offers(
     search: Search,
     screen: Screen,
     base: Fit,
-    pool: ThreadPoolExecutor,
     *,
     count: int,
     among: Collection[tuple[str, str, str]],
@@ -246,7 +241,7 @@ def _offers(
     local = about(screen, base, explained=along)
     ground = local.ground(named, simulated=named is not None and along)
     solved = [p for p in local.ranked(named, ground) if not among or p.placed.key in among]
-    points = refined(local, ground, solved, pool)
+    points = refined(local, ground, solved)
     if not named:
         search.first = sorted([*search.first, *points] if among else points, key=lambda p: -p.gain)
     inertia = [] if among else local.inertia_points(base, ground)
@@ -298,7 +293,7 @@ def first_fit(problem: Problem, hypothesis: Hypothesis, start: np.ndarray, *, li
     return fit(problem, hypothesis, start=start, iterations=iterations, exact=False, limit=limit)
 
 
-def _simulated(search: Search, candidates: Sequence[Placed], pool: ThreadPoolExecutor) -> None:
+def _simulated(search: Search, candidates: Sequence[Placed]) -> None:
     """Fit contacts from the best of their grid by free runs.
 
     Where only velocities or accelerations are measured, the middle of the motion is unknown, and a stop that shifts it is screened
@@ -322,9 +317,9 @@ def _simulated(search: Search, candidates: Sequence[Placed], pool: ThreadPoolExe
             residual = problem.residual((placed,), start)
             return float(residual @ residual)
 
-        costs = np.array(list(pool.map(cost, starts)))
+        costs = np.array(in_threads(cost, starts))
         tasks += [((placed,), starts[i]) for i in np.argsort(costs)[:SIMULATED] if np.isfinite(costs[i])]
-    converge(search, pool, tasks)
+    converge(search, tasks)
 
 
 def _contact(effect: Effect) -> bool:

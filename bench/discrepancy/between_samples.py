@@ -60,13 +60,13 @@ def _ladder(explanations: Sequence[Explanation]) -> Iterator[Explanation]:
         ranked = [e for e in explanations if len(e.hypothesis) == size]
         if ranked:
             yield max(ranked, key=lambda e: e.log_posterior)
-    if not (best.consistent and _stated(best)):
+    if not (best.consistent and best.noise_stated):
         yield best
 
 
 def _promises(read: Case, rung: Explanation, best: Explanation) -> bool:
     """Whether the effects of an explanation, fitted in another reading, leave little enough for a search in it."""
-    noise = sum(fitted.n_residuals for _, fitted in best.parts) if _stated(best) else 0
+    noise = sum(fitted.n_residuals for _, fitted in best.parts) if best.noise_stated else 0
     limit = rung.chi2 - INSTEAD * (rung.chi2 - best.chi2)
     if rung is best:
         limit = noise + BETTER * (best.chi2 - noise)
@@ -85,10 +85,6 @@ def _promises(read: Case, rung: Explanation, best: Explanation) -> bool:
         for problem, _, f in parts
     )
     return sum(found.chi2 for found in fits) < limit
-
-
-def _stated(explanation: Explanation) -> bool:
-    return all(problem.noise_stated for problem, _ in explanation.parts)
 
 
 def _read(case: Case, problem: Problem) -> Problem:

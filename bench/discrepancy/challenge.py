@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -24,7 +23,7 @@ LEFT = 0.02
 """Part of a named effect's gain along the motion that a challenger may lack, besides twice what the effect leaves."""
 
 
-def challenge(search: Search, screen: Screen, pool: ThreadPoolExecutor, *, rounds: int = 3) -> None:
+def challenge(search: Search, screen: Screen, *, rounds: int = 3) -> None:
     """Fit the rivals of every effect of the best hypothesis, and that effect itself, from several starts.
 
     The rivals are screened along the free run of that hypothesis where it follows the motion: a run driven through accelerations
@@ -33,7 +32,6 @@ def challenge(search: Search, screen: Screen, pool: ThreadPoolExecutor, *, round
     Args:
         search: Fits so far; the new ones are added.
         screen: Screening of the same problem.
-        pool: Threads.
         rounds: A rival that wins is challenged in turn, so many times at most; once where nothing explains the records.
     """
     challenged: set[frozenset] = set()
@@ -55,7 +53,7 @@ def challenge(search: Search, screen: Screen, pool: ThreadPoolExecutor, *, round
                 named = base if rest else None
                 ground = local.ground(named)
                 alone = float(np.sum(ground.left**2))
-                points = refined(local, ground, local.ranked(named, ground), pool)
+                points = refined(local, ground, local.ranked(named, ground))
             own = max((p.gain for p in points if p.placed.key == placed.key), default=np.inf)
             left = max(alone - own, search.problem.n_residuals)
             for point in leading(points, 5, own - left - LEFT * own, starts=REFINED_STARTS):
@@ -68,9 +66,9 @@ def challenge(search: Search, screen: Screen, pool: ThreadPoolExecutor, *, round
                 if begun is not None and not known and key_of(begun.hypothesis) not in search.converged:
                     tasks.append((begun.hypothesis, begun.vector))
             tasks += _alike(placed, rest, vector, search, screen)
-        converge(search, pool, tasks, limit=best.cost + SIGHT)
-        carry_on(search, pool, len(best.hypothesis), most=6)
-        reduce_best(search, pool)
+        converge(search, tasks, limit=best.cost + SIGHT)
+        carry_on(search, len(best.hypothesis), most=6)
+        reduce_best(search)
 
 
 def _alike(
@@ -94,7 +92,7 @@ def _of_one_number(effect: Effect) -> bool:
     return effect.site != "joint" and len(effect.parameters) == 1 and effect.parameters[0].signed
 
 
-def simplify(search: Search, candidates: Sequence[Placed], pool: ThreadPoolExecutor) -> None:
+def simplify(search: Search, candidates: Sequence[Placed]) -> None:
     """Fit simpler relatives of the effects of the foremost hypotheses in their stead.
 
     Where nothing is down to the noise, whatever has most parameters comes foremost, and a law with one may never have been tried
@@ -103,7 +101,6 @@ def simplify(search: Search, candidates: Sequence[Placed], pool: ThreadPoolExecu
     Args:
         search: Fits so far; the new ones are added.
         candidates: Effects at their places.
-        pool: Threads.
     """
     tasks: dict[frozenset, Task] = {}
     for fitted in search.ranked()[:SIMPLIFIED]:
@@ -115,7 +112,7 @@ def simplify(search: Search, candidates: Sequence[Placed], pool: ThreadPoolExecu
                 if new and _simpler(other, placed):
                     starts = np.array([np.append(vector, eta) for eta in other.effect.grid()])
                     tasks.setdefault(key, ((*rest, other), starts))
-    converge(search, pool, list(tasks.values()))
+    converge(search, list(tasks.values()))
 
 
 def _simpler(other: Placed, placed: Placed) -> bool:
@@ -126,13 +123,13 @@ def _simpler(other: Placed, placed: Placed) -> bool:
     return same and other.effect.family in families and fewer < free
 
 
-def reduce_best(search: Search, pool: ThreadPoolExecutor) -> None:
+def reduce_best(search: Search) -> None:
     """Strike each effect in turn from the best hypothesis: is it still needed beside what the others have become?"""
     best = search.ranked()[0]
     if len(best.hypothesis) < 2:
         return
     tasks = [_without(i, best, search.problem) for i in range(len(best.hypothesis))]
-    converge(search, pool, tasks, limit=best.cost + SIGHT)
+    converge(search, tasks, limit=best.cost + SIGHT)
 
 
 def _without(i: int, best: Fit, problem: Problem) -> tuple[Hypothesis, np.ndarray]:

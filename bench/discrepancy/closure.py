@@ -74,7 +74,9 @@ _SURFACE = ForceLaw(
 def curve_force(t, q, v, z, theta, f):
     """A force of one variable from -1 to 1: a cubic spline of `SPANS` pieces, shorter about rest, by its B-spline coefficients."""
     x = min(max(q[0] * theta[0] + v[0] * theta[1], -1.0), 1.0)
-    u = 0.5 * SPANS * (1.0 + math.asinh(x * WARPED) / WARP)
+    # asinh, which the C library takes twice as long over
+    a = abs(x) * WARPED
+    u = 0.5 * SPANS * (1.0 + math.copysign(math.log(a + math.sqrt(1.0 + a * a)), x) / WARP)
     k = min(max(int(u), 0), SPANS - 1)
     s = u - k
     r = 1.0 - s
@@ -118,16 +120,27 @@ def patch_force(t, q, v, z, theta, f):
     """A force of displacement and velocity: bicubic spline of `PATCHES` by its B-spline coefficients, the velocity's shorter about rest."""
     u = 0.5 * PATCHES[0] * (1.0 + min(max(q[0] * theta[0], -1.0), 1.0))
     y = min(max(v[0] * theta[1], -1.0), 1.0)
-    w = 0.5 * PATCHES[1] * (1.0 + math.asinh(y * WARPED) / WARP)
+    warped = abs(y) * WARPED
+    w = (
+        0.5
+        * PATCHES[1]
+        * (1.0 + math.copysign(math.log(warped + math.sqrt(1.0 + warped * warped)), y) / WARP)
+    )
     i = min(max(int(u), 0), PATCHES[0] - 1)
     j = min(max(int(w), 0), PATCHES[1] - 1)
+    s, x = w - j, u - i
+    r, y = 1.0 - s, 1.0 - x
+    across = (r * r * r, 3.0 * s * s * s - 6.0 * s * s + 4.0, 3.0 * r * r * r - 6.0 * r * r + 4.0, s * s * s)
+    along = (y * y * y, 3.0 * x * x * x - 6.0 * x * x + 4.0, 3.0 * y * y * y - 6.0 * y * y + 4.0, x * x * x)
     for a in range(4):
-        s = u - i if a % 2 else 1.0 - u + i
-        along = s * s * s if a % 3 == 0 else 3.0 * s * s * s - 6.0 * s * s + 4.0
-        for b in range(4):
-            s = w - j if b % 2 else 1.0 - w + j
-            across = s * s * s if b % 3 == 0 else 3.0 * s * s * s - 6.0 * s * s + 4.0
-            f[0] += along * across / 36.0 * theta[2 + (i + a) * (PATCHES[1] + 3) + j + b]
+        k = 2 + (i + a) * (PATCHES[1] + 3) + j
+        row = (
+            across[0] * theta[k]
+            + across[1] * theta[k + 1]
+            + across[2] * theta[k + 2]
+            + across[3] * theta[k + 3]
+        )
+        f[0] += along[a] * row / 36.0
 
 
 _PATCH = ForceLaw(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
@@ -23,7 +22,8 @@ from bench.discrepancy.nominate import (
 )
 from bench.discrepancy.placements import placements
 from bench.discrepancy.screen import Ground, Screen
-from bench.discrepancy.search import IMMATERIAL, THREADS, Search, converge, names
+from bench.discrepancy.search import IMMATERIAL, Search, converge, names
+from bench.discrepancy.threads import in_threads
 
 HOPELESS_COUPLING = 50.0
 """Reduced chi-squared of a coupling effect alone above which only a second coupling is added to it."""
@@ -67,31 +67,28 @@ def coupled_fits(
     problem = kept.problem
     candidates = [p for p in placements(problem.case, problem.structure, catalogue) if not p.effect.rare]
     forces = [p for p in candidates if p.effect.site == "joint"]
-    with ThreadPoolExecutor(THREADS) as pool:
-        screen = Screen(problem, forces, pool.map)
-        coupling = {p.key for p in forces if p.effect.n_coordinates > 1}
-        if not kept.fits:
-            _alone(kept, screen, coupling, pool)
-        deep = bool(kept.fits) and deeper(kept.ranked()[0])
-        if deep:
-            screen.add([p for p in candidates if p.effect.site != "joint"], pool.map)
-        size = 1
-        while deep and size < most and _one_more(kept, screen, coupling, pool, progress):
-            size += 1
+    screen = Screen(problem, forces)
+    coupling = {p.key for p in forces if p.effect.n_coordinates > 1}
+    if not kept.fits:
+        _alone(kept, screen, coupling)
+    deep = bool(kept.fits) and deeper(kept.ranked()[0])
+    if deep:
+        screen.add([p for p in candidates if p.effect.site != "joint"])
+    size = 1
+    while deep and size < most and _one_more(kept, screen, coupling, progress):
+        size += 1
     return deep
 
 
-def _alone(kept: Search, screen: Screen, coupling: Keys, pool: ThreadPoolExecutor) -> None:
+def _alone(kept: Search, screen: Screen, coupling: Keys) -> None:
     """Fit every coupling alone."""
-    points = refined(screen, screen.ground(), [p for p in screen.ranked() if p.placed.key in coupling], pool)
+    points = refined(screen, screen.ground(), [p for p in screen.ranked() if p.placed.key in coupling])
     zero = np.zeros(len(kept.problem.nominal))
     # all starts: which one leads to the deepest minimum, a gain along the measured motion does not tell
-    converge(kept, pool, [((p.placed,), np.append(zero, p.eta)) for p in points])
+    converge(kept, [((p.placed,), np.append(zero, p.eta)) for p in points])
 
 
-def _one_more(
-    kept: Search, screen: Screen, coupling: Keys, pool: ThreadPoolExecutor, progress: Callable[[str], None]
-) -> bool:
+def _one_more(kept: Search, screen: Screen, coupling: Keys, progress: Callable[[str], None]) -> bool:
     """Fit one more effect beside the best hypothesis; whether that has brought it far enough for another."""
     base = kept.ranked()[0]
     if len(base.hypothesis) > 1 and base.reduced > HOPELESS_THIRD:
@@ -103,7 +100,7 @@ def _one_more(
     solved = local.ranked(base, ground)
     if base.reduced > HOPELESS_COUPLING:
         solved = [p for p in solved if p.placed.key in coupling]
-    points = refined(local, ground, solved, pool) + local.inertia_points(base, ground)
+    points = refined(local, ground, solved) + local.inertia_points(base, ground)
     worth = _worth(sorted(points, key=lambda p: -p.gain), base, ground, coupling)
     if not worth:
         return False
@@ -118,10 +115,10 @@ def _one_more(
     least = TRUSTED * worth[0].gain if along else WORTH_A_FIT
     chosen = leading(worth, TRIALS, least, starts=1)
     chosen += passed_over(solved, chosen, TRIALS, least)
-    trials = sorted(pool.map(extended, chosen), key=lambda f: f.cost)
+    trials = sorted(in_threads(extended, chosen), key=lambda f: f.cost)
     some = trials[: CONVERGED_PAIRS if len(base.hypothesis) == 1 else CONVERGED_BEYOND]
-    converge(kept, pool, [(f.hypothesis, f.vector) for f in some])
-    reduce_best(kept, pool)
+    converge(kept, [(f.hypothesis, f.vector) for f in some])
+    reduce_best(kept)
     best = kept.ranked()[0]
     return best is not base and best.reduced - 1.0 <= STALLED * (base.reduced - 1.0)
 

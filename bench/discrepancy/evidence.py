@@ -86,7 +86,7 @@ def weights(explanations: Sequence[Explanation]) -> np.ndarray:
     """
     logs = np.array([e.log_posterior for e in explanations])
     logs[logs > logs[0]] = -np.inf
-    if not _noise_stated(explanations):
+    if not explanations[0].noise_stated:
         # The noise is whatever the first explanation leaves, and hardly more independent than the visits to a state;
         # what has more parameters was passed over because it is not much better.
         best = explanations[0]
@@ -103,7 +103,7 @@ def weights(explanations: Sequence[Explanation]) -> np.ndarray:
 def judge(explanations: Sequence[Explanation]) -> tuple[Kind, dict[str, float]]:
     """Verdict, and the probabilities of "effect", "none" and "unknown"."""
     best = explanations[0]
-    if not _noise_stated(explanations):
+    if not best.noise_stated:
         return _judge_unscaled(explanations)
     shares = weights(explanations)
     none = float(sum(w for w, e in zip(shares, explanations, strict=True) if not e.hypothesis))
@@ -113,10 +113,6 @@ def judge(explanations: Sequence[Explanation]) -> tuple[Kind, dict[str, float]]:
     if not complete:
         return "unknown", probabilities
     return ("none" if not best.hypothesis else "effect"), probabilities
-
-
-def _noise_stated(explanations: Sequence[Explanation]) -> bool:
-    return all(problem.noise_stated for problem, _ in explanations[0].parts)
 
 
 def _judge_unscaled(explanations: Sequence[Explanation]) -> tuple[Kind, dict[str, float]]:
@@ -133,7 +129,7 @@ def _judge_unscaled(explanations: Sequence[Explanation]) -> tuple[Kind, dict[str
 def marginal(explanations: Sequence[Explanation]) -> dict[tuple[str, str], float]:
     """Probability that each (name, place) belongs to the truth."""
     total: dict[tuple[str, str], float] = {}
-    known = 1.0 - OUTSIDE if _noise_stated(explanations) else 1.0
+    known = 1.0 - OUTSIDE if explanations[0].noise_stated else 1.0
     for share, explanation in zip(weights(explanations), explanations, strict=True):
         for key in {(p.effect.name, p.place.name) for p in explanation.hypothesis}:
             total[key] = total.get(key, 0.0) + known * float(share)
@@ -218,7 +214,7 @@ def _named(problem, placed: Placed, eta: np.ndarray, std: np.ndarray, probabilit
 
 def _short_of_it(explanations: Sequence[Explanation]) -> str:
     best, near = explanations[0], nearest(explanations)
-    if not _noise_stated([best]) or not best.consistent:
+    if not best.noise_stated or not best.consistent:
         return (
             "and no catalogued effect brings the records down to their noise. "
             f"The nearest is {names(near.hypothesis)}, which leaves {near.reduced:.3g} times the power of the noise."
@@ -254,7 +250,7 @@ def plain_words(kind: Kind, explanations: Sequence[Explanation], *, doubt: str =
     if kind == "unknown":
         return f"Something is missing from the model, {_short_of_it(explanations)}"
     missing = f"Missing from the model: {names(best.hypothesis)}."
-    if not _noise_stated(explanations):
+    if not best.noise_stated:
         nothing = nominal_alone(explanations)
         share = 100.0 * (1.0 - best.reduced / nothing.reduced)
         taken = f"It takes away {share:.3g} % of the power of the residuals"

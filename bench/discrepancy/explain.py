@@ -9,7 +9,6 @@ noise, or a force. Chi-squared and evidence add over groups, so all explanations
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
@@ -31,7 +30,6 @@ from bench.discrepancy.screen import Screen
 from bench.discrepancy.search import (
     SIGHT,
     THOROUGH,
-    THREADS,
     WITHIN_REACH,
     Search,
     consistent,
@@ -107,6 +105,11 @@ class Explanation:
             lack.significant(explained, effects=len(fitted.hypothesis))
             for lack, (_, fitted) in zip(self.lacks, self.parts, strict=True)
         )
+
+    @property
+    def noise_stated(self) -> bool:
+        """Whether the noise of every response channel is stated, so that chi-squared has an absolute meaning."""
+        return all(problem.noise_stated for problem, _ in self.parts)
 
     @property
     def chi2(self) -> float:
@@ -321,27 +324,26 @@ def close(best: Explanation, nothing: Explanation, closures: Sequence[Effect]) -
             current = fit(problem, (), start=np.zeros(len(problem.nominal)), iterations=THOROUGH)
             if fitted.reduced - 1.0 < HELPFUL * (current.reduced - 1.0):
                 current = fitted
-            with ThreadPoolExecutor(THREADS) as pool:
-                for _ in range(CLOSED):
-                    closed = _closed(problem, screen, current, pool.map)
-                    if closed is None:
-                        break
-                    current = closed
-                    used.append(closed.hypothesis[-1].effect.name)
-                    if consistent(current) and not lacks:
-                        break
+            for _ in range(CLOSED):
+                closed = _closed(problem, screen, current)
+                if closed is None:
+                    break
+                current = closed
+                used.append(closed.hypothesis[-1].effect.name)
+                if consistent(current) and not lacks:
+                    break
         parts.append((problem, current))
     return Explanation(tuple(parts)), " + ".join(dict.fromkeys(used))
 
 
-def _closed(problem: Problem, screen: Screen, current: Fit, each: Callable) -> Fit | None:
+def _closed(problem: Problem, screen: Screen, current: Fit) -> Fit | None:
     """One more closure on top of a fit: of those that the screening likes best the first that pays; None where none does."""
     own = {placed.key for placed in current.hypothesis}
     for point in leading(
         [p for p in screen.ranked(current) if p.placed.key not in own], TRIED, 0.0, starts=1
     ):
         start = np.concatenate([current.vector, point.eta])
-        closed = fit(problem, (*current.hypothesis, point.placed), start=start, iterations=12, each=each)
+        closed = fit(problem, (*current.hypothesis, point.placed), start=start, iterations=12)
         idle = not consistent(current) and closed.reduced - 1.0 > STALLED * (current.reduced - 1.0)
         if not idle and closed.log_evidence > current.log_evidence:
             return closed

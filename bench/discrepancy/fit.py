@@ -10,7 +10,7 @@ References:
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -84,7 +84,6 @@ def fit(
     fixed: Array | None = None,
     limit: float = np.inf,
     exact: bool = True,
-    each: Callable = map,
 ) -> Fit:
     """Fit a hypothesis.
 
@@ -97,7 +96,6 @@ def fit(
         fixed: (n,) boolean, entries held at their start.
         limit: Cost that has to be within sight, see `minimise`.
         exact: Whether the curvature is taken anew at the end, as the evidence and intervals need it.
-        each: Maps a function over the columns of the Jacobian, in threads where wanted.
 
     Returns:
         The fit; its cost is infinite where no simulation stayed finite.
@@ -115,7 +113,6 @@ def fit(
         tolerance=tolerance,
         limit=limit,
         exact=exact,
-        each=each,
     )
     precision, evidence = laplace(problem, hypothesis, found.cost, found.curvature, free)
     with np.errstate(over="ignore"):  # a run on its way to divergence

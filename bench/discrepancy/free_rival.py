@@ -14,8 +14,7 @@ References:
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import product
 from typing import NamedTuple
@@ -46,7 +45,6 @@ from bench.discrepancy.search import (
     LOG_PRIOR_EFFECT,
     SIGHT,
     THOROUGH,
-    THREADS,
     WITHIN_REACH,
     consistent,
     posterior,
@@ -98,7 +96,7 @@ def likelier_force(explanations: Sequence[Explanation]) -> Rival | None:
         The likelier explanation; None where the laws are likelier, in every group.
     """
     best = explanations[0]
-    if any(problem.windowed or not problem.noise_stated for problem, _ in best.parts):
+    if not best.noise_stated or any(problem.windowed for problem, _ in best.parts):
         return None
     parts, free = [], []
     for problem, fitted in best.parts:
@@ -123,14 +121,10 @@ def _contacts(problem: Problem, explanations: Sequence[Explanation]) -> list[Fit
 def _rival(problem: Problem, fitted: Fit, contacts: Sequence[Fit]) -> Fit | None:
     """The fit of a single force alone, where it is likelier than a hypothesis; the likeliest one."""
     best, most = None, posterior(fitted)
-    with ThreadPoolExecutor(THREADS) as pool:
-        tasks = [*_damped(problem, contacts), *_free(problem, fitted, pool.map)]
-        for placed, start, toll in tasks:
-            rival = fit(
-                problem, (placed,), start=start, iterations=THOROUGH, limit=fitted.cost + SIGHT, each=pool.map
-            )
-            if posterior(rival) + toll > most:
-                best, most = rival, posterior(rival) + toll
+    for placed, start, toll in [*_damped(problem, contacts), *_free(problem, fitted)]:
+        rival = fit(problem, (placed,), start=start, iterations=THOROUGH, limit=fitted.cost + SIGHT)
+        if posterior(rival) + toll > most:
+            best, most = rival, posterior(rival) + toll
     return best
 
 
@@ -145,11 +139,11 @@ def _damped(problem: Problem, fits: Sequence[Fit]) -> Iterator[tuple[Placed, Arr
                 yield replace(placed, effect=damped(placed.effect)), start, 0.0
 
 
-def _free(problem: Problem, fitted: Fit, each: Callable) -> Iterator[tuple[Placed, Array, float]]:
+def _free(problem: Problem, fitted: Fit) -> Iterator[tuple[Placed, Array, float]]:
     """Free forces that promise to be likelier than a hypothesis, the likeliest first, and where to begin with them."""
     families = (FREE_DISPLACEMENT, FREE_VELOCITY, FREE_SURFACE, FREE_MEMORY)
-    screen = along(Screen(problem, (), each), fitted)
-    screen.add(placements(problem.case, problem.structure, families), each)
+    screen = along(Screen(problem, ()), fitted)
+    screen.add(placements(problem.case, problem.structure, families))
     ground = screen.ground()
     promises = sorted(
         (_promised(screen, ground, node) for node in screen.nodes), key=lambda p: -p.log_posterior

@@ -86,8 +86,8 @@ def products(a: NDArray[np.floating], b: NDArray[np.floating]) -> Array:
     """Products (k, m) of the columns of two matrices (n, k) and (n, m), summed in double precision without a copy of either."""
     total = np.zeros((a.shape[1], b.shape[1]))
     for first in range(0, len(a), ROWS):
-        rows = slice(first, first + ROWS)
-        total += a[rows].astype(np.float64).T @ b[rows].astype(np.float64)
+        x, y = (m[first : first + ROWS].astype(np.float64, copy=False) for m in (a, b))
+        total += x.T @ y
     return total
 
 

@@ -30,6 +30,7 @@ from bench.discrepancy.prepared import whitened
 from bench.discrepancy.problem import Array, Problem
 from bench.discrepancy.screen import Ground, Screen
 from bench.discrepancy.structure import Place
+from bench.discrepancy.threads import in_threads
 
 KNOTS = 12
 """Knots of a free force of one coordinate; between them it is straight."""
@@ -209,10 +210,12 @@ def free_responses(screen: Screen, place: Place) -> dict[str, Array]:
     def responses(model: str) -> Array:
         count = forces[0][model].shape[1]
         return np.column_stack(
-            [
-                screen.response(lambda i, k=k: np.asarray(-np.outer(forces[i][model][:, k], row), float))
-                for k in range(count)
-            ]
+            in_threads(
+                lambda k: screen.response(
+                    lambda i: np.asarray(-np.outer(forces[i][model][:, k], row), float)
+                ),
+                range(count),
+            )
         )
 
     return {model: responses(model) for model in forces[0]}

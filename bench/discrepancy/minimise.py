@@ -16,6 +16,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.discrepancy.threads import in_threads
+
 Array = NDArray[np.float64]
 
 DIFFERENCES = 1e-4, 0.1
@@ -92,7 +94,6 @@ class _Task(NamedTuple):
     low: Array
     high: Array
     reach: Array
-    each: Callable
     tolerance: float
     limit: float
 
@@ -121,7 +122,6 @@ def minimise(
     tolerance: float = 0.05,
     limit: float = np.inf,
     exact: bool = True,
-    each: Callable = map,
 ) -> Minimum:
     """Minimise squared residuals plus the misfit of a Gaussian prior.
 
@@ -135,10 +135,9 @@ def minimise(
         tolerance: Decrease of the cost that is not worth a step.
         limit: Cost that has to be within sight; the iteration ends where the linearisation promises much less.
         exact: Whether the curvature is taken anew at the end, where the residuals have come near the noise.
-        each: Maps a function over the columns of the Jacobian.
     """
     own = Prior(prior.mean[free], prior.std[free], prior.low[free], prior.high[free])
-    task = _Task(residual_at, free, *own, reach, each, tolerance, limit)
+    task = _Task(residual_at, free, *own, reach, tolerance, limit)
     state = min((task.state(vector.copy()) for vector in np.atleast_2d(start)), key=lambda at: at.cost)
     identity = np.eye(len(free))
     if not np.isfinite(state.cost):
@@ -274,7 +273,6 @@ def differences(
     free: NDArray[np.int64],
     steps: Array,
     high: Array,
-    each: Callable = map,
 ) -> Array | None:
     """Finite differences of the residuals.
 
@@ -285,7 +283,6 @@ def differences(
         free: (n_free,) indices of the entries that move.
         steps: (n_free,) how far; backwards from a bound.
         high: (n_free,) upper bounds.
-        each: Maps a function over the columns.
 
     Returns:
         (n_residuals, n_free) changes by the steps; None where a run diverged.
@@ -298,7 +295,7 @@ def differences(
         shifted = residual_at(moved)
         return sign * (shifted - residual) if shifted.shape == residual.shape else np.full(1, np.nan)
 
-    columns = list(each(column, range(len(free))))
+    columns = in_threads(column, range(len(free)))
     if any(c.shape != residual.shape for c in columns):
         return None
     return np.column_stack(columns) if columns else np.zeros((len(residual), 0))
@@ -313,6 +310,5 @@ def _jacobian(task: _Task, state: _State, difference: float) -> Array | None:
         free=task.free,
         steps=difference * task.std,
         high=task.high,
-        each=task.each,
     )
     return None if changes is None else changes / difference

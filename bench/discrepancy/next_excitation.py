@@ -12,7 +12,6 @@ Where the records call for no effect at all, or cannot tell two apart, the reaso
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,6 +27,7 @@ from bench.discrepancy.problem import Array, Problem
 from bench.discrepancy.proposals import LEVELS, Proposal, candidates, feasible, limits_of
 from bench.discrepancy.reasons import why_alike, why_none
 from bench.discrepancy.search import names
+from bench.discrepancy.threads import in_threads
 from bench.excitation.bayes_factor import Contrast, expected_log_bayes_factor
 
 ODDS = 99.0
@@ -40,7 +40,6 @@ DRAWS = 4000
 """Draws of the log Bayes factor behind a power."""
 SAMPLES = 20_000
 """Longest proposed record, shorter with more degrees of freedom: simulations are what the search costs."""
-THREADS = 2
 SPOKEN_OF = ("coulomb_friction", "gap", "cubic_stiffness", "quadratic_damping")
 """Effects whose detectable size is told where the records call for nothing: one of each family of forces."""
 OTHERS = 3
@@ -150,15 +149,10 @@ def separate(problem: Problem, explanations: Sequence[Explanation]) -> dict[str,
         "log_odds_now": odds,
         "repeating": {} if now is None else {"expected_log_odds": now.log_odds, "power": now.power},
     }
-    with ThreadPoolExecutor(THREADS) as pool:
-        finalists = _finalists(problem, first, second, pool)
-        looks = list(
-            pool.map(lambda p: outlook(problem, first, second, p.record, odds=odds, scale=scale), finalists)
-        )
-    scored = [(look, p) for look, p in zip(looks, finalists, strict=True) if look is not None]
-    if not scored:
+    found = _best_of(problem, first, second, odds, scale)
+    if found is None:
         return out | {"excitation": ""}
-    look, proposal = max(scored, key=lambda entry: entry[0].log_odds)
+    proposal, look = found
     out |= _described(problem, proposal, look)
     out["also_against"] = _others(problem, first, rivals[1:], proposal, scale)
     return out
@@ -186,14 +180,16 @@ def told_apart(problem: Problem, kind: str, catalogue: Sequence[Effect]) -> dict
 
 def propose(problem: Problem, first: Explanation, second: Explanation) -> tuple[Proposal, Outlook] | None:
     """The excitation that separates two explanations best, and what it is expected to say; None where none is feasible."""
-    rivals = Rival.of(first), Rival.of(second)
-    odds = log_odds(first, second)
     scale = _noise_scale(problem, first)
-    with ThreadPoolExecutor(THREADS) as pool:
-        finalists = _finalists(problem, *rivals, pool)
-        looks = list(
-            pool.map(lambda p: outlook(problem, *rivals, p.record, odds=odds, scale=scale), finalists)
-        )
+    return _best_of(problem, Rival.of(first), Rival.of(second), log_odds(first, second), scale)
+
+
+def _best_of(
+    problem: Problem, first: Rival, second: Rival, odds: float, scale: float
+) -> tuple[Proposal, Outlook] | None:
+    """The feasible excitation of the largest expected log odds; None where none is feasible."""
+    finalists = _finalists(problem, first, second)
+    looks = in_threads(lambda p: outlook(problem, first, second, p.record, odds=odds, scale=scale), finalists)
     scored = [(look, p) for look, p in zip(looks, finalists, strict=True) if look is not None]
     if not scored:
         return None
@@ -289,7 +285,7 @@ def _noise_scale(problem: Problem, best: Explanation) -> float:
     return float(np.sqrt(max(best.reduced, 1.0))) if not problem.noise_stated or not best.consistent else 1.0
 
 
-def _finalists(problem: Problem, first: Rival, second: Rival, pool: ThreadPoolExecutor) -> list[Proposal]:
+def _finalists(problem: Problem, first: Rival, second: Rival) -> list[Proposal]:
     """Feasible excitations by the whitened difference of the rivals' responses, the largest first."""
     limits = limits_of(problem)
     longest = max(len(r) for r in problem.records)
@@ -314,7 +310,7 @@ def _finalists(problem: Problem, first: Rival, second: Rival, pool: ThreadPoolEx
                 out.append((float(np.sum(((a - b) / problem.noise) ** 2)), proposal))
         return out
 
-    weighed = [x for part in pool.map(weigh, candidates(problem, loads, samples)) for x in part]
+    weighed = [x for part in in_threads(weigh, candidates(problem, loads, samples)) for x in part]
     weighed.sort(key=lambda entry: -entry[0])
     return [proposal for _, proposal in weighed[:FINALISTS]]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 
 from bench.discrepancy.effect import Effect
 from bench.discrepancy.fit import Fit
@@ -11,6 +10,7 @@ from bench.discrepancy.grid_points import Point
 from bench.discrepancy.problem import Problem
 from bench.discrepancy.screen import Ground, Screen
 from bench.discrepancy.search import SAME, consistent, near, sticks
+from bench.discrepancy.threads import in_threads
 
 WORTH_A_FIT = 25.0
 """Screened gain in chi-squared from which one more effect could overcome its prior and its Occam factor."""
@@ -60,14 +60,13 @@ def along(screen: Screen, fitted: Fit) -> Screen:
     return screen.beside(fitted, simulated=True) if told else screen
 
 
-def refined(screen: Screen, ground: Ground, points: Sequence[Point], pool: ThreadPoolExecutor) -> list[Point]:
+def refined(screen: Screen, ground: Ground, points: Sequence[Point]) -> list[Point]:
     """Refine the leading grid points of the leading effects along the measured motion; by decreasing gain.
 
     Args:
         screen: Screening.
         ground: What the base leaves.
         points: Solved grid points by decreasing gain.
-        pool: Threads.
     """
     chosen: dict[tuple[str, str, str], list[Point]] = {}
     for point in points:
@@ -79,7 +78,7 @@ def refined(screen: Screen, ground: Ground, points: Sequence[Point], pool: Threa
         if len(starts) < REFINED_STARTS and all(_apart(point, other) > APART for other in starts):
             starts.append(point)
     tasks = [point for starts in chosen.values() for point in starts]
-    return sorted(pool.map(lambda point: screen.refine(point, ground), tasks), key=lambda p: -p.gain)
+    return sorted(in_threads(lambda point: screen.refine(point, ground), tasks), key=lambda p: -p.gain)
 
 
 def _apart(point: Point, other: Point) -> float:

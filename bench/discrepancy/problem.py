@@ -40,6 +40,7 @@ from bench.discrepancy.starts import (
 )
 from bench.discrepancy.structure import Place, Structure, with_frictions
 from bench.discrepancy.system import Elements, Motion
+from bench.discrepancy.threads import in_threads
 
 Array = NDArray[np.float64]
 ACCELERATION = 2
@@ -454,18 +455,21 @@ class Problem:
 
     def residual(self, hypothesis: Hypothesis, vector: Array) -> Array:
         """Whitened residuals of all records, real and imaginary parts stacked; their sum of squares is chi-squared."""
-        parts = []
-        for data in self.data:
-            predicted = self.simulate(hypothesis, vector, data.record)
-            if not np.isfinite(predicted).all():
-                return np.array([np.inf])
-            moved = start_responses(self, hypothesis, vector, data.record, predicted) if self.windowed else ()
-            residual = data.responses - predicted
-            for c, observer in enumerate(self.structure.observers if hypothesis and not self.driven else ()):
-                if observer.order == ACCELERATION:
-                    residual[:, c] = timed(residual[:, c], predicted[:, c], self.noise[c])
-            parts.append(projected(residual, moved, data))
-        return np.concatenate(parts)
+        parts = in_threads(lambda data: self._residual_of(data, hypothesis, vector), self.data)
+        finite = [part for part in parts if part is not None]
+        return np.concatenate(finite) if len(finite) == len(parts) else np.array([np.inf])
+
+    def _residual_of(self, data: RecordData, hypothesis: Hypothesis, vector: Array) -> Array | None:
+        """Whitened residuals of one record; None where its free run diverged."""
+        predicted = self.simulate(hypothesis, vector, data.record)
+        if not np.isfinite(predicted).all():
+            return None
+        moved = start_responses(self, hypothesis, vector, data.record, predicted) if self.windowed else ()
+        residual = data.responses - predicted
+        for c, observer in enumerate(self.structure.observers if hypothesis and not self.driven else ()):
+            if observer.order == ACCELERATION:
+                residual[:, c] = timed(residual[:, c], predicted[:, c], self.noise[c])
+        return projected(residual, moved, data)
 
     @property
     def noise_stated(self) -> bool:

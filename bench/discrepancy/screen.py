@@ -32,6 +32,7 @@ from bench.discrepancy.problem import COULOMB, Array, Problem
 from bench.discrepancy.signal_effects import quantise
 from bench.discrepancy.starts import channels_of, in_motion
 from bench.discrepancy.system import Elements, LinearStructure
+from bench.discrepancy.threads import in_threads
 
 REFINED = 1e-3
 """Part of chi-squared that is not worth a step of a refinement."""
@@ -96,7 +97,6 @@ class Screen:
     Args:
         problem: Records and nominal model.
         candidates: Effects; actuator, sensor and inertia effects are kept for `ranked`.
-        each: Maps a function over items, in threads where wanted.
         about: Where the linear structure, the sensors and perhaps the motion are taken from; see `beside`.
     """
 
@@ -104,11 +104,9 @@ class Screen:
         self,
         problem: Problem,
         candidates: Sequence[Placed],
-        each: Callable = map,
         *,
         about: About | None = None,
     ) -> None:
-        self.each = each
         self.candidates: list[Placed] = []
         self._beside: tuple[bytes, Screen] | None = None
         n = len(problem.nominal)
@@ -131,31 +129,23 @@ class Screen:
         self.zero = problem.residual((), self.deviations)
         if problem.structure.frictions and not problem.driven:
             self.zero = self._without_friction() - self.response(self._nominal_friction)
-        self.nominal = np.column_stack(
-            [
-                self.response(lambda i, p=p: self._deviation(i, p))
-                if p < problem.n_physical
-                else self._start_response(p)
-                for p in range(n)
-            ]
-        )
+        self.nominal = np.column_stack(in_threads(self._nominal_response, range(n)))
         self.inertia: list[Placed] = []
         self.signals: list[Placed] = []
         self.nodes: list[Node] = []
-        self.add(candidates, each)
+        self.add(candidates)
 
-    def add(self, candidates: Sequence[Placed], each: Callable = map) -> None:
+    def add(self, candidates: Sequence[Placed]) -> None:
         """Screen further effects.
 
         Args:
             candidates: Effects that are not screened yet.
-            each: Maps a function over items, in threads where wanted.
         """
         self.candidates += candidates
         self.inertia += [p for p in candidates if p.effect.site == "inertia"]
         self.signals += [p for p in candidates if p.effect.site in {"actuator", "sensor"}]
         tasks = [(p, eta) for p in candidates if p.effect.site == "joint" for eta in p.effect.grid()]
-        self.nodes += [node for node in each(lambda task: self._node(*task), tasks) if node is not None]
+        self.nodes += [node for node in in_threads(lambda task: self._node(*task), tasks) if node is not None]
 
     def beside(self, base: Fit, *, simulated: bool) -> Screen:
         """This screening about a base: for the structure it found, and seen through its sensor effects.
@@ -172,7 +162,7 @@ class Screen:
         if self._beside is None or self._beside[0] != key:
             about = About(base, simulated)
             self._beside = None  # a screening is large
-            self._beside = key, Screen(self.problem, self.candidates, self.each, about=about)
+            self._beside = key, Screen(self.problem, self.candidates, about=about)
         return self._beside[1]
 
     def _sensed(self, channels: Array, index: int) -> Array:
@@ -191,6 +181,12 @@ class Screen:
             return channels
         with_change = self.problem.sensed(placed, etas, free + small * channels, step)
         return (with_change - self.problem.sensed(placed, etas, free.copy(), step)) / small
+
+    def _nominal_response(self, parameter: int) -> Array:
+        """Whitened response of all records to a deviation of one nominal parameter, or initial state, by its uncertainty."""
+        if parameter >= self.problem.n_physical:
+            return self._start_response(parameter)
+        return self.response(lambda i: self._deviation(i, parameter))
 
     def _deviation(self, index: int, parameter: int) -> Array:
         """Force that a deviation of one nominal parameter by its uncertainty takes from the structure."""
@@ -264,11 +260,16 @@ class Screen:
         first, *further = spanning(placed, eta)
         offset = self.effect_response(placed, first)
         columns = np.empty((len(offset), 1 + len(further)), dtype=np.float32)
+
+        def write(k: int) -> None:
+            response = self.effect_response(placed, further[k])
+            with np.errstate(over="ignore", invalid="ignore"):
+                columns[:, 1 + k] = response - offset if relative else response
+
+        relative = placed.effect.modulated or placed.effect.affine
         with np.errstate(over="ignore", invalid="ignore"):
             columns[:, 0] = offset
-            for column, point in zip(columns.T[1:], further, strict=True):
-                response = self.effect_response(placed, point)
-                column[:] = response - offset if placed.effect.modulated or placed.effect.affine else response
+        in_threads(write, range(len(further)))
         # a hidden resonance can make more of a record than rounding leaves of anything else
         largest = max(columns.max(), -columns.min())
         if not 0.0 < largest < LARGEST:
@@ -327,16 +328,15 @@ class Screen:
         ground = ground or self.ground(base)
         own = {placed.key for placed in hypothesis}
         rest = ground.left[: len(ground.residual)]
-        points = []
-        for node in [node for node in self.nodes if node.placed.key not in own] + self._signal_nodes(
-            hypothesis, vector
-        ):
+        nodes = [node for node in self.nodes if node.placed.key not in own]
+        nodes += self._signal_nodes(hypothesis, vector)
+
+        def solved(node: Node) -> Point | None:
             inner = products(ground.head, node.columns)
-            point = read(node, node.gram - inner.T @ inner, products(node.columns, rest[:, None])[:, 0])
-            if point is not None:
-                points.append(point)
-        points.sort(key=lambda point: -point.gain)
-        return points
+            return read(node, node.gram - inner.T @ inner, products(node.columns, rest[:, None])[:, 0])
+
+        points = [point for point in in_threads(solved, nodes) if point is not None]
+        return sorted(points, key=lambda point: -point.gain)
 
     def inertia_points(self, base: Fit, ground: Ground) -> list[Point]:
         """Errors of nominal parameters that a base does not hold, by the chi-squared that goes if the prior of one falls.
@@ -394,20 +394,23 @@ class Screen:
             if placed.effect.site == "inertia":
                 i = self.problem.structure.parameters.index(placed.target)
                 columns.append(1e3 * self.nominal[:, [i]])
-            if placed.effect.site != "joint":
-                continue
-            response = self.effect_response(placed, eta)
-            residual = residual - response
-            for k, parameter in enumerate(placed.effect.parameters):
-                if parameter.fixed:
-                    continue
-                moved = eta.copy()
-                step = SHAPE_STEP * parameter.std
-                moved[k] += step if moved[k] + step <= parameter.bounds[1] else -step
-                columns.append(
-                    ((self.effect_response(placed, moved) - response) / (moved[k] - eta[k]))[:, None]
-                )
+            if placed.effect.site == "joint":
+                response, changes = self._shaped(placed, eta)
+                residual = residual - response
+                columns.append(changes)
         return residual, np.hstack(columns), self.deviations
+
+    def _shaped(self, placed: Placed, eta: Array) -> tuple[Array, Array]:
+        """Response (n,) to an effect along the measured motion, and its changes (n, k) with the free parameters."""
+        free = [k for k, parameter in enumerate(placed.effect.parameters) if not parameter.fixed]
+        points = np.repeat(eta[None], 1 + len(free), axis=0)
+        for point, k in zip(points[1:], free, strict=True):
+            parameter = placed.effect.parameters[k]
+            step = SHAPE_STEP * parameter.std
+            point[k] += step if point[k] + step <= parameter.bounds[1] else -step
+        response, *moved = in_threads(lambda point: self.effect_response(placed, point), points)
+        changes = [(m - response) / (p[k] - eta[k]) for m, p, k in zip(moved, points[1:], free, strict=True)]
+        return response, np.array(changes).reshape(-1, len(response)).T
 
     def _simulated_columns(self, hypothesis: Hypothesis, vector: Array, residual: Array) -> Array:
         """Responses (n, k) of a free run to the nominal parameters and to the free ones of its effects."""
@@ -415,11 +418,10 @@ class Screen:
         shapes = [p.fixed for placed in hypothesis for p in placed.effect.parameters]
         held = [False] * len(self.problem.nominal) + shapes
         return np.column_stack(
-            [
-                self._simulated_column(hypothesis, vector, residual, i, RUN_STEP * std[i], high[i])
-                for i in range(len(vector))
-                if not held[i]
-            ]
+            in_threads(
+                lambda i: self._simulated_column(hypothesis, vector, residual, i, RUN_STEP * std[i], high[i]),
+                np.flatnonzero(~np.array(held)).tolist(),
+            )
         )
 
     def _simulated_column(
@@ -440,19 +442,20 @@ class Screen:
         """Changes that actuator and sensor effects make to the simulated channels of a base."""
         own = {placed.key for placed in hypothesis}
         base = self.problem.residual(hypothesis, vector)
-        nodes = []
-        for placed in self.signals:
-            if placed.key in own:
-                continue
-            for eta in placed.effect.grid():
-                point = eta.copy()
-                if placed.effect.parameters[0].signed:
-                    point[0] = SIGNAL_STEP
-                changed = self.problem.residual((*hypothesis, placed), np.concatenate([vector, point]))
-                if changed.shape == base.shape and np.any(changed != base):
-                    column = (base - changed)[:, None]
-                    nodes.append(Node(placed, point, column, column.T @ column))
-        return nodes
+
+        def node(task: tuple[Placed, Array]) -> Node | None:
+            placed, eta = task
+            point = eta.copy()
+            if placed.effect.parameters[0].signed:
+                point[0] = SIGNAL_STEP
+            changed = self.problem.residual((*hypothesis, placed), np.concatenate([vector, point]))
+            if changed.shape != base.shape or not np.any(changed != base):
+                return None
+            column = (base - changed)[:, None]
+            return Node(placed, point, column, column.T @ column)
+
+        tasks = [(p, eta) for p in self.signals if p.key not in own for eta in p.effect.grid()]
+        return [found for found in in_threads(node, tasks) if found is not None]
 
 
 def _unspoilt(problem: Problem, base: Fit, record: CaseRecord) -> Array:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -14,8 +13,8 @@ from bench.discrepancy.grid_points import Point
 from bench.discrepancy.minimise import DIFFERENCES, differences
 from bench.discrepancy.placed import Hypothesis
 from bench.discrepancy.problem import Array, Problem
+from bench.discrepancy.threads import in_threads
 
-THREADS = 2
 THOROUGH = 60
 """Iterations of a fit that is carried on to convergence."""
 LOG_PRIOR_EFFECT = -3.4
@@ -51,6 +50,8 @@ BEGUN_AGAIN = 500.0
 have come to half of that."""
 SHAKES, IN_VAIN, DRAWS = 6, 2, 48
 """Rounds, those in vain after which there is no further one, and draws of a round."""
+FOLLOWED = 2
+"""Draws of a round that are followed to their minima."""
 SCALES = ((1.0,), (2.0,), (4.0,))
 """Sizes of the draws' moves, in posterior standard deviations."""
 DENT = 1.0
@@ -132,7 +133,7 @@ def names(hypothesis: Hypothesis) -> str:
     )
 
 
-def carry_on(search: Search, pool: ThreadPoolExecutor, size: int, *, most: int) -> None:
+def carry_on(search: Search, size: int, *, most: int) -> None:
     """Carry the fits of one size that may still become the best on to convergence."""
     for share in (HOPELESS, 0.0):
         ranked = [f for f in search.ranked(size) if np.isfinite(f.cost)]
@@ -145,12 +146,11 @@ def carry_on(search: Search, pool: ThreadPoolExecutor, size: int, *, most: int) 
             if key_of(f.hypothesis) not in search.converged
             and (f.reduced < limit or posterior(f) > posterior(ranked[0]) - WITHIN_REACH)
         ]
-        converge(search, pool, [(f.hypothesis, f.vector) for f in chosen])
+        converge(search, [(f.hypothesis, f.vector) for f in chosen])
 
 
 def converge(
     search: Search,
-    pool: ThreadPoolExecutor,
     tasks: Sequence[Task],
     *,
     limit: float | None = None,
@@ -163,12 +163,12 @@ def converge(
     def thorough(task: Task) -> Fit:
         return fit(search.problem, task[0], start=task[1], iterations=THOROUGH, limit=limits[len(task[0])])
 
-    for fitted in pool.map(thorough, tasks):
+    for fitted in in_threads(thorough, tasks):
         search.add(fitted)
         search.converged.add(key_of(fitted.hypothesis))
 
 
-def integrate_finer(search: Search, pool: ThreadPoolExecutor) -> None:
+def integrate_finer(search: Search) -> None:
     """Halve the integration steps while the best fit tells the difference, and fit the best ones again.
 
     The steps are chosen for smooth laws. Where one switches, an error of the integration may stand out of the noise of a good
@@ -176,7 +176,6 @@ def integrate_finer(search: Search, pool: ThreadPoolExecutor) -> None:
 
     Args:
         search: Fits so far; its problem is integrated in finer steps from here on.
-        pool: Threads.
     """
     problem, best = search.problem, search.ranked()[0]
     if problem.driven or problem.windowed:
@@ -193,7 +192,7 @@ def integrate_finer(search: Search, pool: ThreadPoolExecutor) -> None:
         return
     for fitted in [f for f in search.ranked() if near(f)][:SHAKEN]:
         search.fits[key_of(fitted.hypothesis)] = fit(
-            problem, fitted.hypothesis, start=fitted.vector, iterations=THOROUGH, each=pool.map
+            problem, fitted.hypothesis, start=fitted.vector, iterations=THOROUGH
         )
 
 
@@ -203,7 +202,7 @@ def limit_of(search: Search, size: int) -> float:
     return best + SIGHT + max(best - search.problem.n_residuals, 0.0)
 
 
-def shake(search: Search, pool: ThreadPoolExecutor) -> None:
+def shake(search: Search) -> None:
     """Fit hypotheses near the best again, from draws about where they ended, if friction sticks in them.
 
     Whether a slider stops at a reversal hangs on trifles, so the cost is rough: a descent ends in the first of many dents, some
@@ -211,7 +210,6 @@ def shake(search: Search, pool: ThreadPoolExecutor) -> None:
 
     Args:
         search: Fits so far; better ones take their places.
-        pool: Threads.
     """
     best = search.ranked()[0]
     if not consistent(best) and best.chi2 - best.n_residuals > 2.0 * BEGUN_AGAIN:
@@ -219,19 +217,19 @@ def shake(search: Search, pool: ThreadPoolExecutor) -> None:
     both_stick = sticks(best)
     reach = SHAKEN_REACH if both_stick else WITHIN_REACH
     for fitted in [f for f in search.ranked() if near(f) and sticks(f)][:SHAKEN]:
-        begun = _beside_the_best(search, fitted, pool) if both_stick else fitted
+        begun = _beside_the_best(search, fitted) if both_stick else fitted
         behind = posterior(search.ranked()[0]) - posterior(begun)
         if behind < reach:
-            _shaken(search, begun, pool, 2.0 * behind)
+            _shaken(search, begun, 2.0 * behind)
 
 
-def _beside_the_best(search: Search, fitted: Fit, pool: ThreadPoolExecutor) -> Fit:
+def _beside_the_best(search: Search, fitted: Fit) -> Fit:
     """The better of a fit and the same begun with the nominal parameters of the best one, which may have got over its dents."""
     best, n = search.ranked()[0], len(search.problem.nominal)
     if fitted is best or posterior(best) - posterior(fitted) > BEGUN_AGAIN:
         return fitted
     start = np.concatenate([best.vector[:n], fitted.vector[n:]])
-    again = fit(search.problem, fitted.hypothesis, start=start, iterations=THOROUGH, each=pool.map)
+    again = fit(search.problem, fitted.hypothesis, start=start, iterations=THOROUGH)
     search.add(again)
     return min(fitted, again, key=lambda f: f.cost)
 
@@ -241,7 +239,7 @@ def sticks(fitted: Fit) -> bool:
     return any(placed.effect.limit is not None for placed in fitted.hypothesis)
 
 
-def _shaken(search: Search, fitted: Fit, pool: ThreadPoolExecutor, behind: float) -> None:
+def _shaken(search: Search, fitted: Fit, behind: float) -> None:
     """Shake one fit, while rounds like the last one could make up the cost by which it is `behind`."""
     problem, hypothesis = search.problem, fitted.hypothesis
     mean, std, low, high = problem.prior(hypothesis)
@@ -257,25 +255,23 @@ def _shaken(search: Search, fitted: Fit, pool: ThreadPoolExecutor, behind: float
 
     in_vain = 0
     for further in reversed(range(SHAKES)):
-        fitted = _overlooking_dents(fitted, problem, free, pool)
+        fitted = _overlooking_dents(fitted, problem, free)
         spread = np.linalg.cholesky(fitted.covariance[np.ix_(free, free)])
         draws = np.repeat(fitted.vector[None], DRAWS, axis=0)
         draws[:, free] += rng.standard_normal((DRAWS, len(free))) @ spread.T * np.resize(SCALES, (DRAWS, 1))
         draws = np.clip(draws, low, high)
-        best = draws[np.argsort(list(pool.map(cost, draws)))[:THREADS]]
-        again = min(pool.map(again_from, best), key=lambda f: f.cost)
+        best = draws[np.argsort(in_threads(cost, draws))[:FOLLOWED]]
+        again = min(in_threads(again_from, best), key=lambda f: f.cost)
         gained = fitted.cost - again.cost
         in_vain = in_vain + 1 if gained < DENT else 0
         fitted = min(fitted, again, key=lambda f: f.cost)
         behind -= max(gained, 0.0)
         if in_vain == IN_VAIN or behind > further * max(gained, DENT):
             break
-    search.fits[key_of(hypothesis)] = _overlooking_dents(fitted, problem, free, pool)
+    search.fits[key_of(hypothesis)] = _overlooking_dents(fitted, problem, free)
 
 
-def _overlooking_dents(
-    fitted: Fit, problem: Problem, free: NDArray[np.int64], pool: ThreadPoolExecutor
-) -> Fit:
+def _overlooking_dents(fitted: Fit, problem: Problem, free: NDArray[np.int64]) -> Fit:
     """A fit whose precision and evidence are those of the landscape, not of the dent it lies in: by coarse differences."""
     _, std, _, high = problem.prior(fitted.hypothesis)
     changes = differences(
@@ -285,7 +281,6 @@ def _overlooking_dents(
         free=free,
         steps=DIFFERENCES[1] * std[free],
         high=high[free],
-        each=pool.map,
     )
     if changes is None:
         return fitted

@@ -24,6 +24,7 @@ from bench.discrepancy.nominate import along
 from bench.discrepancy.problem import Array
 from bench.discrepancy.screen import Ground, Screen
 from bench.discrepancy.structure import Place
+from bench.discrepancy.threads import in_threads
 
 CELLS = 24
 """Cells that the reach of a coordinate is cut into."""
@@ -152,7 +153,7 @@ def _free(place: Place, states: list[Array], over: int, screen: Screen, ground: 
     def response(k: int) -> Array:
         return screen.response(lambda i: -np.outer(per_record[i][:, k], row))
 
-    columns = np.column_stack([ground.project(response(k)) for k in range(SHAPES * CELLS)])
+    columns = np.column_stack(in_threads(lambda k: ground.project(response(k)), range(SHAPES * CELLS)))
     alone = ground.left
     gram, seen = columns.T @ columns, columns.T @ alone
     best = np.asarray(np.linalg.lstsq(gram, seen, rcond=1e-9)[0], dtype=np.float64)

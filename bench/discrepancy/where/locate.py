@@ -107,7 +107,7 @@ def locate(
     known = known_parameters(best)
     maps = state_maps(problem, problem.records, known=known)
     acting: Mapping[str, tuple[dict[str, Any], ...]] = {}
-    if borne_out and all(part.noise_stated and near(fitted) for part, fitted in best.parts):
+    if borne_out and best.noise_stated and all(near(fitted) for _, fitted in best.parts):
         acting = acting_regions(best)
     if unknown and not acting:
         acting = limited_regions(nominal, best)
@@ -164,7 +164,7 @@ def box(region: Region) -> dict[str, tuple[float, float]]:
 
 def known_parameters(best: Explanation) -> dict[str, float] | None:
     """Nominal parameters as the best explanation has them; None where it does not reach the noise and so proves nothing."""
-    if not best.consistent or not all(problem.noise_stated for problem, _ in best.parts):
+    if not best.consistent or not best.noise_stated:
         return None
     out: dict[str, float] = {}
     for part, fitted in best.parts:
