@@ -1,7 +1,7 @@
 """Benchmarks of jointbench, every row a ratio against a peer or a limit, run side by side.
 
 python scripts/benchmark.py native stream --save out.json
-python scripts/benchmark.py diagnosis --data FOLDER --full
+python scripts/benchmark.py diagnosis --data FOLDER --rig joint
 python scripts/benchmark.py --compare before.json after.json
 """
 
@@ -15,7 +15,7 @@ import platform
 import sys
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import tyro
@@ -47,6 +47,7 @@ class Args:
         compare: Two saved files to compare instead of running.
         full: More and longer cases, for the groups that draw cases.
         data: Folder of cases with their answers, for the groups that draw cases, in place of drawn ones.
+        rig: Rig whose cases of that folder are run: sdof or joint.
         work: Folder that keeps what is done, for the groups that take long: the same command goes on from there.
     """
 
@@ -57,6 +58,7 @@ class Args:
     compare: Annotated[tuple[Path, Path] | None, tyro.conf.arg(metavar="A B")] = field(default=None)
     full: bool = False
     data: Path | None = None
+    rig: Literal["sdof", "joint"] = "sdof"
     work: Path | None = None
 
 
@@ -77,7 +79,8 @@ def main() -> int:
         with console.status(f"running {group}") as status:
             run = importlib.import_module(f"benchmarks.{group}").rows
             taken = inspect.signature(run).parameters
-            settings = {"full": args.full, "data": args.data, "work": args.work, "progress": status.update}
+            settings = {"full": args.full, "data": args.data, "rig": args.rig, "work": args.work}
+            settings["progress"] = status.update
             rows: list[Row] = run(args.repeats, **{k: v for k, v in settings.items() if k in taken})
         document["groups"][group] = [row.to_dict() for row in rows]
         holds &= all(row.holds is not False for row in rows)

@@ -286,6 +286,17 @@ CAPABILITIES: Sequence[Capability] = (
         data="../trials",
         hours=True,
     ),
+    Capability(
+        "peers_joint",
+        "The same on the development trials of the joint, mujoco.sysid given ten times the diagnosis's time",
+        (
+            *("python", "scripts/benchmark.py", "diagnosis", "--data", "{data}/../trials"),
+            *("--rig", "joint", "--work", "out/peers_joint", "--json"),
+        ),
+        _benchmark,
+        data="../trials",
+        hours=True,
+    ),
     _excitation_task(
         "sdof", "Excitation on the SDOF rig: trained policy against the baselines, held-out rigs"
     ),

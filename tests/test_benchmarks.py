@@ -159,16 +159,29 @@ def test_sysid_is_given_the_same_problem(effect, tolerance):
 
 
 @pytest.mark.slow
-def test_sysid_names_an_effect_of_its_own_when_it_is_plain():
+@pytest.mark.parametrize(
+    "seconds", [np.inf, 1e4]
+)  # as long as it takes; in heats, none of which comes to its end in time
+def test_sysid_names_an_effect_of_its_own_when_it_is_plain(seconds):
     from benchmarks import peer_sysid
 
     from bench.discrepancy.catalogue import effect_named
 
     # the whole catalogue takes it minutes; these are the gap's nearest rivals, and an effect of another kind each
     rivals = ("gap", "cubic_stiffness", "coulomb_friction", "mass_error")
-    placed, _ = peer_sysid.diagnose(_case("gap", 5), catalogue=[effect_named(name) for name in rivals])
+    catalogue = [effect_named(name) for name in rivals]
+    placed, _ = peer_sysid.diagnose(_case("gap", 5), catalogue=catalogue, seconds=seconds)
     assert placed is not None
     assert placed.effect.name == "gap"
+
+
+@pytest.mark.slow
+def test_sysid_says_what_it_has_when_its_time_is_over():
+    from benchmarks import peer_sysid
+
+    case = _case("gap", 5)
+    _, predict = peer_sysid.diagnose(case, seconds=0.0)
+    assert all(np.isfinite(samples).all() for samples in predict(case.validation[0]).values())
 
 
 @pytest.mark.slow

@@ -4,6 +4,12 @@ It gets every help: the diagnosis's catalogue with its priors, bounds and starti
 MuJoCo model, MuJoCo's own friction constraint where it has one; the residuals whitened against the noise of a measured
 force too (a plain weighting would take that for an effect); loads centred over each step; a model builder that writes
 into a compiled model; the scaling by the Jacobian, with which it is quickest.
+
+Every candidate is fitted whole, which takes minutes with one degree of freedom. On the joint, with a hundred candidates, sixteen
+nominal parameters and half a second a free run, it would take 100 minutes a case. Where time is limited candidates go through heats
+therefore: the nominal parameters held at their best fit without an effect, on the record of which that leaves most, integrated by
+the semi-implicit Euler scheme; the best ones freely on that record; the best of these freely on all records, by Runge-Kutta as
+ever. A heat that runs out of its time keeps what each fit has reached.
 """
 
 from __future__ import annotations
@@ -11,6 +17,7 @@ from __future__ import annotations
 import contextlib
 import copy
 import io
+import time
 from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
@@ -39,6 +46,10 @@ CARRIED = 4
 """Candidates that are carried on, by the BIC of their first fits."""
 LAST = 20
 """Further iterations of those."""
+ALONE = 0.1
+"""Part of a limited time by which the nominal model is fitted."""
+HEATS = ((0.45, 3, 8), (0.6, 4, 2))
+"""Of the heats before the last: the part of the time by which each ends, its iterations, and how many candidates stay."""
 REACH = 20.0
 """Bound, in units of the prior's standard deviation, of what has none: the optimiser wants finite ones."""
 DIVERGED = 1e6
@@ -61,8 +72,8 @@ class _Coordinates:
         """Coordinate whose square a rank-one matrix is."""
         return next(name for row, name in self.names.items() if np.array_equal(np.outer(row, row), matrix))
 
-    def mjcf(self) -> str:
-        """The model, with unit masses and neither springs nor dampers."""
+    def mjcf(self, *, solver: bool = True) -> str:
+        """The model, with unit masses and neither springs nor dampers, and without the constraint solver where nothing needs it."""
         dofs = self.structure.dofs
         bodies = "".join(
             f'<body name="{dof}" pos="0 {i} 0"><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
@@ -88,7 +99,9 @@ class _Coordinates:
             for dof in dofs
         )
         return (
-            '<mujoco><option gravity="0 0 0"><flag contact="disable"/></option>'
+            '<mujoco><option gravity="0 0 0"><flag contact="disable"'
+            + ("" if solver else ' constraint="disable"')
+            + "/></option>"
             f"<worldbody>{bodies}</worldbody>"
             + (f"<tendon>{tendons}</tendon>" if tendons else "")
             + f"<actuator>{motors}</actuator><sensor>{sensors}</sensor></mujoco>"
@@ -111,9 +124,13 @@ class Candidate:
         self.high = np.minimum(high, self.mean + REACH * self.std)
         parameters = () if placed is None else placed.effect.parameters
         held = np.concatenate([problem.spread == 0.0, [p.fixed for p in parameters]]).astype(bool)
-        self.free = np.flatnonzero(~held)
+        self.free = self.all_free = np.flatnonzero(~held)
+        self.own = self.free[self.free >= len(problem.nominal)]
+        self.heard: Sequence[int] = range(len(problem.records))
         step = problem.records[0].step
-        self.rig = Rig("peer", coordinates.mjcf(), self._elements(coordinates), timestep=step)
+        elements = self._elements(coordinates)
+        mjcf = coordinates.mjcf(solver=any(element.exact for element in elements))
+        self.rig = Rig("peer", mjcf, elements, timestep=step)
         self.model, self.scratch = self.rig.model, mujoco.MjData(self.rig.model)
         self.places = [self._place(coordinates, i) for i in range(len(structure.parameters))]
         self.columns = [
@@ -248,7 +265,7 @@ class Candidate:
         vector = self.full(parameters.as_vector())
         index = int(measured.data[0, 0])
         data = self.problem.data[index]
-        misfit = ((vector - self.mean) / self.std)[self.free] / np.sqrt(len(self.problem.data))
+        misfit = ((vector - self.mean) / self.std)[self.free] / np.sqrt(len(self.heard))
         error = data.responses - self.observe(vector, data.record, predicted.data)
         residual = whitened(error, data) if np.isfinite(error).all() else np.full(self._size(index), DIVERGED)
         return np.concatenate([residual, misfit]), predicted, predicted
@@ -259,12 +276,12 @@ class Candidate:
     def residual(self, x: Array, parameters: Any) -> tuple[list[Array], list, list]:
         """The residuals as `mujoco.sysid.optimize` wants them, by its own machinery, a record at a time."""
         parts = []
-        for index, (record, sequence) in enumerate(zip(self.problem.records, self.sequences, strict=True)):
+        for index in self.heard:
             run = sysid.build_residual_fn(
-                models_sequences=[sequence],
+                models_sequences=[self.sequences[index]],
                 build_model=lambda p, _spec: self.build(self.full(p.as_vector())),
                 modify_residual=self._residual,
-                custom_rollout=partial(self._rollout, record),
+                custom_rollout=partial(self._rollout, self.problem.records[index]),
                 resample_true=False,
             )
             try:
@@ -283,34 +300,65 @@ class Candidate:
             out.add(sysid.Parameter(f"p{i:02d}", self.start[i], self.low[i], self.high[i]))
         return out
 
-    def best_start(self) -> Array:
-        """The point of the catalogue's grid with the least cost, the nominal parameters at their values."""
-        head = np.zeros(len(self.problem.nominal))
-        grid = [()] if self.placed is None else self.placed.effect.grid()
-        starts = [np.concatenate([head, eta]) for eta in grid]
-        return starts[0] if len(starts) == 1 else min(starts, key=self.cost)
+    def best_start(self, head: Array) -> Array:
+        """The point of the catalogue's grid with the least cost, the nominal deviations at `head`."""
+        grid = [np.zeros(0)] if self.placed is None else self.placed.effect.grid()
+        starts = np.array([np.concatenate([head, eta]) for eta in grid])
+        return starts[int(np.argmin(self.costs(starts)))] if len(starts) > 1 else starts[0]
+
+    def costs(self, vectors: Array) -> Array:
+        """Chi-squared and the misfit of the priors (k,) at vectors (k, n) that differ in what is free."""
+        parameters = self.parameters(vectors[0])
+        parts, _, _ = self.residual(np.clip(vectors, self.low, self.high)[:, self.free].T, parameters)
+        return np.sum(np.concatenate(parts) ** 2, axis=0)
 
     def cost(self, vector: Array) -> float:
-        """Chi-squared and the misfit of the priors."""
-        parameters = self.parameters(vector)
-        residual = np.concatenate(self.residual(parameters.as_vector(), parameters)[0])
-        return float(residual @ residual)
+        """The cost at one vector."""
+        return float(self.costs(vector[None])[0])
 
-    def fit(self, start: Array, iterations: int) -> tuple[Array, float]:
-        """Fit from a start; the vector reached and its cost."""
+    def misfit(self, vector: Array, index: int) -> float:
+        """The cost of one record, by its number of residuals."""
+        everything, self.heard = self.heard, [index]
+        cost = self.cost(vector)
+        self.heard = everything
+        return cost / self._size(index)
+
+    def fit(self, start: Array, iterations: int, deadline: float = np.inf) -> tuple[Array, float]:
+        """Fit from a start; the vector reached and its cost, at a deadline those of the best vector so far."""
         parameters = self.parameters(start)
+        best = (np.inf, parameters.as_vector())
+
+        def residual(x: Array, p: Any) -> Any:
+            nonlocal best
+            if time.perf_counter() > deadline:
+                raise _LateError
+            found = self.residual(x, p)
+            if x.ndim == 1 or x.shape[1] == 1:
+                best = min(
+                    best, (float(np.sum(np.concatenate(found[0]) ** 2)), x.ravel().copy()), key=lambda b: b[0]
+                )
+            return found
+
         # its table cannot be turned off from here
-        with contextlib.redirect_stdout(io.StringIO()):
-            _, result = sysid.optimize(
-                parameters, self.residual, verbose=False, max_iters=iterations, x_scale="jac"
-            )
-        vector = self.full(np.asarray(result.x).ravel())
-        return vector, self.cost(vector)
+        with contextlib.redirect_stdout(io.StringIO()), contextlib.suppress(_LateError):
+            if len(self.free):
+                _, result = sysid.optimize(
+                    parameters, residual, verbose=False, max_iters=iterations, x_scale="jac"
+                )
+                best = (np.inf, np.asarray(result.x).ravel())
+        vector = self.full(best[1])
+        return vector, best[0] if np.isfinite(best[0]) else self.cost(vector)
 
     def bic(self, cost: float) -> float:
         """Bayesian information criterion; the nominal parameters are in every candidate."""
-        effect = int(np.sum(self.free >= len(self.problem.nominal)))
-        return cost + effect * float(np.log(self.problem.n_residuals))
+        residuals = sum(self._size(index) for index in self.heard)
+        return cost + len(self.own) * float(np.log(residuals))
+
+    def enter(self, *, held: bool, heard: Sequence[int]) -> None:
+        """Enter a heat: on some records, the nominal parameters held or free, coarsely integrated where held."""
+        self.heard, self.free = heard, self.own if held else self.all_free
+        euler = mujoco.mjtIntegrator.mjINT_EULER
+        self.model.opt.integrator = euler if held else mujoco.mjtIntegrator.mjINT_RK4
 
     def predict(self, vector: Array, record: CaseRecord) -> Mapping[str, Array]:
         """Free run of a record; NaN where it diverged."""
@@ -328,25 +376,72 @@ class Candidate:
         return dict(zip(channels, self.observe(vector, record, run.sensordata.data).T, strict=True))
 
 
-def diagnose(case: Case, *, catalogue: Sequence[Effect] = CATALOGUE) -> tuple[Placed | None, Any]:
-    """The candidate with the best BIC, None for the nominal model, and its free run of a record."""
+Entry = tuple[Candidate, Array, float]
+"""A candidate, the vector its fit has reached and the cost there."""
+
+
+class _LateError(Exception):
+    """The time of a fit is over."""
+
+
+def diagnose(
+    case: Case, *, catalogue: Sequence[Effect] = CATALOGUE, seconds: float = np.inf
+) -> tuple[Placed | None, Any]:
+    """The candidate with the best BIC, None for the nominal model, and its free run of a record.
+
+    Args:
+        case: Nominal model and records.
+        catalogue: Effects to consider.
+        seconds: Time that the fits may take.
+    """
     from absl import logging
 
     logging.set_verbosity(logging.ERROR)  # it warns of every start at a bound
     mujoco.set_mju_user_warning(lambda text: None)  # and MuJoCo of every candidate that diverges
     try:
-        return _best(case, catalogue)
+        return _best(case, catalogue, seconds)
     finally:
         mujoco.set_mju_user_warning(None)
 
 
-def _best(case: Case, catalogue: Sequence[Effect]) -> tuple[Placed | None, Any]:
+def _best(case: Case, catalogue: Sequence[Effect], seconds: float) -> tuple[Placed | None, Any]:
+    began = time.perf_counter()
     structure = structure_of(case)
     problem = Problem(case, structure, case.identification)
-    candidates = [Candidate(problem, None)]
-    candidates += [Candidate(problem, placed) for placed in placements(case, structure, catalogue)]
-    fitted = [(c, *c.fit(c.best_start(), FIRST)) for c in candidates]
-    fitted.sort(key=lambda entry: entry[0].bic(entry[2]))
-    carried = [(c, *c.fit(vector, LAST)) for c, vector, _ in fitted[:CARRIED]]
-    best, vector, _ = min([*carried, *fitted[CARRIED:]], key=lambda entry: entry[0].bic(entry[2]))
+    nothing = Candidate(problem, None)
+    others = [Candidate(problem, placed) for placed in placements(case, structure, catalogue)]
+    if np.isfinite(seconds):
+        fitted = _in_heats(nothing, others, began, seconds)
+    else:
+        head = np.zeros(len(problem.nominal))
+        fitted = _by_bic([(c, *c.fit(c.best_start(head), FIRST)) for c in [nothing, *others]])
+        fitted[:CARRIED] = [(c, *c.fit(vector, LAST)) for c, vector, _ in fitted[:CARRIED]]
+    best, vector, _ = _by_bic(fitted)[0]
     return best.placed, lambda record: best.predict(vector, record)
+
+
+def _by_bic(entries: Sequence[Entry]) -> list[Entry]:
+    return sorted(entries, key=lambda entry: entry[0].bic(entry[2]))
+
+
+def _in_heats(nothing: Candidate, others: Sequence[Candidate], began: float, seconds: float) -> list[Entry]:
+    """The candidates of the last heat, fitted to all records, and the nominal model alone."""
+    everything = nothing.heard
+    alone = nothing.fit(nothing.mean, LAST, began + ALONE * seconds)
+    worst = max(everything, key=lambda index: nothing.misfit(alone[0], index))
+    left = [(c, alone[0]) for c in others]
+    for number, (share, iterations, stay) in enumerate(HEATS):
+        for candidate, _ in left:
+            candidate.enter(held=number == 0, heard=[worst])
+        if number == 0:
+            left = [(c, c.best_start(head)) for c, head in left]
+        deadline = began + share * seconds
+        found = _by_bic([(c, *c.fit(start, iterations, deadline)) for c, start in left])
+        left = [(c, vector) for c, vector, _ in found[:stay]]
+    fitted = [(nothing, *alone)]
+    for i, (candidate, start) in enumerate(left):
+        candidate.enter(held=False, heard=everything)
+        now = time.perf_counter()
+        deadline = now + max(began + seconds - now, 0.0) / (len(left) - i)
+        fitted.append((candidate, *candidate.fit(start, LAST, deadline)))
+    return fitted
