@@ -82,7 +82,9 @@ def check_reach(
                     f"'{channel}' in '{record.name}' runs from {reached.min():.4g} to {reached.max():.4g}, but the model clips "
                     f"actuator '{name}' to {low:g} … {high:g}; widen its ctrlrange, or check the unit of the channel"
                 )
-        _check_stops(record, _positions(case, structure, record), model, dofs)
+        position = _positions(case, structure, record)
+        _check_stops(record, position, model, dofs)
+        _check_turns(record, position, structure)
     _check_contacts(case, structure, rig, dofs)
 
 
@@ -111,6 +113,17 @@ def _check_stops(record: CaseRecord, position: Array, model: mujoco.MjModel, dof
                 f"joint '{model.joint(joint).name}' moves from {reached.min():.4g} to {reached.max():.4g} in '{record.name}', into "
                 f"the stops of the model at {low:g} … {high:g}; take the range out of the model and let the diagnosis look "
                 "for 'one_sided_stop' and 'gap', or check the unit of the channel"
+            )
+
+
+def _check_turns(record: CaseRecord, position: Array, structure: Structure) -> None:
+    for spring in structure.springs:
+        reached = float(np.nanmax(np.abs(position @ spring.row), initial=0.0))
+        if reached > spring.reach:
+            raise ModelError(
+                f"joint '{structure.dofs[int(np.argmax(np.abs(spring.row)))]}' turns by {reached:.4g} rad in '{record.name}', where "
+                f"gravity is followed up to {spring.reach:.4g}: a pendulum that goes over the top runs away from every model; "
+                "swing it less, or check the unit of the channel"
             )
 
 

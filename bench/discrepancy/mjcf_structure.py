@@ -1,11 +1,11 @@
 """The user's own MJCF as the structure of a diagnosis.
 
 The matrices are read off the compiled model by `LinearRig`, which refuses whatever is not linear: the diagnosis adds forces
-to a linear structure, and an approximation in the nominal model would come back as an effect. Three things that are not
+to a linear structure, and an approximation in the nominal model would come back as an effect. Four things that are not
 linear are dealt with here, since hardly a model is without them. Dry friction (``frictionloss``) becomes truly set-valued friction of
 the nominal model. Ranges of joints and controls, and contacts, are left out as long as the measured motion and the loads never
 reach them; where they do, the record is refused. Gravity on a slide only shifts the rest position, from which motion is
-counted; gravity on a pendulum, whose stiffness changes with the angle, is not linear and is refused.
+counted; on a pendulum it is a spring that bends with the angle, which is known and is added (`mjcf_gravity`).
 
 Entries of ``nominal.json`` refer to the model by name:
 
@@ -28,8 +28,10 @@ from numpy.typing import NDArray
 
 from bench import native
 from bench.discrepancy.case import Case, CaseChannel
+from bench.discrepancy.mjcf_gravity import gravity_springs, has_gravity, without_gravity
 from bench.discrepancy.mjcf_ranges import check_reach, free_of_constraints
-from bench.discrepancy.structure import NominalFriction, Observer, Place, Structure
+from bench.discrepancy.nominal_forces import NominalFriction, NominalSpring
+from bench.discrepancy.structure import Observer, Place, Structure
 from bench.errors import BenchError, FileFormatError, ModelError, UnknownNameError
 from bench.identification.linear_rig import LinearRig, current
 from bench.native.encoding import Coordinate
@@ -60,11 +62,11 @@ def mjcf_structure(case: Case) -> Structure:
     loads, responses = _channels(case, rig)
     parameters = [name for name in structural if not name.startswith("structure/frictionloss/")]
     try:
-        linear = LinearRig.of(rig, [sensor for _, sensor, _ in responses] + _cells(loads), parameters)
+        linear, bent = _linear(rig, [sensor for _, sensor, _ in responses] + _cells(loads), parameters)
     except ModelError as error:
         raise ModelError(
             f"'{path}' cannot be the nominal model of a diagnosis: {error}. The nominal model has to be linear in position, "
-            "velocity and command: take out what bends it (gravity on a pendulum, levers that swing far, stops, "
+            "velocity and command: take out what bends it (levers that carry one another, stops, "
             "couplings) or replace it by its tangent, a stiffness at the joint; the diagnosis looks for what is missing"
         ) from None
     n_dof = len(linear.dofs)
@@ -75,13 +77,32 @@ def mjcf_structure(case: Case) -> Structure:
     )
     stacks, fixed = _stacks(case, structural, linear, rig)
     names = tuple(p.name for p in case.parameters)
+    springs: tuple[NominalSpring, ...] = ()
+    if bent:
+        springs, tangents, changes = gravity_springs(rig, linear, structural)
+        fixed[2] += np.diag(tangents)
+        stacks[2][:] += np.array([np.diag(change) for change in changes])
     structure = Structure(
         tuple(rig.model.joint(int(rig.model.dof_jntid[dof])).name for dof in linear.dofs),
         names, *stacks, inputs, tuple(channel.name for channel, _ in loads), observers,
-        _places(case, rig, linear, names, stacks), fixed, _frictions(own, linear, names),
+        _places(case, rig, linear, names, stacks), fixed, _frictions(own, linear, names), springs,
     )  # fmt: skip
     check_reach(case, structure, own, {channel.name: actuator for channel, actuator in loads}, linear.dofs)
     return structure
+
+
+def _linear(rig: Rig, channels: Sequence[str], parameters: Sequence[str]) -> tuple[LinearRig, bool]:
+    """The matrices of a model, and whether they are those without gravity, since it bends the model."""
+    try:
+        return LinearRig.of(rig, channels, parameters), False
+    except ModelError:
+        if not has_gravity(rig):
+            raise
+        try:
+            return LinearRig.of(without_gravity(rig), channels, parameters), True
+        except ModelError:
+            pass
+        raise
 
 
 def _structural(name: str, rig: Rig) -> str:

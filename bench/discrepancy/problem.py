@@ -20,6 +20,7 @@ from bench.discrepancy.driven import driven_force
 from bench.discrepancy.driving import driving_loads, fewest_steps, run_in
 from bench.discrepancy.effect import Scales
 from bench.discrepancy.measured_motion import measured_motion
+from bench.discrepancy.nominal_forces import with_own_forces
 from bench.discrepancy.pace import rates, speeds, steps
 from bench.discrepancy.placed import Hypothesis, Placed
 from bench.discrepancy.prepared import RecordData, band_bins, noise_floor, projected, timed
@@ -38,7 +39,7 @@ from bench.discrepancy.starts import (
     with_starts,
     without_starts,
 )
-from bench.discrepancy.structure import Place, Structure, with_frictions
+from bench.discrepancy.structure import Place, Structure
 from bench.discrepancy.system import Elements, Motion
 from bench.discrepancy.threads import in_threads
 
@@ -229,7 +230,7 @@ class Problem:
         record: CaseRecord,
         *,
         starts: Array | None = None,
-        friction: bool = True,
+        own_forces: bool = True,
     ) -> Array:
         """Free run of a hypothesis.
 
@@ -238,7 +239,7 @@ class Problem:
             vector: Deviations of the nominal parameters in units of their uncertainty, then the etas of all effects.
             record: Record whose loads drive the run.
             starts: (n_windows, 2 n_dof) positions and velocities at `firsts`; those of `starts_of` where None.
-            friction: Whether the nominal model keeps its own dry friction.
+            own_forces: Whether the nominal model keeps its own dry friction and bending springs.
 
         Returns:
             (n, n_channels) predicted responses; NaN where it diverged.
@@ -246,7 +247,7 @@ class Problem:
         values, etas = self.split(hypothesis, vector)
         if self.driven:
             return self._driven_response(hypothesis, etas, values, record)
-        motion = self.free_motion(hypothesis, vector, record, starts=starts, friction=friction)
+        motion = self.free_motion(hypothesis, vector, record, starts=starts, own_forces=own_forces)
         channels = self.observe(hypothesis, etas, motion, record.step)
         return self.acquired(self.picked_up(hypothesis, etas, channels, record), record)
 
@@ -257,15 +258,15 @@ class Problem:
         record: CaseRecord,
         *,
         starts: Array | None = None,
-        friction: bool = True,
+        own_forces: bool = True,
     ) -> Motion:
         """Motion of a free run, of which `simulate` returns what is measured; the arguments are the same."""
         values, etas = self.split(hypothesis, vector)
         lead = self.lead_in(record)
         linear = self.structure.at(values)
         elements, rates = self.elements(hypothesis, etas, record)
-        if friction and self.structure.frictions:
-            elements = with_frictions(elements, self.structure, values)
+        if own_forces:
+            elements = with_own_forces(elements, self.structure, values)
         # The rate of a law is that at its largest velocity, where a step of one time constant is still accurate enough.
         own = np.sqrt(np.max(np.abs(linear.stiffness).sum(1) / np.diag(linear.mass)))
         substeps = self._substeps(record.step * np.maximum(0.6 * rates, own))

@@ -53,6 +53,8 @@ SHIFTS = 50
 """Largest shift between load and responses that is looked for, in samples."""
 PIECES = 8
 """Pieces of a record over which a lag is followed."""
+ANGLES = 1001
+"""Displacements at which the stiffness of a bending spring is looked at."""
 
 
 def refuse(problem: Problem) -> None:
@@ -106,7 +108,7 @@ def notes(case: Case, problem: Problem) -> tuple[str, ...]:
         problem: Its identification records and nominal model on all degrees of freedom.
     """
     found: list[str] = []
-    for check in (_unstated, _short, _clock, _repeated, _saturated, _understated, _still):
+    for check in (_unstated, _short, _clock, _repeated, _saturated, _understated, _still, _tipping):
         found += check(case, problem)
     channels = tuple(_between_channels(problem))
     found += channels
@@ -119,6 +121,25 @@ def _unstated(case: Case, problem: Problem) -> Iterator[str]:
     for name in problem.structure.channels:
         if case.channel(name).noise_std is None:
             yield f"the noise of '{name}' is not stated; its high-frequency floor is taken instead"
+
+
+def _tipping(case: Case, problem: Problem) -> Iterator[str]:
+    """Pendulums that swing to where gravity drives them further."""
+    structure, values = problem.structure, problem.nominal
+    tangent = structure.at(values).stiffness
+    for spring in structure.springs:
+        angle = np.linspace(-spring.reach, spring.reach, ANGLES)
+        bent = spring.slope_along(spring.coefficients(values), np.outer(angle, spring.row))
+        stiffness = bent + float(spring.row @ tangent @ spring.row)
+        limit = float(np.min(np.abs(angle[stiffness < 0.0]), initial=np.inf))
+        for record in case.identification + case.validation:
+            reached = float(np.abs(problem.motion_of(record).position @ spring.row).max())
+            if reached > limit:
+                name = structure.dofs[int(np.argmax(np.abs(spring.row)))]
+                yield (
+                    f"'{name}' swings to {np.degrees(reached):.0f} degrees in '{record.name}'; beyond {np.degrees(limit):.0f} gravity "
+                    "drives it on, and a free run leaves it there on the least error: swing it less"
+                )
 
 
 def _short(case: Case, problem: Problem) -> Iterator[str]:

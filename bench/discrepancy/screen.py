@@ -25,6 +25,7 @@ from bench.discrepancy.fit import Fit
 from bench.discrepancy.grid_points import SIGNAL_STEP, Node, Point, products, read, spanning
 from bench.discrepancy.linear_run import linear_run
 from bench.discrepancy.minimise import Prior, minimise
+from bench.discrepancy.nominal_forces import own_change, own_force
 from bench.discrepancy.pace import steps
 from bench.discrepancy.placed import Hypothesis, Placed
 from bench.discrepancy.prepared import whitened
@@ -127,8 +128,10 @@ class Screen:
         spread = np.where(problem.spread > 0.0, problem.spread, 1.0)
         self.deviations = (values - problem.nominal) / spread
         self.zero = problem.residual((), self.deviations)
-        if problem.structure.frictions and not problem.driven:
-            self.zero = self._without_friction() - self.response(self._nominal_friction)
+        if problem.structure.has_own_forces and not problem.driven:
+            self.zero = self._without_own_forces() - self.response(
+                lambda i: -own_force(problem.structure, values, problem.motion(i))
+            )
         self.nominal = np.column_stack(in_threads(self._nominal_response, range(n)))
         self.inertia: list[Placed] = []
         self.signals: list[Placed] = []
@@ -193,27 +196,15 @@ class Screen:
         if self.problem.structure.parameters[parameter] == COULOMB:
             return -self.problem.spread[parameter] * np.sign(self.problem.motion(index).velocity)
         motion, s = self.problem.motion(index), self.problem.structure
-        for friction in s.frictions:
-            if friction.parameter == s.parameters[parameter]:
-                rate = motion.velocity @ friction.row
-                return -self.problem.spread[parameter] * np.outer(np.sign(rate), friction.row)
-        force = motion.acceleration @ s.mass[parameter].T + motion.velocity @ s.damping[parameter].T
+        force = own_change(s, parameter, motion)
+        force += motion.acceleration @ s.mass[parameter].T + motion.velocity @ s.damping[parameter].T
         return -self.problem.spread[parameter] * (force + motion.position @ s.stiffness[parameter].T)
 
-    def _nominal_friction(self, index: int) -> Array:
-        """Force (n, n_dof) of the nominal model's own dry friction along the measured motion, as it acts."""
-        structure, velocity = self.problem.structure, self.problem.motion(index).velocity
-        force = np.zeros_like(velocity)
-        for friction in structure.frictions:
-            level = friction.level(structure, self.problem.nominal)
-            force -= level * np.outer(np.sign(velocity @ friction.row), friction.row)
-        return force
-
-    def _without_friction(self) -> Array:
-        """Whitened residuals of the nominal model without its own dry friction."""
-        problem, zero = self.problem, np.zeros(len(self.problem.nominal))
+    def _without_own_forces(self) -> Array:
+        """Whitened residuals of the nominal model without its own dry friction and bending springs."""
+        problem = self.problem
         parts = [
-            whitened(d.responses - problem.simulate((), zero, d.record, friction=False), d)
+            whitened(d.responses - problem.simulate((), self.deviations, d.record, own_forces=False), d)
             for d in problem.data
         ]
         return np.concatenate(parts)

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.discrepancy.case import Case
-from bench.discrepancy.friction_limits import coulomb_limit
-from bench.discrepancy.system import ROW, THETA, Elements, LinearStructure
+from bench.discrepancy.nominal_forces import NominalFriction, NominalSpring
+from bench.discrepancy.system import LinearStructure
 from bench.errors import FileFormatError
 
 
@@ -59,27 +59,6 @@ class Place:
 
 
 @dataclass(frozen=True)
-class NominalFriction:
-    """Dry friction that the nominal model has already.
-
-    Attributes:
-        row: (n_dof,) relative coordinate that it acts on.
-        parameter: Name of the nominal parameter that is its limit; empty where the limit is fixed.
-        value: The limit where it is fixed [N or N m].
-    """
-
-    row: NDArray[np.float64]
-    parameter: str = ""
-    value: float = 0.0
-
-    def level(self, structure: Structure, values: NDArray[np.float64]) -> float:
-        """Limit of the friction at nominal parameter values (n_parameters,)."""
-        if not self.parameter:
-            return self.value
-        return max(float(values[structure.parameters.index(self.parameter)]), 0.0)
-
-
-@dataclass(frozen=True)
 class Structure:
     """A rig with constant mass matrix, linear in its nominal parameters.
 
@@ -95,6 +74,7 @@ class Structure:
         places: Where effects can sit.
         fixed: Mass, damping and stiffness (3, n_dof, n_dof) that no parameter changes; None for none.
         frictions: Dry friction of the nominal model.
+        springs: What its restoring forces are beyond their tangents.
     """
 
     dofs: tuple[str, ...]
@@ -108,6 +88,12 @@ class Structure:
     places: tuple[Place, ...]
     fixed: NDArray[np.float64] | None = None
     frictions: tuple[NominalFriction, ...] = ()
+    springs: tuple[NominalSpring, ...] = ()
+
+    @property
+    def has_own_forces(self) -> bool:
+        """Whether the nominal model has forces that no matrix holds."""
+        return bool(self.frictions or self.springs)
 
     def at(self, values: NDArray[np.float64]) -> LinearStructure:
         """Return the matrices at parameter values (n_parameters,)."""
@@ -149,8 +135,8 @@ class Structure:
         linked = (np.abs(self.mass).sum(0) + np.abs(self.damping).sum(0) + np.abs(self.stiffness).sum(0)) > 0
         if self.fixed is not None:
             linked |= np.abs(self.fixed).sum(0) > 0
-        for friction in self.frictions:
-            linked |= np.outer(friction.row, friction.row) != 0
+        for force in (*self.frictions, *self.springs):
+            linked |= np.outer(force.row, force.row) != 0
         linked |= np.eye(len(self.dofs), dtype=bool)
         for _ in self.dofs:
             linked = (linked.astype(int) @ linked.astype(int)) > 0
@@ -168,10 +154,10 @@ class Structure:
             for i in range(len(self.parameters))
             if any(np.abs(stack[i][block]).sum() > 0 for stack in (self.mass, self.damping, self.stiffness))
         ]
-        frictions = tuple(
-            NominalFriction(f.row[keep], f.parameter, f.value) for f in self.frictions if np.any(f.row[keep])
-        )
-        active = sorted({*active, *(self.parameters.index(f.parameter) for f in frictions if f.parameter)})
+        active += [
+            self.parameters.index(f.parameter) for f in self.frictions if f.parameter and np.any(f.row[keep])
+        ]
+        active = sorted(set(active))
         loads = [i for i in range(len(self.loads)) if np.abs(self.inputs[keep, i]).sum() > 0]
         return Structure(
             tuple(self.dofs[i] for i in keep),
@@ -192,27 +178,9 @@ class Structure:
                 if np.abs(p.rows[:, keep]).sum() == np.abs(p.rows).sum()
             ),
             None if self.fixed is None else self.fixed[np.ix_(range(3), keep, keep)],
-            frictions,
+            tuple(f.restricted(keep) for f in self.frictions if np.any(f.row[keep])),
+            tuple(s.restricted(keep, active) for s in self.springs if np.any(s.row[keep])),
         )
-
-
-def with_frictions(elements: Elements, structure: Structure, values: NDArray[np.float64]) -> Elements:
-    """Return elements preceded by the nominal model's own dry friction, at parameter values (n_parameters,)."""
-    own = structure.frictions
-    if not own:
-        return elements
-    count = len(own)
-    theta = np.array([friction.level(structure, values) for friction in own])
-    table = elements.table.copy()
-    table[:, ROW] += count
-    table[:, THETA] += count
-    mine = [[0, 0, coulomb_limit.address, 1, i, i, 0, 0] for i in range(count)]
-    return Elements(
-        np.vstack([np.array(mine, dtype=np.int64), table]),
-        np.vstack([np.array([friction.row for friction in own]), elements.rows]),
-        np.concatenate([theta, elements.theta]),
-        elements.start,
-    )
 
 
 def structure_of(case: Case) -> Structure:

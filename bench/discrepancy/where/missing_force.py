@@ -26,8 +26,10 @@ import numba
 import numpy as np
 
 from bench.discrepancy.case import CaseRecord
+from bench.discrepancy.nominal_forces import own_force
 from bench.discrepancy.problem import COULOMB, Array, Problem
 from bench.discrepancy.structure import Place, Structure
+from bench.discrepancy.system import LinearStructure, Motion
 
 INTENSITIES = 10.0 ** np.arange(-3.0, 2.1, 0.5)
 """Multiples of a first guess of the walk's intensity that are compared by likelihood."""
@@ -217,9 +219,27 @@ class ForceObserver:
     def _noise(self) -> tuple[Array, Array]:
         channels = dict(zip(self.problem.structure.channels, self.problem.noise, strict=True))
         loads = dict(zip(self.problem.structure.loads, self.problem.load_noise, strict=True))
+        own = np.zeros(len(self.dofs) if self.structure.has_own_forces else 0)
         return (
             np.array([channels[name] for name in self.structure.channels]),
-            np.array([loads[name] for name in self.structure.loads]),
+            np.append([loads[name] for name in self.structure.loads], own),
+        )
+
+    def _loads(self, record: CaseRecord, values: Array, motion: Motion) -> Array:
+        """Loads (n, n_inputs) of a record, and what the nominal model's own friction and bending springs exert along a motion."""
+        loads = np.column_stack([record.values[name] for name in self.structure.loads])
+        return (
+            np.hstack([loads, -own_force(self.structure, values, motion)])
+            if self.structure.has_own_forces
+            else loads
+        )
+
+    def _inputs(self, linear: LinearStructure) -> Array:
+        """How these act (n_dof, n_inputs)."""
+        return (
+            np.hstack([linear.inputs, np.eye(len(self.dofs))])
+            if self.structure.has_own_forces
+            else linear.inputs
         )
 
     def estimate(self, record: CaseRecord, values: Array, *, noise: int = 0) -> ForceEstimate:
@@ -233,11 +253,11 @@ class ForceObserver:
         if self.problem.driven:
             return self._driven(record, values, noise)
         own = list(self.dofs)
-        motion = self.problem.motion_of(record)
-        position, velocity = motion.position[:, own], motion.velocity[:, own]
+        motion = Motion(*(samples[:, own] for samples in self.problem.motion_of(record)))
+        position, velocity = motion.position, motion.velocity
         reach = np.maximum(np.std(position, axis=0), 1e-12)
         model = self._model(values, record.step, reach)
-        loads = np.column_stack([record.values[name] for name in self.structure.loads])
+        loads = self._loads(record, values, motion)
         samples = np.column_stack([record.values[name] for name in self.structure.channels])
         start = np.concatenate([position[0], velocity[0], np.zeros(len(self.places))]) / model.scale
         if record.name not in self._intensity:
@@ -258,13 +278,14 @@ class ForceObserver:
     def _guess(self, loads: Array, position: Array, velocity: Array) -> Array:
         rows = np.vstack([p.rows for p in self.places])
         acting = np.abs(self.structure.inputs).sum(axis=0) > 0
-        level = float(np.sqrt(np.mean(loads[:, acting] ** 2))) if acting.any() else 1.0
+        level = float(np.sqrt(np.mean(loads[:, : len(acting)][:, acting] ** 2))) if acting.any() else 1.0
         rate = np.std(velocity @ rows.T, axis=0) / np.maximum(np.std(position @ rows.T, axis=0), 1e-300)
         return (level or 1.0) * np.sqrt(np.maximum(rate, 1e-3))
 
     def _model(self, values: Array, step: float, reach: Array) -> _Model:
         linear = self.structure.at(values)
-        n, p, u = len(linear.mass), len(self.places), linear.inputs.shape[1]
+        inputs = self._inputs(linear)
+        n, p, u = len(linear.mass), len(self.places), inputs.shape[1]
         inverse = np.linalg.inv(linear.mass)
         rows = np.vstack([place.rows for place in self.places])
         spread = inverse @ rows.T
@@ -276,7 +297,7 @@ class ForceObserver:
         rate[n : 2 * n] = acceleration
         rate[2 * n :, 2 * n :] = -FORGETTING * stiffest * np.eye(p)
         drive = np.zeros((d, u))
-        drive[n : 2 * n] = inverse @ linear.inputs
+        drive[n : 2 * n] = inverse @ inputs
         # In steps as the unit of time the states are alike in size; the Riccati equation is hopeless in SI units.
         apparent = np.abs(spread).max(axis=0)
         scale = np.concatenate([reach, reach / step, reach.max() / step**2 / apparent])
@@ -287,7 +308,7 @@ class ForceObserver:
             row = np.zeros(d)
             direct = np.zeros(u)
             if observer.order == 2:
-                row, direct = observer.row @ acceleration, observer.row @ inverse @ linear.inputs
+                row, direct = observer.row @ acceleration, observer.row @ inverse @ inputs
             else:
                 row[observer.order * n : (observer.order + 1) * n] = observer.row
             observe.append(row)
