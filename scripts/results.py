@@ -157,6 +157,17 @@ def _localisation(told: Any) -> Figures:
     return [(what, f"{value:.3f}", limit) for what, value, limit in figures]
 
 
+def _pendulum(told: Any) -> Figures:
+    return [
+        ("cases, peak swing", f"{told['n']}, {told['degrees']:.0f} degrees", ""),
+        ("missing forces named exactly", f"{100.0 * told['exact']:.1f} %", "≥ 95 %"),
+        ("clean cases: false alarms", f"{100.0 * told['false_alarms']:.1f} %", "≤ 5 %"),
+        ("gap before, median NRMSE", f"{told['before']:.3g}", ""),
+        ("gap after over noise floor, median", f"{told['ratio']:.3g}", "≤ 1.1"),
+        ("seconds a case, median", f"{told['seconds']:.3g}", "≤ 20 s"),
+    ]
+
+
 def _sealed(told: Any) -> Figures:
     def share(key: str) -> str:
         return "–" if told[key] is None else f"{100.0 * told[key]:.1f} %"
@@ -256,6 +267,12 @@ CAPABILITIES: Sequence[Capability] = (
         "Where the missing force lies",
         ("python", "scripts/localisation.py", "--json"),
         _localisation,
+    ),
+    Capability(
+        "pendulum",
+        "Diagnosis of a pendulum that swings far, gravity read off its MJCF",
+        ("python", "scripts/pendulum.py", "--json"),
+        _pendulum,
     ),
     Capability(
         "measured",

@@ -7,16 +7,14 @@ import json
 import mujoco
 import numpy as np
 import pytest
-from scipy import ndimage
 from test_discrepancy_input import PARAMETERS, model, write
 
 from bench.discrepancy import diagnose, read_case
 from bench.discrepancy.catalogue import effect_named
 from bench.discrepancy.driving import with_load_noise
-from bench.discrepancy.prepared import fast_length
+from bench.discrepancy.prepared import whitened
 from bench.discrepancy.problem import Problem
 from bench.discrepancy.quality import notes
-from bench.discrepancy.residual_noise import SMOOTHED_BINS
 from bench.discrepancy.structure import structure_of
 from bench.discrepancy.system import Elements
 from bench.discrepancy.where.missing_force import observers
@@ -222,22 +220,21 @@ def test_the_map_of_a_missing_force_leaves_out_the_friction_that_the_model_has(t
     assert np.std(found.force - 2000.0 * beyond) < 0.1
 
 
-def test_noise_of_the_load_passes_the_stiffness_of_the_moment(tmp_path):
-    case = record(tmp_path, mjcf(arm(more='frictionloss="0"')), 0.25)
+def test_noise_of_the_load_is_white_where_a_change_of_stiffness_shows(tmp_path):
+    case = record(tmp_path, mjcf(arm()), 0.25)
     problem = Problem(case, structure_of(case), case.identification)
-    (own,), model, rng = case.identification, ((), np.zeros(2)), np.random.default_rng(2)
-    clean = problem.simulate(*model, own)
-    total = 0.0
-    for _ in range(40):
-        noisy = problem.forgetful().simulate(*model, with_load_noise(problem, own, rng))
-        total = total + np.abs(np.fft.rfft((noisy - clean)[:, 0], fast_length(len(own)))) ** 2 / len(own) / 40
-    drawn = ndimage.uniform_filter1d(total, SMOOTHED_BINS)
-    whitening = problem.data[0].whitening[:, 0, 0]
-    told = np.abs(whitening) ** -2.0 - problem.noise[0] ** 2
-    band = slice(5, 18)  # 0.6 to 2.1 Hz, about the resonance at 1.4 Hz
-    # eight draws smoothed over nine bins against forty, of a power that varies a thousandfold over the band
-    np.testing.assert_allclose(told[band], drawn[band], rtol=0.6)
-    omega = 2.0 * np.pi * np.arange(18) * RATE / fast_length(len(own))
-    at_rest = problem.structure.at(problem.nominal)
-    linear = np.abs(problem.structure.transfer(at_rest, omega)[band, 0, 0] * problem.load_noise[0]) ** 2
-    assert np.min(linear / drawn[band]) < 0.1  # by the stiffness at rest most of it would be missed
+    (data,), model, rng = problem.data, ((), np.zeros(2)), np.random.default_rng(2)
+    clean = problem.simulate(*model, data.record)
+    changed = problem.simulate((), np.array([0.02, 0.0]), data.record) - clean
+    spread = {}
+    for name, told in {"together": data, "alone": data._replace(together=None)}.items():
+        direction = whitened(changed, told)
+        direction /= np.linalg.norm(direction)
+        found = []
+        for _ in range(80):
+            noisy = problem.forgetful().simulate(*model, with_load_noise(problem, data.record, rng))
+            own = problem.noise * rng.standard_normal(clean.shape)
+            found.append(float(direction @ whitened(noisy - clean + own, told)))
+        spread[name] = float(np.std(found))
+    assert spread["together"] == pytest.approx(1.0, abs=0.25)  # of 80 draws it is known to 8 %
+    assert spread["alone"] > 2.0

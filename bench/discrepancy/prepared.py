@@ -34,6 +34,7 @@ class RecordData(NamedTuple):
         whitening: (n_bins, n_channels, n_channels) complex; whitening times the spectrum of the noise is white.
         windows: Windows that restart from the measured state; None where the whole record is one free run.
         compared: (n,) ones and zeros: samples that are compared; None for all.
+        together: (k, k) what whitens the lower bins together, see `swinging_noise`; None where every bin stands alone.
     """
 
     record: CaseRecord
@@ -43,6 +44,7 @@ class RecordData(NamedTuple):
     whitening: NDArray[np.complex128]
     windows: Windows | None = None
     compared: Array | None = None
+    together: Array | None = None
 
 
 def fast_length(n: int) -> int:
@@ -155,4 +157,8 @@ def whitened_spectrum(residual: Array, data: RecordData) -> Array:
     )
     white = whiten(spectrum, data.whitening)
     white[:, 0] /= np.sqrt(2.0)
+    if data.together is not None:
+        count = len(data.together) // (2 * spectrum.shape[1])
+        lower = np.concatenate([spectrum[:count].real.ravel(), spectrum[:count].imag.ravel()])
+        white[:, :count] = (data.together @ lower).reshape(2, count, -1)
     return white.ravel()

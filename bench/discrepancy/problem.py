@@ -26,7 +26,7 @@ from bench.discrepancy.placed import Hypothesis, Placed
 from bench.discrepancy.prepared import RecordData, band_bins, noise_floor, projected, timed
 from bench.discrepancy.prescribed_motion import Prescribed, decided, prescribed_motion
 from bench.discrepancy.quantisation import raised_noise
-from bench.discrepancy.residual_noise import whitening_behind
+from bench.discrepancy.residual_noise import sensor_gains, whitening_behind
 from bench.discrepancy.starts import (
     cut,
     drifts,
@@ -40,6 +40,7 @@ from bench.discrepancy.starts import (
     without_starts,
 )
 from bench.discrepancy.structure import Place, Structure
+from bench.discrepancy.swinging_noise import whitening_together
 from bench.discrepancy.system import Elements, Motion
 from bench.discrepancy.threads import in_threads
 
@@ -130,7 +131,11 @@ class Problem:
         windows = windows_of(self, record, n_bins, self.split(*passed)[0])
         compared = decided(self.prescribed(record)) if self.driven else None
         whitening = whitening_behind(self, record, n_bins, passed, compared)
-        return RecordData(record, loads, responses, n_bins, whitening, windows, compared)
+        together = None
+        if self.structure.springs and not self.windowed:
+            gains = sensor_gains(self, record, passed)
+            together = whitening_together(self, record, n_bins, self.split(*passed)[0], gains)
+        return RecordData(record, loads, responses, n_bins, whitening, windows, compared, together)
 
     def behind(self, hypothesis: Hypothesis, vector: Array) -> Problem:
         """The same records, their noise as an explanation passes it on."""
