@@ -116,6 +116,8 @@ def test_stiffness_and_its_change_with_the_mass_are_those_of_the_weight(tmp_path
     structure = structure_of(case)
     assert structure.at(np.array([0.5, 0.01])).stiffness[0, 0] == pytest.approx(WEIGHT, rel=1e-6)
     assert structure.at(np.array([0.6, 0.01])).stiffness[0, 0] == pytest.approx(1.2 * WEIGHT, rel=1e-6)
+    (place,) = structure.places
+    assert (place.mass, place.stiffness) == (("mass:arm",), "")  # the weight is no spring of the model
     (spring,) = structure.springs
     angles = np.linspace(-3.0, 3.0, 50)
     for mass in (0.5, 0.6):

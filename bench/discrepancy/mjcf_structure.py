@@ -77,6 +77,8 @@ def mjcf_structure(case: Case) -> Structure:
     )
     stacks, fixed = _stacks(case, structural, linear, rig)
     names = tuple(p.name for p in case.parameters)
+    # before gravity makes a stiffness of a mass: what is called the stiffness of a place is a spring of the model
+    places = _places(case, rig, linear, names, stacks)
     springs: tuple[NominalSpring, ...] = ()
     if bent:
         springs, tangents, changes = gravity_springs(rig, linear, structural)
@@ -85,7 +87,7 @@ def mjcf_structure(case: Case) -> Structure:
     structure = Structure(
         tuple(rig.model.joint(int(rig.model.dof_jntid[dof])).name for dof in linear.dofs),
         names, *stacks, inputs, tuple(channel.name for channel, _ in loads), observers,
-        _places(case, rig, linear, names, stacks), fixed, _frictions(own, linear, names), springs,
+        places, fixed, _frictions(own, linear, names), springs,
     )  # fmt: skip
     check_reach(case, structure, own, {channel.name: actuator for channel, actuator in loads}, linear.dofs)
     return structure

@@ -27,9 +27,9 @@ if TYPE_CHECKING:
     from bench.discrepancy.problem import Problem
 
 Array = NDArray[np.float64]
+ACCELERATION = 2
 MOST_BINS = 400
 """Bins that are whitened together, at most; above the resonances inertia alone decides, and that does not change."""
-ACCELERATION = 2
 ABOVE = 12.0
 """Times the highest natural frequency at rest up to which they go: noise of a resonance that swings reaches far beyond it."""
 BLOCK = 1000
