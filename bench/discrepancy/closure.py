@@ -13,11 +13,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
+import numba
 import numpy as np
 
 from bench.discrepancy.effect import Effect, FreeParameter, Scales, Values
+from bench.discrepancy.spline import cubic, piece, weights
 from bench.laws.base import ForceLaw, Parameter, kernel
+
+_inline: Any = numba.njit(error_model="numpy", nogil=True, forceinline=True)
 
 POWERS = ((0, 0), (2, 0), (1, 1), (0, 2), (3, 0), (2, 1), (1, 2), (0, 3), (5, 0), (4, 1), (0, 5))
 """Powers of displacement and velocity of the surface; (1, 0) and (0, 1) are the nominal stiffness and damping."""
@@ -70,23 +75,19 @@ _SURFACE = ForceLaw(
 )
 
 
+@_inline
+def _warped(x, pieces):
+    """Place on a spline whose pieces are shorter about rest, counted from 0 to `pieces`."""
+    a = abs(x) * WARPED
+    # asinh, which the C library takes twice as long over
+    return 0.5 * pieces * (1.0 + math.copysign(math.log(a + math.sqrt(1.0 + a * a)), x) / WARP)
+
+
 @kernel
 def curve_force(t, q, v, z, theta, f):
     """A force of one variable from -1 to 1: a cubic spline of `SPANS` pieces, shorter about rest, by its B-spline coefficients."""
     x = min(max(q[0] * theta[0] + v[0] * theta[1], -1.0), 1.0)
-    # asinh, which the C library takes twice as long over
-    a = abs(x) * WARPED
-    u = 0.5 * SPANS * (1.0 + math.copysign(math.log(a + math.sqrt(1.0 + a * a)), x) / WARP)
-    k = min(max(int(u), 0), SPANS - 1)
-    s = u - k
-    r = 1.0 - s
-    first, last = r * r * r, s * s * s
-    f[0] += (
-        first * theta[2 + k]
-        + (3.0 * last - 6.0 * s * s + 4.0) * theta[3 + k]
-        + (3.0 * first - 6.0 * r * r + 4.0) * theta[4 + k]
-        + last * theta[5 + k]
-    ) / 6.0
+    f[0] += cubic(theta, 2, SPANS, _warped(x, SPANS))
 
 
 _CURVE = ForceLaw(
@@ -120,18 +121,9 @@ def patch_force(t, q, v, z, theta, f):
     """A force of displacement and velocity: bicubic spline of `PATCHES` by its B-spline coefficients, the velocity's shorter about rest."""
     u = 0.5 * PATCHES[0] * (1.0 + min(max(q[0] * theta[0], -1.0), 1.0))
     y = min(max(v[0] * theta[1], -1.0), 1.0)
-    warped = abs(y) * WARPED
-    w = (
-        0.5
-        * PATCHES[1]
-        * (1.0 + math.copysign(math.log(warped + math.sqrt(1.0 + warped * warped)), y) / WARP)
-    )
-    i = min(max(int(u), 0), PATCHES[0] - 1)
-    j = min(max(int(w), 0), PATCHES[1] - 1)
-    s, x = w - j, u - i
-    r, y = 1.0 - s, 1.0 - x
-    across = (r * r * r, 3.0 * s * s * s - 6.0 * s * s + 4.0, 3.0 * r * r * r - 6.0 * r * r + 4.0, s * s * s)
-    along = (y * y * y, 3.0 * x * x * x - 6.0 * x * x + 4.0, 3.0 * y * y * y - 6.0 * y * y + 4.0, x * x * x)
+    w = _warped(y, PATCHES[1])
+    i, j = piece(u, PATCHES[0]), piece(w, PATCHES[1])
+    along, across = weights(u - i), weights(w - j)
     for a in range(4):
         k = 2 + (i + a) * (PATCHES[1] + 3) + j
         row = (

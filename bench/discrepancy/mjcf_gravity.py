@@ -14,7 +14,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.discrepancy.nominal_forces import PIECES, NominalSpring, spline_through
+from bench.discrepancy.nominal_forces import PIECES, NominalSpring
+from bench.discrepancy.spline import spline_through
 from bench.errors import ModelError
 from bench.identification.linear_rig import LinearRig, current
 from bench.identification.parameter_address import address
@@ -95,7 +96,7 @@ def gravity_springs(
         bent = np.column_stack([own - table @ values, table])[:-2]
         # springs bear what gravity pulls at rest
         bent -= bent[2 * PIECES] + np.outer(REACH * x, np.append(tangents[i], changes[:, i]))
-        coefficients = spline_through(x, bent)
+        coefficients = spline_through(x, bent, PIECES)
         row = np.eye(len(dofs))[i]
         springs.append(NominalSpring(row, REACH, coefficients[:, 0], coefficients[:, 1:].T.copy()))
     return tuple(springs), tangents, changes

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import BSpline
 
 from bench.discrepancy.friction_limits import coulomb_limit
+from bench.discrepancy.spline import cubic, spline_of
 from bench.discrepancy.system import ROW, THETA, Elements, Motion
 from bench.laws.base import kernel
 
@@ -70,13 +70,14 @@ class NominalSpring:
 
     def along(self, coefficients: Array, position: Array) -> Array:
         """Force (n,) of a spline of such coefficients at positions (n, n_dof)."""
-        return spline_at(coefficients, np.asarray(position @ self.row / self.reach, dtype=np.float64))
+        x = np.asarray(position @ self.row / self.reach, dtype=np.float64)
+        return np.asarray(spline_of(coefficients)(np.clip(x, -1.0, 1.0)), dtype=np.float64)
 
     def slope_along(self, coefficients: Array, position: Array) -> Array:
         """Stiffness (n,) of a spline of such coefficients at positions (n, n_dof); none beyond its reach."""
         x = np.asarray(position @ self.row / self.reach, dtype=np.float64)
         inside = np.abs(x) <= 1.0
-        slope = BSpline(_knots(), coefficients, 3).derivative()
+        slope = spline_of(coefficients).derivative()
         return np.asarray(
             np.where(inside, slope(np.where(inside, x, 0.0)), 0.0) / self.reach, dtype=np.float64
         )
@@ -90,33 +91,8 @@ class NominalSpring:
 @kernel
 def spline_force(t, q, v, z, theta, f):
     """A cubic spline over the displacement: its reach, then B-spline coefficients of `PIECES` equal pieces."""
-    u = 0.5 * PIECES * (1.0 + min(max(q[0] / theta[0], -1.0), 1.0))
-    k = min(max(int(u), 0), PIECES - 1)
-    s = u - k
-    r = 1.0 - s
-    first, last = r * r * r, s * s * s
-    f[0] += (
-        first * theta[1 + k]
-        + (3.0 * last - 6.0 * s * s + 4.0) * theta[2 + k]
-        + (3.0 * first - 6.0 * r * r + 4.0) * theta[3 + k]
-        + last * theta[4 + k]
-    ) / 6.0
-
-
-def _knots() -> Array:
-    return np.asarray(-1.0 + 2.0 / PIECES * np.arange(-3, PIECES + 4), dtype=np.float64)
-
-
-def spline_at(coefficients: Array, x: Array) -> Array:
-    """The spline of `spline_force` at displacements (n,) over its reach."""
-    spline = BSpline(_knots(), coefficients, 3)
-    return np.asarray(spline(np.clip(x, -1.0, 1.0)), dtype=np.float64)
-
-
-def spline_through(x: Array, y: Array) -> Array:
-    """Coefficients (PIECES + 3, …) of the spline nearest to values (n, …) at displacements (n,) over their reach."""
-    design = np.asarray(BSpline.design_matrix(x, _knots(), 3).toarray(), dtype=np.float64)
-    return np.asarray(np.linalg.lstsq(design, y, rcond=None)[0], dtype=np.float64)
+    x = min(max(q[0] / theta[0], -1.0), 1.0)
+    f[0] += cubic(theta, 1, PIECES, 0.5 * PIECES * (1.0 + x))
 
 
 def with_own_forces(elements: Elements, structure: Structure, values: Array) -> Elements:

@@ -39,13 +39,12 @@ from bench.discrepancy.starts import (
     with_starts,
     without_starts,
 )
-from bench.discrepancy.structure import Place, Structure
+from bench.discrepancy.structure import ACCELERATION, Place, Structure
 from bench.discrepancy.swinging_noise import whitening_together
 from bench.discrepancy.system import Elements, Motion
 from bench.discrepancy.threads import in_threads
 
 Array = NDArray[np.float64]
-ACCELERATION = 2
 MOTION_DRAWS = 8
 """Draws of the noise of a prescribed motion."""
 COULOMB = "coulomb"

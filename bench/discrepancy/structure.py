@@ -19,6 +19,9 @@ from bench.discrepancy.nominal_forces import NominalFriction, NominalSpring
 from bench.discrepancy.system import LinearStructure
 from bench.errors import FileFormatError
 
+ACCELERATION = 2
+"""Order of an observer that reads accelerations."""
+
 
 @dataclass(frozen=True)
 class Observer:

@@ -22,12 +22,12 @@ from scipy.linalg import cholesky, solve_triangular
 
 from bench.discrepancy.case import CaseRecord
 from bench.discrepancy.prepared import fast_length
+from bench.discrepancy.structure import ACCELERATION
 
 if TYPE_CHECKING:
     from bench.discrepancy.problem import Problem
 
 Array = NDArray[np.float64]
-ACCELERATION = 2
 MOST_BINS = 400
 """Bins that are whitened together, at most; above the resonances inertia alone decides, and that does not change."""
 ABOVE = 12.0
