@@ -2,7 +2,7 @@
 
 An effect at a joint or a drive sets entries of the parameter vector of that joint's runs (`joint_run.Slot`); one of a body changes the
 torque of the inverse dynamics of all joints; one of an encoder corrects the log. Parameters are of order one, as in the catalogue of
-linear structures (`bench.discrepancy.effect`), with the scales of the joint's own records.
+linear structures (`bench.discrepancy.effects.effect`), with the scales of the joint's own records.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from bench.discrepancy.articulated.joint_run import Slot
 from bench.discrepancy.articulated.records import Encoder
-from bench.discrepancy.effect import FreeParameter, log_grid
+from bench.discrepancy.effects.effect import FreeParameter, log_grid
 from bench.errors import UnknownNameError
 
 Array = NDArray[np.float64]

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.discrepancy.articulated.problem import ArticulatedProblem, Hypothesis, misfit_of
-from bench.discrepancy.minimise import Prior, minimise
-from bench.discrepancy.threads import in_threads
+from bench.discrepancy.numerics.least_squares import Prior, minimise
+from bench.discrepancy.numerics.threads import in_threads
 
 Array = NDArray[np.float64]
 REACH = 4.0

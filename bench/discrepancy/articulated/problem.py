@@ -22,7 +22,7 @@ from bench.discrepancy.articulated.effects import ArticulatedEffect, JointScales
 from bench.discrepancy.articulated.joint_run import SLOTS, Slot, predict
 from bench.discrepancy.articulated.model import ArticulatedModel, Joint
 from bench.discrepancy.articulated.records import Encoder, JointRecord, PreparedRecord, corrected, prepare, relinked
-from bench.discrepancy.case import Case, CaseRecord
+from bench.discrepancy.case.case import Case, CaseRecord
 from bench.errors import UnknownNameError
 
 Array = NDArray[np.float64]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from bench.discrepancy.articulated.fitting import ArticulatedFit, Others, fit, linearised
 from bench.discrepancy.articulated.problem import ArticulatedProblem, Hypothesis, Placed, misfit_of
-from bench.discrepancy.threads import in_threads
+from bench.discrepancy.numerics.threads import in_threads
 
 Array = NDArray[np.float64]
 UNSCALED = ("actuator_saturation", "backlash", "joint_compliance", "one_sided_stop")
