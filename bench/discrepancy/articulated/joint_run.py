@@ -98,21 +98,21 @@ def _beyond(x, width):
 
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
-def run(p, mass, bias, slope, reference, load, extra, u, step, n_sub, y, v_measured, gain, start, out, states):  # noqa: PLR0912, PLR0915
+def run(p, mass, bias, slope, reference, load, u, step, n_sub, y, v_measured, gain, starts, every, out, states):  # noqa: PLR0912, PLR0915
     """Predict the encoder of one joint sample by sample.
 
     Args:
         p: (SLOTS,) parameters, see `Slot`.
         mass, bias, slope, reference: (n_steps,) coefficients of the equation at the middle of every step.
         load: (n_steps,) torque that the gear carries (magnitude), for friction that grows with it.
-        extra: (n_steps,) further torque on the joint.
         u: (n_steps,) input.
         step: Length of a step [s].
         n_sub: Steps a sample.
         y: (n,) measured positions.
         v_measured: (n,) measured velocities, or (0,).
         gain: (2, 2) of the innovations of position and velocity into position and velocity.
-        start: (2,) position and velocity at the first sample.
+        starts: (n_windows, 2) position and velocity at the first sample of every window.
+        every: Samples a window; at its end the state is set anew.
         out: (n, 2) innovations; overwritten.
         states: (n, 4) predicted position and velocity on the encoder's side, then of the link where there is a train; overwritten.
     """
@@ -121,15 +121,8 @@ def run(p, mass, bias, slope, reference, load, extra, u, step, n_sub, y, v_measu
     servo = p[1] > 0.5
     train = p[29] > 0.5
     encoder_on_link = p[34] > 0.5
-    q, v = start[0], start[1]  # motor, and everything where there is no train
-    ql, vl = q, v
-    if train:  # at rest the train is wound up by what the link weighs
-        weight = bias[0] + p[7] * (q - p[8])
-        wound = weight / p[30] + math.copysign(p[32], weight)
-        if encoder_on_link:
-            q += wound
-        else:
-            ql -= wound
+    q, v = 0.0, 0.0  # motor, and everything where there is no train
+    ql, vl = 0.0, 0.0
     z = 0.0
     shift = p[28] / step
     lagged = 0.0
@@ -138,6 +131,16 @@ def run(p, mass, bias, slope, reference, load, extra, u, step, n_sub, y, v_measu
     first = True
     bristles = p[16] > 0.0
     for i in range(n):
+        if i % every == 0:
+            q, v = starts[i // every, 0], starts[i // every, 1]
+            ql, vl = q, v
+            if train:  # the train is wound up by what the link weighs
+                weight = bias[min(i * n_sub, bias.shape[0] - 1)] + p[7] * (q - p[8])
+                wound = weight / p[30] + math.copysign(p[32], weight)
+                if encoder_on_link:
+                    q += wound
+                else:
+                    ql -= wound
         at_q, at_v = (ql, vl) if (train and encoder_on_link) else (q, v)
         states[i, 0], states[i, 1] = at_q, at_v
         states[i, 2], states[i, 3] = ql, vl
@@ -189,7 +192,7 @@ def run(p, mass, bias, slope, reference, load, extra, u, step, n_sub, y, v_measu
                 x, w = ql, vl
             else:
                 x, w = q, v
-            rest = -bias[k] - slope[k] * (x - reference[k]) + p[15] + extra[k]
+            rest = -bias[k] - slope[k] * (x - reference[k]) + p[15]
             rest -= p[7] * (x - p[8])
             own = 0.0  # on the motor's side
             if p[19] != 0.0:
@@ -274,21 +277,23 @@ def predict(
     n_sub: int,
     measured: tuple[NDArray[np.float64], NDArray[np.float64]],
     gain: NDArray[np.float64],
-    start: NDArray[np.float64],
+    starts: NDArray[np.float64],
+    every: int | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Run `run`; return innovations (n, 2) and states (n, 4). NaN where it diverged.
 
     Args:
         p: (SLOTS,).
-        arrays: mass, bias, slope, reference, load, extra, each (n_steps,).
+        arrays: mass, bias, slope, reference, load, each (n_steps,).
         u: (n_steps,) input.
         step: Length of a step [s].
         n_sub: Steps a sample.
         measured: Positions (n,) and velocities (n,) or (0,).
         gain: (2, 2).
-        start: (2,).
+        starts: (n_windows, 2) states at the beginning of every window.
+        every: Samples a window; one window where None.
     """
-    out = np.zeros((len(measured[0]), 2))
-    states = np.zeros((len(out), 4))
-    run(p, *arrays, u, step, n_sub, *measured, gain, start, out, states)
+    n = len(measured[0])
+    out, states = np.zeros((n, 2)), np.zeros((n, 4))
+    run(p, *arrays, u, step, n_sub, *measured, gain, np.atleast_2d(starts), every or n, out, states)
     return out, states

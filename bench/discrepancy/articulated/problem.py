@@ -191,14 +191,34 @@ class ArticulatedProblem:
     ) -> tuple[Array, Array]:
         """Innovations (n, n_measured) and states (n, 4), see `joint_run.run`, of joint `j` in a record; NaN where it diverged."""
         record = prepared.joints[j]
+        out, states = self._run(j, hypothesis, vector, record, record.gain, record.start, None)
+        return out[:, : record.n_measured], states
+
+    def free_run(self, j: int, hypothesis: Hypothesis, vector: Array, prepared: PreparedRecord) -> Array:
+        """Measured less predicted positions (n,) of joint `j`, run without corrections from the measured states of its windows."""
+        record, motion = prepared.joints[j], prepared.motion
+        every = record.window or len(record.position)
+        starts = np.column_stack([motion.position[::every, j], motion.velocity[::every, j]])
+        out, _ = self._run(j, hypothesis, vector, record, np.zeros((2, 2)), starts, every)
+        return out[:, 0]
+
+    def _run(
+        self,
+        j: int,
+        hypothesis: Hypothesis,
+        vector: Array,
+        record: JointRecord,
+        gain: Array,
+        starts: Array,
+        every: int | None,
+    ) -> tuple[Array, Array]:
         bias, inertia = self._coefficients(record, hypothesis, vector)
         p = self.slots(j, hypothesis, vector, on_link=record.on_link)
         p[Slot.RATIO] = 1.0 + record.encoder.gain
-        arrays = (inertia, bias, record.slope, record.reference, record.load, np.zeros_like(bias))
-        out, states = predict(
-            p, arrays, record.servo_command, record.step, record.n_sub, (record.position, record.velocity), record.gain, record.start
-        )
-        return out[:, : record.n_measured], states
+        return predict(
+            p, (inertia, bias, record.slope, record.reference, record.load), record.servo_command, record.step,
+            record.n_sub, (record.position, record.velocity), gain, starts, every,
+        )  # fmt: skip
 
     def _coefficients(self, record: JointRecord, hypothesis: Hypothesis, vector: Array) -> tuple[Array, Array]:
         bias, inertia = record.bias, record.inertia

@@ -131,25 +131,55 @@ class JointRecord:
         """Number of measured channels of the joint."""
         return len(self.noise)
 
-    def _filter(self) -> tuple[Array, Array]:
-        """Stationary gain, and the whitening of the innovations."""
+    @property
+    def window(self) -> int:
+        """Samples that a free run goes without drifting off; zero where a servo holds it, so that it goes for the whole record."""
+        drive = self.joint.drive
+        return 0 if drive is not None and drive.servo else max(2, round(WINDOW / self.sample))
+
+    def _system(self) -> tuple[Array, Array, Array, Array]:
+        """Transition, process noise, observation and noise of the joint about its mean inertia, sample by sample."""
         drive, m = self.joint.drive, float(np.mean(self.inertia))
-        servo = drive is not None and drive.servo
-        stiffness = drive.gear * drive.kp + float(np.mean(self.slope)) if servo else 0.0  # type: ignore[union-attr]
-        damping = self.joint.damping + (drive.gear * drive.kv if servo else 0.0)  # type: ignore[union-attr]
+        assert drive is not None
+        stiffness = drive.gear * drive.kp + float(np.mean(self.slope)) if drive.servo else 0.0
+        damping = self.joint.damping + (drive.gear * drive.kv if drive.servo else 0.0)
         transition = expm(np.array([[0.0, 1.0], [-stiffness / m, -damping / m]]) * self.sample)
         push = np.array([0.5 * self.sample**2, self.sample]) / m
         process = np.outer(push, push) * self.process**2
-        observed = np.eye(2)[: self.n_measured]
-        noise = np.diag(self.noise**2)
+        return transition, process, np.eye(2)[: self.n_measured], np.diag(self.noise**2)
+
+    def _covariance(self) -> Array:
+        """Stationary covariance (2, 2) of the predicted state."""
+        transition, process, observed, noise = self._system()
         try:
-            covariance = solve_discrete_are(transition.T, observed.T, process, noise)
+            return np.asarray(solve_discrete_are(transition.T, observed.T, process, noise))
         except (np.linalg.LinAlgError, ValueError):
-            covariance = np.zeros((2, 2))
+            return np.zeros((2, 2))
+
+    def _filter(self) -> tuple[Array, Array]:
+        """Stationary gain, and the whitening of the innovations."""
+        _, _, observed, noise = self._system()
+        covariance = self._covariance()
         innovation = observed @ covariance @ observed.T + noise
         gain = np.zeros((2, 2))
         gain[:, : self.n_measured] = covariance @ observed.T @ np.linalg.inv(innovation)
         return gain, np.linalg.inv(np.linalg.cholesky(innovation))
+
+    def free_run_noise(self) -> float:
+        """RMS error of the position that noise alone leaves in a free run in windows."""
+        transition, process, observed, noise = self._system()
+        covariance = self._covariance()
+        gain = covariance @ observed.T @ np.linalg.inv(observed @ covariance @ observed.T + noise)
+        state = covariance - gain @ observed @ covariance
+        total, count = 0.0, self.window or len(self.position)
+        for _ in range(count):
+            total += state[0, 0] + noise[0, 0]
+            state = transition @ state @ transition.T + process
+        return float(np.sqrt(total / count))
+
+
+WINDOW = 0.5
+"""Length of a free run of a joint that no servo holds [s]: some time constants of what drives it, and far less than it takes to drift off."""
 
 
 class Encoders(NamedTuple):
