@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal
 
 from bench.files import json_values
@@ -203,6 +203,10 @@ class Verdict:
     complete: bool = False
     remainder: dict[str, Any] = field(default_factory=dict)
     nominal: tuple[NominalEstimate, ...] = ()
+
+    def timed(self, seconds: float) -> Verdict:
+        """The verdict with its wall time [s]."""
+        return replace(self, seconds=seconds)
 
     def to_json(self) -> dict[str, Any]:
         """Return the verdict as JSON values; numbers that are not finite become None."""

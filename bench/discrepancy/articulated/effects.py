@@ -89,6 +89,16 @@ class ArticulatedEffect:
         """Whether it is an elastic drive train between motor and link."""
         return self.slots is _train
 
+    def unit(self, parameter: FreeParameter, position: str) -> str:
+        """Unit of a parameter on a joint whose coordinate has the unit `position`."""
+        force, inertia = ("N m", "kg m^2") if position == "rad" else ("N", "kg")
+        return parameter.unit or {
+            "force": force, "peak": force, "input": force if self.servo is False else "input", "position": position,
+            "velocity": f"{position}/s", "inertia": inertia, "mass": "kg", "reach": "m", "1": "1",
+            "force/position": f"{force}/{position}", "force/velocity": f"{force} s/{position}",
+            "force/velocity/velocity": f"{force} s^2/{position}^2",
+        }[parameter.scale]  # fmt: skip
+
     def values(self, eta: Array, scales: JointScales) -> Values:
         """Physical values by name."""
         return {p.name: p.value(float(e), scales) for p, e in zip(self.parameters, eta, strict=True)}

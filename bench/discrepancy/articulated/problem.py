@@ -183,7 +183,7 @@ class ArticulatedProblem:
             p[LOCAL_SLOTS[entry.kind]] += entry.std * vector[i]
         for placed, eta in zip(hypothesis, self.etas(hypothesis, vector), strict=True):
             if placed.effect.slots is not None and placed.joint == j:
-                placed.effect.slots(_placed_values(placed, eta), p)
+                placed.effect.slots(placed_values(placed, eta), p)
         return p
 
     def innovations(
@@ -313,7 +313,8 @@ def base_slots(joint: Joint, on_link: bool) -> Array:
     return p
 
 
-def _placed_values(placed: Placed, eta: Array) -> Mapping[str, float]:
+def placed_values(placed: Placed, eta: Array) -> Mapping[str, float]:
+    """Physical values of an effect at its place; a stop's position is counted from the zero of the joint."""
     values = placed.effect.values(eta, placed.scales)
     if placed.effect.name == "one_sided_stop":
         values["position"] += placed.scales.middle
