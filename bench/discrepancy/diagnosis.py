@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis, applies, diagnose_articulated
 from bench.discrepancy.case.case import Case, read_case
 from bench.discrepancy.case.idle_loads import idle_notes, without_idle_noise
 from bench.discrepancy.case.schema import check_units
@@ -81,8 +82,8 @@ def diagnose(
     most: int = 3,
     rng: np.random.Generator | None = None,
     progress: Progress = lambda text: None,
-) -> Diagnosis:
-    """Diagnose a case.
+) -> Diagnosis | ArticulatedDiagnosis:
+    """Diagnose a case; one of an articulated MJCF by `diagnose_articulated`, with the catalogue of joints, drives and encoders.
 
     Args:
         case: Nominal model and records.
@@ -96,6 +97,9 @@ def diagnose(
         UnknownNameError: A name in `exclude` is not in the catalogue.
         RecordingError: The records cannot be used.
     """
+    if applies(case):
+        with threadpool_limits(1, user_api="blas"):
+            return diagnose_articulated(case, exclude=exclude, most=most, rng=rng, progress=progress)
     rng = np.random.default_rng(SEED) if rng is None else rng
     known = [effect.name for effect in catalogue]
     for name in exclude:
@@ -254,7 +258,7 @@ def _told(words: str, seen: Sequence[NamedEffect]) -> str:
     return words + told
 
 
-def diagnose_folder(folder: str | Path, **options) -> Diagnosis:
+def diagnose_folder(folder: str | Path, **options) -> Diagnosis | ArticulatedDiagnosis:
     """Diagnose the case in a folder; the options are those of `diagnose`."""
     return diagnose(read_case(folder), **options)
 
