@@ -157,6 +157,7 @@ def _cogging(values: Values, p: Array) -> None:
 
 
 LIMIT = FreeParameter("limit", "force", **POSITIVE)
+IN_LOOP = FreeParameter("in_loop", fixed=True, signed=True, grid=(0.0, 1.0), unit="1")
 RELATIVE = FreeParameter("relative_error", signed=True, mean=0.0, std=0.3, bounds=(-0.95, 20.0), unit="1")
 
 CATALOGUE: tuple[ArticulatedEffect, ...] = (
@@ -319,17 +320,17 @@ CATALOGUE: tuple[ArticulatedEffect, ...] = (
         "position_offset",
         "sensor",
         "sensor",
-        (FreeParameter("offset", "position", signed=True, mean=0.0, std=0.3, bounds=(-3.0, 3.0)),),
+        (FreeParameter("offset", "position", signed=True, mean=0.0, std=0.3, bounds=(-3.0, 3.0)), IN_LOOP),
         "logged = true + offset",
-        encoder=lambda v: Encoder(offset=v["offset"]),
+        encoder=lambda v: Encoder(offset=v["offset"], in_loop=v["in_loop"]),
     ),
     ArticulatedEffect(
         "position_gain_error",
         "sensor",
         "sensor",
-        (FreeParameter("relative_error", signed=True, mean=0.0, std=0.1, bounds=(-0.7, 2.0), unit="1"),),
+        (FreeParameter("relative_error", signed=True, mean=0.0, std=0.1, bounds=(-0.7, 2.0), unit="1"), IN_LOOP),
         "logged = (1 + e) true",
-        encoder=lambda v: Encoder(gain=v["relative_error"]),
+        encoder=lambda v: Encoder(gain=v["relative_error"], in_loop=v["in_loop"]),
     ),
     ArticulatedEffect(
         "velocity_gain_error",

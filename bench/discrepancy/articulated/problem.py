@@ -214,7 +214,7 @@ class ArticulatedProblem:
     ) -> tuple[Array, Array]:
         bias, inertia = self._coefficients(record, hypothesis, vector)
         p = self.slots(j, hypothesis, vector, on_link=record.on_link)
-        p[Slot.RATIO] = 1.0 + record.encoder.gain
+        p[Slot.RATIO] = record.servo_ratio
         return predict(
             p, (inertia, bias, record.slope, record.reference, record.load), record.servo_command, record.step,
             record.n_sub, (record.position, record.velocity), gain, starts, every,

@@ -36,12 +36,16 @@ SERVO_BAND = (0.2, 10.0)
 
 
 class Encoder(NamedTuple):
-    """What is wrong with the log of a joint: ``logged = (1 + gain) true(t - delay) + offset``, its velocity ``(1 + speed) true``."""
+    """What is wrong with the log of a joint: ``logged = (1 + gain) true(t - delay) + offset``, its velocity ``(1 + speed) true``.
+
+    A servo may act on the wrong reading (``in_loop`` of one), or have a right one of its own (zero).
+    """
 
     offset: float = 0.0
     gain: float = 0.0
     delay: float = 0.0
     speed: float = 0.0
+    in_loop: float = 0.0
 
     def corrected(self, samples: Array, orders: Sequence[int]) -> Array:
         """True samples (n, n_channels) behind logged ones of the given orders (0 position, 1 velocity), the delay left in."""
@@ -89,7 +93,7 @@ class JointRecord:
         gain: (2, 2) of the innovations.
         whitening: (n_measured, n_measured) of the innovations.
         sample: Time between samples [s].
-        encoder: What is wrong with its encoder, which a servo acts on as it is.
+        encoder: What is wrong with its encoder.
     """
 
     joint: Joint
@@ -124,7 +128,13 @@ class JointRecord:
     def servo_command(self) -> Array:
         """The input (n_steps,), that of a servo less the offset of its encoder."""
         drive = self.joint.drive
-        return self.command - self.encoder.offset if drive is not None and drive.servo else self.command
+        wrong = drive is not None and drive.servo and self.encoder.in_loop > 0.5
+        return self.command - self.encoder.offset if wrong else self.command
+
+    @property
+    def servo_ratio(self) -> float:
+        """What a servo reads over the true position."""
+        return 1.0 + self.encoder.gain if self.encoder.in_loop > 0.5 else 1.0
 
     @property
     def n_measured(self) -> int:

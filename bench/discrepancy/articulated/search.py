@@ -104,8 +104,9 @@ def screen(problem: ArticulatedProblem, base: ArticulatedFit, candidates: Sequen
         ground = grounds[tuple(problem.reached((placed,)))]
         hypothesis = (*base.hypothesis, placed)
         power, count = float(ground.left @ ground.left), len(ground.left) - ground.n_prior
+        drive = problem.joints[placed.joint].drive
         found = []
-        for eta in grid(placed):
+        for eta in grid(placed, servo=bool(drive and drive.servo)):
             vector = np.concatenate([base.vector, eta])
             change = ground.without(
                 np.concatenate([
@@ -146,8 +147,11 @@ def _scaled(placed: Placed, eta: Array, along: float) -> Array:
     return out
 
 
-def grid(placed: Placed) -> list[Array]:
-    """Values of the parameters that are tried; a small amplitude where the effect is linear in it."""
+def grid(placed: Placed, *, servo: bool) -> list[Array]:
+    """Values of the parameters that are tried; a small amplitude where the effect is linear in it.
+
+    Whether a wrong encoder is in the loop is asked of servos only.
+    """
     effect = placed.effect
     if effect.name == "cogging":
         return [np.array([s, c, n]) for n in effect.parameters[2].grid for s, c in ((0.03, 0.0), (0.0, 0.03))]
@@ -156,7 +160,7 @@ def grid(placed: Placed) -> list[Array]:
     axes = []
     for k, p in enumerate(effect.parameters):
         default = 0.1 * p.std if p.signed and k == 0 else p.mean
-        axes.append(p.grid or (default,))
+        axes.append(p.grid[:1] if p.name == "in_loop" and not servo else p.grid or (default,))
     return [np.array(point) for point in product(*axes)]
 
 
