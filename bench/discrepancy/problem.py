@@ -273,6 +273,7 @@ class Problem:
             elements = with_own_forces(elements, self.structure, values)
         # The rate of a law is that at its largest velocity, where a step of one time constant is still accurate enough.
         own = np.sqrt(np.max(np.abs(linear.stiffness).sum(1) / np.diag(linear.mass)))
+        own = max([own, *(friction.rate(linear.mass) for friction in self.structure.frictions)])
         substeps = self._substeps(record.step * np.maximum(0.6 * rates, own))
         if lead and len(substeps) > 1:
             substeps = np.resize(substeps, lead + len(record))

@@ -41,6 +41,7 @@ from bench.laws.normal_force_friction import (
     TIME_VARYING_FRICTION,
 )
 from bench.laws.polynomial import polynomial_law_of
+from bench.laws.soft_friction import SOFT_COULOMB
 from bench.laws.stiffness import COGGING, CUBIC_STIFFNESS, QUADRATIC_STIFFNESS, STIFFNESS_DRIFT
 from bench.laws.stribeck import STRIBECK
 
@@ -65,6 +66,7 @@ LAWS: Mapping[str, ForceLaw] = MappingProxyType(
             BASE_FLEXIBILITY,
             COULOMB,
             ASYMMETRIC_COULOMB,
+            SOFT_COULOMB,
             STRIBECK,
             LOAD_DEPENDENT_FRICTION,
             TIME_VARYING_FRICTION,
