@@ -48,6 +48,7 @@ from bench.discrepancy.search import (
     near,
     shake,
 )
+from bench.discrepancy.soft_friction import soften
 from bench.discrepancy.threads import in_threads
 
 QUICK = 6
@@ -99,6 +100,7 @@ def attribute(
         if not points or points[0].gain < NOTICEABLE:
             return search
     _extend(search, screen, [nothing], count=8)
+    soften(search, 1)
     if not consistent(search.ranked()[0]) and all(o.order > 0 for o in problem.structure.observers):
         _simulated(search, candidates)
     rare = [p for p in candidates if p.effect.rare]
@@ -124,12 +126,14 @@ def attribute(
                 break
             bases = worth_extending(search, screen, size, 4 - size) if lacks else [best]
             _extend(search, screen, bases, count=4)
+            soften(search, size + 1)
             reduce_best(search)
             continue
         ranked = search.ranked(size)
         if not ranked or ranked[0].reduced - 1.0 > STALLED * (search.ranked(size - 1)[0].reduced - 1.0):
             break
         _extend(search, screen, worth_extending(search, screen, size, 4 - size), count=6 - size)
+        soften(search, size + 1)
         reduce_best(search)
     best = search.ranked()[0]
     if not problem.noise_stated:

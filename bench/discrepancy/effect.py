@@ -154,6 +154,9 @@ class Effect:
         pickup: The sensor adds a share of another measured channel: a load, or the response of the other axis.
         log_prior: Log prior odds against an effect of the README's list.
         rate_bound: Parameter values and scales to the fastest rate of the law [1/s]; the structure's own where None.
+        variant: What tells it from the effect of the same name in the catalogue; empty for that one.
+        creeps: Its friction creeps at rest, so that `limit` writes how (`friction_limits`).
+        in_place: It takes the place of the nominal model's own dry friction along its coordinate.
     """
 
     name: str
@@ -175,6 +178,14 @@ class Effect:
     pickup: bool = False
     log_prior: float = 0.0
     rate_bound: Callable[[Values, Scales], float] | None = None
+    variant: str = ""
+    creeps: bool = False
+    in_place: bool = False
+
+    @property
+    def sticks(self) -> bool:
+        """Whether it is friction that is set-valued at rest."""
+        return self.limit is not None and not self.creeps
 
     @property
     def rare(self) -> bool:

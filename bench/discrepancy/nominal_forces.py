@@ -51,6 +51,10 @@ class NominalFriction:
         level = self.level(structure, values)
         return np.array([level, level * self.creep, self.lead])
 
+    def acts_along(self, row: Array) -> bool:
+        """Whether it acts on a coordinate (n_dof,), and on it alone."""
+        return bool(np.array_equal(self.row, row))
+
     def along(self, level: float, motion: Motion) -> Array:
         """Force (n,) of a limit of `level` along a motion."""
         ahead = (motion.velocity + self.lead * motion.acceleration) @ self.row
@@ -121,10 +125,19 @@ def spline_force(t, q, v, z, theta, f):
     f[0] += cubic(theta, 1, PIECES, 0.5 * PIECES * (1.0 + x))
 
 
-def with_own_forces(elements: Elements, structure: Structure, values: Array) -> Elements:
-    """Elements preceded by the nominal model's own forces, at parameter values (n_parameters,)."""
-    frictions, springs = structure.frictions, structure.springs
-    if not structure.has_own_forces:
+def with_own_forces(
+    elements: Elements, structure: Structure, values: Array, replaced: Sequence[Array] = ()
+) -> Elements:
+    """Elements preceded by the nominal model's own forces.
+
+    Args:
+        elements: Force laws of a hypothesis.
+        structure: The nominal model.
+        values: (n_parameters,) its parameters.
+        replaced: Coordinates (n_dof,) along which its dry friction is left out.
+    """
+    frictions, springs = _kept(structure, replaced), structure.springs
+    if not (frictions or springs):
         return elements
     theta = [friction.theta(structure, values) for friction in frictions]
     theta += [np.append(spring.reach, spring.coefficients(values)) for spring in springs]
@@ -140,6 +153,19 @@ def with_own_forces(elements: Elements, structure: Structure, values: Array) -> 
         np.concatenate([*theta, elements.theta]),
         elements.start,
     )
+
+
+def _kept(structure: Structure, replaced: Sequence[Array]) -> tuple[NominalFriction, ...]:
+    return tuple(f for f in structure.frictions if not any(f.acts_along(row) for row in replaced))
+
+
+def own_friction(structure: Structure, values: Array, motion: Motion, row: Array) -> Array:
+    """Force (n,) of the nominal model's own dry friction along one coordinate (n_dof,)."""
+    force = np.zeros(len(motion.position))
+    for friction in structure.frictions:
+        if friction.acts_along(row):
+            force += friction.along(friction.level(structure, values), motion)
+    return force
 
 
 def own_force(structure: Structure, values: Array, motion: Motion) -> Array:

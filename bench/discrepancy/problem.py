@@ -270,7 +270,8 @@ class Problem:
         linear = self.structure.at(values)
         elements, rates = self.elements(hypothesis, etas, record)
         if own_forces:
-            elements = with_own_forces(elements, self.structure, values)
+            replaced = [placed.place.rows[0] for placed in hypothesis if placed.effect.in_place]
+            elements = with_own_forces(elements, self.structure, values, replaced)
         # The rate of a law is that at its largest velocity, where a step of one time constant is still accurate enough.
         own = np.sqrt(np.max(np.abs(linear.stiffness).sum(1) / np.diag(linear.mass)))
         own = max([own, *(friction.rate(linear.mass) for friction in self.structure.frictions)])

@@ -1,0 +1,151 @@
+"""Coulomb friction with a softness: variants of `coulomb_friction` that are fitted where the set-valued law misses the noise.
+
+Friction of simulators and of many a real contact does not stick, it creeps. How much is a question of one or two further
+parameters, not of another cause, so the variants bear the name of their ideal. They are no part of the screening: along the measured
+motion they differ from it by little, and a fit of the ideal is the start they need.
+
+A nominal model that has dry friction itself may have the wrong kind of it, above all MuJoCo's default one. A variant "in place" takes
+the place of the nominal friction of its coordinate, with a limit of its own.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.discrepancy import friction_limits as limits
+from bench.discrepancy.catalogue import FRICTION, effect_named
+from bench.discrepancy.effect import Effect, FreeParameter, Scales, Values
+from bench.discrepancy.fit import Fit
+from bench.discrepancy.placed import Placed
+from bench.discrepancy.problem import Problem
+from bench.discrepancy.search import Search, Task, consistent, converge
+from bench.laws.coulomb import COULOMB
+from bench.laws.soft_friction import SOFT_COULOMB
+
+Array = NDArray[np.float64]
+IDEAL = "coulomb_friction"
+"""The effect that the others are variants of."""
+SOFTENED = 2
+"""Hypotheses of one size whose friction is softened."""
+CREEPS = (0.01, 0.05, 0.2)
+"""Creep velocities, over the largest velocity, from which a fit may begin."""
+LEADS = (0.003, 0.015)
+"""Lead times from which a fit may begin [s]; MuJoCo's default is 9.5 ms."""
+CREEP = FreeParameter(
+    "creep_velocity", "velocity", mean=math.log(0.03), std=1.3, bounds=(math.log(3e-4), math.log(1.0))
+)
+LEAD = FreeParameter(
+    "lead_time", mean=math.log(0.005), std=1.2, bounds=(math.log(5e-5), math.log(0.5)), unit="s"
+)
+
+
+def _settling(values: Values, scales: Scales) -> float:
+    """Rate [1/s] at which a mass that the load gives its acceleration settles to the creep of rounded friction."""
+    return values[0] * scales.acceleration / (scales.force * values[1])
+
+
+def _soft_settling(values: Values, scales: Scales) -> float:
+    return 1.0 / (1.0 / _settling(values, scales) + values[2])
+
+
+ROUNDED = Effect(
+    IDEAL,
+    "friction",
+    "joint",
+    (FRICTION, CREEP),
+    "f = Fc tanh(v / vc)",
+    law=COULOMB,
+    rate_bound=_settling,
+    variant="rounded",
+)
+SOFT = Effect(
+    IDEAL,
+    "friction",
+    "joint",
+    (FRICTION, CREEP, LEAD),
+    "f = Fc sat((v + tau a) / vc)",
+    law=SOFT_COULOMB,
+    limit=limits.soft_coulomb_limit,
+    creeps=True,
+    rate_bound=_soft_settling,
+    variant="soft",
+)
+
+
+def soften(search: Search, size: int) -> None:
+    """Fit the variants of Coulomb friction in the foremost hypotheses of a size that hold it, where they do not explain the records.
+
+    Args:
+        search: Fits so far; the new ones are added.
+        size: Number of effects of the hypotheses.
+    """
+    ranked = search.ranked(size)
+    tasks: list[Task] = []
+    for fitted in [f for f in ranked if _ideal_at(f) is not None and np.isfinite(f.cost)][:SOFTENED]:
+        own_friction = bool(search.problem.structure.frictions)
+        if own_friction or fitted is not ranked[0] or not consistent(fitted):
+            tasks += _softened(search.problem, fitted)
+    converge(search, tasks)
+
+
+def _ideal_at(fitted: Fit) -> int | None:
+    """Which effect of a hypothesis is ideal Coulomb friction."""
+    for i, placed in enumerate(fitted.hypothesis):
+        if placed.effect.name == IDEAL and not placed.effect.variant:
+            return i
+    return None
+
+
+def _softened(problem: Problem, fitted: Fit) -> Iterator[Task]:
+    """A fit of every variant that can take the place of the friction in a hypothesis."""
+    i = _ideal_at(fitted)
+    assert i is not None
+    placed = fitted.hypothesis[i]
+    values, etas = problem.split(fitted.hypothesis, fitted.vector)
+    scales, ideal = problem.scales_of(placed), effect_named(IDEAL)
+    level = float(ideal.values(etas[i], scales)[0])
+    loss = _nominal_level(problem, placed, values)
+    variants = [(ROUNDED, level), (SOFT, level)]
+    n = len(problem.nominal)
+    still = fitted.vector[:n].copy()
+    if loss is not None:
+        variants = [(_in_place(effect), level + loss) for effect in (ideal, ROUNDED, SOFT)]
+        still = np.where(_frictional(problem), 0.0, still)
+    for effect, limit in variants:
+        head = [FRICTION.eta(limit, scales)]
+        if effect.law is COULOMB and not effect.limit:
+            shapes = [[math.log(creep)] for creep in CREEPS]
+        else:
+            shapes = [[math.log(c), math.log(t)] for c, t in product(CREEPS, LEADS)] if effect.creeps else [[]]
+        hypothesis = (*fitted.hypothesis[:i], Placed(effect, placed.place), *fitted.hypothesis[i + 1 :])
+        starts = [
+            np.concatenate([still, *etas[:i], np.array(head + shape), *etas[i + 1 :]]) for shape in shapes
+        ]
+        yield hypothesis, np.array(starts)
+
+
+def _nominal_level(problem: Problem, placed: Placed, values: Array) -> float | None:
+    """Limit of the nominal model's own friction along a place; None where it has none."""
+    for friction in problem.structure.frictions:
+        if friction.acts_along(placed.place.rows[0]):
+            return friction.level(problem.structure, values)
+    return None
+
+
+def _frictional(problem: Problem) -> NDArray[np.bool_]:
+    """Which entries (n_nominal,) of a vector are limits of the nominal model's own friction."""
+    names = {friction.parameter for friction in problem.structure.frictions}
+    out = np.zeros(len(problem.nominal), dtype=bool)
+    out[: problem.n_physical] = [name in names for name in problem.structure.parameters]
+    return out
+
+
+def _in_place(effect: Effect) -> Effect:
+    """A variant that stands in the place of the nominal model's own friction."""
+    return replace(effect, variant=f"{effect.variant} in place".strip(), in_place=True)
