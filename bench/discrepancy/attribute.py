@@ -141,6 +141,7 @@ def attribute(
     elif near(best):
         progress(f"rivals of {names(best.hypothesis)}")
         challenge(search, screen)
+        soften(search, len(search.ranked()[0].hypothesis))
         shake(search)
     return search
 

@@ -28,7 +28,7 @@ from bench.laws.calling import advance, call_kernel, pointer_at
 
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
-def _driven(dt, t0, substeps, q, v, table, theta, z, force):
+def _driven(dt, t0, substeps, q, v, table, theta, z, force):  # noqa: PLR0912  (one compiled loop)
     """Force (n, n_rows) and hidden states of elements whose coordinates follow the samples `q`, `v` (n, n_rows)."""
     n_states = z.shape[0]
     work = np.zeros((3, MAX_ROWS + GRIPS))

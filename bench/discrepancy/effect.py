@@ -42,6 +42,7 @@ class Scales(NamedTuple):
         acceleration: Largest acceleration along the coordinate.
         damping: Nominal damping, zero where there is none.
         source: Largest value of the channel that a sensor picks up, for cross-talk.
+        mobility: Acceleration along the coordinate that a unit force gives the nominal model; zero where the motion is prescribed.
     """
 
     force: float
@@ -56,6 +57,7 @@ class Scales(NamedTuple):
     acceleration: float = 1.0
     damping: float = 0.0
     source: float = 1.0
+    mobility: float = 0.0
 
 
 def log_grid(*values: float) -> tuple[float, ...]:

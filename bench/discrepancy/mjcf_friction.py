@@ -9,18 +9,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.discrepancy.nominal_forces import NominalFriction
+from bench.discrepancy.pace import MAX_SUBSTEPS
 
 Array = NDArray[np.float64]
 LEAST, MOST = 1e-4, 0.9999
 """MuJoCo's mjMINIMP and mjMAXIMP, between which it keeps what `solimp` says."""
 STEPS = 2.0
 """Steps of the simulation that `refsafe` lets a time constant have at least."""
+HARDEST = 0.999
+"""Impedance of friction that does not creep: 1e-3 of the mobility of the joint is left."""
 DEFAULT_DMAX = 0.95
 """Second number of MuJoCo's default `solimpfriction`."""
 
 
 def nominal_frictions(
-    model: mujoco.MjModel, rows: Sequence[tuple[str, Array]], parameters: Sequence[str]
+    model: mujoco.MjModel, rows: Sequence[tuple[str, Array]], parameters: Sequence[str], step: float
 ) -> tuple[NominalFriction, ...]:
     """Dry friction of a model itself, free where it is a nominal parameter, and soft as `softness` says.
 
@@ -28,6 +31,7 @@ def nominal_frictions(
         model: The model.
         rows: Names of joints and fixed tendons, each with its row (n_dof,) over the degrees of freedom kept.
         parameters: Names of the nominal parameters.
+        step: Time between samples [s]; softness that shows only within a fraction of it is none.
     """
     out = []
     for name, row in rows:
@@ -44,6 +48,8 @@ def nominal_frictions(
                 model, model.tendon_solref_fri[tendon], model.tendon_solimp_fri[tendon],
                 model.tendon_invweight0[tendon],
             )  # fmt: skip
+        if creep[1] < step / MAX_SUBSTEPS:
+            creep = (0.0, 0.0)
         if np.any(row) and (parameter in parameters or value > 0.0):
             out.append(NominalFriction(row, parameter if parameter in parameters else "", value, *creep))
     return tuple(out)
@@ -71,20 +77,23 @@ def softness(model: mujoco.MjModel, solref: Array, solimp: Array, mobility: floa
     return (1.0 - first) / first * float(mobility) * lead, lead
 
 
-def frictionloss_of(limit: float, creep: float, lead: float, mobility: float) -> dict[str, str]:
+def frictionloss_of(
+    limit: float, creep: float, lead: float, *, mobility: float, step: float
+) -> dict[str, str]:
     """Attributes of a joint that make MuJoCo's `frictionloss` the soft friction of a limit, creep velocity and lead time.
 
-    MuJoCo has no creep without a lead. Where the lead is shorter than what makes its impedance 1e-4, that is what stands here.
+    MuJoCo's friction has a lead always: `refsafe` lets its time constant be two steps at least.
 
     Args:
         limit: [N or N m].
         creep: Velocity at the limit [m/s or rad/s].
         lead: [s].
         mobility: Inverse inertia of the joint [1/kg or 1/(kg m^2)].
+        step: Step of the simulation [s].
     """
     drag = creep / max(limit * mobility, 1e-300)
-    lead = max(lead, drag * LEAST / (1.0 - LEAST))
-    impedance = float(np.clip(1.0 / (1.0 + drag / lead), LEAST, MOST))
+    lead = max(lead, 0.5 * DEFAULT_DMAX * STEPS * step)
+    impedance = float(np.clip(1.0 / (1.0 + drag / lead), LEAST, HARDEST))
     largest = max(impedance, DEFAULT_DMAX)
     return {
         "frictionloss": f"{limit:.6g}",

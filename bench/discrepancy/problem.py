@@ -214,18 +214,26 @@ class Problem:
         return Scales(
             float(force[0]), float(position[0]), float(velocity[0]), float(stiffness), len(record) * record.step,
             record.step, float(force[-1]), float(position[-1]), float(velocity[-1]),
-            acceleration or 1.0, float(damping),
+            acceleration or 1.0, float(damping), mobility=self._mobility(place.rows[0]),
         )  # fmt: skip
 
+    def _mobility(self, row: Array) -> float:
+        """Acceleration along a coordinate (n_dof,) that a unit force along it gives the nominal model."""
+        if self.driven:
+            return 0.0
+        return float(row @ np.linalg.solve(self.structure.at(self.nominal).mass, row))
+
     def _loading(self, row: Array) -> float:
-        """RMS load of the group of degrees of freedom that a coordinate belongs to."""
+        """RMS load of the group of degrees of freedom that a coordinate belongs to; that of its inertia where nothing drives it."""
         if self.driven:
             return float(np.sqrt(np.mean([float(np.mean(d.responses**2)) for d in self.data]))) or 1.0
         group = next(g for g in self.structure.groups() if np.any(row[list(g)] != 0.0))
         acting = np.abs(self.structure.inputs[list(group)]).sum(axis=0) > 0
-        if not acting.any():
-            return 1.0
-        return float(np.sqrt(np.mean([float(np.mean(d.loads[:, acting] ** 2)) for d in self.data]))) or 1.0
+        power = [float(np.mean(d.loads[:, acting] ** 2)) for d in self.data] if acting.any() else [0.0]
+        if not any(power):
+            moved = [self.motion(i).acceleration @ row for i in range(len(self.records))]
+            power = [float(np.mean((a / self._mobility(row)) ** 2)) for a in moved]
+        return float(np.sqrt(np.mean(power))) or 1.0
 
     def simulate(
         self,

@@ -24,7 +24,7 @@ from bench.discrepancy.effect import Effect, FreeParameter, Scales, Values
 from bench.discrepancy.fit import Fit
 from bench.discrepancy.placed import Placed
 from bench.discrepancy.problem import Problem
-from bench.discrepancy.search import Search, Task, consistent, converge
+from bench.discrepancy.search import Search, Task, converge
 from bench.laws.coulomb import COULOMB
 from bench.laws.soft_friction import SOFT_COULOMB
 
@@ -33,12 +33,12 @@ IDEAL = "coulomb_friction"
 """The effect that the others are variants of."""
 SOFTENED = 2
 """Hypotheses of one size whose friction is softened."""
-CREEPS = (0.01, 0.05, 0.2)
+CREEPS = (1e-4, 1e-3, 1e-2, 0.1)
 """Creep velocities, over the largest velocity, from which a fit may begin."""
-LEADS = (0.003, 0.015)
+LEADS = (1e-3, 0.01)
 """Lead times from which a fit may begin [s]; MuJoCo's default is 9.5 ms."""
 CREEP = FreeParameter(
-    "creep_velocity", "velocity", mean=math.log(0.03), std=1.3, bounds=(math.log(3e-4), math.log(1.0))
+    "creep_velocity", "velocity", mean=math.log(0.01), std=2.3, bounds=(math.log(1e-5), math.log(1.0))
 )
 LEAD = FreeParameter(
     "lead_time", mean=math.log(0.005), std=1.2, bounds=(math.log(5e-5), math.log(0.5)), unit="s"
@@ -46,12 +46,12 @@ LEAD = FreeParameter(
 
 
 def _settling(values: Values, scales: Scales) -> float:
-    """Rate [1/s] at which a mass that the load gives its acceleration settles to the creep of rounded friction."""
-    return values[0] * scales.acceleration / (scales.force * values[1])
+    """Rate [1/s] at which the motion settles to the creep of rounded friction."""
+    return values[0] * scales.mobility / values[1]
 
 
 def _soft_settling(values: Values, scales: Scales) -> float:
-    return 1.0 / (1.0 / _settling(values, scales) + values[2])
+    return 1.0 / (values[1] / max(values[0] * scales.mobility, 1e-300) + values[2])
 
 
 ROUNDED = Effect(
@@ -79,7 +79,8 @@ SOFT = Effect(
 
 
 def soften(search: Search, size: int) -> None:
-    """Fit the variants of Coulomb friction in the foremost hypotheses of a size that hold it, where they do not explain the records.
+    """Fit the variants of Coulomb friction in the foremost hypotheses of a size that hold it, unless the first is one that leaves
+    no more than the noise does on average.
 
     Args:
         search: Fits so far; the new ones are added.
@@ -89,7 +90,8 @@ def soften(search: Search, size: int) -> None:
     tasks: list[Task] = []
     for fitted in [f for f in ranked if _ideal_at(f) is not None and np.isfinite(f.cost)][:SOFTENED]:
         own_friction = bool(search.problem.structure.frictions)
-        if own_friction or fitted is not ranked[0] or not consistent(fitted):
+        within = fitted.chi2 - fitted.n_residuals < np.sqrt(2.0 * fitted.n_residuals)
+        if own_friction or fitted is not ranked[0] or not within:
             tasks += _softened(search.problem, fitted)
     converge(search, tasks)
 
@@ -122,7 +124,9 @@ def _softened(problem: Problem, fitted: Fit) -> Iterator[Task]:
         if effect.law is COULOMB and not effect.limit:
             shapes = [[math.log(creep)] for creep in CREEPS]
         else:
-            shapes = [[math.log(c), math.log(t)] for c, t in product(CREEPS, LEADS)] if effect.creeps else [[]]
+            shapes = (
+                [[math.log(c), math.log(t)] for c, t in product(CREEPS, LEADS)] if effect.creeps else [[]]
+            )
         hypothesis = (*fitted.hypothesis[:i], Placed(effect, placed.place), *fitted.hypothesis[i + 1 :])
         starts = [
             np.concatenate([still, *etas[:i], np.array(head + shape), *etas[i + 1 :]]) for shape in shapes

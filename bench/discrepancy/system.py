@@ -135,7 +135,7 @@ def _entry(p, e, column):
 
 
 @_inline
-def _derivative(p, t, y, slope, load):
+def _derivative(p, t, y, slope, load):  # noqa: PLR0912  (one compiled loop)
     """Write dy/dt at workspace offset `slope` for the state at offset `y` and the loads at offset `load`.
 
     The holding force and the limit of every friction element go into `grip` (2, n_elements).
@@ -227,9 +227,7 @@ def _creep(p, y, slope, sweeps):
             relative += compliance * p.grip[e]
             wanted = 0.0
             if limit > 0.0:
-                wanted = (rate + lead * relative) / (
-                    p.grip[2 * p.n_elements + e] / limit + lead * compliance
-                )
+                wanted = (rate + lead * relative) / (p.grip[2 * p.n_elements + e] / limit + lead * compliance)
             wanted = min(max(wanted, -limit), limit)
             for i in range(p.n_dof):
                 p.work[slope + p.n_dof + i] -= p.spread[i * p.n_rows + row] * (wanted - p.grip[e])

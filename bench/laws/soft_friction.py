@@ -10,7 +10,7 @@ MuJoCo's `frictionloss` is this law, with both. Its constraint asks for the acce
 
 | of MuJoCo | is |
 |---|---|
-| b | ``2 / (dmax timeconst)`` of a `solreffriction` (timeconst, dampratio), the ratio having no part in it; ``-damping / dmax`` of a direct one |
+| b | ``2 / (dmax timeconst)`` of a `solreffriction` (timeconst, dampratio), whatever the ratio; ``-damping / dmax`` of a direct one |
 | R | ``(1 - d0) / d0`` times the inverse inertia of the joint at the reference position (`dof_invweight0`) |
 | d0, dmax | the first two numbers of `solimpfriction`: the constraint has no position, so the others do nothing |
 
@@ -45,8 +45,16 @@ SOFT_COULOMB = ForceLaw(
     name="soft_coulomb",
     parameters=(
         LIMIT,
-        Parameter("creep_velocity", "m/s", 1e-3, (1e-9, math.inf), "velocity vc of creep at the limit", "rad/s"),
-        Parameter("lead_time", "s", 0.0, (0.0, math.inf), "time tau by which the force turns round before the velocity"),
+        Parameter(
+            "creep_velocity", "m/s", 1e-3, (1e-9, math.inf), "velocity vc of creep at the limit", "rad/s"
+        ),
+        Parameter(
+            "lead_time",
+            "s",
+            0.0,
+            (0.0, math.inf),
+            "time tau by which the force turns round before the velocity",
+        ),
     ),
     force=force,
     equation="f = Fc sat((v + tau a) / vc); as an element a = 0",
