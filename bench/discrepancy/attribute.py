@@ -50,6 +50,7 @@ from bench.discrepancy.search import (
 )
 from bench.discrepancy.soft_friction import soften
 from bench.discrepancy.threads import in_threads
+from bench.discrepancy.timed_force import with_timed_force
 
 QUICK = 6
 """Iterations of a first fit; the best are carried on to convergence."""
@@ -108,6 +109,7 @@ def attribute(
         progress("rarer effects")
         screen.add(rare)
         _extend(search, screen, [nothing], count=6, among={p.key for p in rare})
+    with_timed_force(search)
     for size in range(1, most):
         if near(search.ranked()[0]):
             integrate_finer(search)

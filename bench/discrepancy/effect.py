@@ -158,6 +158,7 @@ class Effect:
         rate_bound: Parameter values and scales to the fastest rate of the law [1/s]; the structure's own where None.
         variant: What tells it from the effect of the same name in the catalogue; empty for that one.
         creeps: Its friction creeps at rest, so that `limit` writes how (`friction_limits`).
+        of_record: Parameter values and the name of a record to the theta of `law` in that record; the same in all where None.
         in_place: It takes the place of the nominal model's own dry friction along its coordinate.
     """
 
@@ -183,6 +184,7 @@ class Effect:
     variant: str = ""
     creeps: bool = False
     in_place: bool = False
+    of_record: Callable[[Values, str], Values] | None = None
 
     @property
     def sticks(self) -> bool:

@@ -435,6 +435,8 @@ class Problem:
                 continue
             scales = self.scales_of(placed)._replace(duration=len(record) * record.step)
             parameters = effect.kernel_theta(eta, scales)
+            if effect.of_record is not None:
+                parameters = effect.of_record(effect.values(eta, scales), record.name)
             table.append(
                 [
                     *effect.addresses, effect.n_coordinates, n_rows, n_theta, n_states, len(effect.law.states),
@@ -470,18 +472,21 @@ class Problem:
 
     def residual(self, hypothesis: Hypothesis, vector: Array) -> Array:
         """Whitened residuals of all records, real and imaginary parts stacked; their sum of squares is chi-squared."""
-        parts = in_threads(lambda data: self._residual_of(data, hypothesis, vector), self.data)
+        parts = in_threads(lambda data: self.residual_of(data, hypothesis, vector), self.data)
         finite = [part for part in parts if part is not None]
         return np.concatenate(finite) if len(finite) == len(parts) else np.array([np.inf])
 
-    def _residual_of(self, data: RecordData, hypothesis: Hypothesis, vector: Array) -> Array | None:
-        """Whitened residuals of one record; None where its free run diverged."""
+    def residual_of(
+        self, data: RecordData, hypothesis: Hypothesis, vector: Array, *, lenient: bool = True
+    ) -> Array | None:
+        """Whitened residuals of one record, jumps that come a little early or late excused if `lenient`; None where it diverged."""
         predicted = self.simulate(hypothesis, vector, data.record)
         if not np.isfinite(predicted).all():
             return None
         moved = start_responses(self, hypothesis, vector, data.record, predicted) if self.windowed else ()
         residual = data.responses - predicted
-        for c, observer in enumerate(self.structure.observers if hypothesis and not self.driven else ()):
+        excused = lenient and hypothesis and not self.driven
+        for c, observer in enumerate(self.structure.observers if excused else ()):
             if observer.order == ACCELERATION:
                 residual[:, c] = timed(residual[:, c], predicted[:, c], self.noise[c])
         return projected(residual, moved, data)

@@ -80,25 +80,33 @@ def _joint(effect: NamedEffect, diagnosis: Diagnosis) -> tuple[str, ...]:
 
 def element_code(law: str, theta: tuple[float, ...], joints: tuple[str, ...] = ("JOINT",)) -> str:
     """Python code that makes the element of a found effect."""
+    names = ", ".join(f'"{joint}"' for joint in joints)
+    header, values = _sized(law, theta)
+    numbers = ", ".join(f"{name}={value:.6g}" for name, value in values.items())
+    entry = f'find_law("{law}", {header})' if header else f'"{law}"'
+    imports = "from bench.laws import find_law\n" if header else ""
+    return (
+        f"{imports}from bench.rig import Element\n\nelement = Element.of({entry}, {names}, {numbers})\n"
+        "rig = rig.with_element(element)"
+    )
+
+
+def _sized(law: str, theta: tuple[float, ...]) -> tuple[tuple[float, ...], dict[str, float]]:
+    """Header of a law in the size of a theta, and its parameters by name."""
     from bench.laws import find_law  # noqa: PLC0415  (laws import their kernels)
 
-    names = ", ".join(f'"{joint}"' for joint in joints)
-    numbers = ", ".join(
-        f"{name}={value:.6g}" for name, value in zip(find_law(law).parameter_names, theta, strict=True)
-    )
-    return f'from bench.rig import Element\n\nelement = Element.of("{law}", {names}, {numbers})\nrig = rig.with_element(element)'
+    header = theta[: len(find_law(law).header)]
+    values = theta[len(header) :]
+    return header, dict(zip(find_law(law, header).parameter_names, values, strict=True))
 
 
 def element_toml(law: str, theta: tuple[float, ...], joints: tuple[str, ...] = ("JOINT",)) -> str:
     """The element of a found effect as an entry of a rig configuration."""
-    from bench.laws import find_law  # noqa: PLC0415
-
     names = ", ".join(f'"{joint}"' for joint in joints)
-    numbers = ", ".join(
-        f"{name} = {_toml_number(value)}"
-        for name, value in zip(find_law(law).parameter_names, theta, strict=True)
-    )
-    return f'[[elements]]\nlaw = "{law}"\njoints = [{names}]\nparameters = {{ {numbers} }}'
+    header, values = _sized(law, theta)
+    numbers = ", ".join(f"{name} = {_toml_number(value)}" for name, value in values.items())
+    size = f"header = [{', '.join(_toml_number(x) for x in header)}]\n" if header else ""
+    return f'[[elements]]\nlaw = "{law}"\n{size}joints = [{names}]\nparameters = {{ {numbers} }}'
 
 
 def _toml_number(value: float) -> str:
