@@ -7,7 +7,8 @@
 Window i begins at ``s_i``, lasts ``d_i`` and has the relative size ``r_i``. Its edges rise smoothly from h before to h after, a step or so:
 an integrator of fixed step then sees an edge move as it moves, and the response is a smooth function of it.
 
-Time is the clock of the record. `constant_force` is the same without windows, `time_varying_friction` a limit that changes with time, not a force.
+Time is the clock of the record. `constant_force` is the same without windows, `time_varying_friction` a limit that changes
+with time, not a force.
 
 References:
     M. Basseville & I. V. Nikiforov, Detection of Abrupt Changes, Prentice Hall 1993, ch. 2 (additive changes as steps).
