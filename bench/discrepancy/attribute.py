@@ -32,6 +32,7 @@ from bench.discrepancy.nominate import (
 )
 from bench.discrepancy.placed import Hypothesis, Placed
 from bench.discrepancy.problem import Problem
+from bench.discrepancy.scheduled import with_schedules
 from bench.discrepancy.screen import Screen
 from bench.discrepancy.search import (
     IMMATERIAL,
@@ -110,6 +111,7 @@ def attribute(
         screen.add(rare)
         _extend(search, screen, [nothing], count=6, among={p.key for p in rare})
     with_timed_force(search)
+    with_schedules(search)
     for size in range(1, most):
         if near(search.ranked()[0]):
             integrate_finer(search)

@@ -19,9 +19,12 @@ from bench.discrepancy.system import (
     N_STATES,
     RATE,
     ROW,
+    SCALE,
     STATE,
     THETA,
     Elements,
+    full,
+    scale_at,
     steps_of_each,
 )
 from bench.laws.calling import advance, call_kernel, pointer_at
@@ -55,9 +58,14 @@ def _driven(dt, t0, substeps, q, v, table, theta, z, force):  # noqa: PLR0912  (
             zp = advance(z_pointer, table[e, STATE])
             if table[e, FORCE] != 0:
                 call_kernel(table[e, FORCE], t, wq, wv, zp, parameters, wf)
+            scale = 1.0
+            if table[e, SCALE] != 0:
+                scale = scale_at(advance(theta_pointer, table[e, SCALE] - 1), t)
+                for r in range(rows):
+                    work[2, r] *= scale
             if table[e, LIMIT] != 0:
                 call_kernel(table[e, LIMIT], t, wq, wv, zp, parameters, advance(wf, MAX_ROWS))
-                limit = max(work[2, MAX_ROWS], 0.0)
+                limit = max(scale * work[2, MAX_ROWS], 0.0)
                 creep = work[2, MAX_ROWS + 1]
                 lead = work[2, MAX_ROWS + 2]
                 if creep > 0.0 or lead > 0.0:
@@ -106,7 +114,7 @@ def driven_force(
     force = np.zeros_like(position)
     counts = steps_of_each(substeps, len(position))
     q, v = np.ascontiguousarray(position), np.ascontiguousarray(velocity)
-    _driven(step, start_time, counts, q, v, elements.table, elements.theta, elements.start.copy(), force)
+    _driven(step, start_time, counts, q, v, full(elements.table), elements.theta, elements.start.copy(), force)
     return force
 
 
@@ -130,7 +138,7 @@ def driven_states(
         v = np.ascontiguousarray(velocity[before : sample + 1])
         time = start_time + before * step
         own = counts[before : sample + 1]
-        _driven(step, time, own, q, v, elements.table, elements.theta, z, np.zeros_like(q))
+        _driven(step, time, own, q, v, full(elements.table), elements.theta, z, np.zeros_like(q))
         out[i] = z
         before = int(sample)
     return out

@@ -14,12 +14,15 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import product
-from typing import Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bench.laws.base import ForceLaw, Kernel
+
+if TYPE_CHECKING:
+    from bench.discrepancy.case import CaseRecord
 
 Site = Literal["joint", "inertia", "actuator", "sensor", "record"]
 Values = NDArray[np.float64]
@@ -159,6 +162,7 @@ class Effect:
         variant: What tells it from the effect of the same name in the catalogue; empty for that one.
         creeps: Its friction creeps at rest, so that `limit` writes how (`friction_limits`).
         of_record: Parameter values and the name of a record to the theta of `law` in that record; the same in all where None.
+        schedule: Parameter values and a record to the schedule of its force there (`system.scale_at`); none where None.
         in_place: It takes the place of the nominal model's own dry friction along its coordinate.
     """
 
@@ -185,6 +189,7 @@ class Effect:
     creeps: bool = False
     in_place: bool = False
     of_record: Callable[[Values, str], Values] | None = None
+    schedule: Callable[[Values, CaseRecord], Values] | None = None
 
     @property
     def sticks(self) -> bool:

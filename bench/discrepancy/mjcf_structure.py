@@ -129,6 +129,8 @@ def _channels(
     force_sensors = _force_sensors(rig.model)
     loads, responses = [], []
     for channel in case.channels:
+        if channel.role == "scheduling":
+            continue
         kind, _, name = channel.target.rpartition(":")
         name = name or channel.name
         if channel.role == "prescribed":

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from bench.discrepancy.friction_limits import soft_coulomb_limit
 from bench.discrepancy.spline import cubic, spline_of
-from bench.discrepancy.system import ROW, THETA, Elements, Motion
+from bench.discrepancy.system import ROW, SCALE, THETA, Elements, Motion, full
 from bench.laws.base import kernel
 
 if TYPE_CHECKING:
@@ -144,11 +144,12 @@ def with_own_forces(
     firsts = np.cumsum([0, *(len(own) for own in theta)])
     own = [[0, 0, soft_coulomb_limit.address, 1, i, firsts[i], 0, 0] for i in range(len(frictions))]
     own += [[spline_force.address, 0, 0, 1, i, firsts[i], 0, 0] for i in range(len(frictions), len(theta))]
-    table = elements.table.copy()
+    table = full(elements.table).copy()
     table[:, ROW] += len(own)
     table[:, THETA] += firsts[-1]
+    table[:, SCALE] += firsts[-1] * (table[:, SCALE] != 0)
     return Elements(
-        np.vstack([np.array(own, dtype=np.int64), table]),
+        np.vstack([full(np.array(own, dtype=np.int64)), table]),
         np.vstack([*(force.row for force in (*frictions, *springs)), elements.rows]),
         np.concatenate([*theta, elements.theta]),
         elements.start,

@@ -20,7 +20,7 @@ from bench.discrepancy.driven import driven_force
 from bench.discrepancy.driving import driving_loads, fewest_steps, run_in
 from bench.discrepancy.effect import Scales
 from bench.discrepancy.measured_motion import measured_motion
-from bench.discrepancy.nominal_forces import with_own_forces
+from bench.discrepancy.nominal_forces import own_friction, with_own_forces
 from bench.discrepancy.pace import rates, speeds, steps
 from bench.discrepancy.placed import Hypothesis, Placed
 from bench.discrepancy.prepared import RecordData, band_bins, noise_floor, projected, timed
@@ -41,7 +41,7 @@ from bench.discrepancy.starts import (
 )
 from bench.discrepancy.structure import ACCELERATION, Place, Structure
 from bench.discrepancy.swinging_noise import whitening_together
-from bench.discrepancy.system import Elements, Motion
+from bench.discrepancy.system import COLUMNS, Elements, Motion
 from bench.discrepancy.threads import in_threads
 
 Array = NDArray[np.float64]
@@ -331,7 +331,7 @@ class Problem:
         motion = self.motion_of(record)
         linear = self.structure.at(values)
         force = motion.position @ linear.stiffness + motion.velocity @ linear.damping
-        if COULOMB in self.structure.parameters:
+        if COULOMB in self.structure.parameters and not any(p.effect.in_place for p in hypothesis):
             force += values[self.structure.parameters.index(COULOMB)] * np.sign(motion.velocity)
         elements, rates = self.elements(hypothesis, etas, record)
         if len(elements.table):
@@ -348,6 +348,14 @@ class Problem:
                 return np.full_like(force, np.nan)
             force += driven @ elements.rows
         return self.sensed(hypothesis, etas, force, record.step)
+
+    def own_friction(self, motion: Motion, row: Array) -> Array:
+        """Force (n,) of the nominal model's own dry friction along one coordinate (n_dof,)."""
+        if self.driven:
+            own = COULOMB in self.structure.parameters
+            level = self.nominal[self.structure.parameters.index(COULOMB)] if own else 0.0
+            return level * np.sign(motion.velocity[:, 0])
+        return own_friction(self.structure, self.nominal, motion, row)
 
     def finer(self, refinement: int) -> Problem:
         """A copy that is integrated in other steps."""
@@ -437,22 +445,24 @@ class Problem:
             parameters = effect.kernel_theta(eta, scales)
             if effect.of_record is not None:
                 parameters = effect.of_record(effect.values(eta, scales), record.name)
+            schedule = effect.schedule(effect.values(eta, scales), record) if effect.schedule else np.zeros(0)
             table.append(
                 [
                     *effect.addresses, effect.n_coordinates, n_rows, n_theta, n_states, len(effect.law.states),
+                    1 + n_theta + len(parameters) if effect.schedule else 0,
                 ]
             )  # fmt: skip
             own = rates(effect, effect.values(eta, scales), scales, self._speeds(placed, record))
             fastest = np.maximum(fastest, own)
             rows.append(placed.place.rows)
-            theta.append(parameters)
+            theta += [parameters, schedule]
             n_rows += effect.n_coordinates
-            n_theta += len(parameters)
+            n_theta += len(parameters) + len(schedule)
             n_states += len(effect.law.states)
         n_dof = len(self.structure.dofs)
         return (
             Elements(
-                np.array(table, dtype=np.int64).reshape(-1, 8),
+                np.array(table, dtype=np.int64).reshape(-1, COLUMNS),
                 np.vstack(rows) if rows else np.zeros((0, n_dof)),
                 np.concatenate([*theta, [0.0]]),
                 np.zeros(n_states),

@@ -25,7 +25,7 @@ from bench.discrepancy.fit import Fit
 from bench.discrepancy.grid_points import SIGNAL_STEP, Node, Point, products, read, spanning
 from bench.discrepancy.linear_run import linear_run
 from bench.discrepancy.minimise import Prior, minimise
-from bench.discrepancy.nominal_forces import own_change, own_force, own_friction
+from bench.discrepancy.nominal_forces import own_change, own_force
 from bench.discrepancy.pace import steps
 from bench.discrepancy.placed import Hypothesis, Placed
 from bench.discrepancy.prepared import whitened
@@ -490,5 +490,5 @@ def force_along(problem: Problem, placed: Placed, eta: Array, index: int) -> Arr
         start_time=record.start,
     )
     if placed.effect.in_place:
-        force[:, 0] -= own_friction(problem.structure, problem.nominal, motion, rows[0])
+        force[:, 0] -= problem.own_friction(motion, rows[0])
     return force @ rows

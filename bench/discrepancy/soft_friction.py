@@ -23,6 +23,7 @@ from bench.discrepancy.catalogue import FRICTION, effect_named
 from bench.discrepancy.effect import Effect, FreeParameter, Scales, Values
 from bench.discrepancy.fit import Fit
 from bench.discrepancy.placed import Placed
+from bench.discrepancy.problem import COULOMB as COULOMB_PARAMETER
 from bench.discrepancy.problem import Problem
 from bench.discrepancy.search import Search, Task, converge
 from bench.laws.coulomb import COULOMB
@@ -89,7 +90,7 @@ def soften(search: Search, size: int) -> None:
     ranked = search.ranked(size)
     tasks: list[Task] = []
     for fitted in [f for f in ranked if _ideal_at(f) is not None and np.isfinite(f.cost)][:SOFTENED]:
-        own_friction = bool(search.problem.structure.frictions)
+        own_friction = bool(frictional(search.problem).any())
         within = fitted.chi2 - fitted.n_residuals < np.sqrt(2.0 * fitted.n_residuals)
         if own_friction or fitted is not ranked[0] or not within:
             tasks += _softened(search.problem, fitted)
@@ -112,13 +113,13 @@ def _softened(problem: Problem, fitted: Fit) -> Iterator[Task]:
     values, etas = problem.split(fitted.hypothesis, fitted.vector)
     scales, ideal = problem.scales_of(placed), effect_named(IDEAL)
     level = float(ideal.values(etas[i], scales)[0])
-    loss = _nominal_level(problem, placed, values)
+    loss = nominal_level(problem, placed, values)
     variants = [(ROUNDED, level), (SOFT, level)]
     n = len(problem.nominal)
     still = fitted.vector[:n].copy()
     if loss is not None:
         variants = [(_in_place(effect), level + loss) for effect in (ideal, ROUNDED, SOFT)]
-        still = np.where(_frictional(problem), 0.0, still)
+        still = np.where(frictional(problem), 0.0, still)
     for effect, limit in variants:
         head = [FRICTION.eta(limit, scales)]
         if effect.law is COULOMB and not effect.limit:
@@ -134,17 +135,20 @@ def _softened(problem: Problem, fitted: Fit) -> Iterator[Task]:
         yield hypothesis, np.array(starts)
 
 
-def _nominal_level(problem: Problem, placed: Placed, values: Array) -> float | None:
+def nominal_level(problem: Problem, placed: Placed, values: Array) -> float | None:
     """Limit of the nominal model's own friction along a place; None where it has none."""
+    if problem.driven and COULOMB_PARAMETER in problem.structure.parameters:
+        return float(values[problem.structure.parameters.index(COULOMB_PARAMETER)])
     for friction in problem.structure.frictions:
         if friction.acts_along(placed.place.rows[0]):
             return friction.level(problem.structure, values)
     return None
 
 
-def _frictional(problem: Problem) -> NDArray[np.bool_]:
+def frictional(problem: Problem) -> NDArray[np.bool_]:
     """Which entries (n_nominal,) of a vector are limits of the nominal model's own friction."""
     names = {friction.parameter for friction in problem.structure.frictions}
+    names |= {COULOMB_PARAMETER} if problem.driven else set()
     out = np.zeros(len(problem.nominal), dtype=bool)
     out[: problem.n_physical] = [name in names for name in problem.structure.parameters]
     return out

@@ -32,8 +32,12 @@ from bench.laws.calling import advance, call_kernel, load_int, pointer_at
 MAX_EVENTS = 12
 """Most friction events resolved within one step; beyond it the step is completed with the mode it has."""
 
-FORCE, RATE, LIMIT, N_ROWS, ROW, THETA, STATE, N_STATES = range(8)
+FORCE, RATE, LIMIT, N_ROWS, ROW, THETA, STATE, N_STATES, SCALE = range(9)
 """Columns of the element table passed to the compiled loop."""
+
+
+COLUMNS = 9
+"""Their number."""
 
 
 DIVERGED = 1e12
@@ -63,8 +67,9 @@ class Elements(NamedTuple):
     """The force laws of one simulation, flattened for the compiled loop.
 
     Attributes:
-        table: (n_elements, 8) integers: addresses of the force, rate and limit kernels (0: none), number of
-            coordinates, first row in `rows`, first entry in `theta`, first hidden state, number of hidden states.
+        table: (n_elements, 8 or 9) integers: addresses of the force, rate and limit kernels (0: none), number of
+            coordinates, first row in `rows`, first entry in `theta`, first hidden state, number of hidden states; and, where there is
+            a ninth, one more than the entry in `theta` where the schedule of the force begins (0: none, see `scale_at`).
         rows: (n_rows, n_dof); row times q is a coordinate of an element.
         theta: (n_theta,) parameters of all elements one after the other.
         start: (n_states,) initial hidden states.
@@ -131,7 +136,17 @@ class _Plan(NamedTuple):
 @_inline
 def _entry(p, e, column):
     """Integer of the element table."""
-    return load_int(p.table + 8 * (8 * e + column))
+    return load_int(p.table + 8 * (COLUMNS * e + column))
+
+
+@_inline
+def scale_at(schedule, t):
+    """Factor of a force at a time: (time of the first sample, samples a second, their number, samples), linear between them."""
+    x = (t - schedule[0]) * schedule[1]
+    n = int(schedule[2])
+    whole = min(max(int(x), 0), n - 2)
+    share = min(max(x - whole, 0.0), 1.0)
+    return schedule[3 + whole] + share * (schedule[4 + whole] - schedule[3 + whole])
 
 
 @_inline
@@ -178,13 +193,18 @@ def _derivative(p, t, y, slope, load):  # noqa: PLR0912  (one compiled loop)
         v_pointer = advance(p.work, v)
         if _entry(p, e, FORCE) != 0:
             call_kernel(_entry(p, e, FORCE), t, q_pointer, v_pointer, z, theta, advance(p.work, f))
+        scale = 1.0
+        if _entry(p, e, SCALE) != 0:
+            scale = scale_at(advance(p.theta, _entry(p, e, SCALE) - 1), t)
+            for r in range(n_rows):
+                work[f + r] *= scale
         if _entry(p, e, LIMIT) != 0:
             for i in range(GRIPS):
                 work[f + MAX_ROWS + i] = 0.0
             call_kernel(
                 _entry(p, e, LIMIT), t, q_pointer, v_pointer, z, theta, advance(p.work, (f + MAX_ROWS))
             )
-            p.grip[p.n_elements + e] = max(work[f + MAX_ROWS], 0.0)
+            p.grip[p.n_elements + e] = max(scale * work[f + MAX_ROWS], 0.0)
             if p.mode[e] == SOFT:
                 p.grip[2 * p.n_elements + e] = work[f + MAX_ROWS + 1]
                 p.grip[3 * p.n_elements + e] = work[f + MAX_ROWS + 2]
@@ -455,6 +475,12 @@ def _free_run(clock, u, start, scratch, n_dof, matrices, table, rows, spread, th
                 rest -= used
 
 
+def full(table: NDArray[np.int64]) -> NDArray[np.int64]:
+    """An element table with all its columns."""
+    missing = COLUMNS - table.shape[1]
+    return np.ascontiguousarray(np.pad(table, ((0, 0), (0, missing))) if missing else table)
+
+
 def steps_of_each(substeps: int | NDArray[np.int64], n: int) -> NDArray[np.int64]:
     """Steps of every sample (n,), where one number may stand for all."""
     return np.ascontiguousarray(np.broadcast_to(substeps, n), dtype=np.int64)
@@ -501,7 +527,7 @@ def free_run(
     motion = Motion(np.zeros((n, n_dof)), np.zeros((n, n_dof)), np.zeros((n, n_dof)))
     _free_run(
         (step, start_time, steps_of_each(substeps, n), load_factor), np.ascontiguousarray(loads), y, scratch, n_dof, matrices,
-        elements.table, rows,
+        full(elements.table), rows,
         np.ascontiguousarray(inverse @ rows.T), elements.theta, tuple(motion),
     )  # fmt: skip
     return motion

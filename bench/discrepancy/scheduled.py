@@ -1,0 +1,166 @@
+"""Laws that follow a channel: friction with the normal force, a seal's with the pressure, a damper's with its current.
+
+A channel of the role "scheduling" is no load and no response; it tells a condition. Under it the force of a law is
+
+    f(t) = (1 - kappa + kappa s(t) / s0) f_law,
+
+with s0 the RMS of the channel in the records for identification: in proportion to the channel for a sensitivity kappa of one,
+independent of it for zero. Limit and slopes of a law scale alike, as a contact's do with its normal force. A measured channel that
+is no load of one of the bench's rigs counts as scheduling, too.
+
+Where no channel tells, friction may differ from record to record all the same. It is then named with its limit in each, which says that
+something has changed between the records and not what; on a record of its own it is the mean of those.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.discrepancy.case import Case, CaseChannel, CaseRecord
+from bench.discrepancy.catalogue import FRICTION, effect_named
+from bench.discrepancy.effect import RARE, Effect, FreeParameter, Scales, Values
+from bench.discrepancy.fit import Fit
+from bench.discrepancy.nominal_file import RIGS
+from bench.discrepancy.placed import Placed
+from bench.discrepancy.problem import Problem
+from bench.discrepancy.search import Search, Task, consistent, converge
+from bench.discrepancy.soft_friction import IDEAL, frictional, nominal_level
+
+Array = NDArray[np.float64]
+SCHEDULED = 4
+"""Effects that are tried with a schedule: those that come nearest alone."""
+SENSITIVITY = FreeParameter("sensitivity", signed=True, mean=1.0, std=0.5, bounds=(-4.0, 6.0))
+RUBBING = ("friction", "hysteresis")
+"""Families that may take the place of the nominal model's own friction."""
+LOADS = ("force", "torque")
+"""Load channels of the bench's own rigs."""
+DIFFERS = "record_dependent_friction"
+APART = 0.3
+"""Prior standard deviation of the logarithm of a limit in one record over the mean."""
+
+
+def scheduling(case: Case) -> list[CaseChannel]:
+    """Channels that laws may follow."""
+    own = case.rig in RIGS
+    return [
+        c for c in case.channels
+        if c.role == "scheduling" or (own and c.role == "measured" and c.name not in LOADS)
+    ]  # fmt: skip
+
+
+def with_schedules(search: Search) -> None:
+    """Fit the foremost effects with a schedule, or friction that differs between records where no channel tells.
+
+    Args:
+        search: Fits so far; the new ones are added.
+    """
+    problem = search.problem
+    if consistent(search.ranked()[0]):
+        return
+    channels = scheduling(problem.case)
+    forces = [f for f in search.ranked(1) if _schedulable(f)][:SCHEDULED]
+    tasks: list[Task] = []
+    for channel in channels:
+        for fitted in forces:
+            tasks += _followed(problem, fitted, channel)
+    if not channels and len(problem.records) > 1:
+        tasks = [task for fitted in forces if fitted.hypothesis[0].effect.name == IDEAL for task in _differing(problem, fitted)]
+    converge(search, tasks)
+
+
+def _schedulable(fitted: Fit) -> bool:
+    (placed,) = fitted.hypothesis
+    effect = placed.effect
+    plain = effect.schedule is None and effect.of_record is None and not effect.variant
+    return effect.site == "joint" and plain and bool(np.isfinite(fitted.cost)) and not effect.modulated
+
+
+def _followed(problem: Problem, fitted: Fit, channel: CaseChannel) -> list[Task]:
+    """Fits of an effect whose force follows a channel: added to the nominal model, and in the place of its friction."""
+    (placed,) = fitted.hypothesis
+    values, (eta,) = problem.split(fitted.hypothesis, fitted.vector)
+    n = len(problem.nominal)
+    effect = followed(placed.effect, channel, problem)
+    reference = _reference(problem, channel)
+    shapes = [np.append(eta, [kappa, reference]) for kappa in (0.5, 1.0)]
+    new = Placed(effect, placed.place, channel.name)
+    tasks: list[Task] = [((new,), np.array([np.append(fitted.vector[:n], shape) for shape in shapes]))]
+    loss = nominal_level(problem, placed, values)
+    if loss is not None and placed.effect.family in RUBBING:
+        scales = problem.scales_of(placed)
+        first = placed.effect.parameters[0]
+        whole = eta.copy()
+        if first.name == FRICTION.name:
+            whole[0] = first.eta(first.value(eta[0], scales) + loss, scales)
+        still = np.where(frictional(problem), 0.0, fitted.vector[:n])
+        starts = [np.concatenate([still, own, [kappa, reference]]) for kappa in (0.5, 1.0) for own in (whole, eta)]
+        tasks.append(((Placed(replace(effect, in_place=True, variant="in place"), placed.place, channel.name),), np.array(starts)))
+    return tasks
+
+
+def followed(effect: Effect, channel: CaseChannel, problem: Problem) -> Effect:
+    """An effect whose force follows a channel."""
+    count = len(effect.parameters)
+    theta, bound, name = effect.theta, effect.rate_bound, channel.name
+
+    def schedule(values: Values, record: CaseRecord) -> Values:
+        samples = record.values.get(name)
+        if samples is None:
+            return np.array([0.0, 1.0, 2.0, 1.0, 1.0])
+        kappa, reference = values[count:]
+        factor = 1.0 - kappa + kappa * samples / reference
+        return np.concatenate([[record.start, 1.0 / record.step, float(len(samples))], factor])
+
+    def own_theta(values: Values, scales: Scales) -> Values:
+        return values[:count] if theta is None else theta(values[:count], scales)
+
+    return replace(
+        effect, name=f"scheduled_{effect.name}", equation=f"(1 - kappa + kappa s/s0) f, s = {name}; {effect.equation}",
+        parameters=(*effect.parameters, SENSITIVITY, FreeParameter("reference", signed=True, fixed=True, unit=channel.unit or "1")),
+        theta=own_theta, schedule=schedule, log_prior=effect.log_prior + 0.5 * RARE,
+        rate_bound=None if bound is None else lambda values, scales: bound(values[:count], scales),
+    )  # fmt: skip
+
+
+def _reference(problem: Problem, channel: CaseChannel) -> float:
+    power = [float(np.mean(record.values[channel.name] ** 2)) for record in problem.records]
+    return math.sqrt(float(np.mean(power))) or 1.0
+
+
+def _differing(problem: Problem, fitted: Fit) -> list[Task]:
+    """Coulomb friction of another limit in every record, added to the nominal model or in the place of its friction."""
+    (placed,) = fitted.hypothesis
+    values, (eta,) = problem.split(fitted.hypothesis, fitted.vector)
+    n, names = len(problem.nominal), [record.name for record in problem.records]
+    effect, scales = differing(names), problem.scales_of(placed)
+    level = FRICTION.value(eta[0], scales)
+    tasks: list[Task] = []
+    for in_place in (False, True):
+        loss = nominal_level(problem, placed, values) if in_place else 0.0
+        if loss is None:
+            continue
+        start = np.concatenate([fitted.vector[:n], [FRICTION.eta(level + loss, scales)], np.zeros(len(names))])
+        own = replace(effect, in_place=in_place, variant="in place" if in_place else "")
+        tasks.append(((Placed(own, placed.place),), start))
+    return tasks
+
+
+def differing(records: list[str]) -> Effect:
+    """Coulomb friction of another limit in every record for identification."""
+    ideal = effect_named(IDEAL)
+    theta = ideal.theta
+    assert theta is not None
+
+    def schedule(values: Values, record: CaseRecord) -> Values:
+        factor = math.exp(values[1 + records.index(record.name)]) if record.name in records else 1.0
+        return np.array([0.0, 1.0, 2.0, factor, factor])
+
+    own = tuple(FreeParameter(f"log_ratio_{name}", signed=True, std=APART, bounds=(-4.0, 4.0)) for name in records)
+    return replace(
+        ideal, name=DIFFERS, equation="f = Fc exp(r_i) sgn(v) in record i", parameters=(*ideal.parameters, *own),
+        theta=lambda values, scales: theta(values[:1], scales), schedule=schedule, log_prior=RARE,
+    )  # fmt: skip
