@@ -31,7 +31,7 @@ from bench.laws.calling import advance, call_kernel, pointer_at
 
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
-def _driven(dt, t0, substeps, q, v, table, theta, z, force):  # noqa: PLR0912  (one compiled loop)
+def _driven(dt, t0, substeps, q, v, table, theta, z, force):  # noqa: PLR0912, PLR0915  (one compiled loop)
     """Force (n, n_rows) and hidden states of elements whose coordinates follow the samples `q`, `v` (n, n_rows)."""
     n_states = z.shape[0]
     work = np.zeros((3, MAX_ROWS + GRIPS))
@@ -114,7 +114,9 @@ def driven_force(
     force = np.zeros_like(position)
     counts = steps_of_each(substeps, len(position))
     q, v = np.ascontiguousarray(position), np.ascontiguousarray(velocity)
-    _driven(step, start_time, counts, q, v, full(elements.table), elements.theta, elements.start.copy(), force)
+    _driven(
+        step, start_time, counts, q, v, full(elements.table), elements.theta, elements.start.copy(), force
+    )
     return force
 
 

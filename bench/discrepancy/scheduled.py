@@ -27,20 +27,21 @@ from bench.discrepancy.fit import Fit
 from bench.discrepancy.nominal_file import RIGS
 from bench.discrepancy.placed import Placed
 from bench.discrepancy.problem import Problem
-from bench.discrepancy.search import Search, Task, consistent, converge
+from bench.discrepancy.search import Search, Task, consistent, converge, key_of
 from bench.discrepancy.soft_friction import IDEAL, frictional, nominal_level
+from bench.discrepancy.structure import Place
 
 Array = NDArray[np.float64]
 SCHEDULED = 4
 """Effects that are tried with a schedule: those that come nearest alone."""
+FAINT = 0.1
+"""Part of the nominal model's own friction with which more of it begins."""
 SENSITIVITY = FreeParameter("sensitivity", signed=True, mean=1.0, std=0.5, bounds=(-4.0, 6.0))
 RUBBING = ("friction", "hysteresis")
 """Families that may take the place of the nominal model's own friction."""
 LOADS = ("force", "torque")
 """Load channels of the bench's own rigs."""
 DIFFERS = "record_dependent_friction"
-APART = 0.3
-"""Prior standard deviation of the logarithm of a limit in one record over the mean."""
 
 
 def scheduling(case: Case) -> list[CaseChannel]:
@@ -62,14 +63,33 @@ def with_schedules(search: Search) -> None:
     if consistent(search.ranked()[0]):
         return
     channels = scheduling(problem.case)
-    forces = [f for f in search.ranked(1) if _schedulable(f)][:SCHEDULED]
     tasks: list[Task] = []
     for channel in channels:
-        for fitted in forces:
-            tasks += _followed(problem, fitted, channel)
+        for placed, start in _seeds(search):
+            tasks += _followed(problem, placed, start, channel)
     if not channels and len(problem.records) > 1:
-        tasks = [task for fitted in forces if fitted.hypothesis[0].effect.name == IDEAL for task in _differing(problem, fitted)]
+        tasks = [
+            t for place in problem.structure.places if len(place.rows) == 1 for t in _differing(search, place)
+        ]
     converge(search, tasks)
+
+
+def _seeds(search: Search) -> list[tuple[Placed, Array]]:
+    """Effects that are tried with a schedule, and vectors to start from: those that come nearest alone, and Coulomb friction.
+
+    Friction of the mean limit may be in the nominal model already, so that no fit has asked for any.
+    """
+    problem = search.problem
+    seeds = [(f.hypothesis[0], f.vector) for f in search.ranked(1) if _schedulable(f)][:SCHEDULED]
+    known = {placed.key for placed, _ in seeds}
+    still, ideal = search.ranked(0)[0].vector, effect_named(IDEAL)
+    for place in problem.structure.places:
+        placed = Placed(ideal, place)
+        if len(place.rows) == 1 and placed.key not in known:
+            level = nominal_level(problem, placed, problem.split((), still)[0]) or 0.0
+            faint = FAINT * level or FRICTION.value(FRICTION.mean, problem.scales_of(placed))
+            seeds.append((placed, np.append(still, FRICTION.eta(faint, problem.scales_of(placed)))))
+    return seeds
 
 
 def _schedulable(fitted: Fit) -> bool:
@@ -79,16 +99,15 @@ def _schedulable(fitted: Fit) -> bool:
     return effect.site == "joint" and plain and bool(np.isfinite(fitted.cost)) and not effect.modulated
 
 
-def _followed(problem: Problem, fitted: Fit, channel: CaseChannel) -> list[Task]:
+def _followed(problem: Problem, placed: Placed, start: Array, channel: CaseChannel) -> list[Task]:
     """Fits of an effect whose force follows a channel: added to the nominal model, and in the place of its friction."""
-    (placed,) = fitted.hypothesis
-    values, (eta,) = problem.split(fitted.hypothesis, fitted.vector)
+    values, (eta,) = problem.split((placed,), start)
     n = len(problem.nominal)
     effect = followed(placed.effect, channel, problem)
     reference = _reference(problem, channel)
     shapes = [np.append(eta, [kappa, reference]) for kappa in (0.5, 1.0)]
     new = Placed(effect, placed.place, channel.name)
-    tasks: list[Task] = [((new,), np.array([np.append(fitted.vector[:n], shape) for shape in shapes]))]
+    tasks: list[Task] = [((new,), np.array([np.append(start[:n], shape) for shape in shapes]))]
     loss = nominal_level(problem, placed, values)
     if loss is not None and placed.effect.family in RUBBING:
         scales = problem.scales_of(placed)
@@ -96,9 +115,16 @@ def _followed(problem: Problem, fitted: Fit, channel: CaseChannel) -> list[Task]
         whole = eta.copy()
         if first.name == FRICTION.name:
             whole[0] = first.eta(first.value(eta[0], scales) + loss, scales)
-        still = np.where(frictional(problem), 0.0, fitted.vector[:n])
-        starts = [np.concatenate([still, own, [kappa, reference]]) for kappa in (0.5, 1.0) for own in (whole, eta)]
-        tasks.append(((Placed(replace(effect, in_place=True, variant="in place"), placed.place, channel.name),), np.array(starts)))
+        still = np.where(frictional(problem), 0.0, start[:n])
+        starts = [
+            np.concatenate([still, own, [kappa, reference]]) for kappa in (0.5, 1.0) for own in (whole, eta)
+        ]
+        tasks.append(
+            (
+                (Placed(replace(effect, in_place=True, variant="in place"), placed.place, channel.name),),
+                np.array(starts),
+            )
+        )
     return tasks
 
 
@@ -131,36 +157,39 @@ def _reference(problem: Problem, channel: CaseChannel) -> float:
     return math.sqrt(float(np.mean(power))) or 1.0
 
 
-def _differing(problem: Problem, fitted: Fit) -> list[Task]:
+def _differing(search: Search, place: Place) -> list[Task]:
     """Coulomb friction of another limit in every record, added to the nominal model or in the place of its friction."""
-    (placed,) = fitted.hypothesis
-    values, (eta,) = problem.split(fitted.hypothesis, fitted.vector)
-    n, names = len(problem.nominal), [record.name for record in problem.records]
-    effect, scales = differing(names), problem.scales_of(placed)
-    level = FRICTION.value(eta[0], scales)
+    problem, names = search.problem, [record.name for record in search.problem.records]
+    effect = differing(names)
+    ideal = search.fits.get(key_of((Placed(effect_named(IDEAL), place),)))
+    vector = search.ranked(0)[0].vector if ideal is None else ideal.vector
+    n = len(problem.nominal)
+    scales = problem.scales_of(Placed(effect, place))
+    level = 0.0 if ideal is None else FRICTION.value(ideal.vector[n], scales)
     tasks: list[Task] = []
-    for in_place in (False, True):
-        loss = nominal_level(problem, placed, values) if in_place else 0.0
-        if loss is None:
-            continue
-        start = np.concatenate([fitted.vector[:n], [FRICTION.eta(level + loss, scales)], np.zeros(len(names))])
-        own = replace(effect, in_place=in_place, variant="in place" if in_place else "")
-        tasks.append(((Placed(own, placed.place),), start))
+    loss = nominal_level(problem, Placed(effect, place), problem.split((), vector[:n])[0])
+    replacing = replace(effect, in_place=True, variant="in place")
+    for own, limit in ((effect, level), (replacing, level + (loss or 0.0))):
+        if limit > 0.0 and (loss is not None or not own.in_place):
+            still = np.where(frictional(problem), 0.0, vector[:n]) if own.in_place else vector[:n]
+            start = np.append(still, np.full(len(names), FRICTION.eta(limit, scales)))
+            tasks.append(((Placed(own, place),), start))
     return tasks
 
 
 def differing(records: list[str]) -> Effect:
-    """Coulomb friction of another limit in every record for identification."""
+    """Coulomb friction of another limit in every record for identification, and of their mean in any other."""
     ideal = effect_named(IDEAL)
     theta = ideal.theta
     assert theta is not None
 
     def schedule(values: Values, record: CaseRecord) -> Values:
-        factor = math.exp(values[1 + records.index(record.name)]) if record.name in records else 1.0
+        factor = values[records.index(record.name)] / np.mean(values) if record.name in records else 1.0
         return np.array([0.0, 1.0, 2.0, factor, factor])
 
-    own = tuple(FreeParameter(f"log_ratio_{name}", signed=True, std=APART, bounds=(-4.0, 4.0)) for name in records)
     return replace(
-        ideal, name=DIFFERS, equation="f = Fc exp(r_i) sgn(v) in record i", parameters=(*ideal.parameters, *own),
-        theta=lambda values, scales: theta(values[:1], scales), schedule=schedule, log_prior=RARE,
+        ideal, name=DIFFERS, equation="f = Fc_i sgn(v) in record i",
+        parameters=tuple(replace(FRICTION, name=f"friction_force_{name}") for name in records),
+        theta=lambda values, scales: theta(np.array([np.mean(values)]), scales), schedule=schedule, log_prior=RARE,
+        n_linear=1,
     )  # fmt: skip

@@ -150,7 +150,7 @@ def scale_at(schedule, t):
 
 
 @_inline
-def _derivative(p, t, y, slope, load):  # noqa: PLR0912  (one compiled loop)
+def _derivative(p, t, y, slope, load):  # noqa: PLR0912, PLR0915  (one compiled loop)
     """Write dy/dt at workspace offset `slope` for the state at offset `y` and the loads at offset `load`.
 
     The holding force and the limit of every friction element go into `grip` (2, n_elements).
