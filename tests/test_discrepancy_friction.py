@@ -12,11 +12,11 @@ import pytest
 from planted_cases import load, motion_with, planted_case
 
 from bench.discrepancy import diagnose, read_case
-from bench.discrepancy.driven import driven_force
-from bench.discrepancy.friction_limits import soft_coulomb_limit
-from bench.discrepancy.mjcf_friction import frictionloss_of, softness
-from bench.discrepancy.report.application import recipes
-from bench.discrepancy.system import Elements, LinearStructure, free_run
+from bench.discrepancy.effects.friction_limits import soft_coulomb_limit
+from bench.discrepancy.model.mjcf_friction import frictionloss_of, softness
+from bench.discrepancy.report.model_update import recipes
+from bench.discrepancy.simulation.prescribed_response import driven_force
+from bench.discrepancy.simulation.stick_slip import Elements, LinearStructure, free_run
 
 MASS, DAMPING, STIFFNESS, LOSS = 2.4, 6.0, 1500.0, 2.0
 RATE = 500.0

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from bench.discrepancy import Case, CaseChannel, NominalParameter, diagnose, record_from_arrays
-from bench.discrepancy.driven import driven_force
-from bench.discrepancy.friction_limits import coulomb_limit
-from bench.discrepancy.system import Elements, LinearStructure, free_run
+from bench.discrepancy.effects.friction_limits import coulomb_limit
+from bench.discrepancy.simulation.prescribed_response import driven_force
+from bench.discrepancy.simulation.stick_slip import Elements, LinearStructure, free_run
 
 RATE = 500.0
 
