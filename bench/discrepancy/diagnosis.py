@@ -16,7 +16,13 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis, applies, diagnose_articulated
+from bench.discrepancy.articulated.diagnosis import (
+    ArticulatedDiagnosis,
+    applies,
+    diagnose_articulated,
+    drives_only,
+)
+from bench.discrepancy.articulated.effects import CATALOGUE as ARTICULATED
 from bench.discrepancy.case.case import Case, read_case
 from bench.discrepancy.case.idle_loads import idle_notes, without_idle_noise
 from bench.discrepancy.case.schema import check_units
@@ -103,12 +109,19 @@ def diagnose(
     rng = np.random.default_rng(SEED) if rng is None else rng
     known = [effect.name for effect in catalogue]
     for name in exclude:
-        if name not in known:
+        if name not in known and name not in {effect.name for effect in ARTICULATED}:
             raise UnknownNameError("effect", name, known)
     chosen = [effect for effect in catalogue if effect.name not in exclude]
     # fits run in threads of their own; threads of BLAS within them would only get in each other's way
     with threadpool_limits(1, user_api="blas"):
-        return _diagnose(case, chosen, most, rng, progress)
+        found = _diagnose(case, chosen, most, rng, progress)
+        if found.verdict.verdict == "unknown" and drives_only(case):
+            # what no force on the joint explains may sit in its drive
+            progress("effects of drives and encoders")
+            other = diagnose_articulated(case, exclude=exclude, most=most, rng=rng, progress=progress)
+            if other.verdict.verdict == "effect" and other.verdict.gap.after < found.verdict.gap.after:
+                return other
+        return found
 
 
 def _diagnose(

@@ -15,7 +15,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.discrepancy.articulated.effects import CATALOGUE, ArticulatedEffect
+from bench.discrepancy.articulated.channels import bound
+from bench.discrepancy.articulated.effects import CATALOGUE
 from bench.discrepancy.articulated.fitting import ArticulatedFit
 from bench.discrepancy.articulated.judgement import (
     JudgementSettings,
@@ -26,10 +27,19 @@ from bench.discrepancy.articulated.judgement import (
     ladder,
     predict,
 )
-from bench.discrepancy.articulated.model import DRIVES, ArticulatedModel
-from bench.discrepancy.articulated.problem import ArticulatedProblem, Hypothesis, Placed, placed_values, placements
+from bench.discrepancy.articulated.model import DRIVES, ArticulatedModel, compiled_model
+from bench.discrepancy.articulated.problem import (
+    ArticulatedProblem,
+    Hypothesis,
+    Placed,
+    nominal_parameters,
+    placed_values,
+    placements,
+)
+from bench.discrepancy.articulated.records import encoders_of, input_of
 from bench.discrepancy.articulated.search import SearchSettings, search
 from bench.discrepancy.case.case import Case
+from bench.discrepancy.effects.catalogue import CATALOGUE as LINEAR
 from bench.discrepancy.verdict import (
     Estimate,
     Gap,
@@ -40,7 +50,7 @@ from bench.discrepancy.verdict import (
     Ranked,
     Verdict,
 )
-from bench.errors import UnknownNameError
+from bench.errors import BenchError, UnknownNameError
 
 Array = NDArray[np.float64]
 SEED = 20060501
@@ -89,6 +99,23 @@ def applies(case: Case) -> bool:
     return bool(servo) or _posture_matters(model)
 
 
+def drives_only(case: Case) -> bool:
+    """Whether every joint of the rig of a case, an MJCF, is measured and driven on its own, so that this engine can be asked, too."""
+    path = Path(case.folder or ".") / case.rig
+    if case.rig in ("sdof", "joint", "damper") or not path.is_file():
+        return False
+    try:
+        compiled = compiled_model(path)
+        model, own = ArticulatedModel.of(compiled), bound(case, compiled)
+        for joint in model.joints:
+            encoders_of(own, joint)
+            input_of(own, joint)
+        nominal_parameters(own, model)
+    except BenchError:
+        return False
+    return True
+
+
 def _posture_matters(model: mujoco.MjModel) -> bool:
     if model.nv != model.njnt or model.nv < 2:
         return False
@@ -129,13 +156,16 @@ def diagnose_articulated(
     began = time.perf_counter()
     rng = np.random.default_rng(SEED) if rng is None else rng
     how, judged = settings or (SearchSettings(most=most), JudgementSettings())
-    known = [effect.name for effect in CATALOGUE]
+    known = {effect.name for effect in (*CATALOGUE, *LINEAR)}
     for name in exclude:
         if name not in known:
-            raise UnknownNameError("effect", name, known)
+            raise UnknownNameError("effect", name, sorted(known))
     catalogue = [effect for effect in CATALOGUE if effect.name not in exclude]
     progress("reading the model and the records")
-    model = ArticulatedModel.from_file(Path(case.folder or ".") / case.rig)
+    compiled = compiled_model(Path(case.folder or ".") / case.rig)
+    stated = all((c.noise_std or 0.0) > 0.0 for c in case.channels if c.role == "response")
+    case = bound(case, compiled)
+    model = ArticulatedModel.of(compiled, case.rig)
     problem = ArticulatedProblem.of(case, model, case.identification)
     judging = ArticulatedProblem.of(case, model, case.validation)
     fits = search(problem, placements(problem, catalogue), settings=how, progress=progress)
@@ -144,9 +174,11 @@ def diagnose_articulated(
     last, predictions = kept(judging, rungs, judged)
     untouched = predict(judging, None, judged)
     final = rungs[last]
-    verdict = _verdict(problem, fits, rungs, last, untouched, predictions, judged, catalogue, rng)
+    verdict = _verdict(problem, fits, rungs, last, untouched, predictions, judged, rng, stated=stated)
     verdict = verdict.timed(time.perf_counter() - began)
-    return ArticulatedDiagnosis(case, model, problem, judging, tuple(fits), final, _matrix(problem, fits), verdict)
+    return ArticulatedDiagnosis(
+        case, model, problem, judging, tuple(fits), final, _matrix(problem, fits), verdict
+    )
 
 
 def _verdict(
@@ -157,11 +189,12 @@ def _verdict(
     untouched: Prediction,
     predictions: Sequence[Prediction],
     settings: JudgementSettings,
-    catalogue: Sequence[ArticulatedEffect],
     rng: np.random.Generator,
+    *,
+    stated: bool,
 ) -> Verdict:
     final, base = rungs[last], rungs[0]
-    whole = complete(final, settings)
+    whole = stated and complete(final, settings)
     explained, _ = closed(predictions[0], predictions[last], predictions[0], rng)
     kind: Kind = "effect" if last else "none"
     if not whole and (not last or explained < settings.material):
@@ -206,10 +239,16 @@ def _words(
     names = " and ".join(f"{e.name} ({e.where})" for e in effects)
     left = "" if whole else f" {_left(problem, final)}"
     if kind == "none":
-        return "The stated uncertainties and the noise explain the records; nothing is missing from the model."
+        return (
+            "The stated uncertainties and the noise explain the records; nothing is missing from the model."
+        )
     if kind == "effect":
-        return f"Missing from the model: {names}. With it the records are explained to within their noise." if whole else (
-            f"Missing from the model: {names}, which closes {100.0 * explained:.3g} % of the discrepancy on the judging records.{left}"
+        return (
+            f"Missing from the model: {names}. With it the records are explained to within their noise."
+            if whole
+            else (
+                f"Missing from the model: {names}, which closes {100.0 * explained:.3g} % of the discrepancy on the judging records.{left}"
+            )
         )
     if effects:
         return (
@@ -300,7 +339,9 @@ def _named(
     joint = problem.joints[placed.joint]
     estimates = {
         p.name: Estimate(
-            float(values[p.name]), float(abs(p.slope(float(e), placed.scales)) * s), placed.effect.unit(p, joint.unit)
+            float(values[p.name]),
+            float(abs(p.slope(float(e), placed.scales)) * s),
+            placed.effect.unit(p, joint.unit),
         )
         for p, e, s in zip(placed.effect.parameters, eta, std, strict=True)
     }
@@ -331,7 +372,10 @@ def _gaps(
         floor = float(after.floor[j])
         one = [Prediction(p.power[:, j : j + 1], p.floor[j : j + 1]) for p in (first, after)]
         share, interval = closed(one[0], one[1], one[0], rng)
-        steps = [("nominal", float(first.discrepancy[j])), ("parameters only", float(predictions[0].discrepancy[j]))]
+        steps = [
+            ("nominal", float(first.discrepancy[j])),
+            ("parameters only", float(predictions[0].discrepancy[j])),
+        ]
         steps += [
             (" + ".join(_name(p) for p in rung.hypothesis), float(p.discrepancy[j]))
             for rung, p in zip(rungs[1:], predictions[1:], strict=True)
@@ -358,12 +402,17 @@ def _locations(problem: ArticulatedProblem, base: ArticulatedFit) -> tuple[Locat
         joint = problem.joints[int(j)]
         prepared = problem.records[0]
         channel = next(
-            c.name for c in problem.case.channels if c.target == f"joint:{joint.name}" and c.quantity == "position"
+            c.name
+            for c in problem.case.channels
+            if c.target == f"joint:{joint.name}" and c.quantity == "position"
         )
         innovation, _ = problem.innovations(int(j), (), base.vector, prepared)
         band, span = _gathered(innovation[:, 0], prepared.record.step, prepared.record.start)
         q, v = prepared.motion.position[:, j], prepared.motion.velocity[:, j]
-        region = {"displacement": (float(q.min()), float(q.max())), "velocity": (float(v.min()), float(v.max()))}
+        region = {
+            "displacement": (float(q.min()), float(q.max())),
+            "velocity": (float(v.min()), float(v.max())),
+        }
         out.append(Location(channel, joint.name, share, band, span, region, kind="undetermined"))
     return tuple(out)
 
@@ -392,7 +441,9 @@ def _remainder(
     problem: ArticulatedProblem, final: ArticulatedFit, left: Prediction, untouched: Prediction
 ) -> dict[str, object]:
     j = int(np.argmax(final.reduced))
-    innovation, _ = problem.innovations(j, final.hypothesis, final.vector, problem.motions(final.hypothesis, final.vector)[0])
+    innovation, _ = problem.innovations(
+        j, final.hypothesis, final.vector, problem.motions(final.hypothesis, final.vector)[0]
+    )
     band, span = _gathered(innovation[:, 0], problem.records[0].record.step, problem.records[0].record.start)
     return {
         "nrmse": float(left.discrepancy[j]),
@@ -426,4 +477,4 @@ def _matrix(problem: ArticulatedProblem, fits: Sequence[ArticulatedFit]) -> dict
     return out
 
 
-__all__ = ["ArticulatedDiagnosis", "Hypothesis", "applies", "diagnose_articulated"]
+__all__ = ["ArticulatedDiagnosis", "Hypothesis", "applies", "diagnose_articulated", "drives_only"]

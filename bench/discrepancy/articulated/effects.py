@@ -140,6 +140,7 @@ def _train(values: Values, p: Array) -> None:
     p[Slot.TRAIN_STIFFNESS] = values["stiffness"]
     p[Slot.TRAIN_DAMPING] = values["damping"]
     p[Slot.CLEARANCE] = values.get("half_clearance", 0.0)
+    p[Slot.MOTOR] *= values["motor_share"]
 
 
 def _stop(values: Values, p: Array) -> None:
@@ -156,13 +157,22 @@ def _cogging(values: Values, p: Array) -> None:
     p[Slot.PHASE] = math.atan2(cosine, sine)
 
 
+MOTOR_SHARE = FreeParameter(
+    "motor_share", mean=0.0, std=0.5, bounds=(-4.0, -1e-3), grid=(-1e-2, math.log(0.4)), unit="1"
+)
+"""Part of the armature that sits on the motor's side of an elastic train; what is left of it moves with the link."""
 LIMIT = FreeParameter("limit", "force", **POSITIVE)
 IN_LOOP = FreeParameter("in_loop", fixed=True, signed=True, grid=(0.0, 1.0), unit="1")
 RELATIVE = FreeParameter("relative_error", signed=True, mean=0.0, std=0.3, bounds=(-0.95, 20.0), unit="1")
 
 CATALOGUE: tuple[ArticulatedEffect, ...] = (
     ArticulatedEffect(
-        "coulomb_friction", "friction", "joint", (LIMIT,), "f = Fc sgn(v), set-valued at rest", _set(LIMIT="limit")
+        "coulomb_friction",
+        "friction",
+        "joint",
+        (LIMIT,),
+        "f = Fc sgn(v), set-valued at rest",
+        _set(LIMIT="limit"),
     ),
     ArticulatedEffect(
         "stribeck_friction",
@@ -170,9 +180,16 @@ CATALOGUE: tuple[ArticulatedEffect, ...] = (
         "joint",
         (
             LIMIT,
-            FreeParameter("rise", mean=math.log(0.7), std=0.7, bounds=(-3.0, 2.5), grid=log_grid(0.7), unit="1"),
             FreeParameter(
-                "velocity", "velocity", mean=math.log(0.1), std=1.0, bounds=(-6.0, 0.7), grid=log_grid(0.03, 0.1, 0.3)
+                "rise", mean=math.log(0.7), std=0.7, bounds=(-3.0, 2.5), grid=log_grid(0.7), unit="1"
+            ),
+            FreeParameter(
+                "velocity",
+                "velocity",
+                mean=math.log(0.1),
+                std=1.0,
+                bounds=(-6.0, 0.7),
+                grid=log_grid(0.03, 0.1, 0.3),
             ),
         ),
         "f = Fc (1 + rise exp(-(v/vs)^2)) sgn(v)",
@@ -185,9 +202,21 @@ CATALOGUE: tuple[ArticulatedEffect, ...] = (
         (
             LIMIT,
             FreeParameter(
-                "stiffness", "force/position", mean=math.log(3.0), std=1.5, bounds=(-4.0, 7.0), grid=log_grid(0.3, 1.0, 3.0, 10.0, 30.0)
+                "stiffness",
+                "force/position",
+                mean=math.log(3.0),
+                std=1.5,
+                bounds=(-4.0, 7.0),
+                grid=log_grid(0.3, 1.0, 3.0, 10.0, 30.0),
             ),
-            FreeParameter("damping", "force/velocity", mean=math.log(0.1), std=1.5, bounds=(-8.0, 3.0), grid=log_grid(0.03, 0.3)),
+            FreeParameter(
+                "damping",
+                "force/velocity",
+                mean=math.log(0.1),
+                std=1.5,
+                bounds=(-8.0, 3.0),
+                grid=log_grid(0.03, 0.3),
+            ),
         ),
         "f = s0 z + s1 z', z' = v - s0 |v| z / Fc (LuGre; Dahl for s1 = 0)",
         _set(BRISTLE_LIMIT="limit", BRISTLE_STIFFNESS="stiffness", BRISTLE_DAMPING="damping"),
@@ -197,14 +226,23 @@ CATALOGUE: tuple[ArticulatedEffect, ...] = (
         "friction",
         "joint",
         (
-            FreeParameter("limit_0", "force", mean=math.log(0.05), std=1.5, bounds=(-9.0, 4.0), grid=log_grid(0.05)),
-            FreeParameter("mu", mean=math.log(0.1), std=1.0, bounds=(-7.0, 1.0), grid=log_grid(0.1), unit="1"),
+            FreeParameter(
+                "limit_0", "force", mean=math.log(0.05), std=1.5, bounds=(-9.0, 4.0), grid=log_grid(0.05)
+            ),
+            FreeParameter(
+                "mu", mean=math.log(0.1), std=1.0, bounds=(-7.0, 1.0), grid=log_grid(0.1), unit="1"
+            ),
         ),
         "f = (F0 + mu |torque carried|) sgn(v)",
         _set(LIMIT="limit_0", CARRIED="mu"),
     ),
     ArticulatedEffect(
-        "force_offset", "offset", "joint", (FreeParameter("force", "force", **SIGNED),), "a constant torque on the joint", _add(OFFSET="force")
+        "force_offset",
+        "offset",
+        "joint",
+        (FreeParameter("force", "force", **SIGNED),),
+        "a constant torque on the joint",
+        _add(OFFSET="force"),
     ),
     ArticulatedEffect(
         "damping_error",
@@ -227,8 +265,23 @@ CATALOGUE: tuple[ArticulatedEffect, ...] = (
         "drive",
         "joint",
         (
-            FreeParameter("stiffness", "force/position", mean=math.log(10.0), std=1.5, bounds=(-2.0, 9.0), grid=log_grid(3.0, 10.0, 30.0, 100.0)),
-            FreeParameter("damping", "force/velocity", mean=math.log(0.1), std=1.5, bounds=(-9.0, 3.0), grid=log_grid(0.05)),
+            FreeParameter(
+                "stiffness",
+                "force/position",
+                mean=math.log(10.0),
+                std=1.5,
+                bounds=(-2.0, 9.0),
+                grid=log_grid(3.0, 10.0, 30.0, 100.0),
+            ),
+            FreeParameter(
+                "damping",
+                "force/velocity",
+                mean=math.log(0.1),
+                std=1.5,
+                bounds=(-9.0, 3.0),
+                grid=log_grid(0.05),
+            ),
+            MOTOR_SHARE,
         ),
         "T = k (q_motor - q_link) + c (v_motor - v_link)",
         _train,
@@ -238,9 +291,31 @@ CATALOGUE: tuple[ArticulatedEffect, ...] = (
         "drive",
         "joint",
         (
-            FreeParameter("half_clearance", "position", mean=math.log(0.02), std=1.3, bounds=(-9.0, 0.0), grid=log_grid(0.003, 0.01, 0.03, 0.1)),
-            FreeParameter("stiffness", "force/position", mean=math.log(300.0), std=1.5, bounds=(2.0, 11.0), grid=log_grid(300.0)),
-            FreeParameter("damping", "force/velocity", mean=math.log(0.3), std=1.5, bounds=(-9.0, 5.0), grid=log_grid(0.3)),
+            FreeParameter(
+                "half_clearance",
+                "position",
+                mean=math.log(0.02),
+                std=1.3,
+                bounds=(-9.0, 0.0),
+                grid=log_grid(0.003, 0.01, 0.03, 0.1),
+            ),
+            FreeParameter(
+                "stiffness",
+                "force/position",
+                mean=math.log(300.0),
+                std=1.5,
+                bounds=(2.0, 11.0),
+                grid=log_grid(300.0),
+            ),
+            FreeParameter(
+                "damping",
+                "force/velocity",
+                mean=math.log(0.3),
+                std=1.5,
+                bounds=(-9.0, 5.0),
+                grid=log_grid(0.3),
+            ),
+            MOTOR_SHARE,
         ),
         "T = k dz(q_motor - q_link, b) + c (v_motor - v_link) in contact",
         _train,
@@ -252,7 +327,9 @@ CATALOGUE: tuple[ArticulatedEffect, ...] = (
         (
             FreeParameter("sine", "force", signed=True, mean=0.0, std=0.3, bounds=(-10.0, 10.0)),
             FreeParameter("cosine", "force", signed=True, mean=0.0, std=0.3, bounds=(-10.0, 10.0)),
-            FreeParameter("periods_per_turn", fixed=True, signed=True, grid=TEETH, unit="1", bounds=(1.0, 400.0)),
+            FreeParameter(
+                "periods_per_turn", fixed=True, signed=True, grid=TEETH, unit="1", bounds=(1.0, 400.0)
+            ),
         ),
         "f = A sin(n q + phase)",
         _cogging,
@@ -262,8 +339,23 @@ CATALOGUE: tuple[ArticulatedEffect, ...] = (
         "stop",
         "joint",
         (
-            FreeParameter("stiffness", "force/position", mean=math.log(3.0), std=1.5, bounds=(-4.0, 7.0), grid=log_grid(3.0)),
-            FreeParameter("position", "position", signed=True, mean=0.0, std=0.7, bounds=(-1.2, 1.2), grid=(-0.8, -0.5, -0.2, 0.2, 0.5, 0.8)),
+            FreeParameter(
+                "stiffness",
+                "force/position",
+                mean=math.log(3.0),
+                std=1.5,
+                bounds=(-4.0, 7.0),
+                grid=log_grid(3.0),
+            ),
+            FreeParameter(
+                "position",
+                "position",
+                signed=True,
+                mean=0.0,
+                std=0.7,
+                bounds=(-1.2, 1.2),
+                grid=(-0.8, -0.5, -0.2, 0.2, 0.5, 0.8),
+            ),
             FreeParameter("damping", "force/velocity", mean=math.log(0.05), std=1.5, bounds=(-9.0, 3.0)),
             FreeParameter("side", fixed=True, signed=True, grid=(1.0, -1.0), unit="1"),
         ),
@@ -282,7 +374,17 @@ CATALOGUE: tuple[ArticulatedEffect, ...] = (
         "actuator_delay",
         "actuator",
         "actuator",
-        (FreeParameter("delay_s", "1", mean=math.log(0.01), std=1.0, bounds=(-9.0, -1.5), grid=log_grid(0.003, 0.01, 0.03), unit="s"),),
+        (
+            FreeParameter(
+                "delay_s",
+                "1",
+                mean=math.log(0.01),
+                std=1.0,
+                bounds=(-9.0, -1.5),
+                grid=log_grid(0.003, 0.01, 0.03),
+                unit="s",
+            ),
+        ),
         "input acts later by a delay",
         _set(DELAY="delay_s"),
     ),
@@ -290,7 +392,17 @@ CATALOGUE: tuple[ArticulatedEffect, ...] = (
         "actuator_lag",
         "actuator",
         "actuator",
-        (FreeParameter("time_constant_s", "1", mean=math.log(0.01), std=1.0, bounds=(-9.0, -1.0), grid=log_grid(0.003, 0.01, 0.03), unit="s"),),
+        (
+            FreeParameter(
+                "time_constant_s",
+                "1",
+                mean=math.log(0.01),
+                std=1.0,
+                bounds=(-9.0, -1.0),
+                grid=log_grid(0.003, 0.01, 0.03),
+                unit="s",
+            ),
+        ),
         "T u' + u = input",
         _set(LAG="time_constant_s"),
     ),
@@ -298,13 +410,23 @@ CATALOGUE: tuple[ArticulatedEffect, ...] = (
         "force_gain_error", "actuator", "actuator", (RELATIVE,), "tau = (1 + e) nominal", _scale(Slot.GEAR)
     ),
     ArticulatedEffect(
-        "servo_gain_error", "actuator", "actuator", (RELATIVE,), "kp = (1 + e) nominal", _scale(Slot.KP), servo=True
+        "servo_gain_error",
+        "actuator",
+        "actuator",
+        (RELATIVE,),
+        "kp = (1 + e) nominal",
+        _scale(Slot.KP),
+        servo=True,
     ),
     ArticulatedEffect(
         "actuator_saturation",
         "actuator",
         "actuator",
-        (FreeParameter("limit", "peak", mean=math.log(0.5), std=0.7, bounds=(-4.0, 0.5), grid=log_grid(0.4, 0.6, 0.8)),),
+        (
+            FreeParameter(
+                "limit", "peak", mean=math.log(0.5), std=0.7, bounds=(-4.0, 0.5), grid=log_grid(0.4, 0.6, 0.8)
+            ),
+        ),
         "|force| <= limit",
         _saturated,
     ),
@@ -312,7 +434,16 @@ CATALOGUE: tuple[ArticulatedEffect, ...] = (
         "actuator_deadband",
         "actuator",
         "actuator",
-        (FreeParameter("half_width", "input", mean=math.log(0.2), std=1.5, bounds=(-9.0, 2.0), grid=log_grid(0.03, 0.1, 0.3)),),
+        (
+            FreeParameter(
+                "half_width",
+                "input",
+                mean=math.log(0.2),
+                std=1.5,
+                bounds=(-9.0, 2.0),
+                grid=log_grid(0.03, 0.1, 0.3),
+            ),
+        ),
         "no force within a band of the input (of the position error of a servo)",
         _set(DEADBAND="half_width"),
     ),
@@ -328,7 +459,10 @@ CATALOGUE: tuple[ArticulatedEffect, ...] = (
         "position_gain_error",
         "sensor",
         "sensor",
-        (FreeParameter("relative_error", signed=True, mean=0.0, std=0.1, bounds=(-0.7, 2.0), unit="1"), IN_LOOP),
+        (
+            FreeParameter("relative_error", signed=True, mean=0.0, std=0.1, bounds=(-0.7, 2.0), unit="1"),
+            IN_LOOP,
+        ),
         "logged = (1 + e) true",
         encoder=lambda v: Encoder(gain=v["relative_error"], in_loop=v["in_loop"]),
     ),
@@ -345,7 +479,17 @@ CATALOGUE: tuple[ArticulatedEffect, ...] = (
         "position_delay",
         "sensor",
         "sensor",
-        (FreeParameter("delay_s", "1", mean=math.log(0.01), std=1.0, bounds=(-9.0, -1.5), grid=log_grid(0.01), unit="s"),),
+        (
+            FreeParameter(
+                "delay_s",
+                "1",
+                mean=math.log(0.01),
+                std=1.0,
+                bounds=(-9.0, -1.5),
+                grid=log_grid(0.01),
+                unit="s",
+            ),
+        ),
         "logged later by a delay",
         encoder=lambda v: Encoder(delay=v["delay_s"]),
     ),
@@ -361,7 +505,10 @@ CATALOGUE: tuple[ArticulatedEffect, ...] = (
         "inertia",
         "body",
         tuple(
-            FreeParameter(f"shift_{axis}", "reach", signed=True, mean=0.0, std=0.1, bounds=(-3.0, 3.0), unit="m") for axis in "xyz"
+            FreeParameter(
+                f"shift_{axis}", "reach", signed=True, mean=0.0, std=0.1, bounds=(-3.0, 3.0), unit="m"
+            )
+            for axis in "xyz"
         ),
         "the centre of mass elsewhere in the body",
     ),

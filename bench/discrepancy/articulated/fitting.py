@@ -113,12 +113,16 @@ def linearised(
     residual = problem.residual(j, base.hypothesis, base.vector) / base.scale[j]
 
     def column(i: int) -> Array:
-        step = DIFFERENCE * std[i] if base.vector[i] + DIFFERENCE * std[i] <= high[i] else -DIFFERENCE * std[i]
+        step = (
+            DIFFERENCE * std[i] if base.vector[i] + DIFFERENCE * std[i] <= high[i] else -DIFFERENCE * std[i]
+        )
         moved = base.vector.copy()
         moved[i] += step
         return (problem.residual(j, base.hypothesis, moved) / base.scale[j] - residual) / step
 
-    return np.column_stack([column(i) for i in columns]) if len(columns) else np.zeros((len(residual), 0)), residual
+    return np.column_stack([column(i) for i in columns]) if len(columns) else np.zeros(
+        (len(residual), 0)
+    ), residual
 
 
 def fit(
@@ -165,7 +169,9 @@ def fit(
     return _summary(problem, hypothesis, found.vector, found.curvature, free, scale, active, others)
 
 
-def _free(problem: ArticulatedProblem, hypothesis: Hypothesis, active: Sequence[int] | None) -> NDArray[np.int64]:
+def _free(
+    problem: ArticulatedProblem, hypothesis: Hypothesis, active: Sequence[int] | None
+) -> NDArray[np.int64]:
     """Entries that a fit moves: all that are free, or those of the active joints and the masses."""
     out = [
         i for i, p in enumerate(problem.nominal) if active is None or p.kind == "mass" or p.joint in active
@@ -221,6 +227,8 @@ def _summary(
 
 def _occam_of_rest(others: Others, moved: set[int], std: Array) -> float:
     """Occam factor of the parameters that a fit did not move, as its base had it: the same in all that are compared."""
-    covariance = others.base.covariance / np.outer(std[: len(others.base.vector)], std[: len(others.base.vector)])
+    covariance = others.base.covariance / np.outer(
+        std[: len(others.base.vector)], std[: len(others.base.vector)]
+    )
     rest = [i for i in range(len(covariance)) if i not in moved and covariance[i, i] > 0.0]
     return 0.0 if not rest else 0.5 * float(np.linalg.slogdet(covariance[np.ix_(rest, rest)])[1])

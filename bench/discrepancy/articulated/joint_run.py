@@ -8,8 +8,8 @@ with ``b_j`` what the inverse dynamics of the nominal model asks of the joint be
 the angle: both are read off MuJoCo once a record. At every sample the prediction is held against the encoder, and the state is moved by a
 constant gain times the innovation; without noise of the torque that gain is zero and the run is a free one (output error).
 
-The step is a leapfrog one: half a drift, a kick, half a drift. Damping, bristles and a servo's velocity gain are implicit in the kick, and dry
-friction is its proximal map (it truly sticks), so that no stiffness of the friction limits the step.
+The step is a leapfrog one: half a drift, a kick, half a drift. Damping, bristles and a servo's velocity gain are implicit in the kick,
+and dry friction is its proximal map (it truly sticks), so that no stiffness of the friction limits the step.
 
 References:
     L. Ljung, *System Identification*, 2nd ed. 1999, section 4.3 and chapter 7 (innovations form, prediction errors);
@@ -66,7 +66,9 @@ class Slot(IntEnum):
     MOTOR = 33  # inertia of the motor, at the joint
     ENCODER = 34  # 0: on the motor, 1: on the link
     SPEED_LIMIT = 35  # speed at which the force available has fallen to zero; 0: no such limit
-    RATIO = 36  # reading of the encoder that a servo acts on over the true position; one where nothing is wrong
+    RATIO = (
+        36  # reading of the encoder that a servo acts on over the true position; one where nothing is wrong
+    )
 
     ON_LINK = 37  # 1: damping acts on the link's side of a train
 
@@ -74,7 +76,13 @@ class Slot(IntEnum):
 SLOTS = len(Slot)
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True, inline="always")
+FAR = 1e6
+"""Error from which a run counts as diverged [rad, m, or these per second]."""
+
+_inlined = numba.njit(cache=True, error_model="numpy", nogil=True, inline="always")
+
+
+@_inlined
 def _input(u, k, shift):
     """Input at the middle of step `k`, delayed by `shift` steps."""
     at = k - shift
@@ -83,11 +91,10 @@ def _input(u, k, shift):
     low = int(at)
     if low >= u.shape[0] - 1:
         return u[u.shape[0] - 1]
-    part = at - low
-    return u[low] + part * (u[low + 1] - u[low])
+    return u[low] + (at - low) * (u[low + 1] - u[low])
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True, inline="always")
+@_inlined
 def _beyond(x, width):
     """What of `x` lies beyond a dead band of half width `width`."""
     if x > width:
@@ -97,8 +104,99 @@ def _beyond(x, width):
     return 0.0
 
 
+@_inlined
+def _actuator(p, command, q, v, lagged, keep):
+    """Force of the actuator at the joint, the part of its velocity gain that the step may take implicitly, and the state of its lag."""
+    implicit = 0.0
+    if p[1] > 0.5:  # a servo
+        wanted = p[2] * _beyond(command - p[36] * q, p[26]) - p[3] * p[36] * v
+        implicit = p[3] * p[36]
+    else:
+        wanted = p[2] * _beyond(command, p[26])
+    if p[27] > 0.0:
+        lagged = wanted if math.isnan(lagged) else wanted + (lagged - wanted) * keep
+        wanted = lagged
+        implicit = 0.0
+    low, high = p[4], p[5]
+    if p[35] > 0.0:  # the force available falls with the speed
+        high = min(high, high * max(0.0, 1.0 - v / p[35]))
+        low = max(low, low * max(0.0, 1.0 + v / p[35]))
+    if wanted > high or wanted < low:
+        wanted = min(max(wanted, low), high)
+        implicit = 0.0
+    return p[0] * wanted, p[0] * implicit, lagged
+
+
+@_inlined
+def _stop(p, x, w):
+    """Force of the one-sided stop on the joint; it only pushes."""
+    depth = p[25] * (x - p[23])
+    if p[22] > 0.0 and depth > 0.0:
+        return -p[25] * max(p[22] * depth + p[24] * p[25] * w, 0.0)
+    return 0.0
+
+
+@_inlined
+def _friction_limit(p, v, load):
+    """Limit of the dry friction."""
+    limit = p[10]
+    if p[11] != 0.0:
+        ratio = v / p[12]
+        limit *= 1.0 + p[11] * math.exp(-ratio * ratio)
+    return limit + p[13] * load
+
+
+@_inlined
+def _bristles(p, v, z):
+    """Force of the bristles at velocity `v`, and the damping that the step may take implicitly."""
+    if p[16] <= 0.0:
+        return 0.0, 0.0
+    damping = p[18] * (1.0 - p[17] / p[16] * z * math.copysign(1.0, v))
+    implicit = 0.5 * max(damping, 0.0)
+    return -p[17] * z - (damping - implicit) * v, implicit
+
+
+@_inlined
+def _slid(p, z, v, step):
+    """The bristles after a step of sliding at velocity `v`; exact where that is constant."""
+    if p[16] <= 0.0:
+        return z
+    steady = math.copysign(p[16] / p[17], v)
+    return steady + (z - steady) * math.exp(-p[17] * abs(v) * step / p[16])
+
+
+@_inlined
+def _kick_train(p, mass, step, motor_force, link_force, damping, implicit, bristle, limit, q, v, ql, vl):
+    """New velocities of motor and link: implicit in the damping of the train, dry friction on the motor by its proximal map."""
+    motor, link = p[33] + p[9], mass - p[33]
+    on_motor, on_link = (0.0, damping) if p[37] > 0.5 else (damping, 0.0)
+    beyond = _beyond(q - ql, p[32])
+    torque = p[30] * beyond
+    grip = p[31] if beyond != 0.0 else 0.0
+    a11 = motor / step + 0.5 * (on_motor + implicit) + grip + bristle
+    a22 = link / step + 0.5 * on_link + grip
+    b1 = motor / step * v + motor_force - torque - 0.5 * (on_motor - implicit) * v
+    b2 = link / step * vl + link_force + torque - 0.5 * on_link * vl
+    det = a11 - grip * grip / a22
+    free = (b1 + grip * b2 / a22) / det
+    new = math.copysign(max(abs(free) - limit / det, 0.0), free)
+    return new, (b2 + grip * new) / a22
+
+
+@_inlined
+def _set_anew(p, bias, q, on_link):
+    """Positions of motor and link that rest at an encoder's reading `q`, the train wound up by what the link weighs."""
+    if p[29] <= 0.5:
+        return q, q
+    weight = bias + p[7] * (q - p[8])
+    wound = weight / p[30] + math.copysign(p[32], weight)
+    return (q + wound, q) if on_link else (q, q - wound)
+
+
 @numba.njit(cache=True, error_model="numpy", nogil=True)
-def run(p, mass, bias, slope, reference, load, u, step, n_sub, y, v_measured, gain, starts, every, out, states):  # noqa: PLR0912, PLR0915
+def run(
+    p, mass, bias, slope, reference, load, u, step, n_sub, y, v_measured, gain, starts, every, out, states
+):
     """Predict the encoder of one joint sample by sample.
 
     Args:
@@ -117,156 +215,52 @@ def run(p, mass, bias, slope, reference, load, u, step, n_sub, y, v_measured, ga
         states: (n, 4) predicted position and velocity on the encoder's side, then of the link where there is a train; overwritten.
     """
     n = y.shape[0]
-    has_velocity = v_measured.shape[0] > 0
-    servo = p[1] > 0.5
     train = p[29] > 0.5
-    encoder_on_link = p[34] > 0.5
-    q, v = 0.0, 0.0  # motor, and everything where there is no train
-    ql, vl = 0.0, 0.0
-    z = 0.0
-    shift = p[28] / step
-    lagged = 0.0
-    lagging = p[27] > 0.0
-    keep = math.exp(-step / p[27]) if lagging else 0.0
-    first = True
-    bristles = p[16] > 0.0
+    on_link = train and p[34] > 0.5
+    q, v, ql, vl, z = 0.0, 0.0, 0.0, 0.0, 0.0
+    lagged = math.nan
+    keep = math.exp(-step / p[27]) if p[27] > 0.0 else 0.0
     for i in range(n):
         if i % every == 0:
-            q, v = starts[i // every, 0], starts[i // every, 1]
-            ql, vl = q, v
-            if train:  # the train is wound up by what the link weighs
-                weight = bias[min(i * n_sub, bias.shape[0] - 1)] + p[7] * (q - p[8])
-                wound = weight / p[30] + math.copysign(p[32], weight)
-                if encoder_on_link:
-                    q += wound
-                else:
-                    ql -= wound
-        at_q, at_v = (ql, vl) if (train and encoder_on_link) else (q, v)
-        states[i, 0], states[i, 1] = at_q, at_v
+            q, ql = _set_anew(p, bias[min(i * n_sub, bias.shape[0] - 1)], starts[i // every, 0], on_link)
+            v = vl = starts[i // every, 1]
+        states[i, 0], states[i, 1] = (ql, vl) if on_link else (q, v)
         states[i, 2], states[i, 3] = ql, vl
-        r0 = y[i] - at_q
-        r1 = v_measured[i] - at_v if has_velocity else 0.0
-        out[i, 0], out[i, 1] = r0, r1
-        dq = gain[0, 0] * r0 + gain[0, 1] * r1
-        dv = gain[1, 0] * r0 + gain[1, 1] * r1
-        q += dq
-        v += dv
-        ql += dq
-        vl += dv
+        out[i, 0] = y[i] - states[i, 0]
+        out[i, 1] = v_measured[i] - states[i, 1] if v_measured.shape[0] > 0 else 0.0
+        if not (abs(out[i, 0]) < FAR and abs(out[i, 1]) < FAR):
+            out[i:] = math.nan
+            return
         if i == n - 1:
             break
-        for s in range(n_sub):
-            k = i * n_sub + s
+        q += gain[0, 0] * out[i, 0] + gain[0, 1] * out[i, 1]
+        ql += gain[0, 0] * out[i, 0] + gain[0, 1] * out[i, 1]
+        v += gain[1, 0] * out[i, 0] + gain[1, 1] * out[i, 1]
+        vl += gain[1, 0] * out[i, 0] + gain[1, 1] * out[i, 1]
+        for k in range(i * n_sub, (i + 1) * n_sub):
             q += 0.5 * step * v
+            ql += 0.5 * step * vl
+            force, implicit, lagged = _actuator(p, _input(u, k, p[28] / step), q, v, lagged, keep)
+            bristle_force, bristle = _bristles(p, v, z)
+            own = force + bristle_force - p[19] * math.sin(p[20] * q + p[21])
+            x, w = (ql, vl) if train else (q, v)
+            rest = p[15] - bias[k] - slope[k] * (x - reference[k]) - p[7] * (x - p[8]) + _stop(p, x, w)
+            limit = _friction_limit(p, v, load[k])
+            damping = p[6] + p[14] * abs(v)
+            before = v
             if train:
-                ql += 0.5 * step * vl
-            # the actuator
-            command = _input(u, float(k), shift)
-            implicit = 0.0
-            if servo:
-                wanted = p[2] * _beyond(command - p[36] * q, p[26]) - p[3] * p[36] * v
-                implicit = p[3] * p[36]
-            else:
-                wanted = _beyond(command, p[26])
-            if lagging:
-                if first:
-                    lagged = wanted
-                    first = False
-                lagged = wanted + (lagged - wanted) * keep
-                wanted = lagged
-                implicit = 0.0
-            low, high = p[4], p[5]
-            if p[35] > 0.0:  # the force available falls with the speed
-                high = min(high, high * max(0.0, 1.0 - v / p[35]))
-                low = max(low, low * max(0.0, 1.0 + v / p[35]))
-            if wanted > high:
-                wanted = high
-                implicit = 0.0
-            elif wanted < low:
-                wanted = low
-                implicit = 0.0
-            force = p[0] * wanted
-            implicit *= p[0]
-            # forces of the joint
-            if train:
-                x, w = ql, vl
-            else:
-                x, w = q, v
-            rest = -bias[k] - slope[k] * (x - reference[k]) + p[15]
-            rest -= p[7] * (x - p[8])
-            own = 0.0  # on the motor's side
-            if p[19] != 0.0:
-                own -= p[19] * math.sin(p[20] * q + p[21])
-            if p[22] > 0.0:
-                depth = p[25] * (x - p[23])
-                if depth > 0.0:
-                    push = p[22] * depth + p[24] * p[25] * w
-                    if push > 0.0:
-                        rest -= p[25] * push
-            # friction acts where the motor is
-            limit = p[10]
-            if limit > 0.0 or p[13] > 0.0:
-                if p[11] != 0.0:
-                    ratio = v / p[12]
-                    limit *= 1.0 + p[11] * math.exp(-ratio * ratio)
-                limit += p[13] * load[k]
-            damping = p[6] + p[14] * abs(v) + 0.0
-            if bristles:
-                fall = p[17] / p[16]
-                rate = 1.0 - fall * z * math.copysign(1.0, v)
-                own -= p[17] * z
-                bristle = p[18] * rate
-                if bristle > 0.0:
-                    own -= bristle * 0.5 * v
-                    implicit_bristle = 0.5 * bristle
-                else:
-                    own -= bristle * v
-                    implicit_bristle = 0.0
-            else:
-                implicit_bristle = 0.0
-            if train:
-                motor = p[33] + p[9]
-                link = mass[k] - p[33]
-                wind = q - ql
-                beyond = _beyond(wind, p[32])
-                torque = 0.0
-                grip = 0.0
-                if beyond != 0.0:
-                    torque = p[30] * beyond
-                    grip = p[31]
-                # implicit in the damping of the train, solved for both velocities
-                on_motor, on_link = (0.0, damping) if p[37] > 0.5 else (damping, 0.0)
-                a11 = motor / step + 0.5 * (on_motor + implicit) + grip + implicit_bristle
-                a22 = link / step + 0.5 * on_link + grip
-                b1 = motor / step * v + force + own - torque - 0.5 * (on_motor - implicit) * v
-                b2 = link / step * vl + rest + torque - 0.5 * on_link * vl
-                # friction on the motor: eliminate the link, then the proximal map
-                det = a11 - grip * grip / a22
-                free = (b1 + grip * b2 / a22) / det
-                stuck = limit / det
-                v_new = math.copysign(max(abs(free) - stuck, 0.0), free)
-                vl = (b2 + grip * v_new) / a22
-                v_mid = v_new
-                v = v_new
+                v, vl = _kick_train(
+                    p, mass[k], step, own, rest, damping, implicit, bristle, limit, q, v, ql, vl
+                )
             else:
                 inertia = (mass[k] + p[9]) / step
-                total = inertia * v + force + rest + own - 0.5 * (damping - implicit) * v
-                a = inertia + 0.5 * (damping + implicit) + implicit_bristle
-                free = total / a
-                v_new = math.copysign(max(abs(free) - limit / a, 0.0), free)
-                v_mid = 0.5 * (v + v_new)
-                v = v_new
-            if bristles:
-                steady = math.copysign(p[16] / p[17], v_mid)
-                z = steady + (z - steady) * math.exp(-p[17] * abs(v_mid) * step / p[16])
+                a = inertia + 0.5 * (damping + implicit) + bristle
+                free = (inertia * v + own + rest - 0.5 * (damping - implicit) * v) / a
+                v = math.copysign(max(abs(free) - limit / a, 0.0), free)
+                vl = v
+            z = _slid(p, z, 0.5 * (before + v), step)
             q += 0.5 * step * v
-            if train:
-                ql += 0.5 * step * vl
-            if not (abs(q) < 1e6 and abs(v) < 1e9):
-                for j in range(i, n):
-                    out[j, 0] = math.nan
-                    out[j, 1] = math.nan
-                return
+            ql += 0.5 * step * vl
 
 
 def predict(

@@ -65,7 +65,9 @@ class Prediction:
         return np.asarray((self.power - self.floor**2).sum(axis=1))
 
 
-def predict(problem: ArticulatedProblem, found: ArticulatedFit | None, settings: JudgementSettings) -> Prediction:
+def predict(
+    problem: ArticulatedProblem, found: ArticulatedFit | None, settings: JudgementSettings
+) -> Prediction:
     """Free runs of a problem's records with a fit's model; with the nominal model as it is where None."""
     hypothesis = found.hypothesis if found else ()
     vector = found.vector if found else np.zeros(len(problem.nominal))
@@ -80,7 +82,9 @@ def predict(problem: ArticulatedProblem, found: ArticulatedFit | None, settings:
             size = max(float(np.std(prepared.joints[j].position)), float(np.max(prepared.joints[j].noise)))
             error = np.nan_to_num(errors[jobs.index((j, r))], nan=1e3 * size)
             factor = 1.0 + motions[r].joints[j].encoder.gain
-            columns.append([float(np.mean(b**2)) for b in np.array_split(error * factor / size, settings.blocks)])
+            columns.append(
+                [float(np.mean(b**2)) for b in np.array_split(error * factor / size, settings.blocks)]
+            )
             floor.append(prepared.joints[j].free_run_noise() / size)
         rows.append(np.array(columns).T)
         floors.append(floor)
@@ -119,7 +123,9 @@ def complete(found: ArticulatedFit, settings: JudgementSettings) -> bool:
     return bool(np.all(found.reduced <= (1.0 + settings.noise_known) ** 2))
 
 
-def closed(before: Prediction, after: Prediction, first: Prediction, rng: np.random.Generator) -> tuple[float, tuple[float, float]]:
+def closed(
+    before: Prediction, after: Prediction, first: Prediction, rng: np.random.Generator
+) -> tuple[float, tuple[float, float]]:
     """Part of the first discrepancy that lies between two predictions, and its block-bootstrap interval; of the squares of NRMSE."""
     table = np.column_stack([before.excess - after.excess, first.excess])
     draws = table[rng.integers(len(table), size=(1000, len(table)))].sum(axis=1)

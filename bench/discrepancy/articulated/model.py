@@ -119,11 +119,7 @@ class ArticulatedModel:
         Raises:
             ModelError: It cannot be read, or something in it is no hinge or slide on a fixed base.
         """
-        try:
-            model = mujoco.MjModel.from_xml_path(str(path))
-        except ValueError as error:
-            raise ModelError(f"'{path}' is no MJCF that MuJoCo reads: {error}") from None
-        return cls.of(model, str(path))
+        return cls.of(compiled_model(path), str(path))
 
     @classmethod
     def of(cls, model: mujoco.MjModel, name: str = "model") -> ArticulatedModel:
@@ -213,6 +209,18 @@ class ArticulatedModel:
         return out
 
 
+def compiled_model(path: str | Path) -> mujoco.MjModel:
+    """Compile an MJCF.
+
+    Raises:
+        ModelError: MuJoCo does not read it.
+    """
+    try:
+        return mujoco.MjModel.from_xml_path(str(path))
+    except ValueError as error:
+        raise ModelError(f"'{path}' is no MJCF that MuJoCo reads: {error}") from None
+
+
 def _refuse(model: mujoco.MjModel, name: str) -> None:
     for i in range(model.njnt):
         if int(model.jnt_type[i]) not in MOVING:
@@ -264,10 +272,15 @@ def _drive(model: mujoco.MjModel, u: int) -> Drive:
         )
     servo = affine and bias[1] != 0.0
     lag = 0.0
-    if int(model.actuator_dyntype[u]) in (int(mujoco.mjtDyn.mjDYN_FILTER), int(mujoco.mjtDyn.mjDYN_FILTEREXACT)):
+    if int(model.actuator_dyntype[u]) in (
+        int(mujoco.mjtDyn.mjDYN_FILTER),
+        int(mujoco.mjtDyn.mjDYN_FILTEREXACT),
+    ):
         lag = float(model.actuator_dynprm[u, 0])
     elif int(model.actuator_dyntype[u]) != int(mujoco.mjtDyn.mjDYN_NONE):
-        raise ModelError(f"actuator '{name}' has an activation that is no first-order filter; none or 'filter' is expected")
+        raise ModelError(
+            f"actuator '{name}' has an activation that is no first-order filter; none or 'filter' is expected"
+        )
     forces = model.actuator_forcerange[u] if model.actuator_forcelimited[u] else (-np.inf, np.inf)
     inputs = model.actuator_ctrlrange[u] if model.actuator_ctrllimited[u] else (-np.inf, np.inf)
     joint = int(model.actuator_trnid[u, 0])

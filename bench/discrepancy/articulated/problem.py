@@ -21,7 +21,14 @@ from numpy.typing import NDArray
 from bench.discrepancy.articulated.effects import ArticulatedEffect, JointScales
 from bench.discrepancy.articulated.joint_run import SLOTS, Slot, predict
 from bench.discrepancy.articulated.model import ArticulatedModel, Joint
-from bench.discrepancy.articulated.records import Encoder, JointRecord, PreparedRecord, corrected, prepare, relinked
+from bench.discrepancy.articulated.records import (
+    Encoder,
+    JointRecord,
+    PreparedRecord,
+    corrected,
+    prepare,
+    relinked,
+)
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.errors import UnknownNameError
 
@@ -220,7 +227,9 @@ class ArticulatedProblem:
             record.n_sub, (record.position, record.velocity), gain, starts, every,
         )  # fmt: skip
 
-    def _coefficients(self, record: JointRecord, hypothesis: Hypothesis, vector: Array) -> tuple[Array, Array]:
+    def _coefficients(
+        self, record: JointRecord, hypothesis: Hypothesis, vector: Array
+    ) -> tuple[Array, Array]:
         bias, inertia = record.bias, record.inertia
         for i in self.masses:
             if vector[i] != 0.0:
@@ -340,9 +349,7 @@ def nominal_parameters(case: Case, model: ArticulatedModel) -> tuple[Nominal, ..
         elif kind in LOCAL_SLOTS:
             known = joints
         else:
-            raise UnknownNameError(
-                "parameter", parameter.name, [f"{k}:NAME" for k in ("mass", *LOCAL_SLOTS)]
-            )
+            raise UnknownNameError("parameter", parameter.name, [f"{k}:NAME" for k in ("mass", *LOCAL_SLOTS)])
         if target not in known:
             raise UnknownNameError(f"target of parameter '{parameter.name}'", target, list(known))
         if parameter.std > 0.0:
@@ -364,9 +371,19 @@ def placements(problem: ArticulatedProblem, catalogue: Sequence[ArticulatedEffec
                 continue
             if effect.needs == "velocity" and not velocity:
                 continue
-            where = {"joint": joint.name, "sensor": joint.name, "actuator": drive.name, "body": joint.body}[effect.site]
+            where = {"joint": joint.name, "sensor": joint.name, "actuator": drive.name, "body": joint.body}[
+                effect.site
+            ]
             out.append(Placed(effect, where, j, scales))
     return out
 
 
-__all__ = ["ArticulatedProblem", "Hypothesis", "Nominal", "Placed", "misfit_of", "nominal_parameters", "placements"]
+__all__ = [
+    "ArticulatedProblem",
+    "Hypothesis",
+    "Nominal",
+    "Placed",
+    "misfit_of",
+    "nominal_parameters",
+    "placements",
+]

@@ -189,7 +189,7 @@ class JointRecord:
 
 
 WINDOW = 0.5
-"""Length of a free run of a joint that no servo holds [s]: some time constants of what drives it, and far less than it takes to drift off."""
+"""Length of a free run of a joint that no servo holds [s]: some time constants of its drive, and far less than it takes to drift off."""
 
 
 class Encoders(NamedTuple):
@@ -222,7 +222,7 @@ def encoders_of(case: Case, joint: Joint) -> Encoders:
             found[ORDERS[channel.quantity]] = channel
     if 0 not in found:
         raise FileFormatError(
-            f"nothing measures the position of joint '{joint.name}'; give a channel \"joint\": \"{joint.name}\", "
+            f'nothing measures the position of joint \'{joint.name}\'; give a channel "joint": "{joint.name}", '
             '"quantity": "position", or weld the joint where it was held'
         )
     channels = tuple(found[order] for order in sorted(found))
@@ -326,10 +326,14 @@ def prepare(case: Case, model: ArticulatedModel, record: CaseRecord) -> Prepared
         """Changes of bias and inertia (n_joints, 2, n_steps)."""
         return _Coefficients.of(_difference(changed, dynamics), motion, clock).stacked
 
-    masses = {body: beside(model.with_mass(body, model.mass(body) + 1.0).dynamics(*moved)) for body in model.bodies}
+    masses = {
+        body: beside(model.with_mass(body, model.mass(body) + 1.0).dynamics(*moved)) for body in model.bodies
+    }
     payloads = {body: beside(model.with_payload(body, 1.0).dynamics(*moved)) for body in model.bodies}
     centres = {
-        body: np.stack([beside(model.with_centre(body, SHIFT * axis).dynamics(*moved)) / SHIFT for axis in np.eye(3)])
+        body: np.stack(
+            [beside(model.with_centre(body, SHIFT * axis).dynamics(*moved)) / SHIFT for axis in np.eye(3)]
+        )
         for body in model.bodies
     }
     slope = clock.between(model.slopes(*moved))

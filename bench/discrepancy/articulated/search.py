@@ -1,4 +1,4 @@
-"""Search for what is missing from an articulated model: screening of all effects at all places, fits of the most promising, one more at a time.
+"""Search for what is missing from an articulated model: effects at all places are screened, the most promising fitted, one by one.
 
 A screened effect is one run (or a few, over a grid) of the joints that it changes. The change that it makes, less what the nominal
 parameters could do as well, is regressed on the residuals: what that takes away is what the effect promises.
@@ -69,7 +69,9 @@ class _Ground:
     def __init__(self, problem: ArticulatedProblem, base: ArticulatedFit, joints: Sequence[int]) -> None:
         self.joints = tuple(joints)
         columns = [
-            i for i in range(len(base.vector)) if base.covariance[i, i] > 0.0 and self._moves(problem, base, i)
+            i
+            for i in range(len(base.vector))
+            if base.covariance[i, i] > 0.0 and self._moves(problem, base, i)
         ]
         parts = in_threads(lambda j: linearised(problem, base, j, columns), self.joints)
         mean, std, _, _ = problem.prior(base.hypothesis)
@@ -213,7 +215,13 @@ def search(
         settled = problem.settled(current.hypothesis, current.vector)
         if settled is not problem:
             problem = settled
-            current = fit(problem, current.hypothesis, current.vector, scale=current.scale, iterations=settings.iterations)
+            current = fit(
+                problem,
+                current.hypothesis,
+                current.vector,
+                scale=current.scale,
+                iterations=settings.iterations,
+            )
             found.append(current)
     return sorted(found, key=lambda f: -f.log_posterior)
 
@@ -230,9 +238,13 @@ def _round(
             break
         hypothesis: Hypothesis = (*base.hypothesis, mine[0].placed)
         starts = np.array([np.concatenate([base.vector, point.eta]) for point in mine])
-        new = fit(problem, hypothesis, starts, scale=base.scale, iterations=settings.iterations, others=others)
+        new = fit(
+            problem, hypothesis, starts, scale=base.scale, iterations=settings.iterations, others=others
+        )
         # once more with the scale that it leaves: what a joint says of the masses counts for more then
-        new = fit(problem, hypothesis, new.vector, scale=new.scale, iterations=settings.iterations, others=others)
+        new = fit(
+            problem, hypothesis, new.vector, scale=new.scale, iterations=settings.iterations, others=others
+        )
         fits.append(new)
         gained = max(gained, 2.0 * (new.log_posterior - base.log_posterior))
     if not fits:

@@ -55,7 +55,9 @@ def _errors(diagnosis: ArticulatedDiagnosis, fit: ArticulatedFit | None) -> Arra
 def articulated_page(diagnosis: ArticulatedDiagnosis) -> Page:
     """Build the report."""
     verdict = diagnosis.verdict
-    out = Page(f"Diagnosis of {diagnosis.case.name}", verdict.explanation, f"{verdict.seconds:.1f} s of computation")
+    out = Page(
+        f"Diagnosis of {diagnosis.case.name}", verdict.explanation, f"{verdict.seconds:.1f} s of computation"
+    )
     _what(out, diagnosis)
     _how_far(out, diagnosis)
     _where(out, diagnosis)
@@ -105,7 +107,12 @@ def _where(out: Page, diagnosis: ArticulatedDiagnosis) -> None:
         "What the nominal model leaves beyond the noise, its parameters re-estimated",
         ("joint", "share", "band [Hz]", "time [s]"),
         [
-            (p.dof, f"{100 * p.share:.3g} %", f"{p.band_hz[0]:.3g} to {p.band_hz[1]:.3g}", f"{p.time_s[0]:.3g} to {p.time_s[1]:.3g}")
+            (
+                p.dof,
+                f"{100 * p.share:.3g} %",
+                f"{p.band_hz[0]:.3g} to {p.band_hz[1]:.3g}",
+                f"{p.time_s[0]:.3g} to {p.time_s[1]:.3g}",
+            )
             for p in diagnosis.verdict.locations
         ],
     )
@@ -117,7 +124,13 @@ def _where(out: Page, diagnosis: ArticulatedDiagnosis) -> None:
             "screening promised too little for a fit",
             ("effect", *joints),
             [
-                (name, *(f"{100 * diagnosis.matrix[j][name]:.3g} %" if name in diagnosis.matrix[j] else "" for j in joints))
+                (
+                    name,
+                    *(
+                        f"{100 * diagnosis.matrix[j][name]:.3g} %" if name in diagnosis.matrix[j] else ""
+                        for j in joints
+                    ),
+                )
                 for name in effects
             ],
         )
@@ -129,7 +142,12 @@ def _parameters(out: Page, diagnosis: ArticulatedDiagnosis) -> None:
         "Re-estimated within their stated uncertainty",
         ("parameter", "stated", "estimate", "shift in stated sigmas"),
         [
-            (p.name, f"{p.stated:.5g} ± {p.stated_std:.2g}", f"{p.value:.5g} ± {p.std:.2g}", f"{p.shift_in_std:+.2f}")
+            (
+                p.name,
+                f"{p.stated:.5g} ± {p.stated_std:.2g}",
+                f"{p.value:.5g} ± {p.std:.2g}",
+                f"{p.shift_in_std:+.2f}",
+            )
             for p in diagnosis.verdict.nominal
         ],
     )
