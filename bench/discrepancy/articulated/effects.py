@@ -24,6 +24,11 @@ Array = NDArray[np.float64]
 Site = Literal["joint", "body", "actuator", "sensor"]
 Values = dict[str, float]
 
+NUMBERS = frozenset({
+    "mass_error", "com_error", "armature_error", "damping_error", "force_gain_error", "servo_gain_error", "position_gain_error",
+    "force_offset", "position_offset",
+})  # fmt: skip
+"""Effects that are a wrong number."""
 POSITIVE = {"mean": math.log(0.2), "std": 1.5, "bounds": (-9.0, 4.0)}
 """Prior of a positive amplitude: a fifth of its scale, within a factor of twenty with 95 %."""
 SIGNED = {"signed": True, "mean": 0.0, "std": 0.5, "bounds": (-30.0, 30.0)}
@@ -85,6 +90,11 @@ class ArticulatedEffect:
     needs: str = ""
 
     @property
+    def number(self) -> bool:
+        """Whether a number of the model or of the log is wrong, rather than a force missing."""
+        return self.name in NUMBERS
+
+    @property
     def train(self) -> bool:
         """Whether it is an elastic drive train between motor and link."""
         return self.slots is _train
@@ -141,6 +151,7 @@ def _train(values: Values, p: Array) -> None:
     p[Slot.TRAIN_DAMPING] = values["damping"]
     p[Slot.CLEARANCE] = values.get("half_clearance", 0.0)
     p[Slot.MOTOR] *= values["motor_share"]
+    p[Slot.ENCODER] = values["encoder_on_link"]
 
 
 def _stop(values: Values, p: Array) -> None:
@@ -161,6 +172,8 @@ MOTOR_SHARE = FreeParameter(
     "motor_share", mean=0.0, std=0.5, bounds=(-4.0, -1e-3), grid=(-1e-2, math.log(0.4)), unit="1"
 )
 """Part of the armature that sits on the motor's side of an elastic train; what is left of it moves with the link."""
+ON_LINK = FreeParameter("encoder_on_link", fixed=True, signed=True, grid=(0.0, 1.0), unit="1")
+"""Side of the encoder; tried where the channel does not state its ``"side"``."""
 LIMIT = FreeParameter("limit", "force", **POSITIVE)
 IN_LOOP = FreeParameter("in_loop", fixed=True, signed=True, grid=(0.0, 1.0), unit="1")
 RELATIVE = FreeParameter("relative_error", signed=True, mean=0.0, std=0.3, bounds=(-0.95, 20.0), unit="1")
@@ -271,7 +284,7 @@ CATALOGUE: tuple[ArticulatedEffect, ...] = (
                 mean=math.log(10.0),
                 std=1.5,
                 bounds=(-2.0, 9.0),
-                grid=log_grid(3.0, 10.0, 30.0, 100.0),
+                grid=log_grid(1.0, 3.0, 10.0, 30.0, 100.0),
             ),
             FreeParameter(
                 "damping",
@@ -282,6 +295,7 @@ CATALOGUE: tuple[ArticulatedEffect, ...] = (
                 grid=log_grid(0.05),
             ),
             MOTOR_SHARE,
+            ON_LINK,
         ),
         "T = k (q_motor - q_link) + c (v_motor - v_link)",
         _train,
@@ -316,6 +330,7 @@ CATALOGUE: tuple[ArticulatedEffect, ...] = (
                 grid=log_grid(0.3),
             ),
             MOTOR_SHARE,
+            ON_LINK,
         ),
         "T = k dz(q_motor - q_link, b) + c (v_motor - v_link) in contact",
         _train,

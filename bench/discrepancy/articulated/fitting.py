@@ -45,6 +45,16 @@ class ArticulatedFit:
     count: Array
     log_posterior: float
 
+    @classmethod
+    def at(cls, problem: ArticulatedProblem, hypothesis: Hypothesis, vector: Array) -> ArticulatedFit:
+        """A hypothesis as it stands at a vector (whose further entries are left out), not fitted and without a posterior."""
+        size = problem.size(hypothesis)
+        residuals = [problem.residual(j, hypothesis, vector[:size]) for j in range(len(problem.joints))]
+        chi2 = np.array([float(r @ r) for r in residuals])
+        count = np.array([float(len(r)) for r in residuals])
+        _, std, _, _ = problem.prior(hypothesis)
+        return cls(hypothesis, vector[:size], np.diag(std**2), chi2, count, -np.inf)
+
     @property
     def reduced(self) -> Array:
         """Mean squared whitened innovation of every joint; one where nothing is missing."""

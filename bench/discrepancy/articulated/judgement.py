@@ -106,14 +106,18 @@ def kept(
 ) -> tuple[int, list[Prediction]]:
     """How many effects of a ladder the judging records bear out, and the predictions of every rung.
 
-    The first effects are kept up to the last that improves on the one before by more than its standard error allows for.
+    Effects are kept up to the last that improves on what was kept before it by more than the standard error allows for, and that takes
+    away more than it leaves. Nothing is added to what is complete.
     """
     predictions = [predict(problem, rung, settings) for rung in rungs]
     last = 0
     for k in range(1, len(rungs)):
+        if complete(rungs[last], settings):
+            break
         difference = predictions[last].excess - predictions[k].excess
         error = float(np.std(difference, ddof=1)) / np.sqrt(len(difference))
-        if float(np.mean(difference)) > settings.sure * error:
+        gained, left = float(np.mean(difference)), float(np.mean(predictions[k].excess))
+        if gained > max(settings.sure * error, left if last else 0.0):
             last = k
     return last, predictions
 

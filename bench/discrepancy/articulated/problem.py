@@ -11,7 +11,7 @@ noise as its lower bound: minus twice the profiled log-likelihood of a joint wit
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from threading import Lock
 
@@ -165,6 +165,28 @@ class ArticulatedProblem:
                     self._corrected.pop(next(iter(self._corrected)))
                 self._corrected[key] = tuple(corrected(self.case, self.model, r, wrong) for r in self.records)
             return self._corrected[key]
+
+    def softened(self, level: float) -> ArticulatedProblem:
+        """The same problem with torque noise of at least `level` times the RMS torque where no servo holds a joint.
+
+        A free run that nothing corrects remembers every error of a wrong model to its end: the misfit of an elastic or slipping drive
+        has then a minimum at the truth and many beside it. Corrected a little at every sample, it forgets.
+        """
+        if all(joint.drive is not None and joint.drive.servo for joint in self.joints):
+            return self
+        records = []
+        for prepared in self.records:
+            joints = []
+            for record in prepared.joints:
+                drive = record.joint.drive
+                torque = (
+                    0.0
+                    if drive is None or drive.servo
+                    else level * float(np.std(record.command)) * abs(drive.gear * drive.kp)
+                )
+                joints.append(replace(record, process=torque) if torque > record.process else record)
+            records.append(replace(prepared, joints=tuple(joints)))
+        return ArticulatedProblem(self.case, self.model, tuple(records))
 
     def settled(self, hypothesis: Hypothesis, vector: Array) -> ArticulatedProblem:
         """The same problem with the links of elastic joints where a fit has them; itself where there are none behind their motors."""

@@ -85,7 +85,7 @@ class JointRecord:
         velocity: (n,) measured, or (0,).
         noise: (n_measured,).
         start: (2,) smoothed position and velocity at the first sample.
-        on_link: Whether the encoder sits on the link.
+        side: "motor" or "link", where the encoder sits; empty where nobody says.
         process: Equivalent white noise of the torque, one-sigma a sample.
         changes: Body to the changes of bias and inertia (2, n_steps) for a kilogram more of it.
         payloads: The same for a kilogram at its tip.
@@ -109,7 +109,7 @@ class JointRecord:
     velocity: Array
     noise: Array
     start: Array
-    on_link: bool
+    side: str
     process: float
     changes: Mapping[str, Array]
     payloads: Mapping[str, Array]
@@ -135,6 +135,11 @@ class JointRecord:
     def servo_ratio(self) -> float:
         """What a servo reads over the true position."""
         return 1.0 + self.encoder.gain if self.encoder.in_loop > 0.5 else 1.0
+
+    @property
+    def on_link(self) -> bool:
+        """Whether the encoder is known to sit on the link."""
+        return self.side == "link"
 
     @property
     def n_measured(self) -> int:
@@ -347,7 +352,7 @@ def prepare(case: Case, model: ArticulatedModel, record: CaseRecord) -> Prepared
             JointRecord(
                 joint, record.step / clock.n_sub, clock.n_sub, base.inertia[j] + joint.armature, base.bias[j], slope[j],
                 base.reference[j], base.load[j], _input(case, record, channel, clock), *_measured(motion, j),
-                encoders_of(case, joint).channels[0].side == "link", float(np.hypot(stated, process[j])),
+                encoders_of(case, joint).channels[0].side, float(np.hypot(stated, process[j])),
                 {b: c[j] for b, c in masses.items()}, {b: c[j] for b, c in payloads.items()},
                 {b: np.ascontiguousarray(c[:, j]) for b, c in centres.items()}, record.step,
             )

@@ -35,6 +35,10 @@ class SearchSettings:
         starts: Grid points from which one effect is fitted.
         iterations: Steps of a fit.
         refits: Fits of the nominal model alone, each with the scales that the last one left.
+        softening: Noise of the torque, as parts of its RMS, with which effects are screened and fitted one after the other before the
+            stated noise holds (`ArticulatedProblem.softened`): from what a crude model errs by to what motor currents tell.
+        strained: Deviation of a nominal parameter, in its stated standard uncertainties, from which it counts as a finding.
+        finalists: Effects that are fitted again without it.
         worth: Log posterior that a further effect has to add, ten to one being 2.3 and a hundred to one 4.6.
     """
 
@@ -46,6 +50,9 @@ class SearchSettings:
     iterations: int = 20
     refits: int = 3
     worth: float = 4.6
+    softening: tuple[float, ...] = (0.2, 0.02)
+    strained: float = 3.0
+    finalists: int = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +115,7 @@ def screen(problem: ArticulatedProblem, base: ArticulatedFit, candidates: Sequen
         power, count = float(ground.left @ ground.left), len(ground.left) - ground.n_prior
         drive = problem.joints[placed.joint].drive
         found = []
-        for eta in grid(placed, servo=bool(drive and drive.servo)):
+        for eta in grid(placed, servo=bool(drive and drive.servo), sides=_sides(problem, placed)):
             vector = np.concatenate([base.vector, eta])
             change = ground.without(
                 np.concatenate([
@@ -149,10 +156,10 @@ def _scaled(placed: Placed, eta: Array, along: float) -> Array:
     return out
 
 
-def grid(placed: Placed, *, servo: bool) -> list[Array]:
+def grid(placed: Placed, *, servo: bool, sides: Sequence[float]) -> list[Array]:
     """Values of the parameters that are tried; a small amplitude where the effect is linear in it.
 
-    Whether a wrong encoder is in the loop is asked of servos only.
+    Whether a wrong encoder is in the loop is asked of servos only, and on which side of an elastic drive it sits where nobody says.
     """
     effect = placed.effect
     if effect.name == "cogging":
@@ -162,8 +169,17 @@ def grid(placed: Placed, *, servo: bool) -> list[Array]:
     axes = []
     for k, p in enumerate(effect.parameters):
         default = 0.1 * p.std if p.signed and k == 0 else p.mean
-        axes.append(p.grid[:1] if p.name == "in_loop" and not servo else p.grid or (default,))
+        values = p.grid or (default,)
+        if p.name == "in_loop" and not servo:
+            values = values[:1]
+        axes.append(sides if p.name == "encoder_on_link" else values)
     return [np.array(point) for point in product(*axes)]
+
+
+def _sides(problem: ArticulatedProblem, placed: Placed) -> tuple[float, ...]:
+    """Sides of an elastic drive where the encoder of a joint may sit."""
+    side = problem.records[0].joints[placed.joint].side
+    return {"motor": (0.0,), "link": (1.0,)}.get(side, (0.0, 1.0))
 
 
 def _by_effect(points: Sequence[Screened], starts: int) -> list[list[Screened]]:
@@ -204,10 +220,10 @@ def search(
     found = [current]
     for count in range(1, settings.most + 1):
         taken = {placed.key for placed in current.hypothesis}
-        progress(f"screening of effect {count}")
-        points = screen(problem, current, [c for c in candidates if c.key not in taken])
-        progress(f"fits of effect {count}")
-        best, fits = _round(problem, current, points, settings)
+        rest = [c for c in candidates if c.key not in taken]
+        best, fits = _round(
+            problem, current, rest, settings, lambda text, n=count: progress(f"effect {n}: {text}")
+        )
         found += fits
         if best is None or best.log_posterior < current.log_posterior + settings.worth:
             break
@@ -227,28 +243,133 @@ def search(
 
 
 def _round(
-    problem: ArticulatedProblem, base: ArticulatedFit, points: Sequence[Screened], settings: SearchSettings
+    problem: ArticulatedProblem,
+    base: ArticulatedFit,
+    candidates: Sequence[Placed],
+    settings: SearchSettings,
+    progress: Callable[[str], None],
 ) -> tuple[ArticulatedFit | None, list[ArticulatedFit]]:
-    """Fit the most promising effects on top of a fit: the best, with all joints free, and all of them."""
-    others = Others.of(problem, base)
-    fits: list[ArticulatedFit] = []
-    gained = 0.0
-    for k, mine in enumerate(_by_effect(points, settings.starts)[: settings.fitted]):
-        if k >= settings.least and mine[0].gain < settings.hope * gained:
+    """One effect more: screened and fitted where runs forget, the best of them fitted again as they are.
+
+    Returns:
+        The best, all joints free, and all that were fitted as they are.
+    """
+    first: list[ArticulatedFit] = []
+    for level in settings.softening:
+        soft = problem.softened(level)
+        if first:
+            first = [_again(soft, f, settings) for f in first]
+            continue
+        ground = fit(
+            soft, base.hypothesis, base.vector, scale=_scale_of(soft, base), iterations=settings.iterations
+        )
+        progress("screening")
+        points = _by_effect(screen(soft, ground, candidates), settings.starts)
+        progress("fits")
+        first = _fits(soft, ground, points, settings)
+        if soft is problem:  # servos hold every joint: nothing forgets more than it does anyway
             break
-        hypothesis: Hypothesis = (*base.hypothesis, mine[0].placed)
-        starts = np.array([np.concatenate([base.vector, point.eta]) for point in mine])
+    others = Others.of(problem, base)
+    fits = []
+    first = [f for f in first if sound(problem, f)] or first
+    for one in sorted(first, key=lambda f: -f.log_posterior)[: settings.finalists]:
         new = fit(
-            problem, hypothesis, starts, scale=base.scale, iterations=settings.iterations, others=others
+            problem,
+            one.hypothesis,
+            one.vector,
+            scale=_scale_of(problem, one),
+            iterations=settings.iterations,
+            others=others,
         )
         # once more with the scale that it leaves: what a joint says of the masses counts for more then
-        new = fit(
-            problem, hypothesis, new.vector, scale=new.scale, iterations=settings.iterations, others=others
+        fits.append(
+            fit(
+                problem,
+                one.hypothesis,
+                new.vector,
+                scale=new.scale,
+                iterations=settings.iterations,
+                others=others,
+            )
         )
-        fits.append(new)
-        gained = max(gained, 2.0 * (new.log_posterior - base.log_posterior))
+    fits = [f for f in fits if sound(problem, f)]
     if not fits:
         return None, fits
     best = max(fits, key=lambda f: f.log_posterior)
     whole = fit(problem, best.hypothesis, best.vector, scale=best.scale, iterations=settings.iterations)
     return whole, [*(f for f in fits if f is not best), whole]
+
+
+def _again(problem: ArticulatedProblem, found: ArticulatedFit, settings: SearchSettings) -> ArticulatedFit:
+    """A fit once more in another problem, on the joints that its last effect changes."""
+    base = ArticulatedFit.at(problem, found.hypothesis[:-1], found.vector)
+    return fit(
+        problem, found.hypothesis, found.vector, scale=_scale_of(problem, found), iterations=settings.iterations,
+        others=Others.of(problem, base),
+    )  # fmt: skip
+
+
+def sound(problem: ArticulatedProblem, found: ArticulatedFit) -> bool:
+    """Whether a fit is finite and no parameter of its effects sits at a bound."""
+    if not (np.isfinite(found.log_posterior) and np.isfinite(found.vector).all()):
+        return False
+    at = len(problem.nominal)
+    for placed in found.hypothesis:
+        for p in placed.effect.parameters:
+            low, high = p.bounds
+            inside = low + AT_BOUND < found.vector[at] < high - AT_BOUND
+            if not (inside or p.fixed or p.name in BOUNDED):
+                return False
+            at += 1
+    return True
+
+
+AT_BOUND = 1e-6
+"""Distance from a bound at which a parameter sits on it: rounding."""
+BOUNDED = ("motor_share", "position")
+"""Parameters whose bounds are physical: a share is at most one, a stop lies where the joint goes."""
+
+
+def _scale_of(problem: ArticulatedProblem, found: ArticulatedFit) -> Array:
+    """Scale (n_joints,) of the residuals of a fit's model in a problem, at least one."""
+    joints = range(len(problem.joints))
+    left = in_threads(
+        lambda j: float(np.mean(problem.residual(j, found.hypothesis, found.vector) ** 2)), joints
+    )
+    return np.sqrt(np.maximum(left, 1.0))
+
+
+def _fits(
+    problem: ArticulatedProblem,
+    base: ArticulatedFit,
+    points: Sequence[Sequence[Screened]],
+    settings: SearchSettings,
+) -> list[ArticulatedFit]:
+    """Fits of the most promising effects on top of a fit, on the joints that they change."""
+    others = Others.of(problem, base)
+    out: list[ArticulatedFit] = []
+    gained = 0.0
+    strained = {
+        p.joint for p, x in zip(problem.nominal, base.vector, strict=False) if abs(x) > settings.strained
+    }
+    for k, mine in enumerate(points):
+        # where a number of the model was moved too far, all numbers that may be wrong instead are tried
+        instead = mine[0].placed.effect.number and mine[0].placed.joint in strained
+        hopeful = k < settings.fitted and mine[0].gain >= settings.hope * gained
+        if not (k < settings.least or hopeful or instead):
+            continue
+        hypothesis: Hypothesis = (*base.hypothesis, mine[0].placed)
+        # nominal parameters that stood in for what was missing are also tried where they were stated
+        untouched = np.concatenate([np.zeros(len(problem.nominal)), base.vector[len(problem.nominal) :]])
+        starts = np.array(
+            [np.concatenate([at, point.eta]) for point in mine for at in (base.vector, untouched)]
+        )
+        new = fit(
+            problem, hypothesis, starts, scale=base.scale, iterations=settings.iterations, others=others
+        )
+        new = fit(
+            problem, hypothesis, new.vector, scale=new.scale, iterations=settings.iterations, others=others
+        )
+        out.append(new)
+        gained = max(gained, 2.0 * (new.log_posterior - base.log_posterior))
+    return out
