@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.discrepancy.case.case import Case, CaseRecord
-from bench.discrepancy.checks.quantisation import raised_noise
+from bench.discrepancy.case.channel_noise import noise_floor, raised_noise
 from bench.discrepancy.effects.effect import Scales
 from bench.discrepancy.likelihood.noise_covariance import sensor_gains, whitening_behind
 from bench.discrepancy.likelihood.time_varying_noise import whitening_together
-from bench.discrepancy.likelihood.whitening import RecordData, band_bins, noise_floor, projected, timed
+from bench.discrepancy.likelihood.whitening import RecordData, band_bins, projected, timed
 from bench.discrepancy.likelihood.window_whitening import (
     cut,
     drifts,
@@ -35,8 +35,9 @@ from bench.discrepancy.likelihood.window_whitening import (
 )
 from bench.discrepancy.model.nominal_forces import with_own_forces
 from bench.discrepancy.model.placement import Hypothesis, Placed
-from bench.discrepancy.model.structure import ACCELERATION, Place, Structure
+from bench.discrepancy.model.structure import Place, Structure
 from bench.discrepancy.motion.measured import measured_motion
+from bench.discrepancy.motion.observer import ACCELERATION
 from bench.discrepancy.motion.prescribed import Prescribed, decided, prescribed_motion
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.response.driving_loads import driving_loads, fewest_steps, run_in

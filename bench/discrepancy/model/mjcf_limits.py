@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.discrepancy.case.case import Case, CaseRecord
-from bench.discrepancy.likelihood.whitening import noise_floor
+from bench.discrepancy.case.channel_noise import noise_floor
 from bench.discrepancy.model.structure import Structure
 from bench.discrepancy.motion.measured import measured_motion
 from bench.errors import ModelError, UnknownNameError
