@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple, Protocol
 from xml.etree import ElementTree
 
 import mujoco
@@ -13,9 +13,6 @@ from bench import native
 from bench.errors import ModelError, ParameterError, UnknownNameError
 from bench.native import Coordinate
 from bench.rig.element import Element
-
-if TYPE_CHECKING:
-    from bench.rig.description import Rig
 
 INTEGRATORS = {
     "RK4": mujoco.mjtIntegrator.mjINT_RK4,
@@ -27,6 +24,45 @@ STRUCTURE = ("mass", "inertia", "stiffness", "damping", "frictionloss", "armatur
 """Structural quantities that `Rig.with_structure` changes."""
 
 EXACT_SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)
+
+
+class Buildable(Protocol):
+    """What of a rig a model is built from; `bench.rig.Rig` says what each is."""
+
+    @property
+    def name(self) -> str:
+        """Name, for messages."""
+        ...
+
+    @property
+    def mjcf(self) -> str:
+        """The model as MJCF text."""
+        ...
+
+    @property
+    def folder(self) -> str:
+        """Folder that meshes and includes are looked for in."""
+        ...
+
+    @property
+    def timestep(self) -> float:
+        """Integration step [s]."""
+        ...
+
+    @property
+    def integrator(self) -> str:
+        """One of `INTEGRATORS`."""
+        ...
+
+    @property
+    def elements(self) -> tuple[Element, ...]:
+        """The elements."""
+        ...
+
+    @property
+    def structure(self) -> tuple[tuple[str, str, float], ...]:
+        """Changes of the MJCF's own numbers."""
+        ...
 
 
 class Placed(NamedTuple):
@@ -74,7 +110,7 @@ def _includes(text: str, folder: Path) -> dict[str, bytes]:
     return found
 
 
-def specify(rig: Rig, built: Built | None = None) -> mujoco.MjSpec:
+def specify(rig: Buildable, built: Built | None = None) -> mujoco.MjSpec:
     """The rig as an MjSpec, its elements' rows empty, or as they are in `built`."""
     spec = parse(rig.mjcf, rig.folder, f"rig '{rig.name}'")
     spec.option.timestep = rig.timestep
@@ -134,7 +170,7 @@ def _add_state_actuator(spec: mujoco.MjSpec, element: Element, index: int) -> No
     actuator.biastype = mujoco.mjtBias.mjBIAS_NONE
 
 
-def build(rig: Rig, *, drawings: bool = False) -> Built:
+def build(rig: Buildable, *, drawings: bool = False) -> Built:
     """Compile a rig, with or without what is only drawn; see `Rig.built` for what it raises."""
     native.install()
     spec = specify(rig)
@@ -168,7 +204,7 @@ def build(rig: Rig, *, drawings: bool = False) -> Built:
     return Built(model, tuple(placed), own)
 
 
-def _check_targets(spec: mujoco.MjSpec, rig: Rig, element: Element) -> None:
+def _check_targets(spec: mujoco.MjSpec, rig: Buildable, element: Element) -> None:
     known = [joint.name for joint in spec.joints] + [tendon.name for tendon in spec.tendons]
     for joint in element.joints:
         if joint not in known:

@@ -33,7 +33,7 @@ from bench.discrepancy.likelihood.window_whitening import (
     with_starts,
     without_starts,
 )
-from bench.discrepancy.model.nominal_forces import own_friction, with_own_forces
+from bench.discrepancy.model.nominal_elements import own_friction, with_own_forces
 from bench.discrepancy.model.placement import Hypothesis, Placed
 from bench.discrepancy.model.structure import Place, Structure
 from bench.discrepancy.motion.measured import measured_motion
@@ -41,8 +41,8 @@ from bench.discrepancy.motion.observer import ACCELERATION
 from bench.discrepancy.motion.prescribed import Prescribed, decided, prescribed_motion
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.response.driving_loads import driving_loads, fewest_steps, run_in
-from bench.discrepancy.response.step_size import rates, speeds, steps
 from bench.discrepancy.simulation.prescribed_response import driven_force
+from bench.discrepancy.simulation.step_size import rates, speeds, steps
 from bench.discrepancy.simulation.stick_slip import COLUMNS, Elements, Motion
 
 Array = NDArray[np.float64]
