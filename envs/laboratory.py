@@ -148,11 +148,10 @@ class Laboratories:
         Returns:
             Channels ``(m, n_steps, n_channels)`` at the start of each step.
         """
-        native.install()
         m, n_steps, _ = controls.shape
         full = np.zeros((m, n_steps, self._rig.model.nu))
         full[:, :, self._driven] = controls
-        with native.untimed():
+        with native.running():
             record = self._batch.rollout(
                 n_steps,
                 full,
