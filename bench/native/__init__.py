@@ -161,8 +161,8 @@ def running(*models: mujoco.MjModel) -> Iterator[None]:
         *models: The models that are run.
 
     Raises:
-        NativeError: Before the first step, where a foreign callback is in place (or a Python function as another one), or a model holds elements of another process;
-            afterwards, where the callbacks have been taken away meanwhile.
+        NativeError: Before the first step, where a foreign callback is in place (or a Python function as another one), or a model
+            holds elements of another process; afterwards, where the callbacks have been taken away meanwhile.
     """
     install()
     _refuse_python_callbacks()

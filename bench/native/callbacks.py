@@ -70,10 +70,8 @@ def _law(table, row):
 
 
 @numba.njit(error_model="numpy", inline="always")
-def _coordinates(row, size, table, model, qpos, qvel, ctrl, q, v):
+def _coordinates(row, size, nq, nv, table, model, qpos, qvel, ctrl, q, v):
     """Read the coordinates; returns whether everything that the row refers to lies within it and within the model."""
-    nq = _word(table, model, M_NQ)
-    nv = _word(table, model, M_NV)
     if not 1.0 <= row[3] <= _LENGTH:
         return False
     at = HEADER
@@ -125,6 +123,8 @@ def passive(model, data):
     count = _word(table, model, M_NNUMERIC)
     if count == 0:
         return
+    nq = float(_word(table, model, M_NQ))
+    nv = float(_word(table, model, M_NV))
     addresses = _word(table, model, M_NUMERIC_ADR)
     sizes = _word(table, model, M_NUMERIC_SIZE)
     numbers = _pointer(table, model, M_NUMERIC_DATA)
@@ -145,7 +145,7 @@ def passive(model, data):
         if row[0] != MAGIC:
             continue
         law = _law(table, row)
-        if law == 0 or not _coordinates(row, size, table, model, qpos, qvel, ctrl, q, v):
+        if law == 0 or not _coordinates(row, size, nq, nv, table, model, qpos, qvel, ctrl, q, v):
             for k in range(_word(table, model, M_NV)):  # let it show, rather than leave the force out
                 qfrc[k] = NOT_A_NUMBER
             continue
@@ -179,7 +179,10 @@ def act_dyn(model, data, actuator):
     v = stack_array(_LENGTH)
     qpos = _pointer(table, data, D_QPOS)
     qvel = _pointer(table, data, D_QVEL)
-    if not _coordinates(row, size, table, model, qpos, qvel, _pointer(table, data, D_CTRL), q, v):
+    nq = float(_word(table, model, M_NQ))
+    nv = float(_word(table, model, M_NV))
+    ctrl = _pointer(table, data, D_CTRL)
+    if not _coordinates(row, size, nq, nv, table, model, qpos, qvel, ctrl, q, v):
         return NOT_A_NUMBER
     act = _pointer(table, data, D_ACT)
     rates = advance(_pointer(table, data, D_ACT_DOT), first)

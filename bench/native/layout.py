@@ -124,7 +124,10 @@ def _check_against_live_arrays(table: dict[str, int]) -> None:
 
     wrong = [
         name
-        for owner, prefix, names in ((model, "m.", MODEL_FIELDS[len(MODEL_SIZES) :]), (data, "d.", DATA_FIELDS[1:]))
+        for owner, prefix, names in (
+            (model, "m.", MODEL_FIELDS[len(MODEL_SIZES) :]),
+            (data, "d.", DATA_FIELDS[1:]),
+        )
         for name in (prefix + field for field in names)
         if word(name) != getattr(owner, name[2:]).ctypes.data
     ]

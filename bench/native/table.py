@@ -76,8 +76,6 @@ table_address = types.ExternalFunction("jointbench_table", types.int64())
 """For compiled code: the address of the table."""
 
 
-
-
 def read_word(place: int) -> int:
     """A word of the table."""
     return int(_words[place])

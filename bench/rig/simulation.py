@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 import mujoco
 import numpy as np
 from mujoco.batch import Batch
+from mujoco.batch import SimulationError as BatchError
 from numpy.typing import ArrayLike, NDArray
 
 from bench import native
@@ -194,7 +195,15 @@ def _roll(
         [np.zeros((len(rigs), 1)), batch.bind("qpos"), batch.bind("qvel"), batch.bind("act")], axis=1
     )
     with native.running(*{id(rig.model): rig.model for rig in rigs}.values()):
-        result = batch.rollout(n, padded, mujoco.mjtState.mjSTATE_CTRL, [STATE, "sensordata"])
+        try:
+            result = batch.rollout(n, padded, mujoco.mjtState.mjSTATE_CTRL, [STATE, "sensordata"])
+        except BatchError as error:
+            place = int(error.ids[0])
+            raise SimulationError(
+                f"MuJoCo gave up on the simulation of rig '{rigs[place].name}': {batch.error(place)}. Simplify the model (contacts "
+                "take most memory), or give it more with <size memory=…>",
+                time=float("nan"),
+            ) from error
     states = np.concatenate([start[:, None, :], result[STATE]], axis=1)
     for i, rig in enumerate(rigs):
         _check_finite(rig, states[i], controls[i])
