@@ -20,7 +20,7 @@ from bench.errors import BenchError, ModelError
 from bench.excitation import Hypothesis, Uncertain
 from bench.excitation.shaping import SHAPINGS, Shaping
 from envs import rendering, single
-from envs.benches import FLOATS, Benches, Options
+from envs.benches import FLOATS, Options
 from envs.laboratory import Laboratories, combined
 from envs.setups import PAIRS, SDOF_LAWS, discrimination_setup, joint_setup, sdof_setup
 

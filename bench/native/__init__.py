@@ -95,8 +95,9 @@ def install() -> None:
     """Set the callbacks `mjcb_passive` and `mjcb_act_dyn`; does nothing when they are in place already.
 
     Raises:
-        NativeError: Another library's callback is in place. It is left as it is.
+        NativeError: Another library's callback is in place, or a Python function as another of MuJoCo's callbacks. It is left as it is.
     """
+    _refuse_python_callbacks()
     if installed():
         return
     with _lock:
@@ -165,7 +166,6 @@ def running(*models: mujoco.MjModel) -> Iterator[None]:
             holds elements of another process; afterwards, where the callbacks have been taken away meanwhile.
     """
     install()
-    _refuse_python_callbacks()
     for model in models:
         check(model)
     with untimed(), quiet():
