@@ -38,8 +38,9 @@ _lock = threading.Lock()
 
 def _stand_in_front() -> None:
     """Put the handler in front of MuJoCo's own, where it is not; a handler that another library sets later stays in front."""
-    before = set_log_handler(log_handler.address)
-    if before == log_handler.address:
+    own: int = log_handler.address  # type: ignore[assignment]  (numba: None before it is compiled)
+    before = set_log_handler(own)
+    if before == own:
         return
     known = read_word(LOG_NEXT)
     if known in {0, before}:
