@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple, Protocol
 from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from bench import native
 from bench.errors import ModelError, ParameterError, UnknownNameError
@@ -113,6 +115,7 @@ def _includes(text: str, folder: Path) -> dict[str, bytes]:
 def specify(rig: Buildable, built: Built | None = None) -> mujoco.MjSpec:
     """The rig as an MjSpec, its elements' rows empty, or as they are in `built`."""
     spec = parse(rig.mjcf, rig.folder, f"rig '{rig.name}'")
+    _refuse_foreign_elements(spec, rig)
     spec.option.timestep = rig.timestep
     spec.option.integrator = INTEGRATORS[rig.integrator]
     spec.option.disableflags |= (
@@ -129,11 +132,31 @@ def specify(rig: Buildable, built: Built | None = None) -> mujoco.MjSpec:
             )
             start = int(built.model.numeric_adr[numeric])
             data = built.model.numeric_data[start : start + int(built.model.numeric_size[numeric])].copy()
-            data[1] = -1.0  # the law's number holds in this process only
+            data[native.OWN] = native.UNBOUND
         spec.add_numeric(name=native.PREFIX + element.name, data=data, size=len(data))
         if element.law.states:
             _add_state_actuator(spec, element, index)
     return spec
+
+
+def _refuse_foreign_elements(spec: mujoco.MjSpec, rig: Rig) -> None:
+    """Refuse MJCF that marks something of its own as an element: law numbers and addresses are no matter of a file."""
+    marked = [f"numeric '{item.name}'" for item in spec.numerics if _is_marked(item.name, item.data)]
+    marked += [
+        f"actuator '{item.name}'"
+        for item in spec.actuators
+        if _is_marked(item.name, item.dynprm if item.dyntype == mujoco.mjtDyn.mjDYN_USER else ())
+    ]
+    if marked:
+        raise ModelError(
+            f"the MJCF of rig '{rig.name}' marks {', '.join(marked[:3])} as an element of the bench (a name that begins with "
+            f"'{native.PREFIX}', or the first number {native.MAGIC:.0f}); elements belong to the rig, not to its MJCF. Remove it there "
+            "and give the rig the element; a model exported by Rig.to_xml is loaded by MuJoCo itself and bench.native.bind"
+        )
+
+
+def _is_marked(name: str, numbers: Sequence[float] | NDArray[np.float64]) -> bool:
+    return name.startswith(native.PREFIX) or (len(numbers) > 0 and numbers[0] == native.MAGIC)
 
 
 def _leave_out_drawings(spec: mujoco.MjSpec) -> None:
@@ -173,6 +196,11 @@ def _add_state_actuator(spec: mujoco.MjSpec, element: Element, index: int) -> No
 def build(rig: Buildable, *, drawings: bool = False) -> Built:
     """Compile a rig, with or without what is only drawn; see `Rig.built` for what it raises."""
     native.install()
+    with native.quiet():
+        return _build(rig, drawings)
+
+
+def _build(rig: Rig, drawings: bool) -> Built:
     spec = specify(rig)
     if not drawings:
         _leave_out_drawings(spec)
