@@ -7,8 +7,10 @@ part while the others simulate), a pool of processes (`workers`), or an existing
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
+import signal
 import threading
 import time
 from collections import deque
@@ -23,7 +25,7 @@ from concurrent.futures import (
 )
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -79,6 +81,7 @@ class CampaignResult:
         size: Size of the data set [bytes].
         seconds: Time of this run [s].
         means: What ran it.
+        found: What was not as it had been written, a line each; it was made again, or set aside where it was of others.
     """
 
     folder: str
@@ -94,6 +97,7 @@ class CampaignResult:
     size: int
     seconds: float
     means: str
+    found: tuple[str, ...] = ()
 
     @property
     def rate(self) -> float:
@@ -102,7 +106,7 @@ class CampaignResult:
 
     def to_dict(self) -> dict[str, Any]:
         """JSON form, with the rate [records/s]."""
-        return {**asdict(self), "failures": list(self.failures), "rate": self.rate}
+        return {**asdict(self), "failures": list(self.failures), "found": list(self.found), "rate": self.rate}
 
 
 def run_campaign(
@@ -146,7 +150,7 @@ def run_campaign(
         for channel in generator.channels
     ]
     store, start = Store(out), time.perf_counter()
-    with store.opened(plan, channels, resume=resume) as entries:
+    with store.opened(plan, channels, resume=resume) as (entries, found):
         tally = _Tally(plan, entries, progress)
         left = [part for part in range(plan.n_parts) if part not in entries]
         status, means = "stopped", "nothing left to run"
@@ -157,7 +161,8 @@ def run_campaign(
             status = "complete"
         finally:
             store.write_manifest(plan, channels, entries, status=status)
-    return _result(store, status, tally, seconds=time.perf_counter() - start, means=means)
+    made = _result(store, status, tally, seconds=time.perf_counter() - start, means=means)
+    return replace(made, found=tuple(found))
 
 
 def _plan_of(plan: str | Path | Plan | Mapping[str, Any]) -> Plan:
@@ -245,6 +250,7 @@ class _Tally:
         self, plan: Plan, entries: dict[int, dict[str, Any]], report: Callable[[Progress], None] | None
     ) -> None:
         self.plan, self.entries, self.report = plan, entries, report
+        self.sha256 = plan.sha256
         done = counts(list(entries.values()))
         self.before = self.records = done["records"]
         self.failed = done["failed"]
@@ -268,7 +274,7 @@ Submit = Callable[[str, str, int], "Future[dict[str, Any]]"]
 def _run(
     parts: list[int], submit: Callable[[int], Future], window: Callable[[], int], store: Store, tally: _Tally
 ) -> None:
-    """Keep a window of parts in flight until all are done; give up those in flight when one raises."""
+    """Keep a window of parts in flight until all are done and noted; when one raises, note those that are being made."""
     queue, pending, crashes = deque(parts), {}, dict.fromkeys(parts, 0)
     try:
         while queue or pending:
@@ -290,11 +296,20 @@ def _run(
                         ) from error
                     queue.appendleft(part)
                     continue
-                store.journal(entry)
+                store.note(tally.sha256, entry)
                 tally.add(entry)
-    finally:
-        for future in pending:
-            future.cancel()
+    except BaseException:
+        _note_running(list(pending), store, tally)
+        raise
+
+
+def _note_running(futures: list[Future], store: Store, tally: _Tally) -> None:
+    """Give up the parts that no worker has begun; wait for the others, whose files are moved into place, and note them."""
+    for future in [future for future in futures if not future.cancel()]:
+        with contextlib.suppress(Exception):  # another reason is being told already, or the same one
+            entry = future.result()
+            store.note(tally.sha256, entry)
+            tally.entries[entry["part"]] = entry
 
 
 def cores() -> int:
@@ -315,7 +330,7 @@ def _means(
         with ThreadPoolExecutor(count, thread_name_prefix="campaign") as pool:
             yield (
                 (lambda *task: pool.submit(run_part, *task)),
-                (lambda: count),
+                (lambda: count + 1),  # a thread goes on with the next part while its last one is noted
                 f"{count} thread{'s' * (count > 1)}",
             )
     else:
@@ -356,9 +371,13 @@ class _Processes:
 
 
 def _leave_with_parent() -> None:
-    """End this worker when the process that started it is killed; it would wait for work for ever."""
+    """End this worker when the process that started it is killed; it would wait for work for ever.
+
+    Ctrl-C reaches all processes of a terminal; the one that started the others stops them in order.
+    """
     from multiprocessing import parent_process  # noqa: PLC0415
 
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = parent_process()
     if parent is None:
         return
