@@ -153,10 +153,14 @@ def append_line(path: str | Path, line: str) -> None:
 
 
 def settle(folder: Path) -> None:
-    """Wait until the names in a folder are on the disk, where the system can."""
+    """Wait until the names in a folder are on the disk, where the system can.
+
+    Raises:
+        OutputError: The disk reports an error.
+    """
     if os.name != "posix":
         return
-    with _opened(folder, os.O_RDONLY) as handle:
+    with _told(folder), _opened(folder, os.O_RDONLY) as handle:
         try:
             SYSTEM.fsync(handle)
         except OSError as error:
@@ -202,8 +206,7 @@ def _move_all(moves: list[_Move]) -> None:
                 undo.append((move.target, former))
                 SYSTEM.replace(move.temporary, move.target)
         for folder in {move.target.parent for move in moves}:
-            with _told(folder):
-                settle(folder)
+            settle(folder)
     except BaseException:
         for target, former in reversed(undo):
             with contextlib.suppress(OSError):

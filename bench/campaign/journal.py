@@ -26,14 +26,14 @@ class Noted(NamedTuple):
     Attributes:
         header: Its first line; None where it is missing or no header.
         entries: Entry by part, the latest where one comes twice.
-        damaged: Numbers of the lines that are torn, changed or of another plan, a torn last line left out.
-        torn: Whether the last line is cut off, as the end of a process leaves it.
+        damaged: Numbers of the lines that were changed or are of another plan.
+        torn: Numbers of the lines that are cut off, as a full disk or the end of a process leaves them.
     """
 
     header: Mapping[str, Any] | None
     entries: dict[int, dict[str, Any]]
     damaged: list[int]
-    torn: bool
+    torn: list[int]
 
 
 class Journal:
@@ -57,23 +57,21 @@ class Journal:
         Args:
             plan_sha256: Hash of the plan.
         """
-        header, entries, damaged, torn = None, {}, [], False
+        header, entries, damaged, torn = None, {}, [], []
         try:
             text = self.path.read_text(encoding="utf-8", errors="replace")
         except OSError:
-            return Noted(None, {}, [], torn=False)
-        lines = text.split("\n")
-        for number, line in enumerate(lines, start=1):
-            found = _checked(line, plan_sha256)
-            if number == 1 and found is None:
-                header = _header(line)
-            if found is not None:
+            return Noted(None, {}, [], [])
+        for number, line in enumerate(text.split("\n"), start=1):
+            found = _parsed(line)
+            if number == 1 and found is not None and _is_header(found):
+                header = found
+            elif found is None:
+                torn += [number] if line else []
+            elif found.pop("check", "") == _check(found, plan_sha256):
                 entries[found["part"]] = found
-            elif line and not (number == 1 and header is not None):
-                if number == len(lines):
-                    torn = True
-                else:
-                    damaged.append(number)
+            else:
+                damaged.append(number)
         return Noted(header, entries, damaged, torn)
 
     def write(
@@ -90,7 +88,7 @@ class Journal:
 
 
 def journal_faults(
-    journal: Journal, noted: Noted, layout: Layout, told: Mapping[int, Mapping[str, Any]], any_part: bool
+    journal: Journal, noted: Noted, layout: Layout, told: Mapping[int, Any], *, status: str, any_part: bool
 ) -> list[str]:
     """What is wrong with a journal, given the entries of the manifest.
 
@@ -99,6 +97,7 @@ def journal_faults(
         noted: What was read from it.
         layout: The layout of the campaign.
         told: Entries of the manifest, which were copied from the journal.
+        status: What the manifest says of the last run; only one that ended well leaves no lines cut off.
         any_part: Whether there are files of parts, which are made after the journal.
     """
     if journal.path.is_symlink():
@@ -109,7 +108,10 @@ def journal_faults(
         return ["journal.jsonl is damaged in its first line, which tells the plan"]
     if noted.header["plan_sha256"] != layout.sha256:
         return ["journal.jsonl is of another campaign"]
-    wrong = [f"journal.jsonl is damaged in line {number}" for number in noted.damaged]
+    wrong = [
+        f"journal.jsonl is damaged in line {number}"
+        for number in sorted(noted.damaged + (noted.torn if status == "complete" else []))
+    ]
     lacking = sorted(set(told) - set(noted.entries))
     if lacking:
         some = ", ".join(map(str, lacking[:5])) + (", …" if len(lacking) > 5 else "")
@@ -126,22 +128,12 @@ def _check(entry: Mapping[str, Any], plan_sha256: str) -> str:
     return hashlib.sha256(f"{plan_sha256} {text}".encode()).hexdigest()[:16]
 
 
-def _checked(line: str, plan_sha256: str) -> dict[str, Any] | None:
-    """The entry of a line; None where it is not as it was written."""
-    entry = _parsed(line)
-    if entry is None or "check" not in entry:
-        return None
-    check = entry.pop("check")
-    return entry if check == _check(entry, plan_sha256) else None
-
-
-def _header(line: str) -> Mapping[str, Any] | None:
-    found = _parsed(line)
-    if found is None or found.get("journal") != JOURNAL_FORMAT:
-        return None
-    if not isinstance(found.get("versions"), dict) or not isinstance(found.get("plan_sha256"), str):
-        return None
-    return found
+def _is_header(found: Mapping[str, Any]) -> bool:
+    return (
+        found.get("journal") == JOURNAL_FORMAT
+        and isinstance(found.get("versions"), dict)
+        and isinstance(found.get("plan_sha256"), str)
+    )
 
 
 def _parsed(line: str) -> dict[str, Any] | None:

@@ -211,7 +211,7 @@ class Store:
         path = self.folder / "answers" / "answers.json"
         text = json.dumps({"plan": plan.to_dict(), "plan_sha256": plan.sha256}, indent=1, ensure_ascii=False)
         if path.is_symlink() or not path.is_file() or path.read_bytes() != text.encode():
-            write_text(path, text)
+            write_bytes(path, text.encode(), inside=self.folder / ".partial")
 
     def _set_aside(self, layout: Layout) -> list[str]:
         """Move what is not of the campaign out of the folders that readers take whole; tell what it was."""
@@ -241,7 +241,9 @@ class Store:
         """Entries of the finished parts: those of the journal, or where it lacks them of the manifest, that files agree with."""
         noted = self.journal.read(layout.sha256)
         told = manifest_entries(begun, layout)
-        lost = journal_faults(self.journal, noted, layout, told, any_part(self.folder, layout))
+        status = str(begun.get("status", "running"))
+        present = any_part(self.folder, layout)
+        lost = journal_faults(self.journal, noted, layout, told, status=status, any_part=present)
         if lost and self.journal.path.is_symlink():
             self._move_aside(self.journal.path)
         elif lost and self.journal.present:  # a copy: until it is made again it holds what is finished
@@ -251,7 +253,7 @@ class Store:
         for part in range(layout.n_parts):
             entry = noted.entries.get(part) or told.get(part)
             if entry is None or not is_entry(layout, public(entry)):
-                if begun.get("status") != "running":  # a killed run leaves some, which is nothing amiss
+                if status == "complete":  # what a stopped run leaves is nothing amiss
                     found += [
                         f"{name} is noted nowhere and is made again" for name in self._present(layout, part)
                     ]

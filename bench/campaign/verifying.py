@@ -44,14 +44,12 @@ def verify(folder: str | Path) -> list[str]:
     noted = store.journal.read(layout.sha256)
     told = manifest_entries(manifest, layout)
     entries = told | {p: public(e) for p, e in noted.entries.items() if is_entry(layout, public(e))}
-    running = manifest.get("status") == "running"
+    status, present = str(manifest.get("status")), any_part(store.folder, layout)
     wrong = [
         f"{name} is a link" for name in ("manifest.json", *layout.kinds) if (store.folder / name).is_symlink()
     ]
     wrong += _manifest_faults(manifest, layout, told, entries)
-    wrong += journal_faults(store.journal, noted, layout, told, any_part(store.folder, layout))
-    if noted.torn and not running:
-        wrong.append("journal.jsonl is cut off in its last line")
+    wrong += journal_faults(store.journal, noted, layout, told, status=status, any_part=present)
     if layout.withholds and (store.folder / "answers").exists():
         wrong += _answers_faults(store.folder / "answers" / "answers.json", layout)
     wrong += [
