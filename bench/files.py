@@ -272,7 +272,7 @@ def check_folder(folder: str | Path, *, force: bool = False, own: Iterable[str] 
     Args:
         folder: The folder, which need not exist.
         force: Let files in it be overwritten.
-        own: Names of files by one of which a folder is known as written by the same command.
+        own: Patterns of files by one of which a folder is known as written by the same command.
 
     Raises:
         OutputError: It cannot be written to, or holds files and none of its own.
@@ -280,10 +280,12 @@ def check_folder(folder: str | Path, *, force: bool = False, own: Iterable[str] 
     place = Path(folder)
     if place.is_dir():
         check_targets(place / "a result", force=True)
-        visible = [entry.name for entry in place.iterdir() if not entry.name.startswith(".")]
-        if visible and not force and not any(name in visible for name in own):
+        known = force or any(next(place.glob(pattern), None) is not None for pattern in own)
+        files = (path for path in place.rglob("*") if path.is_file() and not path.name.startswith("."))
+        other = None if known else next(files, None)
+        if other is not None:
             raise OutputError(
-                f"'{place}' holds files already ({min(visible)}); choose another folder, or --force to overwrite in it"
+                f"'{place}' holds files already ({other.relative_to(place)}); choose another folder, or --force to overwrite in it"
             )
     else:
         check_targets(place, force=force)
@@ -310,8 +312,8 @@ def _check_name(target: Path) -> None:
     """Raise `OutputError` where a folder, a device or a pipe has the name: the rename would put a file in its place."""
     try:
         mode = target.lstat().st_mode
-    except FileNotFoundError:
-        return
+    except (FileNotFoundError, NotADirectoryError):
+        return  # nothing has the name; whether its folder can be is asked elsewhere
     except OSError as error:
         raise OutputError(
             f"cannot write {target}: {error.strerror or error}; choose another place"

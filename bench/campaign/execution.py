@@ -32,6 +32,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from bench.campaign.plan import Plan
 from bench.campaign.reading import plan_from_dict, read_plan
+from bench.campaign.size import check_size
 from bench.campaign.store import BYTES_DEPEND_ON, CampaignError, Store, counts, versions
 from bench.errors import ParameterError
 
@@ -144,6 +145,8 @@ def run_campaign(
     _check_means(workers, threads, scheduler)
     payload = payload_of(plan)
     generator = generator_of(payload)
+    at_once = 0 if scheduler else (workers or 1) if (workers or 1) > 1 else threads or cores()
+    check_size(generator, Path(out).resolve(), at_once=at_once)
     generator.check()
     channels = [
         {"name": channel.name, "unit": channel.unit, "quantity": channel.quantity, "role": channel.role}
