@@ -14,7 +14,8 @@ import math
 import os
 import secrets
 import stat
-from collections.abc import Callable, Iterable, Iterator, Mapping
+import tempfile
+from collections.abc import Callable, Iterator, Mapping
 from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
@@ -84,11 +85,10 @@ def replacing(path: str | Path, *, inside: Path | None = None, settled: bool = T
             # not mkstemp, whose files are for their owner alone, whatever the user's habit (umask)
             os.close(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
             yield temporary
-            with _opened(temporary, os.O_RDONLY) as handle:
-                SYSTEM.fsync(handle)
+            flush(temporary)
             waiting = _held.get()
             if waiting is None:
-                _check_name(target)
+                check_name(target)
                 SYSTEM.replace(temporary, target)
                 if settled:
                     settle(target.parent)
@@ -152,6 +152,35 @@ def append_line(path: str | Path, line: str) -> None:
         SYSTEM.fsync(handle)
 
 
+@contextlib.contextmanager
+def folder_made_in(root: Path, name: str) -> Iterator[Path]:
+    """Give an empty folder in which the block makes a folder `name`; move that into `root` when the block ends well.
+
+    Args:
+        root: Where the folder is to lie; made where it is missing.
+        name: Its name, maybe with folders above it, as "a/b".
+
+    Raises:
+        OutputError: It cannot be moved.
+    """
+    target = root / name
+    with _told(target):
+        root.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix=".making-", dir=root) as made:
+            yield Path(made)
+            for path in sorted((Path(made) / name).rglob("*"), reverse=True):
+                settle(path) if path.is_dir() else flush(path)
+            target.parent.mkdir(parents=True, exist_ok=True)
+            SYSTEM.replace(Path(made) / name, target)
+        settle(target.parent)
+
+
+def flush(path: Path) -> None:
+    """Wait until the content of a file is on the disk."""
+    with _opened(path, os.O_RDONLY) as handle:
+        SYSTEM.fsync(handle)
+
+
 def settle(folder: Path) -> None:
     """Wait until the names in a folder are on the disk, where the system can.
 
@@ -201,7 +230,7 @@ def _move_all(moves: list[_Move]) -> None:
     try:
         for move in moves:
             with _told(move.target):
-                _check_name(move.target)
+                check_name(move.target)
                 former = _set_by(move.target)
                 undo.append((move.target, former))
                 SYSTEM.replace(move.temporary, move.target)
@@ -233,62 +262,20 @@ def _set_by(target: Path) -> Path | None:
     return former
 
 
-def check_targets(*paths: str | Path | None, force: bool = False) -> None:
-    """Refuse places that results cannot be written to, before the time is spent that making them takes.
-
-    Args:
-        paths: The files that will be written; None and "-" (standard output) are passed over.
-        force: Let files that exist be overwritten.
-
-    Raises:
-        OutputError: A folder has the name, its folder cannot be written to, two results have one name, or the file exists.
-    """
-    taken: set[Path] = set()
-    for path in map(Path, (path for path in paths if path is not None and str(path) != "-")):
-        _check_name(path)
-        try:
-            resolved = path.resolve()
-            nearest = next(parent for parent in resolved.parents if parent.exists())
-        except (OSError, RuntimeError) as error:  # a name that is too long, links in a circle
-            raise OutputError(
-                f"cannot write {path}: {getattr(error, 'strerror', None) or error}; choose another place"
-            ) from error
-        if not nearest.is_dir() or not os.access(nearest, os.W_OK | os.X_OK):
-            raise OutputError(
-                f"cannot write {path}: {nearest} is no folder one may write to; choose another place"
-            )
-        if resolved in taken:
-            raise OutputError(f"{path} is named for two results; give each a file of its own")
-        taken.add(resolved)
-        if not force and os.path.lexists(path):
-            raise OutputError(
-                f"{path} exists and is not overwritten; give another name, or --force to replace it"
-            )
-
-
-def check_folder(folder: str | Path, *, force: bool = False, own: Iterable[str] = ()) -> None:
-    """Refuse a folder for results that cannot be one, or that holds files of others, before anything is made.
-
-    Args:
-        folder: The folder, which need not exist.
-        force: Let files in it be overwritten.
-        own: Patterns of files by one of which a folder is known as written by the same command.
-
-    Raises:
-        OutputError: It cannot be written to, or holds files and none of its own.
-    """
-    place = Path(folder)
-    if place.is_dir():
-        check_targets(place / "a result", force=True)
-        known = force or any(next(place.glob(pattern), None) is not None for pattern in own)
-        files = (path for path in place.rglob("*") if path.is_file() and not path.name.startswith("."))
-        other = None if known else next(files, None)
-        if other is not None:
-            raise OutputError(
-                f"'{place}' holds files already ({other.relative_to(place)}); choose another folder, or --force to overwrite in it"
-            )
-    else:
-        check_targets(place, force=force)
+def check_name(target: Path) -> None:
+    """Raise `OutputError` where a folder, a device or a pipe has the name: the rename would put a file in its place."""
+    try:
+        mode = target.lstat().st_mode
+    except (FileNotFoundError, NotADirectoryError):
+        return  # nothing has the name; whether its folder can be is asked elsewhere
+    except OSError as error:
+        raise OutputError(
+            f"cannot write {target}: {error.strerror or error}; choose another place"
+        ) from error
+    if stat.S_ISDIR(mode):
+        raise OutputError(f"cannot write {target}: it is a folder; name a file in it")
+    if not (stat.S_ISREG(mode) or stat.S_ISLNK(mode)):
+        raise OutputError(f"cannot write {target}: it is a device or a pipe; name a file")
 
 
 def json_values(document: Any) -> Any:
@@ -306,22 +293,6 @@ def json_values(document: Any) -> Any:
     if isinstance(document, list | tuple):
         return [json_values(value) for value in document]
     return document
-
-
-def _check_name(target: Path) -> None:
-    """Raise `OutputError` where a folder, a device or a pipe has the name: the rename would put a file in its place."""
-    try:
-        mode = target.lstat().st_mode
-    except (FileNotFoundError, NotADirectoryError):
-        return  # nothing has the name; whether its folder can be is asked elsewhere
-    except OSError as error:
-        raise OutputError(
-            f"cannot write {target}: {error.strerror or error}; choose another place"
-        ) from error
-    if stat.S_ISDIR(mode):
-        raise OutputError(f"cannot write {target}: it is a folder; name a file in it")
-    if not (stat.S_ISREG(mode) or stat.S_ISLNK(mode)):
-        raise OutputError(f"cannot write {target}: it is a device or a pipe; name a file")
 
 
 def _write_all(handle: int, content: bytes) -> None:

@@ -16,9 +16,11 @@ import pyarrow.parquet as pq
 import pytest
 from campaign_plan import document
 
-from bench.campaign import CampaignError, Progress, plan_from_dict, read_plan, run_campaign, verify
+from bench.campaign import CampaignError, Progress, means, plan_from_dict, read_plan, run_campaign, verify
 from bench.campaign.execution import generator_of, payload_of
 from bench.campaign.generation import Generator
+from bench.campaign.store import Store
+from bench.campaign.versions import versions
 from bench.errors import FileFormatError, ParameterError
 
 
@@ -404,3 +406,40 @@ def test_an_absent_scheduler_is_named(tmp_path: Path, monkeypatch: pytest.Monkey
     monkeypatch.setattr("distributed.Client", refuse)
     with pytest.raises(CampaignError, match=r"tcp://127\.0\.0\.1:9"):
         run_campaign(document(), tmp_path / "none", scheduler="tcp://127.0.0.1:9")
+
+
+def test_workers_that_see_another_disk_or_hold_other_software_are_refused(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    (tmp_path / ".partial").mkdir()
+    (tmp_path / "manifest.json").write_text("{}")  # an older state of the campaign on the worker's own disk
+
+    class Client:
+        def __init__(self, word: str | None, there: dict[str, str]) -> None:
+            self.word, self.there = word, there
+
+        def run(self, task, *arguments):
+            return {"tcp://a:1": self.there if task is versions else self.word or task(*arguments)}
+
+    assert means._check_workers(Client(None, versions()), store) == 1
+    with pytest.raises(CampaignError, match="does not see"):
+        means._check_workers(Client("another word", versions()), store)
+    with pytest.raises(CampaignError, match=r"mujoco 0\.1"):
+        means._check_workers(Client(None, versions() | {"mujoco": "0.1"}), store)
+    payload = json.loads(payload_of(plan_from_dict(document())))  # and one that joins later
+    payload["versions"]["numpy"] = "0.1"
+    with pytest.raises(CampaignError, match=r"here 0\.1"):
+        generator_of(json.dumps(payload))
+
+
+def test_a_part_that_goes_while_the_campaign_runs_is_missed(reference: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "robbed"
+
+    def rob(progress: Progress) -> None:
+        (folder / "samples/part-000000.parquet").unlink(missing_ok=True)
+
+    with pytest.raises(CampaignError, match=r"part-000000\.parquet is not there"):
+        run_campaign(document(), folder, threads=1, progress=rob)
+    assert json.loads((folder / "manifest.json").read_text())["status"] == "stopped"
+    assert "samples/part-000000.parquet is missing" in verify(folder)
+    run_campaign(document(), folder)
+    assert hashes(folder) == hashes(reference)

@@ -22,13 +22,12 @@ from bench.cli import main
 from bench.files import (
     OutputError,
     append_line,
-    check_folder,
-    check_targets,
     replacing,
     together,
     write_bytes,
     write_text,
 )
+from bench.targets import check_folder, check_targets
 
 
 def everything(folder: Path) -> dict[str, bytes]:

@@ -1,47 +1,32 @@
 """Running a campaign: parts handed to threads, to processes, or to the workers of a dask cluster, and what is done noted.
 
-A part is one task: draw, run as native batches, measure, write. Tasks share nothing, so that one way of running them
-serves all: a pool of threads (the default; MuJoCo and the compiled loops run without the GIL, and a thread writes its
-part while the others simulate), a pool of processes (`workers`), or an existing dask cluster (`scheduler`).
+A part is one task: draw, run as native batches, measure, write (`bench.campaign.task`). Tasks share nothing, so that one way
+of running them serves all (`bench.campaign.means`).
 """
 
 from __future__ import annotations
 
 import contextlib
-import json
-import os
-import signal
-import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import (
-    FIRST_COMPLETED,
-    Executor,
-    Future,
-    ProcessPoolExecutor,
-    ThreadPoolExecutor,
-    wait,
-)
+from collections.abc import Callable, Mapping
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
-from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
+from bench.campaign.lock import CampaignError
+from bench.campaign.means import cores, means_of
 from bench.campaign.plan import Plan
 from bench.campaign.reading import plan_from_dict, read_plan
 from bench.campaign.size import check_size
-from bench.campaign.store import BYTES_DEPEND_ON, CampaignError, Store, counts, versions
+from bench.campaign.store import Store, counts
+from bench.campaign.task import generator_of, payload_of
 from bench.errors import ParameterError
-
-if TYPE_CHECKING:
-    from bench.campaign.generation import Generator
 
 CRASHES_ALLOWED = 3
 """Times that a part may take a worker process down with it before the campaign stops."""
-_loading = threading.Lock()
 
 
 class Progress(NamedTuple):
@@ -159,8 +144,9 @@ def run_campaign(
         status, means = "stopped", "nothing left to run"
         try:
             if left:
-                with _means(workers, threads, scheduler, store) as (submit, window, means):
+                with means_of(workers, threads, scheduler, store) as (submit, window, means):
                     _run(left, lambda part: submit(payload, str(store.folder), part), window, store, tally)
+                store.check_present(entries)
             status = "complete"
         finally:
             store.write_manifest(plan, channels, entries, status=status)
@@ -207,45 +193,6 @@ def _result(store: Store, status: str, tally: _Tally, *, seconds: float, means: 
     )
 
 
-def payload_of(plan: Plan) -> str:
-    """A plan as text for another process."""
-    return json.dumps({"plan": plan.to_dict(), "folder": plan.rigs[0].folder}, ensure_ascii=False)
-
-
-def generator_of(payload: str) -> Generator:
-    """The generator of a plan, made once a process."""
-    with _loading:
-        return _generator(payload)
-
-
-@lru_cache(maxsize=2)
-def _generator(payload: str) -> Generator:
-    from bench.campaign.generation import Generator  # noqa: PLC0415  (MuJoCo and the compiled code)
-
-    document = json.loads(payload)
-    return Generator(plan_from_dict(document["plan"], folder=document["folder"]))
-
-
-def run_part(payload: str, folder: str, part: int, threads: int = 1) -> dict[str, Any]:
-    """Generate and write one part; the task that threads, processes and clusters run.
-
-    Args:
-        payload: The plan, as from `payload_of`.
-        folder: Folder of the campaign.
-        part: Number of the part.
-        threads: Threads of its native batches.
-
-    Returns:
-        Its entry in the manifest.
-    """
-    from bench.campaign.tables import part_contents  # noqa: PLC0415
-
-    generator = generator_of(payload)
-    made = generator.part(part, threads=threads)
-    failed = [failure.record for failure in made.failures]
-    return Store(folder).write_part(generator.plan, part, failed, part_contents(generator, made))
-
-
 class _Tally:
     """Entries of the finished parts, and the progress that they make."""
 
@@ -269,9 +216,6 @@ class _Tally:
         rate = (self.records - self.before) / max(elapsed, 1e-9)
         left = (self.plan.records - self.records) / rate
         self.report(Progress(self.records, self.plan.records, self.failed, rate, elapsed, left))
-
-
-Submit = Callable[[str, str, int], "Future[dict[str, Any]]"]
 
 
 def _run(
@@ -313,126 +257,3 @@ def _note_running(futures: list[Future], store: Store, tally: _Tally) -> None:
             entry = future.result()
             store.note(tally.sha256, entry)
             tally.entries[entry["part"]] = entry
-
-
-def cores() -> int:
-    """Cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-@contextmanager
-def _means(
-    workers: int | None, threads: int | None, scheduler: str | None, store: Store
-) -> Iterator[tuple[Submit, Callable[[], int], str]]:
-    """What runs the tasks: how to submit one, how many to keep in flight, and its name."""
-    if scheduler is not None:
-        with _cluster(scheduler, threads or 1, store) as found:
-            yield found
-    elif workers is None or workers == 1:
-        count = threads or cores()
-        with ThreadPoolExecutor(count, thread_name_prefix="campaign") as pool:
-            yield (
-                (lambda *task: pool.submit(run_part, *task)),
-                (lambda: count + 1),  # a thread goes on with the next part while its last one is noted
-                f"{count} thread{'s' * (count > 1)}",
-            )
-    else:
-        count = threads or max(1, cores() // workers)
-        processes = _Processes(workers, count)
-        try:
-            yield (
-                processes.submit,
-                (lambda: workers + 1),
-                f"{workers} processes of {count} thread{'s' * (count > 1)}",
-            )
-        finally:
-            processes.pool.shutdown(cancel_futures=True)
-
-
-class _Processes:
-    """A pool of processes that is made anew when one of them dies."""
-
-    def __init__(self, workers: int, threads: int) -> None:
-        self.workers, self.threads = workers, threads
-        self.pool: Executor = self._made()
-
-    def _made(self) -> ProcessPoolExecutor:
-        from multiprocessing import get_context  # noqa: PLC0415
-
-        # not fork: MuJoCo's and numba's threads would not survive it
-        return ProcessPoolExecutor(
-            self.workers, mp_context=get_context("spawn"), initializer=_leave_with_parent
-        )
-
-    def submit(self, payload: str, folder: str, part: int) -> Future:
-        try:
-            return self.pool.submit(run_part, payload, folder, part, self.threads)
-        except BrokenProcessPool:
-            self.pool.shutdown(wait=False)
-            self.pool = self._made()
-            return self.pool.submit(run_part, payload, folder, part, self.threads)
-
-
-def _leave_with_parent() -> None:
-    """End this worker when the process that started it is killed; it would wait for work for ever.
-
-    Ctrl-C reaches all processes of a terminal; the one that started the others stops them in order.
-    """
-    from multiprocessing import parent_process  # noqa: PLC0415
-
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    parent = parent_process()
-    if parent is None:
-        return
-
-    def watch() -> None:
-        parent.join()
-        os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()
-
-
-@contextmanager
-def _cluster(address: str, threads: int, store: Store) -> Iterator[tuple[Submit, Callable[[], int], str]]:
-    try:
-        from distributed import Client  # noqa: PLC0415
-    except ImportError as error:
-        raise CampaignError("a scheduler needs dask.distributed: pip install 'jointbench[scale]'") from error
-    try:
-        client = Client(address, timeout=10)
-    except (OSError, TimeoutError, ValueError) as error:
-        raise CampaignError(
-            f"no dask scheduler answers at {address} ({error}); start one with `dask scheduler`"
-        ) from error
-    with client:
-        workers = _check_workers(client, store)
-        executor = client.get_executor(pure=False, retries=2)
-
-        def window() -> int:  # workers may join and leave
-            return max(2, 2 * sum(client.nthreads().values()))
-
-        def submit(payload: str, folder: str, part: int) -> Future:
-            return executor.submit(run_part, payload, folder, part, threads)
-
-        yield submit, window, f"{workers} dask workers at {address}"
-
-
-def _check_workers(client: Any, store: Store) -> int:
-    """Number of the workers; raise `CampaignError` unless all workers see the folder and hold the same software."""
-    for worker, sees in client.run(os.path.exists, str(store.manifest_path)).items():
-        if not sees:
-            raise CampaignError(
-                f"worker {worker} does not see {store.folder}; put `out` on a disk that all workers share"
-            )
-    here, all_there = versions(), client.run(versions)
-    for worker, there in all_there.items():
-        different = [
-            f"{name} {there.get(name)} (here {here[name]})"
-            for name in BYTES_DEPEND_ON
-            if there.get(name) != here[name]
-        ]
-        if different:
-            raise CampaignError(
-                f"worker {worker} has {', '.join(different)}; install the same versions everywhere"
-            )
-    return len(all_there)

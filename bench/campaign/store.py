@@ -38,14 +38,12 @@ from bench.campaign.parts import (
     strangers,
 )
 from bench.campaign.plan import Plan
+from bench.campaign.versions import differing, versions
 from bench.errors import FileFormatError
 from bench.files import SYSTEM, OutputError, settle, write_bytes, write_text
-from bench.provenance import software_versions
 
 FORMAT = 1
 """Version of the layout."""
-BYTES_DEPEND_ON = ("jointbench", "mujoco", "numpy", "scipy", "numba", "pyarrow")
-"""Distributions that must be the same when a campaign is resumed."""
 
 
 class Opened(NamedTuple):
@@ -58,13 +56,6 @@ class Opened(NamedTuple):
 
     entries: dict[int, dict[str, Any]]
     found: list[str]
-
-
-def versions() -> dict[str, str]:
-    """Versions of what the bytes of a campaign depend on, and of Python."""
-    from importlib.metadata import version  # noqa: PLC0415
-
-    return {**dict(software_versions()), "pyarrow": version("pyarrow")}
 
 
 class Store:
@@ -173,16 +164,11 @@ class Store:
                 f"'{self.folder}' holds a campaign of another plan ('{begun.get('name', '')}'); "
                 "choose another folder, or resume with the plan it was begun with"
             )
-        now, then = versions(), begun.get("versions")
-        then = then if isinstance(then, Mapping) else {}
-        changed = [
-            f"{name} {then.get(name)} (now {now[name]})"
-            for name in BYTES_DEPEND_ON
-            if name in now and then.get(name) != now[name]
-        ]
+        then = begun.get("versions")
+        changed = differing(then if isinstance(then, Mapping) else {}, versions(), "now")
         if changed:
             raise CampaignError(
-                f"the campaign in '{self.folder}' was begun with {', '.join(changed)}; its records could differ in their "
+                f"the campaign in '{self.folder}' was begun with {changed}; its records could differ in their "
                 "last bits: resume with the same versions, or choose another folder"
             )
 
@@ -287,6 +273,17 @@ class Store:
             write_bytes(self.path(kind, part), content, inside=self.folder / ".partial", settled=False)
         marks = {kind: mark_of(self.path(kind, part), content) for kind, content in contents.items()}
         return {**entry, "marks": marks}
+
+    def check_present(self, entries: Mapping[int, Mapping[str, Any]]) -> None:
+        """Raise `CampaignError` where a file that was noted is not there in its size: removed meanwhile, or on another disk."""
+        for part, entry in entries.items():
+            for kind, noted in entry["files"].items():
+                path = self.path(kind, part)
+                if not path.is_file() or path.stat().st_size != noted["bytes"]:
+                    raise CampaignError(
+                        f"{path} is not there as it was written; it was changed while the campaign ran, or lies on a disk that only "
+                        "its worker sees: resume the campaign"
+                    )
 
     def note(self, plan_sha256: str, entry: Mapping[str, Any]) -> None:
         """Note a finished part in the journal.

@@ -96,7 +96,7 @@ class Diagnose:
     def _check_places(self) -> None:
         """Refuse places that cannot be written to before a minute is spent on the diagnosis."""
         from bench.errors import ParameterError
-        from bench.files import check_targets
+        from bench.targets import check_targets
 
         if self.most < 1:
             raise ParameterError(f"--most is {self.most}; at least one effect has to be allowed")
@@ -215,7 +215,7 @@ class BlindMake:
 
         from bench.discrepancy import BlindOptions, make_blind
         from bench.discrepancy.blind.protocol import SEAL
-        from bench.files import check_folder
+        from bench.targets import check_folder
 
         begun = next(self.folder.glob(f"*/{SEAL}"), None) is not None  # by the same command, which goes on
         for folder in (self.folder, self.answers):
@@ -285,7 +285,8 @@ class BlindScore:
         """Run the command."""
         from bench.discrepancy import score_blind
         from bench.discrepancy.blind.score_report import markdown, page, tables
-        from bench.files import check_targets, together, write_text
+        from bench.files import together, write_text
+        from bench.targets import check_targets
 
         check_targets(self.html, self.markdown, force=self.force)
         score = score_blind(self.results, self.answers, cases=self.cases)

@@ -116,7 +116,7 @@ class Excite:
     def _check(self) -> None:
         """Raise an error for arguments that do not go together."""
         from bench.errors import ParameterError, UnknownNameError
-        from bench.files import check_targets
+        from bench.targets import check_targets
 
         check_targets(self.out, force=self.force)
         if self.method not in METHODS:

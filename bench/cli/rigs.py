@@ -31,7 +31,7 @@ class Demo:
         """Run the command."""
         from bench import demo
         from bench.demo.report import summary, write
-        from bench.files import check_folder
+        from bench.targets import check_folder
 
         check_folder(self.out, force=self.force)
         with progress_bar(quiet=self.json) as progress:
@@ -99,9 +99,9 @@ class Simulate:
         """Run the command."""
         import numpy as np
 
-        from bench.files import check_targets
         from bench.record_files import write_recording
         from bench.rig import simulate
+        from bench.targets import check_targets
 
         check_targets(self.out, force=self.force)
         rig, excitation = _configured(self.configuration)
@@ -143,9 +143,9 @@ class View:
         import numpy as np
 
         from bench.errors import ParameterError
-        from bench.files import check_targets
         from bench.rerun_log import log_comparison
         from bench.rig import simulate
+        from bench.targets import check_targets
 
         check_targets(self.out, force=self.force)
         if not self.configurations:

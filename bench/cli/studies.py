@@ -30,8 +30,8 @@ class Reproduce:
 
     def __call__(self) -> None:
         """Run the command."""
-        from bench.files import check_folder
         from bench.reproduction import reproduce
+        from bench.targets import check_folder
 
         check_folder(self.out, force=self.force, own=("table.json", "[A-D][0-9]*.json"))
         with progress_bar(quiet=self.json) as progress:
