@@ -68,8 +68,6 @@ class Diagnose:
         self, diagnosis: Diagnosis, document: dict[str, Any], stage: Callable[[str], None]
     ) -> tuple[list[Path], Exception | None]:
         """The files written, moved into place together; where one fails, the verdict alone, and what failed."""
-        from bench.discrepancy import write_report
-        from bench.discrepancy.report.rerun import write_rerun
         from bench.files import OutputError, together, write_text
 
         text = json.dumps(document, indent=1, ensure_ascii=False)
@@ -79,9 +77,13 @@ class Diagnose:
                 for path in saved:
                     write_text(path, text)
                 if self.html is not None:
+                    from bench.discrepancy import write_report
+
                     stage(f"writing {self.html}")
                     write_report(diagnosis, self.html)
                 if self.rrd is not None:
+                    from bench.discrepancy.report.rerun_recording import write_rerun
+
                     stage(f"writing {self.rrd}")
                     write_rerun(diagnosis, self.rrd)
         except Exception as error:  # whatever a figure ran into: the verdict is told and kept
