@@ -1,0 +1,195 @@
+"""Quantities of a plan as they stand in its file: a number, a name, or a table that stands for a distribution."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import cache
+from typing import Annotated, Any, ClassVar
+
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Discriminator,
+    Field,
+    InstanceOf,
+    Strict,
+    Tag,
+    TypeAdapter,
+)
+from pydantic.json_schema import SkipJsonSchema
+
+from bench.campaign.distribution import (
+    Choice,
+    Distribution,
+    Integers,
+    LogUniform,
+    Normal,
+    Quantity,
+    Shared,
+    Uniform,
+)
+from bench.documents import Entry, Listed, Name, Number, Pair, Whole, any_of, checked_as, refuse, told
+from bench.errors import shortened, unknown_name
+
+Scalar = Annotated[
+    Annotated[bool, Strict()] | Annotated[int, Strict()] | Number | Name,
+    Field(union_mode="left_to_right"),
+]
+"""A number, a name, or true or false; whole numbers stay whole."""
+
+
+class _Table(Entry):
+    """A table that stands for a distribution."""
+
+    kind = "a distribution"
+    makes: ClassVar[Callable[..., Distribution | Shared]]
+
+    def made(self) -> Distribution | Shared:
+        """The distribution: the numbers of the first entry, and the options by name."""
+        first, *options = type(self).model_fields
+        given = {name: value for name, value in self.given.items() if name in options and value is not None}
+        return type(self).makes(*getattr(self, first), **given)
+
+
+class UniformTable(_Table):
+    """Uniform between two numbers."""
+
+    makes = Uniform
+    uniform: Pair
+    """Lowest and highest."""
+
+
+class LogUniformTable(_Table):
+    """Uniform in the logarithm, between two positive numbers."""
+
+    makes = LogUniform
+    log_uniform: Pair
+    """Lowest and highest."""
+
+
+class NormalTable(_Table):
+    """Normal, truncated where an end is given."""
+
+    makes = Normal
+    normal: Pair
+    """Mean and standard deviation."""
+    low: Number | None = None
+    """Lower end."""
+    high: Number | None = None
+    """Upper end."""
+
+
+class IntegersTable(_Table):
+    """A whole number, both ends included, all alike."""
+
+    makes = Integers
+    integers: Annotated[tuple[Whole, Whole], Strict(False)]
+    """Lowest and highest."""
+
+
+class ChoiceTable(_Table):
+    """One of some numbers or names."""
+
+    choice: Listed[Scalar] = Field(min_length=1)
+    """The values."""
+    weights: Listed[Number] = ()
+    """A weight each; all alike without."""
+
+    def made(self) -> Choice:
+        """The choice."""
+        return Choice(self.choice, self.weights)
+
+
+class SharedTable(_Table):
+    """The quantity of that name in the plan's table `shared`."""
+
+    shared: Name
+    """Its name."""
+    times: Number = 1.0
+    """Factor."""
+
+    def made(self) -> Shared:
+        """The quantity."""
+        return Shared(self.shared, self.times)
+
+
+TABLES: Mapping[str, type[_Table]] = {
+    next(iter(set(table.model_fields) - {"low", "high", "weights", "times"})): table
+    for table in (UniformTable, LogUniformTable, NormalTable, IntegersTable, ChoiceTable, SharedTable)
+}
+"""Table by the entry that tells what it stands for."""
+
+
+def is_quantity_table(entry: object) -> bool:
+    """Whether a table of a plan stands for a distribution (and not for a signal, a stage, …)."""
+    return isinstance(entry, Mapping) and any(form in entry for form in TABLES)
+
+
+def _stated(entry: Any) -> Any:
+    if isinstance(entry, Mapping):
+        forms = [form for form in TABLES if form in entry]
+        if len(forms) != 1:
+            came = ", ".join(map(str, entry)) or "{}"
+            refuse(unknown_name("distribution", came, TABLES), unknown=True)
+        return dict(entry)
+    if not isinstance(entry, bool | int | float | str | Distribution | Shared):
+        refuse(
+            f"{shortened(entry)} came; a number or a distribution as {{ uniform = [0.0, 1.0] }} is expected"
+        )
+    return entry
+
+
+def _form(entry: Any) -> str:
+    if isinstance(entry, Mapping):
+        return next(form for form in TABLES if form in entry)
+    return "made" if isinstance(entry, Distribution | Shared) else "value"
+
+
+def _no_name(quantity: Any) -> Any:
+    if isinstance(quantity, bool | str) or (isinstance(quantity, Distribution) and quantity.textual):
+        refuse(f"{shortened(quantity)} came; a number or a distribution of numbers is expected")
+    return quantity
+
+
+_made = told(lambda table: table.made())
+
+AnyQuantity = Annotated[
+    any_of(
+        Annotated[Scalar, Tag("value")],
+        Annotated[SkipJsonSchema[InstanceOf[Distribution | Shared]], Tag("made")],
+        *(Annotated[table, AfterValidator(_made), Tag(form)] for form, table in TABLES.items()),
+    ),
+    Discriminator(_form),
+    BeforeValidator(_stated),
+]
+"""Validates to a `Quantity`."""
+NumberQuantity = Annotated[AnyQuantity, AfterValidator(_no_name)]
+"""A quantity that is a number."""
+_QUANTITY: TypeAdapter[Quantity] = TypeAdapter(AnyQuantity)
+
+
+def read_quantity(entry: Any, where: str) -> Quantity:
+    """A number, a name or a distribution from a plan.
+
+    Args:
+        entry: The value or table.
+        where: What the quantity is, for messages.
+
+    Raises:
+        DocumentError: No such distribution, an option that it lacks, or numbers that make none.
+    """
+    return checked_as(_QUANTITY, entry, where)
+
+
+@cache
+def spread(kind: Any) -> Any:
+    """The type of a value in whose place a distribution may stand."""
+    table = AnyQuantity if kind is not Number and kind is not Whole else NumberQuantity
+    return Annotated[
+        any_of(Annotated[kind, Tag("value")], Annotated[table, Tag("distribution")]),
+        Discriminator(lambda entry: "distribution" if _stands_for(entry) else "value"),
+    ]
+
+
+def _stands_for(entry: Any) -> bool:
+    return isinstance(entry, Mapping | Distribution | Shared)
