@@ -17,6 +17,7 @@ from pydantic import (
     TypeAdapter,
 )
 from pydantic.json_schema import SkipJsonSchema
+from typing_extensions import TypeAliasType
 
 from bench.campaign.distribution import (
     Choice,
@@ -153,17 +154,20 @@ def _no_name(quantity: Any) -> Any:
 
 _made = told(lambda table: table.made())
 
-AnyQuantity = Annotated[
-    any_of(
-        Annotated[Scalar, Tag("value")],
-        Annotated[SkipJsonSchema[InstanceOf[Distribution | Shared]], Tag("made")],
-        *(Annotated[table, AfterValidator(_made), Tag(form)] for form, table in TABLES.items()),
-    ),
-    Discriminator(_form),
-    BeforeValidator(_stated),
-]
+AnyQuantity = TypeAliasType(
+    "AnyQuantity",
+    Annotated[
+        any_of(
+            Annotated[Scalar, Tag("value")],
+            Annotated[SkipJsonSchema[InstanceOf[Distribution | Shared]], Tag("made")],
+            *(Annotated[table, AfterValidator(_made), Tag(form)] for form, table in TABLES.items()),
+        ),
+        Discriminator(_form),
+        BeforeValidator(_stated),
+    ],
+)
 """Validates to a `Quantity`."""
-NumberQuantity = Annotated[AnyQuantity, AfterValidator(_no_name)]
+NumberQuantity = TypeAliasType("NumberQuantity", Annotated[AnyQuantity, AfterValidator(_no_name)])
 """A quantity that is a number."""
 _QUANTITY: TypeAdapter[Quantity] = TypeAdapter(AnyQuantity)
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field, WrapValidator, model_validator
+from pydantic import AfterValidator, Field, Strict, WrapValidator, model_validator
 
 from bench.campaign.distribution import Distribution
 from bench.campaign.plan import (
@@ -23,6 +23,8 @@ from bench.campaign.plan import (
 )
 from bench.campaign.quantities import AnyQuantity, NumberQuantity, is_quantity_table, read_quantity, spread
 from bench.documents import (
+    AS_NUMBER,
+    AS_WHOLE,
     Count,
     Document,
     Entry,
@@ -32,11 +34,9 @@ from bench.documents import (
     Listed,
     Name,
     NotNegative,
-    Number,
     Positive,
     Table,
     Text,
-    Whole,
     refuse,
     telling,
 )
@@ -89,7 +89,7 @@ class ElementPlanEntry(PlacedLaw):
     """Number or distribution by parameter; the others at the law's defaults."""
     withheld: Flag = False
     """Left out of the public part of the manifest; its parameters stand in the answers."""
-    probability: Annotated[Number, Field(gt=0.0, le=1.0)] = 1.0
+    probability: Annotated[float, Strict(), Field(gt=0.0, le=1.0), AS_NUMBER] = 1.0
     """Share of the rig's records that have the element."""
 
     @model_validator(mode="after")
@@ -223,7 +223,7 @@ class PlanDocument(Document):
     kind = "a plan"
     name: Label = ""
     """Name."""
-    records: Annotated[Whole, Field(ge=1)]
+    records: Annotated[int, Strict(), Field(ge=1), AS_WHOLE]
     """Number of records."""
     duration: Positive
     """Length of a record [s]."""

@@ -6,6 +6,8 @@ that is known. The models give the JSON Schemas that editors complete by (`joint
 """
 
 from bench.documents.kinds import (
+    AS_NUMBER,
+    AS_WHOLE,
     Count,
     Flag,
     Label,
@@ -16,6 +18,7 @@ from bench.documents.kinds import (
     Number,
     Pair,
     Positive,
+    Probability,
     Table,
     Text,
     Whole,
@@ -34,6 +37,8 @@ from bench.documents.model import (
 )
 
 __all__ = [
+    "AS_NUMBER",
+    "AS_WHOLE",
     "LIMITS",
     "Count",
     "Document",
@@ -48,6 +53,7 @@ __all__ = [
     "Number",
     "Pair",
     "Positive",
+    "Probability",
     "Table",
     "Text",
     "Whole",

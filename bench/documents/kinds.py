@@ -49,14 +49,19 @@ def _few(value: Any) -> Any:
     return dict(value) if isinstance(value, Mapping) else value
 
 
-Number = Annotated[float, Strict(), Field(allow_inf_nan=False), BeforeValidator(_plain)]
-Positive = Annotated[Number, Field(gt=0.0)]
-NotNegative = Annotated[Number, Field(ge=0.0)]
-Limit = Annotated[float, Strict(), Field(gt=0.0, allow_inf_nan=True), BeforeValidator(_plain)]
+AS_NUMBER = BeforeValidator(_plain)
+"""Last among the marks of a number that has further bounds than these here."""
+AS_WHOLE = BeforeValidator(_whole)
+"""The same of a whole number."""
+Number = Annotated[float, Strict(), Field(allow_inf_nan=False), AS_NUMBER]
+Positive = Annotated[float, Strict(), Field(gt=0.0, allow_inf_nan=False), AS_NUMBER]
+NotNegative = Annotated[float, Strict(), Field(ge=0.0, allow_inf_nan=False), AS_NUMBER]
+Probability = Annotated[float, Strict(), Field(ge=0.0, le=1.0), AS_NUMBER]
+Limit = Annotated[float, Strict(), Field(gt=0.0, allow_inf_nan=True), AS_NUMBER]
 """A positive number or infinity, which stands for no limit (TOML can write it)."""
-Whole = Annotated[int, Strict(), BeforeValidator(_whole)]
-Count = Annotated[Whole, Field(ge=0)]
-Flag = Annotated[bool, Strict(), BeforeValidator(_plain)]
+Whole = Annotated[int, Strict(), AS_WHOLE]
+Count = Annotated[int, Strict(), Field(ge=0), AS_WHOLE]
+Flag = Annotated[bool, Strict(), AS_NUMBER]
 Text = Annotated[str, Strict()]
 Name = Annotated[
     str, Strict(), StringConstraints(min_length=1, max_length=256, pattern=r"^[^\x00-\x1f\x7f]+$")

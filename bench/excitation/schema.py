@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, Strict, model_validator
 
 from bench.documents import (
+    AS_WHOLE,
     Entry,
     Flag,
     Limit,
@@ -15,13 +16,12 @@ from bench.documents import (
     Pair,
     Positive,
     Table,
-    Whole,
     refuse,
 )
 from bench.rig.schema import ElementDocument, RigDocument
 
 Ranges = Table[Pair]
-Size = Annotated[Whole, Field(ge=1, le=1_000_000)]
+Size = Annotated[int, Strict(), Field(ge=1, le=1_000_000), AS_WHOLE]
 
 
 class LimitsEntry(Entry):

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 from pydantic import Field
 
 from bench.documents import Entry, Flag, Label, Listed, Name, Number
 from bench.laws.base import MAX_COORDINATES, ForceLaw
-from bench.laws.registry import find_law
+from bench.laws.registry import LAWS, MODELS, find_law
 
 
 class PlacedLaw(Entry):
     """A force law placed in a structure, without its parameters."""
 
     kind = "an element"
-    law: Name
+    law: Annotated[Name, Field(json_schema_extra={"enum": [*LAWS, *MODELS]})]
     """Name of the force law, as `jointbench laws` lists them."""
     joints: Listed[Name] = Field(min_length=1, max_length=MAX_COORDINATES)
     """Joints or fixed tendons that the law acts on, in the order of the law."""

@@ -35,7 +35,11 @@ def _known_rig(name: Any) -> Any:
     return name
 
 
-RigName = Annotated[Name, BeforeValidator(_known_rig)]
+RigName = Annotated[
+    Name,
+    BeforeValidator(_known_rig),
+    Field(json_schema_extra={"anyOf": [{"enum": list(RIGS)}, {"pattern": r"\.xml$"}]}),
+]
 
 
 class ElementDocument(PlacedLaw):

@@ -6,57 +6,18 @@ which entries there are and what kind of value each takes; the description that 
 
 from __future__ import annotations
 
-import types
 from collections.abc import Callable, Mapping
-from dataclasses import MISSING, fields
 from functools import cache
-from typing import (
-    TYPE_CHECKING,
-    Annotated,
-    Any,
-    ForwardRef,
-    Literal,
-    Union,
-    get_args,
-    get_origin,
-    get_type_hints,
-)
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_origin
 
-import numpy as np
-from pydantic import (
-    AfterValidator,
-    BeforeValidator,
-    Discriminator,
-    Field,
-    Strict,
-    Tag,
-    TypeAdapter,
-    create_model,
-    model_validator,
-)
-from pydantic_core import PydanticUndefined
+from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag, TypeAdapter, model_validator
 
-from bench.documents import (
-    Document,
-    Entry,
-    Flag,
-    Listed,
-    Number,
-    Positive,
-    Table,
-    Text,
-    Whole,
-    any_of,
-    refuse,
-    telling,
-    told,
-)
+from bench.documents import Document, Entry, Positive, Table, any_of, refuse, telling, told
+from bench.documents.derived import SCALARS, entry_of, first_line
 from bench.errors import shortened, unknown_name
 from bench.signals.base import Signal
 from bench.signals.description import Described
 from bench.signals.excitation import Excitation
-
-_SCALARS: dict[Any, Any] = {float: Number, int: Whole, bool: Flag, str: Text}
 
 Spread = Callable[[Any], Any]
 """Makes the type of a field from that of a single value, so that something else may stand in its place."""
@@ -121,50 +82,18 @@ def _typed(family: type[Described], names: tuple[str, ...]) -> Callable[[Any], A
 
 
 def _model(family: type[Described], member: type[Described], own: str, spread: Spread) -> type[Entry]:
-    hints = get_type_hints(member)
-    texts = _attributes(member)
-    entries: dict[str, Any] = {"type": (Literal[member.name], Field(description=_first_line(member)))}
-    for field in fields(member):  # pyright: ignore[reportArgumentType]  (every member is a dataclass)
-        default: Any = PydanticUndefined
-        if field.default is not MISSING:
-            default = field.default
-        elif field.default_factory is not MISSING:
-            default = field.default_factory()
-        kind = _kind(hints[field.name], family, own, spread)
-        entries[field.name] = (kind, Field(default, description=texts.get(field.name)))
-    model = create_model(
-        f"{member.__name__}{family.__name__}", __base__=Entry, __module__=__name__, **entries
+    def kind(hint: Any) -> Any:
+        if hint in SCALARS or get_origin(hint) is Literal:
+            return spread(SCALARS.get(hint, hint))
+        return own if isinstance(hint, type) and issubclass(hint, Described) else None
+
+    return entry_of(
+        member,
+        kind,
+        kind=f"{family.kind} '{member.name}'",
+        name=f"{member.__name__}{family.__name__}",
+        type=(Literal[member.name], Field(description=first_line(member))),
     )
-    model.kind = f"{family.kind} '{member.name}'"
-    return model
-
-
-def _kind(hint: Any, family: type[Described], own: str, spread: Spread) -> Any:
-    """The type of an entry, from that of the description's field."""
-    if hint in _SCALARS:
-        return spread(_SCALARS[hint])
-    origin, arguments = get_origin(hint), get_args(hint)
-    if origin is Literal:
-        return spread(hint)
-    if isinstance(hint, type) and issubclass(hint, Described):
-        return own
-    if origin in {types.UnionType, Union}:
-        kinds = tuple(a if a is type(None) else _kind(a, family, own, spread) for a in arguments)
-        return any_of(*(_forward(kind) for kind in kinds))
-    if origin is np.ndarray or hint is np.ndarray:
-        return Listed[Number]
-    if origin is tuple:
-        inner = [_forward(_kind(a, family, own, spread)) for a in arguments if a is not Ellipsis]
-        return Listed[inner[0]] if Ellipsis in arguments else _fixed(inner)
-    raise TypeError(f"no document kind for the annotation {hint!r}")
-
-
-def _forward(kind: Any) -> Any:
-    return ForwardRef(kind) if isinstance(kind, str) else kind
-
-
-def _fixed(inner: list[Any]) -> Any:
-    return Annotated[tuple[tuple(inner)], Strict(False)]
 
 
 def _maker(member: type[Described]) -> Callable[[Any], Described]:
@@ -173,27 +102,6 @@ def _maker(member: type[Described]) -> Callable[[Any], Described]:
         return member(**{name: value for name, value in entry.given.items() if name != "type"})
 
     return made
-
-
-def _first_line(member: type[Any]) -> str:
-    return (member.__doc__ or "").strip().splitlines()[0]
-
-
-def _attributes(member: type[Any]) -> dict[str, str]:
-    """The description of each attribute in a Google-style docstring."""
-    found: dict[str, str] = {}
-    name = ""
-    _, _, block = (member.__doc__ or "").partition("Attributes:")
-    for line in block.splitlines():
-        indent, text = len(line) - len(line.lstrip()), line.strip()
-        head, colon, rest = text.partition(": ")
-        if indent == 8 and colon and head.isidentifier():
-            name, found[head] = head, rest
-        elif indent > 8 and name:
-            found[name] += f" {text}"
-        elif text and indent < 8:
-            break
-    return found
 
 
 if TYPE_CHECKING:
