@@ -42,7 +42,7 @@ Scalar = Annotated[
 class _Table(Entry):
     """A table that stands for a distribution."""
 
-    kind = "a distribution"
+    entry_name = "a distribution"
     makes: ClassVar[Callable[..., Distribution | Shared]]
 
     def made(self) -> Distribution | Shared:

@@ -84,7 +84,7 @@ Weight = NotNegative
 class ElementPlanEntry(PlacedLaw):
     """An element of a rig, its parameters drawn."""
 
-    kind = "an element of a plan"
+    entry_name = "an element of a plan"
     parameters: Table[NumberQuantity] = Field(default_factory=dict)
     """Number or distribution by parameter; the others at the law's defaults."""
     withheld: Flag = False
@@ -125,7 +125,7 @@ class ElementPlanEntry(PlacedLaw):
 class RigPlanEntry(Entry):
     """A rig to choose from."""
 
-    kind = "a rig of a plan"
+    entry_name = "a rig of a plan"
     rig: Name
     """A rig of the bench, or the path of an MJCF file."""
     name: Label = ""
@@ -180,7 +180,7 @@ class RigPlanEntry(Entry):
 class ExcitationPlanEntry(Entry):
     """An excitation to choose from."""
 
-    kind = "an excitation of a plan"
+    entry_name = "an excitation of a plan"
     name: Label = ""
     """Name in the tables."""
     weight: Weight = 1.0
@@ -196,7 +196,7 @@ class ExcitationPlanEntry(Entry):
 class SensorPlanEntry(Entry):
     """A set of sensors to choose from."""
 
-    kind = "a set of sensors of a plan"
+    entry_name = "a set of sensors of a plan"
     name: Label = ""
     """Name in the tables."""
     weight: Weight = 1.0
@@ -220,7 +220,7 @@ class SensorPlanEntry(Entry):
 class PlanDocument(Document):
     """A campaign: rigs, excitations and sensors to choose from, with distributions over their numbers."""
 
-    kind = "a plan"
+    entry_name = "a plan"
     name: Label = ""
     """Name."""
     records: Annotated[int, Strict(), Field(ge=1), AS_WHOLE]
@@ -301,7 +301,7 @@ def _by_type(chains: Mapping[str, tuple[Any, ...]]) -> dict[str, dict[str, Node]
 class ChannelEntry(Entry):
     """A channel of a data set."""
 
-    kind = "a channel of a manifest"
+    entry_name = "a channel of a manifest"
     name: Name
     """Name."""
     unit: Text
@@ -315,7 +315,7 @@ class ChannelEntry(Entry):
 class PartFile(Entry):
     """A file of a part."""
 
-    kind = "a file of a part"
+    entry_name = "a file of a part"
     bytes: Count
     """Size."""
     sha256: Text
@@ -325,7 +325,7 @@ class PartFile(Entry):
 class PartEntry(Entry):
     """A finished part."""
 
-    kind = "a part of a manifest"
+    entry_name = "a part of a manifest"
     part: Count
     """Number."""
     first: Count
@@ -352,7 +352,7 @@ class PartEntry(Entry):
 class ManifestDocument(Document):
     """What a campaign says of itself."""
 
-    kind = "a manifest"
+    entry_name = "a manifest"
     format: Literal[1]
     """Version of the layout."""
     name: Text

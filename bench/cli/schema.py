@@ -36,6 +36,12 @@ KINDS: dict[str, Kind] = {
         "a rig with an [experiment] for `excite`", "bench.excitation.schema", "ExcitationRequest"
     ),
     "plan": Kind("a plan for `campaign`", "bench.campaign.schema", "PlanDocument"),
+    "nominal": Kind(
+        "nominal.json of a case for `diagnose`", "bench.discrepancy.nominal_schema", "NominalDocument"
+    ),
+    "verdict": Kind("what `diagnose --json` writes", "bench.discrepancy.verdict_schema", "VerdictDocument"),
+    "protocol": Kind("protocol.json of a sealed case", "bench.discrepancy.blind.schema", "ProtocolDocument"),
+    "answer": Kind("the answer of a sealed case", "bench.discrepancy.blind.schema", "AnswerDocument"),
     "manifest": Kind("manifest.json of a campaign", "bench.campaign.schema", "ManifestDocument"),
     "policy": Kind("the header of a trained policy", "bench.excitation.schema", "PolicyHeader"),
 }

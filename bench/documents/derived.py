@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import types
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import MISSING, fields, is_dataclass
+from types import MappingProxyType
 from typing import Annotated, Any, ForwardRef, Literal, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -22,16 +23,26 @@ Own = Callable[[Any], Any]
 
 
 def entry_of(
-    described: type[Any], own: Own, *, kind: str, name: str = "", base: type[Entry] = Entry, **more: Any
+    described: type[Any],
+    own: Own,
+    *,
+    kind: str,
+    name: str = "",
+    base: type[Entry] = Entry,
+    replaced: Mapping[str, Any] = MappingProxyType({}),
+    needed: Collection[str] | None = None,
+    **more: Any,
 ) -> type[Entry]:
     """The model of a dataclass.
 
     Args:
         described: The dataclass; its docstring describes the fields.
         own: Kinds of annotations that stand for something else here.
-        kind: As `Entry.kind`.
+        kind: As `Entry.entry_name`.
         name: Name of the model; that of the class by default.
         base: Base of the model.
+        replaced: Kinds of single fields by their names.
+        needed: Fields that may not be left out; those without a default where None.
         **more: Fields besides, as pydantic's `create_model` takes them; they come first.
     """
     hints, texts = get_type_hints(described), attributes_of(described)
@@ -42,12 +53,14 @@ def entry_of(
             default = field.default
         elif field.default_factory is not MISSING:
             default = field.default_factory()
+        elif needed is not None and field.name not in needed:
+            default = None
         entries[field.name] = (
-            kind_of(hints[field.name], own, field.name),
+            replaced.get(field.name) or kind_of(hints[field.name], own, field.name),
             Field(default, description=texts.get(field.name)),
         )
     model = create_model(name or described.__name__, __base__=base, __module__=__name__, **entries)
-    model.kind = kind
+    model.entry_name = kind
     return model
 
 

@@ -36,15 +36,19 @@ class Entry(BaseModel):
     """A table within a document.
 
     Attributes:
-        kind: What it is, as it reads in a message: "an element", "a rig configuration".
-        misnomers: Entries that people write, and those that are meant, where the spelling does not tell.
+        entry_name: What it is, as it reads in a message: "an element", "a rig configuration".
+        entry_misnomers: Entries that people write, and those that are meant, where the spelling does not tell.
+        entry_hints: What to write for entries that are needed.
+        entry_open: Whether others may add entries of their own.
     """
 
     model_config = ConfigDict(
         strict=True, extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True
     )
-    kind: ClassVar[str] = "a table"
-    misnomers: ClassVar[Mapping[str, str]] = {}
+    entry_name: ClassVar[str] = "a table"
+    entry_misnomers: ClassVar[Mapping[str, str]] = {}
+    entry_hints: ClassVar[Mapping[str, str]] = {}
+    entry_open: ClassVar[bool] = False
 
     @model_validator(mode="before")
     @classmethod
@@ -52,19 +56,20 @@ class Entry(BaseModel):
         if isinstance(data, cls):
             return data
         if not isinstance(data, Mapping):
-            refuse(f"{shortened(data)} came; {cls.kind} is a table of entries")
+            refuse(f"{shortened(data)} came; {cls.entry_name} is a table of entries")
         known = {field.alias or name: field for name, field in cls.model_fields.items()}
         for key in data:
-            if key not in known:
-                meant = cls.misnomers.get(str(key), "")
-                text = unknown_name(f"entry of {cls.kind}", str(key), known)
+            if key not in known and not cls.entry_open:
+                meant = cls.entry_misnomers.get(str(key), "")
+                text = unknown_name(f"entry of {cls.entry_name}", str(key), known)
                 if meant and "Did you mean" not in text:
                     text += f" Did you mean '{meant}'?"
                 refuse(text, unknown=True)
         needed = [key for key, field in known.items() if field.is_required() and key != "type"]
         missing = [key for key in needed if key not in data]
         if missing:
-            refuse(f"{cls.kind} needs {', '.join(needed)}; {', '.join(missing)} missing")
+            hint = f" ({cls.entry_hints[missing[0]]})" if missing[0] in cls.entry_hints else ""
+            refuse(f"{cls.entry_name} needs {', '.join(needed)}; {', '.join(missing)} missing{hint}")
         return dict(data)
 
     @property

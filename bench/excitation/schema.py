@@ -27,7 +27,7 @@ Size = Annotated[int, Strict(), Field(ge=1, le=1_000_000), AS_WHOLE]
 class LimitsEntry(Entry):
     """What a test may not exceed."""
 
-    kind = "limits"
+    entry_name = "limits"
     force: Annotated[Table[Limit], Field(min_length=1)]
     """Largest command, by actuator [N or N m]."""
     energy: Table[Limit] = Field(default_factory=dict)
@@ -52,7 +52,7 @@ def _check_ranges(ranges: dict[str, tuple[float, float]]) -> None:
 class RivalEntry(Entry):
     """Another explanation of the joint; the question is then which of the two holds."""
 
-    kind = "a rival"
+    entry_name = "a rival"
     elements: Listed[ElementDocument] = Field(min_length=1)
     """The elements in the place of the file's."""
     uncertain: Ranges = Field(default_factory=dict)
@@ -67,7 +67,7 @@ class RivalEntry(Entry):
 class ExperimentEntry(LimitsEntry):
     """What a test is to find out, may do and measures."""
 
-    kind = "an experiment"
+    entry_name = "an experiment"
     duration: Positive
     """Duration [s]."""
     band: Pair
@@ -96,7 +96,7 @@ class ExcitationRequest(RigDocument):
 class StationEntry(Entry):
     """What a policy was trained for."""
 
-    kind = "a station"
+    entry_name = "a station"
     noise: Annotated[Table[Positive], Field(min_length=1)]
     """Standard deviation of the noise, by measured channel."""
     scale: Annotated[Table[Positive], Field(min_length=1)]
@@ -127,7 +127,7 @@ class StationEntry(Entry):
 class PolicyHeader(Entry):
     """What the archive of a trained policy says of it."""
 
-    kind = "the header of a policy"
+    entry_name = "the header of a policy"
     format: Literal[1]
     """Version of the layout."""
     name: Name

@@ -14,7 +14,7 @@ from bench.laws.registry import LAWS, MODELS, find_law
 class PlacedLaw(Entry):
     """A force law placed in a structure, without its parameters."""
 
-    kind = "an element"
+    entry_name = "an element"
     law: Annotated[Name, Field(json_schema_extra={"enum": [*LAWS, *MODELS]})]
     """Name of the force law, as `jointbench laws` lists them."""
     joints: Listed[Name] = Field(min_length=1, max_length=MAX_COORDINATES)

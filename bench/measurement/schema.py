@@ -20,7 +20,7 @@ else:
 class ChainDocument(Entry):
     """What lies between a physical quantity and the numbers in a file."""
 
-    kind = "a chain"
+    entry_name = "a chain"
     stages: Listed[AnyStage]
     """The stages, in the order in which they act."""
 

@@ -66,7 +66,7 @@ class ElementDocument(PlacedLaw):
 class RigDocument(Document):
     """A rig: its structure, the elements in it, and what drives it."""
 
-    kind = "a rig configuration"
+    entry_name = "a rig configuration"
     rig: RigName
     """A rig of the bench (sdof, damper, joint, joint_laboratory, chain, joint_6dof), or the path of an MJCF file."""
     name: Label = ""

@@ -113,7 +113,7 @@ else:
 class ExcitationDocument(Document):
     """What drives a rig: a signal for each actuator, for one duration at one sample rate."""
 
-    kind = "an excitation"
+    entry_name = "an excitation"
     duration: Positive
     """Duration [s]."""
     sample_rate: Positive
