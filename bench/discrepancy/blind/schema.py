@@ -22,6 +22,7 @@ from bench.documents import (
 
 AnyNumber = Annotated[float, Strict(), AS_NUMBER]
 """A number that may be infinite: log odds may."""
+Numbers = Annotated[Listed[AnyNumber], Field(min_length=1)]
 ANSWER_LIMITS = Limits(finite=False)
 
 
@@ -92,9 +93,9 @@ class AnswerDocument(Document, _Open):
     """Where the effects act."""
     detectability: Detectability | None = None
     """How well the records can tell them."""
-    gap_nrmse_identification: AnyNumber | Listed[AnyNumber] | None = None
+    gap_nrmse_identification: AnyNumber | Numbers | None = None
     """Gap of the records for finding."""
-    gap_nrmse_validation: AnyNumber | Listed[AnyNumber] | None = None
+    gap_nrmse_validation: AnyNumber | Numbers | None = None
     """Gap of the judging record."""
     noise: AnyNumber | None = None
     """Noise over the standard deviation of a channel."""
