@@ -126,48 +126,83 @@ def is_quantity_table(entry: object) -> bool:
     return isinstance(entry, Mapping) and any(form in entry for form in TABLES)
 
 
-def _stated(entry: Any) -> Any:
+def _one_form(entry: Any) -> Any:
     if isinstance(entry, Mapping):
         forms = [form for form in TABLES if form in entry]
         if len(forms) != 1:
             came = ", ".join(map(str, entry)) or "{}"
             refuse(unknown_name("distribution", came, TABLES), unknown=True)
         return dict(entry)
-    if not isinstance(entry, bool | int | float | str | Distribution | Shared):
-        refuse(
-            f"{shortened(entry)} came; a number or a distribution as {{ uniform = [0.0, 1.0] }} is expected"
-        )
     return entry
 
 
 def _form(entry: Any) -> str:
-    if isinstance(entry, Mapping):
-        return next(form for form in TABLES if form in entry)
-    return "made" if isinstance(entry, Distribution | Shared) else "value"
+    return next(form for form in TABLES if form in entry) if isinstance(entry, Mapping) else "made"
 
 
-def _no_name(quantity: Any) -> Any:
-    if isinstance(quantity, bool | str) or (isinstance(quantity, Distribution) and quantity.textual):
-        refuse(f"{shortened(quantity)} came; a number or a distribution of numbers is expected")
+def _numeric(quantity: Any) -> Any:
+    if isinstance(quantity, Distribution) and quantity.textual:
+        refuse("a choice of names came; a number or a distribution of numbers is expected")
     return quantity
+
+
+def _stands_for(entry: Any) -> bool:
+    return isinstance(entry, Mapping | Distribution | Shared)
+
+
+def _stated(kinds: tuple[type, ...], expected: str) -> BeforeValidator:
+    """Refuses what is neither a single value nor stands for a distribution, with an example of one."""
+
+    def validator(entry: Any) -> Any:
+        if not _stands_for(entry) and (
+            not isinstance(entry, kinds) or (type(entry) is bool and bool not in kinds)
+        ):
+            refuse(f"{shortened(entry)} came; {expected} is expected")
+        return entry
+
+    return BeforeValidator(validator)
+
+
+def _quantity(value: Any, distribution: Any, *more: Any) -> Any:
+    return Annotated[
+        any_of(Annotated[value, Tag("value")], Annotated[distribution, Tag("distribution")]),
+        Discriminator(lambda entry: "distribution" if _stands_for(entry) else "value"),
+        *more,
+    ]
 
 
 _made = told(lambda table: table.made())
 
-AnyQuantity = TypeAliasType(
-    "AnyQuantity",
+AnyDistribution = TypeAliasType(
+    "AnyDistribution",
     Annotated[
         any_of(
-            Annotated[Scalar, Tag("value")],
             Annotated[SkipJsonSchema[InstanceOf[Distribution | Shared]], Tag("made")],
             *(Annotated[table, AfterValidator(_made), Tag(form)] for form, table in TABLES.items()),
         ),
         Discriminator(_form),
-        BeforeValidator(_stated),
+        BeforeValidator(_one_form),
     ],
 )
+"""A table that stands for a distribution, or for a shared quantity; validates to it."""
+NumberDistribution = Annotated[AnyDistribution, AfterValidator(_numeric)]
+AnyQuantity = TypeAliasType(
+    "AnyQuantity",
+    _quantity(
+        Scalar,
+        AnyDistribution,
+        _stated((bool, int, float, str), "a number or a distribution as { uniform = [0.0, 1.0] }"),
+    ),
+)
 """Validates to a `Quantity`."""
-NumberQuantity = TypeAliasType("NumberQuantity", Annotated[AnyQuantity, AfterValidator(_no_name)])
+NumberQuantity = TypeAliasType(
+    "NumberQuantity",
+    _quantity(
+        Annotated[Annotated[int, Strict()] | Number, Field(union_mode="left_to_right")],
+        NumberDistribution,
+        _stated((int, float), "a number or a distribution of numbers"),
+    ),
+)
 """A quantity that is a number."""
 _QUANTITY: TypeAdapter[Quantity] = TypeAdapter(AnyQuantity)
 
@@ -188,12 +223,4 @@ def read_quantity(entry: Any, where: str) -> Quantity:
 @cache
 def spread(kind: Any) -> Any:
     """The type of a value in whose place a distribution may stand."""
-    table = AnyQuantity if kind is not Number and kind is not Whole else NumberQuantity
-    return Annotated[
-        any_of(Annotated[kind, Tag("value")], Annotated[table, Tag("distribution")]),
-        Discriminator(lambda entry: "distribution" if _stands_for(entry) else "value"),
-    ]
-
-
-def _stands_for(entry: Any) -> bool:
-    return isinstance(entry, Mapping | Distribution | Shared)
+    return _quantity(kind, NumberDistribution if kind in (Number, Whole) else AnyDistribution)

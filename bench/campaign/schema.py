@@ -298,6 +298,10 @@ def _by_type(chains: Mapping[str, tuple[Any, ...]]) -> dict[str, dict[str, Node]
     }
 
 
+Integer = Annotated[int, Strict(), Field(ge=0)]
+"""A whole number as programs write it: 3.0 is none."""
+
+
 class ChannelEntry(Entry):
     """A channel of a data set."""
 
@@ -316,7 +320,7 @@ class PartFile(Entry):
     """A file of a part."""
 
     entry_name = "a file of a part"
-    bytes: Count
+    bytes: Integer
     """Size."""
     sha256: Text
     """Hash."""
@@ -326,17 +330,17 @@ class PartEntry(Entry):
     """A finished part."""
 
     entry_name = "a part of a manifest"
-    part: Count
+    part: Integer
     """Number."""
-    first: Count
+    first: Integer
     """First record."""
-    records: Count
+    records: Integer
     """Number of records."""
-    ok: Count
+    ok: Integer
     """Records that have samples."""
-    failed: Listed[Count]
+    failed: Listed[Integer]
     """Records that failed."""
-    rows: Count
+    rows: Integer
     """Rows of samples."""
     files: dict[Literal["samples", "records", "answers"], PartFile]
     """Its files."""
@@ -369,7 +373,7 @@ class ManifestDocument(Document):
     """Versions of what the bytes depend on."""
     channels: Listed[ChannelEntry]
     """Channels of the data set."""
-    counts: dict[str, Count]
+    counts: dict[str, Integer]
     """Sums over the finished parts."""
     parts: Listed[PartEntry]
     """Finished parts."""

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from bench.campaign.store import Store
 from bench.campaign.tables import records_per_group
-from bench.errors import FileFormatError, ParameterError, UnknownNameError
+from bench.errors import BenchError, FileFormatError, ParameterError, UnknownNameError
 
 
 class Window(NamedTuple):
@@ -214,7 +214,14 @@ def _readable(path: str | Path) -> Iterator[None]:
 
     try:
         yield
-    except (pa.ArrowException, OSError) as error:
+    except BenchError:
+        raise
+    except (
+        pa.ArrowException,
+        OSError,
+        KeyError,
+        IndexError,
+    ) as error:  # the latter two: a column, a row group
         raise FileFormatError(
             f"cannot read {path}: {' '.join(str(error).split())}; run the campaign again to make the part again"
         ) from error

@@ -171,11 +171,12 @@ def naming(where: str) -> Iterator[None]:
 
 def refusal(error: ValidationError, data: Any, where: str) -> DocumentError:
     """The one sentence about the first thing that does not fit: file, place, what came, what is expected."""
-    details = error.errors(include_url=False)
-    first = details[0]
-    place = _place(first, data)
-    same = [detail for detail in details if _place(detail, data) == place]
-    others = len(details) - len(same)
+    details = [(_place(detail, data), detail) for detail in error.errors(include_url=False)]
+    place = details[0][0]
+    # of a list that is no number, and of which one member does not fit, the member is told
+    place = next((at for at, _ in details if len(at) > len(place) and at[: len(place)] == place), place)
+    same = [detail for at, detail in details if at == place]
+    others = len({at for at, _ in details if at != place[: len(at)]})
     head = ": ".join(part for part in (where, spelt(place)) if part)
     text, unknown = _sentence(same, place)
     if others:

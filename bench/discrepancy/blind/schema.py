@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import ConfigDict, Field, Strict
+from pydantic import ConfigDict, Field, Strict, model_validator
 
 from bench.documents import (
     AS_NUMBER,
@@ -18,6 +18,7 @@ from bench.documents import (
     Pair,
     Positive,
     Text,
+    refuse,
 )
 
 AnyNumber = Annotated[float, Strict(), AS_NUMBER]
@@ -105,3 +106,13 @@ class AnswerDocument(Document, _Open):
     """Kinds of loads."""
     commanded: Flag | None = None
     """Whether the load is a command."""
+
+    @model_validator(mode="after")
+    def _effects_are_of_the_class(self) -> AnswerDocument:
+        expected = {"none": 0, "single": 1, "double": 2}.get(self.kind, len(self.effects))
+        if len(self.effects) != expected:
+            refuse(
+                f"{len(self.effects)} effects came; {expected} are expected of the class {self.kind}",
+                "effects",
+            )
+        return self

@@ -289,7 +289,8 @@ def summary(scored: Sequence[Scored]) -> BlindScore:
 def _least_odds(answer: Mapping[str, Any]) -> float:
     """Smaller one of the expected log odds that an answer states; minus infinity where it states none."""
     odds = answer.get("detectability") or {}
-    return min(odds.get("log_odds_rival", -math.inf), odds.get("log_odds_none", -math.inf))
+    stated = [odds.get(name) for name in ("log_odds_rival", "log_odds_none")]
+    return min(-math.inf if value is None else value for value in stated)
 
 
 def _tellable(s: Scored) -> bool:
