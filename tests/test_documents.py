@@ -27,7 +27,7 @@ from bench.campaign.schema import PlanDocument
 from bench.cli import main
 from bench.cli.schema import FOLDER, KINDS, generated, text_of
 from bench.discrepancy.blind.schema import AnswerDocument
-from bench.discrepancy.nominal_schema import NominalDocument
+from bench.discrepancy.case.schema import NominalDocument
 from bench.discrepancy.verdict import Estimate, Gap, Location, NamedEffect, Ranked, Split, Verdict
 from bench.discrepancy.verdict_schema import ResultDocument, VerdictDocument
 from bench.documents import Document, Limits, checked, load_document

@@ -178,8 +178,13 @@ class Windows:
         path = self._store.path("samples", part)
         with _readable(path), pq.ParquetFile(path) as file:
             table = file.read_row_group(group, columns=["record", *self.channels], use_threads=False)
-        records = table.column("record").to_numpy()[:: self.n_samples]
-        columns = [table.column(name).to_numpy().reshape(count, self.n_samples) for name in self.channels]
+            if len(table) != count * self.n_samples:
+                raise FileFormatError(
+                    f"row group {group} of {path} has {len(table)} rows; {count} records of {self.n_samples} samples are expected: "
+                    "run the campaign again to make the part again"
+                )
+            records = table.column("record").to_numpy()[:: self.n_samples]
+            columns = [table.column(name).to_numpy().reshape(count, self.n_samples) for name in self.channels]
         drawn = np.empty((count, 0))
         if self.parameters:
             rows = self._drawn(part)

@@ -37,7 +37,7 @@ KINDS: dict[str, Kind] = {
     ),
     "plan": Kind("a plan for `campaign`", "bench.campaign.schema", "PlanDocument"),
     "nominal": Kind(
-        "nominal.json of a case for `diagnose`", "bench.discrepancy.nominal_schema", "NominalDocument"
+        "nominal.json of a case for `diagnose`", "bench.discrepancy.case.schema", "NominalDocument"
     ),
     "verdict": Kind("what `diagnose --json` writes", "bench.discrepancy.verdict_schema", "VerdictDocument"),
     "protocol": Kind("protocol.json of a sealed case", "bench.discrepancy.blind.schema", "ProtocolDocument"),

@@ -21,11 +21,11 @@ from typing import Any
 
 import numpy as np
 
-from bench.discrepancy.blind.bands import bands_of, by_band
-from bench.discrepancy.blind.region_score import region_scores
+from bench.discrepancy.blind.proportions import Share, calibration_error, reliability, share_of
+from bench.discrepancy.blind.region_overlap import region_scores
 from bench.discrepancy.blind.schema import ANSWER_LIMITS, AnswerDocument
-from bench.discrepancy.blind.shares import Share, calibration_error, reliability, share_of
-from bench.discrepancy.catalogue import CATALOGUE
+from bench.discrepancy.blind.strata import bands_of, by_band
+from bench.discrepancy.effects.catalogue import CATALOGUE
 from bench.discrepancy.verdict_schema import ResultDocument
 from bench.documents import checked, load_document, parse_json, read_text
 from bench.errors import FileFormatError
