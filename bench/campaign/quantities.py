@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import cache
-from typing import Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from pydantic import (
     AfterValidator,
@@ -173,37 +173,44 @@ def _quantity(value: Any, distribution: Any, *more: Any) -> Any:
 
 _made = told(lambda table: table.made())
 
-AnyDistribution = TypeAliasType(
-    "AnyDistribution",
-    Annotated[
-        any_of(
-            Annotated[SkipJsonSchema[InstanceOf[Distribution | Shared]], Tag("made")],
-            *(Annotated[table, AfterValidator(_made), Tag(form)] for form, table in TABLES.items()),
+if TYPE_CHECKING:
+    AnyDistribution = Distribution | Shared
+    NumberDistribution = AnyDistribution
+    AnyQuantity = Quantity
+    NumberQuantity = float | int | Distribution | Shared
+else:
+    AnyDistribution = TypeAliasType(
+        "AnyDistribution",
+        Annotated[
+            any_of(
+                Annotated[SkipJsonSchema[InstanceOf[Distribution | Shared]], Tag("made")],
+                *(Annotated[table, AfterValidator(_made), Tag(form)] for form, table in TABLES.items()),
+            ),
+            Discriminator(_form),
+            BeforeValidator(_one_form),
+        ],
+    )
+    """A table that stands for a distribution, or for a shared quantity; validates to it."""
+    NumberDistribution = Annotated[AnyDistribution, AfterValidator(_numeric)]
+    AnyQuantity = TypeAliasType(
+        "AnyQuantity",
+        _quantity(
+            Scalar,
+            AnyDistribution,
+            _stated((bool, int, float, str), "a number or a distribution as { uniform = [0.0, 1.0] }"),
         ),
-        Discriminator(_form),
-        BeforeValidator(_one_form),
-    ],
-)
-"""A table that stands for a distribution, or for a shared quantity; validates to it."""
-NumberDistribution = Annotated[AnyDistribution, AfterValidator(_numeric)]
-AnyQuantity = TypeAliasType(
-    "AnyQuantity",
-    _quantity(
-        Scalar,
-        AnyDistribution,
-        _stated((bool, int, float, str), "a number or a distribution as { uniform = [0.0, 1.0] }"),
-    ),
-)
-"""Validates to a `Quantity`."""
-NumberQuantity = TypeAliasType(
-    "NumberQuantity",
-    _quantity(
-        Annotated[Annotated[int, Strict()] | Number, Field(union_mode="left_to_right")],
-        NumberDistribution,
-        _stated((int, float), "a number or a distribution of numbers"),
-    ),
-)
-"""A quantity that is a number."""
+    )
+    """Validates to a `Quantity`."""
+    NumberQuantity = TypeAliasType(
+        "NumberQuantity",
+        _quantity(
+            Annotated[Annotated[int, Strict()] | Number, Field(union_mode="left_to_right")],
+            NumberDistribution,
+            _stated((int, float), "a number or a distribution of numbers"),
+        ),
+    )
+    """A quantity that is a number."""
+
 _QUANTITY: TypeAdapter[Quantity] = TypeAdapter(AnyQuantity)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, Strict, WrapValidator, model_validator
 
@@ -77,7 +77,10 @@ def _distribution(quantity: Any) -> Any:
 
 SignalNode = Annotated[varied_type(Signal, spread), WrapValidator(_nested)]
 StageNode = Annotated[varied_type(Stage, spread), WrapValidator(_nested)]
-SharedQuantity = Annotated[AnyQuantity, AfterValidator(_distribution)]
+if TYPE_CHECKING:
+    SharedQuantity = Distribution
+else:
+    SharedQuantity = Annotated[AnyQuantity, AfterValidator(_distribution)]
 Weight = NotNegative
 
 
