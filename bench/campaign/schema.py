@@ -353,6 +353,10 @@ class PartEntry(Entry):
         missing = {"samples", "records"} - set(self.files)
         if missing:
             refuse(f"a part has samples and records; {' and '.join(sorted(missing))} missing", "files")
+        if self.ok + len(self.failed) != self.records:
+            refuse(
+                f"{self.ok} records and {len(self.failed)} failed ones came; {self.records} in all are expected"
+            )
         return self
 
 
@@ -380,3 +384,13 @@ class ManifestDocument(Document):
     """Sums over the finished parts."""
     parts: Listed[PartEntry]
     """Finished parts."""
+
+    @model_validator(mode="after")
+    def _parts_are_of_the_plan(self) -> ManifestDocument:
+        for index, part in enumerate(self.parts):
+            if part.first + part.records > self.plan.records:
+                refuse(
+                    f"records {part.first} to {part.first + part.records - 1} came; the plan has {self.plan.records}",
+                    "parts", index,
+                )  # fmt: skip
+        return self

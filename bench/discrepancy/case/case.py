@@ -55,7 +55,8 @@ class CaseChannel:
     Attributes:
         name: Column name.
         unit: Unit.
-        role: A measured load, a commanded load ("command"), a "prescribed" motion, a "response".
+        role: A measured load, a commanded load ("command"), a "prescribed" motion, a "response", or "scheduling", what
+            laws may depend on besides.
         noise_std: One-sigma noise; None where it is not stated.
         antialias: Filter that a response passed before it was sampled; None where there was none, or the loads passed it too.
         target: Entry of the user's own MJCF that it stands for: "sensor:NAME", "joint:NAME" or "actuator:NAME"; found by

@@ -48,6 +48,8 @@ PARAMETERS: dict[str, tuple[str, ...]] = {
     ),
 }  # fmt: skip
 """Nominal parameters of the bench's rigs. An MJCF of the user's own says itself which it has (`mjcf_structure`)."""
+RIGS = tuple(PARAMETERS)
+"""The bench's rigs that a nominal model may be."""
 RESPONSES: dict[str, tuple[str, ...]] = {
     "sdof": ("displacement", "velocity", "acceleration"),
     "damper": ("force", "displacement", "velocity", "acceleration"),
@@ -61,8 +63,8 @@ RESPONSES: dict[str, tuple[str, ...]] = {
 MEASURED = ("force", "torque")
 """Channels of the bench's rigs that are measured loads unless they say otherwise."""
 
-Role = Literal["measured", "command", "prescribed", "response"]
-"""A measured load, a commanded load, a prescribed motion, a response."""
+Role = Literal["measured", "command", "prescribed", "response", "scheduling"]
+"""A measured load, a commanded load, a prescribed motion, a response, and what laws may depend on besides."""
 
 
 def _known_rig(name: Any) -> Any:
