@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, get_args
 from xml.etree import ElementTree
 
 import mujoco
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from bench import native
 from bench.errors import ModelError, ParameterError, UnknownNameError
+from bench.mjcf import StructureName
 from bench.native import Coordinate
 from bench.rig.element import Element
 
@@ -22,7 +23,7 @@ INTEGRATORS = {
     "implicit": mujoco.mjtIntegrator.mjINT_IMPLICIT,
     "implicitfast": mujoco.mjtIntegrator.mjINT_IMPLICITFAST,
 }
-STRUCTURE = ("mass", "inertia", "stiffness", "damping", "frictionloss", "armature")
+STRUCTURE: tuple[str, ...] = get_args(StructureName)
 """Structural quantities that `Rig.with_structure` changes."""
 
 EXACT_SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)
@@ -139,7 +140,7 @@ def specify(rig: Buildable, built: Built | None = None) -> mujoco.MjSpec:
     return spec
 
 
-def _refuse_foreign_elements(spec: mujoco.MjSpec, rig: Rig) -> None:
+def _refuse_foreign_elements(spec: mujoco.MjSpec, rig: Buildable) -> None:
     """Refuse MJCF that marks something of its own as an element: law numbers and addresses are no matter of a file."""
     marked = [f"numeric '{item.name}'" for item in spec.numerics if _is_marked(item.name, item.data)]
     marked += [
@@ -200,7 +201,7 @@ def build(rig: Buildable, *, drawings: bool = False) -> Built:
         return _build(rig, drawings)
 
 
-def _build(rig: Rig, drawings: bool) -> Built:
+def _build(rig: Buildable, drawings: bool) -> Built:
     spec = specify(rig)
     if not drawings:
         _leave_out_drawings(spec)
