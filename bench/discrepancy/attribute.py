@@ -117,7 +117,7 @@ def attribute(
             if len(best.hypothesis) != size:
                 break
             # what is down to the noise and lacks a force all the same may be neither of two effects
-            lacks = not problem.windowed and lack_of_fit(problem, best).significant(
+            lacks = not (problem.windowed or problem.error) and lack_of_fit(problem, best).significant(
                 nothing.chi2 - best.chi2, effects=SEVERAL
             )
             if not lacks and not _promising(screen, best):
@@ -132,7 +132,7 @@ def attribute(
         _extend(search, screen, worth_extending(search, screen, size, 4 - size), count=6 - size)
         reduce_best(search)
     best = search.ranked()[0]
-    if not problem.noise_stated:
+    if not problem.scaled:
         simplify(search, candidates)
     elif near(best):
         progress(f"rivals of {names(best.hypothesis)}")
@@ -247,7 +247,7 @@ def _offers(
     inertia = [] if among else local.inertia_points(base, ground)
     most = max((p.gain for p in [*points, *inertia]), default=0.0)
     excess = base.chi2 - base.n_residuals
-    if named and problem.noise_stated and not consistent(base) and most < UNPROMISING * excess:
+    if named and problem.scaled and not consistent(base) and most < UNPROMISING * excess:
         return _Offers(base, [], [])
 
     def task(point: Point) -> Task:

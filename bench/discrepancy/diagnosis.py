@@ -27,6 +27,10 @@ from bench.discrepancy.effect import Effect
 from bench.discrepancy.explain import Explanation, close, explain, nominal_alone
 from bench.discrepancy.free_rival import Rival, likelier_force
 from bench.discrepancy.idle_loads import idle_notes, without_idle_noise
+from bench.discrepancy.judgement.closing import complete, nominal_estimates, remainder, with_closed
+from bench.discrepancy.judgement.coarse_finding import REFERENCE, coarse_explanations, coarse_finding
+from bench.discrepancy.judgement.finding import Finding
+from bench.discrepancy.likelihood.model_error import ModelError
 from bench.discrepancy.moving_starts import with_starts_found
 from bench.discrepancy.next_excitation import separate, told_apart
 from bench.discrepancy.nominal_file import check_units
@@ -116,29 +120,18 @@ def _diagnose(
     told = case = with_starts_found(case)
     refuse(Problem(case, structure_of(case), case.identification))
     quiet = without_idle_noise(told)
-    case, explanations = _explained(quiet, catalogue, most, progress)
+    case, finding = _found(quiet, catalogue, most, rng, progress)
     problem = Problem(case, structure_of(case), case.identification)
-    best = explanations[0]
-    kind, probabilities = evidence.judge(explanations)
-    doubt, rival = "", None
-    if kind != "none":
-        progress(f"doubts about {names(best.hypothesis)}")
-        rival = likelier_force(explanations)
-    if kind == "effect":
-        doubt = _doubt(case, problem, best, rival, rng)
-    if doubt:
-        kind, probabilities = "unknown", evidence.OUTSIDE_THE_CATALOGUE
+    explanations, kind, rival = finding.explanations, finding.kind, finding.rival
+    best, probabilities, words = explanations[0], finding.probabilities, finding.words
     seen, fitted = recorded(problem, catalogue), kind
-    words = evidence.plain_words(kind, explanations, doubt=doubt)
-    if rival is not None and not doubt and rival.explanation.consistent:
-        words += evidence.enough(rival.closure)
     if seen and kind == "none":
         kind = "effect"
-        probabilities |= {"effect": 1.0 - probabilities["unknown"], "none": 0.0}
+        probabilities = probabilities | {"effect": 1.0 - probabilities["unknown"], "none": 0.0}
     progress("gap on the judging records")
     final, closure, found = _shrunk(case, problem, explanations, kind, rival, rng)
     widest = max(found, key=lambda gap: gap.before / max(gap.noise_floor, 1e-12))
-    if kind == "unknown" and not doubt:
+    if kind == "unknown" and not finding.doubt:
         words += evidence.closes(names(evidence.nearest(explanations).hypothesis), widest)
     where = locate(
         problem,
@@ -147,11 +140,12 @@ def _diagnose(
         borne_out=rival is not None or kind == "effect",
         unknown=kind == "unknown",
     )
+    named = with_closed(case, problem, finding.named, explanations, rng) if finding.named else ()
     verdict = Verdict(
         verdict=kind,
-        named=(*evidence.named(explanations), *seen) if kind == "effect" else (),
-        ranking=(*(Ranked(e.name, e.where, e.probability) for e in seen), *evidence.ranking(explanations)),
-        indistinguishable=evidence.indistinguishable(explanations) if kind != "unknown" else (),
+        named=(*named, *seen) if kind == "effect" else (),
+        ranking=(*(Ranked(e.name, e.where, e.probability) for e in seen), *finding.ranking),
+        indistinguishable=finding.indistinguishable if kind != "unknown" else (),
         locations=where.locations,
         gap=widest,
         gaps=found,
@@ -169,25 +163,85 @@ def _diagnose(
         ),
         splits=where.splits,
         seconds=time.perf_counter() - began,
+        complete=kind != "unknown" and complete(found, sharp=not finding.coarse),
+        remainder=remainder(problem, final, widest),
+        nominal=nominal_estimates(final),
     )
     return Diagnosis(case, problem, tuple(explanations), verdict, final, where)
 
 
+def _found(
+    case: Case, catalogue: Sequence[Effect], most: int, rng: np.random.Generator, progress: Progress
+) -> tuple[Case, Finding]:
+    """What is found by the stated noise where that explains what is left, else by the error of the model."""
+
+    def search(case: Case, error: ModelError) -> tuple[Case, list[Explanation]]:
+        return _explained(case, catalogue, min(most, REFERENCE), progress, error)
+
+    known: list[Explanation] = []
+    if Problem(case, structure_of(case), case.identification).noise_stated:
+        case, known = _explained(case, catalogue, most, progress)
+        sharp = _sharp(case, known, rng, progress)
+        outside = sharp.rival is not None and sharp.rival.explanation.consistent
+        if sharp.kind != "unknown" or outside or sharp.doubt:
+            return case, sharp
+    progress("weighed by the error of the model")
+    case, explanations = coarse_explanations(case, search, known)
+    problem = Problem(case, structure_of(case), case.identification)
+    coarse = coarse_finding(case, problem, explanations, rng)
+    return case, (sharp if known and coarse.kind != "effect" else coarse)
+
+
+def _sharp(
+    case: Case, explanations: list[Explanation], rng: np.random.Generator, progress: Progress
+) -> Finding:
+    """What is found by the stated noise."""
+    problem = Problem(case, structure_of(case), case.identification)
+    best = explanations[0]
+    kind, probabilities = evidence.judge(explanations)
+    doubt, rival = "", None
+    if kind != "none":
+        progress(f"doubts about {names(best.hypothesis)}")
+        rival = likelier_force(explanations)
+    if kind == "effect":
+        doubt = _doubt(case, problem, best, rival, rng)
+    if doubt:
+        kind, probabilities = "unknown", evidence.OUTSIDE_THE_CATALOGUE
+    words = evidence.plain_words(kind, explanations, doubt=doubt)
+    if rival is not None and not doubt and rival.explanation.consistent:
+        words += evidence.enough(rival.closure)
+    return Finding(
+        kind=kind,
+        probabilities=probabilities,
+        explanations=tuple(explanations),
+        named=evidence.named(explanations) if kind == "effect" else (),
+        ranking=evidence.ranking(explanations),
+        indistinguishable=evidence.indistinguishable(explanations),
+        words=words,
+        rival=rival,
+        doubt=doubt,
+    )
+
+
 def _explained(
-    case: Case, catalogue: Sequence[Effect], most: int, progress: Progress
+    case: Case,
+    catalogue: Sequence[Effect],
+    most: int,
+    progress: Progress,
+    error: ModelError | None = None,
 ) -> tuple[Case, list[Explanation]]:
     """The explanations of a case, and the case with what they tell of things that nobody stated: its loads and its starts."""
-    explanations = explain(case, catalogue, most=most, progress=progress)
+    explanations = explain(case, catalogue, most=most, progress=progress, error=error)
     for read in promising_readings(case, explanations):
         progress(f"once more, the loads read as {read.load_interpolation}")
-        again = explain(read, catalogue, most=most, progress=progress)
+        again = explain(read, catalogue, most=most, progress=progress, error=error)
         if again[0].log_posterior > explanations[0].log_posterior:
             case, explanations = read, again
             break
     started = with_starts_found(case, explanations[0].predict)
     if any(a.at_rest != b.at_rest for a, b in zip(case.identification, started.identification, strict=True)):
         progress("once more, from the initial states estimated")
-        explanations = explain(started, catalogue, most=most, progress=progress)
+        explanations = explain(started, catalogue, most=most, progress=progress, error=error)
     return started, explanations
 
 

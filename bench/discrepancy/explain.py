@@ -21,6 +21,7 @@ from bench.discrepancy.coupled import coupled_fits
 from bench.discrepancy.effect import Effect
 from bench.discrepancy.fit import Fit, fit
 from bench.discrepancy.lack_of_fit import LackOfFit, lack_of_fit
+from bench.discrepancy.likelihood.model_error import ModelError
 from bench.discrepancy.nominate import leading
 from bench.discrepancy.placed import Hypothesis, Placed
 from bench.discrepancy.placements import placements
@@ -98,7 +99,7 @@ class Explanation:
 
         Not asked of windows: their motion is known as measured only, and its noise is that of the residuals.
         """
-        if not self.consistent or any(problem.windowed for problem, _ in self.parts):
+        if not self.consistent or any(problem.windowed or problem.error for problem, _ in self.parts):
             return (False,) * len(self.parts)
         explained = nothing.chi2 - self.chi2
         return tuple(
@@ -110,6 +111,16 @@ class Explanation:
     def noise_stated(self) -> bool:
         """Whether the noise of every response channel is stated, so that chi-squared has an absolute meaning."""
         return all(problem.noise_stated for problem, _ in self.parts)
+
+    @property
+    def scaled(self) -> bool:
+        """Whether chi-squared has an absolute meaning, by the noise or by the error of the model."""
+        return all(problem.scaled for problem, _ in self.parts)
+
+    @property
+    def coarse(self) -> bool:
+        """Whether residuals are weighed by the error of the model, not by their noise alone."""
+        return any(problem.error is not None for problem, _ in self.parts)
 
     @property
     def chi2(self) -> float:
@@ -148,6 +159,7 @@ def explain(
     *,
     most: int = 3,
     progress: Callable[[str], None] = lambda text: None,
+    error: ModelError | None = None,
 ) -> list[Explanation]:
     """Search the explanations of a case; by decreasing posterior.
 
@@ -156,25 +168,26 @@ def explain(
         catalogue: Effects to consider.
         most: Largest number of effects in a group.
         progress: Called with a line of text at every stage.
+        error: Error of the model that residuals are weighed by besides their noise.
     """
     structure = structure_of(case)
     groups = structure.groups()
     if len(groups) == 1:
         search = _attributed(
-            Problem(case, structure, case.identification),
+            Problem(case, structure, case.identification, error=error),
             placements(case, structure, catalogue),
             most=most,
             progress=progress,
         )
         problem = search.problem
         found = [Explanation(((problem, fitted),)) for fitted in search.ranked()]
-        return _nothing_left_first(found) if problem.noise_stated else _parsimonious(found)
+        return _nothing_left_first(found) if problem.scaled else _parsimonious(found)
     bins = _common_bins(case, structure)
-    whole = Problem(case, structure, case.identification, bins)
+    whole = Problem(case, structure, case.identification, bins, error=error)
     prepared = []
     for group in groups:
         part = structure.restricted(group)
-        problem = Problem(case, part, case.identification, bins)
+        problem = Problem(case, part, case.identification, bins, error=error)
         progress(f"screening of {', '.join(part.dofs)}")
         prepared.append(prepare(problem, placements(case, part, catalogue)))
     odd = [entry for entry in prepared if not consistent(entry[0].ranked(0)[0])]
@@ -214,7 +227,8 @@ def _attributed(
     search = attribute(problem, candidates, most=most, progress=progress)
     best = search.ranked()[0]
     sensors = any(placed.effect.site == "sensor" for placed in best.hypothesis)
-    if (problem.driven or sensors) and problem.noise_stated and best.hypothesis and near(best):
+    stated = problem.noise_stated and problem.error is None
+    if (problem.driven or sensors) and stated and best.hypothesis and near(best):
         behind = problem.behind(best.hypothesis, best.vector)
         left = float(np.sum(behind.residual(best.hypothesis, best.vector) ** 2))
         if abs(left - best.chi2) > NOISIER * best.n_residuals:
@@ -318,7 +332,7 @@ def close(best: Explanation, nothing: Explanation, closures: Sequence[Effect]) -
     parts, used = [], []
     for (problem, fitted), lacks in zip(best.parts, best.lacking(nothing), strict=True):
         current = fitted
-        if lacks or not consistent(fitted):
+        if lacks or not consistent(fitted) or problem.error is not None:
             candidates = placements(problem.case, problem.structure, closures)
             screen = Screen(problem, candidates)
             current = fit(problem, (), start=np.zeros(len(problem.nominal)), iterations=THOROUGH)

@@ -1,0 +1,1 @@
+"""Judgement: from fitted explanations to what is said, and how sure."""

@@ -1,0 +1,204 @@
+"""What is said where the error of the model, not noise, decides what an explanation leaves.
+
+Explanations are compared by blocks that their fits did not see (`held_out`). Among those within one standard error of the best
+the simplest and commonest is named, and they are declared a set. An effect beside others is named if it closes a material part of the
+discrepancy. The judging records choose nothing; they veto: what does not shrink their discrepancy is not named.
+
+References:
+    L. Breiman, J. Friedman, R. Olshen, C. Stone, Classification and Regression Trees, 1984, section 3.4.3 (one standard error).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bench.discrepancy.case import Case
+from bench.discrepancy.explain import Explanation, nominal_alone
+from bench.discrepancy.fit import fit
+from bench.discrepancy.judgement.held_out import HeldOut, held_out, shares
+from bench.discrepancy.problem import Array, Problem
+from bench.discrepancy.search import LOG_PRIOR_EFFECT, THOROUGH, key_of
+from bench.discrepancy.shrink import discrepancies, noise_floors
+
+
+@dataclass(frozen=True)
+class CoarseSettings:
+    """When an effect is named.
+
+    Attributes:
+        finalists: Explanations that are compared by blocks.
+        reach: Difference in log posterior, of the coarsened likelihood, within which one is a finalist.
+        material: Part of the discrepancy of the nominal model, its parameters re-estimated, that an effect closes to be named.
+        pays: Part of the discrepancy of the judging records that a named explanation may leave at most.
+        outside: Share of effects that no catalogue holds among what is named.
+        telling: Difference of the scores (odds of 7) below which the samples cannot tell two explanations apart.
+    """
+
+    finalists: int = 10
+    reach: float = 12.0
+    material: float = 0.1
+    pays: float = 0.8
+    outside: float = 0.05
+    telling: float = 4.0
+
+
+SETTINGS = CoarseSettings()
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """Explanations weighed by prediction.
+
+    Attributes:
+        chosen: What is named; nothing where it has no effect.
+        found: All finalists on held-out blocks, the chosen one first.
+        weights: (n,) probability of each, as if one of them were true.
+        within: Those within one standard error of the best.
+        vetoed: Whether the judging records refused what the others would have named.
+    """
+
+    chosen: HeldOut
+    found: tuple[HeldOut, ...]
+    weights: Array
+    within: tuple[HeldOut, ...]
+    vetoed: bool
+
+
+def judge(
+    case: Case,
+    problem: Problem,
+    explanations: Sequence[Explanation],
+    rng: np.random.Generator,
+    settings: CoarseSettings = SETTINGS,
+) -> Judged:
+    """Weigh explanations by prediction.
+
+    Args:
+        case: The case.
+        problem: Its problem on all degrees of freedom.
+        explanations: By decreasing posterior, the nominal model alone among them.
+        rng: For the bootstrap over blocks.
+        settings: When an effect is named.
+    """
+    nothing = nominal_alone(explanations)
+    near = [
+        e
+        for e in explanations
+        if e.log_posterior > explanations[0].log_posterior - settings.reach and e is not nothing
+    ]
+    found = [held_out(e) for e in [*near[: settings.finalists], nothing]]
+    tolls = np.array([_log_prior(entry.explanation) for entry in found])
+    best = found[int(np.argmin([entry.total - 2.0 * toll for entry, toll in zip(found, tolls, strict=True)]))]
+    known = Discrepancies(case, problem)
+    base = _pruned(best, found, known, settings)
+    # what is larger than what is material has been weighed already
+    found = [
+        e
+        for e in found
+        if len(e.explanation.hypothesis) <= len(base.explanation.hypothesis) and e is not base
+    ]
+    found = [base, *found]
+    weights = shares(found, np.array([_log_prior(e.explanation) for e in found]), rng)
+    within = tuple(entry for entry in found if _as_good(entry, base, settings))
+    vetoed = False
+    for entry in sorted(within, key=_plainness):
+        e = entry.explanation
+        if not e.hypothesis or known.pays(e, nothing, settings.pays):
+            return Judged(entry, tuple(found), weights, within, vetoed)
+        vetoed = True
+    return Judged(found[-1], tuple(found), weights, within, True)
+
+
+def _log_prior(explanation: Explanation) -> float:
+    return sum(LOG_PRIOR_EFFECT + placed.effect.log_prior for placed in explanation.hypothesis)
+
+
+def _as_good(entry: HeldOut, best: HeldOut, settings: CoarseSettings) -> bool:
+    """Whether an explanation predicts as well as the best one: within a standard error, or what so few samples cannot tell."""
+    worse, error = entry.worse_than(best)
+    return entry is best or worse <= max(error, settings.telling)
+
+
+def _plainness(entry: HeldOut) -> tuple[int, int, float, float]:
+    """What comes first is simpler: fewer effects, fewer parameters, commoner ones, and then what predicts better."""
+    e = entry.explanation
+    return (len(e.hypothesis), e.n_free, -sum(p.effect.log_prior for p in e.hypothesis), entry.total)
+
+
+class Discrepancies:
+    """NRMSE of explanations, on the judged coordinate where the nominal model is farthest off; kept by explanation."""
+
+    def __init__(self, case: Case, problem: Problem) -> None:
+        self.case, self.problem = case, problem
+        self._kept: dict[tuple[int, bool], Array] = {}
+
+    def of(self, explanation: Explanation, *, judging: bool) -> Array:
+        """NRMSE (n_coordinates,) of an explanation, on the judging records or on those for identification."""
+        key = id(explanation), judging
+        if key not in self._kept:
+            records = self.case.validation if judging else self.case.identification
+            self._kept[key] = discrepancies(self.problem, records, explanation.predict)
+        return self._kept[key]
+
+    def closed(self, explanation: Explanation, without: Explanation, nothing: Explanation) -> float:
+        """Part of the discrepancy of `nothing`, on the records for identification, that goes with what one has and the other lacks."""
+        before, left, right = (self.of(e, judging=False) for e in (nothing, without, explanation))
+        return float(np.max((left - right) / np.maximum(before, 1e-300)))
+
+    def pays(self, explanation: Explanation, nothing: Explanation, part: float) -> bool:
+        """Whether an explanation leaves at most a part of the judging records' discrepancy, beyond noise, on some coordinate and no
+        more than all of it on any."""
+        floor = noise_floors(self.problem, self.case.validation)
+        before, after = (self.of(e, judging=True) for e in (nothing, explanation))
+        beyond = [np.sqrt(np.maximum(x**2 - floor**2, 0.0)) for x in (before, after)]
+        if not np.isfinite(after).all():
+            return False
+        return bool(
+            np.any(beyond[1] <= part * beyond[0]) and np.all(after <= np.maximum(before, 1.1 * floor) * 1.02)
+        )
+
+
+def _pruned(
+    entry: HeldOut, found: Sequence[HeldOut], known: Discrepancies, settings: CoarseSettings
+) -> HeldOut:
+    """An explanation without the effects that close nothing material beside the others."""
+    nothing = next(e for e in found if not e.explanation.hypothesis)
+    while entry.explanation.hypothesis:
+        smaller = [(i, without(entry.explanation, i)) for i in range(len(entry.explanation.hypothesis))]
+        if len(smaller) == 1:
+            smaller = [(0, nothing.explanation)]
+        closed = [known.closed(entry.explanation, rest, nothing.explanation) for _, rest in smaller]
+        least = int(np.argmin(closed))
+        if closed[least] >= settings.material:
+            return entry
+        rest = smaller[least][1]
+        known_already = {key_of(e.explanation.hypothesis): e for e in found}
+        entry = known_already.get(key_of(rest.hypothesis)) or held_out(rest)
+    return entry
+
+
+def without(explanation: Explanation, index: int) -> Explanation:
+    """An explanation without one of its effects, fitted again from where it was.
+
+    Args:
+        explanation: Fitted.
+        index: Of the effect in its hypothesis.
+    """
+    parts = []
+    for problem, fitted in explanation.parts:
+        if not 0 <= index < len(fitted.hypothesis):
+            parts.append((problem, fitted))
+            index -= len(fitted.hypothesis)
+            continue
+        _, etas = problem.split(fitted.hypothesis, fitted.vector)
+        rest = fitted.hypothesis[:index] + fitted.hypothesis[index + 1 :]
+        kept = np.concatenate([fitted.vector[: len(problem.nominal)], *etas[:index], *etas[index + 1 :]])
+        starts = np.array(
+            [kept, np.concatenate([np.zeros(len(problem.nominal)), *etas[:index], *etas[index + 1 :]])]
+        )
+        parts.append((problem, fit(problem, rest, start=starts, iterations=THOROUGH)))
+        index = -1
+    return Explanation(tuple(parts))

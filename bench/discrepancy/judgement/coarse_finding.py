@@ -1,0 +1,140 @@
+"""A case of which the error of the model decides: its explanations searched again by that error, weighed, and put into words."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from bench.discrepancy import evidence
+from bench.discrepancy.case import Case
+from bench.discrepancy.explain import Explanation
+from bench.discrepancy.judgement.coarse import SETTINGS, Judged, judge
+from bench.discrepancy.judgement.finding import Finding
+from bench.discrepancy.likelihood.model_error import ModelError, crude_error, error_left
+from bench.discrepancy.problem import Problem
+from bench.discrepancy.search import names
+from bench.discrepancy.structure import structure_of
+from bench.discrepancy.verdict import Kind, Ranked
+
+Search = Callable[[Case, ModelError], tuple[Case, list[Explanation]]]
+"""Searches the explanations of a case, weighed by an error; the case comes back with what they tell of it."""
+REFERENCE = 2
+"""Effects, at most, of the explanation that tells the error of the model: more of them take its error for effects."""
+ROUNDS = 3
+"""Estimates of the error, at most."""
+SETTLED = 0.5
+"""Part of the power of an estimated error above which what an explanation leaves is as estimated."""
+
+
+def coarse_explanations(
+    case: Case, search: Search, known: Sequence[Explanation]
+) -> tuple[Case, list[Explanation]]:
+    """Explanations of a case, weighed by the error of the model.
+
+    Args:
+        case: The case.
+        search: How explanations are searched.
+        known: Explanations by the stated noise; empty where none is stated.
+    """
+    structure = structure_of(case)
+    error = _left(case, known) if known else crude_error(case, structure)
+    for _ in range(ROUNDS):
+        case, explanations = search(case, error)
+        best = reference(explanations)
+        if known and best.reduced > SETTLED:
+            break
+        error, known = _left(case, explanations), explanations
+    return case, explanations
+
+
+def reference(explanations: Sequence[Explanation]) -> Explanation:
+    """The explanation of few effects that leaves least."""
+    return min((e for e in explanations if len(e.hypothesis) <= REFERENCE), key=lambda e: e.chi2)
+
+
+def _left(case: Case, explanations: Sequence[Explanation]) -> ModelError:
+    """The error that the best of some explanations leaves."""
+    structure = structure_of(case)
+    data = Problem(case, structure, case.identification).data
+    return error_left(data, structure, reference(explanations).predict)
+
+
+def coarse_finding(
+    case: Case, problem: Problem, explanations: Sequence[Explanation], rng: np.random.Generator
+) -> Finding:
+    """Weigh explanations by prediction and say what is missing.
+
+    Args:
+        case: The case.
+        problem: Its problem on all degrees of freedom.
+        explanations: Weighed by the error of the model, by decreasing posterior.
+        rng: For bootstraps.
+    """
+    judged = judge(case, problem, explanations, rng)
+    chosen = judged.chosen.explanation
+    probabilities = _marginal(judged)
+    kind: Kind = "effect" if chosen.hypothesis else ("unknown" if judged.vetoed else "none")
+    others = [entry.explanation for entry in judged.found if entry is not judged.chosen]
+    order = np.argsort(
+        [-w for w, e in zip(judged.weights, judged.found, strict=True) if e is not judged.chosen]
+    )
+    nothing = float(
+        sum(w for w, e in zip(judged.weights, judged.found, strict=True) if not e.explanation.hypothesis)
+    )
+    known = 1.0 - SETTINGS.outside
+    shares = {"effect": known * (1.0 - nothing), "none": known * nothing, "unknown": SETTINGS.outside}
+    return Finding(
+        kind=kind,
+        probabilities=shares,
+        explanations=(chosen, *(others[i] for i in order)),
+        named=evidence.effects_of(chosen, probabilities) if kind == "effect" else (),
+        ranking=tuple(Ranked(*key, p) for key, p in sorted(probabilities.items(), key=lambda item: -item[1])),
+        indistinguishable=_sets(judged),
+        words=_words(kind, judged),
+        coarse=True,
+    )
+
+
+def _marginal(judged: Judged) -> dict[tuple[str, str], float]:
+    """Probability that each (name, place) belongs to the truth."""
+    total: dict[tuple[str, str], float] = {}
+    for weight, entry in zip(judged.weights, judged.found, strict=True):
+        for key in {(p.effect.name, p.place.name) for p in entry.explanation.hypothesis}:
+            total[key] = total.get(key, 0.0) + (1.0 - SETTINGS.outside) * float(weight)
+    return total
+
+
+def _sets(judged: Judged) -> tuple[tuple[str, ...], ...]:
+    """Names that may stand for one another in what was chosen."""
+    chosen = judged.chosen.explanation
+    own = {p.key: p for p in chosen.hypothesis}
+    sets: dict[str, set[str]] = {}
+    for entry in judged.within:
+        theirs = {p.key: p for p in entry.explanation.hypothesis}
+        if not theirs or not own or entry is judged.chosen:
+            continue
+        lost = [own[key] for key in own.keys() - theirs.keys()]
+        gained = [theirs[key] for key in theirs.keys() - own.keys()]
+        if len(lost) != 1 or len(gained) != 1:
+            lost, gained = list(chosen.hypothesis), list(entry.explanation.hypothesis)
+        label, instead = (" + ".join(sorted(p.effect.name for p in part)) for part in (lost, gained))
+        if label != instead:
+            sets.setdefault(label, {label}).add(instead)
+    return tuple(tuple(sorted(entry)) for entry in sets.values())
+
+
+def _words(kind: Kind, judged: Judged) -> str:
+    chosen = judged.chosen.explanation
+    if kind == "effect":
+        return (
+            f"Missing from the model: {names(chosen.hypothesis)}. What is left is more than the stated noise, or no noise is stated: "
+            "the model stays wrong in small ways, and explanations were weighed by what they predict of blocks that they did not see."
+        )
+    if kind == "none":
+        return "No effect of the catalogue predicts the records better than the nominal model does with its parameters re-estimated."
+    best = next((e.explanation for e in judged.within if e.explanation.hypothesis), chosen)
+    return (
+        f"Something is missing from the model, and no catalogued effect is it: {names(best.hypothesis)} fits the records for "
+        "identification, but does not shrink the discrepancy of the judging records."
+    )
