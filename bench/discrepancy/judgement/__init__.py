@@ -1,1 +1,1 @@
-"""Judgement: from fitted explanations to what is said, and how sure."""
+"""From fits to a verdict: posterior, predictive checks, the discrepancy on validation records."""

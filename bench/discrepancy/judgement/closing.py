@@ -12,14 +12,14 @@ from typing import Any
 
 import numpy as np
 
-from bench.discrepancy.case import Case
-from bench.discrepancy.explain import Explanation, nominal_alone
+from bench.discrepancy.case.case import Case
 from bench.discrepancy.judgement.coarse import without
-from bench.discrepancy.problem import Problem
-from bench.discrepancy.search import key_of
-from bench.discrepancy.shrink import gaps
+from bench.discrepancy.judgement.validation_discrepancy import gaps
+from bench.discrepancy.likelihood.problem import Problem
+from bench.discrepancy.localisation.localise import left_by
+from bench.discrepancy.search.explain import Explanation, nominal_alone
+from bench.discrepancy.search.fits import key_of
 from bench.discrepancy.verdict import Gap, NamedEffect, NominalEstimate
-from bench.discrepancy.where.locate import left_by
 
 WITHIN_NOISE = 1.3
 """Discrepancy over that of noise alone up to which an explanation is complete."""

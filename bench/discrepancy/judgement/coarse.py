@@ -15,13 +15,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.discrepancy.case import Case
-from bench.discrepancy.explain import Explanation, nominal_alone
-from bench.discrepancy.fit import fit
+from bench.discrepancy.case.case import Case
+from bench.discrepancy.fitting.map_fit import fit
 from bench.discrepancy.judgement.held_out import HeldOut, held_out, shares
-from bench.discrepancy.problem import Array, Problem
-from bench.discrepancy.search import LOG_PRIOR_EFFECT, THOROUGH, key_of
-from bench.discrepancy.shrink import discrepancies, noise_floors
+from bench.discrepancy.judgement.validation_discrepancy import discrepancies, noise_floors
+from bench.discrepancy.likelihood.problem import Array, Problem
+from bench.discrepancy.search.explain import Explanation, nominal_alone
+from bench.discrepancy.search.fits import LOG_PRIOR_EFFECT, THOROUGH, key_of
 
 
 @dataclass(frozen=True)

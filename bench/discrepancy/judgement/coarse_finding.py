@@ -6,15 +6,15 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from bench.discrepancy import evidence
-from bench.discrepancy.case import Case
-from bench.discrepancy.explain import Explanation
+from bench.discrepancy.case.case import Case
+from bench.discrepancy.judgement import posterior as evidence
 from bench.discrepancy.judgement.coarse import SETTINGS, Judged, judge
 from bench.discrepancy.judgement.finding import Finding
 from bench.discrepancy.likelihood.model_error import ModelError, crude_error, error_left
-from bench.discrepancy.problem import Problem
-from bench.discrepancy.search import names
-from bench.discrepancy.structure import structure_of
+from bench.discrepancy.likelihood.problem import Problem
+from bench.discrepancy.model.structure import structure_of
+from bench.discrepancy.search.explain import Explanation
+from bench.discrepancy.search.fits import names
 from bench.discrepancy.verdict import Kind, Ranked
 
 Search = Callable[[Case, ModelError], tuple[Case, list[Explanation]]]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from bench.discrepancy.explain import Explanation
-from bench.discrepancy.free_rival import Rival
+from bench.discrepancy.judgement.nonparametric_rival import Rival
+from bench.discrepancy.search.explain import Explanation
 from bench.discrepancy.verdict import Kind, NamedEffect, Ranked
 
 

@@ -20,11 +20,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.discrepancy.explain import Explanation
-from bench.discrepancy.fit import Fit, free_entries
-from bench.discrepancy.minimise import DIFFERENCES, differences
-from bench.discrepancy.prepared import fast_length
-from bench.discrepancy.problem import Problem
+from bench.discrepancy.fitting.map_fit import Fit, free_entries
+from bench.discrepancy.likelihood.problem import Problem
+from bench.discrepancy.likelihood.whitening import fast_length
+from bench.discrepancy.numerics.least_squares import DIFFERENCES, differences
+from bench.discrepancy.search.explain import Explanation
 
 Array = NDArray[np.float64]
 

@@ -1,1 +1,1 @@
-"""The likelihood of records: what residuals a model leaves, and how much each of them counts."""
+"""What a residual is worth: the noise of the residuals, its whitening, and the prior."""

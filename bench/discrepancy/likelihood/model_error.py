@@ -24,9 +24,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.discrepancy.case import Case, CaseRecord
-from bench.discrepancy.prepared import RecordData, fast_length, masked
-from bench.discrepancy.structure import Structure
+from bench.discrepancy.case.case import Case, CaseRecord
+from bench.discrepancy.likelihood.whitening import RecordData, fast_length, masked
+from bench.discrepancy.model.structure import Structure
 
 Array = NDArray[np.float64]
 Prediction = Callable[[CaseRecord], Mapping[str, Array]]
