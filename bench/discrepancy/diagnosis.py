@@ -152,6 +152,7 @@ def _diagnose(
         probabilities=probabilities,
         explanation=_told(words, seen),
         warnings=(
+            *finding.notes,
             *notes(case, problem),
             *idle_notes(told, quiet),
             *reading_notes(quiet, case),
@@ -166,6 +167,7 @@ def _diagnose(
         complete=kind != "unknown" and complete(found, sharp=not finding.coarse),
         remainder=remainder(problem, final, widest),
         nominal=nominal_estimates(final),
+        nearest=finding.nearest,
     )
     return Diagnosis(case, problem, tuple(explanations), verdict, final, where)
 
@@ -189,7 +191,7 @@ def _found(
     case, explanations = coarse_explanations(case, search, known)
     problem = Problem(case, structure_of(case), case.identification)
     coarse = coarse_finding(case, problem, explanations, rng)
-    return case, (sharp if known and coarse.kind != "effect" else coarse)
+    return case, coarse
 
 
 def _sharp(

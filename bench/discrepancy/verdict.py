@@ -183,6 +183,7 @@ class Verdict:
         complete: Whether what is named leaves nothing but noise.
         remainder: What is left on the judging records: "nrmse", "over_noise" (times what noise leaves), "of_before" (part of the gap
             before), and the "channel", "band_hz" and "time_s" that hold most of it in the records for identification.
+        nearest: Where nothing is named because something unknown is missing, the effects of the catalogue that come nearest.
         nominal: Nominal parameters as the explanation behind `gap.after` has them.
     """
 
@@ -203,6 +204,7 @@ class Verdict:
     complete: bool = False
     remainder: dict[str, Any] = field(default_factory=dict)
     nominal: tuple[NominalEstimate, ...] = ()
+    nearest: tuple[NamedEffect, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """Return the verdict as JSON values; numbers that are not finite become None."""

@@ -31,21 +31,28 @@ class CoarseSettings:
     Attributes:
         finalists: Explanations that are compared by blocks.
         reach: Difference in log posterior, of the coarsened likelihood, within which one is a finalist.
+        within: Stated standard deviations that a nominal parameter may move. Gaussian tails are an assumption about small deviations; what
+            lies farther off is a finding, and has to be named as an error of that parameter.
         material: Part of the discrepancy of the nominal model, its parameters re-estimated, that an effect closes to be named.
-        pays: Part of the discrepancy of the judging records that a named explanation may leave at most.
-        outside: Share of effects that no catalogue holds among what is named.
+        pays: Part of the discrepancy of the judging records that a named explanation may leave at most: half of its power.
+        most: The same where the noise is rightly stated and all that a law of the catalogue leaves is therefore not it.
+        outside: Share of effects that no catalogue holds among what is named, at least.
         telling: Difference of the scores (odds of 7) below which the samples cannot tell two explanations apart.
     """
 
     finalists: int = 10
     reach: float = 12.0
+    within: float = 4.0
     material: float = 0.1
-    pays: float = 0.8
+    pays: float = 0.7
+    most: float = 0.5
     outside: float = 0.05
     telling: float = 4.0
 
 
 SETTINGS = CoarseSettings()
+ABOUT_NOISE, UNCHANGED = 1.1, 1.02
+"""Times the noise below which a judged discrepancy is nothing but that, and change of it that is none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +65,7 @@ class Judged:
         weights: (n,) probability of each, as if one of them were true.
         within: Those within one standard error of the best.
         vetoed: Whether the judging records refused what the others would have named.
+        left: Part of the power of the judged discrepancy, beyond noise, that the chosen one leaves.
     """
 
     chosen: HeldOut
@@ -65,6 +73,12 @@ class Judged:
     weights: Array
     within: tuple[HeldOut, ...]
     vetoed: bool
+    left: float
+
+    @property
+    def outside(self) -> float:
+        """Probability that no effect of the catalogue is the cause: what is left might hold what explains the rest as well."""
+        return float(np.clip(self.left, SETTINGS.outside, 1.0))
 
 
 def judge(
@@ -72,6 +86,8 @@ def judge(
     problem: Problem,
     explanations: Sequence[Explanation],
     rng: np.random.Generator,
+    *,
+    trusted: bool = False,
     settings: CoarseSettings = SETTINGS,
 ) -> Judged:
     """Weigh explanations by prediction.
@@ -81,14 +97,13 @@ def judge(
         problem: Its problem on all degrees of freedom.
         explanations: By decreasing posterior, the nominal model alone among them.
         rng: For the bootstrap over blocks.
+        trusted: Whether the noise is stated, and nothing contradicts it: what is named has to close most of the discrepancy then.
         settings: When an effect is named.
     """
-    nothing = nominal_alone(explanations)
-    near = [
-        e
-        for e in explanations
-        if e.log_posterior > explanations[0].log_posterior - settings.reach and e is not nothing
-    ]
+    nothing = bounded(nominal_alone(explanations), settings.within)
+    with_effects = [e for e in explanations if e.hypothesis][: 2 * settings.finalists]
+    ranked = sorted((bounded(e, settings.within) for e in with_effects), key=lambda e: -e.log_posterior)
+    near = [e for e in ranked if e.log_posterior > ranked[0].log_posterior - settings.reach]
     found = [held_out(e) for e in [*near[: settings.finalists], nothing]]
     tolls = np.array([_log_prior(entry.explanation) for entry in found])
     best = found[int(np.argmin([entry.total - 2.0 * toll for entry, toll in zip(found, tolls, strict=True)]))]
@@ -103,13 +118,25 @@ def judge(
     found = [base, *found]
     weights = shares(found, np.array([_log_prior(e.explanation) for e in found]), rng)
     within = tuple(entry for entry in found if _as_good(entry, base, settings))
-    vetoed = False
+    vetoed, part = False, settings.most if trusted else settings.pays
     for entry in sorted(within, key=_plainness):
         e = entry.explanation
-        if not e.hypothesis or known.pays(e, nothing, settings.pays):
-            return Judged(entry, tuple(found), weights, within, vetoed)
+        if not e.hypothesis or known.pays(e, nothing, part):
+            return Judged(entry, tuple(found), weights, within, vetoed, known.left(e, nothing))
         vetoed = True
-    return Judged(found[-1], tuple(found), weights, within, True)
+    return Judged(found[-1], tuple(found), weights, within, True, 1.0)
+
+
+def bounded(explanation: Explanation, within: float) -> Explanation:
+    """An explanation whose nominal parameters stay within so many stated standard deviations, fitted again where they do not."""
+    parts = []
+    for problem, fitted in explanation.parts:
+        if np.any(np.abs(fitted.vector[: problem.n_physical]) > within):
+            narrow = problem.bounded(within)
+            parts.append((narrow, fit(narrow, fitted.hypothesis, start=fitted.vector, iterations=THOROUGH)))
+        else:
+            parts.append((problem, fitted))
+    return Explanation(tuple(parts))
 
 
 def _log_prior(explanation: Explanation) -> float:
@@ -133,6 +160,7 @@ class Discrepancies:
 
     def __init__(self, case: Case, problem: Problem) -> None:
         self.case, self.problem = case, problem
+        self._floor = noise_floors(problem, case.validation)
         self._kept: dict[tuple[int, bool], Array] = {}
 
     def of(self, explanation: Explanation, *, judging: bool) -> Array:
@@ -151,14 +179,22 @@ class Discrepancies:
     def pays(self, explanation: Explanation, nothing: Explanation, part: float) -> bool:
         """Whether an explanation leaves at most a part of the judging records' discrepancy, beyond noise, on some coordinate and no
         more than all of it on any."""
-        floor = noise_floors(self.problem, self.case.validation)
-        before, after = (self.of(e, judging=True) for e in (nothing, explanation))
-        beyond = [np.sqrt(np.maximum(x**2 - floor**2, 0.0)) for x in (before, after)]
-        if not np.isfinite(after).all():
-            return False
-        return bool(
-            np.any(beyond[1] <= part * beyond[0]) and np.all(after <= np.maximum(before, 1.1 * floor) * 1.02)
-        )
+        before, after = self._judged(nothing, explanation)
+        shrinks = self._beyond(after) <= part * self._beyond(before)
+        worse = after > np.maximum(before, ABOUT_NOISE * self._floor) * UNCHANGED
+        return bool(np.isfinite(after).all() and np.any(shrinks) and not np.any(worse))
+
+    def left(self, explanation: Explanation, nothing: Explanation) -> float:
+        """Part of the power of the judging records' discrepancy, beyond noise, that an explanation leaves where it is largest."""
+        before, after = (self._beyond(x) for x in self._judged(nothing, explanation))
+        widest = int(np.argmax(before))
+        return float(min((after[widest] / max(before[widest], 1e-300)) ** 2, 1.0))
+
+    def _judged(self, nothing: Explanation, explanation: Explanation) -> tuple[Array, Array]:
+        return self.of(nothing, judging=True), self.of(explanation, judging=True)
+
+    def _beyond(self, found: Array) -> Array:
+        return np.sqrt(np.maximum(found**2 - self._floor**2, 0.0))
 
 
 def _pruned(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from bench.discrepancy.case.case import Case
 from bench.discrepancy.judgement import posterior as evidence
 from bench.discrepancy.judgement.coarse import SETTINGS, Judged, judge
 from bench.discrepancy.judgement.finding import Finding
-from bench.discrepancy.likelihood.model_error import ModelError, crude_error, error_left
+from bench.discrepancy.likelihood.model_error import ModelError, crude_error, error_left, own_noise
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.structure import structure_of
 from bench.discrepancy.search.explain import Explanation
@@ -23,6 +23,9 @@ REFERENCE = 2
 """Effects, at most, of the explanation that tells the error of the model: more of them take its error for effects."""
 ROUNDS = 3
 """Estimates of the error, at most."""
+UNDERSTATED, QUIETEST = 1.5, 0.1
+"""Noise over the stated one from which that is said, and part of a spectrum that may be quieter: of spectra smoothed over half an octave
+the quietest bins scatter by some tenths."""
 SETTLED = 0.5
 """Part of the power of an estimated error above which what an explanation leaves is as estimated."""
 
@@ -71,29 +74,66 @@ def coarse_finding(
         explanations: Weighed by the error of the model, by decreasing posterior.
         rng: For bootstraps.
     """
-    judged = judge(case, problem, explanations, rng)
-    chosen = judged.chosen.explanation
+    understated = tuple(_understated(problem, explanations[0]))
+    judged = judge(case, problem, explanations, rng, trusted=problem.noise_stated and not understated)
+    chosen, nearest = judged.chosen.explanation, _nearest(judged)
     probabilities = _marginal(judged)
-    kind: Kind = "effect" if chosen.hypothesis else ("unknown" if judged.vetoed else "none")
+    # noise that is stated and is not all that is left is something that is missing, whatever it be
+    unexplained = judged.vetoed or problem.noise_stated
+    kind: Kind = "effect" if chosen.hypothesis else ("unknown" if unexplained else "none")
     others = [entry.explanation for entry in judged.found if entry is not judged.chosen]
     order = np.argsort(
         [-w for w, e in zip(judged.weights, judged.found, strict=True) if e is not judged.chosen]
     )
-    nothing = float(
-        sum(w for w, e in zip(judged.weights, judged.found, strict=True) if not e.explanation.hypothesis)
-    )
-    known = 1.0 - SETTINGS.outside
-    shares = {"effect": known * (1.0 - nothing), "none": known * nothing, "unknown": SETTINGS.outside}
     return Finding(
         kind=kind,
-        probabilities=shares,
+        probabilities=_probabilities(kind, judged),
         explanations=(chosen, *(others[i] for i in order)),
         named=evidence.effects_of(chosen, probabilities) if kind == "effect" else (),
         ranking=tuple(Ranked(*key, p) for key, p in sorted(probabilities.items(), key=lambda item: -item[1])),
         indistinguishable=_sets(judged),
-        words=_words(kind, judged),
+        words=_words(kind, judged, nearest),
+        nearest=evidence.effects_of(nearest, probabilities) if kind == "unknown" else (),
+        notes=understated,
         coarse=True,
     )
+
+
+def _probabilities(kind: Kind, judged: Judged) -> dict[str, float]:
+    """Probabilities of the verdicts."""
+    if kind == "unknown":
+        return {"effect": SETTINGS.outside, "none": 0.0, "unknown": 1.0 - SETTINGS.outside}
+    pairs = zip(judged.weights, judged.found, strict=True)
+    nothing = float(sum(weight for weight, entry in pairs if not entry.explanation.hypothesis))
+    outside = judged.outside if kind == "effect" else SETTINGS.outside
+    known = 1.0 - outside
+    return {"effect": known * (1.0 - nothing), "none": known * nothing, "unknown": outside}
+
+
+def _nearest(judged: Judged) -> Explanation:
+    """The likeliest explanation that has an effect; the chosen one where there is none."""
+    pairs = sorted(zip(judged.weights, judged.found, strict=True), key=lambda pair: -pair[0])
+    return next((e.explanation for _, e in pairs if e.explanation.hypothesis), judged.chosen.explanation)
+
+
+def _understated(problem: Problem, best: Explanation) -> Iterator[str]:
+    """Channels whose noise is larger than stated, wherever one looks in their spectra."""
+    error = best.parts[0][0].error
+    for name in problem.structure.channels:
+        stated = problem.case.channel(name).noise_std
+        if error is None or not stated or problem.windowed:
+            continue
+        c = problem.structure.channels.index(name)
+        least = [
+            np.quantile(error.power[data.record.name, name] / own_noise(data)[:, c], QUIETEST)
+            for data in problem.data
+        ]
+        factor = float(np.sqrt(1.0 + min(least)))
+        if factor > UNDERSTATED:
+            yield (
+                f"the noise of '{name}' is larger than stated, by a factor of {factor:.2g}: hardly anywhere in its spectrum does an "
+                "explanation leave less; measure it at rest"
+            )
 
 
 def _marginal(judged: Judged) -> dict[tuple[str, str], float]:
@@ -101,7 +141,7 @@ def _marginal(judged: Judged) -> dict[tuple[str, str], float]:
     total: dict[tuple[str, str], float] = {}
     for weight, entry in zip(judged.weights, judged.found, strict=True):
         for key in {(p.effect.name, p.place.name) for p in entry.explanation.hypothesis}:
-            total[key] = total.get(key, 0.0) + (1.0 - SETTINGS.outside) * float(weight)
+            total[key] = total.get(key, 0.0) + (1.0 - judged.outside) * float(weight)
     return total
 
 
@@ -124,7 +164,7 @@ def _sets(judged: Judged) -> tuple[tuple[str, ...], ...]:
     return tuple(tuple(sorted(entry)) for entry in sets.values())
 
 
-def _words(kind: Kind, judged: Judged) -> str:
+def _words(kind: Kind, judged: Judged, nearest: Explanation) -> str:
     chosen = judged.chosen.explanation
     if kind == "effect":
         return (
@@ -133,8 +173,17 @@ def _words(kind: Kind, judged: Judged) -> str:
         )
     if kind == "none":
         return "No effect of the catalogue predicts the records better than the nominal model does with its parameters re-estimated."
-    best = next((e.explanation for e in judged.within if e.explanation.hypothesis), chosen)
+    if not nearest.hypothesis:
+        return (
+            "The nominal model leaves more than the stated noise, and no effect of the catalogue predicts the records better than it does "
+            "with its parameters re-estimated."
+        )
+    fate = (
+        "but does not shrink the discrepancy of the judging records"
+        if judged.vetoed
+        else "but does not predict the records better than the nominal model does with its parameters re-estimated"
+    )
     return (
-        f"Something is missing from the model, and no catalogued effect is it: {names(best.hypothesis)} fits the records for "
-        "identification, but does not shrink the discrepancy of the judging records."
+        "Something is missing from the model, and no catalogued effect is it. "
+        f"The nearest is {names(nearest.hypothesis)}, {fate}."
     )

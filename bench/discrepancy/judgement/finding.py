@@ -23,6 +23,8 @@ class Finding:
         words: The verdict in a sentence or two.
         rival: A free force that does better than the laws, if any.
         doubt: What speaks against an explanation that leaves nothing but noise; empty where nothing does.
+        nearest: Where nothing is named, the effects that come nearest, with their parameters.
+        notes: What else the reader has to know.
         coarse: Whether the error of the model decided, rather than noise.
     """
 
@@ -35,4 +37,6 @@ class Finding:
     words: str
     rival: Rival | None = None
     doubt: str = ""
+    nearest: tuple[NamedEffect, ...] = ()
+    notes: tuple[str, ...] = ()
     coarse: bool = False

@@ -64,6 +64,7 @@ class Problem:
         bins: Frequency bins of every record, where they have to agree with those of another problem.
         substeps: Integration steps a sample; chosen by the fastest rate where None.
         refinement: Multiple of the steps so chosen, as far as `pace` lets it.
+        within: Stated standard deviations that a nominal parameter may move.
         error: Error of the model that residuals are weighed by besides their noise; None where noise is all that they hold.
         nominal: (n_nominal,) values of the structure's parameters, initial states of records in motion after them.
         spread: (n_nominal,) their one-sigma uncertainties.
@@ -81,6 +82,7 @@ class Problem:
     substeps: int | None = None
     refinement: int = 1
     error: ModelError | None = None
+    within: float = np.inf
     nominal: Array = field(init=False)
     spread: Array = field(init=False)
     noise: Array = field(init=False)
@@ -372,6 +374,12 @@ class Problem:
         out.refinement = refinement
         return out
 
+    def bounded(self, within: float) -> Problem:
+        """A copy whose nominal parameters move by so many stated standard deviations at most."""
+        out = copy.copy(self)
+        out.within = within
+        return out
+
     def beside(self, records: Sequence[CaseRecord]) -> Problem:
         """A copy of all records and further ones that start at rest; the scales of the effects stay, and so do vectors."""
         out = copy.copy(self)
@@ -538,6 +546,9 @@ class Problem:
         low, high = [np.full(n, -np.inf)], [np.full(n, np.inf)]
         positive = (self.nominal > 0) & (self.spread > 0) & (np.arange(n) < self.n_physical)
         low[0][positive] = -0.98 * self.nominal[positive] / self.spread[positive]
+        physical = np.arange(n) < self.n_physical
+        low[0][physical] = np.maximum(low[0][physical], -self.within)
+        high[0][physical] = self.within
         for placed in hypothesis:
             p = placed.effect.parameters
             mean.append(np.array([x.mean for x in p]))
