@@ -45,7 +45,7 @@ def with_closed(
     known = {key_of(e.hypothesis): e for e in explanations}
     out = []
     for i, (effect, placed) in enumerate(zip(named, best.hypothesis, strict=True)):
-        rest = known.get(key_of([p for p in best.hypothesis if p is not placed]))
+        rest = known.get(key_of(tuple(p for p in best.hypothesis if p is not placed)))
         rest = rest or (nothing if len(best.hypothesis) == 1 else without(best, i))
         found = gaps(
             case,
