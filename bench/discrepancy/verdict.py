@@ -206,6 +206,21 @@ class Verdict:
     nominal: tuple[NominalEstimate, ...] = ()
     nearest: tuple[NamedEffect, ...] = ()
 
+    @property
+    def left(self) -> str:
+        """What is left, in words; empty where it is nothing but noise."""
+        if self.complete or not self.remainder:
+            return ""
+        own = self.remainder
+        noise = "" if own.get("over_noise") is None else f", {own['over_noise']:.3g} times what noise leaves"
+        place = ""
+        if own.get("channel"):
+            (low, high), (first, last) = own["band_hz"], own["time_s"]
+            place = (
+                f"; most of it in '{own['channel']}', {low:.3g} to {high:.3g} Hz, {first:.3g} to {last:.3g} s"
+            )
+        return f"Left on the judging records: NRMSE {own['nrmse']:.3g}{noise}{place}."
+
     def to_json(self) -> dict[str, Any]:
         """Return the verdict as JSON values; numbers that are not finite become None."""
         return json_values(asdict(self))

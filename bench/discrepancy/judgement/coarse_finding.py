@@ -13,6 +13,7 @@ from bench.discrepancy.judgement.finding import Finding
 from bench.discrepancy.likelihood.model_error import ModelError, crude_error, error_left, own_noise
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.structure import structure_of
+from bench.discrepancy.numerics.deadline import NEVER, Deadline
 from bench.discrepancy.search.explain import Explanation
 from bench.discrepancy.search.fits import names
 from bench.discrepancy.verdict import Kind, Ranked
@@ -31,7 +32,7 @@ SETTLED = 0.5
 
 
 def coarse_explanations(
-    case: Case, search: Search, known: Sequence[Explanation]
+    case: Case, search: Search, known: Sequence[Explanation], deadline: Deadline = NEVER
 ) -> tuple[Case, list[Explanation]]:
     """Explanations of a case, weighed by the error of the model.
 
@@ -39,15 +40,16 @@ def coarse_explanations(
         case: The case.
         search: How explanations are searched.
         known: Explanations by the stated noise; empty where none is stated.
+        deadline: When no further estimate of the error is begun.
     """
-    structure = structure_of(case)
-    error = _left(case, known) if known else crude_error(case, structure)
-    for _ in range(ROUNDS):
-        case, explanations = search(case, error)
-        best = reference(explanations)
-        if known and best.reduced > SETTLED:
+    error = _left(case, known) if known else crude_error(case, structure_of(case))
+    case, explanations = search(case, error)
+    for _ in range(1, ROUNDS):
+        settled = bool(known) and reference(explanations).reduced > SETTLED
+        if settled or not deadline.allows("a further estimate of the error of the model"):
             break
-        error, known = _left(case, explanations), explanations
+        known = explanations
+        case, explanations = search(case, _left(case, known))
     return case, explanations
 
 
@@ -58,9 +60,12 @@ def reference(explanations: Sequence[Explanation]) -> Explanation:
 
 def _left(case: Case, explanations: Sequence[Explanation]) -> ModelError:
     """The error that the best of some explanations leaves."""
-    structure = structure_of(case)
-    data = Problem(case, structure, case.identification).data
-    return error_left(data, structure, reference(explanations).predict)
+    structure, best = structure_of(case), reference(explanations)
+    problem = Problem(case, structure, case.identification)
+    if problem.windowed:
+        before = best.parts[0][0].error
+        return ModelError({}, max(best.reduced * (1.0 if before is None else before.scale), 1.0))
+    return error_left(problem.data, structure, best.predict)
 
 
 def coarse_finding(
@@ -94,6 +99,7 @@ def coarse_finding(
         indistinguishable=_sets(judged),
         words=_words(kind, judged, nearest),
         nearest=evidence.effects_of(nearest, probabilities) if kind == "unknown" else (),
+        closest=nearest if kind == "unknown" and nearest.hypothesis else None,
         notes=understated,
         coarse=True,
     )

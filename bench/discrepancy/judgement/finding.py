@@ -24,6 +24,7 @@ class Finding:
         rival: A free force that does better than the laws, if any.
         doubt: What speaks against an explanation that leaves nothing but noise; empty where nothing does.
         nearest: Where nothing is named, the effects that come nearest, with their parameters.
+        closest: The explanation that has these.
         notes: What else the reader has to know.
         coarse: Whether the error of the model decided, rather than noise.
     """
@@ -38,5 +39,6 @@ class Finding:
     rival: Rival | None = None
     doubt: str = ""
     nearest: tuple[NamedEffect, ...] = ()
+    closest: Explanation | None = None
     notes: tuple[str, ...] = ()
     coarse: bool = False

@@ -25,6 +25,7 @@ from bench.discrepancy.likelihood.whitening import whitened
 from bench.discrepancy.model.placement import Hypothesis, Placed
 from bench.discrepancy.model.placements import placements
 from bench.discrepancy.model.structure import Structure, structure_of
+from bench.discrepancy.numerics.deadline import NEVER, Deadline
 from bench.discrepancy.screening.candidates import leading
 from bench.discrepancy.screening.score_test import LackOfFit, lack_of_fit
 from bench.discrepancy.screening.screen import Screen
@@ -160,6 +161,7 @@ def explain(
     most: int = 3,
     progress: Callable[[str], None] = lambda text: None,
     error: ModelError | None = None,
+    deadline: Deadline = NEVER,
 ) -> list[Explanation]:
     """Search the explanations of a case; by decreasing posterior.
 
@@ -169,6 +171,7 @@ def explain(
         most: Largest number of effects in a group.
         progress: Called with a line of text at every stage.
         error: Error of the model that residuals are weighed by besides their noise.
+        deadline: When no further stage is begun.
     """
     structure = structure_of(case)
     groups = structure.groups()
@@ -178,6 +181,7 @@ def explain(
             placements(case, structure, catalogue),
             most=most,
             progress=progress,
+            deadline=deadline,
         )
         problem = search.problem
         found = [Explanation(((problem, fitted),)) for fitted in search.ranked()]
@@ -205,10 +209,18 @@ def explain(
             problem = entry[0].problem
             progress(f"degrees of freedom {', '.join(problem.structure.dofs)}")
             chosen = placements(case, problem.structure, catalogue)
-            search = attribute(problem, chosen, most=1 if hopeless else 2, progress=progress, prepared=entry)
+            search = attribute(
+                problem,
+                chosen,
+                most=1 if hopeless else 2,
+                progress=progress,
+                prepared=entry,
+                deadline=deadline,
+            )
             hopeless = hopeless or search.ranked()[0].reduced > HOPELESS_GROUP
     found = _nothing_left_first(_combined([entry[0] for entry in prepared]))
-    if odd and not deep and not _leaves_nothing(found):
+    missing = odd and not deep and not _leaves_nothing(found)
+    if missing and deadline.allows("effects that couple the degrees of freedom"):
         coupled_fits(coupled, catalogue, most, progress)
     # what falls apart is doubted better group by group
     known = {key_of(e.hypothesis) for e in found}
@@ -217,14 +229,19 @@ def explain(
 
 
 def _attributed(
-    problem: Problem, candidates: Sequence[Placed], *, most: int, progress: Callable[[str], None]
+    problem: Problem,
+    candidates: Sequence[Placed],
+    *,
+    most: int,
+    progress: Callable[[str], None],
+    deadline: Deadline,
 ) -> Search:
     """`attribute`, and once more where the best explanation makes more of the noise of what drives it than the nominal model.
 
     A law that the velocity enters strongly passes much of the noise of a prescribed motion on, and a sensor of twice the gain that of
     a measured load; the right one would be refuted by it.
     """
-    search = attribute(problem, candidates, most=most, progress=progress)
+    search = attribute(problem, candidates, most=most, progress=progress, deadline=deadline)
     best = search.ranked()[0]
     sensors = any(placed.effect.site == "sensor" for placed in best.hypothesis)
     stated = problem.noise_stated and problem.error is None
@@ -233,7 +250,7 @@ def _attributed(
         left = float(np.sum(behind.residual(best.hypothesis, best.vector) ** 2))
         if abs(left - best.chi2) > NOISIER * best.n_residuals:
             progress(f"the noise behind {names(best.hypothesis)}")
-            return attribute(behind, candidates, most=most, progress=progress)
+            return attribute(behind, candidates, most=most, progress=progress, deadline=deadline)
     return search
 
 
