@@ -12,14 +12,27 @@ from bench.discrepancy import diagnose
 from bench.discrepancy.effects.catalogue import effect_named
 from bench.discrepancy.fitting.map_fit import fit
 from bench.discrepancy.judgement.held_out import HeldOut, held_out, shares
-from bench.discrepancy.likelihood.model_error import band_weights, crude_error, error_left, own_noise, smoothed
+from bench.discrepancy.likelihood.model_error import (
+    band_weights,
+    crude_error,
+    error_left,
+    own_noise,
+    smoothed,
+)
 from bench.discrepancy.likelihood.problem import Problem
-from bench.discrepancy.model.structure import structure_of
+from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.search.explain import Explanation
 
 FEW = [
     effect_named(name)
-    for name in ("cubic_stiffness", "gap", "coulomb_friction", "quadratic_damping", "stiffness_drift", "mass_error")
+    for name in (
+        "cubic_stiffness",
+        "gap",
+        "coulomb_friction",
+        "quadratic_damping",
+        "stiffness_drift",
+        "mass_error",
+    )
 ]
 UNSTATED = {"force": None, "displacement": None, "acceleration": None}
 UNDERSTATED = {"force": 0.0, **{name: 0.4 * NOISE[name] for name in ("displacement", "acceleration")}}
@@ -66,7 +79,8 @@ def test_an_octave_counts_as_so_many_samples_however_finely_it_is_sampled():
 def test_a_spectrum_is_smoothed_over_a_part_of_an_octave_and_keeps_its_level():
     power = np.random.default_rng(1).exponential(3.0, (2000, 1))
     level = smoothed(power)
-    assert np.std(level[500:]) < 0.2 and np.mean(level) == pytest.approx(3.0, rel=0.05)
+    assert np.std(level[500:]) < 0.2
+    assert np.mean(level) == pytest.approx(3.0, rel=0.05)
 
 
 def test_the_error_is_never_below_noise_and_makes_the_reference_consistent():
@@ -122,7 +136,8 @@ def test_an_effect_is_named_over_a_background_that_no_model_has(noise):
     assert not verdict.complete
     assert verdict.gap.after < 0.3 * verdict.gap.parameters_only
     low, high = first.closed_ci95
-    assert low <= first.closed <= high and first.closed > 0.5
+    assert low <= first.closed <= high
+    assert first.closed > 0.5
     k3 = first.parameters["k3"]
     assert abs(k3.value - 8e5) < 3.0 * k3.std
     assert k3.std > 2e-3 * k3.value  # nothing is known to a thousandth from a model that is wrong by more

@@ -28,14 +28,15 @@ from bench.discrepancy.effects.effect import Effect
 from bench.discrepancy.effects.nonparametric import CLOSURES
 from bench.discrepancy.fitting.initial_state_fit import start_warnings
 from bench.discrepancy.judgement import posterior as evidence
-from bench.discrepancy.judgement.closing import complete, nominal_estimates, remainder, with_closed
+from bench.discrepancy.judgement.closing import complete, nominal_estimates, with_closed
 from bench.discrepancy.judgement.nonparametric_rival import Rival
 from bench.discrepancy.judgement.two_regimes import How, Progress, found_of
 from bench.discrepancy.judgement.validation_discrepancy import gaps, nominal_prediction
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.localisation.localise import Whereabouts, locate
+from bench.discrepancy.localisation.remainder import remainder
 from bench.discrepancy.model.placement import Hypothesis
-from bench.discrepancy.model.structure import structure_of
+from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.next_test.discriminating_excitation import separate, told_apart
 from bench.discrepancy.numerics.deadline import Deadline
 from bench.discrepancy.search.explain import Explanation, close, nominal_alone

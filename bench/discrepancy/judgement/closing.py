@@ -1,4 +1,4 @@
-"""What each named effect closes of the gap, what is left, and where the nominal parameters have gone.
+"""What each named effect closes of the gap, whether that is all, and where the nominal parameters have gone.
 
 An effect closes the part of the judging records' discrepancy that comes back when it is taken out and everything else is fitted again,
 with an interval from blocks of these records, which chose nothing.
@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -16,7 +15,6 @@ from bench.discrepancy.case.case import Case
 from bench.discrepancy.judgement.coarse import without
 from bench.discrepancy.judgement.validation_discrepancy import gaps
 from bench.discrepancy.likelihood.problem import Problem
-from bench.discrepancy.localisation.localise import left_by
 from bench.discrepancy.search.explain import Explanation, nominal_alone
 from bench.discrepancy.search.fits import key_of
 from bench.discrepancy.verdict import Gap, NamedEffect, NominalEstimate
@@ -80,20 +78,3 @@ def nominal_estimates(explanation: Explanation) -> tuple[NominalEstimate, ...]:
 def complete(found: Sequence[Gap], *, sharp: bool) -> bool:
     """Whether what an explanation leaves is noise: by the stated one, or by what is left on the judging records."""
     return sharp or all(gap.after <= WITHIN_NOISE * gap.noise_floor for gap in found)
-
-
-def remainder(problem: Problem, final: Explanation, gap: Gap) -> dict[str, Any]:
-    """What an explanation leaves: how large it is, and where most of it lies.
-
-    Args:
-        problem: Its problem on all degrees of freedom.
-        final: The explanation behind `gap.after`.
-        gap: The gap of the case.
-    """
-    place = left_by(problem, final)
-    return {
-        "nrmse": gap.after,
-        "over_noise": gap.after / gap.noise_floor if gap.noise_floor > 0.0 else None,
-        "of_before": gap.after / gap.before if gap.before > 0.0 else 0.0,
-        **({} if place is None else place),
-    }

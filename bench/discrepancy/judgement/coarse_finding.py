@@ -12,7 +12,7 @@ from bench.discrepancy.judgement.coarse import SETTINGS, Judged, judge
 from bench.discrepancy.judgement.finding import Finding
 from bench.discrepancy.likelihood.model_error import ModelError, crude_error, error_left, own_noise
 from bench.discrepancy.likelihood.problem import Problem
-from bench.discrepancy.model.structure import structure_of
+from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.numerics.deadline import NEVER, Deadline
 from bench.discrepancy.search.explain import Explanation
 from bench.discrepancy.search.fits import names

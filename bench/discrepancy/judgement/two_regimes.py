@@ -22,7 +22,7 @@ from bench.discrepancy.judgement.nonparametric_rival import Rival, likelier_forc
 from bench.discrepancy.judgement.predictive_check import contradicted
 from bench.discrepancy.likelihood.model_error import ModelError
 from bench.discrepancy.likelihood.problem import Problem
-from bench.discrepancy.model.structure import structure_of
+from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.numerics.deadline import NEVER, Deadline
 from bench.discrepancy.search.explain import Explanation, explain
 from bench.discrepancy.search.fits import names

@@ -141,7 +141,7 @@ def nominal_level(problem: Problem, placed: Placed, values: Array) -> float | No
         return float(values[problem.structure.parameters.index(COULOMB_PARAMETER)])
     for friction in problem.structure.frictions:
         if friction.acts_along(placed.place.rows[0]):
-            return friction.level(problem.structure, values)
+            return friction.level(problem.structure.parameters, values)
     return None
 
 
