@@ -25,6 +25,24 @@ ROWS_PER_PART = 500_000
 MIN_PARTS = 64
 """Parts that a campaign is cut into where it has the records, so that many cores have work."""
 
+
+@dataclass(frozen=True)
+class PlanLimits:
+    """What a plan may ask for, whatever the machine.
+
+    Attributes:
+        records: Ten times the largest campaign that docs/scale.md reckons with, which fills the shared disks it names.
+        samples: Samples of a record, whose numbers are 32 bits long in the data set.
+        parts: Their numbers have six digits in the names of the files, and journal and manifest hold about 0.5 kB of each.
+    """
+
+    records: int = 100_000_000
+    samples: int = 2**31 - 1
+    parts: int = 1_000_000
+
+
+PLAN_LIMITS = PlanLimits()
+
 Node = Any
 """A signal's or chain's dictionary in which a distribution may stand for a number."""
 
@@ -267,6 +285,7 @@ class Plan:
                 value = self.sample_rate
             if isinstance(value, bool | str | None) or not (math.isfinite(value) and value > 0.0):
                 raise ParameterError(f"{name} of the campaign is {value!r}; a positive number is expected")
+        self._check_size(PLAN_LIMITS)
         if (
             abs(self.duration * self.sample_rate - self.n_samples) > 1e-6 * self.n_samples
             or self.n_samples < 2
@@ -282,6 +301,22 @@ class Plan:
         if not self.records_per_part:
             whole = max(1, ROWS_PER_PART // self.n_samples)
             object.__setattr__(self, "records_per_part", max(1, min(whole, -(-self.records // MIN_PARTS))))
+
+    def _check_size(self, limits: PlanLimits) -> None:
+        samples = self.duration * self.sample_rate
+        parts = -(-self.records // self.records_per_part) if self.records_per_part else 0
+        for what, value, most, todo in (
+            ("records", self.records, limits.records, "make several campaigns, each with a seed of its own"),
+            ("samples a record", samples, limits.samples, "shorten the records, or lower the sample rate"),
+            ("parts", parts, limits.parts, "raise records_per_part"),
+        ):
+            if value > most:
+                width = 4 if self.precision == "float32" else 8
+                terabytes = min(self.records, 10**30) * samples * width / 1e12
+                raise ParameterError(
+                    f"the campaign is too large: {_short(self.records)} records of {_short(samples)} samples are "
+                    f"{terabytes:.3g} TB a channel, and at most {most} {what} can be asked for; {todo}"
+                )
 
     def _check_members(self) -> None:
         for what, members in (("rigs", self.rigs), ("excitations", self.excitations)):
@@ -401,6 +436,13 @@ def filled(node: Node, path: str, values: Mapping[str, Value]) -> Any:
     if isinstance(node, list | tuple):
         return [filled(value, f"{path}/{index}", values) for index, value in enumerate(node)]
     return node
+
+
+def _short(number: float) -> str:
+    """A number on a few characters, whatever its size."""
+    if isinstance(number, int) and number.bit_length() > 64:
+        return f"about 10^{math.floor(number.bit_length() * math.log10(2.0))}"
+    return f"{number:,}".replace(",", " ") if isinstance(number, int) else f"{number:g}"
 
 
 def _unique(what: str, names: list[str]) -> None:

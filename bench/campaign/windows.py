@@ -7,7 +7,6 @@ one record are as far apart as the buffer is long.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from pathlib import Path
@@ -208,14 +207,7 @@ def _parameters(path: str, names: tuple[str, ...]) -> dict[int, NDArray[np.float
 
 def _journaled(store: Store) -> dict[int, int]:
     """Finished parts of a campaign that is still running, and their records."""
-    found = {}
-    for line in (store.folder / "journal.jsonl").read_text(encoding="utf-8").splitlines():
-        try:
-            entry = json.loads(line)
-        except ValueError:  # the line that is just being written
-            continue
-        found[entry["part"]] = entry["ok"]
-    return found
+    return {part: entry["ok"] for part, entry in store.journaled().items()}
 
 
 def _stacked(held: Sequence[Window]) -> Window:

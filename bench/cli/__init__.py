@@ -13,6 +13,7 @@ import tyro
 from rich.console import Console
 
 from bench import __version__
+from bench.cli.console import Terminated, terminable
 from bench.cli.diagnosis import Blind, Diagnose
 from bench.cli.excite import Excite
 from bench.cli.rigs import Demo, Laws, Simulate, View
@@ -48,7 +49,7 @@ def _speak_unicode() -> None:
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Run the command line; returns the exit status: 0 done, 2 refused with a message, 130 stopped by hand."""
+    """Run the command line; returns the exit status: 0 done, 2 refused with a message, 130 stopped by hand, 143 by the system."""
     warnings.showwarning = _show_warning
     _speak_unicode()
     if (sys.argv[1:] if argv is None else argv) == ["--version"]:
@@ -61,15 +62,16 @@ def main(argv: list[str] | None = None) -> int:
             description="A MuJoCo virtual test bench for nonlinear joints. --version prints the version.",
             args=argv,
         )
-        command()
+        with terminable():
+            command()
     except (BenchError, OSError) as error:
         Console(stderr=True, soft_wrap=True).print(
             f"jointbench: {error}", style="red", markup=False, highlight=False
         )
         return 2
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as stopped:
         print("jointbench: stopped", file=sys.stderr)
-        return 130
+        return stopped.status if isinstance(stopped, Terminated) else 130
     return 0
 
 

@@ -54,6 +54,8 @@ class Excite:
     """Signals that dopt weighs."""
     seed: int = 0
     """Seed."""
+    force: bool = False
+    """Overwrite a file that exists."""
     json: bool = False
     """Print JSON."""
 
@@ -114,7 +116,9 @@ class Excite:
     def _check(self) -> None:
         """Raise an error for arguments that do not go together."""
         from bench.errors import ParameterError, UnknownNameError
+        from bench.targets import check_targets
 
+        check_targets(self.out, force=self.force)
         if self.method not in METHODS:
             raise UnknownNameError("method", self.method, METHODS)
         if self.out.suffix not in {".csv", ".json"}:

@@ -22,6 +22,8 @@ class Demo:
 
     out: Path = Path("out/demo")
     """Folder for the results."""
+    force: bool = False
+    """Overwrite the results of an earlier run."""
     json: bool = False
     """Print the figures as JSON instead of a table."""
 
@@ -29,7 +31,9 @@ class Demo:
         """Run the command."""
         from bench import demo
         from bench.demo.report import summary, write
+        from bench.targets import check_folder
 
+        check_folder(self.out, force=self.force)
         with progress_bar(quiet=self.json) as progress:
             result = demo.compute(progress)
             files = write(result, self.out, progress)
@@ -86,6 +90,8 @@ class Simulate:
     """The record to write."""
     seed: int = 0
     """Seed of the excitation."""
+    force: bool = False
+    """Overwrite a record that exists."""
     json: bool = False
     """Print JSON."""
 
@@ -95,7 +101,9 @@ class Simulate:
 
         from bench.record_files import write_recording
         from bench.rig import simulate
+        from bench.targets import check_targets
 
+        check_targets(self.out, force=self.force)
         rig, excitation = _configured(self.configuration)
         record = simulate(rig, excitation, rng=np.random.default_rng(self.seed))
         write_recording(self.out, record)
@@ -127,6 +135,8 @@ class View:
     """File to save (.rrd); opens the viewer where not given."""
     seed: int = 0
     """Seed of the excitation."""
+    force: bool = False
+    """Overwrite a file that exists."""
 
     def __call__(self) -> None:
         """Run the command."""
@@ -135,7 +145,9 @@ class View:
         from bench.errors import ParameterError
         from bench.rerun_log import log_comparison
         from bench.rig import simulate
+        from bench.targets import check_targets
 
+        check_targets(self.out, force=self.force)
         if not self.configurations:
             raise ParameterError(
                 "give at least one rig configuration (a TOML or JSON file; see docs/configuration.md)"

@@ -6,6 +6,7 @@ trained for (channels, scales, limits, windows), because its numbers mean someth
 
 from __future__ import annotations
 
+import io
 import json
 import zipfile
 from collections.abc import Mapping
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 
 from bench.errors import FileFormatError, ParameterError, UnknownNameError
 from bench.excitation.station import Station
+from bench.files import write_bytes
 
 FOLDER = Path(__file__).resolve().parent.parent / "_data" / "policies"
 FORMAT = 1
@@ -101,7 +103,14 @@ class Policy:
         return np.clip(value + self.station.scheduled(observation, self.schedule), -1.0, 1.0)
 
     def save(self, path: Path) -> None:
-        """Write the policy as a NumPy archive of plain arrays and a JSON text."""
+        """Write the policy as a NumPy archive of plain arrays and a JSON text, whole or not at all.
+
+        Args:
+            path: Path of the file; ".npz" is appended where it does not end so.
+
+        Raises:
+            OutputError: It cannot be written.
+        """
         about = {
             "format": FORMAT,
             "name": self.name,
@@ -111,9 +120,10 @@ class Policy:
         }
         layers = {f"weight_{i}": array for i, array in enumerate(self.weights)}
         layers |= {f"bias_{i}": array for i, array in enumerate(self.biases)}
-        path.parent.mkdir(parents=True, exist_ok=True)
         arrays = {"mean": self.mean, "deviation": self.deviation, "schedule": self.schedule, **layers}
-        np.savez_compressed(path, allow_pickle=False, document=np.array(json.dumps(about)), **arrays)
+        content = io.BytesIO()
+        np.savez_compressed(content, allow_pickle=False, document=np.array(json.dumps(about)), **arrays)
+        write_bytes(path if path.suffix == ".npz" else Path(f"{path}.npz"), content.getvalue())
 
     @classmethod
     def load(cls, path: Path) -> Policy:

@@ -30,7 +30,7 @@ import numpy as np
 from bench.discrepancy.blind.drawing import BlindOptions, draw_case
 from bench.discrepancy.case.case import Case
 from bench.errors import BenchError, FileFormatError, ParameterError
-from bench.files import replacing, write_text
+from bench.files import together, write_bytes, write_text
 
 __all__ = ["BlindOptions", "draw_case", "make_blind", "run_blind", "write_case"]
 
@@ -96,11 +96,12 @@ def _make_one(task: tuple[str, Path, Path, int, int, BlindOptions]) -> str:
         )
     case, answer = draw_case(name, rng, options)
     text = json.dumps(answer | {"salt": salt}, indent=1)
-    if options.leave_one_out:
-        write_text(folder / name / PROTOCOL, json.dumps({"exclude": answer["struck"]}))
-    write_case(case, folder / name)
-    write_text(answer_file, text)
-    write_text(sealed, _digest(text) + "\n")
+    with together():  # no case without its answer
+        if options.leave_one_out:
+            write_text(folder / name / PROTOCOL, json.dumps({"exclude": answer["struck"]}))
+        write_case(case, folder / name)
+        write_text(answer_file, text)
+        write_text(sealed, _digest(text) + "\n")
     return f"{name} made"
 
 
@@ -133,8 +134,7 @@ def write_case(case: Case, folder: str | Path) -> None:
         text = io.StringIO()
         header = ",".join(["time", *record.values])
         np.savetxt(text, table, delimiter=",", header=header, comments="", fmt="%.8g")
-        with replacing(folder / f"{record.name}.csv.gz") as temporary:
-            temporary.write_bytes(gzip.compress(text.getvalue().encode(), mtime=0))
+        write_bytes(folder / f"{record.name}.csv.gz", gzip.compress(text.getvalue().encode(), mtime=0))
     nominal = {
         "rig": case.rig,
         "sample_rate_hz": 1.0 / case.identification[0].step,
