@@ -183,6 +183,7 @@ class Verdict:
         complete: Whether what is named leaves nothing but noise.
         remainder: What is left on the judging records: "nrmse", "over_noise" (times what noise leaves), "of_before" (part of the gap
             before), and the "channel", "band_hz" and "time_s" that hold most of it in the records for identification.
+        nearest: Where nothing is named because something unknown is missing, the effects of the catalogue that come nearest.
         nominal: Nominal parameters as the explanation behind `gap.after` has them.
     """
 
@@ -203,6 +204,22 @@ class Verdict:
     complete: bool = False
     remainder: dict[str, Any] = field(default_factory=dict)
     nominal: tuple[NominalEstimate, ...] = ()
+    nearest: tuple[NamedEffect, ...] = ()
+
+    @property
+    def left(self) -> str:
+        """What is left, in words; empty where it is nothing but noise."""
+        if self.complete or not self.remainder:
+            return ""
+        own = self.remainder
+        noise = "" if own.get("over_noise") is None else f", {own['over_noise']:.3g} times what noise leaves"
+        place = ""
+        if own.get("channel"):
+            (low, high), (first, last) = own["band_hz"], own["time_s"]
+            place = (
+                f"; most of it in '{own['channel']}', {low:.3g} to {high:.3g} Hz, {first:.3g} to {last:.3g} s"
+            )
+        return f"Left on the judging records: NRMSE {own['nrmse']:.3g}{noise}{place}."
 
     def timed(self, seconds: float) -> Verdict:
         """The verdict with its wall time [s]."""
