@@ -78,3 +78,7 @@ class IdentificationError(BenchError, ValueError):
 
 class RangeWarning(UserWarning):
     """A reduced-order model was used outside the range of the data it was identified from."""
+
+
+class RecordWarning(UserWarning):
+    """Something in a record's file was assumed, repaired or left out, or is doubtful; the text says what."""
