@@ -42,7 +42,7 @@ class ReadingLimits:
     numbers: int = 64_000_000
     line_bytes: int = 2**20
     columns: int = 10_000
-    objects: int = 100_000
+    objects: int = 30_000
     depth: int = 32
     model_bytes: int = 64 * 2**20
     included: int = 100

@@ -79,7 +79,9 @@ def _member(path: Path, archive: zipfile.ZipFile, info: zipfile.ZipInfo, left: i
     if claimed > 8 * left:
         raise _beyond(path, f"an array '{info.filename[:60]}' of {size_text(claimed)}", size_text(8 * left))
     if claimed > info.file_size:
-        raise ValueError(f"array '{info.filename[:60]}' claims {size_text(claimed)} and holds {size_text(info.file_size)}")
+        raise ValueError(
+            f"array '{info.filename[:60]}' claims {size_text(claimed)} and holds {size_text(info.file_size)}"
+        )
     with archive.open(info) as stream:
         return np.lib.format.read_array(stream, allow_pickle=False)
 
@@ -139,32 +141,50 @@ def read_hdf5(
     except ImportError:
         raise FileFormatError(f"reading '{path.name}' needs h5py: pip install 'jointbench[io]'") from None
 
-    variables: dict[str, Variable] = {}
-    seen, left = 0, limits.numbers
-
-    def visit(name: str | bytes, item: Any) -> None:
-        nonlocal seen, left
-        seen += 1
-        if seen > limits.objects:
-            raise _beyond(path, f"more than {limits.objects} groups and data sets", f"{limits.objects}")
-        if not isinstance(item, h5py.Dataset):
-            return
-        name = name.decode("utf-8", "replace") if isinstance(name, bytes) else name
-        if (wanted is not None and not wanted(name)) or item.shape is None or item.dtype.kind not in "biufc":
-            other = np.empty(0, dtype="U1") if item.dtype.kind not in "biufc" else np.empty(0)
-            variables[name] = Variable(other)
-            return
-        left -= _checked_size(path, name, item, left)
-        variables[name] = Variable(np.asarray(item[()]), _unit(item))
-
     try:
         with h5py.File(path, "r") as file:
-            file.visititems(visit)
+            return _data_sets(path, file, wanted, limits)
     except BenchError:
         raise
     # h5py turns the library's errors into whatever class fits best (OSError, RuntimeError, KeyError, ValueError, TypeError, …)
     except Exception as error:
         raise FileFormatError(_unreadable(path, "HDF5", error)) from None
+
+
+def _data_sets(
+    path: Path, file: Any, wanted: Callable[[str], bool] | None, limits: ReadingLimits
+) -> dict[str, Variable]:
+    """All data sets of a file by path; of several names of one group, the first found counts."""
+    import h5py  # noqa: PLC0415
+
+    variables: dict[str, Variable] = {}
+    left, found = limits.numbers, 0
+    waiting: list[tuple[str, Any, int]] = [("", file["/"], 0)]
+    groups = {h5py.h5o.get_info(file["/"].id).addr}
+    while waiting:
+        prefix, group, depth = waiting.pop()
+        for key in group:
+            found += 1
+            if found > limits.objects or depth > limits.depth:
+                raise FileFormatError(
+                    f"'{path}' holds more than {limits.objects} groups and data sets, or nests them more than {limits.depth} deep, "
+                    "which is not read; copy the channels into a file of their own"
+                )
+            if not isinstance(group.get(key, getlink=True), h5py.HardLink):
+                continue  # to another place in this file, or to another file
+            item, name = group[key], prefix + key
+            if isinstance(item, h5py.Group):
+                address = h5py.h5o.get_info(item.id).addr
+                if address not in groups:
+                    groups.add(address)
+                    waiting.append((name + "/", item, depth + 1))
+            elif isinstance(item, h5py.Dataset):
+                numeric = item.dtype.kind in "biufc"
+                if not numeric or item.shape is None or not (wanted is None or wanted(name)):
+                    variables[name] = Variable(np.empty(0, dtype=float if numeric else "U1"))
+                    continue
+                left -= _checked_size(path, name, item, left)
+                variables[name] = Variable(np.asarray(item[()]), _unit(item))
     return variables
 
 
@@ -192,9 +212,15 @@ def _unit(item: Any) -> str:
         if key not in item.attrs:
             continue
         attribute = item.attrs.get_id(key)
-        if math.prod(attribute.shape) == 1 and attribute.dtype.itemsize <= 1000 and attribute.dtype.kind in "SUO":
+        if (
+            math.prod(attribute.shape) == 1
+            and attribute.dtype.itemsize <= 1000
+            and attribute.dtype.kind in "SUO"
+        ):
             value = item.attrs[key]
-            value = value.item() if isinstance(value, np.ndarray | np.generic) and np.size(value) == 1 else value
+            value = (
+                value.item() if isinstance(value, np.ndarray | np.generic) and np.size(value) == 1 else value
+            )
             return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
     return ""
 

@@ -65,7 +65,9 @@ def base_name(source: str) -> str:
     return match["name"].strip() if match else source
 
 
-def find(variables: Mapping[str, Variable], source: str, *, file: str, kinds: str = "biuf") -> tuple[NDArray, str]:
+def find(
+    variables: Mapping[str, Variable], source: str, *, file: str, kinds: str = "biuf"
+) -> tuple[NDArray, str]:
     """Values ``(n,)`` and unit of a source.
 
     Args:

@@ -26,8 +26,9 @@ from bench.recording import Recording
 TEXT = (".csv", ".tsv", ".txt", ".dat", ".asc")
 """Suffixes of text tables, which may be gzipped."""
 
-READABLE = (".parquet", ".csv", ".csv.gz", ".mat", ".npz", ".h5", ".hdf5") + tuple(
-    f"{suffix}{packed}" for suffix in TEXT[1:] for packed in ("", ".gz")
+READABLE = (
+    *(".parquet", ".csv", ".csv.gz", ".mat", ".npz", ".h5", ".hdf5"),
+    *(f"{suffix}{packed}" for suffix in TEXT[1:] for packed in ("", ".gz")),
 )
 """Suffixes of the files that are read, in small or capital letters."""
 
@@ -138,7 +139,7 @@ def _assembled(
     arrays, told = {}, {}
     for channel, place in sources.items():
         values, unit = find(variables, place, file=path.name)
-        arrays[channel] = values.astype(float)
+        arrays[channel] = values.astype(float, copy=False)
         if unit:
             told[channel] = unit
     return Columns(clock, arrays, told, notes)

@@ -66,7 +66,12 @@ def cells_of(line: str, delimiter: str) -> list[str]:
     if delimiter == WHITE and '"' not in line:
         return line.split()
     try:
-        row = next(csv.reader([line.strip() if delimiter == WHITE else line], delimiter=delimiter, skipinitialspace=True), [])
+        row = next(
+            csv.reader(
+                [line.strip() if delimiter == WHITE else line], delimiter=delimiter, skipinitialspace=True
+            ),
+            [],
+        )
     except csv.Error:
         return [line]
     return [cell.strip() for cell in row]
@@ -92,7 +97,9 @@ def dialect_of(lines: Sequence[str], file: str) -> Dialect:
     places = [i for i, line in enumerate(lines) if line.strip() and not line.lstrip().startswith(COMMENTS)]
     if not places:
         comments = any(line.strip() for line in lines)
-        raise FileFormatError(f"'{file}' holds no table: it is empty{' but for comments' if comments else ''}")
+        raise FileFormatError(
+            f"'{file}' holds no table: it is empty{' but for comments' if comments else ''}"
+        )
     delimiter, decimal, width = _best([lines[i] for i in places[-_SHOWN:]])
     rows = {i: _trimmed(cells_of(lines[i], delimiter), width) for i in places}
     numeric = _numeric_columns([rows[i] for i in places[-_SHOWN:]], width, decimal)
@@ -107,7 +114,9 @@ def dialect_of(lines: Sequence[str], file: str) -> Dialect:
         columns.append(Column(headings[k], kind, units[k], sample))
     twice = next((name for name, n in Counter(filter(None, headings)).items() if n > 1), None)
     if twice is not None:
-        raise FileFormatError(f"'{file}' has several columns headed '{twice[:60]}'; give each its own heading")
+        raise FileFormatError(
+            f"'{file}' has several columns headed '{twice[:60]}'; give each its own heading"
+        )
     return Dialect(delimiter, decimal, tuple(columns), first)
 
 
@@ -169,9 +178,17 @@ def _first_of_numbers(
     at = next((n for n, i in enumerate(places) if kinds[i] == "numbers"), None)
     if at is None:
         last = [cell for cell in rows[places[-1]] if cell]
-        what = f"has headings ({', '.join(last[:8])[:200]}) but" if kinds[places[-1]] == "text" and len(last) > 1 else "holds"
+        what = (
+            f"has headings ({', '.join(last[:8])[:200]}) but"
+            if kinds[places[-1]] == "text" and len(last) > 1
+            else "holds"
+        )
         raise FileFormatError(f"'{file}' {what} no line of numbers; was the test recorded?")
-    while at > 1 and kinds[places[at - 1]] == "mixed" and "text" in {kinds[i] for i in places[max(0, at - 3) : at - 1]}:
+    while (
+        at > 1
+        and kinds[places[at - 1]] == "mixed"
+        and "text" in {kinds[i] for i in places[max(0, at - 3) : at - 1]}
+    ):
         at -= 1
     return places[at]
 
@@ -202,7 +219,9 @@ def _headings(
         if len(above) > 2 and _are_units(above[-2]):
             return above[-3], [cell.strip(_BRACKETS) for cell in above[-2]]
         return above[-1], units
-    comment = next((lines[i].strip() for i in range(first - 1, -1, -1) if lines[i].lstrip().startswith(COMMENTS)), "")
+    comment = next(
+        (lines[i].strip() for i in range(first - 1, -1, -1) if lines[i].lstrip().startswith(COMMENTS)), ""
+    )
     words = [word.strip(' "') for word in cells_of(comment.lstrip("".join(COMMENTS)).strip(), delimiter)]
     if comment and len(words) == width and all(words) and not all(is_number(word, decimal) for word in words):
         return words, units

@@ -18,6 +18,7 @@ from bench.limits import READING_LIMITS, ReadingLimits
 from bench.record_files.column_map import ColumnMap
 from bench.record_files.columns import READABLE, read_columns
 from bench.recording import Recording
+from bench.recording.channel import channels_from
 from bench.recording.clock import JITTER, grid
 from bench.recording.jumps import hidden_dropouts
 from bench.recording.mending import mended
@@ -32,8 +33,8 @@ class Noted(NamedTuple):
     """``(n,)`` [s]."""
     sample_rate: float
     """[Hz]."""
-    arrays: dict[str, NDArray[np.float64]]
-    """Values by channel name, each ``(n,)``."""
+    values: NDArray[np.float64]
+    """``(n, n_channels)``, each column contiguous in memory."""
     report: dict[str, Any]
     """What was repaired."""
     notes: tuple[str, ...]
@@ -82,7 +83,7 @@ def on_one_clock(
             f"all channels jump at {where}, although the times run through: samples seem to be missing there (a dropout whose times "
             "were renumbered); cut the record there",
         )
-    return Noted(clock, rate, dict(zip(arrays, stacked.T, strict=True)), report, notes)
+    return Noted(clock, rate, stacked, report, notes)
 
 
 def read_recording(
@@ -152,7 +153,11 @@ def read_recording(
         n = len(next(iter(contents.arrays.values())))
         seconds = grid(0.0, layout.sample_rate, n) if clock is None else clock.seconds
         noted = on_one_clock(
-            seconds, contents.arrays, sample_rate=layout.sample_rate, bridge=gaps == "interpolate", jitter=jitter
+            seconds,
+            contents.arrays,
+            sample_rate=layout.sample_rate,
+            bridge=gaps == "interpolate",
+            jitter=jitter,
         )
         source = {"file": path.name, "sha256": _digest(path)}
         if clock is not None and clock.start:
@@ -164,12 +169,17 @@ def read_recording(
             told["repaired"] = noted.report
         if notes:
             told["warnings"] = notes
-        recording = Recording.from_arrays(
-            noted.time,
-            noted.arrays,
+        channels = channels_from(
+            list(contents.arrays),
             units=contents.units | dict(layout.units),
             quantities=layout.quantities,
             roles=layout.roles,
+        )
+        contents.arrays.clear()  # the recording makes its own copy of the values
+        recording = Recording(
+            noted.time,
+            noted.values,
+            channels,
             settle=settle or 0.0,
             meta={**told, **(meta or {})},
             sample_rate=noted.sample_rate,

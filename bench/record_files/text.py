@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import codecs
-import gzip
 import re
-import zlib
 from collections import deque
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -15,16 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.errors import FileFormatError
-from bench.limits import READING_LIMITS, ReadingLimits, size_text
+from bench.limits import READING_LIMITS, ReadingLimits
 from bench.record_files.column_map import Variable, name_and_unit
-from bench.record_files.dialect import COMMENTS, WHITE, Column, Dialect, cells_of, dialect_of, is_number
+from bench.record_files.dialect import WHITE, Column, Dialect, cells_of, dialect_of, is_number
+from bench.record_files.lines import BLOCK, blocks_of, cut_off, decoded
 
-_BLOCK = 4 * 2**20
 _HEAD = 5000
 """Lines in which a table has to begin."""
 _ABOVE = 1000
 """Rows above the last one that it is compared with, to see whether it was cut."""
-_MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
 
 
 class TextTable(NamedTuple):
@@ -63,23 +59,25 @@ def read_csv(
         FileFormatError: Empty, headings only, ragged lines, the same heading twice, text among the numbers of a column that is
             wanted, damaged compression, or beyond the limits.
     """
-    blocks = _blocks(path, limits)
+    blocks = blocks_of(path, limits)
     first = next(blocks, b"")
-    lines = _decoded(first).split("\n", _HEAD)[:_HEAD]
+    lines = decoded(first).split("\n", _HEAD)[:_HEAD]
     dialect = dialect_of([line.rstrip("\r") for line in lines], path.name)
     if len(dialect.columns) > limits.columns:
         raise FileFormatError(
             f"'{path}' has {len(dialect.columns)} columns, and at most {limits.columns} are read; cut it into parts"
         )
     body = _body(first, blocks, dialect)
-    chosen = [c for c in dialect.columns if c.kind != "text" and c.heading and (wanted is None or wanted(c.heading))]
+    chosen = [
+        c for c in dialect.columns if c.kind != "text" and c.heading and (wanted is None or wanted(c.heading))
+    ]
     reader = _Reader(path, dialect, chosen, limits)
     for block in body:
         reader.take(block)
     values = reader.values()
     variables: dict[str, Variable] = {}
     for column in dialect.columns:
-        name, told = name_and_unit(column.heading)
+        _, told = name_and_unit(column.heading)
         unit = column.unit or told
         if column.heading in values:
             variables[column.heading] = Variable(values[column.heading], unit)
@@ -125,8 +123,12 @@ class _Reader:
         names = [str(k) for k in range(len(dialect.columns))]
         self._places = {column.heading: names[dialect.columns.index(column)] for column in chosen}
         self._options: dict[str, Any] = {
-            "read_options": pc.ReadOptions(column_names=names, use_threads=False, block_size=2 * _BLOCK + limits.line_bytes),
-            "parse_options": pc.ParseOptions(delimiter="\t" if dialect.delimiter == WHITE else dialect.delimiter),
+            "read_options": pc.ReadOptions(
+                column_names=names, use_threads=False, block_size=2 * BLOCK + limits.line_bytes
+            ),
+            "parse_options": pc.ParseOptions(
+                delimiter="\t" if dialect.delimiter == WHITE else dialect.delimiter
+            ),
             "convert_options": pc.ConvertOptions(
                 decimal_point=dialect.decimal,
                 column_types={self._places[c.heading]: kinds.get(c.kind, pa.string()) for c in chosen},
@@ -152,7 +154,9 @@ class _Reader:
                 "cut it into parts, or name fewer columns"
             )
         for column in self.chosen:
-            self._parts[column.heading].append(self._numbers(table.column(self._places[column.heading]), column, block))
+            self._parts[column.heading].append(
+                self._numbers(table.column(self._places[column.heading]), column, block)
+            )
 
     def values(self) -> dict[str, NDArray[Any]]:
         """The columns, without empty rows at the end."""
@@ -175,13 +179,13 @@ class _Reader:
     def fills(self, column: Column) -> bool:
         """Whether a column without a heading has cells, as far as the last rows tell."""
         k = self.dialect.columns.index(column)
-        rows = (cells_of(_decoded(row), self.dialect.delimiter) for row in self._above)
+        rows = (cells_of(decoded(row), self.dialect.delimiter) for row in self._above)
         return any(len(row) > k and row[k] for row in rows)
 
     def _whole(self, text: bytes) -> tuple[bytes, str]:
         """The block without comments, and without a last line that was cut off in writing; and what to say of that line."""
         cut = ""
-        if any(mark in text for mark in (b"\n#", b"\n%")) or text.startswith((b"#", b"%")):
+        if b"#" in text or b"%" in text:
             lines = text.split(b"\n")
             kept = [line for line in lines if not line.lstrip().startswith((b"#", b"%"))]
             self._comments += len(lines) - len(kept)
@@ -189,9 +193,9 @@ class _Reader:
         if not text.endswith((b"\n", b"\r")):
             head, _, last = text.rpartition(b"\n")
             above = [*self._above, *head.split(b"\n")[-_ABOVE:]]
-            cut = _cut(last, above, self.dialect)
+            cut = cut_off(last, above, self.dialect)
             text = head + b"\n" if cut else text
-        self._above.extend(text.rsplit(b"\n", _ABOVE)[1:] if text.count(b"\n") > _ABOVE else text.split(b"\n"))
+        self._above.extend(text.rsplit(b"\n", _ABOVE)[1:])
         if self.dialect.delimiter == WHITE:
             text = re.sub(rb"[ \t]+", b"\t", re.sub(rb"(?m)^[ \t]+|[ \t\r]+$", b"", text))
         return text, cut
@@ -228,7 +232,7 @@ class _Reader:
         """The error that names the first line that does not fit."""
         dialect = self.dialect
         delimiter = "\t" if dialect.delimiter == WHITE else dialect.delimiter
-        for number, row in enumerate(_decoded(text).split("\n"), start=line):
+        for number, row in enumerate(decoded(text).split("\n"), start=line):
             if not row.strip():
                 continue
             cells = cells_of(row, delimiter)
@@ -254,14 +258,19 @@ class _Reader:
 
     def _numbers(self, column: Any, described: Column, block: _Block) -> NDArray[Any]:
         import pyarrow as pa  # noqa: PLC0415
-        import pyarrow.compute as compute  # noqa: PLC0415
+        from pyarrow import compute  # noqa: PLC0415
 
         if described.kind in ("number", "long"):
             return column.to_numpy(zero_copy_only=False)
         try:
             text = compute.replace_substring(column, ",", ".")
             if described.kind == "clock":
-                return text.cast(pa.time64("ns")).cast(pa.int64()).to_numpy(zero_copy_only=False).astype("m8[ns]")
+                return (
+                    text.cast(pa.time64("ns"))
+                    .cast(pa.int64())
+                    .to_numpy(zero_copy_only=False)
+                    .astype("m8[ns]")
+                )
             text = compute.replace_substring_regex(text, r"^(\d\d)\.(\d\d)\.(\d{4})", r"\3-\2-\1")
             text = compute.replace_substring_regex(text, r"^(\d{4})/(\d\d)/(\d\d)", r"\1-\2-\3")
             kind = pa.timestamp("ns", "UTC" if described.kind == "zoned" else None)
@@ -273,95 +282,13 @@ class _Reader:
 
 def _filled(values: NDArray[Any]) -> int:
     """Number of rows up to the last that is not empty."""
-    bad = np.isnat(values[::-1]) if values.dtype.kind in "mM" else np.isnan(values[::-1]) if values.dtype.kind == "f" else None
+    bad = (
+        np.isnat(values[::-1])
+        if values.dtype.kind in "mM"
+        else np.isnan(values[::-1])
+        if values.dtype.kind == "f"
+        else None
+    )
     if bad is None or not bad.size:
         return len(values)
     return len(values) - int(np.argmin(bad)) if not bad.all() else 0
-
-
-def _cut(last: bytes, above: list[bytes], dialect: Dialect) -> str:
-    """Why a last line without a line break must have been cut off in writing; empty where nothing tells."""
-    if not last.strip():
-        return ""
-    cells = cells_of(_decoded(last), dialect.delimiter)
-    rows = [cells_of(_decoded(row), dialect.delimiter) for row in above if row.strip()]
-    width = len(dialect.columns)
-    rows = [row for row in rows if len(row) == width]
-    left_out = "the file was cut off in writing, and that line is left out"
-    if not rows:
-        return ""
-    if len(cells) < width and any(row[-1] for row in rows):
-        return f"the last line has no line break and {len(cells)} of {width} cells: {left_out}"
-    k = len(cells) - 1
-    cell, others = cells[k], [row[k] for row in rows if row[k]]
-    if k >= width or dialect.columns[k].kind == "text" or not others:
-        return ""
-    told = f"the last line has no line break and ends in '{cell[:40]}'"
-    if dialect.columns[k].kind in ("number", "long") and not is_number(cell, dialect.decimal):
-        return f"{told}, which is no whole number: {left_out}" if len(rows) > 1 else ""
-    exponents = {len(other) - other.lower().index("e") for other in others if "e" in other.lower()}
-    if exponents and "e" in cell.lower() and len(cell) - cell.lower().index("e") < min(exponents):
-        return f"{told}, whose exponent is shorter than any above: {left_out}"
-    # a number of all its digits is that short in fewer than one of twenty rows
-    if len(others) >= 20 and len(cell) < min(map(len, others)):
-        return f"{told}, which has fewer digits than the {len(others)} numbers above: {left_out}"
-    return ""
-
-
-def _blocks(path: Path, limits: ReadingLimits) -> Iterator[bytes]:
-    """The text in UTF-8, in blocks of whole lines; the last may lack its line break."""
-    carried, total, returns = b"", 0, False
-    decoder: codecs.IncrementalDecoder | None = None
-    for number, raw in enumerate(_raw(path)):
-        chunk = raw
-        if number == 0:
-            for mark, name in _MARKS:
-                if chunk.startswith(mark):
-                    decoder = codecs.getincrementaldecoder(name)(errors="replace")
-                    break
-        if decoder is not None:
-            chunk = decoder.decode(chunk).encode("utf-8", "replace")
-        total += len(chunk)
-        if total > limits.text_bytes:
-            raise FileFormatError(
-                f"'{path}' holds more than {size_text(limits.text_bytes)} of text, which is the most that is read; cut it into parts"
-            )
-        if b"\0" in chunk:
-            raise FileFormatError(f"'{path}' is no text file; give it the suffix of what it is")
-        if number == 0:
-            returns = b"\n" not in chunk and b"\r" in chunk
-        if returns:  # lines that end as on old Macintoshes
-            chunk = chunk.replace(b"\r", b"\n")
-        head, found, tail = (carried + chunk).rpartition(b"\n")
-        carried = tail
-        if len(carried) > limits.line_bytes:
-            raise FileFormatError(
-                f"'{path}' has a line longer than {size_text(limits.line_bytes)}, which no table has; give the file the suffix of "
-                "what it is"
-            )
-        if found:
-            yield head + found
-    if carried:
-        yield carried
-
-
-def _raw(path: Path) -> Iterator[bytes]:
-    packed = path.suffix.lower() == ".gz"
-    try:
-        with gzip.open(path, "rb") if packed else path.open("rb") as stream:
-            while chunk := stream.read(_BLOCK):
-                yield chunk
-    except (gzip.BadGzipFile, EOFError, zlib.error) as error:
-        raise FileFormatError(
-            f"'{path}' is no complete gzip file ({error}); restore it from its source, or drop the suffix "
-            ".gz if it is plain text"
-        ) from None
-    except OSError as error:
-        raise FileFormatError(f"'{path}' cannot be read: {error.strerror or error}") from None
-
-
-def _decoded(text: bytes) -> str:
-    try:
-        return text.decode("utf-8")
-    except UnicodeDecodeError:  # instruments write degree signs and mu in the Windows encoding
-        return text.decode("cp1252", "replace")

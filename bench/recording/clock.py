@@ -24,6 +24,7 @@ step pass.
 LONGEST_REPAIR = 10
 """Most successive samples that are interpolated: beyond, a repair would invent data rather than bridge a dropout."""
 
+
 def grid(start: float, sample_rate: float, n: int) -> NDArray[np.float64]:
     """The uniform clock ``start + k / sample_rate`` [s], ``(n,)``, read-only."""
     time = start + np.arange(n) / sample_rate
@@ -157,7 +158,9 @@ def lateness(t: NDArray[np.float64], places: NDArray[np.int64], rate: float) -> 
     return (t - t[0]) * rate - places
 
 
-def not_uniform(t: NDArray[np.float64], late: NDArray[np.float64], rate: float, k: int, allowed: float) -> RecordingError:
+def not_uniform(
+    t: NDArray[np.float64], late: NDArray[np.float64], rate: float, k: int, allowed: float
+) -> RecordingError:
     """The error about the sample that lies furthest off the clock."""
     return RecordingError(
         f"the clock is not uniform: sample {k} at t = {t[k]:.9g} s lies {100.0 * abs(late[k]):.3g} % of a step off a clock "

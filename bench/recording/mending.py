@@ -193,7 +193,12 @@ def _report(
     missing = np.diff(places) - 1
     gaps = [[float(t[i]), int(missing[i])] for i in np.flatnonzero(missing)]
     counts = {names[column]: count for column, count in lost.items() if count}
-    report: dict[str, Any] = {"method": "pchip", "missing_samples": int(missing.sum()), "gaps": gaps, "values": counts}
+    report: dict[str, Any] = {
+        "method": "pchip",
+        "missing_samples": int(missing.sum()),
+        "gaps": gaps,
+        "values": counts,
+    }
     notes = []
     if gaps:
         notes.append(f"{gap_text(t, places)}: bridged by interpolation")
