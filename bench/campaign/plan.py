@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 from bench.campaign.distribution import Distribution, Quantity, Shared, Value, check_weights
 from bench.errors import ParameterError, UnknownNameError
+from bench.signals.base import MAX_SAMPLES
 
 Sampling = Literal["random", "latin_hypercube", "sobol"]
 Precision = Literal["float32", "float64"]
@@ -24,6 +24,8 @@ ROWS_PER_PART = 500_000
 """Rows that a part aims at where the plan does not say: 14 MB for seven channels of float32."""
 MIN_PARTS = 64
 """Parts that a campaign is cut into where it has the records, so that many cores have work."""
+MAX_PARTS = 40_000
+"""Parts of a campaign at most: the manifest, with some 700 bytes each, then stays within what a document may have."""
 
 Node = Any
 """A signal's or chain's dictionary in which a distribution may stand for a number."""
@@ -54,12 +56,6 @@ class ElementPlan:
     exact: bool = False
     withheld: bool = False
     probability: float = 1.0
-
-    def __post_init__(self) -> None:
-        if not 0.0 < self.probability <= 1.0:
-            raise ParameterError(
-                f"probability of element '{self.name}' is {self.probability!r}; a number in (0, 1] is expected"
-            )
 
     def to_dict(self) -> dict[str, Any]:
         """As in a plan."""
@@ -255,18 +251,11 @@ class Plan:
     records_per_part: int = 0
 
     def __post_init__(self) -> None:
-        for name, low in (("records", 1), ("seed", 0), ("records_per_part", 0)):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int) or value < low:
-                raise ParameterError(
-                    f"{name} of the campaign is {value!r}; a whole number of at least {low} is expected"
-                )
-        for name in ("duration", "sample_rate", "drive_rate"):
-            value = getattr(self, name)
-            if value is None and name == "drive_rate":
-                value = self.sample_rate
-            if isinstance(value, bool | str | None) or not (math.isfinite(value) and value > 0.0):
-                raise ParameterError(f"{name} of the campaign is {value!r}; a positive number is expected")
+        if not self.duration * self.sample_rate <= MAX_SAMPLES:
+            raise ParameterError(
+                f"{self.duration:g} s at {self.sample_rate:g} Hz are {self.duration * self.sample_rate:g} samples a record; at most "
+                f"{MAX_SAMPLES} are expected: shorten the records"
+            )
         if (
             abs(self.duration * self.sample_rate - self.n_samples) > 1e-6 * self.n_samples
             or self.n_samples < 2
@@ -275,18 +264,18 @@ class Plan:
                 f"{self.duration:g} s at {self.sample_rate:g} Hz is not a whole number of samples (at least 2); "
                 "change the duration or the sample rate"
             )
-        for name, options in (("sampling", Sampling), ("precision", Precision), ("compression", Compression)):
-            if getattr(self, name) not in get_args(options):
-                raise UnknownNameError(f"{name} of the campaign", str(getattr(self, name)), get_args(options))
         self._check_members()
         if not self.records_per_part:
             whole = max(1, ROWS_PER_PART // self.n_samples)
             object.__setattr__(self, "records_per_part", max(1, min(whole, -(-self.records // MIN_PARTS))))
+        if self.n_parts > MAX_PARTS:
+            raise ParameterError(
+                f"{self.records} records of {self.n_samples} samples, {self.records_per_part} a part, make {self.n_parts} parts and "
+                f"some {4e-9 * self.records * self.n_samples:.3g} GB a channel; at most {MAX_PARTS} parts are expected: ask for "
+                "fewer records, or set a larger records_per_part"
+            )
 
     def _check_members(self) -> None:
-        for what, members in (("rigs", self.rigs), ("excitations", self.excitations)):
-            if not members:
-                raise ParameterError(f"the campaign has no {what}; at least one [[{what}]] is expected")
         names = [rig.name for rig in self.rigs]
         for what, members in (
             ("rigs", self.rigs),

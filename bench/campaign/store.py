@@ -78,16 +78,18 @@ class Store:
         Raises:
             FileFormatError: There is none, or it is no manifest of a campaign.
         """
+        from bench.campaign.schema import MANIFEST_LIMITS, ManifestDocument  # noqa: PLC0415  (pydantic, for those who read)
+        from bench.documents import checked, load_document  # noqa: PLC0415
+
         try:
-            document = json.loads(self.manifest_path.read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
-            raise FileFormatError(
-                f"'{self.folder}' is no campaign: {self.manifest_path.name} cannot be read ({error})"
-            ) from error
-        if not isinstance(document, dict) or document.get("format") != FORMAT:
+            document = load_document(self.manifest_path, limits=MANIFEST_LIMITS)
+        except FileFormatError as error:
+            raise FileFormatError(f"'{self.folder}' is no campaign: {error}") from error
+        if document.get("format") != FORMAT:
             raise FileFormatError(
                 f"'{self.manifest_path}' is no manifest of format {FORMAT}; a folder written by a campaign is expected"
             )
+        checked(ManifestDocument, document, str(self.manifest_path))
         return document
 
     @contextlib.contextmanager
@@ -173,13 +175,8 @@ class Store:
 
     def _finished(self, plan: Plan) -> dict[int, dict[str, Any]]:
         """Entries of the finished parts: from the journal, and read off the files where it lacks them."""
-        entries: dict[int, dict[str, Any]] = {}
+        entries = self.journaled()
         journal = self.folder / "journal.jsonl"
-        if journal.exists():
-            for line in journal.read_text(encoding="utf-8", errors="replace").splitlines():
-                with contextlib.suppress(ValueError):  # the last line of a killed run may be torn
-                    entry = json.loads(line)
-                    entries[entry["part"]] = entry
         present = {
             path.name: path.stat().st_size for path in (self.folder / "samples").glob("part-*.parquet")
         }
@@ -192,6 +189,22 @@ class Store:
                 entries[part] = self.entry_from_files(plan, part)
         text = "".join(json.dumps(entries[part]) + "\n" for part in sorted(entries))
         write_text(journal, text)
+        return entries
+
+    def journaled(self) -> dict[int, dict[str, Any]]:
+        """Entries of the journal by part; lines that are torn, or that no campaign wrote, are passed over."""
+        from bench.campaign.schema import PartEntry  # noqa: PLC0415
+        from bench.documents import checked, parse_json  # noqa: PLC0415
+
+        journal = self.folder / "journal.jsonl"
+        entries: dict[int, dict[str, Any]] = {}
+        if not journal.exists():
+            return entries
+        with journal.open(encoding="utf-8", errors="replace") as lines:
+            for line in lines:
+                with contextlib.suppress(FileFormatError):  # the last line of a killed run may be torn
+                    entry = parse_json(line, str(journal))
+                    entries[checked(PartEntry, entry).part] = entry
         return entries
 
     def entry_from_files(self, plan: Plan, part: int) -> dict[str, Any]:

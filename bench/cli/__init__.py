@@ -13,6 +13,7 @@ from rich.console import Console
 from bench.cli.diagnosis import Blind, Diagnose
 from bench.cli.excite import Excite
 from bench.cli.rigs import Demo, Laws, Simulate, View
+from bench.cli.schema import Schema
 from bench.cli.studies import Campaign, Reproduce
 from bench.errors import BenchError
 
@@ -26,6 +27,7 @@ COMMANDS: dict[str, type] = {
     "blind": Blind,
     "reproduce": Reproduce,
     "campaign": Campaign,
+    "schema": Schema,
 }
 
 

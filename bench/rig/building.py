@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, get_args
 from xml.etree import ElementTree
 
 import mujoco
@@ -11,6 +11,7 @@ import numpy as np
 
 from bench import native
 from bench.errors import ModelError, ParameterError, UnknownNameError
+from bench.mjcf import StructureName
 from bench.native import Coordinate
 from bench.rig.element import Element
 
@@ -23,7 +24,7 @@ INTEGRATORS = {
     "implicit": mujoco.mjtIntegrator.mjINT_IMPLICIT,
     "implicitfast": mujoco.mjtIntegrator.mjINT_IMPLICITFAST,
 }
-STRUCTURE = ("mass", "inertia", "stiffness", "damping", "frictionloss", "armature")
+STRUCTURE: tuple[str, ...] = get_args(StructureName)
 """Structural quantities that `Rig.with_structure` changes."""
 
 EXACT_SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)
