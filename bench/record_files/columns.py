@@ -44,6 +44,8 @@ class Columns(NamedTuple):
     """Units that the file tells, by channel name."""
     notes: tuple[str, ...]
     """What was left out, assumed or doubtful in the file."""
+    time: NDArray[np.float64] | None = None
+    """Times on a clock that is known to be uniform [s]; None where `clock` says what is known."""
 
 
 def suffix_of(path: str | os.PathLike[str]) -> str:
@@ -53,13 +55,18 @@ def suffix_of(path: str | os.PathLike[str]) -> str:
 
 
 def read_columns(
-    path: str | os.PathLike[str], layout: ColumnMap, *, limits: ReadingLimits = READING_LIMITS
+    path: str | os.PathLike[str],
+    layout: ColumnMap,
+    *,
+    time_optional: bool = False,
+    limits: ReadingLimits = READING_LIMITS,
 ) -> Columns | Recording:
     """Read the columns of a record, or the recording that a file of the bench holds whole.
 
     Args:
         path: Path of the file.
         layout: What is what; without columns, every line of numbers as long as the time is a channel of its own name.
+        time_optional: Whether a file without a time is accepted, since somebody knows its sample rate.
         limits: What the file may cost.
 
     Raises:
@@ -75,7 +82,7 @@ def read_columns(
         contents, notes = _contents(file, layout, limits)
         if isinstance(contents, Recording):
             return contents
-        return _assembled(contents, layout, file, notes)
+        return _assembled(contents, layout, file, notes, time_optional)
     except MemoryError:
         raise FileFormatError(
             f"'{file}' needs more memory than there is; cut it into parts, or name fewer columns"
@@ -115,17 +122,21 @@ def _wanted(layout: ColumnMap) -> Callable[[str], bool] | None:
 
 
 def _assembled(
-    variables: dict[str, Variable], layout: ColumnMap, path: Path, notes: tuple[str, ...]
+    variables: dict[str, Variable],
+    layout: ColumnMap,
+    path: Path,
+    notes: tuple[str, ...],
+    time_optional: bool,
 ) -> Columns:
     clock = None
     source = layout.time or time_source(variables)
-    if not layout.sample_rate or layout.time:
+    if (not layout.sample_rate or layout.time) and (source or not time_optional):
         if not source:
             raise RecordingError(
                 f"'{path}': no column is named 'time' or 't' (it has {_listing(variables)}); name it with time=, or give sample_rate="
             )
         values, unit = find(variables, source, file=path.name, kinds="biufmM")
-        clock = clock_of(values, layout.time_unit or unit, source)
+        clock = clock_of(values, layout.time_unit, source, told=unit)
         notes = (*notes, *clock.notes)
     sources = dict(layout.columns)
     if not sources:

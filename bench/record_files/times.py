@@ -31,6 +31,8 @@ class Clock(NamedTuple):
     """Why the times are probably in another unit than seconds, where nothing in the file says so."""
     start: str = ""
     """The first time as the file gives it, where the seconds are counted from it."""
+    told: str = ""
+    """Unit that the file tells."""
 
 
 def time_source(headings: Iterable[str]) -> str:
@@ -48,13 +50,14 @@ def is_time(heading: str) -> bool:
     return bool(time_source((heading,)))
 
 
-def clock_of(values: NDArray, unit: str, heading: str) -> Clock:
+def clock_of(values: NDArray, stated: str, heading: str, *, told: str = "") -> Clock:
     """The times of a column.
 
     Args:
         values: Numbers, dates or times of day, ``(n,)``.
-        unit: Unit that is stated; empty for none.
-        heading: Name of the column; a unit at its end counts ("time_ms").
+        stated: Unit that somebody states; empty for what the file tells.
+        heading: Name of the column; a unit at its end counts as told ("time_ms").
+        told: Unit that the file tells; empty for none.
 
     Raises:
         UnitError: The unit is none of time.
@@ -66,7 +69,8 @@ def clock_of(values: NDArray, unit: str, heading: str) -> Clock:
         seconds = steps.astype(np.int64) / 1e9
         return Clock(np.where(np.isnat(values), np.nan, seconds), start=str(values[0]))
     match = _NAMED.fullmatch(name_and_unit(heading)[0].lower())
-    unit = unit or (match["unit"] if match and match["unit"] else "")
+    told = told or (match["unit"] if match and match["unit"] else "")
+    unit = stated or told
     notes: tuple[str, ...] = ()
     doubt = ""
     numbers = values.astype(float)
@@ -90,7 +94,7 @@ def clock_of(values: NDArray, unit: str, heading: str) -> Clock:
     start = str(values[0]) + (f" {unit}" if unit else "") if late else ""
     if late:
         numbers = (values - values[0]).astype(float)  # integers are subtracted before a double rounds them
-    return Clock(numbers if scale == 1.0 else _scaled(numbers, scale), notes, doubt, start)
+    return Clock(numbers if scale == 1.0 else _scaled(numbers, scale), notes, doubt, start, told)
 
 
 def _scaled(numbers: NDArray[np.float64], scale: float) -> NDArray[np.float64]:
