@@ -21,7 +21,8 @@ class BenchError(Exception):
     """Base class of all errors raised on purpose by the bench."""
 
     def __str__(self) -> str:  # KeyError would print the repr of its argument
-        return str(self.args[0]) if self.args else ""
+        # one line, whatever line breaks the names in a file have
+        return " ".join(str(self.args[0]).splitlines()) if self.args else ""
 
 
 class UnknownNameError(BenchError, KeyError):

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import ClassVar, NamedTuple, Self, TypeVar
 
 from bench.errors import FileFormatError
+from bench.limits import READING_LIMITS
 from bench.nastran.numbers import parse_integer, parse_real
 
 Field = int | float | str | None
@@ -59,7 +60,7 @@ class RawCard(NamedTuple):
 
     def fail(self, i: int, what: str, expected: str) -> FileFormatError:
         """The error that names line, card, field, what was found and what was expected."""
-        found = "blank" if self.blank(i) else f"'{self.fields[i]}'"
+        found = "blank" if self.blank(i) else f"'{self.fields[i][:80]}'"
         place = self.places[i] if i < len(self.places) else self.place
         return FileFormatError(
             f"{place}: card {self.name}, field {i % 8 + 2} ({what}): {found} found, {expected} expected"
@@ -140,6 +141,8 @@ class ScalarPoints(Card):
             first, last = raw.integer(0, "first point"), raw.integer(2, "last point")
             if last < first:
                 raise raw.fail(2, "last point", f"a number from {first} on")
+            if last - first >= READING_LIMITS.model_items:
+                raise raw.fail(2, "last point", f"at most {READING_LIMITS.model_items} points")
             return cls(tuple(range(first, last + 1)), raw.name)
         used = [i for i in range(len(raw.fields)) if not raw.blank(i)] or [0]
         return cls(tuple(raw.integer(i, "point") for i in used), raw.name)

@@ -26,7 +26,10 @@ def parse_real(text: str) -> float:
     if match is None:
         raise ValueError("a real number with a decimal point")
     mantissa, signed, unsigned = match.groups()
-    return float(f"{mantissa}e{signed or unsigned or '0'}")
+    value = float(f"{mantissa}e{signed or unsigned or '0'}")
+    if not math.isfinite(value):
+        raise ValueError("a real number of at most 1.8+308")
+    return value
 
 
 def parse_integer(text: str) -> int:
@@ -35,7 +38,9 @@ def parse_integer(text: str) -> int:
     Raises:
         ValueError: The text is no integer.
     """
-    if _INTEGER.match(text) is None:
+    if (
+        _INTEGER.match(text) is None or len(text) > 20
+    ):  # Nastran's own have eight digits, in large fields sixteen
         raise ValueError("an integer")
     return int(text)
 

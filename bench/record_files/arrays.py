@@ -99,10 +99,10 @@ def read_mat(path: Path, *, limits: ReadingLimits = READING_LIMITS) -> dict[str,
     from scipy.io import loadmat  # noqa: PLC0415
 
     try:
-        check_claims(path, limits)
+        names = check_claims(path, limits)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of variables that come twice, and of what it does not know
-            contents = loadmat(path, squeeze_me=True, struct_as_record=False)
+            contents = loadmat(path, squeeze_me=True, struct_as_record=False, variable_names=names)
     except BenchError:
         raise
     except NotImplementedError:  # scipy raises it for version 7.3 and for nothing else

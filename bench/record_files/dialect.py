@@ -105,6 +105,7 @@ def dialect_of(lines: Sequence[str], file: str) -> Dialect:
     numeric = _numeric_columns([rows[i] for i in places[-_SHOWN:]], width, decimal)
     kinds = {i: _row_kind(rows[i], width, numeric, decimal) for i in places}
     first = _first_of_numbers(places, kinds, rows, width, file)
+    _refuse_ragged(places, kinds, rows, first, width, decimal, file)
     headings, units = _headings(lines, places, rows, kinds, first, width, delimiter, decimal)
     body = [i for i in places if i >= first]
     columns = []
@@ -144,10 +145,10 @@ def _is_time(cell: str) -> bool:
 
 
 def _trimmed(row: list[str], width: int) -> list[str]:
-    """A row without the empty cells that trailing delimiters leave beyond the width, or filled up to it by one such cell."""
-    while len(row) > width and not row[-1]:
-        row = row[:-1]
-    return row
+    """A row without the empty cells that trailing delimiters leave beyond the width."""
+    if len(row) <= width or any(row[width:]):
+        return row
+    return row[:width]
 
 
 def _numeric_columns(rows: list[list[str]], width: int, decimal: str) -> list[int]:
@@ -191,6 +192,36 @@ def _first_of_numbers(
     ):
         at -= 1
     return places[at]
+
+
+def _refuse_ragged(
+    places: list[int],
+    kinds: dict[int, str],
+    rows: dict[int, list[str]],
+    first: int,
+    width: int,
+    decimal: str,
+    file: str,
+) -> None:
+    """Refuse a table whose headings are more than its columns, or whose first rows of numbers have other numbers of cells."""
+    above = [i for i in places if i < first]
+    for n, i in enumerate(above):
+        numbers = [cell for cell in rows[i] if cell]
+        headed = any(kinds[j] == "text" for j in above[:n])
+        if (
+            kinds[i] == "other"
+            and headed
+            and len(numbers) > 1
+            and all(is_number(cell, decimal) for cell in numbers)
+        ):
+            raise FileFormatError(
+                f"'{file}' is no table of {width} columns at line {i + 1}: every line must have as many cells as the first; complete "
+                "or remove that line"
+            )
+    if above and kinds[above[-1]] == "other" and len([cell for cell in rows[above[-1]] if cell]) > width > 1:
+        raise FileFormatError(
+            f"'{file}' has {len(rows[above[-1]])} names over {width} columns; give every column one name of its own"
+        )
 
 
 def _headings(

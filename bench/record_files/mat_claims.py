@@ -10,6 +10,7 @@ References:
 
 from __future__ import annotations
 
+import contextlib
 import math
 import struct
 import zlib
@@ -20,7 +21,11 @@ from bench.errors import FileFormatError
 from bench.limits import ReadingLimits, size_text
 
 _MATRIX, _COMPRESSED = 14, 15
-_CELL, _STRUCT, _OBJECT, _SPARSE, _LAST = 1, 2, 3, 5, 15
+_CELL, _STRUCT, _OBJECT, _CHAR, _SPARSE, _LAST = 1, 2, 3, 4, 5, 15
+_COMPLEX = 0x0800
+_NUMERIC = frozenset((1, 2, 3, 4, 5, 6, 7, 9, 12, 13))
+_TEXTS = _NUMERIC | {16, 17, 18}
+"""Types of data; scipy takes others for pointers."""
 _STEP = 2**20
 
 
@@ -48,6 +53,10 @@ class _Budget:
             )
 
 
+class _Unread(Exception):
+    """A function handle or an object of a class of the user's: nothing that a channel could be."""
+
+
 class _Tag(NamedTuple):
     """Head of an element."""
 
@@ -59,8 +68,11 @@ class _Tag(NamedTuple):
     """Where the next element begins."""
 
 
-def check_claims(path: Path, limits: ReadingLimits) -> None:
+def check_claims(path: Path, limits: ReadingLimits) -> list[str] | None:
     """Walk the file's tags.
+
+    Returns:
+        Names of the variables that may be read; None for all.
 
     Args:
         path: Path of the file.
@@ -77,15 +89,16 @@ def check_claims(path: Path, limits: ReadingLimits) -> None:
     content = memoryview(path.read_bytes())
     if len(content) < 4 or 0 in content[:4]:
         _check_version_4(content, _Budget(path, limits))
-        return
+        return None
     if len(content) < 128 or content[126:128] not in (b"IM", b"MI"):
         raise ValueError("its first 128 bytes are no header of a MATLAB file")
     order = "<" if content[126:128] == b"IM" else ">"
     if content[125 if order == "<" else 124] != 1:  # version 7.3, of which scipy speaks
-        return
+        return None
     budget = _Budget(path, limits)
     budget.unpacked(len(content))
     at = 128
+    names: list[str] = []
     while at + 8 <= len(content):
         kind, size = struct.unpack_from(order + "II", content, at)
         at += 8
@@ -93,12 +106,13 @@ def check_claims(path: Path, limits: ReadingLimits) -> None:
         if kind == _COMPRESSED:
             data = _unpacked(data, budget)
             if len(data) >= 8:
-                inner, length = struct.unpack_from(order + "II", data, 0)
-                if inner == _MATRIX:
-                    _check_matrix(data[8 : 8 + length], order, budget, 1)
-        elif kind == _MATRIX:
-            _check_matrix(data, order, budget, 1)
+                kind, length = struct.unpack_from(order + "II", data, 0)
+                data = data[8 : 8 + length]
+        if kind == _MATRIX:
+            with contextlib.suppress(_Unread):
+                names.append(_check_matrix(data, order, budget, 1))
         at += size
+    return names
 
 
 def _unpacked(data: memoryview, budget: _Budget) -> memoryview:
@@ -116,18 +130,19 @@ def _unpacked(data: memoryview, budget: _Budget) -> memoryview:
     return memoryview(b"".join(parts))
 
 
-def _check_matrix(data: memoryview, order: str, budget: _Budget, depth: int) -> None:
-    """One array: flags, shape, name, and what its class asks for."""
+def _check_matrix(data: memoryview, order: str, budget: _Budget, depth: int) -> str:
+    """One array: flags, shape, name, and what its class asks for; gives the name."""
     budget.opened(depth)
     if not data:
-        return
+        return ""
     flags = _tag(data, 0, order)
     if flags.size < 4 or flags.data + 4 > len(data):
         raise ValueError("an array has no flags")
-    kind = struct.unpack_from(order + "I", data, flags.data)[0] & 0xFF
+    word = struct.unpack_from(order + "I", data, flags.data)[0]
+    kind, parts = word & 0xFF, 2 if word & _COMPLEX else 1
     shape_tag = _tag(data, flags.following, order)
-    if kind > _LAST:  # function handles and opaque objects, which have no shape
-        return
+    if not 0 < kind <= _LAST:  # function handles and opaque objects, which have no shape
+        raise _Unread
     count = min(shape_tag.size // 4, 64)
     shape = struct.unpack_from(f"{order}{count}i", data, shape_tag.data)
     if any(n < 0 for n in shape):
@@ -138,24 +153,50 @@ def _check_matrix(data: memoryview, order: str, budget: _Budget, depth: int) -> 
     name = _tag(data, shape_tag.following, order)
     at = name.following
     if kind in (_STRUCT, _OBJECT):
-        if kind == _OBJECT:
-            at = _tag(data, at, order).following
-        length_tag = _tag(data, at, order)
-        length = struct.unpack_from(order + "i", data, length_tag.data)[0] if length_tag.size >= 4 else 0
-        names = _tag(data, length_tag.following, order)
-        if length <= 0 or names.size > len(data):
-            raise ValueError("a structure has field names of no length")
-        n *= names.size // length
+        at, fields = _fields(data, at, order, named=kind == _OBJECT)
+        n *= fields
         if n > len(data):
             raise ValueError(f"a structure claims {n} fields in {len(data)} bytes")
-        at = names.following
     if kind in (_CELL, _STRUCT, _OBJECT):
-        for _ in range(n):
-            if at + 8 > len(data):
-                break
-            inner = _tag(data, at, order)
-            _check_matrix(data[inner.data : inner.data + inner.size], order, budget, depth + 1)
-            at = inner.following
+        _check_arrays(data, at, order, n, budget, depth)
+    else:
+        _check_values(
+            data, at, order, [_TEXTS] if kind == _CHAR else [_NUMERIC] * (parts + 2 * (kind == _SPARSE))
+        )
+    return bytes(data[name.data : name.data + name.size]).decode("latin-1").rstrip("\0")
+
+
+def _fields(data: memoryview, at: int, order: str, *, named: bool) -> tuple[int, int]:
+    """Where the fields of a structure begin, and how many names they have; an object has the name of its class before."""
+    if named:
+        at = _tag(data, at, order).following
+    length_tag = _tag(data, at, order)
+    length = struct.unpack_from(order + "i", data, length_tag.data)[0] if length_tag.size >= 4 else 0
+    names = _tag(data, length_tag.following, order)
+    if length <= 0 or names.size > len(data):
+        raise ValueError("a structure has field names of no length")
+    return names.following, names.size // length
+
+
+def _check_arrays(data: memoryview, at: int, order: str, n: int, budget: _Budget, depth: int) -> None:
+    """The arrays within a cell or structure."""
+    for _ in range(n):
+        if at + 8 > len(data):
+            break
+        inner = _tag(data, at, order)
+        if inner.kind != _MATRIX:
+            raise ValueError(f"an element of type {inner.kind} stands where an array is expected")
+        _check_matrix(data[inner.data : inner.data + inner.size], order, budget, depth + 1)
+        at = inner.following
+
+
+def _check_values(data: memoryview, at: int, order: str, kinds: list[frozenset[int]]) -> None:
+    """The parts of an array of numbers or text are of types that there are."""
+    for known in kinds:
+        tag = _tag(data, at, order)
+        if tag.kind not in known:
+            raise ValueError(f"values of type {tag.kind}, which there is none")
+        at = tag.following
 
 
 def _tag(data: memoryview, at: int, order: str) -> _Tag:

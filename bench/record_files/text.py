@@ -121,7 +121,8 @@ class _Reader:
         self._above: deque[bytes] = deque(maxlen=_ABOVE)
         kinds = {"number": pa.float64(), "long": pa.int64()}
         names = [str(k) for k in range(len(dialect.columns))]
-        self._places = {column.heading: names[dialect.columns.index(column)] for column in chosen}
+        numbered = {column.heading: name for column, name in zip(dialect.columns, names, strict=True)}
+        self._places = {column.heading: numbered[column.heading] for column in chosen}
         self._options: dict[str, Any] = {
             "read_options": pc.ReadOptions(
                 column_names=names, use_threads=False, block_size=2 * BLOCK + limits.line_bytes

@@ -31,8 +31,7 @@ from bench.recording.units import conversion
 GROUPS = ("identification", "validation")
 """What the names of records begin with: those that serve to find the effect, and those that judge."""
 
-RATES = 1.5
-"""Ratio of the sample rate that is stated and that of the times beyond which the two cannot mean the same clock."""
+_THOUSANDS = {1: "ms", 2: "us", 3: "ns"}
 
 
 class _Channels(NamedTuple):
@@ -142,7 +141,10 @@ def _record_files(folder: Path) -> dict[str, dict[str, Path]]:
 def _read_record(file: Path, name: str, known: _Channels, units: dict[str, str], at_rest: bool) -> CaseRecord:
     """One record; `units` gathers what headings say of channels whose unit ``nominal.json`` leaves open."""
     layout = ColumnMap({c.name: c.name for c in known.channels}, time_unit=known.time_unit)
-    contents = read_columns(file, layout, time_optional=known.sample_rate > 0.0)
+    try:
+        contents = read_columns(file, layout, time_optional=known.sample_rate > 0.0)
+    except UnknownNameError as error:
+        raise FileFormatError(f"'{file}' lacks a column: {error}") from None
     try:
         if isinstance(contents, Recording):
             contents = _columns_of(contents, known)
@@ -209,19 +211,11 @@ def _times(contents: Columns, known: _Channels) -> tuple[NDArray[np.float64], tu
     steps = np.diff(clock.seconds)
     step = float(np.median(steps)) if steps.size else 0.0
     ratio = known.sample_rate * step if np.isfinite(step) else 0.0
-    if ratio > RATES or 0.0 < ratio < 1.0 / RATES:
-        exponent = round(np.log10(ratio) / 3.0)
-        unit = (
-            {1: "ms", 2: "us", 3: "ns"}.get(exponent, "")
-            if abs(np.log10(ratio) - 3.0 * exponent) < 0.01
-            else ""
-        )
-        why = (
-            f": time in {unit}? Head the column 'time [{unit}]'"
-            if unit
-            else "; correct the one that is wrong"
-        )
+    exponent = round(np.log10(ratio) / 3.0) if ratio > 0.0 else 0
+    if exponent in _THOUSANDS and abs(np.log10(ratio) - 3.0 * exponent) < 0.01:
+        unit = _THOUSANDS[exponent]
         raise RecordingError(
-            f"nominal.json says {known.sample_rate:.6g} Hz, the times {1.0 / step:.6g} Hz{why}{f', {remedy}' if unit else ''}"
+            f"nominal.json says {known.sample_rate:.6g} Hz, the times {1.0 / step:.6g} Hz: time in {unit}? Head the column "
+            f"'time [{unit}]', {remedy}"
         )
     return clock.seconds, ()
