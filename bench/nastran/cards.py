@@ -7,6 +7,7 @@ two lines count as one.
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -48,7 +49,7 @@ class RawCard(NamedTuple):
 
     def real(self, i: int, what: str, default: float | None = None) -> float:
         """Data field i (from 0) as a real number; `default` where it is blank."""
-        return self._value(i, what, parse_real, default, "a real number with a decimal point")
+        return self._value(i, what, _parse_finite, default, "a real number with a decimal point")
 
     def text(self, i: int, what: str, default: str | None = None) -> str:
         """Data field i (from 0) as a name of at most eight letters and digits; `default` where it is blank."""
@@ -75,6 +76,13 @@ class RawCard(NamedTuple):
             return parse(self.fields[i])
         except ValueError as error:
             raise self.fail(i, what, str(error)) from error
+
+
+def _parse_finite(text: str) -> float:
+    value = parse_real(text)
+    if not math.isfinite(value):
+        raise ValueError("a real number of at most 1.8+308")
+    return value
 
 
 def _parse_name(text: str) -> str:

@@ -84,7 +84,7 @@ def read_csv(
         elif column.heading:
             empty = np.empty(0, dtype="U1" if column.kind == "text" else float)
             variables[column.heading] = Variable(empty, unit, column.sample)
-        elif column.kind != "text" and reader.fills(column):
+        elif wanted is None and column.kind != "text" and reader.fills(column):
             reader.notes.append("a column without a heading is left out")
     return TextTable(variables, tuple(reader.notes))
 
@@ -266,11 +266,9 @@ class _Reader:
         try:
             text = compute.replace_substring(column, ",", ".")
             if described.kind == "clock":
+                text = compute.binary_join_element_wise("1970-01-01T", text, "")
                 return (
-                    text.cast(pa.time64("ns"))
-                    .cast(pa.int64())
-                    .to_numpy(zero_copy_only=False)
-                    .astype("m8[ns]")
+                    text.cast(pa.timestamp("ns")).to_numpy(zero_copy_only=False).astype("i8").astype("m8[ns]")
                 )
             text = compute.replace_substring_regex(text, r"^(\d\d)\.(\d\d)\.(\d{4})", r"\3-\2-\1")
             text = compute.replace_substring_regex(text, r"^(\d{4})/(\d\d)/(\d\d)", r"\1-\2-\3")

@@ -428,7 +428,8 @@ def read_deck(folder: Path) -> None:
         read_network(folder / "deck.bdf")
 
 
-UNITS = ("m", "N m", "m/s^2", "deg", "rpm", "inch", "lbf", "kip", "g", "mm", "°", "µm", "%", "dB", "degC", "Nm", "(m)", "**", "^", "^9", "^-2",
+UNITS = ("m", "N m", "m/s^2", "deg", "rpm", "inch", "lbf", "kip", "g", "mm", "°", "µm", "%", "dB", "degC", "Nm", "(m)", "**", "^",
+         "^9", "^-2",
          "/", "*", " ", "(", ")", "1", "0", ".", "9", "e", "\x00", "m" * 70, "a" * 40, "é", "[", "\n", "lambda", "__", "!")  # fmt: skip
 
 
