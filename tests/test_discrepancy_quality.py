@@ -17,7 +17,7 @@ from bench.discrepancy.blind.protocol import write_case
 from bench.discrepancy.case.schema import check_units
 from bench.discrepancy.checks.data_quality import compare, notes, refuse, unit_factor
 from bench.discrepancy.likelihood.problem import Problem
-from bench.discrepancy.model.structure import structure_of
+from bench.discrepancy.model.rigs import structure_of
 from bench.errors import BenchError, IdentificationError, RecordingError, UnitError
 
 

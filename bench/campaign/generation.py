@@ -213,7 +213,7 @@ class Generator:
             [batch.bind("time")[:, None], batch.bind("qpos"), batch.bind("qvel"), batch.bind("act")], axis=1
         )
         record: list = ["sensordata", *([STATE] if inside else [])]
-        with native.untimed():
+        with native.running(model):
             result = batch.rollout(steps, controls, mujoco.mjtState.mjSTATE_CTRL, record)
         # a simulation in which MuJoCo found a bad state stops, and its clock with it
         whole = np.abs(batch.bind("time") - steps * variant.rig.timestep) < 0.5 * variant.rig.timestep

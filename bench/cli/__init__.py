@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import codecs
 import sys
 import warnings
 from collections.abc import Callable
+from io import TextIOWrapper
 from typing import Any
 
 import tyro
 from rich.console import Console
 
+from bench import __version__
 from bench.cli.diagnosis import Blind, Diagnose
 from bench.cli.excite import Excite
 from bench.cli.rigs import Demo, Laws, Simulate, View
@@ -37,14 +40,27 @@ def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
     )
 
 
+def _speak_unicode() -> None:
+    """Have both streams write UTF-8 where the locale (LANG=C, PYTHONIOENCODING) says ASCII: results have units and Greek letters."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            ascii_only = codecs.lookup(stream.encoding).name == "ascii"
+            # what another locale's alphabet lacks is told as its number rather than by a traceback
+            stream.reconfigure(encoding="utf-8" if ascii_only else None, errors="backslashreplace")
+
+
 def main(argv: list[str] | None = None) -> int:
     """Run the command line; returns the exit status: 0 done, 2 refused with a message, 130 stopped by hand."""
     warnings.showwarning = _show_warning
+    _speak_unicode()
+    if (sys.argv[1:] if argv is None else argv) == ["--version"]:
+        print(f"jointbench {__version__}")
+        return 0
     try:
         command: Callable[[], None] = tyro.extras.subcommand_cli_from_dict(
             COMMANDS,
             prog="jointbench",
-            description="A MuJoCo virtual test bench for nonlinear joints.",
+            description="A MuJoCo virtual test bench for nonlinear joints. --version prints the version.",
             args=argv,
         )
         command()

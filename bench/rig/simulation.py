@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 
 import mujoco
 import numpy as np
 from mujoco.batch import Batch
+from mujoco.batch import SimulationError as BatchError
 from numpy.typing import ArrayLike, NDArray
 
 from bench import native
@@ -210,25 +210,20 @@ def _roll(
     start = np.concatenate(
         [np.zeros((len(rigs), 1)), batch.bind("qpos"), batch.bind("qvel"), batch.bind("act")], axis=1
     )
-    with _own_report(), native.untimed():
-        result = batch.rollout(n, padded, mujoco.mjtState.mjSTATE_CTRL, [STATE, "sensordata"])
+    with native.running(*{id(rig.model): rig.model for rig in rigs}.values()):
+        try:
+            result = batch.rollout(n, padded, mujoco.mjtState.mjSTATE_CTRL, [STATE, "sensordata"])
+        except BatchError as error:
+            place = int(error.ids[0])
+            raise SimulationError(
+                f"MuJoCo gave up on the simulation of rig '{rigs[place].name}': {batch.error(place)}. Simplify the model (contacts "
+                "take most memory), or give it more with <size memory=…>",
+                time=float("nan"),
+            ) from error
     states = np.concatenate([start[:, None, :], result[STATE]], axis=1)
     for i, rig in enumerate(rigs):
         _check_finite(rig, states[i], controls[i])
     return states[:, :-1], result["sensordata"], controls
-
-
-@contextmanager
-def _own_report() -> Iterator[None]:
-    """Keep MuJoCo from printing its warnings and leaving MUJOCO_LOG.TXT behind: a divergence is reported as an error."""
-    theirs = mujoco.get_mju_user_warning()
-    if theirs is None:
-        mujoco.set_mju_user_warning(lambda message: None)
-    try:
-        yield
-    finally:
-        if theirs is None:
-            mujoco.set_mju_user_warning(None)
 
 
 def _set_initial(

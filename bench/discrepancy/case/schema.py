@@ -61,8 +61,8 @@ RESPONSES: dict[str, tuple[str, ...]] = {
 MEASURED = ("force", "torque")
 """Channels of the bench's rigs that are measured loads unless they say otherwise."""
 
-Role = Literal["measured", "command", "prescribed", "response"]
-"""A measured load, a commanded load, a prescribed motion, a response."""
+Role = Literal["measured", "command", "prescribed", "response", "scheduling"]
+"""A measured load, a commanded load, a prescribed motion, a response, and what laws may depend on besides."""
 
 
 def _known_rig(name: Any) -> Any:
