@@ -17,8 +17,9 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from bench.discrepancy.case.case import Case, read_case
+from bench.discrepancy.case.case import Case
 from bench.discrepancy.case.idle_loads import idle_notes, without_idle_noise
+from bench.discrepancy.case.reading import read_case
 from bench.discrepancy.case.schema import check_units
 from bench.discrepancy.checks.data_quality import notes, refuse
 from bench.discrepancy.checks.initial_motion import with_starts_found
