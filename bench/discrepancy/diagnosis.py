@@ -24,8 +24,9 @@ from bench.discrepancy.articulated.diagnosis import (
     drives_only,
 )
 from bench.discrepancy.articulated.effects import CATALOGUE as ARTICULATED
-from bench.discrepancy.case.case import Case, read_case
+from bench.discrepancy.case.case import Case
 from bench.discrepancy.case.idle_loads import idle_notes, without_idle_noise
+from bench.discrepancy.case.reading import read_case
 from bench.discrepancy.case.schema import check_units
 from bench.discrepancy.checks.data_quality import notes, refuse
 from bench.discrepancy.checks.initial_motion import with_starts_found
