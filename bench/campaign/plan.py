@@ -7,8 +7,8 @@ quantities. `bench.campaign.reading` makes a plan from TOML; `Plan.to_dict` give
 from __future__ import annotations
 
 import hashlib
-import math
 import json
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
