@@ -137,11 +137,17 @@ def attribute(
     best = search.ranked()[0]
     if not problem.scaled:
         simplify(search, candidates)
-    elif near(best) and deadline.allows("rivals of what was found, from further starts"):
+    elif (
+        near(best)
+        and not _crude(problem)
+        and deadline.allows("rivals of what was found, from further starts")
+    ):
         progress(f"rivals of {names(best.hypothesis)}")
-        challenge(search, screen)
+        # few samples do not tell rivals apart by their last digits, nor dents of friction
+        challenge(search, screen, rounds=3 if problem.error is None else 1)
         soften(search, len(search.ranked()[0].hypothesis))
-        shake(search)
+        if problem.error is None:
+            shake(search)
     return search
 
 
@@ -166,6 +172,11 @@ def _single(
     if deadline.allows("forces from outside and friction that follows a channel"):
         with_timed_force(search)
         with_schedules(search)
+
+
+def _crude(problem: Problem) -> bool:
+    """Whether residuals are weighed by a guess, so that what is found serves for no more than a better one."""
+    return problem.error is not None and problem.error.crude
 
 
 def worth_extending(search: Search, screen: Screen, size: int, most: int) -> list[Fit]:
