@@ -96,7 +96,7 @@ def test_own_mjcf_with_an_element(tmp_path, capsys):
         ("clearance = 0.005", "clearanc = 0.005", "Did you mean 'clearance'"),
         ("clearance = 0.005", "clearance = -1.0", "a finite value in [0, inf] is expected"),
         ('joints = ["carriage"]', 'joints = ["cart"]', "unknown joint or tendon"),
-        ('joints = ["carriage"]', "", "needs the entries law and joints"),
+        ('joints = ["carriage"]', "", "an element needs law, joints; joints missing"),
         ('rig = "sdof"', 'rig = "sdoff"', "Did you mean 'sdof'"),
         ('rig = "sdof"', 'rig = "nowhere.xml"', "cannot read the model"),
         ('rig = "sdof"', 'machine = "sdof"', "unknown entry of a rig configuration 'machine'"),

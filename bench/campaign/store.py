@@ -84,16 +84,18 @@ class Store:
         Raises:
             FileFormatError: There is none, or it is no manifest of a campaign.
         """
+        from bench.campaign.schema import MANIFEST_LIMITS, ManifestDocument  # noqa: PLC0415  (pydantic, for those who read)
+        from bench.documents import checked, load_document  # noqa: PLC0415
+
         try:
-            document = json.loads(self.manifest_path.read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
-            raise FileFormatError(
-                f"'{self.folder}' is no campaign: {self.manifest_path.name} cannot be read ({error})"
-            ) from error
-        if not isinstance(document, dict) or document.get("format") != FORMAT:
+            document = load_document(self.manifest_path, limits=MANIFEST_LIMITS)
+        except FileFormatError as error:
+            raise FileFormatError(f"'{self.folder}' is no campaign: {error}") from error
+        if document.get("format") != FORMAT:
             raise FileFormatError(
                 f"'{self.manifest_path}' is no manifest of format {FORMAT}; a folder written by a campaign is expected"
             )
+        checked(ManifestDocument, document, str(self.manifest_path))
         return document
 
     @contextlib.contextmanager

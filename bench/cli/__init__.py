@@ -17,6 +17,7 @@ from bench.cli.console import Terminated, terminable
 from bench.cli.diagnosis import Blind, Diagnose
 from bench.cli.excite import Excite
 from bench.cli.rigs import Demo, Laws, Simulate, View
+from bench.cli.schema import Schema
 from bench.cli.studies import Campaign, Reproduce
 from bench.errors import BenchError
 
@@ -30,6 +31,7 @@ COMMANDS: dict[str, type] = {
     "blind": Blind,
     "reproduce": Reproduce,
     "campaign": Campaign,
+    "schema": Schema,
 }
 
 

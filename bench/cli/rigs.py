@@ -88,10 +88,10 @@ class Simulate:
     """Rig, elements and excitation (see docs/configuration.md)."""
     out: Annotated[Path, tyro.conf.arg(aliases=["-o"])] = Path("record.parquet")
     """The record to write."""
-    seed: int = 0
-    """Seed of the excitation."""
     force: bool = False
     """Overwrite a record that exists."""
+    seed: int | None = None
+    """Seed of the excitation; that of the file by default, or 0."""
     json: bool = False
     """Print JSON."""
 
@@ -104,8 +104,9 @@ class Simulate:
         from bench.targets import check_targets
 
         check_targets(self.out, force=self.force)
-        rig, excitation = _configured(self.configuration)
-        record = simulate(rig, excitation, rng=np.random.default_rng(self.seed))
+        rig, excitation, seed = _configured(self.configuration)
+        rng = np.random.default_rng(seed if self.seed is None else self.seed)
+        record = simulate(rig, excitation, rng=rng)
         write_recording(self.out, record)
         rows = [
             {
@@ -133,10 +134,10 @@ class View:
     """One rig, or several to be compared (the first is the truth); the first one's excitation drives all."""
     out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
     """File to save (.rrd); opens the viewer where not given."""
-    seed: int = 0
-    """Seed of the excitation."""
     force: bool = False
     """Overwrite a file that exists."""
+    seed: int | None = None
+    """Seed of the excitation; that of the file by default, or 0."""
 
     def __call__(self) -> None:
         """Run the command."""
@@ -152,26 +153,25 @@ class View:
             raise ParameterError(
                 "give at least one rig configuration (a TOML or JSON file; see docs/configuration.md)"
             )
-        _, excitation = _configured(self.configurations[0])
+        _, excitation, seed = _configured(self.configurations[0])
+        seed = seed if self.seed is None else self.seed
         rigs = {path.stem: _configured(path, need_excitation=False)[0] for path in self.configurations}
         records = {
-            name: simulate(rig, excitation, rng=np.random.default_rng(self.seed))
-            for name, rig in rigs.items()
+            name: simulate(rig, excitation, rng=np.random.default_rng(seed)) for name, rig in rigs.items()
         }
         log_comparison(self.out, rigs, records)
         if self.out is not None:
             print(f"{self.out}: open it with `rerun {self.out}`")
 
 
-def _configured(path: Path, *, need_excitation: bool = True) -> tuple[Any, Any]:
+def _configured(path: Path, *, need_excitation: bool = True) -> tuple[Any, Any, int]:
+    """Rig, excitation and seed of a file."""
     from bench.errors import ParameterError
-    from bench.rig.configuration import read_document, rig_from_configuration
-    from bench.signals import Excitation
+    from bench.rig.configuration import read_rig
 
-    document = read_document(path)
-    rig = rig_from_configuration(document, folder=path.parent)
-    if "excitation" not in document and need_excitation:
+    document, rig = read_rig(path)
+    if document.excitation is None and need_excitation:
         raise ParameterError(
             f"{path} has no [excitation]; say what drives the rig (see docs/configuration.md)"
         )
-    return rig, Excitation.from_dict(document["excitation"]) if "excitation" in document else None
+    return rig, document.drive, document.seed or 0

@@ -17,8 +17,16 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from bench.discrepancy.case.case import Case, read_case
+from bench.discrepancy.articulated.diagnosis import (
+    ArticulatedDiagnosis,
+    applies,
+    diagnose_articulated,
+    drives_only,
+)
+from bench.discrepancy.articulated.effects import CATALOGUE as ARTICULATED
+from bench.discrepancy.case.case import Case
 from bench.discrepancy.case.idle_loads import idle_notes, without_idle_noise
+from bench.discrepancy.case.reading import read_case
 from bench.discrepancy.case.schema import check_units
 from bench.discrepancy.checks.data_quality import notes, refuse
 from bench.discrepancy.checks.initial_motion import with_starts_found
@@ -84,8 +92,8 @@ def diagnose(
     rng: np.random.Generator | None = None,
     progress: Progress = lambda text: None,
     budget: float = math.inf,
-) -> Diagnosis:
-    """Diagnose a case.
+) -> Diagnosis | ArticulatedDiagnosis:
+    """Diagnose a case; one of an articulated MJCF by `diagnose_articulated`, with the catalogue of joints, drives and encoders.
 
     Args:
         case: Nominal model and records.
@@ -101,15 +109,25 @@ def diagnose(
         UnknownNameError: A name in `exclude` is not in the catalogue.
         RecordingError: The records cannot be used.
     """
+    if applies(case):
+        with threadpool_limits(1, user_api="blas"):
+            return diagnose_articulated(case, exclude=exclude, most=most, rng=rng, progress=progress)
     rng = np.random.default_rng(SEED) if rng is None else rng
     known = [effect.name for effect in catalogue]
     for name in exclude:
-        if name not in known:
+        if name not in known and name not in {effect.name for effect in ARTICULATED}:
             raise UnknownNameError("effect", name, known)
     chosen = [effect for effect in catalogue if effect.name not in exclude]
     # fits run in threads of their own; threads of BLAS within them would only get in each other's way
     with threadpool_limits(1, user_api="blas"):
-        return _diagnose(case, How(chosen, most, progress, Deadline(budget)), rng)
+        found = _diagnose(case, How(chosen, most, progress, Deadline(budget)), rng)
+        if found.verdict.verdict == "unknown" and drives_only(case):
+            # what no force on the joint explains may sit in its drive
+            progress("effects of drives and encoders")
+            other = diagnose_articulated(case, exclude=exclude, most=most, rng=rng, progress=progress)
+            if other.verdict.verdict == "effect" and other.verdict.gap.after < found.verdict.gap.after:
+                return other
+        return found
 
 
 def _diagnose(case: Case, how: How, rng: np.random.Generator) -> Diagnosis:
@@ -242,7 +260,7 @@ def _told(words: str, seen: Sequence[NamedEffect]) -> str:
     return words + told
 
 
-def diagnose_folder(folder: str | Path, **options) -> Diagnosis:
+def diagnose_folder(folder: str | Path, **options) -> Diagnosis | ArticulatedDiagnosis:
     """Diagnose the case in a folder; the options are those of `diagnose`."""
     return diagnose(read_case(folder), **options)
 

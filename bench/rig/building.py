@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, get_args
 from xml.etree import ElementTree
 
 import mujoco
@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 
 from bench import native
 from bench.errors import ModelError, ParameterError, UnknownNameError
+from bench.mjcf import StructureName
 from bench.native import Coordinate
 from bench.rig.element import Element
+from bench.rig.mjcf_files import included_files
 
 INTEGRATORS = {
     "RK4": mujoco.mjtIntegrator.mjINT_RK4,
@@ -22,7 +24,7 @@ INTEGRATORS = {
     "implicit": mujoco.mjtIntegrator.mjINT_IMPLICIT,
     "implicitfast": mujoco.mjtIntegrator.mjINT_IMPLICITFAST,
 }
-STRUCTURE = ("mass", "inertia", "stiffness", "damping", "frictionloss", "armature")
+STRUCTURE: tuple[str, ...] = get_args(StructureName)
 """Structural quantities that `Rig.with_structure` changes."""
 
 EXACT_SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)
@@ -91,25 +93,12 @@ def parse(text: str, folder: str, label: str) -> mujoco.MjSpec:
         ModelError: It is no valid MJCF.
     """
     try:
-        spec = mujoco.MjSpec.from_string(text, include=_includes(text, Path(folder)))
+        spec = mujoco.MjSpec.from_string(text, include=included_files(text, Path(folder)))
     except (ValueError, ElementTree.ParseError) as error:
         raise ModelError(f"the MJCF of {label} cannot be read: {error}") from error
     if folder:
         spec.modelfiledir = folder
     return spec
-
-
-def _includes(text: str, folder: Path) -> dict[str, bytes]:
-    """Contents of the files that the MJCF includes, and of those that they include."""
-    found: dict[str, bytes] = {}
-    for node in ElementTree.fromstring(text).iter("include"):
-        name = node.get("file", "")
-        try:
-            found[name] = (folder / name).read_bytes()
-        except OSError as error:
-            raise ModelError(f"cannot read the file '{name}' that the MJCF includes: {error}") from error
-        found |= _includes(found[name].decode("utf-8"), folder)
-    return found
 
 
 def specify(rig: Buildable, built: Built | None = None) -> mujoco.MjSpec:
@@ -139,7 +128,7 @@ def specify(rig: Buildable, built: Built | None = None) -> mujoco.MjSpec:
     return spec
 
 
-def _refuse_foreign_elements(spec: mujoco.MjSpec, rig: Rig) -> None:
+def _refuse_foreign_elements(spec: mujoco.MjSpec, rig: Buildable) -> None:
     """Refuse MJCF that marks something of its own as an element: law numbers and addresses are no matter of a file."""
     marked = [f"numeric '{item.name}'" for item in spec.numerics if _is_marked(item.name, item.data)]
     marked += [
@@ -200,7 +189,7 @@ def build(rig: Buildable, *, drawings: bool = False) -> Built:
         return _build(rig, drawings)
 
 
-def _build(rig: Rig, drawings: bool) -> Built:
+def _build(rig: Buildable, drawings: bool) -> Built:
     spec = specify(rig)
     if not drawings:
         _leave_out_drawings(spec)

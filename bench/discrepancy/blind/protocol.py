@@ -28,7 +28,9 @@ from typing import Any
 import numpy as np
 
 from bench.discrepancy.blind.drawing import BlindOptions, draw_case
+from bench.discrepancy.blind.schema import ANSWER_LIMITS, ProtocolDocument
 from bench.discrepancy.case.case import Case
+from bench.documents import parse_json
 from bench.errors import BenchError, FileFormatError, ParameterError
 from bench.files import together, write_bytes, write_text
 
@@ -89,7 +91,7 @@ def _make_one(task: tuple[str, Path, Path, int, int, BlindOptions]) -> str:
     salt = rng.bytes(16).hex()  # drawn first, so that it also tells whether a case at hand is of this seed
     if sealed.is_file() and answer_file.is_file():
         text = answer_file.read_text(encoding="utf-8")
-        if sealed.read_text().strip() == _digest(text) and json.loads(text).get("salt") == salt:
+        if sealed.read_text().strip() == _digest(text) and _salt(text, answer_file) == salt:
             return f"{name} is there"
         raise FileFormatError(
             f"'{folder / name}' is a case of another seed, or was changed; give an empty folder, or remove it"
@@ -103,6 +105,10 @@ def _make_one(task: tuple[str, Path, Path, int, int, BlindOptions]) -> str:
         write_text(answer_file, text)
         write_text(sealed, _digest(text) + "\n")
     return f"{name} made"
+
+
+def _salt(text: str, file: Path) -> Any:
+    return parse_json(text, str(file), limits=ANSWER_LIMITS).get("salt")
 
 
 def _digest(text: str) -> str:
@@ -171,6 +177,7 @@ def run_blind(
 
     Raises:
         FileFormatError: There is no case.
+        DocumentError: The protocol of a case has an entry that is not known or of the wrong kind.
     """
     folder, results = Path(folder), Path(results)
     cases = sorted(path.parent for path in folder.glob("*/nominal.json"))
@@ -178,7 +185,7 @@ def run_blind(
         raise FileFormatError(f"no case folder (one with nominal.json) in '{folder}'")
     targets = [results / f"{path.name}.json" for path in cases]
     tasks = [
-        (path, target, options)
+        (path, target, _struck(path, options))
         for path, target in zip(cases, targets, strict=True)
         if again or not target.is_file()
     ]
@@ -189,14 +196,19 @@ def run_blind(
     return targets
 
 
+def _struck(path: Path, options: dict[str, Any]) -> dict[str, Any]:
+    """The options, with what the protocol of a case strikes; read before any case is diagnosed."""
+    protocol = path / PROTOCOL
+    if not protocol.is_file():
+        return options
+    struck = ProtocolDocument.read(protocol).exclude
+    return options | {"exclude": tuple(sorted({*options.get("exclude", ()), *struck}))}
+
+
 def _run_one(task: tuple[Path, Path, dict[str, Any]]) -> str:
     from bench.discrepancy.diagnosis import diagnose_folder  # noqa: PLC0415  (the maker does not need it)
 
     path, target, options = task
-    protocol = path / PROTOCOL
-    if protocol.is_file():
-        struck = json.loads(protocol.read_text(encoding="utf-8")).get("exclude", [])
-        options = options | {"exclude": tuple({*options.get("exclude", ()), *struck})}
     try:
         verdict = diagnose_folder(path, **options).verdict
     except KeyboardInterrupt:

@@ -12,10 +12,12 @@ from typing import Any
 
 import numpy as np
 
+from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis
 from bench.discrepancy.diagnosis import Diagnosis
 from bench.discrepancy.judgement.validation_discrepancy import coordinates
 from bench.discrepancy.localisation.localise import box
 from bench.discrepancy.localisation.state_map import StateMap
+from bench.discrepancy.report.articulated import articulated_page
 from bench.discrepancy.report.model_update import recipes
 from bench.discrepancy.report.simulated_records import MEASURED, NOMINAL, variants
 from bench.discrepancy.verdict import Split
@@ -33,8 +35,10 @@ def simulated(diagnosis: Diagnosis) -> dict[str, Recording]:
     return variants(diagnosis)
 
 
-def page(diagnosis: Diagnosis) -> Page:
+def page(diagnosis: Diagnosis | ArticulatedDiagnosis) -> Page:
     """Build the report of a diagnosis."""
+    if isinstance(diagnosis, ArticulatedDiagnosis):
+        return articulated_page(diagnosis)
     verdict = diagnosis.verdict
     out = Page(
         f"Diagnosis of {diagnosis.case.name}", verdict.explanation, f"{verdict.seconds:.1f} s of computation"
@@ -52,7 +56,7 @@ def page(diagnosis: Diagnosis) -> Page:
     return out
 
 
-def write_report(diagnosis: Diagnosis, path: str | Path) -> None:
+def write_report(diagnosis: Diagnosis | ArticulatedDiagnosis, path: str | Path) -> None:
     """Write the report of a diagnosis as one HTML file."""
     page(diagnosis).write(path)
 
