@@ -139,11 +139,10 @@ def attribute(
         simplify(search, candidates)
     elif (
         near(best)
-        and not _crude(problem)
+        and _worth_challenging(best, problem)
         and deadline.allows("rivals of what was found, from further starts")
     ):
         progress(f"rivals of {names(best.hypothesis)}")
-        # few samples do not tell rivals apart by their last digits, nor dents of friction
         challenge(search, screen, rounds=3 if problem.error is None else 1)
         soften(search, len(search.ranked()[0].hypothesis))
         if problem.error is None:
@@ -174,9 +173,13 @@ def _single(
         with_schedules(search)
 
 
-def _crude(problem: Problem) -> bool:
-    """Whether residuals are weighed by a guess, so that what is found serves for no more than a better one."""
-    return problem.error is not None and problem.error.crude
+def _worth_challenging(best: Fit, problem: Problem) -> bool:
+    """Whether rivals of a hypothesis are worth further starts.
+
+    Where the error of the model weighs, few samples do not tell them apart by their last digits: those of a single effect are, unless
+    the error is a guess yet and what is found serves for no more than a better one.
+    """
+    return problem.error is None or (len(best.hypothesis) == 1 and not problem.error.crude)
 
 
 def worth_extending(search: Search, screen: Screen, size: int, most: int) -> list[Fit]:
