@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
-from envs.benches import FLOATS, Benches, Options
-from envs.setups import PAIRS, SDOF_LAWS, Setup, discrimination_setup, joint_setup, sdof_setup
+from .benches import FLOATS, Benches, Options
+from .setups import PAIRS, SDOF_LAWS, Setup, discrimination_setup, joint_setup, sdof_setup
 
 RENDER_MODES = ("rgb_array", "human")
 
