@@ -59,6 +59,7 @@ def test_wheel_holds_code_models_data_and_licences_and_nothing_else(wheel):
         "bench/_data/friction_damper/1Hz_80lb.parquet",
         "bench/_data/published_network.json",
         "jointbench/__init__.py",
+        "bench/_data/schemas/nominal.json",
     ):
         assert expected in names
     assert not [name for name in names if "_facade" in name]

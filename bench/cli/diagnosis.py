@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -39,63 +38,75 @@ class Diagnose:
     """Effects to leave out of the catalogue."""
     most: int = 3
     """Largest number of effects named together."""
+    budget: float = float("inf")
+    """Seconds after which no further stage of the search is begun; the verdict is then the best one so far and says what was not tried."""
+    force: bool = False
+    """Overwrite files that exist."""
     progress: bool = True
     """Show what is being done, on standard error."""
 
     def __call__(self) -> None:
         """Run the command."""
-        from bench.files import write_text
-
         self._check_places()
         with _stages(self.progress) as stage:
-            diagnosis = _diagnosed(self.folder, self.exclude, self.most, stage)
+            diagnosis = _diagnosed(self, stage)
             document = diagnosis.verdict.to_json()
-            if self.html is not None:
-                from bench.discrepancy import write_report
-
-                stage(f"writing {self.html}")
-                write_report(diagnosis, self.html)
-            if self.rrd is not None:
-                from bench.discrepancy.report.rerun_recording import write_rerun
-
-                stage(f"writing {self.rrd}")
-                write_rerun(diagnosis, self.rrd)
+            written, problem = self._written(diagnosis, document, stage)
         if self.json == PRINTED:
             emit(document)
         else:
-            if self.json is not None:
-                write_text(self.json, json.dumps(document, indent=1, ensure_ascii=False))
             for part in summary(diagnosis.verdict):
                 Console().print(part, markup=False, highlight=False)
-            for path in (self.json, self.html, self.rrd):
-                if path is not None:
-                    print(f"written: {path}")
+            for path in written:
+                print(f"written: {path}")
         for warning in diagnosis.verdict.warnings:
             Console(stderr=True, soft_wrap=True).print(
                 f"note: {warning}", style="yellow", markup=False, highlight=False
             )
+        if problem is not None:
+            raise problem
+
+    def _written(
+        self, diagnosis: Diagnosis, document: dict[str, Any], stage: Callable[[str], None]
+    ) -> tuple[list[Path], Exception | None]:
+        """The files written, moved into place together; where one fails, the verdict alone, and what failed."""
+        from bench.files import OutputError, together, write_text
+
+        text = json.dumps(document, indent=1, ensure_ascii=False)
+        saved = [self.json] if self.json is not None and self.json != PRINTED else []
+        try:
+            with together():
+                for path in saved:
+                    write_text(path, text)
+                if self.html is not None:
+                    from bench.discrepancy import write_report
+
+                    stage(f"writing {self.html}")
+                    write_report(diagnosis, self.html)
+                if self.rrd is not None:
+                    from bench.discrepancy.report.rerun_recording import write_rerun
+
+                    stage(f"writing {self.rrd}")
+                    write_rerun(diagnosis, self.rrd)
+        except Exception as error:  # whatever a figure ran into: the verdict is told and kept
+            problem = OutputError(f"the report of this verdict cannot be written: {error}")
+            with contextlib.suppress(OutputError):
+                for path in saved:
+                    write_text(path, text)
+                return saved, problem
+            return [], problem
+        return [path for path in (*saved, self.html, self.rrd) if path is not None], None
 
     def _check_places(self) -> None:
         """Refuse places that cannot be written to before a minute is spent on the diagnosis."""
         from bench.errors import ParameterError
-        from bench.files import OutputError
+        from bench.targets import check_targets
 
         if self.most < 1:
             raise ParameterError(f"--most is {self.most}; at least one effect has to be allowed")
-        taken: set[Path] = set()
-        for path in (self.json, self.html, self.rrd):
-            if path is None or path == PRINTED:
-                continue
-            if path.is_dir():
-                raise OutputError(f"cannot write {path}: it is a folder; name a file in it")
-            nearest = next(parent for parent in path.resolve().parents if parent.exists())
-            if not nearest.is_dir() or not os.access(nearest, os.W_OK):
-                raise OutputError(
-                    f"cannot write {path}: {nearest} is no folder one may write to; choose another place"
-                )
-            if path.resolve() in taken:
-                raise OutputError(f"{path} is named for two results; give each a file of its own")
-            taken.add(path.resolve())
+        if not self.budget > 0.0:
+            raise ParameterError(f"--budget is {self.budget:g} s; give more than zero")
+        check_targets(self.json, self.html, self.rrd, force=self.force)
 
 
 PRINTED = Path("-")
@@ -111,7 +122,7 @@ def _stages(shown: bool) -> Iterator[Callable[[str], None]]:
         yield lambda text: bar.update(task, description=text)
 
 
-def _diagnosed(folder: Path, exclude: tuple[str, ...], most: int, stage: Callable[[str], None]) -> Diagnosis:
+def _diagnosed(asked: Diagnose, stage: Callable[[str], None]) -> Diagnosis:
     """The diagnosis of a folder; what numerics cannot cope with is told like any other input that cannot be used."""
     import numpy as np
 
@@ -119,10 +130,12 @@ def _diagnosed(folder: Path, exclude: tuple[str, ...], most: int, stage: Callabl
     from bench.errors import IdentificationError
 
     try:
-        return diagnose_folder(folder, exclude=exclude, most=most, progress=stage)
+        return diagnose_folder(
+            asked.folder, exclude=asked.exclude, most=asked.most, progress=stage, budget=asked.budget
+        )
     except (np.linalg.LinAlgError, ArithmeticError) as error:
         raise IdentificationError(
-            f"the numbers of '{folder}' cannot be worked with ({error}); check nominal values, units and noise_std: "
+            f"the numbers of '{asked.folder}' cannot be worked with ({error}); check nominal values, units and noise_std: "
             "one of them is probably off by orders of magnitude"
         ) from error
 
@@ -134,15 +147,22 @@ def summary(verdict: Verdict) -> list[Any]:
         verdict: The verdict.
     """
     parts: list[Any] = [verdict.explanation]
-    if verdict.named:
-        table = Table("effect", "where", "probability", "parameters", title="Missing from the model")
-        for effect in verdict.named:
+    for effects, title in (
+        (verdict.named, "Missing from the model"),
+        (verdict.nearest, "What comes nearest"),
+    ):
+        if not effects:
+            continue
+        table = Table("effect", "where", "probability", "closes", "parameters", title=title)
+        for effect in effects:
             values = "\n".join(
                 f"{name} = {p.value:.5g} ± {p.std:.2g} {p.unit if p.unit != '1' else ''}".rstrip()
                 for name, p in effect.parameters.items()
             )
             where = " ".join(text for text in (effect.where, effect.channel) if text)
-            table.add_row(effect.name, where, f"{effect.probability:.3f}", Text(values))
+            low, high = effect.closed_ci95
+            closes = f"{100 * effect.closed:.0f} % ({100 * low:.0f} … {100 * high:.0f})"
+            table.add_row(effect.name, where, f"{effect.probability:.3f}", closes, Text(values))
         parts.append(table)
     table = Table(
         "gap", "before", "parameters only", "after", "noise", "closed", title="How far the gap shrinks"
@@ -156,6 +176,8 @@ def summary(verdict: Verdict) -> list[Any]:
             closed,
         )
     parts.append(table)
+    if verdict.left:
+        parts.append(verdict.left)
     for names in verdict.indistinguishable:
         parts.append(f"These records cannot tell {' from '.join(names)}.")
     proposal = verdict.next_excitation
@@ -201,13 +223,20 @@ class BlindMake:
     """Compute how well the records of each case can tell its effect, for the answers."""
     workers: int = 1
     """Processes."""
+    force: bool = False
+    """Write into folders that hold files of others."""
 
     def __call__(self) -> None:
         """Run the command."""
         import numpy as np
 
         from bench.discrepancy import BlindOptions, make_blind
+        from bench.discrepancy.blind.protocol import SEAL
+        from bench.targets import check_folder
 
+        begun = next(self.folder.glob(f"*/{SEAL}"), None) is not None  # by the same command, which goes on
+        for folder in (self.folder, self.answers):
+            check_folder(folder, force=self.force or begun)
         chosen = {key: value for key, value in vars(self).items() if key in BlindOptions.__dataclass_fields__}
         with Console(stderr=True).status("making cases") as status:
             names = make_blind(
@@ -266,18 +295,23 @@ class BlindScore:
     """File for the scores as a self-contained page."""
     markdown: Path | None = None
     """File for the scores as Markdown."""
+    force: bool = False
+    """Overwrite files that exist."""
 
     def __call__(self) -> None:
         """Run the command."""
         from bench.discrepancy import score_blind
         from bench.discrepancy.blind.score_report import markdown, page, tables
-        from bench.files import write_text
+        from bench.files import together, write_text
+        from bench.targets import check_targets
 
+        check_targets(self.html, self.markdown, force=self.force)
         score = score_blind(self.results, self.answers, cases=self.cases)
-        if self.html is not None:
-            page(score).write(self.html)
-        if self.markdown is not None:
-            write_text(self.markdown, markdown(score))
+        with together():
+            if self.html is not None:
+                page(score).write(self.html)
+            if self.markdown is not None:
+                write_text(self.markdown, markdown(score))
         if self.json:
             emit(score.to_json())
             return

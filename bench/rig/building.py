@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, get_args
 from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from bench import native
 from bench.errors import ModelError, ParameterError, UnknownNameError
+from bench.mjcf import StructureName
 from bench.native import Coordinate
 from bench.rig.element import Element
+from bench.rig.mjcf_files import included_files
 
 INTEGRATORS = {
     "RK4": mujoco.mjtIntegrator.mjINT_RK4,
@@ -20,7 +24,7 @@ INTEGRATORS = {
     "implicit": mujoco.mjtIntegrator.mjINT_IMPLICIT,
     "implicitfast": mujoco.mjtIntegrator.mjINT_IMPLICITFAST,
 }
-STRUCTURE = ("mass", "inertia", "stiffness", "damping", "frictionloss", "armature")
+STRUCTURE: tuple[str, ...] = get_args(StructureName)
 """Structural quantities that `Rig.with_structure` changes."""
 
 EXACT_SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)
@@ -89,7 +93,7 @@ def parse(text: str, folder: str, label: str) -> mujoco.MjSpec:
         ModelError: It is no valid MJCF.
     """
     try:
-        spec = mujoco.MjSpec.from_string(text, include=_includes(text, Path(folder)))
+        spec = mujoco.MjSpec.from_string(text, include=included_files(text, Path(folder)))
     except (ValueError, ElementTree.ParseError) as error:
         raise ModelError(f"the MJCF of {label} cannot be read: {error}") from error
     if folder:
@@ -97,22 +101,10 @@ def parse(text: str, folder: str, label: str) -> mujoco.MjSpec:
     return spec
 
 
-def _includes(text: str, folder: Path) -> dict[str, bytes]:
-    """Contents of the files that the MJCF includes, and of those that they include."""
-    found: dict[str, bytes] = {}
-    for node in ElementTree.fromstring(text).iter("include"):
-        name = node.get("file", "")
-        try:
-            found[name] = (folder / name).read_bytes()
-        except OSError as error:
-            raise ModelError(f"cannot read the file '{name}' that the MJCF includes: {error}") from error
-        found |= _includes(found[name].decode("utf-8"), folder)
-    return found
-
-
 def specify(rig: Buildable, built: Built | None = None) -> mujoco.MjSpec:
     """The rig as an MjSpec, its elements' rows empty, or as they are in `built`."""
     spec = parse(rig.mjcf, rig.folder, f"rig '{rig.name}'")
+    _refuse_foreign_elements(spec, rig)
     spec.option.timestep = rig.timestep
     spec.option.integrator = INTEGRATORS[rig.integrator]
     spec.option.disableflags |= (
@@ -129,11 +121,31 @@ def specify(rig: Buildable, built: Built | None = None) -> mujoco.MjSpec:
             )
             start = int(built.model.numeric_adr[numeric])
             data = built.model.numeric_data[start : start + int(built.model.numeric_size[numeric])].copy()
-            data[1] = -1.0  # the law's number holds in this process only
+            data[native.OWN] = native.UNBOUND
         spec.add_numeric(name=native.PREFIX + element.name, data=data, size=len(data))
         if element.law.states:
             _add_state_actuator(spec, element, index)
     return spec
+
+
+def _refuse_foreign_elements(spec: mujoco.MjSpec, rig: Buildable) -> None:
+    """Refuse MJCF that marks something of its own as an element: law numbers and addresses are no matter of a file."""
+    marked = [f"numeric '{item.name}'" for item in spec.numerics if _is_marked(item.name, item.data)]
+    marked += [
+        f"actuator '{item.name}'"
+        for item in spec.actuators
+        if _is_marked(item.name, item.dynprm if item.dyntype == mujoco.mjtDyn.mjDYN_USER else ())
+    ]
+    if marked:
+        raise ModelError(
+            f"the MJCF of rig '{rig.name}' marks {', '.join(marked[:3])} as an element of the bench (a name that begins with "
+            f"'{native.PREFIX}', or the first number {native.MAGIC:.0f}); elements belong to the rig, not to its MJCF. Remove it there "
+            "and give the rig the element; a model exported by Rig.to_xml is loaded by MuJoCo itself and bench.native.bind"
+        )
+
+
+def _is_marked(name: str, numbers: Sequence[float] | NDArray[np.float64]) -> bool:
+    return name.startswith(native.PREFIX) or (len(numbers) > 0 and numbers[0] == native.MAGIC)
 
 
 def _leave_out_drawings(spec: mujoco.MjSpec) -> None:
@@ -173,6 +185,11 @@ def _add_state_actuator(spec: mujoco.MjSpec, element: Element, index: int) -> No
 def build(rig: Buildable, *, drawings: bool = False) -> Built:
     """Compile a rig, with or without what is only drawn; see `Rig.built` for what it raises."""
     native.install()
+    with native.quiet():
+        return _build(rig, drawings)
+
+
+def _build(rig: Buildable, drawings: bool) -> Built:
     spec = specify(rig)
     if not drawings:
         _leave_out_drawings(spec)

@@ -65,7 +65,7 @@ def _verdict_section(out: Page, diagnosis: Diagnosis) -> None:
         ("verdict", "probability"),
         [(k, f"{p:.3f}") for k, p in verdict.probabilities.items()],
     )
-    for effect in verdict.named:
+    for effect in (*verdict.named, *verdict.nearest):
         where = f" ({effect.where})" if effect.where else ""
         rows = [
             (
@@ -75,12 +75,15 @@ def _verdict_section(out: Page, diagnosis: Diagnosis) -> None:
             for name, e in effect.parameters.items()
         ]  # fmt: skip
         section.table(
-            f"{effect.name}{where}, probability {effect.probability:.3f}: {effect.equation}",
+            f"{'' if verdict.named else 'Nearest: '}{effect.name}{where}, probability {effect.probability:.3f}, closes "
+            f"{100 * effect.closed:.0f} % of what is missing without it: {effect.equation}",
             ("parameter", "value", "one-sigma", "95 % interval", "unit"),
             rows,
         )
     for group in verdict.indistinguishable:
         section.text(f"These records cannot tell apart: {', '.join(group)}.")
+    if verdict.left:
+        section.text(verdict.left)
     for warning in verdict.warnings:
         section.text(f"Note: {warning}.")
 

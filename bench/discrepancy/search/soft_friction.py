@@ -150,7 +150,7 @@ def frictional(problem: Problem) -> NDArray[np.bool_]:
     names = {friction.parameter for friction in problem.structure.frictions}
     names |= {COULOMB_PARAMETER} if problem.driven else set()
     out = np.zeros(len(problem.nominal), dtype=bool)
-    out[: problem.n_physical] = [name in names for name in problem.structure.parameters]
+    out[: problem.n_physical] = [name in names for name in problem.structure.parameters[: problem.n_physical]]
     return out
 
 
