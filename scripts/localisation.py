@@ -4,7 +4,7 @@
 
 Each case is a rig (sdof, one axis of the joint, one spring of a chain of three masses) with nominal parameters off by their
 uncertainty, under noise; a force that no catalogue names acts at one place, in one part of the state space or of time. The records
-are integrated with twenty steps a sample. `bench.discrepancy.where.state_map` sees the records and the nominal model only.
+are integrated with twenty steps a sample. `bench.discrepancy.localisation.state_map` sees the records and the nominal model only.
 
 What counts: the cells of the map of every place, 12 by 12 over displacement and velocity, that the motion visited at least twice.
 Truth are the cells in which the mean of the planted force along the true motion exceeds 15 % of its largest cell; found are the
@@ -25,11 +25,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.discrepancy import Case, CaseChannel, NominalParameter, record_from_arrays
-from bench.discrepancy.driven import driven_force
-from bench.discrepancy.problem import Problem
-from bench.discrepancy.structure import Observer, Place, Structure, structure_of
-from bench.discrepancy.system import Elements, free_run
-from bench.discrepancy.where.state_map import CELLS, TIMES, WEAK, cell_index, state_maps
+from bench.discrepancy.likelihood.problem import Problem
+from bench.discrepancy.localisation.state_map import CELLS, TIMES, WEAK, cell_index, state_maps
+from bench.discrepancy.model.structure import Observer, Place, Structure, structure_of
+from bench.discrepancy.simulation.prescribed_response import driven_force
+from bench.discrepancy.simulation.stick_slip import Elements, free_run
 from bench.laws.base import kernel
 
 Array = NDArray[np.float64]

@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 
 from bench.discrepancy import BlindOptions, Case
-from bench.discrepancy.blind.cases import draw_case
-from bench.discrepancy.blind.effects import RECIPES
-from bench.discrepancy.catalogue import effect_named
-from bench.discrepancy.fit import Fit, fit
-from bench.discrepancy.placements import placements
-from bench.discrepancy.problem import Problem
-from bench.discrepancy.structure import structure_of
+from bench.discrepancy.blind.drawing import draw_case
+from bench.discrepancy.blind.withheld_effects import RECIPES
+from bench.discrepancy.effects.catalogue import effect_named
+from bench.discrepancy.fitting.map_fit import Fit, fit
+from bench.discrepancy.likelihood.problem import Problem
+from bench.discrepancy.model.placements import placements
+from bench.discrepancy.model.structure import structure_of
 
 LATER = {
     "saturating_spring", "hertz_contact", "hidden_resonator", "displacement_dependent_damping", "stress_softening",

@@ -136,10 +136,10 @@ def _case(effect: str, seed: int):
 def test_sysid_is_given_the_same_problem(effect, tolerance):
     from benchmarks.peer_sysid import Candidate
 
-    from bench.discrepancy.catalogue import CATALOGUE
-    from bench.discrepancy.placements import placements
-    from bench.discrepancy.problem import Problem
-    from bench.discrepancy.structure import structure_of
+    from bench.discrepancy.effects.catalogue import CATALOGUE
+    from bench.discrepancy.likelihood.problem import Problem
+    from bench.discrepancy.model.placements import placements
+    from bench.discrepancy.model.structure import structure_of
 
     case = _case("gap", 5)
     structure = structure_of(case)
@@ -165,7 +165,7 @@ def test_sysid_is_given_the_same_problem(effect, tolerance):
 def test_sysid_names_an_effect_of_its_own_when_it_is_plain(seconds):
     from benchmarks import peer_sysid
 
-    from bench.discrepancy.catalogue import effect_named
+    from bench.discrepancy.effects.catalogue import effect_named
 
     # the whole catalogue takes it minutes; these are the gap's nearest rivals, and an effect of another kind each
     rivals = ("gap", "cubic_stiffness", "coulomb_friction", "mass_error")

@@ -24,9 +24,9 @@ from planted_cases import (
 )
 
 from bench.discrepancy import diagnose
-from bench.discrepancy.catalogue import CATALOGUE, effect_named
-from bench.discrepancy.effect import unit_of
-from bench.discrepancy.quantisation import quantisation_step, raised_noise
+from bench.discrepancy.checks.quantisation import quantisation_step, raised_noise
+from bench.discrepancy.effects.catalogue import CATALOGUE, effect_named
+from bench.discrepancy.effects.effect import unit_of
 from bench.laws import LAWS
 from bench.laws.evaluate import evaluate
 

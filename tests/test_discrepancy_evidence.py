@@ -4,10 +4,10 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from bench.discrepancy.catalogue import effect_named
-from bench.discrepancy.evidence import RIVAL, indistinguishable
-from bench.discrepancy.placed import Placed
-from bench.discrepancy.structure import Place
+from bench.discrepancy.effects.catalogue import effect_named
+from bench.discrepancy.judgement.posterior import RIVAL, indistinguishable
+from bench.discrepancy.model.placement import Placed
+from bench.discrepancy.model.structure import Place
 
 AXIAL = Place("axial", np.eye(1), "m", "N")
 

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from bench.discrepancy import BlindOptions
-from bench.discrepancy.blind.cases import draw_case
-from bench.discrepancy.catalogue import effect_named
-from bench.discrepancy.idle_loads import idle, idle_notes, without_idle_noise
-from bench.discrepancy.placements import placements
-from bench.discrepancy.problem import Problem
-from bench.discrepancy.structure import structure_of
+from bench.discrepancy.blind.drawing import draw_case
+from bench.discrepancy.case.idle_loads import idle, idle_notes, without_idle_noise
+from bench.discrepancy.effects.catalogue import effect_named
+from bench.discrepancy.likelihood.problem import Problem
+from bench.discrepancy.model.placements import placements
+from bench.discrepancy.model.structure import structure_of
 
 T = np.arange(5000) / 500.0
 

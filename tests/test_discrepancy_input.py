@@ -15,17 +15,17 @@ from bench.discrepancy import (
     diagnose,
     read_case,
     record_from_arrays,
-    starts,
 )
-from bench.discrepancy.catalogue import effect_named
-from bench.discrepancy.fit import fit
-from bench.discrepancy.placed import Placed
-from bench.discrepancy.problem import Problem
-from bench.discrepancy.screen import Screen
-from bench.discrepancy.shrink import nrmse
-from bench.discrepancy.start_estimates import predict, run_kind, start_warnings
-from bench.discrepancy.structure import structure_of
-from bench.discrepancy.system import NO_ELEMENTS, Elements, LinearStructure, free_run
+from bench.discrepancy.effects.catalogue import effect_named
+from bench.discrepancy.fitting.initial_state_fit import predict, run_kind, start_warnings
+from bench.discrepancy.fitting.map_fit import fit
+from bench.discrepancy.judgement.validation_discrepancy import nrmse
+from bench.discrepancy.likelihood import window_whitening as starts
+from bench.discrepancy.likelihood.problem import Problem
+from bench.discrepancy.model.placement import Placed
+from bench.discrepancy.model.structure import structure_of
+from bench.discrepancy.screening.screen import Screen
+from bench.discrepancy.simulation.stick_slip import NO_ELEMENTS, Elements, LinearStructure, free_run
 from bench.errors import FileFormatError, ModelError, UnknownNameError
 from bench.laws import LAWS
 from bench.rig import Element, Rig, simulate

@@ -7,20 +7,20 @@ import pytest
 from numpy.typing import NDArray
 
 from bench.discrepancy import Case, CaseChannel, NominalParameter, record_from_arrays
-from bench.discrepancy.attribute import attribute
-from bench.discrepancy.catalogue import CATALOGUE
-from bench.discrepancy.explain import Explanation
-from bench.discrepancy.fit import fit
-from bench.discrepancy.placements import placements
-from bench.discrepancy.problem import Problem
-from bench.discrepancy.structure import structure_of
-from bench.discrepancy.where.acting import acting_regions
-from bench.discrepancy.where.limited import limited_regions
-from bench.discrepancy.where.locate import locate
-from bench.discrepancy.where.missing_force import observers
-from bench.discrepancy.where.redundancy import contradictions
-from bench.discrepancy.where.state_map import CELLS, state_maps
-from bench.discrepancy.where.state_splits import force_splits
+from bench.discrepancy.effects.catalogue import CATALOGUE
+from bench.discrepancy.fitting.map_fit import fit
+from bench.discrepancy.likelihood.problem import Problem
+from bench.discrepancy.localisation.bounded_force import limited_regions
+from bench.discrepancy.localisation.force_smoother import observers
+from bench.discrepancy.localisation.law_regions import acting_regions
+from bench.discrepancy.localisation.localise import locate
+from bench.discrepancy.localisation.parity_relations import contradictions
+from bench.discrepancy.localisation.state_map import CELLS, state_maps
+from bench.discrepancy.localisation.state_splits import force_splits
+from bench.discrepancy.model.placements import placements
+from bench.discrepancy.model.structure import structure_of
+from bench.discrepancy.search.explain import Explanation
+from bench.discrepancy.search.forward_selection import attribute
 
 MASS, DAMPING, STIFFNESS = 2.0, 4.0, 1500.0
 RATE, N = 1000.0, 10_000

@@ -15,10 +15,10 @@ from bench.discrepancy import (
     read_case,
     record_from_arrays,
 )
-from bench.discrepancy.acquisition import Antialias, upsampled
-from bench.discrepancy.catalogue import CATALOGUE
-from bench.discrepancy.problem import Problem
-from bench.discrepancy.structure import structure_of
+from bench.discrepancy.case.acquisition import Antialias, upsampled
+from bench.discrepancy.effects.catalogue import CATALOGUE
+from bench.discrepancy.likelihood.problem import Problem
+from bench.discrepancy.model.structure import structure_of
 from bench.errors import FileFormatError, ParameterError, UnknownNameError
 
 RATE = 750.0

@@ -6,16 +6,22 @@ import numpy as np
 import pytest
 
 from bench.discrepancy import Case, CaseChannel, NominalParameter, record_from_arrays
-from bench.discrepancy.catalogue import effect_named
-from bench.discrepancy.explain import Explanation
-from bench.discrepancy.fit import fit
-from bench.discrepancy.next_excitation import Rival, outlook, propose, separate, told_apart
-from bench.discrepancy.placed import Placed
-from bench.discrepancy.problem import Problem
-from bench.discrepancy.proposals import limits_of
-from bench.discrepancy.reasons import why_none
-from bench.discrepancy.report.application import element_code, element_toml
-from bench.discrepancy.structure import structure_of
+from bench.discrepancy.effects.catalogue import effect_named
+from bench.discrepancy.fitting.map_fit import fit
+from bench.discrepancy.likelihood.problem import Problem
+from bench.discrepancy.model.placement import Placed
+from bench.discrepancy.model.structure import structure_of
+from bench.discrepancy.next_test.discriminating_excitation import (
+    Rival,
+    outlook,
+    propose,
+    separate,
+    told_apart,
+)
+from bench.discrepancy.next_test.distinguishability import why_none
+from bench.discrepancy.next_test.feasible_excitations import limits_of
+from bench.discrepancy.report.model_update import element_code, element_toml
+from bench.discrepancy.search.explain import Explanation
 
 RATE, N = 500.0, 3000
 NOISE = 0.02

@@ -10,14 +10,14 @@ import pytest
 from test_discrepancy_input import PARAMETERS, model, write
 
 from bench.discrepancy import diagnose, read_case
-from bench.discrepancy.catalogue import effect_named
-from bench.discrepancy.driving import with_load_noise
-from bench.discrepancy.prepared import whitened
-from bench.discrepancy.problem import Problem
-from bench.discrepancy.quality import notes
-from bench.discrepancy.structure import structure_of
-from bench.discrepancy.system import Elements
-from bench.discrepancy.where.missing_force import observers
+from bench.discrepancy.checks.data_quality import notes
+from bench.discrepancy.effects.catalogue import effect_named
+from bench.discrepancy.likelihood.problem import Problem
+from bench.discrepancy.likelihood.whitening import whitened
+from bench.discrepancy.localisation.force_smoother import observers
+from bench.discrepancy.model.structure import structure_of
+from bench.discrepancy.response.driving_loads import with_load_noise
+from bench.discrepancy.simulation.stick_slip import Elements
 from bench.errors import ModelError
 
 RATE, FINE = 250.0, 40

@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bench.discrepancy.case import Case, CaseChannel, NominalParameter, record_from_arrays
-from bench.discrepancy.catalogue import effect_named
+from bench.discrepancy.case.case import Case, CaseChannel, NominalParameter, record_from_arrays
 from bench.discrepancy.diagnosis import diagnose
-from bench.discrepancy.fit import fit
-from bench.discrepancy.placed import Placed
-from bench.discrepancy.prescribed_motion import decided, held, prescribed_motion
-from bench.discrepancy.problem import Problem
-from bench.discrepancy.search import consistent
-from bench.discrepancy.structure import structure_of
+from bench.discrepancy.effects.catalogue import effect_named
+from bench.discrepancy.fitting.map_fit import fit
+from bench.discrepancy.likelihood.problem import Problem
+from bench.discrepancy.model.placement import Placed
+from bench.discrepancy.model.structure import structure_of
+from bench.discrepancy.motion.prescribed import decided, held, prescribed_motion
+from bench.discrepancy.search.fits import consistent
 from bench.errors import RecordingError
 
 STEP = 0.002

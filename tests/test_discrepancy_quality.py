@@ -14,10 +14,10 @@ from planted_cases import DAMPING, MASS, NOISE, SAMPLE_RATE, STIFFNESS, linear_m
 from bench.cli import main
 from bench.discrepancy import Case, diagnose, read_case, record_from_arrays
 from bench.discrepancy.blind.protocol import write_case
-from bench.discrepancy.nominal_file import check_units
-from bench.discrepancy.problem import Problem
-from bench.discrepancy.quality import compare, notes, refuse, unit_factor
-from bench.discrepancy.structure import structure_of
+from bench.discrepancy.case.schema import check_units
+from bench.discrepancy.checks.data_quality import compare, notes, refuse, unit_factor
+from bench.discrepancy.likelihood.problem import Problem
+from bench.discrepancy.model.structure import structure_of
 from bench.errors import BenchError, IdentificationError, RecordingError, UnitError
 
 

@@ -10,24 +10,24 @@ from planted_cases import NOISE, SAMPLE_RATE, bouc_wen_slope, motion_with, plant
 from sealed_cases import fitted
 
 from bench.discrepancy import diagnose
-from bench.discrepancy.attribute import attribute
-from bench.discrepancy.catalogue import CATALOGUE, effect_named
-from bench.discrepancy.challenge import challenge
-from bench.discrepancy.closure import CLOSURES
-from bench.discrepancy.contradiction import contradicted
-from bench.discrepancy.driving import driving_loads
-from bench.discrepancy.explain import Explanation, close
-from bench.discrepancy.fit import fit
-from bench.discrepancy.grid_points import Point
-from bench.discrepancy.lack_of_fit import LackOfFit, lack_of_fit
-from bench.discrepancy.nominate import WORTH_A_FIT, followed
-from bench.discrepancy.placements import placements
-from bench.discrepancy.prepared import timed
-from bench.discrepancy.problem import Problem
-from bench.discrepancy.screen import Screen
-from bench.discrepancy.search import Search, consistent, integrate_finer
-from bench.discrepancy.signal_effects import delay, sensor_delay
-from bench.discrepancy.structure import structure_of
+from bench.discrepancy.effects.catalogue import CATALOGUE, effect_named
+from bench.discrepancy.effects.channel_operators import delay, sensor_delay
+from bench.discrepancy.effects.nonparametric import CLOSURES
+from bench.discrepancy.fitting.map_fit import fit
+from bench.discrepancy.judgement.predictive_check import contradicted
+from bench.discrepancy.likelihood.problem import Problem
+from bench.discrepancy.likelihood.whitening import timed
+from bench.discrepancy.model.placements import placements
+from bench.discrepancy.model.structure import structure_of
+from bench.discrepancy.response.driving_loads import driving_loads
+from bench.discrepancy.screening.candidates import WORTH_A_FIT, followed
+from bench.discrepancy.screening.linear_amplitudes import Point
+from bench.discrepancy.screening.score_test import LackOfFit, lack_of_fit
+from bench.discrepancy.screening.screen import Screen
+from bench.discrepancy.search.explain import Explanation, close
+from bench.discrepancy.search.fits import Search, consistent, integrate_finer
+from bench.discrepancy.search.forward_selection import attribute
+from bench.discrepancy.search.rivals import challenge
 
 STEP = 1.0 / SAMPLE_RATE
 

@@ -7,22 +7,22 @@ import pytest
 from sealed_cases import fitted, sealed
 
 from bench.discrepancy import BlindOptions, Case, diagnose
-from bench.discrepancy.attribute import attribute, prepare, worth_extending
-from bench.discrepancy.blind.cases import draw_case
-from bench.discrepancy.catalogue import effect_named
-from bench.discrepancy.challenge import challenge
-from bench.discrepancy.contradiction import contradicted, fails
-from bench.discrepancy.coupled import coupled_fits
-from bench.discrepancy.explain import Explanation
-from bench.discrepancy.fit import fit
-from bench.discrepancy.free_rival import likelier_force
-from bench.discrepancy.idle_loads import without_idle_noise
-from bench.discrepancy.lack_of_fit import lack_of_fit
-from bench.discrepancy.placements import placements
-from bench.discrepancy.problem import Problem
-from bench.discrepancy.screen import Screen
-from bench.discrepancy.search import Search, consistent, shake
-from bench.discrepancy.structure import structure_of
+from bench.discrepancy.blind.drawing import draw_case
+from bench.discrepancy.case.idle_loads import without_idle_noise
+from bench.discrepancy.effects.catalogue import effect_named
+from bench.discrepancy.fitting.map_fit import fit
+from bench.discrepancy.judgement.nonparametric_rival import likelier_force
+from bench.discrepancy.judgement.predictive_check import contradicted, fails
+from bench.discrepancy.likelihood.problem import Problem
+from bench.discrepancy.model.placements import placements
+from bench.discrepancy.model.structure import structure_of
+from bench.discrepancy.screening.score_test import lack_of_fit
+from bench.discrepancy.screening.screen import Screen
+from bench.discrepancy.search.coupled_effects import coupled_fits
+from bench.discrepancy.search.explain import Explanation
+from bench.discrepancy.search.fits import Search, consistent, shake
+from bench.discrepancy.search.forward_selection import attribute, prepare, worth_extending
+from bench.discrepancy.search.rivals import challenge
 
 
 def best_names(case, *catalogue, most=2):

@@ -8,17 +8,17 @@ from scipy.optimize import least_squares
 
 from bench.discrepancy import BlindOptions
 from bench.discrepancy.blind.protocol import draw_case
-from bench.discrepancy.catalogue import effect_named
-from bench.discrepancy.grid_points import ROWS, products
-from bench.discrepancy.linear_run import linear_run
-from bench.discrepancy.minimise import Prior, minimise
-from bench.discrepancy.nominate import refined
-from bench.discrepancy.placements import placements
-from bench.discrepancy.problem import Problem
-from bench.discrepancy.screen import Screen
-from bench.discrepancy.structure import structure_of
-from bench.discrepancy.system import NO_ELEMENTS, LinearStructure, free_run
-from bench.discrepancy.whitening import whiten
+from bench.discrepancy.effects.catalogue import effect_named
+from bench.discrepancy.likelihood.problem import Problem
+from bench.discrepancy.model.placements import placements
+from bench.discrepancy.model.structure import structure_of
+from bench.discrepancy.numerics.least_squares import Prior, minimise
+from bench.discrepancy.numerics.spectral_product import whiten
+from bench.discrepancy.screening.candidates import refined
+from bench.discrepancy.screening.linear_amplitudes import ROWS, products
+from bench.discrepancy.screening.screen import Screen
+from bench.discrepancy.simulation.linear_response import linear_run
+from bench.discrepancy.simulation.stick_slip import NO_ELEMENTS, LinearStructure, free_run
 
 TIME = np.linspace(0.0, 3.0, 200)
 DATA = 2.0 * np.exp(-1.3 * TIME) * np.cos(4.0 * TIME)

@@ -10,10 +10,10 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.signal import cont2discrete, dlsim
 
-from bench.discrepancy import friction_limits
-from bench.discrepancy.driven import driven_force
-from bench.discrepancy.smoothing import smooth_motion
-from bench.discrepancy.system import NO_ELEMENTS, Elements, LinearStructure, free_run
+from bench.discrepancy.effects import friction_limits
+from bench.discrepancy.motion.kalman_smoother import smooth_motion
+from bench.discrepancy.simulation.prescribed_response import driven_force
+from bench.discrepancy.simulation.stick_slip import NO_ELEMENTS, Elements, LinearStructure, free_run
 from bench.laws.bouc_wen import BOUC_WEN
 from bench.laws.gap import GAP
 
@@ -153,8 +153,8 @@ def test_smoothing_recovers_the_velocity_that_was_not_measured():
 GUARDED = """
 import ctypes, mmap
 import numpy as np
-from bench.discrepancy.friction_limits import coulomb_limit
-from bench.discrepancy.system import Elements, LinearStructure, free_run
+from bench.discrepancy.effects.friction_limits import coulomb_limit
+from bench.discrepancy.simulation.stick_slip import Elements, LinearStructure, free_run
 
 n, factor = 16384, 32
 size = n * factor * 8

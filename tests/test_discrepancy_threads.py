@@ -5,8 +5,8 @@ import time
 
 import pytest
 
-from bench.discrepancy import threads
-from bench.discrepancy.threads import THREADS, in_threads
+from bench.discrepancy.numerics import threads
+from bench.discrepancy.numerics.threads import THREADS, in_threads
 
 
 def test_results_come_in_the_order_of_the_items_at_any_depth():

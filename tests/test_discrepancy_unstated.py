@@ -9,15 +9,15 @@ import pytest
 from planted_cases import MASS, NOISE, SAMPLE_RATE, STIFFNESS, load, motion_with, planted_case
 
 from bench.discrepancy import Case, CaseChannel, NominalParameter, diagnose, record_from_arrays
-from bench.discrepancy.between_samples import reading_notes
-from bench.discrepancy.catalogue import CATALOGUE, effect_named
-from bench.discrepancy.evidence import closes
-from bench.discrepancy.fit import fit
-from bench.discrepancy.moving_starts import with_starts_found
-from bench.discrepancy.placements import placements
-from bench.discrepancy.problem import Problem
-from bench.discrepancy.screen import Screen
-from bench.discrepancy.structure import structure_of
+from bench.discrepancy.checks.initial_motion import with_starts_found
+from bench.discrepancy.effects.catalogue import CATALOGUE, effect_named
+from bench.discrepancy.fitting.map_fit import fit
+from bench.discrepancy.judgement.posterior import closes
+from bench.discrepancy.likelihood.problem import Problem
+from bench.discrepancy.model.placements import placements
+from bench.discrepancy.model.structure import structure_of
+from bench.discrepancy.screening.screen import Screen
+from bench.discrepancy.search.load_interpolation import reading_notes
 from bench.discrepancy.verdict import Gap
 
 FEW = [effect_named(name) for name in ("cubic_stiffness", "gap", "coulomb_friction", "quadratic_damping")]

@@ -56,7 +56,7 @@ class Diagnose:
                 stage(f"writing {self.html}")
                 write_report(diagnosis, self.html)
             if self.rrd is not None:
-                from bench.discrepancy.report.rerun import write_rerun
+                from bench.discrepancy.report.rerun_recording import write_rerun
 
                 stage(f"writing {self.rrd}")
                 write_rerun(diagnosis, self.rrd)

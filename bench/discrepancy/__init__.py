@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from bench.discrepancy.blind.protocol import BlindOptions, make_blind, run_blind
     from bench.discrepancy.blind.scoring import BlindScore, score_blind
-    from bench.discrepancy.case import (
+    from bench.discrepancy.case.case import (
         Case,
         CaseChannel,
         CaseRecord,
@@ -20,28 +20,28 @@ if TYPE_CHECKING:
         record_from_arrays,
     )
     from bench.discrepancy.diagnosis import Diagnosis, diagnose, diagnose_folder
-    from bench.discrepancy.report.pages import write_report
-    from bench.discrepancy.report.rerun import write_rerun
+    from bench.discrepancy.report.html_page import write_report
+    from bench.discrepancy.report.rerun_recording import write_rerun
     from bench.discrepancy.verdict import Verdict
 
 _HOMES = {
     "BlindOptions": "blind.protocol",
     "BlindScore": "blind.scoring",
-    "Case": "case",
-    "CaseChannel": "case",
-    "CaseRecord": "case",
+    "Case": "case.case",
+    "CaseChannel": "case.case",
+    "CaseRecord": "case.case",
     "Diagnosis": "diagnosis",
-    "NominalParameter": "case",
+    "NominalParameter": "case.case",
     "Verdict": "verdict",
     "diagnose": "diagnosis",
     "diagnose_folder": "diagnosis",
     "make_blind": "blind.protocol",
-    "read_case": "case",
-    "record_from_arrays": "case",
+    "read_case": "case.case",
+    "record_from_arrays": "case.case",
     "run_blind": "blind.protocol",
     "score_blind": "blind.scoring",
-    "write_report": "report.pages",
-    "write_rerun": "report.rerun",
+    "write_report": "report.html_page",
+    "write_rerun": "report.rerun_recording",
 }
 
 __all__ = [

@@ -16,30 +16,30 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from bench.discrepancy import evidence
-from bench.discrepancy.attribute import STALLED
-from bench.discrepancy.between_samples import promising_readings, reading_notes
-from bench.discrepancy.case import Case, read_case
-from bench.discrepancy.catalogue import CATALOGUE
-from bench.discrepancy.closure import CLOSURES
-from bench.discrepancy.contradiction import contradicted
-from bench.discrepancy.effect import Effect
-from bench.discrepancy.explain import Explanation, close, explain, nominal_alone
-from bench.discrepancy.free_rival import Rival, likelier_force
-from bench.discrepancy.idle_loads import idle_notes, without_idle_noise
-from bench.discrepancy.moving_starts import with_starts_found
-from bench.discrepancy.next_excitation import separate, told_apart
-from bench.discrepancy.nominal_file import check_units
-from bench.discrepancy.placed import Hypothesis
-from bench.discrepancy.problem import Problem
-from bench.discrepancy.quality import notes, refuse
-from bench.discrepancy.quantisation import recorded
-from bench.discrepancy.search import names
-from bench.discrepancy.shrink import gaps, nominal_prediction
-from bench.discrepancy.start_estimates import start_warnings
-from bench.discrepancy.structure import structure_of
+from bench.discrepancy.case.case import Case, read_case
+from bench.discrepancy.case.idle_loads import idle_notes, without_idle_noise
+from bench.discrepancy.case.schema import check_units
+from bench.discrepancy.checks.data_quality import notes, refuse
+from bench.discrepancy.checks.initial_motion import with_starts_found
+from bench.discrepancy.checks.quantisation import recorded
+from bench.discrepancy.effects.catalogue import CATALOGUE
+from bench.discrepancy.effects.effect import Effect
+from bench.discrepancy.effects.nonparametric import CLOSURES
+from bench.discrepancy.fitting.initial_state_fit import start_warnings
+from bench.discrepancy.judgement import posterior as evidence
+from bench.discrepancy.judgement.nonparametric_rival import Rival, likelier_force
+from bench.discrepancy.judgement.predictive_check import contradicted
+from bench.discrepancy.judgement.validation_discrepancy import gaps, nominal_prediction
+from bench.discrepancy.likelihood.problem import Problem
+from bench.discrepancy.localisation.localise import Whereabouts, locate
+from bench.discrepancy.model.placement import Hypothesis
+from bench.discrepancy.model.structure import structure_of
+from bench.discrepancy.next_test.discriminating_excitation import separate, told_apart
+from bench.discrepancy.search.explain import Explanation, close, explain, nominal_alone
+from bench.discrepancy.search.fits import names
+from bench.discrepancy.search.forward_selection import STALLED
+from bench.discrepancy.search.load_interpolation import promising_readings, reading_notes
 from bench.discrepancy.verdict import Gap, Kind, NamedEffect, Ranked, Verdict
-from bench.discrepancy.where.locate import Whereabouts, locate
 from bench.errors import UnknownNameError
 
 SEED = 20060501

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from bench.discrepancy import Case, Diagnosis, diagnose_folder
-from bench.discrepancy.report.application import nominal_estimates
+from bench.discrepancy.report.model_update import nominal_estimates
 from bench.recording import Recording
 from bench.rig import Element, Rig, simulate
 

@@ -25,10 +25,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.discrepancy import BlindOptions, BlindScore, diagnose, make_blind, read_case, score_blind
-from bench.discrepancy.case import Case, CaseRecord
-from bench.discrepancy.problem import Problem
-from bench.discrepancy.shrink import DIVERGED_GAP, coordinates, noise_level, nrmse
-from bench.discrepancy.structure import structure_of
+from bench.discrepancy.case.case import Case, CaseRecord
+from bench.discrepancy.judgement.validation_discrepancy import DIVERGED_GAP, coordinates, noise_level, nrmse
+from bench.discrepancy.likelihood.problem import Problem
+from bench.discrepancy.model.structure import structure_of
 from bench.files import write_text
 from benchmarks.new_process import in_new_process, memory_row
 from benchmarks.timing import Row

@@ -18,9 +18,9 @@ import numpy as np
 import pysindy
 from numpy.typing import NDArray
 
-from bench.discrepancy.case import Case, CaseRecord
-from bench.discrepancy.problem import Problem
-from bench.discrepancy.structure import Place, Structure, structure_of
+from bench.discrepancy.case.case import Case, CaseRecord
+from bench.discrepancy.likelihood.problem import Problem
+from bench.discrepancy.model.structure import Place, Structure, structure_of
 
 Array = NDArray[np.float64]
 Column = Callable[[Array, Array, Array, float | Array], Array]

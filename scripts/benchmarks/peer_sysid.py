@@ -28,15 +28,15 @@ from mujoco import sysid
 from numpy.typing import NDArray
 
 from bench import Element, Rig
-from bench.discrepancy.case import Case, CaseRecord
-from bench.discrepancy.catalogue import CATALOGUE
-from bench.discrepancy.effect import Effect
-from bench.discrepancy.placed import Placed
-from bench.discrepancy.placements import placements
-from bench.discrepancy.prepared import whitened
-from bench.discrepancy.problem import Problem
-from bench.discrepancy.structure import Structure, structure_of
-from bench.discrepancy.system import Motion
+from bench.discrepancy.case.case import Case, CaseRecord
+from bench.discrepancy.effects.catalogue import CATALOGUE
+from bench.discrepancy.effects.effect import Effect
+from bench.discrepancy.likelihood.problem import Problem
+from bench.discrepancy.likelihood.whitening import whitened
+from bench.discrepancy.model.placement import Placed
+from bench.discrepancy.model.placements import placements
+from bench.discrepancy.model.structure import Structure, structure_of
+from bench.discrepancy.simulation.stick_slip import Motion
 from benchmarks.peer_model import Compiled
 
 Array = NDArray[np.float64]

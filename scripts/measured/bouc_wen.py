@@ -20,7 +20,7 @@ import numpy as np
 from scipy.io import loadmat
 
 from bench.discrepancy import Case, CaseChannel, NominalParameter, record_from_arrays
-from bench.discrepancy.acquisition import Antialias
+from bench.discrepancy.case.acquisition import Antialias
 from bench.record_files.arrays import read_hdf5
 from measured.target import Target
 

@@ -27,7 +27,7 @@ import numpy as np
 from scipy.io import loadmat
 from scipy.signal import decimate
 
-from bench.discrepancy.case import Case, CaseChannel, NominalParameter, record_from_arrays
+from bench.discrepancy.case.case import Case, CaseChannel, NominalParameter, record_from_arrays
 
 FACTOR = 5
 """Samples at 1 kHz for one of the case."""

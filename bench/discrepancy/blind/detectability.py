@@ -18,13 +18,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from bench.discrepancy.case import Case
+from bench.discrepancy.case.case import Case
 from bench.errors import BenchError
 
 if TYPE_CHECKING:
-    from bench.discrepancy.fit import Fit
-    from bench.discrepancy.grid_points import Point
-    from bench.discrepancy.structure import Structure
+    from bench.discrepancy.fitting.map_fit import Fit
+    from bench.discrepancy.model.structure import Structure
+    from bench.discrepancy.screening.linear_amplitudes import Point
 
 RIVALS, RIVALS_COUPLED = 6, 3
 """Effects that the screening likes best and that are fitted; fewer where an effect couples the degrees of freedom."""
@@ -71,7 +71,7 @@ class _Group(NamedTuple):
 
 def _odds_of(pure: Case, true: Mapping[str, float], truth: Mapping[str, str]) -> dict[str, Any]:
     # the diagnosis is imported where it is asked: a maker that was told to leave this out runs without it
-    from bench.discrepancy.structure import structure_of  # noqa: PLC0415
+    from bench.discrepancy.model.structure import structure_of  # noqa: PLC0415
 
     structure = structure_of(pure)
     parts = [structure.restricted(group) for group in structure.groups()]
@@ -93,11 +93,11 @@ def _odds_of(pure: Case, true: Mapping[str, float], truth: Mapping[str, str]) ->
 
 
 def _group(pure: Case, structure: Structure, true: Mapping[str, float], truth: Mapping[str, str]) -> _Group:
-    from bench.discrepancy.catalogue import CATALOGUE  # noqa: PLC0415
-    from bench.discrepancy.fit import fit  # noqa: PLC0415
-    from bench.discrepancy.placements import placements  # noqa: PLC0415
-    from bench.discrepancy.problem import Problem  # noqa: PLC0415
-    from bench.discrepancy.screen import Screen  # noqa: PLC0415
+    from bench.discrepancy.effects.catalogue import CATALOGUE  # noqa: PLC0415
+    from bench.discrepancy.fitting.map_fit import fit  # noqa: PLC0415
+    from bench.discrepancy.likelihood.problem import Problem  # noqa: PLC0415
+    from bench.discrepancy.model.placements import placements  # noqa: PLC0415
+    from bench.discrepancy.screening.screen import Screen  # noqa: PLC0415
 
     problem = Problem(pure, structure, pure.identification)
     away = [

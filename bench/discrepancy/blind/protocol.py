@@ -27,8 +27,8 @@ from typing import Any
 
 import numpy as np
 
-from bench.discrepancy.blind.cases import BlindOptions, draw_case
-from bench.discrepancy.case import Case
+from bench.discrepancy.blind.drawing import BlindOptions, draw_case
+from bench.discrepancy.case.case import Case
 from bench.errors import BenchError, FileFormatError, ParameterError
 from bench.files import replacing, write_text
 

@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from bench.discrepancy.blind.proportions import Share
 from bench.discrepancy.blind.scoring import BlindScore
-from bench.discrepancy.blind.shares import Share
 from bench.page import Page
 
 REQUIRED = {

@@ -22,10 +22,10 @@ from typing import Any
 
 import numpy as np
 
-from bench.discrepancy.blind.bands import bands_of, by_band
-from bench.discrepancy.blind.region_score import region_scores
-from bench.discrepancy.blind.shares import Share, calibration_error, reliability, share_of
-from bench.discrepancy.catalogue import CATALOGUE
+from bench.discrepancy.blind.proportions import Share, calibration_error, reliability, share_of
+from bench.discrepancy.blind.region_overlap import region_scores
+from bench.discrepancy.blind.strata import bands_of, by_band
+from bench.discrepancy.effects.catalogue import CATALOGUE
 from bench.errors import FileFormatError
 from bench.files import json_values
 

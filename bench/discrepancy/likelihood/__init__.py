@@ -1,0 +1,1 @@
+"""What a residual is worth: the noise of the residuals, its whitening, and the prior."""

@@ -1,0 +1,164 @@
+"""Records made ready for comparison: their band, the whitening of their residuals, their windows where they have any."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from bench.discrepancy.case.case import CaseRecord
+from bench.discrepancy.likelihood.window_whitening import Windows, orthonormal
+from bench.discrepancy.numerics.spectral_product import whiten
+
+Array = NDArray[np.float64]
+ABOVE_NOISE = 1.5
+"""A frequency belongs to the band of a record while a smoothed response spectrum exceeds this many times its noise."""
+TIMED = 5.0
+"""Residual, in standard deviations of the noise, that a jump within a sample of its time may leave."""
+MAX_BINS = 2500
+"""Most frequency bins of a record; friction rattles an accelerometer up to the Nyquist frequency and one need not follow."""
+
+
+class RecordData(NamedTuple):
+    """One record, prepared for fits.
+
+    Attributes:
+        record: The record.
+        loads: (n, n_loads).
+        responses: (n, n_channels).
+        n_bins: Number of frequency bins in the band.
+        whitening: (n_bins, n_channels, n_channels) complex; whitening times the spectrum of the noise is white.
+        windows: Windows that restart from the measured state; None where the whole record is one free run.
+        compared: (n,) ones and zeros: samples that are compared; None for all.
+        together: (k, k) what whitens the lower bins together, see `swinging_noise`; None where every bin stands alone.
+    """
+
+    record: CaseRecord
+    loads: Array
+    responses: Array
+    n_bins: int
+    whitening: NDArray[np.complex128]
+    windows: Windows | None = None
+    compared: Array | None = None
+    together: Array | None = None
+
+
+def fast_length(n: int) -> int:
+    """FFT length for a record of `n` samples."""
+    return int(fft.next_fast_len(n, real=True) or n)
+
+
+def noise_floor(x: Array) -> float:
+    """White noise of a channel whose noise is not stated, from the flattest quarter of its spectrum."""
+    spectrum = np.abs(np.fft.rfft((x - x.mean()) * np.hanning(len(x)))) ** 2 / (len(x) * 0.375)
+    upper = spectrum[len(spectrum) // 2 :]
+    blocks = [np.mean(block) for block in np.array_split(upper, 8)]
+    return float(np.sqrt(max(min(blocks), (1e-6 * np.std(x)) ** 2, 1e-300)))
+
+
+def band_bins(responses: Array, noise: Array) -> int:
+    """Number of frequency bins up to where every response has sunk into its noise."""
+    n = fast_length(len(responses))
+    last = 32
+    for c in range(responses.shape[1]):
+        spectrum = np.abs(np.fft.rfft(responses[:, c], n)) ** 2 / len(responses)
+        width = max(len(spectrum) // 200, 8)
+        usable = len(spectrum) // width * width
+        smooth = spectrum[:usable].reshape(-1, width).mean(axis=1)
+        above = np.flatnonzero(smooth > ABOVE_NOISE * noise[c] ** 2)
+        if len(above):
+            last = max(last, (above[-1] + 2) * width)
+    return int(min(last, n // 2, MAX_BINS))
+
+
+def timed(residual: Array, predicted: Array, noise: float) -> Array:
+    """Residuals (n,) of one channel, limited where a predicted jump that comes a sample early or late explains them.
+
+    Friction and stops make accelerations jump. The noise of the loads moves the time of a jump by microseconds; where a sample
+    falls into them it is off by the whole jump, tens of standard deviations, and no parameter is to blame.
+
+    Args:
+        residual: Measured minus predicted.
+        predicted: The free run.
+        noise: Standard deviation of the channel's noise.
+    """
+    out = residual.copy()
+    _excuse(residual, predicted, TIMED * noise, out)
+    return out
+
+
+@numba.njit(cache=True, error_model="numpy", nogil=True)
+def _excuse(residual, predicted, most, out):
+    """Limit to `most` in `out` what a jump between two samples explains, that of the sample before first."""
+    before = 0.0
+    for k in range(2, len(predicted) - 1):
+        jump = _jump(predicted, k, most) if k < len(predicted) - 3 else 0.0
+        for reach in (-before, jump):
+            part = residual[k] * np.sign(reach)
+            if part > most and part < abs(reach) + most:
+                out[k] = most * np.sign(reach)
+                break
+        before = jump
+
+
+@numba.njit(cache=True, error_model="numpy", nogil=True)
+def _jump(predicted, k, most):
+    """What the rise from sample k to the next is more than the median of four about it; zero where that is no jump."""
+    rise = predicted[k + 1] - predicted[k]
+    left, right = predicted[k] - predicted[k - 1], predicted[k + 2] - predicted[k + 1]
+    far_left, far_right = predicted[k - 1] - predicted[k - 2], predicted[k + 3] - predicted[k + 2]
+    least = min(left, right, far_left, far_right)
+    largest = max(left, right, far_left, far_right)
+    slope = 0.5 * (left + right + far_left + far_right - least - largest)
+    around = max(abs(left - slope), abs(right - slope))
+    return rise - slope if abs(rise - slope) > 2.0 * max(most, around) else 0.0
+
+
+def whitened(residual: Array, data: RecordData) -> Array:
+    """Whitened time-domain residuals (n, n_channels) over the band, as real numbers."""
+    if data.windows is None:
+        return whitened_spectrum(residual, data)
+    white = data.windows.whitened(residual)
+    return (white - (white @ data.windows.reachable) @ data.windows.reachable.T).ravel()
+
+
+def projected(residual: Array, moved: Sequence[Array], data: RecordData) -> Array:
+    """Whitened residuals (n, n_channels) of a record in windows, without what other starts would have changed.
+
+    Args:
+        residual: Residuals.
+        moved: Change of the channels (n, n_channels) with each entry of the starts.
+        data: The record.
+    """
+    if data.windows is None:
+        return whitened(residual, data)
+    white = data.windows.whitened(residual)
+    responses = np.stack([data.windows.whitened(change) for change in moved], axis=-1)
+    for w, columns in enumerate(responses):
+        basis = orthonormal(columns)
+        white[w] -= basis @ (basis.T @ white[w])
+    return white.ravel()
+
+
+def masked(samples: Array, compared: Array | None) -> Array:
+    """Samples (n, k) of a record, those that are not compared set to zero, the others scaled to keep the power of white noise."""
+    return samples if compared is None else samples * (compared / np.sqrt(compared.mean()))[:, None]
+
+
+def whitened_spectrum(residual: Array, data: RecordData) -> Array:
+    """Whitened spectrum of time-domain residuals (n, n_channels) of a whole record, real parts before imaginary ones."""
+    n = len(residual)
+    spectrum = fft.rfft(masked(residual, data.compared), fast_length(n), axis=0)[: data.n_bins] / np.sqrt(
+        n / 2.0
+    )
+    white = whiten(spectrum, data.whitening)
+    white[:, 0] /= np.sqrt(2.0)
+    if data.together is not None:
+        count = len(data.together) // (2 * spectrum.shape[1])
+        lower = np.concatenate([spectrum[:count].real.ravel(), spectrum[:count].imag.ravel()])
+        white[:, :count] = (data.together @ lower).reshape(2, count, -1)
+    return white.ravel()

@@ -1,0 +1,435 @@
+"""The force that a nominal model lacks along a measured motion, with what noise alone would make of it.
+
+At every place a force of unknown course acts; it is a further state of the structure, a slow random walk, and a
+Rauch-Tung-Striebel smoother estimates it together with the motion from loads and all response channels. It uses
+position and acceleration channels alike, whichever exist, and knows no law. The intensity of the walk is chosen by the
+likelihood of the innovations. The smoother is linear in the data, so noise alone, sent through it, tells how large and
+how coloured the error of the estimate is.
+
+Differentiating the measured motion and inserting it into the equations was the alternative; its error grows with the
+square of the frequency, and with two sensors at a coordinate it leaves open which one to trust at which frequency.
+
+References:
+    E. Lourens et al., An augmented Kalman filter for force identification in structural dynamics, Mechanical Systems and
+    Signal Processing 27 (2012) 446-460.
+    E. K. W. Chu, H. Y. Fan, W. W. Lin, A structure-preserving doubling algorithm for periodic discrete-time algebraic
+    Riccati equations, Linear Algebra and its Applications 396 (2005).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numba
+import numpy as np
+
+from bench.discrepancy.case.case import CaseRecord
+from bench.discrepancy.likelihood.problem import COULOMB, Array, Problem
+from bench.discrepancy.model.nominal_forces import own_force
+from bench.discrepancy.model.structure import Place, Structure
+from bench.discrepancy.simulation.stick_slip import LinearStructure, Motion
+
+INTENSITIES = 10.0 ** np.arange(-3.0, 2.1, 0.5)
+"""Multiples of a first guess of the walk's intensity that are compared by likelihood."""
+FORGETTING = 0.01
+"""Decay rate of the force, as a part of the mean circular frequency of the motion: a constant force in front of an
+accelerometer is not observable, and without decay its estimate would not settle."""
+LOOSE = 300.0
+"""How poorly the mean position counts as known where none is measured, as a multiple of the motion."""
+TUNED_ON = 8000
+"""Samples on which the intensity is chosen."""
+DOUBLINGS = 40
+
+_jit = numba.njit(cache=True, error_model="numpy", nogil=True)
+
+
+class ForceEstimate(NamedTuple):
+    """Motion and missing force of a record.
+
+    Attributes:
+        position: (n, n_dof).
+        velocity: (n, n_dof).
+        force: (n, n_places), positive where it opposes a positive displacement.
+        noise: (n_noise, n, n_places), what noise alone leaves of a force that is zero.
+    """
+
+    position: Array
+    velocity: Array
+    force: Array
+    noise: Array
+
+
+class _Model(NamedTuple):
+    """Discrete model of the structure with its missing forces, in scaled states.
+
+    Attributes:
+        transition: (d, d).
+        drive: Two (d, n_loads): load at the start of a step, and its change over it.
+        process: Process noise of the loads (d, d).
+        walk: (n_places, d, d) process noise of a walk of unit intensity at each place.
+        observe: (m, d), channels in units of their noise.
+        feed: (m, n_loads) direct part of the loads in the channels.
+        size: (m,) noise of the channels.
+        scale: (d,) physical over scaled states.
+    """
+
+    transition: Array
+    drive: tuple[Array, Array]
+    process: Array
+    walk: Array
+    observe: Array
+    feed: Array
+    size: Array
+    scale: Array
+
+
+class _Gains(NamedTuple):
+    """Stationary gains of filter and smoother, and the covariance of the innovations."""
+
+    forward: Array
+    backward: Array
+    innovation: Array
+
+
+@_jit
+def _filter(y, drive, transition, observe, gain, start, filtered, predicted):
+    n, m = y.shape
+    d = transition.shape[0]
+    squares = np.zeros((m, m))
+    innovation = np.zeros(m)
+    state = start.copy()
+    skipped = n // 20
+    for k in range(n):
+        if k > 0:
+            for i in range(d):
+                total = drive[k - 1, i]
+                for j in range(d):
+                    total += transition[i, j] * filtered[k - 1, j]
+                state[i] = total
+        for i in range(d):
+            predicted[k, i] = state[i]
+        for c in range(m):
+            innovation[c] = y[k, c]
+            for i in range(d):
+                innovation[c] -= observe[c, i] * state[i]
+        for i in range(d):
+            total = state[i]
+            for c in range(m):
+                total += gain[i, c] * innovation[c]
+            filtered[k, i] = total
+        if k > skipped:
+            for c in range(m):
+                for e in range(m):
+                    squares[c, e] += innovation[c] * innovation[e]
+    return squares / (n - 1 - skipped)
+
+
+@_jit
+def _smooth(filtered, predicted, back):
+    d = filtered.shape[1]
+    ahead = np.zeros(d)
+    for k in range(filtered.shape[0] - 2, -1, -1):
+        for i in range(d):
+            ahead[i] = filtered[k + 1, i] - predicted[k + 1, i]
+        for i in range(d):
+            for j in range(d):
+                filtered[k, i] += back[i, j] * ahead[j]
+
+
+def _exponential(a: Array) -> Array:
+    """Matrix exponential by scaling, Taylor's series and squaring; for these small matrices ten times faster than SciPy's."""
+    halvings = max(0, int(np.ceil(np.log2(max(np.abs(a).sum(axis=0).max(), 1e-300)))) + 2)
+    small = a / 2.0**halvings
+    term = out = np.eye(len(a))
+    for k in range(1, 13):  # 0.25^13 / 13! is below the rounding error
+        term = term @ small / k
+        out = out + term
+    for _ in range(halvings):
+        out = out @ out
+    return out
+
+
+def _riccati(transition: Array, observe: Array, process: Array) -> Array:
+    """Stationary covariance of the prediction under unit noise, by doubling: sure even next to the unit circle."""
+    a = transition.T.copy()
+    g = observe.T @ observe
+    h = process.copy()
+    eye = np.eye(len(a))
+    for _ in range(DOUBLINGS):
+        inner = np.linalg.solve(eye + g @ h, np.hstack([a, g]))
+        a_inner, g_inner = inner[:, : len(a)], inner[:, len(a) :]
+        # (I + G H)^-1 on the left of A and G; H (I + G H)^-1 is symmetric because G and H are
+        new_h = h + a.T @ h @ a_inner
+        g = g + a @ g_inner @ a.T
+        a = a @ a_inner
+        settled = np.abs(new_h - h).max() <= 1e-12 * np.abs(new_h).max()
+        h = 0.5 * (new_h + new_h.T)
+        if settled:
+            break
+    return h
+
+
+def _gains(model: _Model, intensity: Array) -> _Gains:
+    process = model.process + np.tensordot(intensity**2, model.walk, 1)
+    covariance = _riccati(model.transition, model.observe, process)
+    innovation = model.observe @ covariance @ model.observe.T + np.eye(len(model.size))
+    forward = np.linalg.solve(innovation, model.observe @ covariance).T
+    posterior = covariance - forward @ model.observe @ covariance
+    backward = np.linalg.lstsq(covariance, model.transition @ posterior, rcond=1e-13)[0].T
+    return _Gains(
+        np.ascontiguousarray(forward, np.float64), np.ascontiguousarray(backward, np.float64), innovation
+    )
+
+
+@dataclass
+class ForceObserver:
+    """Estimates missing forces on a set of degrees of freedom that the linear structure couples.
+
+    Attributes:
+        problem: Records and priors.
+        structure: The structure on these degrees of freedom.
+        dofs: Their indices in the structure of the problem.
+        places: Places with one coordinate; a force is estimated at each.
+    """
+
+    problem: Problem
+    structure: Structure
+    dofs: tuple[int, ...]
+    places: tuple[Place, ...] = field(init=False)
+    _intensity: dict[str, Array] = field(init=False, default_factory=dict)
+    _steps: dict[tuple, tuple[Array, Array, Array, Array]] = field(init=False, default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.places = tuple(p for p in self.structure.places if len(p.rows) == 1)
+
+    def nominal(self, table: Mapping[str, float] | None = None) -> Array:
+        """Values (n_parameters,) of the structure's parameters: those given by name, the nominal ones otherwise."""
+        own = dict(zip(self.problem.structure.parameters, self.problem.nominal, strict=True)) | dict(
+            table or {}
+        )
+        return np.array([own[name] for name in self.structure.parameters])
+
+    def spread(self) -> Array:
+        """Uncertainties (n_parameters,) of the structure's parameters."""
+        own = dict(zip(self.problem.structure.parameters, self.problem.spread, strict=True))
+        return np.array([own[name] for name in self.structure.parameters])
+
+    def _noise(self) -> tuple[Array, Array]:
+        channels = dict(zip(self.problem.structure.channels, self.problem.noise, strict=True))
+        loads = dict(zip(self.problem.structure.loads, self.problem.load_noise, strict=True))
+        own = np.zeros(len(self.dofs) if self.structure.has_own_forces else 0)
+        return (
+            np.array([channels[name] for name in self.structure.channels]),
+            np.append([loads[name] for name in self.structure.loads], own),
+        )
+
+    def _loads(self, record: CaseRecord, values: Array, motion: Motion) -> Array:
+        """Loads (n, n_inputs) of a record, and what the nominal model's own friction and bending springs exert along a motion."""
+        loads = np.column_stack([record.values[name] for name in self.structure.loads])
+        return (
+            np.hstack([loads, -own_force(self.structure, values, motion)])
+            if self.structure.has_own_forces
+            else loads
+        )
+
+    def _inputs(self, linear: LinearStructure) -> Array:
+        """How these act (n_dof, n_inputs)."""
+        return (
+            np.hstack([linear.inputs, np.eye(len(self.dofs))])
+            if self.structure.has_own_forces
+            else linear.inputs
+        )
+
+    def estimate(self, record: CaseRecord, values: Array, *, noise: int = 0) -> ForceEstimate:
+        """Estimate the missing forces of a record.
+
+        Args:
+            record: Any record with the channels of the case.
+            values: Parameter values (n_parameters,).
+            noise: Number of passes of noise alone.
+        """
+        if self.problem.driven:
+            return self._driven(record, values, noise)
+        own = list(self.dofs)
+        motion = Motion(*(samples[:, own] for samples in self.problem.motion_of(record)))
+        position, velocity = motion.position, motion.velocity
+        reach = np.maximum(np.std(position, axis=0), 1e-12)
+        model = self._model(values, record.step, reach)
+        loads = self._loads(record, values, motion)
+        samples = np.column_stack([record.values[name] for name in self.structure.channels])
+        start = np.concatenate([position[0], velocity[0], np.zeros(len(self.places))]) / model.scale
+        if record.name not in self._intensity:
+            guess = self._guess(loads, position, velocity)
+            self._intensity[record.name] = _tuned(model, samples, loads, start, guess)
+        gains = _gains(model, self._intensity[record.name])
+        states = _smoothed(model, gains, samples, loads, start)
+        passes = np.zeros((noise, len(record), len(self.places)))
+        stds, load_stds = self._noise()
+        n_dof = len(own)
+        for k in range(noise):
+            rng = np.random.default_rng(k)
+            fake = rng.standard_normal(samples.shape) * stds
+            fake_loads = rng.standard_normal(loads.shape) * load_stds
+            passes[k] = _smoothed(model, gains, fake, fake_loads, np.zeros(len(start)))[:, 2 * n_dof :]
+        return ForceEstimate(states[:, :n_dof], states[:, n_dof : 2 * n_dof], states[:, 2 * n_dof :], passes)
+
+    def _guess(self, loads: Array, position: Array, velocity: Array) -> Array:
+        rows = np.vstack([p.rows for p in self.places])
+        acting = np.abs(self.structure.inputs).sum(axis=0) > 0
+        level = float(np.sqrt(np.mean(loads[:, : len(acting)][:, acting] ** 2))) if acting.any() else 1.0
+        rate = np.std(velocity @ rows.T, axis=0) / np.maximum(np.std(position @ rows.T, axis=0), 1e-300)
+        return (level or 1.0) * np.sqrt(np.maximum(rate, 1e-3))
+
+    def _model(self, values: Array, step: float, reach: Array) -> _Model:
+        linear = self.structure.at(values)
+        inputs = self._inputs(linear)
+        n, p, u = len(linear.mass), len(self.places), inputs.shape[1]
+        inverse = np.linalg.inv(linear.mass)
+        rows = np.vstack([place.rows for place in self.places])
+        spread = inverse @ rows.T
+        stiffest = float(np.sqrt(np.abs(inverse @ linear.stiffness).max())) or 1.0 / (1000.0 * step)
+        d = 2 * n + p
+        rate = np.zeros((d, d))
+        rate[:n, n : 2 * n] = np.eye(n)
+        acceleration = np.hstack([-inverse @ linear.stiffness, -inverse @ linear.damping, -spread])
+        rate[n : 2 * n] = acceleration
+        rate[2 * n :, 2 * n :] = -FORGETTING * stiffest * np.eye(p)
+        drive = np.zeros((d, u))
+        drive[n : 2 * n] = inverse @ inputs
+        # In steps as the unit of time the states are alike in size; the Riccati equation is hopeless in SI units.
+        apparent = np.abs(spread).max(axis=0)
+        scale = np.concatenate([reach, reach / step, reach.max() / step**2 / apparent])
+        transition, first, change, walks = self._discrete(rate, drive, step)
+        stds, load_stds = self._noise()
+        observe, feed, noise = [], [], []
+        for c, observer in enumerate(self.structure.observers):
+            row = np.zeros(d)
+            direct = np.zeros(u)
+            if observer.order == 2:
+                row, direct = observer.row @ acceleration, observer.row @ inverse @ inputs
+            else:
+                row[observer.order * n : (observer.order + 1) * n] = observer.row
+            observe.append(row)
+            feed.append(direct)
+            noise.append(stds[c] ** 2 + np.sum((direct * load_stds) ** 2))
+        for i in range(n):
+            if not any(o.order == 0 and o.row[i] != 0 for o in self.structure.observers):
+                row = np.zeros(d)
+                row[i] = 1.0
+                observe.append(row)
+                feed.append(np.zeros(u))
+                noise.append((LOOSE * reach[i]) ** 2)
+        measured = np.array(observe)
+        # Channels in units of their noise, so that the innovations are of order one.
+        size = np.sqrt(np.array(noise))
+        loads_noise = first * load_stds
+        return _Model(
+            np.ascontiguousarray(transition * scale / scale[:, None]),
+            (first / scale[:, None], change / scale[:, None]),
+            loads_noise @ loads_noise.T / np.outer(scale, scale),
+            walks / np.outer(scale, scale),
+            np.ascontiguousarray(measured * scale / size[:, None]),
+            np.array(feed) / size[:, None],
+            size,
+            scale,
+        )
+
+    def _discrete(self, rate: Array, drive: Array, step: float) -> tuple[Array, Array, Array, Array]:
+        """Transition, effect of a load and of its change over a step, and noise of a unit walk at each place."""
+        key = (rate.tobytes(), drive.tobytes(), step)
+        if key in self._steps:
+            return self._steps[key]
+        d, u = drive.shape
+        block = np.zeros((d + 2 * u, d + 2 * u))
+        block[:d, :d] = rate * step
+        block[:d, d : d + u] = drive * step
+        block[d : d + u, d + u :] = np.eye(u)
+        whole = _exponential(block)
+        walks = []
+        for j in range(len(self.places)):
+            joint = np.zeros((2 * d, 2 * d))
+            joint[:d, :d], joint[d:, d:] = -rate, rate.T
+            at = d - len(self.places) + j
+            joint[at, d + at] = 1.0
+            result = _exponential(joint * step)
+            walks.append(result[d:, d:].T @ result[:d, d:])
+        change = whole[:d, d + u :]
+        if self.problem.case.load_interpolation == "zero_order_hold":
+            change = np.zeros_like(change)
+        self._steps[key] = whole[:d, :d], whole[:d, d : d + u], change, np.array(walks)
+        return self._steps[key]
+
+    def _driven(self, record: CaseRecord, values: Array, noise: int) -> ForceEstimate:
+        linear = self.structure.at(values)
+        motion = self.problem.motion_of(record)
+        model = motion.position @ linear.stiffness + motion.velocity @ linear.damping
+        if COULOMB in self.structure.parameters:
+            model = model + values[self.structure.parameters.index(COULOMB)] * np.sign(motion.velocity)
+        measured = np.column_stack([record.values[name] for name in self.structure.channels])[:, :1]
+        stds, _ = self._noise()
+        passes = np.array(
+            [np.random.default_rng(k).standard_normal(measured.shape) * stds[0] for k in range(noise)]
+        ).reshape(noise, *measured.shape)
+        return ForceEstimate(motion.position, motion.velocity, measured - model, passes)
+
+
+def _signals(model: _Model, samples: Array, loads: Array) -> tuple[Array, Array]:
+    """Channels less the direct part of the loads (n, m), and what the loads add to the state over each step (n, d)."""
+    padded = np.zeros((len(samples), len(model.size)))
+    padded[:, : samples.shape[1]] = samples
+    y = padded / model.size - loads @ model.feed.T
+    rise = np.vstack([np.diff(loads, axis=0), np.zeros((1, loads.shape[1]))])
+    drive = loads @ model.drive[0].T + rise @ model.drive[1].T
+    return np.ascontiguousarray(y), np.ascontiguousarray(drive)
+
+
+def _smoothed(model: _Model, gains: _Gains, samples: Array, loads: Array, start: Array) -> Array:
+    """Smoothed states (n, d) in physical units."""
+    y, drive = _signals(model, samples, loads)
+    filtered = np.zeros((len(y), len(start)))
+    predicted = np.zeros_like(filtered)
+    _filter(y, drive, model.transition, model.observe, gains.forward, start, filtered, predicted)
+    _smooth(filtered, predicted, gains.backward)
+    return filtered * model.scale
+
+
+def _tuned(model: _Model, samples: Array, loads: Array, start: Array, guess: Array) -> Array:
+    """Most likely intensity of the walk at each place, one place after the other, twice round where there are several."""
+    y, drive = _signals(model, samples[:TUNED_ON], loads[:TUNED_ON])
+    filtered = np.zeros((len(y), len(start)))
+    predicted = np.zeros_like(filtered)
+
+    def score(intensity: Array) -> float:
+        gains = _gains(model, intensity)
+        if not np.isfinite(gains.forward).all():
+            return np.inf
+        observed = _filter(
+            y, drive, model.transition, model.observe, gains.forward, start, filtered, predicted
+        )
+        _, logarithm = np.linalg.slogdet(gains.innovation)
+        total = float(logarithm + np.trace(np.linalg.solve(gains.innovation, observed)))
+        return total if np.isfinite(total) else np.inf
+
+    best = guess.copy()
+    for _ in range(1 if len(guess) == 1 else 2):
+        for j in range(len(guess)):
+            trials = []
+            for multiple in INTENSITIES:
+                trial = best.copy()
+                trial[j] = multiple * guess[j]
+                trials.append((score(trial), multiple * guess[j]))
+            best[j] = min(trials)[1]
+    return best
+
+
+def observers(problem: Problem) -> tuple[ForceObserver, ...]:
+    """Return one observer for every group of coupled degrees of freedom that holds a place."""
+    out = []
+    for group in problem.structure.groups():
+        part = problem.structure.restricted(group)
+        observer = ForceObserver(problem, part, tuple(group))
+        if observer.places and part.observers:
+            out.append(observer)
+    return tuple(out)

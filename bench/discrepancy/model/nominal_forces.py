@@ -1,0 +1,139 @@
+"""Forces that the nominal model has itself and that no matrix holds: its dry friction, and springs that bend with the angle."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.discrepancy.effects.friction_limits import coulomb_limit
+from bench.discrepancy.numerics.cubic_spline import cubic, spline_of
+from bench.discrepancy.simulation.stick_slip import ROW, THETA, Elements, Motion
+from bench.laws.base import kernel
+
+if TYPE_CHECKING:
+    from bench.discrepancy.model.structure import Structure
+
+Array = NDArray[np.float64]
+PIECES = 256
+"""Pieces of the spline that a bending spring is tabulated as: over a turn of a pendulum either way it is good to 2e-8 of the torque."""
+
+
+@dataclass(frozen=True)
+class NominalFriction:
+    """Dry friction that the nominal model has already.
+
+    Attributes:
+        row: (n_dof,) relative coordinate that it acts on.
+        parameter: Name of the nominal parameter that is its limit; empty where the limit is fixed.
+        value: The limit where it is fixed [N or N m].
+    """
+
+    row: Array
+    parameter: str = ""
+    value: float = 0.0
+
+    def level(self, structure: Structure, values: Array) -> float:
+        """Limit of the friction at nominal parameter values (n_parameters,)."""
+        if not self.parameter:
+            return self.value
+        return max(float(values[structure.parameters.index(self.parameter)]), 0.0)
+
+    def restricted(self, keep: Sequence[int]) -> NominalFriction:
+        """The same on some degrees of freedom."""
+        return NominalFriction(self.row[list(keep)], self.parameter, self.value)
+
+
+@dataclass(frozen=True)
+class NominalSpring:
+    """What a restoring force of the nominal model is beyond its tangent: gravity on a pendulum that swings far.
+
+    Attributes:
+        row: (n_dof,) coordinate that it acts on.
+        reach: Displacement either way up to which it is known; beyond it stays what it is there [m or rad].
+        fixed: (PIECES + 3,) coefficients of the cubic spline that no parameter changes [N or N m].
+        slopes: (n_parameters, PIECES + 3) their change with a unit of each nominal parameter.
+    """
+
+    row: Array
+    reach: float
+    fixed: Array
+    slopes: Array
+
+    def coefficients(self, values: Array) -> Array:
+        """Coefficients (PIECES + 3,) at nominal parameter values; initial states may follow these."""
+        changed = values[: len(self.slopes)] @ self.slopes
+        return np.asarray(self.fixed + changed, dtype=np.float64)
+
+    def along(self, coefficients: Array, position: Array) -> Array:
+        """Force (n,) of a spline of such coefficients at positions (n, n_dof)."""
+        x = np.asarray(position @ self.row / self.reach, dtype=np.float64)
+        return np.asarray(spline_of(coefficients)(np.clip(x, -1.0, 1.0)), dtype=np.float64)
+
+    def slope_along(self, coefficients: Array, position: Array) -> Array:
+        """Stiffness (n,) of a spline of such coefficients at positions (n, n_dof); none beyond its reach."""
+        x = np.asarray(position @ self.row / self.reach, dtype=np.float64)
+        inside = np.abs(x) <= 1.0
+        slope = spline_of(coefficients).derivative()
+        return np.asarray(
+            np.where(inside, slope(np.where(inside, x, 0.0)), 0.0) / self.reach, dtype=np.float64
+        )
+
+    def restricted(self, keep: Sequence[int], active: Sequence[int]) -> NominalSpring:
+        """The same on some degrees of freedom, with some of the parameters."""
+        own = [i for i in active if i < len(self.slopes)]
+        return NominalSpring(self.row[list(keep)], self.reach, self.fixed, self.slopes[own])
+
+
+@kernel
+def spline_force(t, q, v, z, theta, f):
+    """A cubic spline over the displacement: its reach, then B-spline coefficients of `PIECES` equal pieces."""
+    x = min(max(q[0] / theta[0], -1.0), 1.0)
+    f[0] += cubic(theta, 1, PIECES, 0.5 * PIECES * (1.0 + x))
+
+
+def with_own_forces(elements: Elements, structure: Structure, values: Array) -> Elements:
+    """Elements preceded by the nominal model's own forces, at parameter values (n_parameters,)."""
+    frictions, springs = structure.frictions, structure.springs
+    if not structure.has_own_forces:
+        return elements
+    theta = [np.array([friction.level(structure, values)]) for friction in frictions]
+    theta += [np.append(spring.reach, spring.coefficients(values)) for spring in springs]
+    firsts = np.cumsum([0, *(len(own) for own in theta)])
+    own = [[0, 0, coulomb_limit.address, 1, i, firsts[i], 0, 0] for i in range(len(frictions))]
+    own += [[spline_force.address, 0, 0, 1, i, firsts[i], 0, 0] for i in range(len(frictions), len(theta))]
+    table = elements.table.copy()
+    table[:, ROW] += len(own)
+    table[:, THETA] += firsts[-1]
+    return Elements(
+        np.vstack([np.array(own, dtype=np.int64), table]),
+        np.vstack([*(force.row for force in (*frictions, *springs)), elements.rows]),
+        np.concatenate([*theta, elements.theta]),
+        elements.start,
+    )
+
+
+def own_force(structure: Structure, values: Array, motion: Motion) -> Array:
+    """Force (n, n_dof) that the nominal model's own forces take from the structure along a motion."""
+    force = np.zeros_like(motion.position)
+    for friction in structure.frictions:
+        rate = motion.velocity @ friction.row
+        force += friction.level(structure, values) * np.outer(np.sign(rate), friction.row)
+    for spring in structure.springs:
+        force += np.outer(spring.along(spring.coefficients(values), motion.position), spring.row)
+    return force
+
+
+def own_change(structure: Structure, parameter: int, motion: Motion) -> Array:
+    """Change of `own_force` (n, n_dof) with a unit of a nominal parameter."""
+    force = np.zeros_like(motion.position)
+    for friction in structure.frictions:
+        if friction.parameter == structure.parameters[parameter]:
+            force += np.outer(np.sign(motion.velocity @ friction.row), friction.row)
+    for spring in structure.springs:
+        if parameter < len(spring.slopes):
+            force += np.outer(spring.along(spring.slopes[parameter], motion.position), spring.row)
+    return force

@@ -1,0 +1,71 @@
+"""Placements: every effect of a catalogue at every place of a structure where it can sit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from bench.discrepancy.case.case import Case
+from bench.discrepancy.effects.effect import Effect
+from bench.discrepancy.model.placement import FROM, Placed
+from bench.discrepancy.model.structure import Place, Structure
+
+OTHER_AXIS = {
+    "displacement": "rotation",
+    "rotation": "displacement",
+    "velocity": "angular_velocity",
+    "angular_velocity": "velocity",
+    "acceleration": "angular_acceleration",
+    "angular_acceleration": "acceleration",
+}
+"""Channels of the joint rig that one sensor measures along its two axes."""
+
+
+def placements(case: Case, structure: Structure, catalogue: Iterable[Effect]) -> list[Placed]:
+    """Return every effect of a catalogue at every place of a structure where it can sit."""
+    out: list[Placed] = []
+    for effect in catalogue:
+        for place in structure.places:
+            if effect.site == "joint" and len(place.rows) == effect.n_coordinates:
+                out.append(Placed(effect, place))
+            if len(place.rows) != 1:
+                continue
+            out += [Placed(effect, place, target) for target in _targets(case, effect, structure, place)]
+    return out
+
+
+def _targets(case: Case, effect: Effect, structure: Structure, place: Place) -> list[str]:
+    if effect.site == "inertia":
+        names = {"mass": place.mass, "stiffness": (place.stiffness,), "damping": (place.damping,)}[
+            effect.quantity
+        ]
+        return [name for name in names if name in structure.parameters]
+    dofs = np.abs(place.rows).sum(axis=0) > 0
+    if effect.site == "actuator":
+        commanded = [name for name in structure.loads if case.channel(name).role == "command"]
+        return [
+            name
+            for name in commanded
+            if np.abs(structure.inputs[dofs, structure.loads.index(name)]).sum() > 0
+        ]
+    if effect.site == "sensor":
+        order = {"position": 0, "velocity": 1, "acceleration": 2}[effect.quantity]
+        channels = [
+            o.channel for o in structure.observers if o.order == order and np.abs(o.row[dofs]).sum() > 0
+        ]
+        return _pickups(case, structure, channels) if effect.pickup else channels
+    return []
+
+
+def _pickups(case: Case, structure: Structure, channels: Sequence[str]) -> list[str]:
+    """Cross-talk into response channels: from the loads on their structure, and from the same sensor's other axis."""
+    if case.rig == "damper":  # what the force channel picks up from the displacement is a stiffness
+        return []
+    out = []
+    for channel in channels:
+        kind, _, number = channel.rpartition("_")
+        across = f"{OTHER_AXIS[kind]}_{number}" if kind in OTHER_AXIS else ""
+        sources = [*structure.loads, across] if case.has(across) else structure.loads
+        out += [f"{channel}{FROM}{source}" for source in sources]
+    return out

@@ -1,0 +1,1 @@
+"""Motion from records: the Kalman smoother, measured coordinates and prescribed motion."""

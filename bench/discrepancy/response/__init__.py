@@ -1,0 +1,1 @@
+"""From a parameter vector and a record to channels: step size, driving loads."""

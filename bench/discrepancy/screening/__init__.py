@@ -1,0 +1,1 @@
+"""Which effects are worth a fit: projections of the residual, score tests, linear amplitudes."""

@@ -1,0 +1,146 @@
+"""Explanations that hold an effect which couples groups of degrees of freedom: the two axes of a joint."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+
+import numpy as np
+
+from bench.discrepancy.effects.effect import Effect
+from bench.discrepancy.fitting.map_fit import Fit
+from bench.discrepancy.model.placements import placements
+from bench.discrepancy.numerics.threads import in_threads
+from bench.discrepancy.screening.candidates import (
+    TRUSTED,
+    WORTH_A_FIT,
+    about,
+    followed,
+    leading,
+    passed_over,
+    refined,
+)
+from bench.discrepancy.screening.linear_amplitudes import Point, fainter
+from bench.discrepancy.screening.screen import Ground, Screen
+from bench.discrepancy.search.fits import IMMATERIAL, Search, converge, names
+from bench.discrepancy.search.forward_selection import STALLED, first_fit
+from bench.discrepancy.search.rivals import reduce_best
+
+HOPELESS_COUPLING = 50.0
+"""Reduced chi-squared of a coupling effect alone above which only a second coupling is added to it."""
+HOPELESS_THIRD = 5.0
+"""Reduced chi-squared of a pair that a coupling effect belongs to above which no third effect is added: it would repair little."""
+HOPELESS_PAIR = 8.0
+"""Reduced chi-squared that the screening beside a coupling effect must promise to go below: pairs that explain promise 1 to 2.
+Of couplings, which are few, less is asked: that they take away a good part (`STALLED`), since a fit without the other coupling may
+have ended far from the motion."""
+CONVERGED_PAIRS, CONVERGED_BEYOND = 4, 2
+"""Pairs that hold a coupling effect, and larger hypotheses, that are carried on to convergence."""
+TRIALS = 4
+"""Effects that are fitted beside a coupling, but for plain forces that the screening passes over."""
+
+FAINT = (0.3, 0.1)
+"""Parts of the promised size from which an effect is begun as well: friction that sticks at once takes the motion from a coupling."""
+
+Keys = Collection[tuple[str, str, str]]
+
+
+def coupled_fits(
+    kept: Search,
+    catalogue: Sequence[Effect],
+    most: int,
+    progress: Callable[[str], None],
+    deeper: Callable[[Fit], bool] = lambda alone: True,
+) -> bool:
+    """Search explanations that hold an effect which couples the groups.
+
+    Args:
+        kept: Search on all degrees of freedom; couplings that it holds alone already are not fitted again.
+        catalogue: Effects to consider.
+        most: Largest number of effects.
+        progress: Called with a line of text at every stage.
+        deeper: Whether the best coupling alone is worth a search for other effects beside it.
+
+    Returns:
+        Whether other effects were searched beside a coupling.
+    """
+    progress("effects that couple the degrees of freedom")
+    problem = kept.problem
+    candidates = [p for p in placements(problem.case, problem.structure, catalogue) if not p.effect.rare]
+    forces = [p for p in candidates if p.effect.site == "joint"]
+    screen = Screen(problem, forces)
+    coupling = {p.key for p in forces if p.effect.n_coordinates > 1}
+    if not kept.fits:
+        _alone(kept, screen, coupling)
+    deep = bool(kept.fits) and deeper(kept.ranked()[0])
+    if deep:
+        screen.add([p for p in candidates if p.effect.site != "joint"])
+    size = 1
+    while deep and size < most and _one_more(kept, screen, coupling, progress):
+        size += 1
+    return deep
+
+
+def _alone(kept: Search, screen: Screen, coupling: Keys) -> None:
+    """Fit every coupling alone."""
+    points = refined(screen, screen.ground(), [p for p in screen.ranked() if p.placed.key in coupling])
+    zero = np.zeros(len(kept.problem.nominal))
+    # all starts: which one leads to the deepest minimum, a gain along the measured motion does not tell
+    converge(kept, [((p.placed,), np.append(zero, p.eta)) for p in points])
+
+
+def _one_more(kept: Search, screen: Screen, coupling: Keys, progress: Callable[[str], None]) -> bool:
+    """Fit one more effect beside the best hypothesis; whether that has brought it far enough for another."""
+    base = kept.ranked()[0]
+    if len(base.hypothesis) > 1 and base.reduced > HOPELESS_THIRD:
+        return False
+    if not any(placed.key in coupling for placed in base.hypothesis):
+        return False  # the groups' own searches know more of such
+    progress(f"{names(base.hypothesis)}, chi-squared {base.reduced:.3g}")
+    along, local, ground = _ground(screen, base)
+    solved = local.ranked(base, ground)
+    if base.reduced > HOPELESS_COUPLING:
+        solved = [p for p in solved if p.placed.key in coupling]
+    points = refined(local, ground, solved) + local.inertia_points(base, ground)
+    worth = _worth(sorted(points, key=lambda p: -p.gain), base, ground, coupling)
+    if not worth:
+        return False
+
+    def extended(point: Point) -> Fit:
+        starts = local.starts(point, ground, base)
+        if point.placed.effect.site == "joint":
+            faint = [fainter(point.placed, point.eta, share) for share in FAINT]
+            starts = np.vstack([starts, *(np.append(base.vector, eta) for eta in faint)])
+        return first_fit(kept.problem, (*base.hypothesis, point.placed), starts)
+
+    least = TRUSTED * worth[0].gain if along else WORTH_A_FIT
+    chosen = leading(worth, TRIALS, least, starts=1)
+    chosen += passed_over(solved, chosen, TRIALS, least)
+    trials = sorted(in_threads(extended, chosen), key=lambda f: f.cost)
+    some = trials[: CONVERGED_PAIRS if len(base.hypothesis) == 1 else CONVERGED_BEYOND]
+    converge(kept, [(f.hypothesis, f.vector) for f in some])
+    reduce_best(kept)
+    best = kept.ranked()[0]
+    return best is not base and best.reduced - 1.0 <= STALLED * (base.reduced - 1.0)
+
+
+def _ground(screen: Screen, base: Fit) -> tuple[bool, Screen, Ground]:
+    """What a base leaves, along its free run or the measured motion: whether the former, the screening there, and what is left.
+
+    A free run that misses the noise by far still tells the motion better than accelerations, twice integrated, if it leaves less.
+    """
+    if not followed(base, screen.problem):
+        local = about(screen, base, explained=False)
+        ground = local.ground(base)
+        if float(np.sum(ground.left**2)) < base.chi2:
+            return False, local, ground
+    local = about(screen, base, explained=True)
+    return True, local, local.ground(base, simulated=True)
+
+
+def _worth(points: Sequence[Point], base: Fit, ground: Ground, coupling: Keys) -> list[Point]:
+    """Points that are worth a fit beside a base; only couplings where none promises to explain the records."""
+    worth = [p for p in points if p.gain > max(WORTH_A_FIT, IMMATERIAL * base.n_residuals)]
+    alone = float(np.sum(ground.left**2))
+    if alone - max((p.gain for p in worth), default=0.0) > HOPELESS_PAIR * base.n_residuals:
+        worth = [p for p in worth if p.placed.key in coupling and alone - p.gain < STALLED * alone]
+    return worth

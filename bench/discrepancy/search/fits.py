@@ -1,0 +1,289 @@
+"""The state of a search for explanations: fitted hypotheses, how they rank, and fits carried on to their end."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.discrepancy.fitting.map_fit import Fit, fit, free_entries, laplace
+from bench.discrepancy.likelihood.problem import Array, Problem
+from bench.discrepancy.model.placement import Hypothesis
+from bench.discrepancy.numerics.least_squares import DIFFERENCES, differences
+from bench.discrepancy.numerics.threads import in_threads
+from bench.discrepancy.screening.linear_amplitudes import Point
+
+THOROUGH = 60
+"""Iterations of a fit that is carried on to convergence."""
+LOG_PRIOR_EFFECT = -3.4
+"""Log prior odds of one more effect: about one in the number of effects of the catalogue."""
+SIGNIFICANT = 4.0
+"""Standard deviations by which chi-squared may exceed its expectation before a hypothesis counts as refuted."""
+IMMATERIAL = 0.001
+"""Relative improvement of chi-squared that one more effect has to pay for, since the smoothing of stick-slip and the
+interpolation of loads are themselves only as good as that; records of extreme signal-to-noise ratio would else name trifles. Effects
+that are exact by themselves pay nothing where they are alone."""
+HOPELESS = 3.0
+"""A first fit that leaves more than this many times the excess of the best one is not carried on."""
+WITHIN_REACH = 30.0
+"""Difference in log posterior that carrying a first fit on to convergence may still make up."""
+SIGHT = 4.0 * WITHIN_REACH
+"""Cost above that of an explanation at which another one is still in sight of it."""
+MODEL_ERROR = 0.02
+"""Relative excess of chi-squared that is laid to the smoothing and integration of the diagnosis itself."""
+SAME = 0.3
+"""Distance within which two refined starts of an effect count as one."""
+NEAR = 2.0
+"""Reduced chi-squared up to which a free run is off by less than the noise, and tells the motion better than the records do."""
+INTEGRATED, FINEST = 4.0, 8
+"""Sum of squares by which halving the integration steps may change the whitened residuals, so that evidence stays the same to a unit
+or two; and the largest multiple of the steps."""
+CONVERGING = 0.5
+"""Part of the last change that a further halving may make; more is no error of the integration but friction that stops elsewhere."""
+SHAKEN, SHAKEN_REACH = 4, 100.0
+"""Hypotheses that are shaken, at most, and the difference in log posterior that this may still make up where the best one sticks
+too: two laws of friction then differ by what dents they lie in."""
+BEGUN_AGAIN = 500.0
+"""Difference in log posterior that a start with the nominal parameters of the best fit may make up: dents of one law against another's
+have come to half of that."""
+SHAKES, IN_VAIN, DRAWS = 6, 2, 48
+"""Rounds, those in vain after which there is no further one, and draws of a round."""
+FOLLOWED = 2
+"""Draws of a round that are followed to their minima."""
+SCALES = ((1.0,), (2.0,), (4.0,))
+"""Sizes of the draws' moves, in posterior standard deviations."""
+DENT = 1.0
+"""Decrease of the cost below which a round was in vain."""
+
+Task = tuple[Hypothesis, np.ndarray]
+"""Effects, and the vector or vectors that a fit of them starts from."""
+
+
+@dataclass
+class Search:
+    """What an attribution has found so far, for one problem.
+
+    Attributes:
+        problem: Records and priors.
+        fits: Fitted hypotheses by their set of keys.
+        converged: Keys of the fits carried on to convergence.
+        started: Where fits have begun.
+        first: Refined starts of single effects.
+    """
+
+    problem: Problem
+    fits: dict[frozenset, Fit] = field(default_factory=dict)
+    converged: set[frozenset] = field(default_factory=set)
+    started: set[tuple] = field(default_factory=set)
+    first: list[Point] = field(default_factory=list)
+
+    def start(self, base: Hypothesis, point: Point) -> bool:
+        """Note that a fit begins here; False where one has begun so near before."""
+        spread = [p.std for p in point.placed.effect.parameters]
+        place = tuple(int(x) for x in np.round(point.eta / spread / SAME))
+        mark = (key_of((*base, point.placed)), point.placed.key, place)
+        if mark in self.started:
+            return False
+        self.started.add(mark)
+        return True
+
+    def add(self, fitted: Fit) -> None:
+        """Keep a fit if it is the best of its hypothesis."""
+        key = key_of(fitted.hypothesis)
+        if key not in self.fits or fitted.cost < self.fits[key].cost:
+            self.fits[key] = fitted
+
+    def ranked(self, size: int | None = None) -> list[Fit]:
+        """Fits by decreasing posterior, of one number of effects or of all."""
+        chosen = [f for f in self.fits.values() if size is None or len(f.hypothesis) == size]
+        return sorted(chosen, key=lambda f: -posterior(f))
+
+
+def key_of(hypothesis: Hypothesis) -> frozenset:
+    """Key of a hypothesis, regardless of the order of its effects."""
+    return frozenset(placed.key for placed in hypothesis)
+
+
+def posterior(fitted: Fit) -> float:
+    """Log posterior of a hypothesis up to a constant."""
+    # the inaccuracy of one effect may be made good by any other
+    exact = all(placed.effect.exact for placed in fitted.hypothesis)
+    tolerance = 0.0 if exact else 0.5 * IMMATERIAL * fitted.n_residuals
+    return fitted.log_evidence + (LOG_PRIOR_EFFECT - tolerance) * len(fitted.hypothesis)
+
+
+def consistent(fitted: Fit) -> bool:
+    """Whether the residuals of a fit are as small as the stated noise lets them be."""
+    spread = np.sqrt(2.0 / fitted.n_residuals)
+    return fitted.reduced < 1.0 + SIGNIFICANT * spread + MODEL_ERROR
+
+
+def near(fitted: Fit) -> bool:
+    """Whether the free run of a fit is off by less than the noise."""
+    return fitted.reduced < NEAR
+
+
+def names(hypothesis: Hypothesis) -> str:
+    """Readable names of a hypothesis."""
+    return (
+        " + ".join(p.effect.name + (f" ({p.place.name})" if p.place.name else "") for p in hypothesis)
+        or "nothing"
+    )
+
+
+def carry_on(search: Search, size: int, *, most: int) -> None:
+    """Carry the fits of one size that may still become the best on to convergence."""
+    for share in (HOPELESS, 0.0):
+        ranked = [f for f in search.ranked(size) if np.isfinite(f.cost)]
+        if not ranked:
+            return
+        limit = 1.5 * bool(share) + share * (ranked[0].reduced - 1.0)
+        chosen = [
+            f
+            for f in ranked[:most]
+            if key_of(f.hypothesis) not in search.converged
+            and (f.reduced < limit or posterior(f) > posterior(ranked[0]) - WITHIN_REACH)
+        ]
+        converge(search, [(f.hypothesis, f.vector) for f in chosen])
+
+
+def converge(
+    search: Search,
+    tasks: Sequence[Task],
+    *,
+    limit: float | None = None,
+) -> None:
+    """Fit hypotheses from starts to convergence, but for those that cannot come near a cost: that of the best of their size."""
+
+    sizes = {len(hypothesis) for hypothesis, _ in tasks}
+    limits = {size: limit_of(search, size) if limit is None else limit for size in sizes}
+
+    def thorough(task: Task) -> Fit:
+        return fit(search.problem, task[0], start=task[1], iterations=THOROUGH, limit=limits[len(task[0])])
+
+    for fitted in in_threads(thorough, tasks):
+        search.add(fitted)
+        search.converged.add(key_of(fitted.hypothesis))
+
+
+def integrate_finer(search: Search) -> None:
+    """Halve the integration steps while the best fit tells the difference, and fit the best ones again.
+
+    The steps are chosen for smooth laws. Where one switches, an error of the integration may stand out of the noise of a good
+    record, and one more effect would be found, or a law of more parameters preferred, that does nothing but undo it.
+
+    Args:
+        search: Fits so far; its problem is integrated in finer steps from here on.
+    """
+    problem, best = search.problem, search.ranked()[0]
+    if problem.driven or problem.windowed:
+        return
+    refinement, coarse = problem.refinement, problem.residual(best.hypothesis, best.vector)
+    before = np.inf
+    while problem.refinement < FINEST:
+        fine = problem.finer(2 * problem.refinement).residual(best.hypothesis, best.vector)
+        change = float(np.sum((fine - coarse) ** 2))
+        if not INTEGRATED < change < CONVERGING * before:
+            break
+        problem.refinement, coarse, before = 2 * problem.refinement, fine, change
+    if problem.refinement == refinement:
+        return
+    for fitted in [f for f in search.ranked() if near(f)][:SHAKEN]:
+        search.fits[key_of(fitted.hypothesis)] = fit(
+            problem, fitted.hypothesis, start=fitted.vector, iterations=THOROUGH
+        )
+
+
+def limit_of(search: Search, size: int) -> float:
+    """Cost beyond which a fit of so many effects is of no more interest."""
+    best = min((f.cost for f in search.fits.values() if len(f.hypothesis) == size), default=np.inf)
+    return best + SIGHT + max(best - search.problem.n_residuals, 0.0)
+
+
+def shake(search: Search) -> None:
+    """Fit hypotheses near the best again, from draws about where they ended, if friction sticks in them.
+
+    Whether a slider stops at a reversal hangs on trifles, so the cost is rough: a descent ends in the first of many dents, some
+    tens above the deepest one, and which of two laws has found the deeper dent says nothing of the laws.
+
+    Args:
+        search: Fits so far; better ones take their places.
+    """
+    best = search.ranked()[0]
+    if not consistent(best) and best.chi2 - best.n_residuals > 2.0 * BEGUN_AGAIN:
+        return  # no dent is that deep: whatever explains the records is not among these
+    both_stick = sticks(best)
+    reach = SHAKEN_REACH if both_stick else WITHIN_REACH
+    for fitted in [f for f in search.ranked() if near(f) and sticks(f)][:SHAKEN]:
+        begun = _beside_the_best(search, fitted) if both_stick else fitted
+        behind = posterior(search.ranked()[0]) - posterior(begun)
+        if behind < reach:
+            _shaken(search, begun, 2.0 * behind)
+
+
+def _beside_the_best(search: Search, fitted: Fit) -> Fit:
+    """The better of a fit and the same begun with the nominal parameters of the best one, which may have got over its dents."""
+    best, n = search.ranked()[0], len(search.problem.nominal)
+    if fitted is best or posterior(best) - posterior(fitted) > BEGUN_AGAIN:
+        return fitted
+    start = np.concatenate([best.vector[:n], fitted.vector[n:]])
+    again = fit(search.problem, fitted.hypothesis, start=start, iterations=THOROUGH)
+    search.add(again)
+    return min(fitted, again, key=lambda f: f.cost)
+
+
+def sticks(fitted: Fit) -> bool:
+    """Whether a hypothesis holds friction that is set-valued at rest."""
+    return any(placed.effect.limit is not None for placed in fitted.hypothesis)
+
+
+def _shaken(search: Search, fitted: Fit, behind: float) -> None:
+    """Shake one fit, while rounds like the last one could make up the cost by which it is `behind`."""
+    problem, hypothesis = search.problem, fitted.hypothesis
+    mean, std, low, high = problem.prior(hypothesis)
+    free = free_entries(problem, hypothesis)
+    rng = np.random.default_rng(0)
+
+    def cost(vector: Array) -> float:
+        residual = problem.residual(hypothesis, vector)
+        return float(residual @ residual + np.sum(((vector - mean) / std) ** 2))
+
+    def again_from(start: Array) -> Fit:
+        return fit(problem, hypothesis, start=start, iterations=THOROUGH)
+
+    in_vain = 0
+    for further in reversed(range(SHAKES)):
+        fitted = _overlooking_dents(fitted, problem, free)
+        spread = np.linalg.cholesky(fitted.covariance[np.ix_(free, free)])
+        draws = np.repeat(fitted.vector[None], DRAWS, axis=0)
+        draws[:, free] += rng.standard_normal((DRAWS, len(free))) @ spread.T * np.resize(SCALES, (DRAWS, 1))
+        draws = np.clip(draws, low, high)
+        best = draws[np.argsort(in_threads(cost, draws))[:FOLLOWED]]
+        again = min(in_threads(again_from, best), key=lambda f: f.cost)
+        gained = fitted.cost - again.cost
+        in_vain = in_vain + 1 if gained < DENT else 0
+        fitted = min(fitted, again, key=lambda f: f.cost)
+        behind -= max(gained, 0.0)
+        if in_vain == IN_VAIN or behind > further * max(gained, DENT):
+            break
+    search.fits[key_of(hypothesis)] = _overlooking_dents(fitted, problem, free)
+
+
+def _overlooking_dents(fitted: Fit, problem: Problem, free: NDArray[np.int64]) -> Fit:
+    """A fit whose precision and evidence are those of the landscape, not of the dent it lies in: by coarse differences."""
+    _, std, _, high = problem.prior(fitted.hypothesis)
+    changes = differences(
+        lambda vector: problem.residual(fitted.hypothesis, vector),
+        fitted.vector,
+        problem.residual(fitted.hypothesis, fitted.vector),
+        free=free,
+        steps=DIFFERENCES[1] * std[free],
+        high=high[free],
+    )
+    if changes is None:
+        return fitted
+    curvature = np.eye(len(free)) + changes.T @ changes / DIFFERENCES[1] ** 2
+    precision, evidence = laplace(problem, fitted.hypothesis, fitted.cost, curvature, free)
+    return replace(fitted, precision=precision, log_evidence=evidence)

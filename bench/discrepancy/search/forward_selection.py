@@ -1,0 +1,329 @@
+"""Attribution: which effects, out of the catalogue, explain the records.
+
+Screening proposes, output-error fits decide, and hypotheses are compared by their evidence. Effects are added one at
+a time as long as the residuals do not look like noise: to the best few hypotheses so far and to those that promise most together
+with another effect, the screening conditioned on each. What promised most and was not kept by its fit makes room for the next.
+An effect that a larger hypothesis does not need any more loses to the smaller one by its Occam factor. In the end every effect
+of the best hypothesis is challenged by those that do nearly as well along the motion it explains, each fitted from several
+starts, so that no flexible law wins because a simpler one was fitted carelessly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from bench.discrepancy.effects.effect import Effect
+from bench.discrepancy.fitting.map_fit import Fit, fit
+from bench.discrepancy.likelihood.problem import Problem
+from bench.discrepancy.model.placement import Hypothesis, Placed
+from bench.discrepancy.numerics.threads import in_threads
+from bench.discrepancy.screening.candidates import (
+    SHORT,
+    TRUSTED,
+    WORTH_A_FIT,
+    about,
+    followed,
+    leading,
+    passed_over,
+    refined,
+)
+from bench.discrepancy.screening.linear_amplitudes import Point
+from bench.discrepancy.screening.score_test import lack_of_fit
+from bench.discrepancy.screening.screen import Screen
+from bench.discrepancy.search.fits import (
+    IMMATERIAL,
+    THOROUGH,
+    Search,
+    Task,
+    carry_on,
+    consistent,
+    converge,
+    integrate_finer,
+    key_of,
+    limit_of,
+    names,
+    near,
+    shake,
+)
+from bench.discrepancy.search.rivals import challenge, reduce_best, simplify
+
+QUICK = 6
+"""Iterations of a first fit; the best are carried on to convergence."""
+NOTICEABLE = 15.0
+"""Screened gain from which the first effect is fitted: noise alone lets the best of the catalogue gain so much in few cases."""
+LEVELS = (-2.0, -1.0, 0.0, 1.0)
+"""Sizes of contacts that are simulated on their grid, in prior standard deviations from their mean."""
+SIMULATED = 2
+"""Starts of each that are fitted."""
+STALLED = 0.7
+"""If one more effect leaves more than this part of the excess of chi-squared, a further one is not tried."""
+SEVERAL = 2
+"""Number of effects as which a force that is lacking is doubted: a second one is looked for at the least suspicion."""
+CONSIDERED, PROMISED = 12, 2
+"""Hypotheses that are asked what they promise together with one more effect, and those that are extended for that alone."""
+UNPROMISING = 0.25
+"""Part of the excess of a base that one more effect must promise to take away, or none is fitted beside it."""
+
+Prepared = tuple[Search, Screen, list[Point]]
+"""A search before its first step: the nominal model fitted, the catalogue screened, its grid points by decreasing gain."""
+
+
+def attribute(
+    problem: Problem,
+    candidates: Sequence[Placed],
+    *,
+    most: int = 3,
+    progress: Callable[[str], None] = lambda text: None,
+    prepared: Prepared | None = None,
+) -> Search:
+    """Search the hypotheses of up to `most` effects.
+
+    Args:
+        problem: Records and priors.
+        candidates: Effects at their places.
+        most: Largest number of effects.
+        progress: Called with a line of text at every stage.
+        prepared: What `prepare` returned for the same arguments, where it was called before.
+
+    Returns:
+        All fits made.
+    """
+    search, screen, points = prepared or prepare(problem, candidates)
+    nothing = search.ranked(0)[0]
+    progress(f"nominal model: chi-squared {nothing.reduced:.3g} of its expectation")
+    if followed(nothing, problem):
+        points = about(screen, nothing, explained=True).ranked()
+        if not points or points[0].gain < NOTICEABLE:
+            return search
+    _extend(search, screen, [nothing], count=8)
+    if not consistent(search.ranked()[0]) and all(o.order > 0 for o in problem.structure.observers):
+        _simulated(search, candidates)
+    rare = [p for p in candidates if p.effect.rare]
+    if rare and not consistent(search.ranked()[0]):
+        progress("rarer effects")
+        screen.add(rare)
+        _extend(search, screen, [nothing], count=6, among={p.key for p in rare})
+    for size in range(1, most):
+        if near(search.ranked()[0]):
+            integrate_finer(search)
+        best = search.ranked()[0]
+        progress(
+            f"{len(best.hypothesis)} effect(s): {names(best.hypothesis)}, chi-squared {best.reduced:.3g}"
+        )
+        if consistent(best):
+            if len(best.hypothesis) != size:
+                break
+            # what is down to the noise and lacks a force all the same may be neither of two effects
+            lacks = not problem.windowed and lack_of_fit(problem, best).significant(
+                nothing.chi2 - best.chi2, effects=SEVERAL
+            )
+            if not lacks and not _promising(screen, best):
+                break
+            bases = worth_extending(search, screen, size, 4 - size) if lacks else [best]
+            _extend(search, screen, bases, count=4)
+            reduce_best(search)
+            continue
+        ranked = search.ranked(size)
+        if not ranked or ranked[0].reduced - 1.0 > STALLED * (search.ranked(size - 1)[0].reduced - 1.0):
+            break
+        _extend(search, screen, worth_extending(search, screen, size, 4 - size), count=6 - size)
+        reduce_best(search)
+    best = search.ranked()[0]
+    if not problem.noise_stated:
+        simplify(search, candidates)
+    elif near(best):
+        progress(f"rivals of {names(best.hypothesis)}")
+        challenge(search, screen)
+        shake(search)
+    return search
+
+
+def worth_extending(search: Search, screen: Screen, size: int, most: int) -> list[Fit]:
+    """Hypotheses beside which one more effect is searched: the best ones, and those that promise most together with another effect.
+
+    Alone, a flexible law is bent to what two forces do, and the one that was right about half of it lies far behind.
+
+    Args:
+        search: Fits so far.
+        screen: Screening of the same problem.
+        size: Number of effects of the hypotheses.
+        most: Number of the best ones.
+
+    Returns:
+        The hypotheses by decreasing posterior.
+    """
+    problem, ranked = search.problem, search.ranked(size)
+
+    def promised(base: Fit) -> float:
+        ground = screen.ground(base)
+        points = screen.ranked(base, ground)[:1]
+        return float(np.sum(ground.left**2)) - sum(point.gain for point in points)
+
+    far = [f for f in ranked[:CONSIDERED] if np.isfinite(f.cost) and not followed(f, problem)]
+    chosen = ranked[:most] + sorted(far, key=promised)[:PROMISED]
+    return [f for f in ranked if any(f is own for own in chosen)]
+
+
+def _promising(screen: Screen, best: Fit) -> bool:
+    """Whether one more effect could still be in the residual of a hypothesis that is down to the noise."""
+    screen = about(screen, best, explained=True)
+    ground = screen.ground(best, simulated=True)
+    points = screen.ranked(best, ground)[:1] + screen.inertia_points(best, ground)[:1]
+    return max((p.gain for p in points), default=0.0) > max(WORTH_A_FIT, IMMATERIAL * best.n_residuals)
+
+
+def prepare(problem: Problem, candidates: Sequence[Placed]) -> Prepared:
+    """Fit the nominal model and screen the catalogue: the cheap part of an attribution.
+
+    Args:
+        problem: Records and priors.
+        candidates: Effects at their places.
+    """
+    search = Search(problem)
+    search.add(fit(problem, (), start=np.zeros(len(problem.nominal)), iterations=THOROUGH))
+    screen = Screen(problem, [p for p in candidates if not p.effect.rare])
+    return search, screen, screen.ranked()
+
+
+class _Offers(NamedTuple):
+    """What a screening offers beside a base; the screening itself is large, and let go.
+
+    Attributes:
+        base: Fitted hypothesis.
+        tasks: Fits of what promises most.
+        spare: Further starts and their fits, for the case that those do not keep what they promise.
+    """
+
+    base: Fit
+    tasks: list[Task]
+    spare: list[tuple[Point, Task]]
+
+
+def _extend(
+    search: Search,
+    screen: Screen,
+    bases: Sequence[Fit],
+    *,
+    count: int,
+    among: Collection[tuple[str, str, str]] = (),
+) -> None:
+    """Add one effect to every base, of those `among` where some are given: screen, refine, fit quickly, carry the best on."""
+    size = len(bases[0].hypothesis) + 1
+    offers = [_offers(search, screen, base, count=count, among=among) for base in bases]
+    limit = limit_of(search, size)
+
+    def fit_all(tasks: Iterable[Task]) -> None:
+        for fitted in in_threads(lambda task: first_fit(search.problem, *task, limit=limit), tasks):
+            search.add(fitted)
+
+    fit_all(task for found in offers for task in found.tasks)
+    for base, _, spare in offers:
+        kept = _kept(search, base)
+        fit_all(task for p, task in spare if p.gain > kept and search.start(base.hypothesis, p))
+    carry_on(search, size, most=4)
+
+
+def _offers(
+    search: Search,
+    screen: Screen,
+    base: Fit,
+    *,
+    count: int,
+    among: Collection[tuple[str, str, str]],
+) -> _Offers:
+    """Screen one more effect beside a base, of those `among` where some are given."""
+    problem = search.problem
+    named = base if base.hypothesis else None
+    along = followed(base, problem)
+    local = about(screen, base, explained=along)
+    ground = local.ground(named, simulated=named is not None and along)
+    solved = [p for p in local.ranked(named, ground) if not among or p.placed.key in among]
+    points = refined(local, ground, solved)
+    if not named:
+        search.first = sorted([*search.first, *points] if among else points, key=lambda p: -p.gain)
+    inertia = [] if among else local.inertia_points(base, ground)
+    most = max((p.gain for p in [*points, *inertia]), default=0.0)
+    excess = base.chi2 - base.n_residuals
+    if named and problem.noise_stated and not consistent(base) and most < UNPROMISING * excess:
+        return _Offers(base, [], [])
+
+    def task(point: Point) -> Task:
+        return (*base.hypothesis, point.placed), local.starts(point, ground, named)
+
+    # a screening can promise more than there is
+    most = min(most, max(excess, WORTH_A_FIT))
+    short = (TRUSTED if named and along else SHORT) * most
+    chosen = leading(points, count, short)
+    if not among:
+        chosen += passed_over(solved, chosen, count, WORTH_A_FIT)
+    begun = {point.placed.key for point in chosen}
+    rest = [p for p in points if p.placed.key not in begun] if named and along else []
+    spare = [(p, task(p)) for p in leading(rest, count, WORTH_A_FIT, starts=1)]
+    tasks = [task(p) for p in chosen if search.start(base.hypothesis, p)]
+    least = min(short, WORTH_A_FIT) if consistent(base) else short
+    tasks += [
+        ((*base.hypothesis, p.placed), np.append(base.vector, p.eta)) for p in inertia if p.gain > least
+    ]
+    return _Offers(base, tasks, spare)
+
+
+def _kept(search: Search, base: Fit) -> float:
+    """How much one more effect has taken from the cost of a base so far: what was promised may not have been kept."""
+    own = key_of(base.hypothesis)
+    size = len(base.hypothesis) + 1
+    best = min(
+        (f.cost for key, f in search.fits.items() if len(key) == size and own < key), default=base.cost
+    )
+    return base.cost - best
+
+
+def first_fit(problem: Problem, hypothesis: Hypothesis, start: np.ndarray, *, limit: float = np.inf) -> Fit:
+    """A few iterations with one more effect, the last one; of channels and inertia, which the screening begins farther off, more.
+
+    Args:
+        problem: Records and priors.
+        hypothesis: Effects.
+        start: Start vector (n,), or several (k, n).
+        limit: Cost that has to be within sight, see `minimise`.
+    """
+    iterations = QUICK if hypothesis[-1].effect.site == "joint" else 2 * QUICK
+    return fit(problem, hypothesis, start=start, iterations=iterations, exact=False, limit=limit)
+
+
+def _simulated(search: Search, candidates: Sequence[Placed]) -> None:
+    """Fit contacts from the best of their grid by free runs.
+
+    Where only velocities or accelerations are measured, the middle of the motion is unknown, and a stop that shifts it is screened
+    at the wrong place. Contacts have few shapes and cost little to simulate.
+    """
+    problem = search.problem
+    still = np.zeros(len(problem.nominal))
+    tasks: list[Task] = []
+    for placed in candidates:
+        effect = placed.effect
+        if effect.rare or not _contact(effect):
+            continue
+        size = effect.parameters[0]
+        starts = [
+            np.concatenate([still, [size.mean + level * size.std], eta[1:]])
+            for eta in effect.grid()
+            for level in LEVELS
+        ]
+
+        def cost(start: np.ndarray, placed: Placed = placed) -> float:
+            residual = problem.residual((placed,), start)
+            return float(residual @ residual)
+
+        costs = np.array(in_threads(cost, starts))
+        tasks += [((placed,), starts[i]) for i in np.argsort(costs)[:SIMULATED] if np.isfinite(costs[i])]
+    converge(search, tasks)
+
+
+def _contact(effect: Effect) -> bool:
+    """Whether an effect is a force of the displacement with a position to be found."""
+    return (
+        effect.family == "stiffness" and any(p.grid for p in effect.parameters) and effect.rate_bound is None
+    )

@@ -1,0 +1,1 @@
+"""Time integration: stick-slip systems, linear and prescribed responses."""

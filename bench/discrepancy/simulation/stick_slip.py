@@ -1,0 +1,442 @@
+"""The fast simulator of the fits: linear structures with force laws, and friction that is truly set-valued.
+
+A diagnosis asks for thousands of free runs. They are made here, by one compiled loop over the same law kernels that
+the MuJoCo callback calls; the test suite holds the two equal. Two things differ from a general simulator and make it fast:
+the structure is linear with a constant mass matrix, and its loads are known samples: piecewise linear between them, held,
+or given on a finer grid by whoever knows better (`bench.discrepancy.case.acquisition`).
+
+Dry friction is no smoothed sign function here. A friction element carries a mode: sliding (+1, -1) or sticking (0).
+While it slides the force is ``mode * limit(t, q, v)``; while it sticks the force is whatever keeps the relative
+acceleration zero; the instants of reversal and of breaking loose are found inside the step by the secant rule. The
+fits therefore see a response that depends smoothly on the parameters as long as the order of events stays the same.
+
+References:
+    E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 1993 (RK4, section II.1; event
+    location on discontinuities, section II.6).
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.laws.calling import advance, call_kernel, load_int, pointer_at
+
+MAX_EVENTS = 12
+"""Most friction events resolved within one step; beyond it the step is completed with the mode it has."""
+
+FORCE, RATE, LIMIT, N_ROWS, ROW, THETA, STATE, N_STATES = range(8)
+"""Columns of the element table passed to the compiled loop."""
+
+
+DIVERGED = 1e12
+"""Position beyond which a simulation counts as diverged."""
+
+_jit = numba.njit(cache=True, error_model="numpy", nogil=True)
+_inline = numba.njit(cache=True, error_model="numpy", nogil=True, forceinline=True)
+
+
+class LinearStructure(NamedTuple):
+    """Matrices of ``M q'' + C q' + K q = B u - (forces of the elements)``.
+
+    Attributes:
+        mass: (n_dof, n_dof) [kg or kg m^2].
+        damping: (n_dof, n_dof).
+        stiffness: (n_dof, n_dof).
+        inputs: (n_dof, n_inputs), how the loads act.
+    """
+
+    mass: NDArray[np.float64]
+    damping: NDArray[np.float64]
+    stiffness: NDArray[np.float64]
+    inputs: NDArray[np.float64]
+
+
+class Elements(NamedTuple):
+    """The force laws of one simulation, flattened for the compiled loop.
+
+    Attributes:
+        table: (n_elements, 8) integers: addresses of the force, rate and limit kernels (0: none), number of
+            coordinates, first row in `rows`, first entry in `theta`, first hidden state, number of hidden states.
+        rows: (n_rows, n_dof); row times q is a coordinate of an element.
+        theta: (n_theta,) parameters of all elements one after the other.
+        start: (n_states,) initial hidden states.
+    """
+
+    table: NDArray[np.int64]
+    rows: NDArray[np.float64]
+    theta: NDArray[np.float64]
+    start: NDArray[np.float64]
+
+
+class Motion(NamedTuple):
+    """Motion on a uniform clock.
+
+    Attributes:
+        position: (n, n_dof).
+        velocity: (n, n_dof).
+        acceleration: (n, n_dof).
+    """
+
+    position: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    acceleration: NDArray[np.float64]
+
+
+NO_ELEMENTS = Elements(np.zeros((0, 8), dtype=np.int64), np.zeros((0, 1)), np.zeros(1), np.zeros(0))
+"""No force law: the linear structure alone."""
+
+MAX_ROWS = 16
+"""Most coordinates of an element; one further scratch entry holds a friction limit."""
+
+
+class _Plan(NamedTuple):
+    """What the compiled functions share: sizes, matrices, element table, and one workspace with its address.
+
+    The workspace holds, one after the other: the state, a trial state, a stage state, four slopes, the coordinates,
+    velocities and forces of the element at hand, and the loads at the start, middle and end of a step. One array
+    with integer offsets instead of many small ones: creating array views and their pointers inside the
+    derivative took two thirds of the time.
+    """
+
+    n_dof: int
+    n: int
+    n_inputs: int
+    n_elements: int
+    n_rows: int
+    load_factor: int
+    matrices: Any
+    table: int
+    rows: Any
+    spread: Any
+    mode: Any
+    grip: Any
+    theta: Any
+    work: Any
+
+
+@_inline
+def _entry(p, e, column):
+    """Integer of the element table."""
+    return load_int(p.table + 8 * (8 * e + column))
+
+
+@_inline
+def _derivative(p, t, y, slope, load):
+    """Write dy/dt at workspace offset `slope` for the state at offset `y` and the loads at offset `load`.
+
+    The holding force and the limit of every friction element go into `grip` (2, n_elements).
+    """
+    n_dof = p.n_dof
+    work = p.work
+    n_inputs = p.n_inputs
+    width = 2 * n_dof + n_inputs
+    for i in range(n_dof):
+        work[slope + i] = work[y + n_dof + i]
+        total = 0.0
+        for j in range(n_inputs):
+            total += p.matrices[i * width + 2 * n_dof + j] * work[load + j]
+        for j in range(n_dof):
+            total -= (
+                p.matrices[i * width + j] * work[y + j]
+                + p.matrices[i * width + n_dof + j] * work[y + n_dof + j]
+            )
+        work[slope + n_dof + i] = total
+    q = 7 * p.n
+    v = q + MAX_ROWS
+    f = v + MAX_ROWS
+    held = False
+    for e in range(p.n_elements):
+        first = _entry(p, e, ROW)
+        n_rows = _entry(p, e, N_ROWS)
+        for r in range(n_rows):
+            coordinate = 0.0
+            rate = 0.0
+            for j in range(n_dof):
+                coordinate += p.rows[(first + r) * p.n_dof + j] * work[y + j]
+                rate += p.rows[(first + r) * p.n_dof + j] * work[y + n_dof + j]
+            work[q + r] = coordinate
+            work[v + r] = rate
+            work[f + r] = 0.0
+        z = advance(p.work, (y + 2 * n_dof + _entry(p, e, STATE)))
+        theta = advance(p.theta, _entry(p, e, THETA))
+        q_pointer = advance(p.work, q)
+        v_pointer = advance(p.work, v)
+        if _entry(p, e, FORCE) != 0:
+            call_kernel(_entry(p, e, FORCE), t, q_pointer, v_pointer, z, theta, advance(p.work, f))
+        if _entry(p, e, LIMIT) != 0:
+            work[f + MAX_ROWS] = 0.0
+            call_kernel(
+                _entry(p, e, LIMIT), t, q_pointer, v_pointer, z, theta, advance(p.work, (f + MAX_ROWS))
+            )
+            p.grip[p.n_elements + e] = max(work[f + MAX_ROWS], 0.0)
+            work[f] += p.mode[e] * p.grip[p.n_elements + e]
+            held = held or p.mode[e] == 0.0
+        for r in range(n_rows):
+            for i in range(n_dof):
+                work[slope + n_dof + i] -= p.spread[i * p.n_rows + first + r] * work[f + r]
+        if _entry(p, e, RATE) != 0:
+            zdot = advance(p.work, (slope + 2 * n_dof + _entry(p, e, STATE)))
+            call_kernel(_entry(p, e, RATE), t, q_pointer, v_pointer, z, theta, zdot)
+    if held:
+        _hold(p, slope)
+
+
+@_inline
+def _hold(p, slope):
+    """Add the forces of the sticking elements, which make their relative acceleration zero."""
+    for e in range(p.n_elements):
+        if _entry(p, e, LIMIT) != 0 and p.mode[e] == 0.0:
+            row = _entry(p, e, ROW)
+            relative = 0.0
+            compliance = 0.0
+            for i in range(p.n_dof):
+                relative += p.rows[row * p.n_dof + i] * p.work[slope + p.n_dof + i]
+                compliance += p.rows[row * p.n_dof + i] * p.spread[i * p.n_rows + row]
+            p.grip[e] = relative / compliance
+            for i in range(p.n_dof):
+                p.work[slope + p.n_dof + i] -= p.spread[i * p.n_rows + row] * p.grip[e]
+
+
+@_inline
+def _rk4(p, t, dt, known):
+    """One classical Runge-Kutta step from the state into the trial state; `known`: the first slope is there already."""
+    n = p.n
+    work = p.work
+    load = 7 * n + 3 * MAX_ROWS + 1
+    n_inputs = p.n_inputs
+    if not known:
+        _derivative(p, t, 0, 3 * n, load)
+    for i in range(n):
+        work[2 * n + i] = work[i] + 0.5 * dt * work[3 * n + i]
+    _derivative(p, t + 0.5 * dt, 2 * n, 4 * n, load + n_inputs)
+    for i in range(n):
+        work[2 * n + i] = work[i] + 0.5 * dt * work[4 * n + i]
+    _derivative(p, t + 0.5 * dt, 2 * n, 5 * n, load + n_inputs)
+    for i in range(n):
+        work[2 * n + i] = work[i] + dt * work[5 * n + i]
+    _derivative(p, t + dt, 2 * n, 6 * n, load + 2 * n_inputs)
+    for i in range(n):
+        work[n + i] = work[i] + dt / 6.0 * (
+            work[3 * n + i] + 2.0 * (work[4 * n + i] + work[5 * n + i]) + work[6 * n + i]
+        )
+
+
+@_inline
+def _relative_velocity(p, y, row):
+    total = 0.0
+    for j in range(p.n_dof):
+        total += p.rows[row * p.n_dof + j] * p.work[y + p.n_dof + j]
+    return total
+
+
+@_jit
+def _settle(p, e, t, load):
+    """Bring friction element `e` to relative rest and choose its mode: hold, or slide the way it is pushed."""
+    row = _entry(p, e, ROW)
+    velocity = _relative_velocity(p, 0, row)
+    compliance = 0.0
+    for i in range(p.n_dof):
+        compliance += p.rows[row * p.n_dof + i] * p.spread[i * p.n_rows + row]
+    for i in range(p.n_dof):
+        p.work[p.n_dof + i] -= p.spread[i * p.n_rows + row] * velocity / compliance
+    p.mode[e] = 0.0
+    _derivative(p, t, 0, 3 * p.n, load)
+    if abs(p.grip[e]) > p.grip[p.n_elements + e]:
+        p.mode[e] = 1.0 if p.grip[e] > 0.0 else -1.0
+
+
+@_inline
+def _fill_loads(p, u, k, fraction, share):
+    """Loads at the start, middle and end of a step that begins at `fraction` of sample `k` and is `share` of it long."""
+    load = 7 * p.n + 3 * MAX_ROWS + 1
+    n_inputs = u.shape[1]
+    for i in range(3):
+        at = (fraction + 0.5 * i * share) * p.load_factor
+        # the instant of an event in a run that diverges is no number, and must not become an address
+        whole = max(min(int(at), p.load_factor - 1), 0)
+        first = k * max(p.load_factor, 1) + whole
+        for j in range(n_inputs):
+            low = u[first, j]
+            if p.load_factor > 0:
+                low += (u[first + 1, j] - low) * (at - whole)
+            p.work[load + i * n_inputs + j] = low
+
+
+@_jit
+def _first_event(p, t, dt, rest):
+    """Element whose mode ends first within the trial step of length `rest`, and the share of it until then."""
+    event = -1
+    first = rest
+    load = 7 * p.n + 3 * MAX_ROWS + 1
+    for e in range(p.n_elements):
+        if _entry(p, e, LIMIT) == 0:
+            continue
+        if p.mode[e] == 0.0:
+            # grip holds the values of the last stage, that is of the end of the step, until it is asked for the start
+            excess = abs(p.grip[e]) - p.grip[p.n_elements + e]
+            if excess <= 0.0:
+                continue
+            _derivative(p, t, 0, 3 * p.n, load)
+            before = min(abs(p.grip[e]) - p.grip[p.n_elements + e], 0.0)
+            _derivative(p, t + dt, p.n, 3 * p.n, load + 2 * p.n_inputs)
+            crossing = rest * before / (before - excess)
+        else:
+            end = p.mode[e] * _relative_velocity(p, p.n, _entry(p, e, ROW))
+            if end >= 0.0:
+                continue
+            before = max(p.mode[e] * _relative_velocity(p, 0, _entry(p, e, ROW)), 0.0)
+            crossing = rest * before / (before - end)
+        if crossing < first or event < 0:
+            event = e
+            first = crossing
+    return event, first
+
+
+@_jit
+def _pass_event(p, u, k, t, dt, event, fraction, first, rest):
+    """Step to the event, refine its instant once, and change the mode; return the share of the sample used."""
+    sliding = p.mode[event] != 0.0
+    row = _entry(p, event, ROW)
+    for _ in range(2 if sliding else 1):
+        _fill_loads(p, u, k, fraction, first)
+        _rk4(p, t, first * dt, False)
+        if not sliding:
+            break
+        before = p.mode[event] * _relative_velocity(p, 0, row)
+        end = p.mode[event] * _relative_velocity(p, p.n, row)
+        if not (before > end and abs(end) > 1e-9 * before):
+            break
+        first = min(max(first * before / (before - end), 0.0), rest)
+    for i in range(p.n):
+        p.work[i] = p.work[p.n + i]
+    if sliding:
+        _settle(p, event, t + first * dt, 7 * p.n + 3 * MAX_ROWS + 1 + 2 * u.shape[1])
+    else:
+        p.mode[event] = 1.0 if p.grip[event] > 0.0 else -1.0
+    return first
+
+
+@_jit
+def _free_run(clock, u, start, scratch, n_dof, matrices, table, rows, spread, theta, out):  # noqa: PLR0912  (one compiled loop)
+    """Integrate over all samples from `start`; write position, velocity, acceleration to `out`.
+
+    `clock` is the time between samples, the time of the first, the steps of every sample and the rows of `u` a sample (zero: held).
+
+    `scratch` belongs to the caller: memory reached only through pointers would be freed here after its last mention.
+    """
+    dt, t0, substeps, load_factor = clock
+    n = start.shape[0]
+    n_elements = table.shape[0]
+    work = scratch[2 * n_elements + n_elements :]
+    mode = scratch[:n_elements]
+    position, velocity, acceleration = out
+    base = pointer_at(scratch.ctypes.data)
+    p = _Plan(
+        n_dof, n, u.shape[1], n_elements, rows.shape[0], load_factor, pointer_at(matrices.ctypes.data), table.ctypes.data,
+        pointer_at(rows.ctypes.data), pointer_at(spread.ctypes.data), base, advance(base, n_elements),
+        pointer_at(theta.ctypes.data), advance(base, 3 * n_elements),
+    )  # fmt: skip
+    work[:n] = start
+    load = 7 * n + 3 * MAX_ROWS + 1
+    frictional = False
+    for j in range(u.shape[1]):
+        work[load + j] = u[0, j]
+    for e in range(n_elements):
+        if _entry(p, e, LIMIT) != 0:
+            frictional = True
+            rate = _relative_velocity(p, 0, _entry(p, e, ROW))
+            if rate != 0.0:
+                mode[e] = 1.0 if rate > 0.0 else -1.0
+            else:
+                _settle(p, e, t0, load)
+    n_samples = position.shape[0]
+    for k in range(n_samples):
+        t = t0 + k * dt
+        share = 1.0 / substeps[k]
+        for j in range(u.shape[1]):
+            work[load + j] = u[k * max(load_factor, 1), j]
+        _derivative(p, t, 0, 3 * n, load)
+        for i in range(n_dof):
+            position[k, i] = work[i]
+            velocity[k, i] = work[n_dof + i]
+            acceleration[k, i] = work[3 * n + n_dof + i]
+        if not abs(work[0]) < DIVERGED:
+            position[k:] = np.nan
+            return
+        if k == n_samples - 1:
+            return
+        for s in range(substeps[k]):
+            fraction = s * share
+            rest = share
+            events = 0
+            while True:
+                _fill_loads(p, u, k, fraction, rest)
+                _rk4(p, t + fraction * dt, rest * dt, s == 0 and events == 0)
+                event = -1
+                first = rest
+                if frictional and events < MAX_EVENTS:
+                    event, first = _first_event(p, t + fraction * dt, rest * dt, rest)
+                if event < 0:
+                    for i in range(n):
+                        work[i] = work[n + i]
+                    break
+                events += 1
+                used = _pass_event(p, u, k, t + fraction * dt, dt, event, fraction, first, rest)
+                fraction += used
+                rest -= used
+
+
+def steps_of_each(substeps: int | NDArray[np.int64], n: int) -> NDArray[np.int64]:
+    """Steps of every sample (n,), where one number may stand for all."""
+    return np.ascontiguousarray(np.broadcast_to(substeps, n), dtype=np.int64)
+
+
+def free_run(
+    structure: LinearStructure,
+    elements: Elements,
+    *,
+    loads: NDArray[np.float64],
+    step: float,
+    substeps: int | NDArray[np.int64] = 1,
+    load_factor: int = 1,
+    start: NDArray[np.float64] | None = None,
+    start_time: float = 0.0,
+) -> Motion:
+    """Simulate the structure with its elements under sampled loads.
+
+    Args:
+        structure: Mass, damping, stiffness and input matrices.
+        elements: Force laws.
+        loads: ((n - 1) load_factor + 1, n_inputs) [N or N m], piecewise linear between its rows.
+        step: Time between samples [s].
+        substeps: Runge-Kutta steps a sample, or (n,) of each.
+        load_factor: Rows of `loads` a sample; 0: one row a sample, held until the next.
+        start: Positions and velocities at the first sample (2 n_dof,); at rest where None.
+        start_time: Time of the first sample [s].
+
+    Returns:
+        The motion at every sample; positions are NaN from where it diverged.
+    """
+    n_dof = structure.mass.shape[0]
+    inverse = np.linalg.inv(structure.mass)
+    matrices = np.ascontiguousarray(
+        np.hstack([inverse @ structure.stiffness, inverse @ structure.damping, inverse @ structure.inputs])
+    )
+    rows = np.ascontiguousarray(elements.rows if elements.rows.size else np.zeros((0, n_dof)))
+    y = np.zeros(2 * n_dof + len(elements.start))
+    if start is not None:
+        y[: 2 * n_dof] = start
+    y[2 * n_dof :] = elements.start
+    n, n_inputs = (len(loads) - 1) // max(load_factor, 1) + 1, loads.shape[1]
+    scratch = np.zeros(3 * len(elements.table) + 7 * len(y) + 3 * MAX_ROWS + 1 + 3 * n_inputs)
+    motion = Motion(np.zeros((n, n_dof)), np.zeros((n, n_dof)), np.zeros((n, n_dof)))
+    _free_run(
+        (step, start_time, steps_of_each(substeps, n), load_factor), np.ascontiguousarray(loads), y, scratch, n_dof, matrices,
+        elements.table, rows,
+        np.ascontiguousarray(inverse @ rows.T), elements.theta, tuple(motion),
+    )  # fmt: skip
+    return motion
