@@ -39,6 +39,10 @@ class Diagnose:
     """Effects to leave out of the catalogue."""
     most: int = 3
     """Largest number of effects named together."""
+    anyway: bool = False
+    """Go on where a unit, a sign or a part of the model stands against the diagnosis; what it was becomes a note."""
+    force: bool = False
+    """Overwrite files that are there already."""
     progress: bool = True
     """Show what is being done, on standard error."""
 
@@ -48,7 +52,7 @@ class Diagnose:
 
         self._check_places()
         with _stages(self.progress) as stage:
-            diagnosis = _diagnosed(self.folder, self.exclude, self.most, stage)
+            diagnosis = _diagnosed(self.folder, self.exclude, self.most, self.anyway, stage)
             document = diagnosis.verdict.to_json()
             if self.html is not None:
                 from bench.discrepancy import write_report
@@ -111,7 +115,9 @@ def _stages(shown: bool) -> Iterator[Callable[[str], None]]:
         yield lambda text: bar.update(task, description=text)
 
 
-def _diagnosed(folder: Path, exclude: tuple[str, ...], most: int, stage: Callable[[str], None]) -> Diagnosis:
+def _diagnosed(
+    folder: Path, exclude: tuple[str, ...], most: int, anyway: bool, stage: Callable[[str], None]
+) -> Diagnosis:
     """The diagnosis of a folder; what numerics cannot cope with is told like any other input that cannot be used."""
     import numpy as np
 
@@ -119,7 +125,7 @@ def _diagnosed(folder: Path, exclude: tuple[str, ...], most: int, stage: Callabl
     from bench.errors import IdentificationError
 
     try:
-        return diagnose_folder(folder, exclude=exclude, most=most, progress=stage)
+        return diagnose_folder(folder, exclude=exclude, most=most, anyway=anyway, progress=stage)
     except (np.linalg.LinAlgError, ArithmeticError) as error:
         raise IdentificationError(
             f"the numbers of '{folder}' cannot be worked with ({error}); check nominal values, units and noise_std: "

@@ -18,8 +18,8 @@ from threadpoolctl import threadpool_limits
 
 from bench.discrepancy.case.case import Case, read_case
 from bench.discrepancy.case.idle_loads import idle_notes, without_idle_noise
-from bench.discrepancy.case.schema import check_units
-from bench.discrepancy.checks.data_quality import notes, refuse
+from bench.discrepancy.checks.admission import admitted
+from bench.discrepancy.checks.data_quality import notes
 from bench.discrepancy.checks.initial_motion import with_starts_found
 from bench.discrepancy.checks.quantisation import recorded
 from bench.discrepancy.effects.catalogue import CATALOGUE
@@ -79,6 +79,7 @@ def diagnose(
     catalogue: Sequence[Effect] = CATALOGUE,
     exclude: Collection[str] = (),
     most: int = 3,
+    anyway: bool = False,
     rng: np.random.Generator | None = None,
     progress: Progress = lambda text: None,
 ) -> Diagnosis:
@@ -89,12 +90,15 @@ def diagnose(
         catalogue: Effects to consider.
         exclude: Names of effects to leave out of the catalogue.
         most: Largest number of effects named together.
+        anyway: Whether factors, signs and parts of the model that stand against a diagnosis are noted rather than refused.
         rng: For the bootstrap intervals; a fixed seed where None.
         progress: Called with a line of text at every stage.
 
     Raises:
         UnknownNameError: A name in `exclude` is not in the catalogue.
         RecordingError: The records cannot be used.
+        UnitError: A unit does not fit the model, or a channel is off by a factor or a sign that no missing force makes.
+        ModelError: The model holds what a nominal simulation cannot, and the records reach it.
     """
     rng = np.random.default_rng(SEED) if rng is None else rng
     known = [effect.name for effect in catalogue]
@@ -104,17 +108,15 @@ def diagnose(
     chosen = [effect for effect in catalogue if effect.name not in exclude]
     # fits run in threads of their own; threads of BLAS within them would only get in each other's way
     with threadpool_limits(1, user_api="blas"):
-        return _diagnose(case, chosen, most, rng, progress)
+        return _diagnose(case, chosen, most, anyway, rng, progress)
 
 
 def _diagnose(
-    case: Case, catalogue: Sequence[Effect], most: int, rng: np.random.Generator, progress: Progress
+    case: Case, catalogue: Sequence[Effect], most: int, anyway: bool, rng: np.random.Generator, progress: Progress
 ) -> Diagnosis:
     began = time.perf_counter()
     progress("looking at the records")
-    check_units(case)
-    told = case = with_starts_found(case)
-    refuse(Problem(case, structure_of(case), case.identification))
+    told, admission = admitted(case, anyway=anyway)
     quiet = without_idle_noise(told)
     case, explanations = _explained(quiet, catalogue, most, progress)
     problem = Problem(case, structure_of(case), case.identification)
@@ -158,6 +160,7 @@ def _diagnose(
         probabilities=probabilities,
         explanation=_told(words, seen),
         warnings=(
+            *admission,
             *notes(case, problem),
             *idle_notes(told, quiet),
             *reading_notes(quiet, case),

@@ -198,7 +198,8 @@ def _run_one(task: tuple[Path, Path, dict[str, Any]]) -> str:
         struck = json.loads(protocol.read_text(encoding="utf-8")).get("exclude", [])
         options = options | {"exclude": tuple({*options.get("exclude", ()), *struck})}
     try:
-        verdict = diagnose_folder(path, **options).verdict
+        # a planted polarity or gain is to be named here, not refused as one of the recording
+        verdict = diagnose_folder(path, **{"anyway": True, **options}).verdict
     except KeyboardInterrupt:
         raise
     except Exception as error:  # one case that fails is one wrong answer, not the end of the run

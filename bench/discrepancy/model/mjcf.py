@@ -59,7 +59,7 @@ def mjcf_structure(case: Case) -> Structure:
     joints = sorted({c.target.removeprefix("joint:") for c in case.channels if c.target.startswith("joint:")})
     rig = free_of_constraints(own, joints, prefix=PROBE)
     structural = [_structural(p.name, rig) for p in case.parameters]
-    loads, responses = _channels(case, rig)
+    loads, responses = loads_and_responses(case, rig)
     parameters = [name for name in structural if not name.startswith("structure/frictionloss/")]
     try:
         linear, bent = _linear(rig, [sensor for _, sensor, _ in responses] + _cells(loads), parameters)
@@ -119,7 +119,7 @@ def _structural(name: str, rig: Rig) -> str:
     return f"structure/{kind}/{target}"
 
 
-def _channels(
+def loads_and_responses(
     case: Case, rig: Rig
 ) -> tuple[list[tuple[CaseChannel, str]], list[tuple[CaseChannel, str, int | None]]]:
     """Loads with their actuator or its force sensor; responses with their sensor, and the order where a joint is meant."""

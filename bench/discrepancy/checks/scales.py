@@ -19,11 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import signal
 
-from bench.discrepancy.case import Case, CaseRecord
-from bench.discrepancy.nominal_forces import own_force
-from bench.discrepancy.prepared import noise_floor
-from bench.discrepancy.prescribed_motion import CHANNELS
-from bench.discrepancy.problem import Problem
+from bench.discrepancy.case.case import Case, CaseRecord
+from bench.discrepancy.model.nominal_forces import own_force
+from bench.discrepancy.likelihood.whitening import noise_floor
+from bench.discrepancy.motion.prescribed import CHANNELS
+from bench.discrepancy.likelihood.problem import Problem
 from bench.errors import UnitError
 from bench.recording.units import conversion, read_as, si_unit
 

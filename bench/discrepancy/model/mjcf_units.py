@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import mujoco
 
-from bench.discrepancy.case import Case, CaseChannel
-from bench.discrepancy.unit_conversion import Expectation
+from bench.discrepancy.case.case import Case, CaseChannel
+from bench.discrepancy.case.unit_conversion import Expectation
 from bench.rig import Rig
 
 Model = mujoco.MjModel

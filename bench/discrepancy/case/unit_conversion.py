@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bench.discrepancy.case import Case, CaseChannel, CaseRecord, NominalParameter
+from bench.discrepancy.case.case import Case, CaseChannel, CaseRecord, NominalParameter
 from bench.errors import UnitError
 from bench.recording.units import conversion, read_as
 

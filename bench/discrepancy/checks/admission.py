@@ -1,0 +1,68 @@
+"""What has to hold before anything is fitted: units by the model, limits of the model applied, no factor and no sign that is one of the
+recording, and a nominal simulation that is the user's model."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from bench.discrepancy.case.case import Case
+from bench.discrepancy.case.rig_units import in_coherent_units
+from bench.discrepancy.case.unit_conversion import converted
+from bench.discrepancy.checks.data_quality import refuse
+from bench.discrepancy.checks.initial_motion import with_starts_found
+from bench.discrepancy.checks.like_mujoco import unlike_mujoco
+from bench.discrepancy.checks.scales import suspicions
+from bench.discrepancy.likelihood.problem import Problem
+from bench.discrepancy.model.mjcf_loads import within_limits
+from bench.discrepancy.model.mjcf_reference import actuators_of, reference_of, rig_of
+from bench.discrepancy.model.mjcf_units import expected_units
+from bench.discrepancy.model.mjcf_values import value_notes
+from bench.discrepancy.model.structure import structure_of
+from bench.errors import ModelError, UnitError
+
+
+class Admitted(NamedTuple):
+    """A case that may be diagnosed.
+
+    Attributes:
+        case: In the units of its model, its loads within the model's limits.
+        notes: What was done to it or is doubtful about it, a sentence each.
+    """
+
+    case: Case
+    notes: tuple[str, ...]
+
+
+def admitted(declared: Case, *, anyway: bool = False) -> Admitted:
+    """Admit a case to the diagnosis.
+
+    Args:
+        declared: The case as read.
+        anyway: Whether what is doubtful is noted rather than refused.
+
+    Raises:
+        UnitError: A unit does not fit, or a channel is off by a factor or a sign.
+        ModelError: The model holds what the nominal simulation cannot, and it comes into play.
+        RecordingError: Nothing moves the rig, or nothing is measured.
+        IdentificationError: The nominal model diverges.
+    """
+    own = declared.rig.endswith(".xml")
+    case, said = in_coherent_units(declared)
+    if own:
+        rig = rig_of(declared)
+        case, said = converted(declared, *expected_units(declared, rig))
+        case, limited = within_limits(case, rig, actuators_of(case, rig))
+        said = (*said, *limited, *value_notes(case, rig))
+    case = with_starts_found(case)
+    problem = Problem(case, structure_of(case), case.identification)
+    refuse(problem)
+    doubts = suspicions(declared, problem)
+    if doubts and not anyway:
+        more = f" (and {len(doubts) - 1} more such)" if len(doubts) > 1 else ""
+        raise UnitError(f"{doubts[0]}{more}; --anyway diagnoses the records as they are")
+    if own:
+        apart = unlike_mujoco(problem, reference_of(case, rig_of(declared)), (*case.identification, *case.validation))
+        if apart and not anyway:
+            raise ModelError(f"{apart}; --anyway diagnoses with the nominal model all the same")
+        doubts = (*doubts, apart) if apart else doubts
+    return Admitted(case, (*said, *doubts))
