@@ -5,7 +5,8 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-from collections.abc import Callable, Iterator
+import signal
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -51,33 +52,39 @@ class Diagnose:
         from bench.files import write_text
 
         self._check_places()
-        with _stages(self.progress) as stage:
+        with _ended_like_interrupts(), _stages(self.progress) as stage:
             diagnosis = _diagnosed(self.folder, self.exclude, self.most, self.anyway, stage)
             document = diagnosis.verdict.to_json()
+            outputs: list[tuple[Path, Callable[[Path], None]]] = []
+            if self.json is not None and self.json != PRINTED:
+                text = json.dumps(document, indent=1, ensure_ascii=False)
+                outputs.append((self.json, lambda path: write_text(path, text)))
             if self.html is not None:
                 from bench.discrepancy import write_report
 
-                stage(f"writing {self.html}")
-                write_report(diagnosis, self.html)
+                outputs.append((self.html, lambda path: write_report(diagnosis, path)))
             if self.rrd is not None:
                 from bench.discrepancy.report.rerun_recording import write_rerun
 
-                stage(f"writing {self.rrd}")
-                write_rerun(diagnosis, self.rrd)
+                outputs.append((self.rrd, lambda path: write_rerun(diagnosis, path)))
+            failures = _written_together(outputs, stage)
         if self.json == PRINTED:
             emit(document)
         else:
-            if self.json is not None:
-                write_text(self.json, json.dumps(document, indent=1, ensure_ascii=False))
             for part in summary(diagnosis.verdict):
                 Console().print(part, markup=False, highlight=False)
-            for path in (self.json, self.html, self.rrd):
-                if path is not None:
+            for path, _ in outputs:
+                if path not in failures:
                     print(f"written: {path}")
         for warning in diagnosis.verdict.warnings:
             Console(stderr=True, soft_wrap=True).print(
                 f"note: {warning}", style="yellow", markup=False, highlight=False
             )
+        if failures:
+            from bench.files import OutputError
+
+            reasons = "; ".join(f"{path}: {reason}" for path, reason in failures.items())
+            raise OutputError(f"the verdict is complete, but not everything could be written ({reasons})")
 
     def _check_places(self) -> None:
         """Refuse places that cannot be written to before a minute is spent on the diagnosis."""
@@ -97,6 +104,8 @@ class Diagnose:
                 raise OutputError(
                     f"cannot write {path}: {nearest} is no folder one may write to; choose another place"
                 )
+            if path.exists() and not self.force:
+                raise OutputError(f"{path} is there already; --force overwrites it, or name another file")
             if path.resolve() in taken:
                 raise OutputError(f"{path} is named for two results; give each a file of its own")
             taken.add(path.resolve())
@@ -104,6 +113,43 @@ class Diagnose:
 
 PRINTED = Path("-")
 """Stands for standard output."""
+
+
+@contextlib.contextmanager
+def _ended_like_interrupts() -> Iterator[None]:
+    """End on SIGTERM as on SIGINT, so that half-written files are removed."""
+
+    def end(number: int, frame: object) -> None:
+        raise KeyboardInterrupt
+
+    try:
+        before = signal.signal(signal.SIGTERM, end)
+    except ValueError:  # not in the main thread, where no signal arrives
+        yield
+        return
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _written_together(
+    outputs: Sequence[tuple[Path, Callable[[Path], None]]], stage: Callable[[str], None]
+) -> dict[Path, str]:
+    """Make all files beside their places and move them there together; what could not be made, with the reason."""
+    from bench.files import replacing
+
+    failures: dict[Path, str] = {}
+    with contextlib.ExitStack() as together:
+        for path, write in outputs:
+            stage(f"writing {path}")
+            try:
+                with contextlib.ExitStack() as one:
+                    write(one.enter_context(replacing(path)))
+                    together.push(one.pop_all())
+            except Exception as error:  # a picture that fails is no reason to lose a verdict of minutes
+                failures[path] = str(error) or type(error).__name__
+    return failures
 
 
 @contextlib.contextmanager
@@ -139,6 +185,8 @@ def summary(verdict: Verdict) -> list[Any]:
     Args:
         verdict: The verdict.
     """
+    from bench.discrepancy.judgement.shares import closed_words, probability
+
     parts: list[Any] = [verdict.explanation]
     if verdict.named:
         table = Table("effect", "where", "probability", "parameters", title="Missing from the model")
@@ -148,20 +196,17 @@ def summary(verdict: Verdict) -> list[Any]:
                 for name, p in effect.parameters.items()
             )
             where = " ".join(text for text in (effect.where, effect.channel) if text)
-            table.add_row(effect.name, where, f"{effect.probability:.3f}", Text(values))
+            table.add_row(effect.name, where, probability(effect.probability), Text(values))
         parts.append(table)
-    table = Table(
-        "gap", "before", "parameters only", "after", "noise", "closed", title="How far the gap shrinks"
-    )
     for gap in verdict.gaps:
-        closed = f"{100 * gap.closed:.1f} % ({100 * gap.closed_ci95[0]:.1f} … {100 * gap.closed_ci95[1]:.1f})"
         label = f"{gap.dof}: {gap.metric}" if gap.dof else gap.metric
-        table.add_row(
-            label,
-            *(f"{x:.3g}" for x in (gap.before, gap.parameters_only, gap.after, gap.noise_floor)),
-            closed,
-        )
-    parts.append(table)
+        table = Table("model", "NRMSE", "closed", title=f"How far the gap shrinks ({label})")
+        *before, last = gap.steps
+        for name, value in before:
+            table.add_row(name, f"{value:.3g}", "" if value == gap.before else closed_words(gap, value))
+        table.add_row(last[0], f"{last[1]:.3g}", closed_words(gap))
+        table.add_row("noise alone", f"{gap.noise_floor:.3g}", "")
+        parts.append(table)
     for names in verdict.indistinguishable:
         parts.append(f"These records cannot tell {' from '.join(names)}.")
     proposal = verdict.next_excitation

@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -49,6 +50,7 @@ WORSE = 1.1
 """Gap with a closure over that without, on any judged coordinate, from which the closure is withdrawn."""
 
 Progress = Callable[[str], None]
+Placed = TypeVar("Placed", NamedEffect, Ranked)
 
 
 @dataclass(frozen=True)
@@ -149,10 +151,11 @@ def _diagnose(
         borne_out=rival is not None or kind == "effect",
         unknown=kind == "unknown",
     )
+    ranked = (*(Ranked(e.name, e.where, e.probability) for e in seen), *evidence.ranking(explanations))
     verdict = Verdict(
         verdict=kind,
-        named=(*evidence.named(explanations), *seen) if kind == "effect" else (),
-        ranking=(*(Ranked(e.name, e.where, e.probability) for e in seen), *evidence.ranking(explanations)),
+        named=_somewhere(problem, (*evidence.named(explanations), *seen)) if kind == "effect" else (),
+        ranking=_somewhere(problem, ranked),
         indistinguishable=evidence.indistinguishable(explanations) if kind != "unknown" else (),
         locations=where.locations,
         gap=widest,
@@ -245,6 +248,12 @@ def _model(explanation: Explanation) -> tuple[Hypothesis, np.ndarray] | None:
     """Effects and vector of an explanation in one part; None where it has several."""
     fits = [fitted for _, fitted in explanation.parts]
     return (fits[0].hypothesis, fits[0].vector) if len(fits) == 1 else None
+
+
+def _somewhere(problem: Problem, found: Sequence[Placed]) -> tuple[Placed, ...]:
+    """Effects with the name of the only place where they need none to be told apart."""
+    sites = {place.name: place.site for place in problem.structure.places}
+    return tuple(replace(effect, where=effect.where or sites.get("", "")) for effect in found)
 
 
 def _told(words: str, seen: Sequence[NamedEffect]) -> str:

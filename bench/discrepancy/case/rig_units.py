@@ -4,26 +4,24 @@ from __future__ import annotations
 
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.case.schema import CONSTANTS, LOADS, MOTION, RIGS, check_units
+from bench.discrepancy.case.single_axis import turns
 from bench.discrepancy.case.unit_conversion import Expectation, converted
 from bench.errors import UnitError
 
-ROTARY = {"angle": "rad", "rotation": "rad", "angular_velocity": "rad/s", "angular_acceleration": "rad/s^2", "torque": "N m"}
-"""Channels by which a rig of one coordinate is one that turns."""
-
-
 def expected_units(case: Case) -> tuple[dict[str, Expectation], dict[str, Expectation]]:
     """What the channels and the parameters of a case on one of the bench's rigs are measured in."""
-    turns = case.rig != "joint" and any(channel.name in ROTARY for channel in case.channels)
+    rotary = case.rig != "joint" and turns(case)
     channels, parameters = {}, {}
     for channel in case.channels:
         base = channel.name.rstrip("0123456789").rstrip("_")
-        unit = ROTARY.get(base) or next((table[base][1] for table in (MOTION, LOADS) if base in table), "")
+        base = "rotation" if base == "angle" else base
+        unit = next((table[base][1] for table in (MOTION, LOADS) if base in table), "")
         if unit:
             channels[channel.name] = Expectation((unit,), f"rig '{case.rig}' has {base.replace('_', ' ')} there")
     for parameter in case.parameters:
-        axial = not (turns or "torsional" in parameter.name or "inertia" in parameter.name)
+        axial = not (rotary or "torsional" in parameter.name or "inertia" in parameter.name)
         axis = "axial" if axial else "torsional"
-        name = "inertia" if turns and parameter.name == "mass" else parameter.name
+        name = "inertia" if rotary and parameter.name == "mass" else parameter.name
         units = next((u for (kind, a), u in CONSTANTS.items() if a == axis and kind in name), None)
         if parameter.name == "coulomb":
             units = ("N",) if axial else ("N m",)

@@ -6,6 +6,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from bench.discrepancy.case.case import Case
+from bench.discrepancy.case.free_decay import is_free_decay, with_no_load
 from bench.discrepancy.case.rig_units import in_coherent_units
 from bench.discrepancy.case.unit_conversion import converted
 from bench.discrepancy.checks.data_quality import refuse
@@ -13,8 +14,9 @@ from bench.discrepancy.checks.initial_motion import with_starts_found
 from bench.discrepancy.checks.like_mujoco import unlike_mujoco
 from bench.discrepancy.checks.scales import suspicions
 from bench.discrepancy.likelihood.problem import Problem
+from bench.discrepancy.model.mjcf_file import rig_of
 from bench.discrepancy.model.mjcf_loads import within_limits
-from bench.discrepancy.model.mjcf_reference import actuators_of, reference_of, rig_of
+from bench.discrepancy.model.mjcf_reference import actuators_of, reference_of
 from bench.discrepancy.model.mjcf_units import expected_units
 from bench.discrepancy.model.mjcf_values import value_notes
 from bench.discrepancy.model.structure import structure_of
@@ -47,6 +49,7 @@ def admitted(declared: Case, *, anyway: bool = False) -> Admitted:
         IdentificationError: The nominal model diverges.
     """
     own = declared.rig.endswith(".xml")
+    declared = with_no_load(declared) if is_free_decay(declared) and not _driven_by_name(declared) else declared
     case, said = in_coherent_units(declared)
     if own:
         rig = rig_of(declared)
@@ -66,3 +69,8 @@ def admitted(declared: Case, *, anyway: bool = False) -> Admitted:
             raise ModelError(f"{apart}; --anyway diagnoses with the nominal model all the same")
         doubts = (*doubts, apart) if apart else doubts
     return Admitted(case, (*said, *doubts))
+
+
+def _driven_by_name(case: Case) -> bool:
+    """Whether a channel of a user's own model is a load by nothing but the name of an actuator."""
+    return case.rig.endswith(".xml") and any(c.name in rig_of(case).actuators and not c.target for c in case.channels)

@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from scipy import signal
 
 from bench.discrepancy.case.case import Case, CaseRecord
+from bench.discrepancy.case.single_axis import motion_channels
 from bench.discrepancy.model.nominal_forces import own_force
 from bench.discrepancy.likelihood.whitening import noise_floor
-from bench.discrepancy.motion.prescribed import CHANNELS
 from bench.discrepancy.likelihood.problem import Problem
 from bench.errors import UnitError
 from bench.recording.units import conversion, read_as, si_unit
@@ -115,18 +115,6 @@ def suspicions(
     return tuple(dict.fromkeys(_against_model(declared, problem, chosen)))
 
 
-def require_plausible(declared: Case, problem: Problem) -> None:
-    """Refuse records with a factor or a sign that no missing force makes.
-
-    Raises:
-        UnitError: There is one; the message names the factor, and the line to change.
-    """
-    found = suspicions(declared, problem)
-    if found:
-        more = f" (and {len(found) - 1} more such)" if len(found) > 1 else ""
-        raise UnitError(f"{found[0]}{more}; --anyway diagnoses the records as they are")
-
-
 def spectra(first: Array, second: Array, step: float, noise: tuple[float, float], settings: ScaleSettings) -> Spectra:
     """Averaged spectra of two signals (n,).
 
@@ -189,8 +177,7 @@ def _observed(problem: Problem) -> list[tuple[str, int, Array, float]]:
         records = problem.records
         return [
             (name, order, np.ones(1), max(_noise(problem.case, name, record) for record in records))
-            for order, name in enumerate(CHANNELS)
-            if problem.case.has(name)
+            for order, name in motion_channels(problem.case).items()
         ]
     return [
         (o.channel, o.order, o.row, max(_noise(problem.case, o.channel, record) for record in problem.records))

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from bench.discrepancy.effects.effect import unit_of
+from bench.discrepancy.judgement.shares import percent
 from bench.discrepancy.judgement.validation_discrepancy import closed_share
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.search.explain import Explanation, nominal_alone, plainest
@@ -74,7 +75,7 @@ def closes(label: str, gap: Gap) -> str:
     if share < MOSTLY:
         return ""
     return (
-        f" On the judging records {label} closes {100.0 * min(share, 1.0):.3g} % of the gap all the same: it is much of what is "
+        f" On the judging records {label} closes {percent(share)} of the gap all the same: it is much of what is "
         "missing, or much like it."
     )
 

@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 
 from bench import native
 from bench.discrepancy.case.case import Case, CaseChannel
+from bench.discrepancy.model.mjcf_file import rig_of
 from bench.discrepancy.model.mjcf_gravity import gravity_springs, has_gravity, without_gravity
 from bench.discrepancy.model.mjcf_limits import check_reach, free_of_constraints
 from bench.discrepancy.model.nominal_forces import NominalFriction, NominalSpring
@@ -55,7 +56,7 @@ def mjcf_structure(case: Case) -> Structure:
         FileFormatError: An entry is not of the form expected.
     """
     path = Path(case.folder or ".") / case.rig
-    own = Rig.from_file(path)
+    own = rig_of(case)
     joints = sorted({c.target.removeprefix("joint:") for c in case.channels if c.target.startswith("joint:")})
     rig = free_of_constraints(own, joints, prefix=PROBE)
     structural = [_structural(p.name, rig) for p in case.parameters]
@@ -314,7 +315,7 @@ def _places(
             Place(
                 "" if len(wanted) == 1 else name, row[None, :], "rad" if hinge else "m", "N m" if hinge else "N",
                 tuple(names[i] for i in own[0]),
-                next((names[i] for i in own[2]), ""), next((names[i] for i in own[1]), ""),
+                next((names[i] for i in own[2]), ""), next((names[i] for i in own[1]), ""), name,
             )
         )  # fmt: skip
     return tuple(out)

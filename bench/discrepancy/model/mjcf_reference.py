@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pathlib import Path
-
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
@@ -42,11 +40,6 @@ class Reference:
     rest: Array
     offsets: Array
     unsteady: bool
-
-
-def rig_of(case: Case) -> Rig:
-    """The user's own model, as it stands in its file."""
-    return Rig.from_file(Path(case.folder or ".") / case.rig)
 
 
 def actuators_of(case: Case, rig: Rig) -> dict[str, str]:

@@ -8,13 +8,14 @@ the deviation of each nominal parameter becomes one column of a linear least-squ
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bench.discrepancy.case.case import Case
+from bench.discrepancy.case.single_axis import MOTIONS, load_channel, motion_channels, turns
 from bench.discrepancy.model.nominal_forces import NominalFriction, NominalSpring
 from bench.discrepancy.simulation.stick_slip import LinearStructure
 from bench.errors import FileFormatError
@@ -43,13 +44,14 @@ class Place:
     """Where an effect can sit.
 
     Attributes:
-        name: "" on a rig with one joint; "axial", "torsional", "joint" on the joint rig; a joint name otherwise.
+        name: "" where there is one place only; "axial", "torsional", "joint" on the joint rig; a joint name otherwise.
         rows: (n_coordinates, n_dof) relative coordinates.
         position_unit: Unit of the coordinate.
         force_unit: Unit of the force on it.
         mass: Names of the nominal parameters that are inertias moved along this coordinate.
         stiffness: Name of the nominal stiffness that acts on this coordinate; empty where there is none.
         damping: Likewise for the damping.
+        label: What to call it where `name` is empty.
     """
 
     name: str
@@ -59,6 +61,12 @@ class Place:
     mass: tuple[str, ...] = ()
     stiffness: str = ""
     damping: str = ""
+    label: str = ""
+
+    @property
+    def site(self) -> str:
+        """Its name in words: never empty on a rig that is known."""
+        return self.name or self.label
 
 
 @dataclass(frozen=True)
@@ -176,7 +184,7 @@ class Structure:
                 if np.abs(o.row[keep]).sum() > 0
             ),
             tuple(
-                Place(p.name, p.rows[:, keep], p.position_unit, p.force_unit, p.mass, p.stiffness, p.damping)
+                replace(p, rows=p.rows[:, keep])
                 for p in self.places
                 if np.abs(p.rows[:, keep]).sum() == np.abs(p.rows).sum()
             ),
@@ -231,16 +239,16 @@ def _observers(case: Case, table: Sequence[tuple[str, int, NDArray[np.float64]]]
 
 def _sdof(case: Case) -> Structure:
     names = ("mass", "damping", "stiffness", "coulomb")
-    _require(case, ("mass",), ("force",))
+    load, motion = load_channel(case), motion_channels(case)
+    _require(case, ("mass",), (load,))
     have = tuple(name for name in names if any(p.name == name for p in case.parameters))
     frictions = (NominalFriction(np.ones(1), "coulomb"),) if "coulomb" in have else ()
     stacks = [np.array([[[1.0 if name == kind else 0.0]] for name in have]) for kind in names[:3]]
     one = np.ones(1)
-    length = next((c.unit for c in case.channels if c.name == "displacement"), "m") or "m"
-    observers = _observers(case, (("displacement", 0, one), ("velocity", 1, one), ("acceleration", 2, one)))
+    observers = _observers(case, tuple((motion.get(i, names[0]), i, one) for i, names in enumerate(MOTIONS)))
     place = Place(
-        "", np.ones((1, 1)), length, case.channel("force").unit or "N", ("mass",),
-        "stiffness" if "stiffness" in have else "", "damping" if "damping" in have else "",
+        "", np.ones((1, 1)), *_units(case), ("mass",),
+        "stiffness" if "stiffness" in have else "", "damping" if "damping" in have else "", "carriage",
     )  # fmt: skip
     return Structure(
         ("x",),
@@ -249,16 +257,25 @@ def _sdof(case: Case) -> Structure:
         stacks[1],
         stacks[2],
         np.ones((1, 1)),
-        ("force",),
+        (load,),
         observers,
         (place,),
         frictions=frictions,
     )
 
 
+def _units(case: Case) -> tuple[str, str]:
+    """Units of the position and of the force along the coordinate of a rig that has one."""
+    position, load = motion_channels(case).get(0, ""), load_channel(case)
+    length, force = ("rad", "N m") if turns(case) else ("m", "N")
+    own = case.channel(position).unit if position else ""
+    return own or length, case.channel(load).unit or force
+
+
 def _damper(case: Case) -> Structure:
     """A massless component under prescribed motion; the mass only carries the bookkeeping of the coordinate."""
-    _require(case, (), ("displacement", "force"))
+    load, position = load_channel(case), motion_channels(case).get(0, MOTIONS[0][0])
+    _require(case, (), (position, load))
     names = tuple(p.name for p in case.parameters if p.name in {"stiffness", "damping", "coulomb"})
     stacks = [
         np.zeros((len(names), 1, 1)),
@@ -268,8 +285,8 @@ def _damper(case: Case) -> Structure:
         ),
     ]
     place = Place(
-        "", np.ones((1, 1)), case.channel("displacement").unit or "m", case.channel("force").unit or "N", (),
-        "stiffness" if "stiffness" in names else "", "damping" if "damping" in names else "",
+        "", np.ones((1, 1)), *_units(case), (),
+        "stiffness" if "stiffness" in names else "", "damping" if "damping" in names else "", "piston",
     )  # fmt: skip
     return Structure(
         ("x",),
@@ -278,8 +295,8 @@ def _damper(case: Case) -> Structure:
         stacks[1],
         stacks[2],
         np.ones((1, 1)),
-        ("displacement",),
-        (Observer("force", 0, np.ones(1)),),
+        (position,),
+        (Observer(load, 0, np.ones(1)),),
         (place,),
     )
 
