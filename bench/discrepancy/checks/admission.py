@@ -17,6 +17,7 @@ from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.mjcf_file import rig_of
 from bench.discrepancy.model.mjcf_loads import within_limits
 from bench.discrepancy.model.mjcf_reference import actuators_of, reference_of
+from bench.discrepancy.model.mjcf_rest import counted_from_rest
 from bench.discrepancy.model.mjcf_units import expected_units
 from bench.discrepancy.model.mjcf_values import value_notes
 from bench.discrepancy.model.structure import structure_of
@@ -51,11 +52,14 @@ def admitted(declared: Case, *, anyway: bool = False) -> Admitted:
     own = declared.rig.endswith(".xml")
     declared = with_no_load(declared) if is_free_decay(declared) and not _driven_by_name(declared) else declared
     case, said = in_coherent_units(declared)
+    reference = None
     if own:
         rig = rig_of(declared)
         case, said = converted(declared, *expected_units(declared, rig))
         case, limited = within_limits(case, rig, actuators_of(case, rig))
-        said = (*said, *limited, *value_notes(case, rig))
+        reference = reference_of(case, rig)
+        case, shifted = counted_from_rest(case, reference)
+        said = (*said, *limited, *shifted, *value_notes(case, rig))
     case = with_starts_found(case)
     problem = Problem(case, structure_of(case), case.identification)
     refuse(problem)
@@ -63,8 +67,8 @@ def admitted(declared: Case, *, anyway: bool = False) -> Admitted:
     if doubts and not anyway:
         more = f" (and {len(doubts) - 1} more such)" if len(doubts) > 1 else ""
         raise UnitError(f"{doubts[0]}{more}; --anyway diagnoses the records as they are")
-    if own:
-        apart = unlike_mujoco(problem, reference_of(case, rig_of(declared)), (*case.identification, *case.validation))
+    if reference is not None:
+        apart = unlike_mujoco(problem, reference, (*case.identification, *case.validation))
         if apart and not anyway:
             raise ModelError(f"{apart}; --anyway diagnoses with the nominal model all the same")
         doubts = (*doubts, apart) if apart else doubts

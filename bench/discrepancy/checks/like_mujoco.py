@@ -133,7 +133,7 @@ def unlike_mujoco(
     found: Deviation | None = None
     worst: CaseRecord | None = None
     for record in usable:
-        split = max(int(np.ceil(record.step / reference.model.opt.timestep - 1e-9)), 1)
+        split = _split(reference, record.step)
         length = min(len(record), budget // split)
         if length < 2:
             break
@@ -156,9 +156,11 @@ def _deviations(
     fine = simulated(reference, model, record, length, 2 * split)
     out = []
     for c, name in enumerate(problem.structure.channels):
-        if name not in reference.responses or not np.isfinite(own[:, c]).all():
+        if name not in reference.responses:
             continue
         at = list(reference.responses).index(name)
+        if not np.isfinite([own[:, c], fine[:, at], coarse[:, at]]).all():
+            continue
         difference = own[:, c] - fine[:, at]
         size = _rms(difference)
         allowed = settings.integration * _rms(fine[:, at] - coarse[:, at])
@@ -167,6 +169,12 @@ def _deviations(
             first = int(np.argmax(np.abs(difference) > max(level, settings.share * response)))
             out.append(Deviation(record.name, name, size / level, size / response, float(record.time[first])))
     return out
+
+
+def _split(reference: Reference, step: float) -> int:
+    """MuJoCo's steps a sample: its own step size, or that at which it is accurate, a time constant of the fastest motion."""
+    longest = min(reference.model.opt.timestep, 1.0 / max(reference.fastest, 1e-9))
+    return max(int(np.ceil(step / longest - 1e-9)), 1)
 
 
 def _rms(x: Array) -> float:
@@ -202,7 +210,7 @@ def simulated(reference: Reference, model: mujoco.MjModel, record: CaseRecord, l
 
 def _culprit(problem: Problem, reference: Reference, record: CaseRecord, settings: LikenessSettings) -> str:
     """The item without which MuJoCo comes nearest to the nominal simulation; empty where none helps."""
-    split = max(int(np.ceil(record.step / reference.model.opt.timestep - 1e-9)), 1)
+    split = _split(reference, record.step)
     length = min(len(record), settings.steps // split)
     own = problem.simulate((), np.zeros(len(problem.nominal)), record)[:length]
     columns = [problem.structure.channels.index(name) for name in reference.responses]

@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 
 from bench import native
 from bench.discrepancy.case.case import Case, CaseChannel
+from bench.discrepancy.model.mjcf_couplings import LINK, constrained, rows_of, stiff_modes, without_equalities
 from bench.discrepancy.model.mjcf_file import rig_of
 from bench.discrepancy.model.mjcf_gravity import gravity_springs, has_gravity, without_gravity
 from bench.discrepancy.model.mjcf_limits import check_reach, free_of_constraints
@@ -58,7 +59,8 @@ def mjcf_structure(case: Case) -> Structure:
     path = Path(case.folder or ".") / case.rig
     own = rig_of(case)
     joints = sorted({c.target.removeprefix("joint:") for c in case.channels if c.target.startswith("joint:")})
-    rig = free_of_constraints(own, joints, prefix=PROBE)
+    coupled, links = without_equalities(own)
+    rig = free_of_constraints(coupled, joints, prefix=PROBE)
     structural = [_structural(p.name, rig) for p in case.parameters]
     loads, responses = loads_and_responses(case, rig)
     parameters = [name for name in structural if not name.startswith("structure/frictionloss/")]
@@ -91,7 +93,11 @@ def mjcf_structure(case: Case) -> Structure:
         places, fixed, _frictions(own, linear, names), springs,
     )  # fmt: skip
     check_reach(case, structure, own, {channel.name: actuator for channel, actuator in loads}, linear.dofs)
-    return structure
+    structure = constrained(
+        structure, rows_of(own.model, links, structure.dofs), [next(iter(link)) for link in links]
+    )
+    values = np.array([p.value for p in case.parameters])
+    return constrained(structure, stiff_modes(structure, values, min(r.step for r in case.identification)))
 
 
 def _linear(rig: Rig, channels: Sequence[str], parameters: Sequence[str]) -> tuple[LinearRig, bool]:
@@ -293,7 +299,7 @@ def _places(
 ) -> tuple[Place, ...]:
     model = rig.model
     joints = [model.joint(int(model.dof_jntid[dof])).name for dof in linear.dofs]
-    tendons = [model.tendon(i).name for i in range(model.ntendon)]
+    tendons = [name for i in range(model.ntendon) if not (name := model.tendon(i).name).startswith(LINK)]
     known = [name for name in (*joints, *tendons) if name and (name in joints or _is_fixed(model, name))]
     wanted = case.options.get("places", known)
     if not isinstance(wanted, (list, tuple)) or not wanted:

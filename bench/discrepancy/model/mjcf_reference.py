@@ -31,6 +31,7 @@ class Reference:
         rest: (n_q,) positions at rest.
         offsets: (n_responses,) readings there.
         unsteady: Whether there is no state of rest.
+        fastest: Rate of the fastest motion about rest [1/s], which a step of integration has to follow.
     """
 
     model: mujoco.MjModel
@@ -40,6 +41,7 @@ class Reference:
     rest: Array
     offsets: Array
     unsteady: bool
+    fastest: float
 
 
 def actuators_of(case: Case, rig: Rig) -> dict[str, str]:
@@ -78,12 +80,12 @@ def reference_of(case: Case, rig: Rig) -> Reference:
         # a force sensor reads what the actuator's gain makes of a command
         gain = float(model.actuator_gainprm[index, 0]) if channel.target.startswith("sensor:") else 1.0
         inputs[channel.name] = (int(model.actuator_ctrladr[index]), 1.0 / gain if gain else 1.0)
-    rest, unsteady = _at_rest(model)
+    rest, unsteady, fastest = _at_rest(model)
     data = mujoco.MjData(model)
     data.qpos[:] = rest
     mujoco.mj_forward(model, data)
     offsets = data.sensordata[list(places.values())].copy()
-    return Reference(model, inputs, places, np.zeros(model.nu), rest, offsets, unsteady)
+    return Reference(model, inputs, places, np.zeros(model.nu), rest, offsets, unsteady, fastest)
 
 
 def _probe(channel: CaseChannel) -> str:
@@ -106,21 +108,22 @@ def _probed(case: Case, rig: Rig) -> Rig:
     return Rig(rig.name, spec.to_xml(), timestep=rig.timestep, folder=rig.folder)
 
 
-def _at_rest(model: mujoco.MjModel) -> tuple[Array, bool]:
-    """Positions at which springs and gravity balance, by Newton steps from the reference positions; and whether there are none."""
+def _at_rest(model: mujoco.MjModel) -> tuple[Array, bool, float]:
+    """Positions at which springs and gravity balance, by Newton steps from the reference positions; whether there are none; and the
+    rate of the fastest motion there [1/s]."""
     data = mujoco.MjData(model)
     q = model.qpos0.copy()
 
-    def force(position: Array) -> Array:
+    def force(position: Array, velocity: Array | float = 0.0) -> Array:
         mujoco.mj_resetData(model, data)
-        data.qpos[:] = position
+        data.qpos[:], data.qvel[:] = position, velocity
         mujoco.mj_fwdPosition(model, data)
         mujoco.mj_fwdVelocity(model, data)
         mujoco.mj_fwdActuation(model, data)
         return data.qfrc_passive - data.qfrc_bias + data.qfrc_actuator
 
     if model.nq != model.nv:
-        return q, True
+        return q, True, 0.0
     scale = max(float(np.abs(force(q)).max(initial=0.0)), 1e-300)
     for _ in range(NEWTON_STEPS):
         here = force(q)
@@ -128,5 +131,12 @@ def _at_rest(model: mujoco.MjModel) -> tuple[Array, bool]:
             break
         jacobian = np.column_stack([(force(q + 1e-6 * row) - here) / 1e-6 for row in np.eye(model.nv)])
         q = q - np.linalg.pinv(jacobian, rcond=1e-9) @ here
-    left = float(np.abs(force(q)).max(initial=0.0))
-    return q, left > 1e-6 * scale and left > 1e-12
+    here, eye = force(q), np.eye(model.nv)
+    mass = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, mass)
+    slopes = np.column_stack(
+        [(force(q + 1e-6 * row) - here) / 1e-6 for row in eye] + [(force(q, 1e-6 * row) - here) / 1e-6 for row in eye]
+    )
+    state = np.vstack([np.hstack([np.zeros_like(eye), eye]), np.linalg.solve(mass, slopes)])
+    left = float(np.abs(here).max(initial=0.0))
+    return q, left > 1e-6 * scale and left > 1e-12, float(np.abs(np.linalg.eigvals(state)).max(initial=0.0))
