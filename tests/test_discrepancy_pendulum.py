@@ -7,7 +7,7 @@ import json
 import mujoco
 import numpy as np
 import pytest
-from test_discrepancy_input import PARAMETERS, model, write
+from test_discrepancy_input import PARAMETERS, STICKS, model, write
 
 from bench.discrepancy import diagnose, read_case
 from bench.discrepancy.checks.data_quality import notes
@@ -213,7 +213,8 @@ def test_the_map_of_a_missing_force_leaves_out_the_friction_that_the_model_has(t
     table = np.array([[*friction, 1, 0, 0, 0, 0], [*gap, 1, 0, 1, 0, 0]])
     hidden = Elements(table, np.ones((1, 1)), np.array([1.5, 2000.0, 0.006, 0.0, 0.0]), np.zeros(0))
     parameters = {**PARAMETERS, "frictionloss:x": {"value": 1.5, "std": 0.1, "unit": "N"}}
-    case = read_case(write(tmp_path, model(friction=1.5), parameters=parameters, hidden=hidden))
+    text = model(friction=1.5, **STICKS)
+    case = read_case(write(tmp_path, text, parameters=parameters, hidden=hidden))
     (observer,) = observers(Problem(case, structure_of(case), case.identification))
     true = {"mass:carriage": 1.51, "stiffness:x": 905.0, "damping:x": 4.2}
     found = observer.estimate(case.identification[0], observer.nominal(true))

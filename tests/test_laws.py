@@ -196,6 +196,7 @@ NOT_ODD = {
     "one_sided_stop",
     "quadratic_stiffness",
     "constant_force",
+    "timed_force",
     "asymmetric_coulomb",
     "printed_coupling",
 }
@@ -230,7 +231,8 @@ CONSERVATIVE = {
 NOT_PASSIVE = {
     "stiffness_drift",
     "printed_coupling",
-}  # time-dependent spring; the printed form may feed energy in
+    "timed_force",
+}  # time-dependent spring and force; the printed form may feed energy in
 
 
 @ALL

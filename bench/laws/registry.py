@@ -41,8 +41,10 @@ from bench.laws.normal_force_friction import (
     TIME_VARYING_FRICTION,
 )
 from bench.laws.polynomial import polynomial_law_of
+from bench.laws.soft_friction import SOFT_COULOMB
 from bench.laws.stiffness import COGGING, CUBIC_STIFFNESS, QUADRATIC_STIFFNESS, STIFFNESS_DRIFT
 from bench.laws.stribeck import STRIBECK
+from bench.laws.timed_force import TIMED_FORCE, timed_force_law
 
 LAWS: Mapping[str, ForceLaw] = MappingProxyType(
     {
@@ -57,6 +59,7 @@ LAWS: Mapping[str, ForceLaw] = MappingProxyType(
             STIFFNESS_DRIFT,
             COGGING,
             CONSTANT_FORCE,
+            TIMED_FORCE,
             LINEAR_DAMPING,
             ASYMMETRIC_DAMPING,
             QUADRATIC_DAMPING,
@@ -65,6 +68,7 @@ LAWS: Mapping[str, ForceLaw] = MappingProxyType(
             BASE_FLEXIBILITY,
             COULOMB,
             ASYMMETRIC_COULOMB,
+            SOFT_COULOMB,
             STRIBECK,
             LOAD_DEPENDENT_FRICTION,
             TIME_VARYING_FRICTION,
@@ -89,7 +93,7 @@ LAWS: Mapping[str, ForceLaw] = MappingProxyType(
 """Every law by its name."""
 
 _SIZED: Mapping[str, Callable[[int], ForceLaw]] = MappingProxyType(
-    {"iwan": iwan_law, "generalised_bouc_wen": generalised_bouc_wen_law}
+    {"iwan": iwan_law, "timed_force": timed_force_law, "generalised_bouc_wen": generalised_bouc_wen_law}
 )
 
 _MODELS: Mapping[str, Callable[[Sequence[float]], ForceLaw]] = MappingProxyType(

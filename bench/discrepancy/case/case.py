@@ -26,8 +26,8 @@ from bench.discrepancy.case.acquisition import INTERPOLATIONS, Antialias
 from bench.discrepancy.case.schema import check_document
 from bench.errors import FileFormatError, RecordingError, UnknownNameError
 
-ROLES = ("measured", "command", "prescribed", "response")
-"""Roles of a channel: a measured load, a commanded load, a prescribed motion, a response."""
+ROLES = ("measured", "command", "prescribed", "response", "scheduling")
+"""Roles of a channel: a measured load, a commanded load, a prescribed motion, a response, and what laws may depend on besides."""
 
 TARGETS = ("sensor", "joint", "actuator")
 """Entries of a user's own MJCF that a channel can refer to."""

@@ -14,12 +14,15 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import product
-from typing import Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bench.laws.base import ForceLaw, Kernel
+
+if TYPE_CHECKING:
+    from bench.discrepancy.case.case import CaseRecord
 
 Site = Literal["joint", "inertia", "actuator", "sensor", "record"]
 Values = NDArray[np.float64]
@@ -42,6 +45,7 @@ class Scales(NamedTuple):
         acceleration: Largest acceleration along the coordinate.
         damping: Nominal damping, zero where there is none.
         source: Largest value of the channel that a sensor picks up, for cross-talk.
+        mobility: Acceleration along the coordinate that a unit force gives the nominal model; zero where the motion is prescribed.
     """
 
     force: float
@@ -56,6 +60,7 @@ class Scales(NamedTuple):
     acceleration: float = 1.0
     damping: float = 0.0
     source: float = 1.0
+    mobility: float = 0.0
 
 
 def log_grid(*values: float) -> tuple[float, ...]:
@@ -154,6 +159,11 @@ class Effect:
         pickup: The sensor adds a share of another measured channel: a load, or the response of the other axis.
         log_prior: Log prior odds against an effect of the README's list.
         rate_bound: Parameter values and scales to the fastest rate of the law [1/s]; the structure's own where None.
+        variant: What tells it from the effect of the same name in the catalogue; empty for that one.
+        creeps: Its friction creeps at rest, so that `limit` writes how (`friction_limits`).
+        of_record: Parameter values and the name of a record to the theta of `law` in that record; the same in all where None.
+        schedule: Parameter values and a record to the schedule of its force there (`system.scale_at`); none where None.
+        in_place: It takes the place of the nominal model's own dry friction along its coordinate.
     """
 
     name: str
@@ -175,6 +185,16 @@ class Effect:
     pickup: bool = False
     log_prior: float = 0.0
     rate_bound: Callable[[Values, Scales], float] | None = None
+    variant: str = ""
+    creeps: bool = False
+    in_place: bool = False
+    of_record: Callable[[Values, str], Values] | None = None
+    schedule: Callable[[Values, CaseRecord], Values] | None = None
+
+    @property
+    def sticks(self) -> bool:
+        """Whether it is friction that is set-valued at rest."""
+        return self.limit is not None and not self.creeps
 
     @property
     def rare(self) -> bool:

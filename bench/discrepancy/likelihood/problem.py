@@ -33,7 +33,7 @@ from bench.discrepancy.likelihood.window_whitening import (
     with_starts,
     without_starts,
 )
-from bench.discrepancy.model.nominal_forces import with_own_forces
+from bench.discrepancy.model.nominal_forces import own_friction, with_own_forces
 from bench.discrepancy.model.placement import Hypothesis, Placed
 from bench.discrepancy.model.structure import ACCELERATION, Place, Structure
 from bench.discrepancy.motion.measured import measured_motion
@@ -42,7 +42,7 @@ from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.response.driving_loads import driving_loads, fewest_steps, run_in
 from bench.discrepancy.response.step_size import rates, speeds, steps
 from bench.discrepancy.simulation.prescribed_response import driven_force
-from bench.discrepancy.simulation.stick_slip import Elements, Motion
+from bench.discrepancy.simulation.stick_slip import COLUMNS, Elements, Motion
 
 Array = NDArray[np.float64]
 MOTION_DRAWS = 8
@@ -214,18 +214,26 @@ class Problem:
         return Scales(
             float(force[0]), float(position[0]), float(velocity[0]), float(stiffness), len(record) * record.step,
             record.step, float(force[-1]), float(position[-1]), float(velocity[-1]),
-            acceleration or 1.0, float(damping),
+            acceleration or 1.0, float(damping), mobility=self._mobility(place.rows[0]),
         )  # fmt: skip
 
+    def _mobility(self, row: Array) -> float:
+        """Acceleration along a coordinate (n_dof,) that a unit force along it gives the nominal model."""
+        if self.driven:
+            return 0.0
+        return float(row @ np.linalg.solve(self.structure.at(self.nominal).mass, row))
+
     def _loading(self, row: Array) -> float:
-        """RMS load of the group of degrees of freedom that a coordinate belongs to."""
+        """RMS load of the group of degrees of freedom that a coordinate belongs to; that of its inertia where nothing drives it."""
         if self.driven:
             return float(np.sqrt(np.mean([float(np.mean(d.responses**2)) for d in self.data]))) or 1.0
         group = next(g for g in self.structure.groups() if np.any(row[list(g)] != 0.0))
         acting = np.abs(self.structure.inputs[list(group)]).sum(axis=0) > 0
-        if not acting.any():
-            return 1.0
-        return float(np.sqrt(np.mean([float(np.mean(d.loads[:, acting] ** 2)) for d in self.data]))) or 1.0
+        power = [float(np.mean(d.loads[:, acting] ** 2)) for d in self.data] if acting.any() else [0.0]
+        if not any(power):
+            moved = [self.motion(i).acceleration @ row for i in range(len(self.records))]
+            power = [float(np.mean((a / self._mobility(row)) ** 2)) for a in moved]
+        return float(np.sqrt(np.mean(power))) or 1.0
 
     def simulate(
         self,
@@ -270,9 +278,11 @@ class Problem:
         linear = self.structure.at(values)
         elements, rates = self.elements(hypothesis, etas, record)
         if own_forces:
-            elements = with_own_forces(elements, self.structure, values)
+            replaced = [placed.place.rows[0] for placed in hypothesis if placed.effect.in_place]
+            elements = with_own_forces(elements, self.structure, values, replaced)
         # The rate of a law is that at its largest velocity, where a step of one time constant is still accurate enough.
         own = np.sqrt(np.max(np.abs(linear.stiffness).sum(1) / np.diag(linear.mass)))
+        own = max([own, *(friction.rate(linear.mass) for friction in self.structure.frictions)])
         substeps = self._substeps(record.step * np.maximum(0.6 * rates, own))
         if lead and len(substeps) > 1:
             substeps = np.resize(substeps, lead + len(record))
@@ -321,7 +331,7 @@ class Problem:
         motion = self.motion_of(record)
         linear = self.structure.at(values)
         force = motion.position @ linear.stiffness + motion.velocity @ linear.damping
-        if COULOMB in self.structure.parameters:
+        if COULOMB in self.structure.parameters and not any(p.effect.in_place for p in hypothesis):
             force += values[self.structure.parameters.index(COULOMB)] * np.sign(motion.velocity)
         elements, rates = self.elements(hypothesis, etas, record)
         if len(elements.table):
@@ -338,6 +348,14 @@ class Problem:
                 return np.full_like(force, np.nan)
             force += driven @ elements.rows
         return self.sensed(hypothesis, etas, force, record.step)
+
+    def own_friction(self, motion: Motion, row: Array) -> Array:
+        """Force (n,) of the nominal model's own dry friction along one coordinate (n_dof,)."""
+        if self.driven:
+            own = COULOMB in self.structure.parameters
+            level = self.nominal[self.structure.parameters.index(COULOMB)] if own else 0.0
+            return level * np.sign(motion.velocity[:, 0])
+        return own_friction(self.structure, self.nominal, motion, row)
 
     def finer(self, refinement: int) -> Problem:
         """A copy that is integrated in other steps."""
@@ -425,22 +443,26 @@ class Problem:
                 continue
             scales = self.scales_of(placed)._replace(duration=len(record) * record.step)
             parameters = effect.kernel_theta(eta, scales)
+            if effect.of_record is not None:
+                parameters = effect.of_record(effect.values(eta, scales), record.name)
+            schedule = effect.schedule(effect.values(eta, scales), record) if effect.schedule else np.zeros(0)
             table.append(
                 [
                     *effect.addresses, effect.n_coordinates, n_rows, n_theta, n_states, len(effect.law.states),
+                    1 + n_theta + len(parameters) if effect.schedule else 0,
                 ]
             )  # fmt: skip
             own = rates(effect, effect.values(eta, scales), scales, self._speeds(placed, record))
             fastest = np.maximum(fastest, own)
             rows.append(placed.place.rows)
-            theta.append(parameters)
+            theta += [parameters, schedule]
             n_rows += effect.n_coordinates
-            n_theta += len(parameters)
+            n_theta += len(parameters) + len(schedule)
             n_states += len(effect.law.states)
         n_dof = len(self.structure.dofs)
         return (
             Elements(
-                np.array(table, dtype=np.int64).reshape(-1, 8),
+                np.array(table, dtype=np.int64).reshape(-1, COLUMNS),
                 np.vstack(rows) if rows else np.zeros((0, n_dof)),
                 np.concatenate([*theta, [0.0]]),
                 np.zeros(n_states),
@@ -460,18 +482,21 @@ class Problem:
 
     def residual(self, hypothesis: Hypothesis, vector: Array) -> Array:
         """Whitened residuals of all records, real and imaginary parts stacked; their sum of squares is chi-squared."""
-        parts = in_threads(lambda data: self._residual_of(data, hypothesis, vector), self.data)
+        parts = in_threads(lambda data: self.residual_of(data, hypothesis, vector), self.data)
         finite = [part for part in parts if part is not None]
         return np.concatenate(finite) if len(finite) == len(parts) else np.array([np.inf])
 
-    def _residual_of(self, data: RecordData, hypothesis: Hypothesis, vector: Array) -> Array | None:
-        """Whitened residuals of one record; None where its free run diverged."""
+    def residual_of(
+        self, data: RecordData, hypothesis: Hypothesis, vector: Array, *, lenient: bool = True
+    ) -> Array | None:
+        """Whitened residuals of one record, jumps that come a little early or late excused if `lenient`; None where it diverged."""
         predicted = self.simulate(hypothesis, vector, data.record)
         if not np.isfinite(predicted).all():
             return None
         moved = start_responses(self, hypothesis, vector, data.record, predicted) if self.windowed else ()
         residual = data.responses - predicted
-        for c, observer in enumerate(self.structure.observers if hypothesis and not self.driven else ()):
+        excused = lenient and hypothesis and not self.driven
+        for c, observer in enumerate(self.structure.observers if excused else ()):
             if observer.order == ACCELERATION:
                 residual[:, c] = timed(residual[:, c], predicted[:, c], self.noise[c])
         return projected(residual, moved, data)

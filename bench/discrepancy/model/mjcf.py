@@ -1,11 +1,12 @@
 """The user's own MJCF as the structure of a diagnosis.
 
-The matrices are read off the compiled model by `LinearRig`, which refuses whatever is not linear: the diagnosis adds forces
-to a linear structure, and an approximation in the nominal model would come back as an effect. Four things that are not
-linear are dealt with here, since hardly a model is without them. Dry friction (``frictionloss``) becomes truly set-valued friction of
-the nominal model. Ranges of joints and controls, and contacts, are left out as long as the measured motion and the loads never
-reach them; where they do, the record is refused. Gravity on a slide only shifts the rest position, from which motion is
-counted; on a pendulum it is a spring that bends with the angle, which is known and is added (`mjcf_gravity`).
+The matrices are read off the compiled model by `LinearRig`, which refuses whatever is not linear: the diagnosis adds forces to
+a linear structure, and an approximation in the nominal model would come back as an effect. Four things that are not linear are
+dealt with here, since hardly a model is without them. Dry friction (``frictionloss``) stays friction of the nominal model,
+which creeps at rest as MuJoCo lets it (`model.mjcf_friction`). Ranges of joints and controls, and contacts, are left out as long as
+the measured motion and the loads never reach them; where they do, the record is refused. Gravity on a slide only shifts the
+rest position, from which motion is counted; on a pendulum it is a spring that bends with the angle, which is known and is added
+(`mjcf_gravity`).
 
 Entries of ``nominal.json`` refer to the model by name:
 
@@ -30,6 +31,7 @@ from bench import native
 from bench.discrepancy.case.case import Case, CaseChannel
 from bench.discrepancy.model.mjcf_couplings import LINK, constrained, rows_of, stiff_modes, without_equalities
 from bench.discrepancy.model.mjcf_file import rig_of
+from bench.discrepancy.model.mjcf_friction import nominal_frictions
 from bench.discrepancy.model.mjcf_gravity import gravity_springs, has_gravity, without_gravity
 from bench.discrepancy.model.mjcf_limits import check_reach, free_of_constraints
 from bench.discrepancy.model.nominal_forces import NominalFriction, NominalSpring
@@ -90,7 +92,7 @@ def mjcf_structure(case: Case) -> Structure:
     structure = Structure(
         tuple(rig.model.joint(int(rig.model.dof_jntid[dof])).name for dof in linear.dofs),
         names, *stacks, inputs, tuple(channel.name for channel, _ in loads), observers,
-        places, fixed, _frictions(own, linear, names), springs,
+        places, fixed, _frictions(own, linear, names, case.identification[0].step), springs,
     )  # fmt: skip
     check_reach(case, structure, own, {channel.name: actuator for channel, actuator in loads}, linear.dofs)
     structure = constrained(
@@ -134,6 +136,8 @@ def loads_and_responses(
     force_sensors = _force_sensors(rig.model)
     loads, responses = [], []
     for channel in case.channels:
+        if channel.role == "scheduling":
+            continue
         kind, _, name = channel.target.rpartition(":")
         name = name or channel.name
         if channel.role == "prescribed":
@@ -277,21 +281,18 @@ def _row(model: mujoco.MjModel, name: str, dofs: NDArray[np.int64]) -> Array:
     return row[dofs] if np.count_nonzero(row) == np.count_nonzero(row[dofs]) else np.zeros(len(dofs))
 
 
-def _frictions(own: Rig, linear: LinearRig, names: Sequence[str]) -> tuple[NominalFriction, ...]:
-    """Dry friction of the model itself, free where it is a nominal parameter."""
+def _frictions(own: Rig, linear: LinearRig, names: Sequence[str], step: float) -> tuple[NominalFriction, ...]:
+    """Dry friction of the model itself."""
     model = own.model
-    joints = {
-        model.joint(int(model.dof_jntid[dof])).name: float(model.dof_frictionloss[dof]) for dof in linear.dofs
-    }
-    tendons = {model.tendon(i).name: float(model.tendon_frictionloss[i]) for i in range(model.ntendon)}
-    out = []
-    for name, value in (joints | tendons).items():
-        parameter = f"frictionloss:{name}"
-        if parameter in names or value > 0.0:
-            row = _row(model, name, linear.dofs)
-            if np.any(row):
-                out.append(NominalFriction(row, parameter if parameter in names else "", value))
-    return tuple(out)
+    joints = [model.joint(int(model.dof_jntid[dof])).name for dof in linear.dofs]
+    tendons = [model.tendon(i).name for i in range(model.ntendon)]
+    frictional = [
+        name
+        for name in tendons
+        if f"frictionloss:{name}" in names or model.tendon_frictionloss[model.tendon(name).id] > 0.0
+    ]
+    rows = [(name, _row(model, name, linear.dofs)) for name in (*joints, *frictional)]
+    return nominal_frictions(model, rows, names, step)
 
 
 def _places(

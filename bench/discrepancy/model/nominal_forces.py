@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.discrepancy.effects.friction_limits import coulomb_limit
+from bench.discrepancy.effects.friction_limits import soft_coulomb_limit
 from bench.discrepancy.numerics.cubic_spline import cubic, spline_of
-from bench.discrepancy.simulation.stick_slip import ROW, THETA, Elements, Motion
+from bench.discrepancy.simulation.stick_slip import ROW, SCALE, THETA, Elements, Motion, full
 from bench.laws.base import kernel
 
 if TYPE_CHECKING:
@@ -30,11 +30,15 @@ class NominalFriction:
         row: (n_dof,) relative coordinate that it acts on.
         parameter: Name of the nominal parameter that is its limit; empty where the limit is fixed.
         value: The limit where it is fixed [N or N m].
+        creep: Velocity of creep at the limit, over the limit [m/s/N or rad/s/(N m)]; zero where it sticks.
+        lead: Time by which it turns round before the velocity does [s], see `bench.laws.soft_friction`.
     """
 
     row: Array
     parameter: str = ""
     value: float = 0.0
+    creep: float = 0.0
+    lead: float = 0.0
 
     def level(self, structure: Structure, values: Array) -> float:
         """Limit of the friction at nominal parameter values (n_parameters,)."""
@@ -42,9 +46,35 @@ class NominalFriction:
             return self.value
         return max(float(values[structure.parameters.index(self.parameter)]), 0.0)
 
+    def theta(self, structure: Structure, values: Array) -> Array:
+        """Limit, creep velocity and lead time (3,) at nominal parameter values (n_parameters,)."""
+        level = self.level(structure, values)
+        return np.array([level, level * self.creep, self.lead])
+
+    def acts_along(self, row: Array) -> bool:
+        """Whether it acts on a coordinate (n_dof,), and on it alone."""
+        return bool(np.array_equal(self.row, row))
+
+    def along(self, level: float, motion: Motion) -> Array:
+        """Force (n,) of a limit of `level` along a motion."""
+        ahead = (motion.velocity + self.lead * motion.acceleration) @ self.row
+        if self.creep == 0.0 or level == 0.0:
+            return level * np.sign(ahead)
+        return np.clip(ahead / self.creep, -level, level)
+
+    def change(self, level: float, motion: Motion) -> Array:
+        """Change (n,) of the force with a unit of its limit: none where it creeps, since the limit then is not reached."""
+        ahead = (motion.velocity + self.lead * motion.acceleration) @ self.row
+        return np.sign(ahead) * (np.abs(ahead) >= level * self.creep)
+
+    def rate(self, mass: Array) -> float:
+        """How fast the creep of a structure of such mass (n_dof, n_dof) settles [1/s]; zero where friction sticks."""
+        slow = self.lead + self.creep / float(self.row @ np.linalg.solve(mass, self.row))
+        return 1.0 / slow if slow > 0.0 else 0.0
+
     def restricted(self, keep: Sequence[int]) -> NominalFriction:
         """The same on some degrees of freedom."""
-        return NominalFriction(self.row[list(keep)], self.parameter, self.value)
+        return replace(self, row=self.row[list(keep)])
 
 
 @dataclass(frozen=True)
@@ -95,44 +125,66 @@ def spline_force(t, q, v, z, theta, f):
     f[0] += cubic(theta, 1, PIECES, 0.5 * PIECES * (1.0 + x))
 
 
-def with_own_forces(elements: Elements, structure: Structure, values: Array) -> Elements:
-    """Elements preceded by the nominal model's own forces, at parameter values (n_parameters,)."""
-    frictions, springs = structure.frictions, structure.springs
-    if not structure.has_own_forces:
+def with_own_forces(
+    elements: Elements, structure: Structure, values: Array, replaced: Sequence[Array] = ()
+) -> Elements:
+    """Elements preceded by the nominal model's own forces.
+
+    Args:
+        elements: Force laws of a hypothesis.
+        structure: The nominal model.
+        values: (n_parameters,) its parameters.
+        replaced: Coordinates (n_dof,) along which its dry friction is left out.
+    """
+    frictions, springs = _kept(structure, replaced), structure.springs
+    if not (frictions or springs):
         return elements
-    theta = [np.array([friction.level(structure, values)]) for friction in frictions]
+    theta = [friction.theta(structure, values) for friction in frictions]
     theta += [np.append(spring.reach, spring.coefficients(values)) for spring in springs]
     firsts = np.cumsum([0, *(len(own) for own in theta)])
-    own = [[0, 0, coulomb_limit.address, 1, i, firsts[i], 0, 0] for i in range(len(frictions))]
+    own = [[0, 0, soft_coulomb_limit.address, 1, i, firsts[i], 0, 0] for i in range(len(frictions))]
     own += [[spline_force.address, 0, 0, 1, i, firsts[i], 0, 0] for i in range(len(frictions), len(theta))]
-    table = elements.table.copy()
+    table = full(elements.table).copy()
     table[:, ROW] += len(own)
     table[:, THETA] += firsts[-1]
+    table[:, SCALE] += firsts[-1] * (table[:, SCALE] != 0)
     return Elements(
-        np.vstack([np.array(own, dtype=np.int64), table]),
+        np.vstack([full(np.array(own, dtype=np.int64)), table]),
         np.vstack([*(force.row for force in (*frictions, *springs)), elements.rows]),
         np.concatenate([*theta, elements.theta]),
         elements.start,
     )
 
 
+def _kept(structure: Structure, replaced: Sequence[Array]) -> tuple[NominalFriction, ...]:
+    return tuple(f for f in structure.frictions if not any(f.acts_along(row) for row in replaced))
+
+
+def own_friction(structure: Structure, values: Array, motion: Motion, row: Array) -> Array:
+    """Force (n,) of the nominal model's own dry friction along one coordinate (n_dof,)."""
+    force = np.zeros(len(motion.position))
+    for friction in structure.frictions:
+        if friction.acts_along(row):
+            force += friction.along(friction.level(structure, values), motion)
+    return force
+
+
 def own_force(structure: Structure, values: Array, motion: Motion) -> Array:
     """Force (n, n_dof) that the nominal model's own forces take from the structure along a motion."""
     force = np.zeros_like(motion.position)
     for friction in structure.frictions:
-        rate = motion.velocity @ friction.row
-        force += friction.level(structure, values) * np.outer(np.sign(rate), friction.row)
+        force += np.outer(friction.along(friction.level(structure, values), motion), friction.row)
     for spring in structure.springs:
         force += np.outer(spring.along(spring.coefficients(values), motion.position), spring.row)
     return force
 
 
-def own_change(structure: Structure, parameter: int, motion: Motion) -> Array:
-    """Change of `own_force` (n, n_dof) with a unit of a nominal parameter."""
+def own_change(structure: Structure, parameter: int, motion: Motion, nominal: float) -> Array:
+    """Change of `own_force` (n, n_dof) with a unit of a nominal parameter about its value."""
     force = np.zeros_like(motion.position)
     for friction in structure.frictions:
         if friction.parameter == structure.parameters[parameter]:
-            force += np.outer(np.sign(motion.velocity @ friction.row), friction.row)
+            force += np.outer(friction.change(max(nominal, 0.0), motion), friction.row)
     for spring in structure.springs:
         if parameter < len(spring.slopes):
             force += np.outer(spring.along(spring.slopes[parameter], motion.position), spring.row)

@@ -28,8 +28,8 @@ class Placed:
 
     @property
     def key(self) -> tuple[str, str, str]:
-        """Name, place and target: what tells two placed effects apart."""
-        return (self.effect.name, self.place.name, self.target)
+        """Name with its variant, place and target: what tells two placed effects apart."""
+        return (f"{self.effect.name} {self.effect.variant}".strip(), self.place.name, self.target)
 
     @property
     def channel(self) -> str:

@@ -5,10 +5,15 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
+from bench.discrepancy.model.mjcf_friction import frictionloss_of
 from bench.discrepancy.verdict import NamedEffect
 
 if TYPE_CHECKING:
     from bench.discrepancy.diagnosis import Diagnosis
+
+
+FRICTION = ("friction_force", "creep_velocity", "lead_time")
+"""Parameters of dry friction, those of its softness where it has any."""
 
 
 class Recipe(NamedTuple):
@@ -75,25 +80,33 @@ def _joint(effect: NamedEffect, diagnosis: Diagnosis) -> tuple[str, ...]:
 
 def element_code(law: str, theta: tuple[float, ...], joints: tuple[str, ...] = ("JOINT",)) -> str:
     """Python code that makes the element of a found effect."""
+    names = ", ".join(f'"{joint}"' for joint in joints)
+    header, values = _sized(law, theta)
+    numbers = ", ".join(f"{name}={value:.6g}" for name, value in values.items())
+    entry = f'find_law("{law}", {header})' if header else f'"{law}"'
+    imports = "from bench.laws import find_law\n" if header else ""
+    return (
+        f"{imports}from bench.rig import Element\n\nelement = Element.of({entry}, {names}, {numbers})\n"
+        "rig = rig.with_element(element)"
+    )
+
+
+def _sized(law: str, theta: tuple[float, ...]) -> tuple[tuple[float, ...], dict[str, float]]:
+    """Header of a law in the size of a theta, and its parameters by name."""
     from bench.laws import find_law  # noqa: PLC0415  (laws import their kernels)
 
-    names = ", ".join(f'"{joint}"' for joint in joints)
-    numbers = ", ".join(
-        f"{name}={value:.6g}" for name, value in zip(find_law(law).parameter_names, theta, strict=True)
-    )
-    return f'from bench.rig import Element\n\nelement = Element.of("{law}", {names}, {numbers})\nrig = rig.with_element(element)'
+    header = theta[: len(find_law(law).header)]
+    values = theta[len(header) :]
+    return header, dict(zip(find_law(law, header).parameter_names, values, strict=True))
 
 
 def element_toml(law: str, theta: tuple[float, ...], joints: tuple[str, ...] = ("JOINT",)) -> str:
     """The element of a found effect as an entry of a rig configuration."""
-    from bench.laws import find_law  # noqa: PLC0415
-
     names = ", ".join(f'"{joint}"' for joint in joints)
-    numbers = ", ".join(
-        f"{name} = {_toml_number(value)}"
-        for name, value in zip(find_law(law).parameter_names, theta, strict=True)
-    )
-    return f'[[elements]]\nlaw = "{law}"\njoints = [{names}]\nparameters = {{ {numbers} }}'
+    header, values = _sized(law, theta)
+    numbers = ", ".join(f"{name} = {_toml_number(value)}" for name, value in values.items())
+    size = f"header = [{', '.join(_toml_number(x) for x in header)}]\n" if header else ""
+    return f'[[elements]]\nlaw = "{law}"\n{size}joints = [{names}]\nparameters = {{ {numbers} }}'
 
 
 def _toml_number(value: float) -> str:
@@ -114,17 +127,27 @@ def _mjcf(
     stiffness = estimates.get(place.stiffness, 0.0) if place else 0.0
     damping = estimates.get(place.damping, 0.0) if place else 0.0
     own = _Own(effect, joint[0], stiffness, damping, diagnosis.case.identification[0].step)
+    if place is not None and not diagnosis.problem.driven:
+        own = own._replace(mobility=diagnosis.problem.scales(place).mobility)
     return native.text.format(own), native.note.format(own)
 
 
 class _Own(NamedTuple):
-    """An effect, and what its joint has already: the name, stiffness and damping; and the step of the records [s]."""
+    """An effect, and what its joint has already: name, stiffness, damping, and mobility; and the step of the records [s]."""
 
     effect: NamedEffect
     joint: str
     stiffness: float
     damping: float
     step: float
+    mobility: float = 1.0
+
+    @property
+    def friction(self) -> str:
+        """MuJoCo's attributes of dry friction of the effect's softness; as hard as its step lets it be where that is none."""
+        numbers = [self.effect.parameters[n].value if n in self.effect.parameters else 0.0 for n in FRICTION]
+        attributes = frictionloss_of(*numbers, mobility=self.mobility, step=self.step)
+        return " ".join(f'{name}="{value}"' for name, value in attributes.items())
 
     @property
     def value(self) -> float:
@@ -164,8 +187,9 @@ class _Native(NamedTuple):
 
 _NATIVE: dict[str, _Native] = {
     "coulomb_friction": _Native(
-        '<joint name="{0.joint}" frictionloss="{0.value:.6g}"/>',
-        "MuJoCo's constraint holds the joint at rest, as real friction does; the element rounds the sign function instead.",
+        '<joint name="{0.joint}" {0.friction}/>',
+        "MuJoCo's constraint creeps at rest; these numbers make it as soft as the records say, or else as hard as a step of "
+        "{0.step:.3g} s lets it be: its defaults turn the force round 9.5 ms early. They take the place of a frictionloss that is there.",
     ),
     "cubic_stiffness": _Native(
         '<joint name="{0.joint}" stiffness="{0.stiffness:.6g} 0 {0.value:.6g}"/>',

@@ -196,7 +196,7 @@ class Screen:
         if self.problem.structure.parameters[parameter] == COULOMB:
             return -self.problem.spread[parameter] * np.sign(self.problem.motion(index).velocity)
         motion, s = self.problem.motion(index), self.problem.structure
-        force = own_change(s, parameter, motion)
+        force = own_change(s, parameter, motion, self.problem.nominal[parameter])
         force += motion.acceleration @ s.mass[parameter].T + motion.velocity @ s.damping[parameter].T
         return -self.problem.spread[parameter] * (force + motion.position @ s.stiffness[parameter].T)
 
@@ -489,4 +489,6 @@ def force_along(problem: Problem, placed: Placed, eta: Array, index: int) -> Arr
         substeps=steps(record.step * rates),
         start_time=record.start,
     )
+    if placed.effect.in_place:
+        force[:, 0] -= problem.own_friction(motion, rows[0])
     return force @ rows

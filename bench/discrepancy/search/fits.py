@@ -236,7 +236,7 @@ def _beside_the_best(search: Search, fitted: Fit) -> Fit:
 
 def sticks(fitted: Fit) -> bool:
     """Whether a hypothesis holds friction that is set-valued at rest."""
-    return any(placed.effect.limit is not None for placed in fitted.hypothesis)
+    return any(placed.effect.sticks for placed in fitted.hypothesis)
 
 
 def _shaken(search: Search, fitted: Fit, behind: float) -> None:

@@ -49,6 +49,9 @@ from bench.discrepancy.search.fits import (
     shake,
 )
 from bench.discrepancy.search.rivals import challenge, reduce_best, simplify
+from bench.discrepancy.search.scheduled import with_schedules
+from bench.discrepancy.search.soft_friction import soften
+from bench.discrepancy.search.timed_force import with_timed_force
 
 QUICK = 6
 """Iterations of a first fit; the best are carried on to convergence."""
@@ -99,6 +102,7 @@ def attribute(
         if not points or points[0].gain < NOTICEABLE:
             return search
     _extend(search, screen, [nothing], count=8)
+    soften(search, 1)
     if not consistent(search.ranked()[0]) and all(o.order > 0 for o in problem.structure.observers):
         _simulated(search, candidates)
     rare = [p for p in candidates if p.effect.rare]
@@ -106,6 +110,8 @@ def attribute(
         progress("rarer effects")
         screen.add(rare)
         _extend(search, screen, [nothing], count=6, among={p.key for p in rare})
+    with_timed_force(search)
+    with_schedules(search)
     for size in range(1, most):
         if near(search.ranked()[0]):
             integrate_finer(search)
@@ -124,12 +130,14 @@ def attribute(
                 break
             bases = worth_extending(search, screen, size, 4 - size) if lacks else [best]
             _extend(search, screen, bases, count=4)
+            soften(search, size + 1)
             reduce_best(search)
             continue
         ranked = search.ranked(size)
         if not ranked or ranked[0].reduced - 1.0 > STALLED * (search.ranked(size - 1)[0].reduced - 1.0):
             break
         _extend(search, screen, worth_extending(search, screen, size, 4 - size), count=6 - size)
+        soften(search, size + 1)
         reduce_best(search)
     best = search.ranked()[0]
     if not problem.noise_stated:
@@ -137,6 +145,7 @@ def attribute(
     elif near(best):
         progress(f"rivals of {names(best.hypothesis)}")
         challenge(search, screen)
+        soften(search, len(search.ranked()[0].hypothesis))
         shake(search)
     return search
 

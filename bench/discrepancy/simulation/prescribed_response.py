@@ -12,25 +12,29 @@ from numpy.typing import NDArray
 
 from bench.discrepancy.simulation.stick_slip import (
     FORCE,
+    GRIPS,
     LIMIT,
     MAX_ROWS,
     N_ROWS,
     N_STATES,
     RATE,
     ROW,
+    SCALE,
     STATE,
     THETA,
     Elements,
+    full,
+    scale_at,
     steps_of_each,
 )
 from bench.laws.calling import advance, call_kernel, pointer_at
 
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
-def _driven(dt, t0, substeps, q, v, table, theta, z, force):
+def _driven(dt, t0, substeps, q, v, table, theta, z, force):  # noqa: PLR0912, PLR0915  (one compiled loop)
     """Force (n, n_rows) and hidden states of elements whose coordinates follow the samples `q`, `v` (n, n_rows)."""
     n_states = z.shape[0]
-    work = np.zeros((3, MAX_ROWS + 1))
+    work = np.zeros((3, MAX_ROWS + GRIPS))
     slopes = np.zeros((4, max(n_states, 1)))
     stage = np.zeros(max(n_states, 1))
     wq = pointer_at(work[0].ctypes.data)
@@ -50,13 +54,29 @@ def _driven(dt, t0, substeps, q, v, table, theta, z, force):
                 work[0, r] = q[k, first + r]
                 work[1, r] = v[k, first + r]
                 work[2, r] = 0.0
-            work[2, MAX_ROWS] = 0.0
+            work[2, MAX_ROWS:] = 0.0
             zp = advance(z_pointer, table[e, STATE])
             if table[e, FORCE] != 0:
                 call_kernel(table[e, FORCE], t, wq, wv, zp, parameters, wf)
+            scale = 1.0
+            if table[e, SCALE] != 0:
+                scale = scale_at(advance(theta_pointer, table[e, SCALE] - 1), t)
+                for r in range(rows):
+                    work[2, r] *= scale
             if table[e, LIMIT] != 0:
                 call_kernel(table[e, LIMIT], t, wq, wv, zp, parameters, advance(wf, MAX_ROWS))
-                work[2, 0] += np.sign(work[1, 0]) * max(work[2, MAX_ROWS], 0.0)
+                limit = max(scale * work[2, MAX_ROWS], 0.0)
+                creep = work[2, MAX_ROWS + 1]
+                lead = work[2, MAX_ROWS + 2]
+                if creep > 0.0 or lead > 0.0:
+                    # the velocity a lead time on; what creeps not at all but only in time turns round early
+                    after = min(k + 1, q.shape[0] - 1)
+                    rise = v[after, first] - v[after - 1, first] if after > 0 else 0.0
+                    ahead = work[1, 0] + lead * rise / dt
+                    ratio = ahead / creep if creep > 0.0 else np.sign(ahead)
+                    work[2, 0] += limit * min(max(ratio, -1.0), 1.0)
+                else:
+                    work[2, 0] += np.sign(work[1, 0]) * limit
             for r in range(rows):
                 force[k, first + r] = work[2, r]
             if table[e, RATE] == 0 or k == q.shape[0] - 1:
@@ -94,7 +114,9 @@ def driven_force(
     force = np.zeros_like(position)
     counts = steps_of_each(substeps, len(position))
     q, v = np.ascontiguousarray(position), np.ascontiguousarray(velocity)
-    _driven(step, start_time, counts, q, v, elements.table, elements.theta, elements.start.copy(), force)
+    _driven(
+        step, start_time, counts, q, v, full(elements.table), elements.theta, elements.start.copy(), force
+    )
     return force
 
 
@@ -118,7 +140,7 @@ def driven_states(
         v = np.ascontiguousarray(velocity[before : sample + 1])
         time = start_time + before * step
         own = counts[before : sample + 1]
-        _driven(step, time, own, q, v, elements.table, elements.theta, z, np.zeros_like(q))
+        _driven(step, time, own, q, v, full(elements.table), elements.theta, z, np.zeros_like(q))
         out[i] = z
         before = int(sample)
     return out

@@ -10,6 +10,10 @@ While it slides the force is ``mode * limit(t, q, v)``; while it sticks the forc
 acceleration zero; the instants of reversal and of breaking loose are found inside the step by the secant rule. The
 fits therefore see a response that depends smoothly on the parameters as long as the order of events stays the same.
 
+Friction that creeps, as MuJoCo's does, has a third mode: ``f = limit sat((v + tau a) / vc)``, saturated at one either way, with a
+creep velocity vc and a lead time tau (`bench.laws.soft_friction`). The acceleration holds the force itself, so that with a0, the
+acceleration without it, and the compliance A of its coordinate ``f = (v + tau a0) / (vc / limit + tau A)`` until it saturates.
+
 References:
     E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 1993 (RK4, section II.1; event
     location on discontinuities, section II.6).
@@ -28,8 +32,12 @@ from bench.laws.calling import advance, call_kernel, load_int, pointer_at
 MAX_EVENTS = 12
 """Most friction events resolved within one step; beyond it the step is completed with the mode it has."""
 
-FORCE, RATE, LIMIT, N_ROWS, ROW, THETA, STATE, N_STATES = range(8)
+FORCE, RATE, LIMIT, N_ROWS, ROW, THETA, STATE, N_STATES, SCALE = range(9)
 """Columns of the element table passed to the compiled loop."""
+
+
+COLUMNS = 9
+"""Their number."""
 
 
 DIVERGED = 1e12
@@ -59,8 +67,9 @@ class Elements(NamedTuple):
     """The force laws of one simulation, flattened for the compiled loop.
 
     Attributes:
-        table: (n_elements, 8) integers: addresses of the force, rate and limit kernels (0: none), number of
-            coordinates, first row in `rows`, first entry in `theta`, first hidden state, number of hidden states.
+        table: (n_elements, 8 or 9) integers: addresses of the force, rate and limit kernels (0: none), number of
+            coordinates, first row in `rows`, first entry in `theta`, first hidden state, number of hidden states; and, where there is
+            a ninth, one more than the entry in `theta` where the schedule of the force begins (0: none, see `scale_at`).
         rows: (n_rows, n_dof); row times q is a coordinate of an element.
         theta: (n_theta,) parameters of all elements one after the other.
         start: (n_states,) initial hidden states.
@@ -90,7 +99,13 @@ NO_ELEMENTS = Elements(np.zeros((0, 8), dtype=np.int64), np.zeros((0, 1)), np.ze
 """No force law: the linear structure alone."""
 
 MAX_ROWS = 16
-"""Most coordinates of an element; one further scratch entry holds a friction limit."""
+"""Most coordinates of an element; `GRIPS` further scratch entries hold what a friction limit writes."""
+GRIPS = 3
+"""A friction limit, its creep velocity and its lead time, see `friction_limits`."""
+SOFT = 2.0
+"""Mode of friction that creeps rather than sticks; it has no events."""
+SWEEPS = 12
+"""Gauss-Seidel sweeps over several friction forces that creep at once; one alone is solved exactly by the first."""
 
 
 class _Plan(NamedTuple):
@@ -121,11 +136,21 @@ class _Plan(NamedTuple):
 @_inline
 def _entry(p, e, column):
     """Integer of the element table."""
-    return load_int(p.table + 8 * (8 * e + column))
+    return load_int(p.table + 8 * (COLUMNS * e + column))
 
 
 @_inline
-def _derivative(p, t, y, slope, load):
+def scale_at(schedule, t):
+    """Factor of a force at a time: (time of the first sample, samples a second, their number, samples), linear between them."""
+    x = (t - schedule[0]) * schedule[1]
+    n = int(schedule[2])
+    whole = min(max(int(x), 0), n - 2)
+    share = min(max(x - whole, 0.0), 1.0)
+    return schedule[3 + whole] + share * (schedule[4 + whole] - schedule[3 + whole])
+
+
+@_inline
+def _derivative(p, t, y, slope, load):  # noqa: PLR0912, PLR0915  (one compiled loop)
     """Write dy/dt at workspace offset `slope` for the state at offset `y` and the loads at offset `load`.
 
     The holding force and the limit of every friction element go into `grip` (2, n_elements).
@@ -149,6 +174,7 @@ def _derivative(p, t, y, slope, load):
     v = q + MAX_ROWS
     f = v + MAX_ROWS
     held = False
+    creeping = 0
     for e in range(p.n_elements):
         first = _entry(p, e, ROW)
         n_rows = _entry(p, e, N_ROWS)
@@ -167,13 +193,24 @@ def _derivative(p, t, y, slope, load):
         v_pointer = advance(p.work, v)
         if _entry(p, e, FORCE) != 0:
             call_kernel(_entry(p, e, FORCE), t, q_pointer, v_pointer, z, theta, advance(p.work, f))
+        scale = 1.0
+        if _entry(p, e, SCALE) != 0:
+            scale = scale_at(advance(p.theta, _entry(p, e, SCALE) - 1), t)
+            for r in range(n_rows):
+                work[f + r] *= scale
         if _entry(p, e, LIMIT) != 0:
-            work[f + MAX_ROWS] = 0.0
+            for i in range(GRIPS):
+                work[f + MAX_ROWS + i] = 0.0
             call_kernel(
                 _entry(p, e, LIMIT), t, q_pointer, v_pointer, z, theta, advance(p.work, (f + MAX_ROWS))
             )
-            p.grip[p.n_elements + e] = max(work[f + MAX_ROWS], 0.0)
-            work[f] += p.mode[e] * p.grip[p.n_elements + e]
+            p.grip[p.n_elements + e] = max(scale * work[f + MAX_ROWS], 0.0)
+            if p.mode[e] == SOFT:
+                p.grip[2 * p.n_elements + e] = work[f + MAX_ROWS + 1]
+                p.grip[3 * p.n_elements + e] = work[f + MAX_ROWS + 2]
+                creeping += 1
+            else:
+                work[f] += p.mode[e] * p.grip[p.n_elements + e]
             held = held or p.mode[e] == 0.0
         for r in range(n_rows):
             for i in range(n_dof):
@@ -181,8 +218,40 @@ def _derivative(p, t, y, slope, load):
         if _entry(p, e, RATE) != 0:
             zdot = advance(p.work, (slope + 2 * n_dof + _entry(p, e, STATE)))
             call_kernel(_entry(p, e, RATE), t, q_pointer, v_pointer, z, theta, zdot)
+    if creeping > 0:
+        _creep(p, y, slope, SWEEPS if creeping > 1 else 1)
     if held:
         _hold(p, slope)
+
+
+@_inline
+def _creep(p, y, slope, sweeps):
+    """Add the forces of the elements that creep: each the one that goes with the acceleration that it leaves."""
+    for e in range(p.n_elements):
+        p.grip[e] = p.grip[e] if p.mode[e] != SOFT else 0.0
+    for _ in range(sweeps):
+        for e in range(p.n_elements):
+            if _entry(p, e, LIMIT) == 0 or p.mode[e] != SOFT:
+                continue
+            row = _entry(p, e, ROW)
+            relative = 0.0
+            rate = 0.0
+            compliance = 0.0
+            for i in range(p.n_dof):
+                share = p.rows[row * p.n_dof + i]
+                relative += share * p.work[slope + p.n_dof + i]
+                rate += share * p.work[y + p.n_dof + i]
+                compliance += share * p.spread[i * p.n_rows + row]
+            limit = p.grip[p.n_elements + e]
+            lead = p.grip[3 * p.n_elements + e]
+            relative += compliance * p.grip[e]
+            wanted = 0.0
+            if limit > 0.0:
+                wanted = (rate + lead * relative) / (p.grip[2 * p.n_elements + e] / limit + lead * compliance)
+            wanted = min(max(wanted, -limit), limit)
+            for i in range(p.n_dof):
+                p.work[slope + p.n_dof + i] -= p.spread[i * p.n_rows + row] * (wanted - p.grip[e])
+            p.grip[e] = wanted
 
 
 @_inline
@@ -206,7 +275,7 @@ def _rk4(p, t, dt, known):
     """One classical Runge-Kutta step from the state into the trial state; `known`: the first slope is there already."""
     n = p.n
     work = p.work
-    load = 7 * n + 3 * MAX_ROWS + 1
+    load = 7 * n + 3 * MAX_ROWS + GRIPS
     n_inputs = p.n_inputs
     if not known:
         _derivative(p, t, 0, 3 * n, load)
@@ -249,10 +318,24 @@ def _settle(p, e, t, load):
         p.mode[e] = 1.0 if p.grip[e] > 0.0 else -1.0
 
 
+@_jit
+def _creeps(p, e, t):
+    """Whether friction element `e` creeps rather than sticks; that does not change with the motion."""
+    limit = 7 * p.n + 3 * MAX_ROWS
+    for i in range(limit, limit + GRIPS):
+        p.work[i] = 0.0
+    first = 7 * p.n
+    call_kernel(
+        _entry(p, e, LIMIT), t, advance(p.work, first), advance(p.work, first), advance(p.work, first),
+        advance(p.theta, _entry(p, e, THETA)), advance(p.work, limit),
+    )  # fmt: skip
+    return p.work[limit + 1] > 0.0 or p.work[limit + 2] > 0.0
+
+
 @_inline
 def _fill_loads(p, u, k, fraction, share):
     """Loads at the start, middle and end of a step that begins at `fraction` of sample `k` and is `share` of it long."""
-    load = 7 * p.n + 3 * MAX_ROWS + 1
+    load = 7 * p.n + 3 * MAX_ROWS + GRIPS
     n_inputs = u.shape[1]
     for i in range(3):
         at = (fraction + 0.5 * i * share) * p.load_factor
@@ -271,9 +354,9 @@ def _first_event(p, t, dt, rest):
     """Element whose mode ends first within the trial step of length `rest`, and the share of it until then."""
     event = -1
     first = rest
-    load = 7 * p.n + 3 * MAX_ROWS + 1
+    load = 7 * p.n + 3 * MAX_ROWS + GRIPS
     for e in range(p.n_elements):
-        if _entry(p, e, LIMIT) == 0:
+        if _entry(p, e, LIMIT) == 0 or p.mode[e] == SOFT:
             continue
         if p.mode[e] == 0.0:
             # grip holds the values of the last stage, that is of the end of the step, until it is asked for the start
@@ -314,7 +397,7 @@ def _pass_event(p, u, k, t, dt, event, fraction, first, rest):
     for i in range(p.n):
         p.work[i] = p.work[p.n + i]
     if sliding:
-        _settle(p, event, t + first * dt, 7 * p.n + 3 * MAX_ROWS + 1 + 2 * u.shape[1])
+        _settle(p, event, t + first * dt, 7 * p.n + 3 * MAX_ROWS + GRIPS + 2 * u.shape[1])
     else:
         p.mode[event] = 1.0 if p.grip[event] > 0.0 else -1.0
     return first
@@ -331,22 +414,24 @@ def _free_run(clock, u, start, scratch, n_dof, matrices, table, rows, spread, th
     dt, t0, substeps, load_factor = clock
     n = start.shape[0]
     n_elements = table.shape[0]
-    work = scratch[2 * n_elements + n_elements :]
+    work = scratch[5 * n_elements :]
     mode = scratch[:n_elements]
     position, velocity, acceleration = out
     base = pointer_at(scratch.ctypes.data)
     p = _Plan(
         n_dof, n, u.shape[1], n_elements, rows.shape[0], load_factor, pointer_at(matrices.ctypes.data), table.ctypes.data,
         pointer_at(rows.ctypes.data), pointer_at(spread.ctypes.data), base, advance(base, n_elements),
-        pointer_at(theta.ctypes.data), advance(base, 3 * n_elements),
+        pointer_at(theta.ctypes.data), advance(base, 5 * n_elements),
     )  # fmt: skip
     work[:n] = start
-    load = 7 * n + 3 * MAX_ROWS + 1
+    load = 7 * n + 3 * MAX_ROWS + GRIPS
     frictional = False
     for j in range(u.shape[1]):
         work[load + j] = u[0, j]
     for e in range(n_elements):
-        if _entry(p, e, LIMIT) != 0:
+        if _entry(p, e, LIMIT) != 0 and _creeps(p, e, t0):
+            mode[e] = SOFT
+        elif _entry(p, e, LIMIT) != 0:
             frictional = True
             rate = _relative_velocity(p, 0, _entry(p, e, ROW))
             if rate != 0.0:
@@ -388,6 +473,12 @@ def _free_run(clock, u, start, scratch, n_dof, matrices, table, rows, spread, th
                 used = _pass_event(p, u, k, t + fraction * dt, dt, event, fraction, first, rest)
                 fraction += used
                 rest -= used
+
+
+def full(table: NDArray[np.int64]) -> NDArray[np.int64]:
+    """An element table with all its columns."""
+    missing = COLUMNS - table.shape[1]
+    return np.ascontiguousarray(np.pad(table, ((0, 0), (0, missing))) if missing else table)
 
 
 def steps_of_each(substeps: int | NDArray[np.int64], n: int) -> NDArray[np.int64]:
@@ -432,11 +523,11 @@ def free_run(
         y[: 2 * n_dof] = start
     y[2 * n_dof :] = elements.start
     n, n_inputs = (len(loads) - 1) // max(load_factor, 1) + 1, loads.shape[1]
-    scratch = np.zeros(3 * len(elements.table) + 7 * len(y) + 3 * MAX_ROWS + 1 + 3 * n_inputs)
+    scratch = np.zeros(5 * len(elements.table) + 7 * len(y) + 3 * MAX_ROWS + GRIPS + 3 * n_inputs)
     motion = Motion(np.zeros((n, n_dof)), np.zeros((n, n_dof)), np.zeros((n, n_dof)))
     _free_run(
         (step, start_time, steps_of_each(substeps, n), load_factor), np.ascontiguousarray(loads), y, scratch, n_dof, matrices,
-        elements.table, rows,
+        full(elements.table), rows,
         np.ascontiguousarray(inverse @ rows.T), elements.theta, tuple(motion),
     )  # fmt: skip
     return motion

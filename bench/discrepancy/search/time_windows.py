@@ -1,0 +1,179 @@
+"""Windows of time in which a force acts: steps of the force that a record lacks.
+
+The missing force along the measured motion is cut into pieces of constant level, as many as pay (optimal partitioning of block
+means; the price of a piece is that of its two numbers under the noise of the force, `PRICE`). Pieces whose level stands out are
+windows; their edges are set where the area under the measured force says, to a fraction of a sample.
+
+References:
+    B. Jackson et al., An algorithm for optimal partitioning of data on an interval, IEEE Signal Processing Letters 12 (2005) 105-108.
+    R. Killick, P. Fearnhead, I. A. Eckley, J. Am. Stat. Assoc. 107 (2012) 1590-1598 (penalised cost).
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import NamedTuple
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.discrepancy.simulation.stick_slip import Motion
+
+Array = NDArray[np.float64]
+BLOCKS = 1500
+"""Block means, at most, that a record is cut from."""
+PRICE = 2.0
+"""Numbers that a piece costs, each the logarithm of the number of blocks times the variance of the means (Schwarz)."""
+STANDS_OUT = 0.5
+"""Part of the largest level from which a piece is a window; what is nearer to zero is what the model leaves besides."""
+ALIKE = 0.2
+"""Relative difference of levels up to which windows have the same force."""
+STAIR = 0.4
+"""Relative difference of levels from which neighbouring pieces are stairs of a force, not one that the model blurs."""
+SHORTEST = 4
+"""Blocks that a window lasts at least."""
+SHARE = 0.7
+"""Part of the power of the missing force that windows have to take away, or they are no description of it."""
+SUDDEN = 0.2
+"""Time that edges take, over that of the pieces on both sides, from which a force swells rather than is switched on: those of a sine take
+two thirds."""
+MIDDLE = (0.25, 0.75)
+"""Part of the height of an edge, half of it, by which its time is measured."""
+FOLLOWS = 0.6
+"""Correlation with the motion, or with its direction, from which windows are those of a force of the motion."""
+
+
+class Windows(NamedTuple):
+    """Windows of one record.
+
+    Attributes:
+        start: (k,) [s], on the clock of the record.
+        duration: (k,) [s].
+        level: (k,) external force in each.
+    """
+
+    start: Array
+    duration: Array
+    level: Array
+
+    def inside(self, time: Array) -> Array:
+        """Force (n,) at times (n,)."""
+        out = np.zeros(len(time))
+        for start, duration, level in zip(*self, strict=True):
+            out[(time >= start) & (time < start + duration)] = level
+        return out
+
+
+def windows_of(time: Array, force: Array) -> Windows | None:
+    """Windows in a missing force.
+
+    Args:
+        time: (n,), uniform.
+        force: (n,) external force that the model lacks.
+
+    Returns:
+        The windows; None where pieces of constant force are no description of it.
+    """
+    factor = -(-len(force) // BLOCKS)
+    count = len(force) // factor
+    means = force[: count * factor].reshape(count, factor).mean(axis=1)
+    jumps = np.diff(means)
+    variance = float((np.median(np.abs(jumps - np.median(jumps))) / 0.6745) ** 2 / 2.0)
+    price = PRICE * np.log(count) * max(variance, 1e-6 * float(np.var(means)))
+    cuts = np.zeros(count + 1, dtype=np.int64)
+    _partition(means, price, SHORTEST, cuts)
+    edges = [count]
+    while edges[-1] > 0:
+        edges.append(int(cuts[edges[-1]]))
+    return _standing_out(time, force, [factor * edge for edge in reversed(edges)], factor)
+
+
+@numba.njit(cache=True, error_model="numpy", nogil=True)
+def _partition(means, price, shortest, cuts):
+    """Where the last piece before each block begins, in the partition of least sum of squares plus a price for each piece."""
+    n = means.shape[0]
+    sums = np.zeros(n + 1)
+    squares = np.zeros(n + 1)
+    best = np.full(n + 1, np.inf)
+    best[0] = -price
+    for k in range(n):
+        sums[k + 1] = sums[k] + means[k]
+        squares[k + 1] = squares[k] + means[k] * means[k]
+    for stop in range(shortest, n + 1):
+        for start in range(stop - shortest + 1):
+            total = sums[stop] - sums[start]
+            cost = best[start] + squares[stop] - squares[start] - total * total / (stop - start) + price
+            if cost < best[stop]:
+                best[stop] = cost
+                cuts[stop] = start
+
+
+def _standing_out(time: Array, force: Array, edges: list[int], factor: int) -> Windows | None:
+    """The pieces between edges whose level stands out, their edges refined; None where there are none or they explain little."""
+    edges, levels, opened = _merged(force, edges)
+    if not np.any(opened) or np.all(opened) or not _sudden(force, edges, levels):
+        return None
+    found = []
+    for i in np.flatnonzero(opened):
+        before = levels[i - 1] if i > 0 else levels[i]
+        after = levels[i + 1] if i + 1 < len(levels) else levels[i]
+        start = _edge(time, force, edges[i], before, levels[i], factor)
+        stop = _edge(time, force, edges[i + 1], levels[i], after, factor)
+        found.append((start, stop - start, levels[i]))
+    windows = Windows(*(np.array(column) for column in zip(*found, strict=True)))
+    left = float(np.sum((force - windows.inside(time)) ** 2))
+    return windows if left < (1.0 - SHARE) * float(np.sum(force**2)) else None
+
+
+def _merged(force: Array, edges: list[int]) -> tuple[list[int], Array, NDArray[np.bool_]]:
+    """Edges of pieces, neighbours of like force and those that do not stand out made one; their levels, and whether they stand out."""
+    levels = [float(np.median(force[a:b])) for a, b in pairwise(edges)]
+    largest = max((abs(level) for level in levels), default=0.0)
+    kept, out, opened = [edges[0]], [], []
+    for stop, level in zip(edges[1:], levels, strict=True):
+        stands = abs(level) > STANDS_OUT * largest
+        if out and stands == opened[-1] and (not stands or abs(level - out[-1]) < STAIR * abs(out[-1])):
+            kept[-1] = stop
+            out[-1] = float(np.median(force[kept[-2] : stop]))
+            continue
+        kept.append(stop)
+        out.append(level)
+        opened.append(stands)
+    return kept, np.array(out), np.array(opened)
+
+
+def _sudden(force: Array, edges: list[int], levels: Array) -> bool:
+    """Whether most of the edges are steep."""
+    steepness = []
+    for i in range(1, len(levels)):
+        before, after = levels[i - 1], levels[i]
+        first, last = (edges[i - 1] + edges[i]) // 2, (edges[i] + edges[i + 1]) // 2
+        height = (force[first:last] - before) / (after - before)
+        inside = np.count_nonzero((height > MIDDLE[0]) & (height < MIDDLE[1]))
+        steepness.append(inside / (MIDDLE[1] - MIDDLE[0]) / (last - first))
+    return float(np.median(steepness)) < SUDDEN
+
+
+def _edge(time: Array, force: Array, edge: int, before: float, after: float, factor: int) -> float:
+    """Time at which a step from one level to another has the area of the measured force about it."""
+    step = time[1] - time[0]
+    reach = 2 * factor + 2
+    if edge == 0 or edge >= len(force) or before == after:
+        return float(time[0] - step if edge == 0 else time[-1] + step)
+    first, last = max(edge - reach, 0), min(edge + reach, len(force))
+    share = np.clip((force[first:last] - before) / (after - before), -0.5, 1.5)
+    return float(
+        np.clip(time[first] + step * (last - first - 0.5 - np.sum(share)), time[first], time[last - 1])
+    )
+
+
+def follows_motion(windows: Windows, time: Array, motion: Motion, row: Array) -> bool:
+    """Whether windows open and close with the motion along a coordinate (n_dof,), so that they are no matter of time."""
+    inside = windows.inside(time)
+    position, velocity, acceleration = (samples @ row for samples in motion)
+    for signal in (position, velocity, acceleration):
+        for shape in (signal, np.sign(signal), np.abs(signal)):
+            if np.std(shape) > 0.0 and abs(np.corrcoef(inside, shape)[0, 1]) > FOLLOWS:
+                return True
+    return False
