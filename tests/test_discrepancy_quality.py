@@ -228,7 +228,9 @@ BROKEN: dict[str, tuple[dict, str]] = {
     "misnamed std": ({"nominal": altered("parameters", "mass", value={"value": 2, "sigma": 1})}, "did you mean 'std'"),
     "no mass": ({"nominal": altered("parameters", "mass", value=None)}, "lacks the nominal parameter(s) mass"),
     "unknown unit": ({"nominal": altered("parameters", "mass", "unit", value="kgg")}, "unknown unit 'kgg'"),
-    "units that clash": ({"nominal": altered("channels", "displacement", "unit", value="mm")}, "do not belong together"),
+    "units that clash": (
+        {"nominal": altered("channels", "displacement", "unit", value="mm")}, "what the nominal model predicts from 'force'",
+    ),
     "unknown role": ({"nominal": altered("channels", "force", "role", value="loadcell")}, "loadcell"),
     "negative noise": ({"nominal": altered("channels", "force", "noise_std", value=-1)}, "from zero up"),
     "no channels": ({"nominal": altered("channels", value={})}, "names no channel"),

@@ -114,7 +114,12 @@ def diagnose(
 
 
 def _diagnose(
-    case: Case, catalogue: Sequence[Effect], most: int, anyway: bool, rng: np.random.Generator, progress: Progress
+    case: Case,
+    catalogue: Sequence[Effect],
+    most: int,
+    anyway: bool,
+    rng: np.random.Generator,
+    progress: Progress,
 ) -> Diagnosis:
     began = time.perf_counter()
     progress("looking at the records")

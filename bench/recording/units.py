@@ -161,6 +161,10 @@ def conversion(source: str, target: str) -> tuple[float, float]:
     return (one, 0.0) if zero == 0.0 else (one - zero, zero)
 
 
+def _reworded(unit: str, words: dict[str, str]) -> str:
+    return _WORD.sub(lambda match: words.get(match[0], match[0]), unit)
+
+
 @cache
 def read_as(unit: str, targets: tuple[str, ...]) -> tuple[str, str]:
     """The unit that is meant where a quantity is known: "g" of an acceleration is no gram, "lb" of a force no mass.
@@ -175,7 +179,7 @@ def read_as(unit: str, targets: tuple[str, ...]) -> tuple[str, str]:
     Raises:
         UnitError: The unit is unknown, or fits none of the targets in any reading.
     """
-    candidates = [unit, *(_WORD.sub(lambda match: words.get(match[0], match[0]), unit) for words in _READ_AS)]
+    candidates = [unit, *(_reworded(unit, words) for words in _READ_AS)]
     reason: UnitError | None = None
     for candidate in dict.fromkeys([*candidates, candidates[1].replace("-", " ")]):
         for target in targets:

@@ -8,6 +8,7 @@ from bench.discrepancy.case.single_axis import turns
 from bench.discrepancy.case.unit_conversion import Expectation, converted
 from bench.errors import UnitError
 
+
 def expected_units(case: Case) -> tuple[dict[str, Expectation], dict[str, Expectation]]:
     """What the channels and the parameters of a case on one of the bench's rigs are measured in."""
     rotary = case.rig != "joint" and turns(case)
@@ -17,7 +18,9 @@ def expected_units(case: Case) -> tuple[dict[str, Expectation], dict[str, Expect
         base = "rotation" if base == "angle" else base
         unit = next((table[base][1] for table in (MOTION, LOADS) if base in table), "")
         if unit:
-            channels[channel.name] = Expectation((unit,), f"rig '{case.rig}' has {base.replace('_', ' ')} there")
+            channels[channel.name] = Expectation(
+                (unit,), f"rig '{case.rig}' has {base.replace('_', ' ')} there"
+            )
     for parameter in case.parameters:
         axial = not (rotary or "torsional" in parameter.name or "inertia" in parameter.name)
         axis = "axial" if axial else "torsional"

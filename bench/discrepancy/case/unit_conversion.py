@@ -130,9 +130,7 @@ def converted(
     )
 
 
-def _labelled(
-    case: Case, channels: Mapping[str, Conversion], parameters: Mapping[str, Conversion]
-) -> Case:
+def _labelled(case: Case, channels: Mapping[str, Conversion], parameters: Mapping[str, Conversion]) -> Case:
     """The case with the units of the model, its numbers beside the records converted."""
 
     def channel(entry: CaseChannel) -> CaseChannel:
@@ -146,9 +144,7 @@ def _labelled(
         done = parameters.get(entry.name)
         if done is None:
             return entry
-        return replace(
-            entry, unit=done.unit, value=entry.value * done.factor, std=entry.std * done.factor
-        )
+        return replace(entry, unit=done.unit, value=entry.value * done.factor, std=entry.std * done.factor)
 
     return replace(
         case,

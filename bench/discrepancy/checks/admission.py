@@ -50,7 +50,9 @@ def admitted(declared: Case, *, anyway: bool = False) -> Admitted:
         IdentificationError: The nominal model diverges.
     """
     own = declared.rig.endswith(".xml")
-    declared = with_no_load(declared) if is_free_decay(declared) and not _driven_by_name(declared) else declared
+    declared = (
+        with_no_load(declared) if is_free_decay(declared) and not _driven_by_name(declared) else declared
+    )
     case, said = in_coherent_units(declared)
     reference = None
     if own:
@@ -77,4 +79,6 @@ def admitted(declared: Case, *, anyway: bool = False) -> Admitted:
 
 def _driven_by_name(case: Case) -> bool:
     """Whether a channel of a user's own model is a load by nothing but the name of an actuator."""
-    return case.rig.endswith(".xml") and any(c.name in rig_of(case).actuators and not c.target for c in case.channels)
+    return case.rig.endswith(".xml") and any(
+        c.name in rig_of(case).actuators and not c.target for c in case.channels
+    )

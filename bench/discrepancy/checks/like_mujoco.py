@@ -113,7 +113,10 @@ ITEMS: dict[str, Callable[[mujoco.MjModel], None]] = {
 
 
 def unlike_mujoco(
-    problem: Problem, reference: Reference, records: Sequence[CaseRecord], settings: LikenessSettings | None = None
+    problem: Problem,
+    reference: Reference,
+    records: Sequence[CaseRecord],
+    settings: LikenessSettings | None = None,
 ) -> str:
     """What parts the nominal simulation from MuJoCo's, in words; empty where nothing does.
 
@@ -181,7 +184,9 @@ def _rms(x: Array) -> float:
     return float(np.sqrt(np.mean(x**2)))
 
 
-def simulated(reference: Reference, model: mujoco.MjModel, record: CaseRecord, length: int, split: int) -> Array:
+def simulated(
+    reference: Reference, model: mujoco.MjModel, record: CaseRecord, length: int, split: int
+) -> Array:
     """Responses (length, n_responses) of a model in MuJoCo, counted from rest, under the loads of a record.
 
     Args:
@@ -193,7 +198,9 @@ def simulated(reference: Reference, model: mujoco.MjModel, record: CaseRecord, l
     """
     variant = copy.copy(model)
     variant.opt.timestep = record.step / split
-    at = np.arange(length * split) / split + 0.5 / split  # the middle of each step: held loads are else late by half of one
+    at = (
+        np.arange(length * split) / split + 0.5 / split
+    )  # the middle of each step: held loads are else late by half of one
     control = np.tile(reference.control, (len(at), 1))
     for channel, (index, factor) in reference.loads.items():
         control[:, index] = factor * np.interp(at, np.arange(len(record)), record.values[channel])
@@ -203,9 +210,9 @@ def simulated(reference: Reference, model: mujoco.MjModel, record: CaseRecord, l
     start = np.zeros(size)
     mujoco.mj_getState(variant, data, start, int(mujoco.mjtState.mjSTATE_FULLPHYSICS))
     with rollout.Rollout(nthread=0) as runner:
-        states, sensors = runner.rollout([variant], [data], start[None, :], control[None])
-    del states
-    return np.asarray(sensors[0][::split][:, list(reference.responses.values())] - reference.offsets, dtype=np.float64)
+        _, sensors = runner.rollout([variant], [data], start[None, :], control[None])
+    readings = np.asarray(sensors, dtype=np.float64)[0, ::split]
+    return np.asarray(readings[:, list(reference.responses.values())] - reference.offsets, dtype=np.float64)
 
 
 def _culprit(problem: Problem, reference: Reference, record: CaseRecord, settings: LikenessSettings) -> str:
@@ -220,9 +227,18 @@ def _culprit(problem: Problem, reference: Reference, record: CaseRecord, setting
         return float(np.sum((difference / problem.noise[columns]) ** 2))
 
     whole = distance(reference.model)
-    left: Mapping[str, float] = {name: distance(_without(reference.model, take)) for name, take in ITEMS.items()}
+    left: Mapping[str, float] = {
+        name: distance(_without(reference.model, take)) for name, take in ITEMS.items()
+    }
     best = min(left, key=lambda name: left[name])
-    return best if left[best] < 0.5 * whole else ""
+    if left[best] < 0.5 * whole:
+        return best
+    soft = max(left[name] for name in ("frictionloss", "an equality")) > whole
+    return (
+        "the softness of its constraints (solref and solimp of an equality or of frictionloss)"
+        if soft
+        else ""
+    )
 
 
 def _without(model: mujoco.MjModel, take: Callable[[mujoco.MjModel], None]) -> mujoco.MjModel:
@@ -238,5 +254,3 @@ def _words(found: Deviation, culprit: str) -> str:
         f"({found.noise:.3g} times the noise) away from the nominal model that a diagnosis can work with, from t = {found.time:.4g} s on: "
         f"{what} comes into play; take it out of the model and let the diagnosis look for it, or stay where it does not act"
     )
-
-

@@ -21,9 +21,9 @@ from scipy import signal
 
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.case.single_axis import motion_channels
-from bench.discrepancy.model.nominal_forces import own_force
-from bench.discrepancy.likelihood.whitening import noise_floor
 from bench.discrepancy.likelihood.problem import Problem
+from bench.discrepancy.likelihood.whitening import noise_floor
+from bench.discrepancy.model.nominal_forces import own_force
 from bench.errors import UnitError
 from bench.recording.units import conversion, read_as, si_unit
 
@@ -98,9 +98,7 @@ SUSPECTS = {
 """SI units, and those that a column labelled with them may really be in."""
 
 
-def suspicions(
-    declared: Case, problem: Problem, settings: ScaleSettings | None = None
-) -> tuple[str, ...]:
+def suspicions(declared: Case, problem: Problem, settings: ScaleSettings | None = None) -> tuple[str, ...]:
     """Factors and signs that stand between the records and any diagnosis, a sentence each with the line to change.
 
     Args:
@@ -115,7 +113,9 @@ def suspicions(
     return tuple(dict.fromkeys(_against_model(declared, problem, chosen)))
 
 
-def spectra(first: Array, second: Array, step: float, noise: tuple[float, float], settings: ScaleSettings) -> Spectra:
+def spectra(
+    first: Array, second: Array, step: float, noise: tuple[float, float], settings: ScaleSettings
+) -> Spectra:
     """Averaged spectra of two signals (n,).
 
     Args:
@@ -127,14 +127,16 @@ def spectra(first: Array, second: Array, step: float, noise: tuple[float, float]
     """
     # longer where the motion is so slow that its strongest frequency would drown in the mean
     peak = max(int(np.argmax(np.abs(np.fft.rfft(signal.detrend(x)))[1:])) + 1 for x in (first, second))
-    length = max(min(settings.cycles * len(first) // peak, len(first) // 2), len(first) // settings.segments, 64)
+    length = max(
+        min(settings.cycles * len(first) // peak, len(first) // 2), len(first) // settings.segments, 64
+    )
 
     def density(x: Array, y: Array):
         return signal.csd(x, y, 1.0 / step, "hann", length, detrend="linear")
 
     frequency, own = density(first, first)
     other, cross = density(second, second)[1], density(first, second)[1]
-    own, other = np.real(own), np.real(other)
+    own, other, cross = np.real(own), np.real(other), np.asarray(cross, dtype=np.complex128)
     counts = np.ones(len(frequency), dtype=bool)
     for power, level in ((own, noise[0]), (other, noise[1])):
         counts &= (power > settings.strong * 2.0 * level**2 * step) & (power > settings.leak * power.max())
@@ -180,7 +182,12 @@ def _observed(problem: Problem) -> list[tuple[str, int, Array, float]]:
             for order, name in motion_channels(problem.case).items()
         ]
     return [
-        (o.channel, o.order, o.row, max(_noise(problem.case, o.channel, record) for record in problem.records))
+        (
+            o.channel,
+            o.order,
+            o.row,
+            max(_noise(problem.case, o.channel, record) for record in problem.records),
+        )
         for o in problem.structure.observers
     ]
 
@@ -211,7 +218,9 @@ def _between(declared: Case, problem: Problem, settings: ScaleSettings) -> Itera
                 pair = Pair(pair.factor / abs(ratio), pair.sign * np.sign(ratio))
                 if _gross(pair, settings):
                     odd.setdefault(second, []).append((first, pair, high - low, record))
-                    odd.setdefault(first, []).append((second, Pair(1.0 / pair.factor, pair.sign), low - high, record))
+                    odd.setdefault(first, []).append(
+                        (second, Pair(1.0 / pair.factor, pair.sign), low - high, record)
+                    )
                 else:
                     agreeing |= {first, second}
     blamed = [name for name in odd if name not in agreeing] or list(odd)
@@ -234,14 +243,14 @@ def _gross(pair: Pair, settings: ScaleSettings) -> bool:
     return abs(np.log(pair.factor)) > np.log(settings.gross) or pair.sign < -0.5
 
 
-def _pair_words(
-    declared: Case, name: str, other: str, pair: Pair, orders: int, record: CaseRecord
-) -> str:
-    kin = {1: "the derivative", 2: "the second derivative", -1: "the integral", -2: "the double integral"}[orders]
+def _pair_words(declared: Case, name: str, other: str, pair: Pair, orders: int, record: CaseRecord) -> str:
+    kin = {1: "the derivative", 2: "the second derivative", -1: "the integral", -2: "the double integral"}[
+        orders
+    ]
     if pair.sign < -0.5 and abs(np.log(pair.factor)) < np.log(3.0):
         return (
-            f"'{name}' and '{other}' have opposite signs in '{record.name}': turn one of the columns round (times -1), or its sensor in the "
-            "model"
+            f"'{name}' and '{other}' have opposite signs in '{record.name}': turn one of the columns round (times -1), or its sensor "
+            "in the model"
         )
     clock = pair.factor ** (1.0 / orders)
     for power, unit in ((1e3, "ms"), (1e6, "us"), (1e9, "ns")):
@@ -291,7 +300,7 @@ def suggestion(declared: Case, name: str, factor: float, tolerance: float = 1.25
     distance, best = min(near)
     if distance > np.log(tolerance):
         return ""
-    return f"is '{name}' in {best} ({unit} against {best})? Then write \"unit\": \"{best}\" at nominal.json, channels, \"{name}\""
+    return f'is \'{name}\' in {best} ({unit} against {best})? Then write "unit": "{best}" at nominal.json, channels, "{name}"'
 
 
 def _fits(unit: str, si: str) -> bool:
@@ -325,7 +334,9 @@ def _against_model(declared: Case, problem: Problem, settings: ScaleSettings) ->
 
 def _typical(found: Sequence[tuple[float, float]]) -> tuple[float, float]:
     """Factor and sign of several findings: the geometric mean, and minus where all of them are turned."""
-    return float(np.exp(np.mean([np.log(f) for f, _ in found]))), -1.0 if all(s < 0.0 for _, s in found) else 1.0
+    return float(np.exp(np.mean([np.log(f) for f, _ in found]))), -1.0 if all(
+        s < 0.0 for _, s in found
+    ) else 1.0
 
 
 def common_factor(bands: Bands, settings: ScaleSettings | None = None) -> tuple[float, float]:
@@ -352,12 +363,16 @@ def common_factor(bands: Bands, settings: ScaleSettings | None = None) -> tuple[
 
 def _is_of_a_unit(log_factor: float, settings: ScaleSettings) -> bool:
     known = {
-        abs(float(np.log(conversion(*read_as(unit, (si,)))[0]))) for si, units in SUSPECTS.items() for unit in units
+        abs(float(np.log(conversion(*read_as(unit, (si,)))[0])))
+        for si, units in SUSPECTS.items()
+        for unit in units
     }
     return any(abs(abs(log_factor) - one) < np.log(settings.unit) for one in known)
 
 
-def _measured_over_predicted(problem: Problem, record: CaseRecord, settings: ScaleSettings) -> Mapping[str, Bands]:
+def _measured_over_predicted(
+    problem: Problem, record: CaseRecord, settings: ScaleSettings
+) -> Mapping[str, Bands]:
     """Bands of every response that both the record and the nominal model move, by channel."""
     if not record.at_rest:
         return {}  # an initial state that is estimated from the record carries its factor into the prediction
@@ -382,7 +397,11 @@ def _implied_loads(problem: Problem, record: CaseRecord, settings: ScaleSettings
         return {}
     values = problem.split((), np.zeros(len(problem.nominal)))[0]
     linear, motion = structure.at(values), problem.motion_of(record)
-    force = motion.acceleration @ linear.mass + motion.velocity @ linear.damping + motion.position @ linear.stiffness
+    force = (
+        motion.acceleration @ linear.mass
+        + motion.velocity @ linear.damping
+        + motion.position @ linear.stiffness
+    )
     force = force + own_force(structure, values, motion)
     implied = np.asarray(force[:, 0] / structure.inputs[0, 0], dtype=np.float64)
     load = record.values[structure.loads[0]]
@@ -413,8 +432,8 @@ def _model_words(
     verb = "are" if len(names) > 1 else "is"
     if factor == 1.0:
         return (
-            f"{what} {'run' if len(names) > 1 else 'runs'} against what the nominal model predicts from {load}, at all frequencies: turn the "
-            f"sign of {load if len(names) > 1 else what} (column times -1), or the axis in the model"
+            f"{what} {'run' if len(names) > 1 else 'runs'} against what the nominal model predicts from {load}, at all frequencies: "
+            f"turn the sign of {load if len(names) > 1 else what} (column times -1), or the axis in the model"
         )
     suspects = [(one, 1.0 / factor) for one in loads]
     suspects = suspects if len(names) > 1 else [(names[0], factor), *suspects]

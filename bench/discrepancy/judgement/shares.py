@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from bench.discrepancy.judgement.validation_discrepancy import AT_THE_NOISE, DIVERGED_GAP
 from bench.discrepancy.verdict import Gap
 
@@ -38,6 +40,6 @@ def closed_words(gap: Gap, value: float | None = None) -> str:
 
 def probability(value: float | None) -> str:
     """A probability as text; none where none was computed."""
-    if value is None or value != value:
+    if value is None or math.isnan(value):
         return "not computed"
     return f"{value:.3f}"

@@ -60,9 +60,7 @@ def mjcf_structure(case: Case) -> Structure:
     """
     path = Path(case.folder or ".") / case.rig
     own = rig_of(case)
-    joints = sorted({c.target.removeprefix("joint:") for c in case.channels if c.target.startswith("joint:")})
-    coupled, links = without_equalities(own)
-    rig = free_of_constraints(coupled, joints, prefix=PROBE)
+    rig, links = plain_rig(case, own)
     structural = [_structural(p.name, rig) for p in case.parameters]
     loads, responses = loads_and_responses(case, rig)
     parameters = [name for name in structural if not name.startswith("structure/frictionloss/")]
@@ -100,6 +98,13 @@ def mjcf_structure(case: Case) -> Structure:
     )
     values = np.array([p.value for p in case.parameters])
     return constrained(structure, stiff_modes(structure, values, min(r.step for r in case.identification)))
+
+
+def plain_rig(case: Case, own: Rig) -> tuple[Rig, list[dict[str, float]]]:
+    """The user's model without what is no matrix, with sensors for channels that refer to joints; and its linear equalities."""
+    joints = sorted({c.target.removeprefix("joint:") for c in case.channels if c.target.startswith("joint:")})
+    coupled, links = without_equalities(own)
+    return free_of_constraints(coupled, joints, prefix=PROBE), links
 
 
 def _linear(rig: Rig, channels: Sequence[str], parameters: Sequence[str]) -> tuple[LinearRig, bool]:

@@ -126,6 +126,8 @@ def _only_joint(model: mujoco.MjModel, actuator: int) -> int:
     others = [
         i
         for i in range(model.nactuator)
-        if i != actuator and int(model.actuator_trntype[i]) in joints and int(model.actuator_trnid[i, 0]) == joint
+        if i != actuator
+        and int(model.actuator_trntype[i]) in joints
+        and int(model.actuator_trnid[i, 0]) == joint
     ]
     return -1 if others else joint

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.discrepancy.case.case import Case, CaseChannel
-from bench.discrepancy.model.mjcf import loads_and_responses
+from bench.discrepancy.model.mjcf import loads_and_responses, plain_rig
 from bench.rig import Rig
 from bench.rig.building import parse
 
@@ -51,7 +51,9 @@ def actuators_of(case: Case, rig: Rig) -> dict[str, str]:
         FileFormatError: A channel is none of the model's.
         UnknownNameError: A channel names nothing in the model.
     """
-    return {channel.name: actuator for channel, actuator in loads_and_responses(case, _probed(case, rig))[0]}
+    return {
+        channel.name: actuator for channel, actuator in loads_and_responses(case, plain_rig(case, rig)[0])[0]
+    }
 
 
 def reference_of(case: Case, rig: Rig) -> Reference:
@@ -67,7 +69,7 @@ def reference_of(case: Case, rig: Rig) -> Reference:
         kind, _, name = parameter.name.partition(":")
         values.setdefault(kind, {})[name] = parameter.value
     model = probed.with_structure(**values).model
-    loads, responses = loads_and_responses(case, probed)
+    loads, responses = loads_and_responses(case, plain_rig(case, rig)[0])
     columns = [channel.name for channel in probed.channels[len(probed.actuators) :]]
     places = {
         channel.name: columns.index(sensor if order is None else _probe(channel))
@@ -95,7 +97,9 @@ def _probe(channel: CaseChannel) -> str:
 def _probed(case: Case, rig: Rig) -> Rig:
     """The rig with sensors for the channels that refer to joints."""
     wanted = {
-        _probe(c): c for c in case.channels if c.target.startswith("joint:") and c.quantity in (*PROBES, "acceleration")
+        _probe(c): c
+        for c in case.channels
+        if c.target.startswith("joint:") and c.quantity in (*PROBES, "acceleration")
     }
     if not wanted:
         return rig
@@ -135,7 +139,8 @@ def _at_rest(model: mujoco.MjModel) -> tuple[Array, bool, float]:
     mass = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, mass)
     slopes = np.column_stack(
-        [(force(q + 1e-6 * row) - here) / 1e-6 for row in eye] + [(force(q, 1e-6 * row) - here) / 1e-6 for row in eye]
+        [(force(q + 1e-6 * row) - here) / 1e-6 for row in eye]
+        + [(force(q, 1e-6 * row) - here) / 1e-6 for row in eye]
     )
     state = np.vstack([np.hstack([np.zeros_like(eye), eye]), np.linalg.solve(mass, slopes)])
     left = float(np.abs(here).max(initial=0.0))

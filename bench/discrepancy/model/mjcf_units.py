@@ -13,7 +13,6 @@ from bench.discrepancy.case.case import Case, CaseChannel
 from bench.discrepancy.case.unit_conversion import Expectation
 from bench.rig import Rig
 
-Model = mujoco.MjModel
 ORDERS = ("position", "velocity", "acceleration")
 TURNS = {
     "position": ("rad",), "velocity": ("rad/s",), "acceleration": ("rad/s^2",), "load": ("N m",),
@@ -36,11 +35,13 @@ def expected_units(case: Case, rig: Rig) -> tuple[dict[str, Expectation], dict[s
         rig: The user's model.
     """
     channels = {c.name: found for c in case.channels if (found := _channel(c, rig)) is not None}
-    parameters = {p.name: found for p in case.parameters if (found := _parameter(p.name, rig.model)) is not None}
+    parameters = {
+        p.name: found for p in case.parameters if (found := _parameter(p.name, rig.model)) is not None
+    }
     return channels, parameters
 
 
-def _parameter(name: str, model: Model) -> Expectation | None:
+def _parameter(name: str, model: mujoco.MjModel) -> Expectation | None:
     kind, _, target = name.partition(":")
     if kind == "mass":
         return Expectation(("kg",), "it is a mass")
@@ -51,7 +52,7 @@ def _parameter(name: str, model: Model) -> Expectation | None:
     return _of_coordinate(model, target, PARAMETERS[kind])
 
 
-def _of_coordinate(model: Model, name: str, quantity: str) -> Expectation | None:
+def _of_coordinate(model: mujoco.MjModel, name: str, quantity: str) -> Expectation | None:
     """A quantity along a joint or a tendon."""
     joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name)
     if joint >= 0:
@@ -66,7 +67,9 @@ def _of_coordinate(model: Model, name: str, quantity: str) -> Expectation | None
     if None in kinds:
         return None
     if len(kinds) > 1:  # a lever between joints that slide and joints that turn: its coefficients decide
-        return Expectation(SLIDES[quantity] + TURNS[quantity], f"{label} joins joints that slide and that turn")
+        return Expectation(
+            SLIDES[quantity] + TURNS[quantity], f"{label} joins joints that slide and that turn"
+        )
     return _along(label, bool(next(iter(kinds))), quantity)
 
 
@@ -74,14 +77,14 @@ def _along(label: str, turns: bool, quantity: str) -> Expectation:
     return Expectation((TURNS if turns else SLIDES)[quantity], f"{label} {'turns' if turns else 'slides'}")
 
 
-def _turns(model: Model, joint: int) -> bool | None:
+def _turns(model: mujoco.MjModel, joint: int) -> bool | None:
     kind = int(model.jnt_type[joint])
     if kind == int(mujoco.mjtJoint.mjJNT_HINGE):
         return True
     return False if kind == int(mujoco.mjtJoint.mjJNT_SLIDE) else None
 
 
-def _of_tendon(model: Model, tendon: int) -> set[bool | None]:
+def _of_tendon(model: mujoco.MjModel, tendon: int) -> set[bool | None]:
     """Whether the joints of a fixed tendon turn; a spatial tendon has a length."""
     first, count = int(model.tendon_adr[tendon]), int(model.tendon_num[tendon])
     wraps = range(first, first + count)
@@ -127,7 +130,7 @@ def _article(quantity: str) -> str:
     return f"{'an' if quantity[:1] in 'aeiou' else 'a'} {quantity}"
 
 
-def _command(model: Model, name: str) -> Expectation | None:
+def _command(model: mujoco.MjModel, name: str) -> Expectation | None:
     """What drives an actuator: a force, or the position or velocity that a servo follows."""
     index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name)
     affine = int(model.actuator_biastype[index]) == int(mujoco.mjtBias.mjBIAS_AFFINE)
@@ -142,7 +145,7 @@ def _command(model: Model, name: str) -> Expectation | None:
     return _at_actuator(model, name, "load", gain=float(model.actuator_gainprm[index, 0]))
 
 
-def _at_actuator(model: Model, name: str, quantity: str, *, gain: float = 1.0) -> Expectation | None:
+def _at_actuator(model: mujoco.MjModel, name: str, quantity: str, *, gain: float = 1.0) -> Expectation | None:
     """A quantity on the side of an actuator: that of its joint where nothing is in between, else in any unit that its gear may have."""
     index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name)
     kind = mujoco.mjtTrn(int(model.actuator_trntype[index]))
@@ -161,4 +164,6 @@ def _at_actuator(model: Model, name: str, quantity: str, *, gain: float = 1.0) -
     if abs(gear) == 1.0 and abs(gain) == 1.0:
         return Expectation(found.units, reason)
     units = (*found.units, *SLIDES[quantity], *TURNS[quantity], *(DRIVES if quantity == "load" else ()))
-    return Expectation(tuple(dict.fromkeys(units)), f"{reason} through a gear of {gear:g} and a gain of {gain:g}")
+    return Expectation(
+        tuple(dict.fromkeys(units)), f"{reason} through a gear of {gear:g} and a gain of {gain:g}"
+    )

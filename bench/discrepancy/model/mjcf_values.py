@@ -35,8 +35,8 @@ def _note(parameter: NominalParameter, rig: Rig) -> str:
     by = f"{apart / parameter.std:.3g} sigma" if parameter.std > 0.0 else "although it is stated as certain"
     factor = f", {parameter.value / own:.4g} times as much" if own else ""
     return (
-        f"'{parameter.name}' is {parameter.value:.5g} {parameter.unit} in nominal.json and {own:.5g} in the model{_sum(parameter.name, rig)}: "
-        f"{by} apart{factor}; the value of nominal.json is taken"
+        f"'{parameter.name}' is {parameter.value:.5g} {parameter.unit} in nominal.json and {own:.5g} in the model"
+        f"{_sum(parameter.name, rig)}: {by} apart{factor}; the value of nominal.json is taken"
     )
 
 

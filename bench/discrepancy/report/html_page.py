@@ -147,7 +147,9 @@ def _gap_section(out: Page, diagnosis: Diagnosis, runs: Mapping[str, Recording])
             _draw(section, partial(time_histories, shown, channels, window=window), caption)
     if len(runs) > 1:
         _draw(
-            section, lambda: error_histories(runs, channels), "What is left: simulated less measured, over the whole record."
+            section,
+            lambda: error_histories(runs, channels),
+            "What is left: simulated less measured, over the whole record.",
         )
     if NOMINAL not in runs:
         section.text("The nominal model diverges on the judging record; it is not drawn.")
@@ -312,7 +314,7 @@ def _parameter_section(out: Page, diagnosis: Diagnosis) -> None:
         ]
         _draw(
             section,
-            lambda: correlation_map([labels[i] for i in free], correlation),
+            partial(correlation_map, [labels[i] for i in free], correlation),
             "Correlations of the estimates; a pair near one in magnitude is known as a combination only.",
         )
 
