@@ -18,7 +18,7 @@ from bench.discrepancy.checks.scales import Bands, common_factor, suspicions
 from bench.discrepancy.judgement.shares import closed_words, percent, probability
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.mjcf_loads import clipped_load
-from bench.discrepancy.model.structure import structure_of
+from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.verdict import Gap
 from bench.errors import BenchError, ModelError, UnitError
 from bench.recording.units import conversion, read_as

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
-import signal
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -42,114 +40,79 @@ class Diagnose:
     """Largest number of effects named together."""
     anyway: bool = False
     """Go on where a unit, a sign or a part of the model stands against the diagnosis; what it was becomes a note."""
+    budget: float = float("inf")
+    """Seconds after which no further stage of the search is begun; the verdict is then the best one so far and says what was not tried."""
     force: bool = False
-    """Overwrite files that are there already."""
+    """Overwrite files that exist."""
     progress: bool = True
     """Show what is being done, on standard error."""
 
     def __call__(self) -> None:
         """Run the command."""
-        from bench.files import write_text
-
         self._check_places()
-        with _ended_like_interrupts(), _stages(self.progress) as stage:
-            diagnosis = _diagnosed(self.folder, self.exclude, self.most, self.anyway, stage)
+        with _stages(self.progress) as stage:
+            diagnosis = _diagnosed(self, stage)
             document = diagnosis.verdict.to_json()
-            outputs: list[tuple[Path, Callable[[Path], None]]] = []
-            if self.json is not None and self.json != PRINTED:
-                text = json.dumps(document, indent=1, ensure_ascii=False)
-                outputs.append((self.json, lambda path: write_text(path, text)))
-            if self.html is not None:
-                from bench.discrepancy import write_report
-
-                outputs.append((self.html, lambda path: write_report(diagnosis, path)))
-            if self.rrd is not None:
-                from bench.discrepancy.report.rerun_recording import write_rerun
-
-                outputs.append((self.rrd, lambda path: write_rerun(diagnosis, path)))
-            failures = _written_together(outputs, stage)
+            written, problem = self._written(diagnosis, document, stage)
         if self.json == PRINTED:
             emit(document)
         else:
             for part in summary(diagnosis.verdict):
                 Console().print(part, markup=False, highlight=False)
-            for path, _ in outputs:
-                if path not in failures:
-                    print(f"written: {path}")
+            for path in written:
+                print(f"written: {path}")
         for warning in diagnosis.verdict.warnings:
             Console(stderr=True, soft_wrap=True).print(
                 f"note: {warning}", style="yellow", markup=False, highlight=False
             )
-        if failures:
-            from bench.files import OutputError
+        if problem is not None:
+            raise problem
 
-            reasons = "; ".join(f"{path}: {reason}" for path, reason in failures.items())
-            raise OutputError(f"the verdict is complete, but not everything could be written ({reasons})")
+    def _written(
+        self, diagnosis: Diagnosis, document: dict[str, Any], stage: Callable[[str], None]
+    ) -> tuple[list[Path], Exception | None]:
+        """The files written, moved into place together; where one fails, the verdict alone, and what failed."""
+        from bench.files import OutputError, together, write_text
+
+        text = json.dumps(document, indent=1, ensure_ascii=False)
+        saved = [self.json] if self.json is not None and self.json != PRINTED else []
+        try:
+            with together():
+                for path in saved:
+                    write_text(path, text)
+                if self.html is not None:
+                    from bench.discrepancy import write_report
+
+                    stage(f"writing {self.html}")
+                    write_report(diagnosis, self.html)
+                if self.rrd is not None:
+                    from bench.discrepancy.report.rerun_recording import write_rerun
+
+                    stage(f"writing {self.rrd}")
+                    write_rerun(diagnosis, self.rrd)
+        except Exception as error:  # whatever a figure ran into: the verdict is told and kept
+            problem = OutputError(f"the report of this verdict cannot be written: {error}")
+            with contextlib.suppress(OutputError):
+                for path in saved:
+                    write_text(path, text)
+                return saved, problem
+            return [], problem
+        return [path for path in (*saved, self.html, self.rrd) if path is not None], None
 
     def _check_places(self) -> None:
         """Refuse places that cannot be written to before a minute is spent on the diagnosis."""
         from bench.errors import ParameterError
-        from bench.files import OutputError
+        from bench.targets import check_targets
 
         if self.most < 1:
             raise ParameterError(f"--most is {self.most}; at least one effect has to be allowed")
-        taken: set[Path] = set()
-        for path in (self.json, self.html, self.rrd):
-            if path is None or path == PRINTED:
-                continue
-            if path.is_dir():
-                raise OutputError(f"cannot write {path}: it is a folder; name a file in it")
-            nearest = next(parent for parent in path.resolve().parents if parent.exists())
-            if not nearest.is_dir() or not os.access(nearest, os.W_OK):
-                raise OutputError(
-                    f"cannot write {path}: {nearest} is no folder one may write to; choose another place"
-                )
-            if path.exists() and not self.force:
-                raise OutputError(f"{path} is there already; --force overwrites it, or name another file")
-            if path.resolve() in taken:
-                raise OutputError(f"{path} is named for two results; give each a file of its own")
-            taken.add(path.resolve())
+        if not self.budget > 0.0:
+            raise ParameterError(f"--budget is {self.budget:g} s; give more than zero")
+        check_targets(self.json, self.html, self.rrd, force=self.force)
 
 
 PRINTED = Path("-")
 """Stands for standard output."""
-
-
-@contextlib.contextmanager
-def _ended_like_interrupts() -> Iterator[None]:
-    """End on SIGTERM as on SIGINT, so that half-written files are removed."""
-
-    def end(number: int, frame: object) -> None:
-        raise KeyboardInterrupt
-
-    try:
-        before = signal.signal(signal.SIGTERM, end)
-    except ValueError:  # not in the main thread, where no signal arrives
-        yield
-        return
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
-
-
-def _written_together(
-    outputs: Sequence[tuple[Path, Callable[[Path], None]]], stage: Callable[[str], None]
-) -> dict[Path, str]:
-    """Make all files beside their places and move them there together; what could not be made, with the reason."""
-    from bench.files import replacing
-
-    failures: dict[Path, str] = {}
-    with contextlib.ExitStack() as together:
-        for path, write in outputs:
-            stage(f"writing {path}")
-            try:
-                with contextlib.ExitStack() as one:
-                    write(one.enter_context(replacing(path)))
-                    together.push(one.pop_all())
-            except Exception as error:  # a picture that fails is no reason to lose a verdict of minutes
-                failures[path] = str(error) or type(error).__name__
-    return failures
 
 
 @contextlib.contextmanager
@@ -161,9 +124,7 @@ def _stages(shown: bool) -> Iterator[Callable[[str], None]]:
         yield lambda text: bar.update(task, description=text)
 
 
-def _diagnosed(
-    folder: Path, exclude: tuple[str, ...], most: int, anyway: bool, stage: Callable[[str], None]
-) -> Diagnosis:
+def _diagnosed(asked: Diagnose, stage: Callable[[str], None]) -> Diagnosis:
     """The diagnosis of a folder; what numerics cannot cope with is told like any other input that cannot be used."""
     import numpy as np
 
@@ -171,10 +132,17 @@ def _diagnosed(
     from bench.errors import IdentificationError
 
     try:
-        return diagnose_folder(folder, exclude=exclude, most=most, anyway=anyway, progress=stage)
+        return diagnose_folder(
+            asked.folder,
+            exclude=asked.exclude,
+            most=asked.most,
+            anyway=asked.anyway,
+            progress=stage,
+            budget=asked.budget,
+        )
     except (np.linalg.LinAlgError, ArithmeticError) as error:
         raise IdentificationError(
-            f"the numbers of '{folder}' cannot be worked with ({error}); check nominal values, units and noise_std: "
+            f"the numbers of '{asked.folder}' cannot be worked with ({error}); check nominal values, units and noise_std: "
             "one of them is probably off by orders of magnitude"
         ) from error
 
@@ -185,28 +153,36 @@ def summary(verdict: Verdict) -> list[Any]:
     Args:
         verdict: The verdict.
     """
-    from bench.discrepancy.judgement.shares import closed_words, probability
+    from bench.discrepancy.judgement.shares import closed_words, interval, probability
 
     parts: list[Any] = [verdict.explanation]
-    if verdict.named:
-        table = Table("effect", "where", "probability", "parameters", title="Missing from the model")
-        for effect in verdict.named:
+    for effects, title in (
+        (verdict.named, "Missing from the model"),
+        (verdict.nearest, "What comes nearest"),
+    ):
+        if not effects:
+            continue
+        table = Table("effect", "where", "probability", "closes", "parameters", title=title)
+        for effect in effects:
             values = "\n".join(
                 f"{name} = {p.value:.5g} ± {p.std:.2g} {p.unit if p.unit != '1' else ''}".rstrip()
                 for name, p in effect.parameters.items()
             )
             where = " ".join(text for text in (effect.where, effect.channel) if text)
-            table.add_row(effect.name, where, probability(effect.probability), Text(values))
+            closes = interval(effect.closed, effect.closed_ci95)
+            table.add_row(effect.name, where, probability(effect.probability), closes, Text(values))
         parts.append(table)
     for gap in verdict.gaps:
         label = f"{gap.dof}: {gap.metric}" if gap.dof else gap.metric
         table = Table("model", "NRMSE", "closed", title=f"How far the gap shrinks ({label})")
-        *before, last = gap.steps
-        for name, value in before:
+        steps = gap.steps or (("nominal", gap.before), ("after", gap.after))
+        for name, value in steps[:-1]:
             table.add_row(name, f"{value:.3g}", "" if value == gap.before else closed_words(gap, value))
-        table.add_row(last[0], f"{last[1]:.3g}", closed_words(gap))
+        table.add_row(steps[-1][0], f"{steps[-1][1]:.3g}", closed_words(gap))
         table.add_row("noise alone", f"{gap.noise_floor:.3g}", "")
         parts.append(table)
+    if verdict.left:
+        parts.append(verdict.left)
     for names in verdict.indistinguishable:
         parts.append(f"These records cannot tell {' from '.join(names)}.")
     proposal = verdict.next_excitation
@@ -252,13 +228,20 @@ class BlindMake:
     """Compute how well the records of each case can tell its effect, for the answers."""
     workers: int = 1
     """Processes."""
+    force: bool = False
+    """Write into folders that hold files of others."""
 
     def __call__(self) -> None:
         """Run the command."""
         import numpy as np
 
         from bench.discrepancy import BlindOptions, make_blind
+        from bench.discrepancy.blind.protocol import SEAL
+        from bench.targets import check_folder
 
+        begun = next(self.folder.glob(f"*/{SEAL}"), None) is not None  # by the same command, which goes on
+        for folder in (self.folder, self.answers):
+            check_folder(folder, force=self.force or begun)
         chosen = {key: value for key, value in vars(self).items() if key in BlindOptions.__dataclass_fields__}
         with Console(stderr=True).status("making cases") as status:
             names = make_blind(
@@ -317,18 +300,23 @@ class BlindScore:
     """File for the scores as a self-contained page."""
     markdown: Path | None = None
     """File for the scores as Markdown."""
+    force: bool = False
+    """Overwrite files that exist."""
 
     def __call__(self) -> None:
         """Run the command."""
         from bench.discrepancy import score_blind
         from bench.discrepancy.blind.score_report import markdown, page, tables
-        from bench.files import write_text
+        from bench.files import together, write_text
+        from bench.targets import check_targets
 
+        check_targets(self.html, self.markdown, force=self.force)
         score = score_blind(self.results, self.answers, cases=self.cases)
-        if self.html is not None:
-            page(score).write(self.html)
-        if self.markdown is not None:
-            write_text(self.markdown, markdown(score))
+        with together():
+            if self.html is not None:
+                page(score).write(self.html)
+            if self.markdown is not None:
+                write_text(self.markdown, markdown(score))
         if self.json:
             emit(score.to_json())
             return

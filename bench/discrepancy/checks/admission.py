@@ -20,7 +20,7 @@ from bench.discrepancy.model.mjcf_reference import actuators_of, reference_of
 from bench.discrepancy.model.mjcf_rest import counted_from_rest
 from bench.discrepancy.model.mjcf_units import expected_units
 from bench.discrepancy.model.mjcf_values import value_notes
-from bench.discrepancy.model.structure import structure_of
+from bench.discrepancy.model.rigs import structure_of
 from bench.errors import ModelError, UnitError
 
 

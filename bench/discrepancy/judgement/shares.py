@@ -31,11 +31,24 @@ def closed_words(gap: Gap, value: float | None = None) -> str:
     if left > gap.before:
         return f"none: it grows to {left / gap.before:.3g} times"
     share = (gap.before - left) / (gap.before - gap.noise_floor)
-    if value is not None or share >= SURE:
-        return percent(share)
-    low, high = (min(end, 1.0) for end in gap.closed_ci95)
+    return percent(share) if value is not None else interval(share, gap.closed_ci95)
+
+
+def interval(share: float, ends: tuple[float, float]) -> str:
+    """A share with its 95 % interval, neither beyond the whole.
+
+    Args:
+        share: At most one.
+        ends: Of the interval.
+    """
+    if math.isnan(share):
+        return "not computed"
+    low, high = (min(end, 1.0) for end in ends)
+    value = percent(share) if share >= 0.0 else ("below -100 %" if share < -1.0 else f"{100.0 * share:.1f} %")
+    if low >= SURE or math.isnan(low) or math.isnan(high):
+        return value
     lower = f"{100.0 * low:.1f}" if low >= -1.0 else "below -100"
-    return f"{percent(share)} ({lower} to {'over 99.9' if high >= SURE else f'{100.0 * high:.1f}'})"
+    return f"{value} ({lower} to {'over 99.9' if high >= SURE else f'{100.0 * high:.1f}'})"
 
 
 def probability(value: float | None) -> str:

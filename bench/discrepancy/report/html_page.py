@@ -13,11 +13,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis
 from bench.discrepancy.diagnosis import Diagnosis
-from bench.discrepancy.judgement.shares import closed_words, probability
+from bench.discrepancy.judgement.shares import closed_words, percent, probability
 from bench.discrepancy.judgement.validation_discrepancy import coordinates
 from bench.discrepancy.localisation.localise import box
 from bench.discrepancy.localisation.state_map import StateMap
+from bench.discrepancy.report.articulated import articulated_page
 from bench.discrepancy.report.model_update import recipes
 from bench.discrepancy.report.simulated_records import MEASURED, NOMINAL, variants
 from bench.discrepancy.verdict import Split
@@ -38,8 +40,10 @@ def simulated(diagnosis: Diagnosis) -> dict[str, Recording]:
     return variants(diagnosis)
 
 
-def page(diagnosis: Diagnosis) -> Page:
+def page(diagnosis: Diagnosis | ArticulatedDiagnosis) -> Page:
     """Build the report of a diagnosis."""
+    if isinstance(diagnosis, ArticulatedDiagnosis):
+        return articulated_page(diagnosis)
     verdict = diagnosis.verdict
     out = Page(
         f"Diagnosis of {diagnosis.case.name}", verdict.explanation, f"{verdict.seconds:.1f} s of computation"
@@ -57,7 +61,7 @@ def page(diagnosis: Diagnosis) -> Page:
     return out
 
 
-def write_report(diagnosis: Diagnosis, path: str | Path) -> None:
+def write_report(diagnosis: Diagnosis | ArticulatedDiagnosis, path: str | Path) -> None:
     """Write the report of a diagnosis as one HTML file."""
     page(diagnosis).write(path)
 
@@ -78,7 +82,7 @@ def _verdict_section(out: Page, diagnosis: Diagnosis) -> None:
         ("verdict", "probability"),
         [(k, probability(p)) for k, p in verdict.probabilities.items()],
     )
-    for effect in verdict.named:
+    for effect in (*verdict.named, *verdict.nearest):
         where = f" ({effect.where})" if effect.where else ""
         rows = [
             (
@@ -88,12 +92,15 @@ def _verdict_section(out: Page, diagnosis: Diagnosis) -> None:
             for name, e in effect.parameters.items()
         ]  # fmt: skip
         section.table(
-            f"{effect.name}{where}, probability {probability(effect.probability)}: {effect.equation}",
+            f"{'' if verdict.named else 'Nearest: '}{effect.name}{where}, probability {probability(effect.probability)}, closes "
+            f"{percent(effect.closed)} of what is missing without it: {effect.equation}",
             ("parameter", "value", "one-sigma", "95 % interval", "unit"),
             rows,
         )
     for group in verdict.indistinguishable:
         section.text(f"These records cannot tell apart: {', '.join(group)}.")
+    if verdict.left:
+        section.text(verdict.left)
     for warning in verdict.warnings:
         section.text(f"Note: {warning}.")
 

@@ -141,7 +141,7 @@ def nominal_level(problem: Problem, placed: Placed, values: Array) -> float | No
         return float(values[problem.structure.parameters.index(COULOMB_PARAMETER)])
     for friction in problem.structure.frictions:
         if friction.acts_along(placed.place.rows[0]):
-            return friction.level(problem.structure, values)
+            return friction.level(problem.structure.parameters, values)
     return None
 
 
@@ -150,7 +150,7 @@ def frictional(problem: Problem) -> NDArray[np.bool_]:
     names = {friction.parameter for friction in problem.structure.frictions}
     names |= {COULOMB_PARAMETER} if problem.driven else set()
     out = np.zeros(len(problem.nominal), dtype=bool)
-    out[: problem.n_physical] = [name in names for name in problem.structure.parameters]
+    out[: problem.n_physical] = [name in names for name in problem.structure.parameters[: problem.n_physical]]
     return out
 
 
