@@ -55,7 +55,8 @@ ARM = """
   <actuator><position name="m1" joint="shoulder"/><position name="m2" joint="elbow"/></actuator>
 </mujoco>
 """
-RATE, FINER = 500.0, 8
+NAMES = ("identification", "validation")
+RATE, FINER = 500.0, 5
 """Sample rate [Hz], and steps of the truth in a step of the model."""
 
 
@@ -72,11 +73,15 @@ def smooth(rng, n, low, high, level):
     return level * samples / np.std(samples) * np.minimum(np.arange(n) / 200.0, 1.0)
 
 
-def measured(xml, wrong, commands, before_step=None):
-    """Positions (n, nq) of a model made wrong by `wrong(spec)`, at finer steps, controls along straight lines between samples."""
+def measured(xml, wrong, commands, before_step=None, settle=0):
+    """Positions (n, nq) of a model made wrong by `wrong(spec)`, at finer steps, controls along straight lines between samples.
+
+    Without controls for `settle` samples first.
+    """
     spec = mujoco.MjSpec.from_string(xml)
     own = float(spec.option.timestep)
     spec.option.timestep = own / FINER
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
     wrong(spec)
     model = spec.compile()
     data = mujoco.MjData(model)
@@ -86,8 +91,8 @@ def measured(xml, wrong, commands, before_step=None):
         np.interp((np.arange(n * per) + 0.5) / per, np.arange(n), column) for column in commands.T
     ])  # fmt: skip
     out = np.empty((n, model.nq))
-    for k, row in enumerate(fine):
-        if k % per == 0:
+    for k, row in enumerate(np.concatenate([np.zeros((settle * per, model.nu)), fine]), start=-settle * per):
+        if k >= 0 and k % per == 0:
             out[k // per] = data.qpos
         data.ctrl[:] = row
         if before_step is not None:
@@ -96,11 +101,11 @@ def measured(xml, wrong, commands, before_step=None):
     return out
 
 
-def stage_case(folder: Path, wrong=lambda spec: None, before_step=None, n=1500, level=12.0) -> Case:
+def stage_case(folder: Path, wrong=lambda spec: None, before_step=None, n=1000, level=12.0) -> Case:
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "stage.xml").write_text(STAGE)
     records = []
-    for seed, name in enumerate(("identification", "validation")):
+    for seed, name in enumerate(NAMES):
         force = smooth(np.random.default_rng(seed), n, 0.5, 8.0, level)
         x = measured(STAGE, wrong, force[:, None], before_step)[:, 0]
         records.append(record_from_arrays(name, np.arange(n) / RATE, {"shaker": force, "displacement": x}))
@@ -113,14 +118,14 @@ def stage_case(folder: Path, wrong=lambda spec: None, before_step=None, n=1500, 
     )  # fmt: skip
 
 
-def arm_case(folder: Path, wrong=lambda spec: None, before_step=None, n=1500, read=None) -> Case:
+def arm_case(folder: Path, wrong=lambda spec: None, before_step=None, n=1000, read=None) -> Case:
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "arm.xml").write_text(ARM)
     records = []
-    for seed, name in enumerate(("identification", "validation")):
+    for seed, name in enumerate(NAMES):
         rng = np.random.default_rng(10 + seed)
         target = np.column_stack([smooth(rng, n, 0.2, 2.0, 0.4), smooth(rng, n, 0.2, 2.5, 0.5)])
-        q = measured(ARM, wrong, target, before_step)
+        q = measured(ARM, wrong, target, before_step, settle=500)
         q = q[:, :2] if read is None else read(q)
         columns = {"t1": target[:, 0], "t2": target[:, 1], "q1": q[:, 0], "q2": q[:, 1]}
         records.append(record_from_arrays(name, np.arange(n) / RATE, columns, at_rest=False))
@@ -136,3 +141,197 @@ def arm_case(folder: Path, wrong=lambda spec: None, before_step=None, n=1500, re
 
 def gap_of(dof, after):
     return Gap("NRMSE", 1.0, 1.0, after, after, 0.0, (0.0, 0.0), (), dof)
+
+
+def friction(joint, level):
+    """Hard friction at the finer steps of the truth."""
+
+    def wrong(spec):
+        item = spec.joint(joint)
+        item.frictionloss = level
+        item.solref_friction, item.solimp_friction = (2.1 * spec.option.timestep, 1.0), (0.999, 0.999, 0.001, 0.5, 2.0)
+
+    return wrong
+
+
+def setting(kind, name, **values):
+    """Attributes of a joint or an actuator, whole or at an index: ``stiffness=(2, 5e6)``."""
+
+    def wrong(spec):
+        item = getattr(spec, kind)(name)
+        for key, value in values.items():
+            if isinstance(value, tuple) and len(value) == 2 and isinstance(value[0], int):
+                row = np.array(getattr(item, key), dtype=float)
+                row[value[0]] = value[1]
+                value = row
+            setattr(item, key, value)
+
+    return wrong
+
+
+def pushed(force, joint="guide"):
+    """A force by Python before every step of the truth."""
+
+    def before_step(model, data):
+        own = model.joint(joint)
+        dof = int(own.dofadr[0])
+        data.qfrc_applied[dof] = force(data.time, data.qpos[own.qposadr[0]], data.qvel[dof])
+
+    return before_step
+
+
+def dead(x, width):
+    return math.copysign(max(abs(x) - width, 0.0), x)
+
+
+def verified(case, effects, dofs=("",), nominal=(), goal=0.02):
+    return verify(
+        case.folder / case.rig, Findings(tuple(effects), tuple(nominal)), [gap_of(dof, goal) for dof in dofs], case
+    )
+
+
+# name: what is wrong with the truth, force before its steps, what the verdict says, form
+STAGE_EFFECTS = {
+    "coulomb_friction": (friction("guide", 3.0), None, effect("coulomb_friction", "guide", friction_force=3.0)),
+    "cubic_stiffness": (None, pushed(lambda t, q, v: -2e6 * q**3), effect("cubic_stiffness", k3=2e6)),
+    "quadratic_stiffness": (None, pushed(lambda t, q, v: -4e3 * q**2), effect("quadratic_stiffness", k2=4e3)),
+    "quadratic_damping": (None, pushed(lambda t, q, v: -60.0 * v * abs(v)), effect("quadratic_damping", "guide", c2=60.0)),
+    "gap": (None, pushed(lambda t, q, v: -1500.0 * dead(q, 0.01)), effect("gap", stiffness=1500.0, clearance=0.01)),
+    "asymmetric_gap": (
+        None,
+        pushed(lambda t, q, v: -1500.0 * max(q - 0.01, 0.0) + 700.0 * max(-0.005 - q, 0.0)),
+        effect("asymmetric_gap", stiffness_positive=1500.0, stiffness_negative=700.0, clearance_positive=0.01,
+               clearance_negative=0.005),
+    ),
+    "one_sided_stop": (
+        None, pushed(lambda t, q, v: 1500.0 * max(-0.006 - q, 0.0)),
+        effect("one_sided_stop", stiffness=1500.0, position=-0.006, side=-1.0),
+    ),
+    "force_offset": (None, pushed(lambda t, q, v: -9.0), effect("force_offset", offset=9.0)),
+    "actuator_delay": (
+        setting("actuator", "shaker", delay=0.0113, nsample=200, interp=1), None,
+        effect("actuator_delay", channel="shaker", delay=0.0113),
+    ),
+    "actuator_lag": (
+        setting("actuator", "shaker", dyntype=mujoco.mjtDyn.mjDYN_FILTEREXACT, dynprm=(0, 0.02)), None,
+        effect("actuator_lag", channel="shaker", time_constant=0.02),
+    ),
+    "force_gain_error": (
+        setting("actuator", "shaker", gear=(0, 0.8)), None, effect("force_gain_error", channel="shaker", relative_error=-0.2),
+    ),
+    "actuator_saturation": (
+        setting("actuator", "shaker", ctrlrange=(-8.0, 8.0), ctrllimited=mujoco.mjtLimited.mjLIMITED_TRUE), None,
+        effect("actuator_saturation", channel="shaker", level=8.0),
+    ),
+    "mass_error": (
+        setting("body", "table", mass=2.5), None, effect("mass_error", channel="mass:table", relative_error=0.25)
+    ),
+    "stribeck_friction": (
+        friction("guide", 2.0),
+        lambda model, data: model.dof_frictionloss.__setitem__(0, 2.0 * (1.0 + 0.8 * math.exp(-((data.qvel[0] / 0.05) ** 2)))),
+        effect("stribeck_friction", "guide", friction_force=2.0, static_excess=0.8, stribeck_velocity=0.05),
+    ),
+    "cogging": (
+        None, pushed(lambda t, q, v: -5.0 * math.sin(2.0 * math.pi * q / 0.02 + 0.4)),
+        effect("cogging", law="cogging", theta=(5.0, 0.02, 0.4), sine=1.0),
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", STAGE_EFFECTS)
+def test_an_effect_on_a_linear_model_closes_in_plain_mujoco(tmp_path, name):
+    wrong, before_step, found = STAGE_EFFECTS[name]
+    case = stage_case(tmp_path, wrong or (lambda spec: None), before_step)
+    (figure,) = verified(case, [found]).figures
+    assert figure.before > 0.08
+    assert figure.after < 0.1 * figure.before + 0.005, figure
+
+
+ARM_EFFECTS = {
+    "coulomb_friction": (friction("elbow", 1.5), None, effect("coulomb_friction", "elbow", "elbow", limit=1.5)),
+    "damping_error": (setting("joint", "elbow", damping=(0, 1.1)), None, effect("damping_error", "elbow", "elbow", added=0.8)),
+    "quadratic_damping": (
+        None, pushed(lambda t, q, v: -0.3 * v * abs(v), "elbow"), effect("quadratic_damping", "elbow", "elbow", c2=0.3)
+    ),
+    "armature_error": (setting("joint", "elbow", armature=0.2), None, effect("armature_error", "elbow", "elbow", added=0.18)),
+    "actuator_delay": (
+        setting("actuator", "m2", delay=0.0207, nsample=400, interp=1), None, effect("actuator_delay", "m2", "elbow", delay_s=0.0207)
+    ),
+    "servo_gain_error": (
+        setting("actuator", "m2", gainprm=(0, 24.0), biasprm=(1, -24.0)), None,
+        effect("servo_gain_error", "m2", "elbow", relative_error=-0.4),
+    ),
+    "actuator_saturation": (
+        setting("actuator", "m2", forcerange=(-1.4, 1.4), forcelimited=mujoco.mjtLimited.mjLIMITED_TRUE), None,
+        effect("actuator_saturation", "m2", "elbow", limit=1.4),
+    ),
+    "one_sided_stop": (
+        None, pushed(lambda t, q, v: -min(max(40.0 * (q - 0.3) + 0.5 * v, 0.0), 1e9) * (q > 0.3), "elbow"),
+        effect("one_sided_stop", "elbow", "elbow", stiffness=40.0, position=0.3, damping=0.5, side=1.0),
+    ),
+    "force_offset": (None, pushed(lambda t, q, v: 1.5, "elbow"), effect("force_offset", "elbow", "elbow", force=1.5)),
+    "actuator_deadband": (
+        None,
+        lambda model, data: data.qfrc_applied.__setitem__(1, 40.0 * (dead(data.ctrl[1] - data.qpos[1], 0.03) - data.ctrl[1] + data.qpos[1])),
+        effect("actuator_deadband", "m2", "elbow", half_width=0.03),
+    ),
+    "load_dependent_friction": (
+        friction("elbow", 0.2),
+        lambda model, data: model.dof_frictionloss.__setitem__(1, 0.2 + 0.9 * abs(carried(model, data))),
+        effect("load_dependent_friction", "elbow", "elbow", limit_0=0.2, mu=0.9),
+    ),
+    "cogging": (
+        None, pushed(lambda t, q, v: -1.2 * math.sin(7.0 * q + math.atan2(0.5, 1.0)) , "elbow"),
+        effect("cogging", "elbow", "elbow", sine=1.2 / math.hypot(1.0, 0.5), cosine=0.6 / math.hypot(1.0, 0.5), periods_per_turn=7.0),
+    ),
+}  # fmt: skip
+
+
+def carried(model, data):
+    """Torque that the elbow carries, by inverse dynamics of the bodies alone."""
+    full = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, full)
+    return (full @ data.qacc)[1] - model.dof_armature[1] * data.qacc[1] + data.qfrc_bias[1]
+
+
+@pytest.mark.parametrize("name", ARM_EFFECTS)
+def test_an_effect_on_an_arm_closes_in_plain_mujoco(tmp_path, name):
+    wrong, before_step, found = ARM_EFFECTS[name]
+    case = arm_case(tmp_path, wrong or (lambda spec: None), before_step)
+    figures = {f.dof: f for f in verified(case, [found], ("shoulder", "elbow")).figures}
+    assert figures["elbow"].before > 0.03
+    assert figures["elbow"].after < 0.03 * figures["elbow"].before + 0.005, figures
+    assert figures["shoulder"].after < 0.01
+
+
+def geared(stiffness, damping, width):
+    """A motor of its own, which turns a rotor that bears on the link through a spring with play."""
+
+    def wrong(spec):
+        elbow = spec.joint("elbow")
+        elbow.armature, elbow.damping = 0.008, np.zeros(3)
+        body = spec.body("upper").add_body(name="rotor", mass=1e-6, inertia=np.full(3, 1e-9), explicitinertial=True)
+        body.add_joint(name="rotor", type=mujoco.mjtJoint.mjJNT_HINGE, axis=(0, 1, 0), armature=0.012, damping=(0.3, 0, 0))
+        spec.actuator("m2").target = "rotor"
+
+    def before_step(model, data):
+        bent, rate = data.qpos[2] - data.qpos[1], data.qvel[2] - data.qvel[1]
+        beyond = dead(bent, width)
+        torque = stiffness * beyond + (damping * rate if beyond or not width else 0.0)
+        data.qfrc_applied[1:3] = torque, -torque
+
+    return wrong, before_step
+
+
+@pytest.mark.parametrize("name", ["joint_compliance", "backlash"])
+@pytest.mark.parametrize("side", [0.0, 1.0])
+def test_a_train_becomes_two_joints(tmp_path, name, side):
+    width = 0.05 if name == "backlash" else 0.0
+    stiffness = 120.0 if width else 25.0
+    # the servo acts on the motor in either case; the encoder of the log sits on the side
+    case = arm_case(tmp_path, *geared(stiffness, 0.3, width), read=lambda q: q[:, [0, 1 if side else 2]])
+    play = {"half_clearance": width} if width else {}
+    found = effect(name, "elbow", "elbow", stiffness=stiffness, damping=0.3, motor_share=0.6, encoder_on_link=side, **play)
+    figures = {f.dof: f for f in verified(case, [found], ("shoulder", "elbow")).figures}
+    print(name, side, figures)
+    assert figures["elbow"].after < 0.15 * figures["elbow"].before + 0.01, figures

@@ -9,7 +9,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from bench.discrepancy.application.target import FAR, PREFIX, Change, Target, mobility
+from bench.discrepancy.application.target import FAR, PREFIX, Change, Target, as_mujoco, mobility
 from bench.discrepancy.model.mjcf_friction import frictionloss_of
 from bench.discrepancy.verdict import NamedEffect
 
@@ -195,6 +195,7 @@ def elastic_train(target: Target, effect: NamedEffect) -> Change:
     v, name = values_of(effect), target.named(effect.where)
     joint = target.spec.joint(name)
     train = joint.parent.add_joint(name=f"{PREFIX}{name}_train", type=joint.type, axis=joint.axis, pos=joint.pos)
+    as_mujoco(train)
     damping = np.zeros_like(np.asarray(train.damping, dtype=float))
     stiffness = np.zeros_like(np.asarray(train.stiffness, dtype=float))
     width = v.get("half_clearance", 0.0)

@@ -18,7 +18,7 @@ from scipy.interpolate import CubicSpline
 from bench.discrepancy.application.applying import Applied
 from bench.discrepancy.application.forces import values_of
 from bench.discrepancy.application.running import Window, controls, hook_of, run, sampled
-from bench.discrepancy.application.target import PREFIX
+from bench.discrepancy.application.target import PREFIX, as_mujoco
 from bench.discrepancy.articulated.channels import bound
 from bench.discrepancy.articulated.effects import CATALOGUE
 from bench.discrepancy.articulated.judgement import JudgementSettings
@@ -180,11 +180,14 @@ def _held(applied: Applied, free: str, reference: mujoco.MjModel) -> mujoco.MjMo
     full = np.zeros((reference.nv, reference.nv))
     mujoco.mj_fullM(reference, data, full)
     rate = SERVO_RATE / step
-    for joint in [j for j in spec.joints if not j.name.startswith(PREFIX) and j.name != free]:
+    followed = {j.name for j in spec.joints if not j.name.startswith(PREFIX) and j.name != free}
+    followed |= {f"{PREFIX}{name}_train" for name in applied.outputs if name != free}  # its link is what was measured
+    for joint in [j for j in spec.joints if j.name in followed]:
         inertia = HEAVY * float(full[reference.joint(joint.name).dofadr[0], reference.joint(joint.name).dofadr[0]])
         joint.armature = inertia
         joint.limited = mujoco.mjtLimited.mjLIMITED_FALSE
         holder: Any = spec.add_actuator(name=_holder(joint.name), target=joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+        as_mujoco(holder)
         holder.gaintype, holder.biastype = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_AFFINE
         holder.gainprm[0] = inertia * rate**2
         holder.biasprm[:3] = (0.0, -inertia * rate**2, -2.0 * inertia * rate)

@@ -224,6 +224,7 @@ class Target:
             label = f"{PREFIX}{name}_{effect}_{number}"
         tendon = self.spec.add_tendon(name=label)
         tendon.wrap_joint(name, 1.0)
+        as_mujoco(tendon)
         return tendon
 
 
@@ -233,3 +234,21 @@ def mobility(model: mujoco.MjModel, name: str) -> float:
     if i >= 0:
         return float(model.dof_invweight0[model.jnt_dofadr[i]])
     return float(model.tendon_invweight0[model.tendon(name).id])
+
+
+def as_mujoco(item: Any) -> None:
+    """Give a new joint, tendon or actuator MuJoCo's own defaults: the user's default classes are meant for others."""
+    if hasattr(item, "dyntype"):
+        plain = mujoco.MjSpec().add_actuator(name="plain")
+        kept = ("name", "target", "trntype")
+    elif hasattr(item, "wrap_joint"):
+        plain = mujoco.MjSpec().add_tendon(name="plain")
+        kept = ("name",)
+    else:
+        plain = mujoco.MjSpec().worldbody.add_body().add_joint(name="plain")
+        kept = ("name", "type", "axis", "pos", "parent", "frame")
+    own = {"classname", "info", "userdata", *kept}
+    for key in dir(plain):
+        entry = getattr(type(plain), key)
+        if not key.startswith("_") and key not in own and isinstance(entry, property) and entry.fset is not None:
+            setattr(item, key, getattr(plain, key))
