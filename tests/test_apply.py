@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from bench.cli import main
-from bench.discrepancy import Case, CaseChannel, diagnose, record_from_arrays
+from bench.discrepancy import Case, CaseChannel, record_from_arrays
 from bench.discrepancy.application.applying import Findings, apply
 from bench.discrepancy.application.verification import verify
 from bench.discrepancy.application.writing import model_text, ranges, snippet, write_model
@@ -333,5 +333,138 @@ def test_a_train_becomes_two_joints(tmp_path, name, side):
     play = {"half_clearance": width} if width else {}
     found = effect(name, "elbow", "elbow", stiffness=stiffness, damping=0.3, motor_share=0.6, encoder_on_link=side, **play)
     figures = {f.dof: f for f in verified(case, [found], ("shoulder", "elbow")).figures}
-    print(name, side, figures)
     assert figures["elbow"].after < 0.15 * figures["elbow"].before + 0.01, figures
+
+
+def saved(case: Case) -> Path:
+    """The case as a folder: nominal.json and CSV."""
+    assert case.folder is not None
+    channels = {
+        c.name: {"unit": c.unit, "role": c.role, "noise_std": c.noise_std, **dict([c.target.split(":")] if c.target else []),
+                 **({"quantity": c.quantity} if c.quantity else {})}
+        for c in case.channels
+    }  # fmt: skip
+    for entry in channels.values():
+        if entry["noise_std"] is None:
+            del entry["noise_std"]
+        if entry["role"] == "response":
+            del entry["role"]
+    document = {
+        "rig": case.rig, "channels": channels,
+        "parameters": {p.name: {"value": p.value, "std": p.std, "unit": p.unit} for p in case.parameters},
+    }  # fmt: skip
+    (case.folder / "nominal.json").write_text(json.dumps(document))
+    for record in (*case.identification, *case.validation):
+        rows = np.column_stack([record.time, *record.values.values()])
+        header = ",".join(["time", *record.values])
+        np.savetxt(case.folder / f"{record.name}.csv", rows, delimiter=",", header=header, comments="", fmt="%.9g")
+    return case.folder
+
+
+@pytest.mark.slow
+def test_from_a_log_to_a_corrected_model_by_two_commands(tmp_path, capsys):
+    folder = saved(stage_case(tmp_path / "case", friction("guide", 3.0), n=2000))
+    verdict, corrected, ranges_file = folder / "verdict.json", tmp_path / "corrected.xml", tmp_path / "ranges.yaml"
+    assert main(["diagnose", str(folder), "--json", str(verdict), "--no-progress"]) == 0
+    capsys.readouterr()
+    command = ["apply", str(verdict), "--model", str(folder / "stage.xml"), "-o", str(corrected)]
+    assert main([*command, "--json", str(tmp_path / "a.json"), "--ranges", str(ranges_file)]) == 0
+    printed = capsys.readouterr().out
+    document = json.loads((tmp_path / "a.json").read_text())
+    assert [effect["name"] for effect in document["named"]] == ["coulomb_friction"]
+    (figure,) = document["applied"]["figures"]
+    assert document["applied"]["line"] in printed and "in your simulator" in printed
+    assert figure["before"] > 0.2 and figure["after"] < 0.05 * figure["before"]
+    # in the user's own simulator the model as it came stands for the diagnosis's
+    assert abs(figure["before"] - document["gap"]["before"]) < 0.05 * document["gap"]["before"]
+    assert figure["short"] < 0.05 or document["applied"]["remedy"] in printed
+    text = corrected.read_text()
+    assert "stiffness 800 to " in text and "stated sigmas" in text and "frictionloss" in text
+    model = mujoco.MjModel.from_xml_path(str(corrected))
+    assert model.dof_frictionloss[0] == pytest.approx(3.0, rel=0.02)
+    assert "coulomb_friction" in ranges_file.read_text()
+    assert not (tmp_path / "corrected.py").exists()
+    assert main(command) == 2  # nothing is overwritten unasked
+    assert "exists and is not overwritten" in capsys.readouterr().err
+
+
+def test_what_mjcf_cannot_hold_becomes_a_snippet_that_runs(tmp_path):
+    (tmp_path / "arm.xml").write_text(ARM)
+    found = [
+        effect("presliding_friction", "elbow", "elbow", limit=0.6, stiffness=30.0, damping=0.1),
+        effect("stribeck_friction", "shoulder", "shoulder", limit=0.4, rise=0.5, velocity=0.1),
+    ]
+    applied = apply(tmp_path / "arm.xml", Findings(tuple(found)), linear=False)
+    write_model(applied, tmp_path / "new.xml", "arm.xml")
+    code = snippet(applied, "new.xml")
+    (tmp_path / "new.py").write_text(code)
+    space = {"__file__": str(tmp_path / "new.py"), "__name__": "snippet"}
+    exec(compile(code, "new.py", "exec"), space)
+    model = space["model"]
+    data = mujoco.MjData(model)
+    data.qvel[:] = 0.5
+    space["before_step"](model, data)
+    assert model.dof_frictionloss[0] == pytest.approx(0.4 * (1.0 + 0.5 * math.exp(-25.0)))
+    for _ in range(50):
+        data.ctrl[0] = 1.0
+        space["before_step"](model, data)
+        mujoco.mj_step(model, data)
+    assert np.isfinite(data.qpos).all() and data.act[-1] != 0.0  # the bristle has bent
+    assert [change.form for change in applied.changes] == ["callback", "step"]
+
+
+def test_numbers_stand_in_the_file_with_what_they_were(tmp_path):
+    (tmp_path / "arm.xml").write_text(ARM)
+    nominal = (
+        NominalEstimate("damping:shoulder", 0.36, 0.01, 0.3, 0.03, 2.0),
+        NominalEstimate("kp:m1", 44.0, 0.5, 40.0, 4.0, 1.0),
+        NominalEstimate("mass:fore", 0.8, 0.01, 0.7, 0.05, 2.0),
+    )
+    found = (
+        effect("mass_error", "fore", "elbow", payload=0.5),
+        effect("com_error", "upper", "shoulder", shift_x=0.01, shift_y=0.0, shift_z=-0.02),
+        effect("position_offset", "elbow", "elbow", offset=0.02, in_loop=1.0),
+    )
+    applied = apply(tmp_path / "arm.xml", Findings(found, nominal), linear=False)
+    (tmp_path / "sub").mkdir()
+    write_model(applied, tmp_path / "sub" / "new.xml", "arm.xml")
+    old, new = (mujoco.MjModel.from_xml_path(str(tmp_path / name)) for name in ("arm.xml", "sub/new.xml"))
+    assert new.dof_damping[0] == pytest.approx(0.36)
+    assert new.actuator_gainprm[0, 0] == pytest.approx(44.0) and new.actuator_biasprm[0, 1] == pytest.approx(-44.0)
+    assert new.body("fore").mass[0] == pytest.approx(1.3)
+    centre = (0.8 * old.body("fore").ipos[0] + 0.5 * 0.25) / 1.3
+    assert new.body("fore").ipos[0] == pytest.approx(centre, abs=1e-6)
+    assert new.body("upper").ipos - old.body("upper").ipos == pytest.approx([0.01, 0.0, -0.02], abs=1e-6)
+    assert new.actuator_biasprm[1, 0] == pytest.approx(-40.0 * 0.02)
+    text = model_text(applied, tmp_path, "arm.xml")
+    for words in ("damping 0.3 to 0.36", "+2.00 stated sigmas", "changes the log, not the model"):
+        assert words in text
+    lines = text.splitlines()
+    at = next(i for i, line in enumerate(lines) if '<body name="fore"' in line)
+    assert "<!-- mass_error: 0.5 kg" in lines[at - 1] or "<!-- mass_error: 0.5 kg" in lines[at - 2]
+    rows = {row["parameter"]: row for row in ranges(Findings(found, nominal))}
+    assert rows["kp:m1"]["low"] == pytest.approx(44.0 - 1.96 * 0.5)
+
+
+def test_the_simulators_own_share_is_named(tmp_path):
+    """Friction of the model itself, with MuJoCo's defaults, at a coarse step: soft, and no physics is missing."""
+    case = stage_case(tmp_path, friction("guide", 3.0))
+    coarse = STAGE.replace('timestep="0.001"', 'timestep="0.002"').replace('damping="6"', 'damping="6" frictionloss="3"')
+    (tmp_path / "stage.xml").write_text(coarse)
+    found = verified(case, [], goal=0.02)
+    (figure,) = found.figures
+    assert found.own_share == pytest.approx(figure.before, rel=0.2) and found.own_share > 0.05
+    assert "your simulator's own share" in found.simulator_line
+    assert found.remedy  # a model without what is missing is off by all of it: said, not hidden
+
+
+def test_a_verdict_that_names_nothing_is_not_applied(tmp_path, capsys):
+    folder = saved(stage_case(tmp_path / "case", n=400))
+    gap = {"metric": "x", "before": 1, "parameters_only": 1, "after": 1, "noise_floor": 1, "closed": 0, "closed_ci95": [0, 0]}
+    verdict = {
+        "verdict": "unknown", "named": [], "ranking": [], "indistinguishable": [], "locations": [], "gap": gap, "gaps": [gap],
+        "probabilities": {"unknown": 1.0}, "explanation": "",
+    }  # fmt: skip
+    (folder / "verdict.json").write_text(json.dumps(verdict))
+    assert main(["apply", str(folder / "verdict.json"), "--model", str(folder / "stage.xml"), "-o", str(tmp_path / "x.xml")]) == 2
+    assert "'unknown'" in capsys.readouterr().err and not (tmp_path / "x.xml").exists()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from bench.discrepancy.application.drives import DRIVES, LOGGED, logged
-from bench.discrepancy.application.forces import FORCES, element
+from bench.discrepancy.application.forces import FORCES, element, harden
 from bench.discrepancy.application.numbers import nominal_parameter, wrong_number
 from bench.discrepancy.application.target import Change, Target
 from bench.discrepancy.case.case import Case
@@ -126,8 +127,23 @@ def loads_of(case: Case | None, model: mujoco.MjModel) -> dict[str, str]:
     return out
 
 
-def apply(path: str | Path, findings: Findings, *, case: Case | None = None, linear: bool = True, step: float | None = None,
-          integrator: mujoco.mjtIntegrator | None = None) -> Applied:
+class Options(NamedTuple):
+    """How the corrected model is simulated where that differs from the user's own options.
+
+    Attributes:
+        step: Step [s].
+        integrator: Integrator.
+        hard: Dry friction of the model as hard as the step lets it be, whatever it says itself.
+    """
+
+    step: float | None = None
+    integrator: mujoco.mjtIntegrator | None = None
+    hard: bool = False
+
+
+def apply(
+    path: str | Path, findings: Findings, *, case: Case | None = None, linear: bool = True, options: Options | None = None
+) -> Applied:
     """Put what was found into a model.
 
     Args:
@@ -135,18 +151,20 @@ def apply(path: str | Path, findings: Findings, *, case: Case | None = None, lin
         findings: Effects and parameters.
         case: The case behind them, which says what its channels and places stand for.
         linear: Whether positions are counted from rest.
-        step: Another step of the simulation [s].
-        integrator: Another integrator.
+        options: Other options of the simulation.
 
     Raises:
         ModelError: The model cannot be read or compiled with the changes.
         UnknownNameError: It lacks what an effect refers to.
     """
     spec = specification(path)
-    if step is not None:
-        spec.option.timestep = step
-    if integrator is not None:
-        spec.option.integrator = integrator
+    own = options or Options()
+    if own.step is not None:
+        spec.option.timestep = own.step
+    if own.integrator is not None:
+        spec.option.integrator = own.integrator
+    if own.hard:
+        harden(spec)
     try:
         nominal = spec.compile()
     except ValueError as error:

@@ -55,6 +55,15 @@ def _set_friction(target: Target, item: Any, level: float, soft: Sequence[float]
     target.later.append(soften)
 
 
+def harden(spec: mujoco.MjSpec) -> None:
+    """Make the dry friction of a model as hard as its step lets it be."""
+    for item in (*spec.joints, *spec.tendons):
+        if item.frictionloss > 0.0:
+            found = frictionloss_of(float(item.frictionloss), 0.0, 0.0, mobility=1.0, step=float(spec.option.timestep))
+            item.solref_friction = [float(x) for x in found["solreffriction"].split()]
+            item.solimp_friction = (*(float(x) for x in found["solimpfriction"].split()), 0.001, 0.5, 2.0)
+
+
 def _modulated(limit: Callable[[dict[str, float]], str]) -> Callable[[Target, NamedEffect], Change]:
     """Dry friction whose limit changes: ``frictionloss``, set anew before every step."""
 

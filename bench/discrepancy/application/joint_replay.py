@@ -21,7 +21,6 @@ from bench.discrepancy.application.running import Window, controls, hook_of, run
 from bench.discrepancy.application.target import PREFIX, as_mujoco
 from bench.discrepancy.articulated.channels import bound
 from bench.discrepancy.articulated.effects import CATALOGUE
-from bench.discrepancy.articulated.judgement import JudgementSettings
 from bench.discrepancy.articulated.model import ArticulatedModel, Joint
 from bench.discrepancy.articulated.records import WINDOW, Encoder, Motion, encoders_of, input_of, motion_of
 from bench.discrepancy.case.case import Case, CaseRecord
@@ -30,6 +29,8 @@ from bench.discrepancy.verdict import NamedEffect
 Array = NDArray[np.float64]
 HEAVY = 1e6
 """Armature of a joint that follows the measured motion, over its inertia: what it still feels of the others."""
+FAR_OFF = 1e3
+"""Error that stands for a run that diverged."""
 SERVO_RATE = 0.2
 """Its servo's frequency [rad] a step: far below the limit of two of an explicit step."""
 
@@ -41,22 +42,25 @@ class JointReplay:
     Attributes:
         case: The case, its channels bound to joints and actuators.
         model: The nominal model.
-        blocks: Blocks of a record whose mean squares are averaged, as the verdict does.
     """
 
     case: Case
     model: ArticulatedModel
-    blocks: int = JudgementSettings().blocks
 
     @classmethod
     def of(cls, case: Case, nominal: mujoco.MjModel) -> JointReplay:
         """Prepare the replay of a case."""
         return cls(bound(case, nominal), ArticulatedModel.of(nominal, case.rig))
 
-    def discrepancies(self, applied: Applied, effects: Sequence[NamedEffect]) -> dict[str, float]:
-        """NRMSE by joint of the judging records, run with a model; logs of wrong encoders are corrected."""
+    def errors(self, applied: Applied, effects: Sequence[NamedEffect]) -> dict[str, Array]:
+        """Measured less simulated positions over the standard deviation of the measured, by joint, all judging records in a row.
+
+        Args:
+            applied: The model they are run with.
+            effects: Logs of wrong encoders are corrected first; errors are those of the log.
+        """
         wrong = encoders_wrong(effects)
-        powers: dict[str, list[float]] = {joint.name: [] for joint in self.model.joints}
+        found: dict[str, list[Array]] = {joint.name: [] for joint in self.model.joints}
         raw = [motion_of(self.case, self.model, record, {}) for record in self.case.validation]
         motions = [
             motion_of(self.case, self.model, record, wrong, like) if wrong else like
@@ -65,13 +69,12 @@ class JointReplay:
         reference = applied.compiled()
         for j, joint in enumerate(self.model.joints):
             held = _held(applied, joint.name, reference)
+            factor = 1.0 + wrong.get(joint.name, Encoder()).gain
             for record, motion, logged in zip(self.case.validation, motions, raw, strict=True):
                 error = self._error(applied, held, j, record, motion, wrong)
                 size = max(float(np.std(logged.samples[j][:, 0])), float(np.max(logged.noise[j])))
-                factor = 1.0 + wrong.get(joint.name, Encoder()).gain
-                error = np.nan_to_num(error * factor / size, nan=1e3, posinf=1e3, neginf=-1e3)
-                powers[joint.name] += [float(np.mean(b**2)) for b in np.array_split(error, self.blocks)]
-        return {name: float(np.sqrt(np.mean(np.minimum(power, 1e6)))) for name, power in powers.items()}
+                found[joint.name].append(np.nan_to_num(error * factor / size, nan=FAR_OFF, posinf=FAR_OFF, neginf=-FAR_OFF))
+        return {name: np.clip(np.concatenate(parts), -FAR_OFF, FAR_OFF) for name, parts in found.items()}
 
     def _error(
         self, applied: Applied, model: mujoco.MjModel, j: int, record: CaseRecord, motion: Motion, wrong: Mapping[str, Encoder]

@@ -16,7 +16,7 @@ from bench.discrepancy.application.forces import values_of
 from bench.discrepancy.application.running import Window, controls, hook_of, run, sampled
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.effects.catalogue import CATALOGUE
-from bench.discrepancy.judgement.validation_discrepancy import DIVERGED_GAP, coordinates, nrmse
+from bench.discrepancy.judgement.validation_discrepancy import DIVERGED_GAP, coordinates
 from bench.discrepancy.likelihood.window_whitening import cut, drifts, in_motion
 from bench.discrepancy.model.structure import Structure
 from bench.discrepancy.verdict import NamedEffect
@@ -48,16 +48,22 @@ class LinearReplay:
         duration = max(len(record) * record.step for record in case.validation)
         return cls(case, structure, drifts(structure, structure.at(values), duration))
 
-    def discrepancies(self, applied: Applied, effects: Sequence[NamedEffect]) -> dict[str, float]:
-        """NRMSE by judged coordinate of the judging records, run with a model; effects of sensors are put onto its readings."""
+    def errors(self, applied: Applied, effects: Sequence[NamedEffect]) -> dict[str, Array]:
+        """Simulated less measured over the standard deviation of the measured, by judged coordinate, all judging records in a row.
+
+        Args:
+            applied: The model they are run with.
+            effects: What is wrong with sensors is put onto their readings.
+        """
         model = applied.compiled()
         player = _Player(self, applied, model)
         runs = [_read(effects, player.channels(record), record) for record in self.case.validation]
         out = {}
         for name, channels in coordinates(self.structure):
-            measured = [_sum(record.values, channels) for record in self.case.validation]
-            simulated = [_sum(found, channels) for found in runs]
-            out[name] = nrmse(np.concatenate(measured), np.concatenate(simulated))
+            measured = np.concatenate([_sum(record.values, channels) for record in self.case.validation])
+            simulated = np.concatenate([_sum(found, channels) for found in runs])
+            error = (simulated - measured) / max(float(np.std(measured)), 1e-300)
+            out[name] = error if np.isfinite(error).all() else np.full(len(error), DIVERGED_GAP)
         return out
 
 

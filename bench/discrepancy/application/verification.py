@@ -8,8 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import mujoco
+import numpy as np
+from numpy.typing import NDArray
 
-from bench.discrepancy.application.applying import INTEGRATORS, Applied, Findings, apply, specification
+from bench.discrepancy.application.applying import INTEGRATORS, Applied, Findings, Options, apply, specification
 from bench.discrepancy.application.joint_replay import JointReplay
 from bench.discrepancy.application.linear_replay import LinearReplay
 from bench.discrepancy.articulated.diagnosis import applies
@@ -29,10 +31,14 @@ class VerificationSettings:
     Attributes:
         short: Part of the diagnosis's own figure by which the native form may miss it.
         refinements: Parts of the user's step that are tried where it does, in turn.
+        converged: Part of the user's step at which a run counts as converged.
+        matters: Part of the discrepancy from which the simulator's own share is named.
     """
 
     short: float = 0.05
     refinements: tuple[int, ...] = (2, 4, 10)
+    converged: int = 10
+    matters: float = 0.1
 
 
 @dataclass(frozen=True)
@@ -67,8 +73,8 @@ class Verification:
         step: Its step [s].
         integrator: Its integrator.
         figures: One a judged coordinate.
-        own_share: NRMSE by which the simulator's own step and integrator account for the figure before: before less before at the
-            finest step tried; zero where none was tried.
+        own_share: NRMSE between the model as it came run as the user runs it, and run converged: fine steps, hard friction. What of
+            the figure before is the simulator's own, not missing physics.
         remedy: What setting would do, in words; empty where nothing is short.
         better: Figures with that setting.
     """
@@ -84,6 +90,17 @@ class Verification:
     def worst(self) -> Figure:
         """The coordinate that was widest open before."""
         return max(self.figures, key=lambda f: f.before / max(f.floor, 1e-12))
+
+    @property
+    def simulator_line(self) -> str:
+        """The simulator's own share in one line; empty where it does not matter."""
+        f = self.worst
+        if self.own_share <= max(VerificationSettings().matters * f.before, f.floor):
+            return ""
+        return (
+            f"your simulator's own share: {self.own_share:.3g} of {f.before:.3g}, by its step of {self.step:.3g} s, its integrator "
+            f"({self.integrator}) and soft friction: the same model, converged, moves otherwise by as much"
+        )
 
     @property
     def line(self) -> str:
@@ -105,7 +122,7 @@ class Verification:
         }
 
 
-Replay = Callable[[Applied, Sequence[Any]], dict[str, float]]
+Replay = Callable[[Applied, Sequence[Any]], dict[str, NDArray[np.float64]]]
 
 
 def is_articulated(findings: Findings, case: Case | None) -> bool:
@@ -148,26 +165,34 @@ def verify(
     replay = _replay(path, case, articulated=articulated)
     nothing = Findings(())
 
-    def figures(step: float | None, integrator: mujoco.mjtIntegrator | None = None) -> tuple[Figure, ...]:
-        options = {"case": case, "linear": not articulated, "step": step, "integrator": integrator}
-        before = replay(apply(path, nothing, **options), ())
-        after = replay(apply(path, findings, **options), findings.effects)
+    def errors(what: Findings, options: Options) -> dict[str, NDArray[np.float64]]:
+        return replay(apply(path, what, case=case, linear=not articulated, options=options), what.effects)
+
+    def figures(options: Options) -> tuple[Figure, ...]:
+        before, after = errors(nothing, options), errors(findings, options)
         return tuple(
-            Figure(g.dof, before[g.dof], after[g.dof], g.after, g.noise_floor) for g in gaps if g.dof in before
+            Figure(g.dof, _rms(before[g.dof]), _rms(after[g.dof]), g.after, g.noise_floor) for g in gaps if g.dof in before
         )
 
     option = specification(path).option
     step, integrator = float(option.timestep), mujoco.mjtIntegrator(option.integrator)
     progress("the judging records in your simulator")
-    found = figures(None)
+    found = figures(Options())
     if not found:
         raise ModelError(
             f"the verdict judges {', '.join(g.dof or 'one coordinate' for g in gaps)}, the case something else; give the case of the verdict"
         )
     out = Verification(step, INTEGRATORS[integrator], found)
+    fine = errors(nothing, Options(step / settings.converged, mujoco.mjtIntegrator.mjINT_RK4, hard=True))
+    own = _rms(errors(nothing, Options())[out.worst.dof] - fine[out.worst.dof])
+    out = replace(out, own_share=own)
     if _short(found) <= settings.short:
         return out
     return _remedied(out, figures, settings, progress)
+
+
+def _rms(error: NDArray[np.float64]) -> float:
+    return float(np.sqrt(np.mean(error**2)))
 
 
 def _short(found: Sequence[Figure]) -> float:
@@ -176,7 +201,7 @@ def _short(found: Sequence[Figure]) -> float:
 
 def _remedied(
     out: Verification,
-    figures: Callable[..., tuple[Figure, ...]],
+    figures: Callable[[Options], tuple[Figure, ...]],
     settings: VerificationSettings,
     progress: Callable[[str], None],
 ) -> Verification:
@@ -187,35 +212,32 @@ def _remedied(
     if out.integrator != "RK4":
         trials.insert(0, (f"the integrator RK4 at the step of {out.step:.3g} s", out.step, mujoco.mjtIntegrator.mjINT_RK4))
     best, label = out.figures, ""
-    finest = out.figures
     for name, step, integrator in trials:
         progress(f"with {name}")
         try:
-            tried = figures(step, integrator)
+            tried = figures(Options(step, integrator))
         except BenchError:
             continue
-        finest = tried
         if _short(tried) < _short(best):
             best, label = tried, name
         if _short(tried) <= settings.short:
             break
     short = 100.0 * _short(out.figures)
-    own = out.worst.before - next(f for f in finest if f.dof == out.worst.dof).before
     if not label:
         words = f"the corrected model misses the diagnosis by {short:.0f} %, and neither a smaller step nor RK4 brings it nearer"
     else:
         worst = next(f for f in best if f.dof == out.worst.dof)
         rest = "" if _short(best) <= settings.short else f", still {100.0 * _short(best):.0f} % off"
         words = f"the corrected model misses the diagnosis by {short:.0f} % at your step; {label} gives {worst.after:.3g}{rest}"
-    return replace(out, own_share=float(own), remedy=words, better=best if label else ())
+    return replace(out, remedy=words, better=best if label else ())
 
 
 def _replay(path: str | Path, case: Case, *, articulated: bool) -> Replay:
     if articulated:
-        return JointReplay.of(case, specification(path).compile()).discrepancies
+        return JointReplay.of(case, specification(path).compile()).errors
     if not case.rig.endswith(".xml"):
         raise ModelError(
             f"the case is one of the rig '{case.rig}' of the bench; its records are run with a model of your own only where that is the rig"
         )
     case = with_starts_found(case)
-    return LinearReplay.of(case, structure_of(case)).discrepancies
+    return LinearReplay.of(case, structure_of(case)).errors
