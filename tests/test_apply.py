@@ -62,7 +62,9 @@ RATE, FINER = 500.0, 5
 
 def effect(name, where="", channel="", law="", theta=(), **values):
     estimates = {key: Estimate(float(value), 0.01 * abs(value), "") for key, value in values.items()}
-    return NamedEffect(name, where, 0.99, estimates, channel=channel, equation=name, law=law, theta=tuple(theta))
+    return NamedEffect(
+        name, where, 0.99, estimates, channel=channel, equation=name, law=law, theta=tuple(theta)
+    )
 
 
 def smooth(rng, n, low, high, level):
@@ -101,31 +103,32 @@ def measured(xml, wrong, commands, before_step=None, settle=0):
     return out
 
 
-def stage_case(folder: Path, wrong=lambda spec: None, before_step=None, n=1000, level=12.0) -> Case:
+def stage_case(folder: Path, wrong=lambda spec: None, before_step=None, n=800, level=12.0, noise=0.0) -> Case:
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "stage.xml").write_text(STAGE)
     records = []
     for seed, name in enumerate(NAMES):
         force = smooth(np.random.default_rng(seed), n, 0.5, 8.0, level)
         x = measured(STAGE, wrong, force[:, None], before_step)[:, 0]
+        x = x + noise * np.random.default_rng(100 + seed).standard_normal(n)
         records.append(record_from_arrays(name, np.arange(n) / RATE, {"shaker": force, "displacement": x}))
     return Case(
         "stage", "stage.xml",
         (NominalParameter("mass:table", 2.0, 0.02), NominalParameter("stiffness:guide", 800.0, 8.0),
          NominalParameter("damping:guide", 6.0, 0.6)),
-        (CaseChannel("shaker", "N", "command", None, None, "actuator:shaker"), CaseChannel("displacement", "m", "response", 1e-5)),
+        (CaseChannel("shaker", "N", "command", None, None, "actuator:shaker"), CaseChannel("displacement", "m", "response", noise or 1e-5)),
         (records[0],), (records[1],), folder,
     )  # fmt: skip
 
 
-def arm_case(folder: Path, wrong=lambda spec: None, before_step=None, n=1000, read=None) -> Case:
+def arm_case(folder: Path, wrong=lambda spec: None, before_step=None, n=800, read=None) -> Case:
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "arm.xml").write_text(ARM)
     records = []
     for seed, name in enumerate(NAMES):
         rng = np.random.default_rng(10 + seed)
         target = np.column_stack([smooth(rng, n, 0.2, 2.0, 0.4), smooth(rng, n, 0.2, 2.5, 0.5)])
-        q = measured(ARM, wrong, target, before_step, settle=500)
+        q = measured(ARM, wrong, target, before_step, settle=300)
         q = q[:, :2] if read is None else read(q)
         columns = {"t1": target[:, 0], "t2": target[:, 1], "q1": q[:, 0], "q2": q[:, 1]}
         records.append(record_from_arrays(name, np.arange(n) / RATE, columns, at_rest=False))
@@ -149,7 +152,10 @@ def friction(joint, level):
     def wrong(spec):
         item = spec.joint(joint)
         item.frictionloss = level
-        item.solref_friction, item.solimp_friction = (2.1 * spec.option.timestep, 1.0), (0.999, 0.999, 0.001, 0.5, 2.0)
+        item.solref_friction, item.solimp_friction = (
+            (2.1 * spec.option.timestep, 1.0),
+            (0.999, 0.999, 0.001, 0.5, 2.0),
+        )
 
     return wrong
 
@@ -160,11 +166,11 @@ def setting(kind, name, **values):
     def wrong(spec):
         item = getattr(spec, kind)(name)
         for key, value in values.items():
+            row = value
             if isinstance(value, tuple) and len(value) == 2 and isinstance(value[0], int):
                 row = np.array(getattr(item, key), dtype=float)
                 row[value[0]] = value[1]
-                value = row
-            setattr(item, key, value)
+            setattr(item, key, row)
 
     return wrong
 
@@ -184,9 +190,16 @@ def dead(x, width):
     return math.copysign(max(abs(x) - width, 0.0), x)
 
 
+def lost(x, width):
+    return dead(x, width) - x
+
+
 def verified(case, effects, dofs=("",), nominal=(), goal=0.02):
     return verify(
-        case.folder / case.rig, Findings(tuple(effects), tuple(nominal)), [gap_of(dof, goal) for dof in dofs], case
+        case.folder / case.rig,
+        Findings(tuple(effects), tuple(nominal)),
+        [gap_of(dof, goal) for dof in dofs],
+        case,
     )
 
 
@@ -272,7 +285,7 @@ ARM_EFFECTS = {
     "force_offset": (None, pushed(lambda t, q, v: 1.5, "elbow"), effect("force_offset", "elbow", "elbow", force=1.5)),
     "actuator_deadband": (
         None,
-        lambda model, data: data.qfrc_applied.__setitem__(1, 40.0 * (dead(data.ctrl[1] - data.qpos[1], 0.03) - data.ctrl[1] + data.qpos[1])),
+        lambda model, data: data.qfrc_applied.__setitem__(1, 40.0 * lost(data.ctrl[1] - data.qpos[1], 0.03)),
         effect("actuator_deadband", "m2", "elbow", half_width=0.03),
     ),
     "load_dependent_friction": (
@@ -298,9 +311,12 @@ def carried(model, data):
 def test_an_effect_on_an_arm_closes_in_plain_mujoco(tmp_path, name):
     wrong, before_step, found = ARM_EFFECTS[name]
     case = arm_case(tmp_path, wrong or (lambda spec: None), before_step)
-    figures = {f.dof: f for f in verified(case, [found], ("shoulder", "elbow")).figures}
+    worth = verified(case, [found], ("shoulder", "elbow"), goal=0.008)
+    # where the integrator of the model does not do, the setting that does is named
+    assert bool(worth.better) == bool(worth.remedy)
+    figures = {f.dof: f for f in worth.better or worth.figures}
     assert figures["elbow"].before > 0.03
-    assert figures["elbow"].after < 0.03 * figures["elbow"].before + 0.005, figures
+    assert figures["elbow"].after < 0.05 * figures["elbow"].before + 0.005, figures
     assert figures["shoulder"].after < 0.01
 
 
@@ -310,8 +326,16 @@ def geared(stiffness, damping, width):
     def wrong(spec):
         elbow = spec.joint("elbow")
         elbow.armature, elbow.damping = 0.008, np.zeros(3)
-        body = spec.body("upper").add_body(name="rotor", mass=1e-6, inertia=np.full(3, 1e-9), explicitinertial=True)
-        body.add_joint(name="rotor", type=mujoco.mjtJoint.mjJNT_HINGE, axis=(0, 1, 0), armature=0.012, damping=(0.3, 0, 0))
+        body = spec.body("upper").add_body(
+            name="rotor", mass=1e-6, inertia=np.full(3, 1e-9), explicitinertial=True
+        )
+        body.add_joint(
+            name="rotor",
+            type=mujoco.mjtJoint.mjJNT_HINGE,
+            axis=(0, 1, 0),
+            armature=0.012,
+            damping=(0.3, 0, 0),
+        )
         spec.actuator("m2").target = "rotor"
 
     def before_step(model, data):
@@ -331,7 +355,16 @@ def test_a_train_becomes_two_joints(tmp_path, name, side):
     # the servo acts on the motor in either case; the encoder of the log sits on the side
     case = arm_case(tmp_path, *geared(stiffness, 0.3, width), read=lambda q: q[:, [0, 1 if side else 2]])
     play = {"half_clearance": width} if width else {}
-    found = effect(name, "elbow", "elbow", stiffness=stiffness, damping=0.3, motor_share=0.6, encoder_on_link=side, **play)
+    found = effect(
+        name,
+        "elbow",
+        "elbow",
+        stiffness=stiffness,
+        damping=0.3,
+        motor_share=0.6,
+        encoder_on_link=side,
+        **play,
+    )
     figures = {f.dof: f for f in verified(case, [found], ("shoulder", "elbow")).figures}
     assert figures["elbow"].after < 0.15 * figures["elbow"].before + 0.01, figures
 
@@ -357,15 +390,21 @@ def saved(case: Case) -> Path:
     for record in (*case.identification, *case.validation):
         rows = np.column_stack([record.time, *record.values.values()])
         header = ",".join(["time", *record.values])
-        np.savetxt(case.folder / f"{record.name}.csv", rows, delimiter=",", header=header, comments="", fmt="%.9g")
+        np.savetxt(
+            case.folder / f"{record.name}.csv", rows, delimiter=",", header=header, comments="", fmt="%.9g"
+        )
     return case.folder
 
 
 @pytest.mark.slow
 def test_from_a_log_to_a_corrected_model_by_two_commands(tmp_path, capsys):
-    folder = saved(stage_case(tmp_path / "case", friction("guide", 3.0), n=2000))
-    verdict, corrected, ranges_file = folder / "verdict.json", tmp_path / "corrected.xml", tmp_path / "ranges.yaml"
-    assert main(["diagnose", str(folder), "--json", str(verdict), "--no-progress"]) == 0
+    folder = saved(stage_case(tmp_path / "case", friction("guide", 3.0), n=1500, noise=2e-4))
+    verdict, corrected, ranges_file = (
+        folder / "verdict.json",
+        tmp_path / "corrected.xml",
+        tmp_path / "ranges.yaml",
+    )
+    assert main(["diagnose", str(folder), "--json", str(verdict), "--most", "1", "--no-progress"]) == 0
     capsys.readouterr()
     command = ["apply", str(verdict), "--model", str(folder / "stage.xml"), "-o", str(corrected)]
     assert main([*command, "--json", str(tmp_path / "a.json"), "--ranges", str(ranges_file)]) == 0
@@ -373,13 +412,17 @@ def test_from_a_log_to_a_corrected_model_by_two_commands(tmp_path, capsys):
     document = json.loads((tmp_path / "a.json").read_text())
     assert [effect["name"] for effect in document["named"]] == ["coulomb_friction"]
     (figure,) = document["applied"]["figures"]
-    assert document["applied"]["line"] in printed and "in your simulator" in printed
-    assert figure["before"] > 0.2 and figure["after"] < 0.05 * figure["before"]
+    assert document["applied"]["line"] in printed
+    assert "in your simulator" in printed
+    assert figure["before"] > 0.2
+    assert figure["after"] < 0.05 * figure["before"]
     # in the user's own simulator the model as it came stands for the diagnosis's
     assert abs(figure["before"] - document["gap"]["before"]) < 0.05 * document["gap"]["before"]
     assert figure["short"] < 0.05 or document["applied"]["remedy"] in printed
     text = corrected.read_text()
-    assert "stiffness 800 to " in text and "stated sigmas" in text and "frictionloss" in text
+    assert "stiffness 800 to " in text
+    assert "stated sigmas" in text
+    assert "frictionloss" in text
     model = mujoco.MjModel.from_xml_path(str(corrected))
     assert model.dof_frictionloss[0] == pytest.approx(3.0, rel=0.02)
     assert "coulomb_friction" in ranges_file.read_text()
@@ -409,7 +452,8 @@ def test_what_mjcf_cannot_hold_becomes_a_snippet_that_runs(tmp_path):
         data.ctrl[0] = 1.0
         space["before_step"](model, data)
         mujoco.mj_step(model, data)
-    assert np.isfinite(data.qpos).all() and data.act[-1] != 0.0  # the bristle has bent
+    assert np.isfinite(data.qpos).all()
+    assert data.act[-1] != 0.0
     assert [change.form for change in applied.changes] == ["callback", "step"]
 
 
@@ -430,7 +474,8 @@ def test_numbers_stand_in_the_file_with_what_they_were(tmp_path):
     write_model(applied, tmp_path / "sub" / "new.xml", "arm.xml")
     old, new = (mujoco.MjModel.from_xml_path(str(tmp_path / name)) for name in ("arm.xml", "sub/new.xml"))
     assert new.dof_damping[0] == pytest.approx(0.36)
-    assert new.actuator_gainprm[0, 0] == pytest.approx(44.0) and new.actuator_biasprm[0, 1] == pytest.approx(-44.0)
+    assert new.actuator_gainprm[0, 0] == pytest.approx(44.0)
+    assert new.actuator_biasprm[0, 1] == pytest.approx(-44.0)
     assert new.body("fore").mass[0] == pytest.approx(1.3)
     centre = (0.8 * old.body("fore").ipos[0] + 0.5 * 0.25) / 1.3
     assert new.body("fore").ipos[0] == pytest.approx(centre, abs=1e-6)
@@ -449,22 +494,46 @@ def test_numbers_stand_in_the_file_with_what_they_were(tmp_path):
 def test_the_simulators_own_share_is_named(tmp_path):
     """Friction of the model itself, with MuJoCo's defaults, at a coarse step: soft, and no physics is missing."""
     case = stage_case(tmp_path, friction("guide", 3.0))
-    coarse = STAGE.replace('timestep="0.001"', 'timestep="0.002"').replace('damping="6"', 'damping="6" frictionloss="3"')
+    coarse = STAGE.replace('timestep="0.001"', 'timestep="0.002"').replace(
+        'damping="6"', 'damping="6" frictionloss="3"'
+    )
     (tmp_path / "stage.xml").write_text(coarse)
     found = verified(case, [], goal=0.02)
     (figure,) = found.figures
-    assert found.own_share == pytest.approx(figure.before, rel=0.2) and found.own_share > 0.05
+    assert found.own_share == pytest.approx(figure.before, rel=0.2)
+    assert found.own_share > 0.03
     assert "your simulator's own share" in found.simulator_line
     assert found.remedy  # a model without what is missing is off by all of it: said, not hidden
 
 
 def test_a_verdict_that_names_nothing_is_not_applied(tmp_path, capsys):
     folder = saved(stage_case(tmp_path / "case", n=400))
-    gap = {"metric": "x", "before": 1, "parameters_only": 1, "after": 1, "noise_floor": 1, "closed": 0, "closed_ci95": [0, 0]}
+    gap = {
+        "metric": "x",
+        "before": 1,
+        "parameters_only": 1,
+        "after": 1,
+        "noise_floor": 1,
+        "closed": 0,
+        "closed_ci95": [0, 0],
+    }
     verdict = {
         "verdict": "unknown", "named": [], "ranking": [], "indistinguishable": [], "locations": [], "gap": gap, "gaps": [gap],
         "probabilities": {"unknown": 1.0}, "explanation": "",
     }  # fmt: skip
     (folder / "verdict.json").write_text(json.dumps(verdict))
-    assert main(["apply", str(folder / "verdict.json"), "--model", str(folder / "stage.xml"), "-o", str(tmp_path / "x.xml")]) == 2
-    assert "'unknown'" in capsys.readouterr().err and not (tmp_path / "x.xml").exists()
+    assert (
+        main(
+            [
+                "apply",
+                str(folder / "verdict.json"),
+                "--model",
+                str(folder / "stage.xml"),
+                "-o",
+                str(tmp_path / "x.xml"),
+            ]
+        )
+        == 2
+    )
+    assert "'unknown'" in capsys.readouterr().err
+    assert not (tmp_path / "x.xml").exists()

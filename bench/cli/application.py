@@ -58,7 +58,11 @@ class Apply:
         applied = apply(self.model, findings, case=case, linear=not is_articulated(findings, case))
         applied.compiled()
         with Console(stderr=True).status("applying") as status:
-            worth = None if case is None else verify(self.model, findings, verdict.gaps, case, progress=status.update)
+            worth = (
+                None
+                if case is None
+                else verify(self.model, findings, verdict.gaps, case, progress=status.update)
+            )
         written = self._written(applied, findings, code if snippet(applied, self.output.name) else None)
         document["applied"] = {
             "model": str(self.output),

@@ -72,8 +72,19 @@ class Applied:
         if not self.elements:
             return model
         settings = {"timestep": float(self.spec.option.timestep), "folder": self.folder}
-        rig = Rig("corrected", self.spec.to_xml(), self.elements, integrator=INTEGRATORS[self.spec.option.integrator], **settings)
+        rig = Rig(
+            "corrected",
+            self.spec.to_xml(),
+            self.elements,
+            integrator=INTEGRATORS[self.spec.option.integrator],
+            **settings,
+        )
         return rig.model
+
+
+def told(error: Exception) -> str:
+    """A message of MuJoCo in one line."""
+    return " ".join(str(error).split())
 
 
 def specification(path: str | Path) -> mujoco.MjSpec:
@@ -85,7 +96,7 @@ def specification(path: str | Path) -> mujoco.MjSpec:
     try:
         return mujoco.MjSpec.from_file(str(path))
     except ValueError as error:
-        raise ModelError(f"'{path}' is no MJCF that MuJoCo reads: {error}") from None
+        raise ModelError(f"'{path}' is no MJCF that MuJoCo reads: {told(error)}") from None
 
 
 def rest_of(model: mujoco.MjModel) -> dict[str, float]:
@@ -97,6 +108,7 @@ def rest_of(model: mujoco.MjModel) -> dict[str, float]:
     flags = int(model.opt.disableflags)
     model.opt.disableflags = flags | int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
     try:
+
         def unbalanced(q: Array) -> Array:
             data.qpos[:], data.qvel[:], data.qacc[:] = q, 0.0, 0.0
             mujoco.mj_inverse(model, data)
@@ -108,7 +120,11 @@ def rest_of(model: mujoco.MjModel) -> dict[str, float]:
     finally:
         model.opt.disableflags = flags
     moved = np.abs(found - start) > 1e-9
-    return {model.joint(i).name: float(found[model.jnt_qposadr[i]]) for i in range(model.njnt) if moved[model.jnt_qposadr[i]]}
+    return {
+        model.joint(i).name: float(found[model.jnt_qposadr[i]])
+        for i in range(model.njnt)
+        if moved[model.jnt_qposadr[i]]
+    }
 
 
 def loads_of(case: Case | None, model: mujoco.MjModel) -> dict[str, str]:
@@ -142,7 +158,12 @@ class Options(NamedTuple):
 
 
 def apply(
-    path: str | Path, findings: Findings, *, case: Case | None = None, linear: bool = True, options: Options | None = None
+    path: str | Path,
+    findings: Findings,
+    *,
+    case: Case | None = None,
+    linear: bool = True,
+    options: Options | None = None,
 ) -> Applied:
     """Put what was found into a model.
 
@@ -168,7 +189,7 @@ def apply(
     try:
         nominal = spec.compile()
     except ValueError as error:
-        raise ModelError(f"'{path}' is no MJCF that MuJoCo compiles: {error}") from None
+        raise ModelError(f"'{path}' is no MJCF that MuJoCo compiles: {told(error)}") from None
     places = case.options.get("places", ()) if case else ()
     named = tuple(str(p) for p in places) if isinstance(places, (list, tuple)) else ()
     target = Target(spec, nominal, rest_of(nominal) if linear else {}, loads_of(case, nominal), named)
@@ -179,13 +200,15 @@ def apply(
         target.finish()
         spec.compile()
     except ValueError as error:
-        raise ModelError(f"the model does not compile with what was found: {error}") from None
+        raise ModelError(f"the model does not compile with what was found: {told(error)}") from None
     return Applied(spec, tuple(changes), target.outputs, str(Path(path).parent))
 
 
 def _ordered(effects: Sequence[NamedEffect]) -> list[NamedEffect]:
     """Numbers first, trains of drives last: they divide what is there."""
-    return sorted(effects, key=lambda e: (e.name in ("backlash", "joint_compliance"), e.name not in WRONG_NUMBERS))
+    return sorted(
+        effects, key=lambda e: (e.name in ("backlash", "joint_compliance"), e.name not in WRONG_NUMBERS)
+    )
 
 
 def _one(target: Target, effect: NamedEffect, nominal: set[str]) -> Change:

@@ -15,7 +15,9 @@ from bench.discrepancy.verdict import NamedEffect
 
 
 def _actuator(target: Target, effect: NamedEffect) -> Any:
-    return target.actuator(effect.where if effect.where and effect.where in _actuators(target) else effect.channel)
+    return target.actuator(
+        effect.where if effect.where and effect.where in _actuators(target) else effect.channel
+    )
 
 
 def _actuators(target: Target) -> list[str]:
@@ -44,7 +46,9 @@ def lag(target: Target, effect: NamedEffect) -> Change:
     if actuator.dyntype not in (
         mujoco.mjtDyn.mjDYN_NONE, mujoco.mjtDyn.mjDYN_FILTER, mujoco.mjtDyn.mjDYN_FILTEREXACT
     ):  # fmt: skip
-        return Change(effect.name, actuator.name, "none", "the actuator has an activation of another kind already")
+        return Change(
+            effect.name, actuator.name, "none", "the actuator has an activation of another kind already"
+        )
     actuator.dyntype = mujoco.mjtDyn.mjDYN_FILTEREXACT
     actuator.dynprm[0] = constant
     actuator.actdim = 1
@@ -64,7 +68,9 @@ def gain(target: Target, effect: NamedEffect) -> Change:
     actuator.biasprm[:3] = np.asarray(actuator.biasprm[:3]) * factor
     if "relative_error" in v and _limited(target, actuator):
         actuator.forcerange = np.sort(np.asarray(actuator.forcerange) * factor)
-    return _done(effect, actuator, f"gain {before:.6g} -> {actuator.gainprm[0]:.6g}, and all of its force with it")
+    return _done(
+        effect, actuator, f"gain {before:.6g} -> {actuator.gainprm[0]:.6g}, and all of its force with it"
+    )
 
 
 def _freeze_damping(target: Target, actuator: Any) -> None:
@@ -81,7 +87,11 @@ def _limited(target: Target, actuator: Any) -> bool:
 def servo_gain(target: Target, effect: NamedEffect) -> Change:
     """The position gain of a servo."""
     actuator = _actuator(target, effect)
-    return _done(effect, actuator, set_kp(target, actuator, float(actuator.gainprm[0]) * (1.0 + values_of(effect)["relative_error"])))
+    return _done(
+        effect,
+        actuator,
+        set_kp(target, actuator, float(actuator.gainprm[0]) * (1.0 + values_of(effect)["relative_error"])),
+    )
 
 
 def set_kp(target: Target, actuator: Any, kp: float) -> str:

@@ -59,7 +59,9 @@ def harden(spec: mujoco.MjSpec) -> None:
     """Make the dry friction of a model as hard as its step lets it be."""
     for item in (*spec.joints, *spec.tendons):
         if item.frictionloss > 0.0:
-            found = frictionloss_of(float(item.frictionloss), 0.0, 0.0, mobility=1.0, step=float(spec.option.timestep))
+            found = frictionloss_of(
+                float(item.frictionloss), 0.0, 0.0, mobility=1.0, step=float(spec.option.timestep)
+            )
             item.solref_friction = [float(x) for x in found["solreffriction"].split()]
             item.solimp_friction = (*(float(x) for x in found["solimpfriction"].split()), 0.001, 0.5, 2.0)
 
@@ -173,7 +175,9 @@ def gap(target: Target, effect: NamedEffect) -> Change:
         limits = (middle - v["clearance"], middle + v["clearance"])
         anchor = target.stop(effect.where, limits, v["stiffness"], 0.0, own=True)
         anchors = (anchor,)
-        text = f"range with limits that are springs of {v['stiffness']:.6g}, {v['clearance']:.6g} to either side"
+        text = (
+            f"range with limits that are springs of {v['stiffness']:.6g}, {v['clearance']:.6g} to either side"
+        )
     else:
         up, down = v["clearance_positive"], v["clearance_negative"]
         anchors = (
@@ -203,7 +207,9 @@ def elastic_train(target: Target, effect: NamedEffect) -> Change:
     """Backlash or compliance of a drive: the joint becomes the motor's, and a second joint on the same axis is its train."""
     v, name = values_of(effect), target.named(effect.where)
     joint = target.spec.joint(name)
-    train = joint.parent.add_joint(name=f"{PREFIX}{name}_train", type=joint.type, axis=joint.axis, pos=joint.pos)
+    train = joint.parent.add_joint(
+        name=f"{PREFIX}{name}_train", type=joint.type, axis=joint.axis, pos=joint.pos
+    )
     as_mujoco(train)
     damping = np.zeros_like(np.asarray(train.damping, dtype=float))
     stiffness = np.zeros_like(np.asarray(train.stiffness, dtype=float))
@@ -230,7 +236,9 @@ def elastic_train(target: Target, effect: NamedEffect) -> Change:
         f"'{name}' is the motor's joint now (armature {whole:.6g} -> {joint.armature:.6g}), '{train.name}' the train behind it; "
         f"the link's angle is the length of the tendon '{link.name}'; the encoder sits on the {side}"
     )
-    return Change(effect.name, name, "native", text, (("joint", name), ("joint", train.name), ("fixed", link.name)))
+    return Change(
+        effect.name, name, "native", text, (("joint", name), ("joint", train.name), ("fixed", link.name))
+    )
 
 
 def _read_link(target: Target, joint: str, link: str) -> None:
@@ -254,11 +262,14 @@ def element(target: Target, effect: NamedEffect) -> Change:
         amplitude, phase = math.hypot(v["sine"], v["cosine"]), math.atan2(v["cosine"], v["sine"])
         law, theta = "cogging", (amplitude, 2.0 * math.pi / v["periods_per_turn"], phase)
     if not law:
-        return Change(effect.name, name, "none", "neither MuJoCo nor the bench has a form of it; correct it where it is")
-    if target.at_rest(name):
-        note = f"; it counts from the rest of the model, {target.at_rest(name):.4g}: shift the joint's ref"
-    else:
-        note = ""
+        return Change(
+            effect.name, name, "none", "neither MuJoCo nor the bench has a form of it; correct it where it is"
+        )
+    note = (
+        f"; it counts from the rest of the model, {target.at_rest(name):.4g}: shift the joint's ref"
+        if target.at_rest(name)
+        else ""
+    )
     return Change(
         effect.name, name, "callback", f"the law '{law}' as a native callback, in the snippet: {effect.equation}{note}",
         (("joint", name),), (law, (name,), tuple(theta)),

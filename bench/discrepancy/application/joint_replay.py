@@ -22,7 +22,7 @@ from bench.discrepancy.application.target import PREFIX, as_mujoco
 from bench.discrepancy.articulated.channels import bound
 from bench.discrepancy.articulated.effects import CATALOGUE
 from bench.discrepancy.articulated.model import ArticulatedModel, Joint
-from bench.discrepancy.articulated.records import WINDOW, Encoder, Motion, encoders_of, input_of, motion_of
+from bench.discrepancy.articulated.records import WINDOW, Encoder, Motion, input_of, motion_of
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.verdict import NamedEffect
 
@@ -73,11 +73,19 @@ class JointReplay:
             for record, motion, logged in zip(self.case.validation, motions, raw, strict=True):
                 error = self._error(applied, held, j, record, motion, wrong)
                 size = max(float(np.std(logged.samples[j][:, 0])), float(np.max(logged.noise[j])))
-                found[joint.name].append(np.nan_to_num(error * factor / size, nan=FAR_OFF, posinf=FAR_OFF, neginf=-FAR_OFF))
+                found[joint.name].append(
+                    np.nan_to_num(error * factor / size, nan=FAR_OFF, posinf=FAR_OFF, neginf=-FAR_OFF)
+                )
         return {name: np.clip(np.concatenate(parts), -FAR_OFF, FAR_OFF) for name, parts in found.items()}
 
     def _error(
-        self, applied: Applied, model: mujoco.MjModel, j: int, record: CaseRecord, motion: Motion, wrong: Mapping[str, Encoder]
+        self,
+        applied: Applied,
+        model: mujoco.MjModel,
+        j: int,
+        record: CaseRecord,
+        motion: Motion,
+        wrong: Mapping[str, Encoder],
     ) -> Array:
         """Measured less simulated positions (n,) of joint `j`."""
         joint, step = self.model.joints[j], float(model.opt.timestep)
@@ -93,13 +101,16 @@ class JointReplay:
                 control[:, model.actuator(_holder(other.name)).id] = follow.command[:, i]
         firsts = list(range(0, len(record), every))
         begins = [int(np.floor(first * record.step / step + 1e-6)) for first in firsts]
-        windows = [self._start(applied, model, j, motion, first, follow, b) for first, b in zip(firsts, begins, strict=True)]
+        windows = [
+            self._start(applied, model, j, motion, first, follow, b)
+            for first, b in zip(firsts, begins, strict=True)
+        ]
         length = int(np.ceil((min(every, len(record)) - 1) * record.step / step - 1e-9)) + 2
         position, velocity = run(model, hook_of(applied), windows, control, length, rested=False)
         out = []
         for w, first in enumerate(firsts):
             count = min(every, len(record) - first)
-            times = (first + np.arange(count)) * record.step - begins[w] * step
+            times = np.asarray((first + np.arange(count)) * record.step - begins[w] * step, dtype=np.float64)
             simulated = sampled(position[w], velocity[w], model, times).position
             out.append(simulated @ self._reading(applied, model, joint.name))
         return motion.samples[j][:, 0] - np.concatenate(out)
@@ -125,7 +136,14 @@ class JointReplay:
         return row
 
     def _start(
-        self, applied: Applied, model: mujoco.MjModel, j: int, motion: Motion, first: int, follow: _Followed, begin: int
+        self,
+        applied: Applied,
+        model: mujoco.MjModel,
+        j: int,
+        motion: Motion,
+        first: int,
+        follow: _Followed,
+        begin: int,
     ) -> Window:
         """State at the first sample of a window: as measured; a train wound up by what its link weighs."""
         data = mujoco.MjData(model)
@@ -184,12 +202,18 @@ def _held(applied: Applied, free: str, reference: mujoco.MjModel) -> mujoco.MjMo
     mujoco.mj_fullM(reference, data, full)
     rate = SERVO_RATE / step
     followed = {j.name for j in spec.joints if not j.name.startswith(PREFIX) and j.name != free}
-    followed |= {f"{PREFIX}{name}_train" for name in applied.outputs if name != free}  # its link is what was measured
+    followed |= {
+        f"{PREFIX}{name}_train" for name in applied.outputs if name != free
+    }  # its link is what was measured
     for joint in [j for j in spec.joints if j.name in followed]:
-        inertia = HEAVY * float(full[reference.joint(joint.name).dofadr[0], reference.joint(joint.name).dofadr[0]])
+        inertia = HEAVY * float(
+            full[reference.joint(joint.name).dofadr[0], reference.joint(joint.name).dofadr[0]]
+        )
         joint.armature = inertia
         joint.limited = mujoco.mjtLimited.mjLIMITED_FALSE
-        holder: Any = spec.add_actuator(name=_holder(joint.name), target=joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+        holder: Any = spec.add_actuator(
+            name=_holder(joint.name), target=joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINT
+        )
         as_mujoco(holder)
         holder.gaintype, holder.biastype = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_AFFINE
         holder.gainprm[0] = inertia * rate**2
@@ -218,12 +242,19 @@ class _Followed:
 
 
 def _followed(
-    joints: Sequence[Joint], motion: Motion, record: CaseRecord, model: mujoco.MjModel, steps: int, late: float
+    joints: Sequence[Joint],
+    motion: Motion,
+    record: CaseRecord,
+    model: mujoco.MjModel,
+    steps: int,
+    late: float,
 ) -> _Followed:
     """The measured motion as a servo of `_held` takes it; of a joint whose log is late, the others as late."""
     step = float(model.opt.timestep)
     clock = np.arange(len(record)) * record.step
     times = np.clip(np.arange(steps) * step - late, 0.0, clock[-1])
-    q, v, a = (CubicSpline(clock, part)(times) for part in (motion.position, motion.velocity, motion.acceleration))
+    q, v, a = (
+        CubicSpline(clock, part)(times) for part in (motion.position, motion.velocity, motion.acceleration)
+    )
     rate = SERVO_RATE / step
     return _Followed(q, v, q + 2.0 * v / rate + a / rate**2)

@@ -71,15 +71,24 @@ def _sum(values: Mapping[str, Array], channels: Sequence[tuple[str, float]]) -> 
     return np.sum([sign * np.asarray(values[name]) for name, sign in channels], axis=0)
 
 
-def _read(effects: Sequence[NamedEffect], channels: Mapping[str, Array], record: CaseRecord) -> dict[str, Array]:
+def _read(
+    effects: Sequence[NamedEffect], channels: Mapping[str, Array], record: CaseRecord
+) -> dict[str, Array]:
     """Readings of wrong sensors."""
     out = dict(channels)
     known = {entry.name: entry for entry in CATALOGUE}
     for effect in effects:
         entry = known.get(effect.name)
-        if entry is None or entry.signal is None or not effect.name.startswith(LOGGED) or effect.channel not in out:
+        if (
+            entry is None
+            or entry.signal is None
+            or not effect.name.startswith(LOGGED)
+            or effect.channel not in out
+        ):
             continue
-        out[effect.channel] = entry.signal(out[effect.channel], np.array(list(values_of(effect).values())), record.step)
+        out[effect.channel] = entry.signal(
+            out[effect.channel], np.array(list(values_of(effect).values())), record.step
+        )
     return out
 
 
@@ -111,8 +120,10 @@ class _Player:
             columns[actuator] = np.asarray(record.values[name]) / gain
         if record.periodic:
             return self._periodic(record, columns)
-        firsts, length = (
-            cut(case, record, len(structure.observers)) if self.replay.windowed else (np.zeros(1, dtype=np.int64), len(record))
+        firsts, _length = (
+            cut(case, record, len(structure.observers))
+            if self.replay.windowed
+            else (np.zeros(1, dtype=np.int64), len(record))
         )
         steps = int(np.ceil((len(record) - 1) * record.step / self.model.opt.timestep - 1e-9)) + 1
         control = controls(record, columns, self.model, steps, case.load_interpolation)
@@ -135,7 +146,9 @@ class _Player:
         def residual(x: Array) -> Array:
             found = self._free(record, control, first, end, x * spread)
             parts = [(found[c] - record.values[c][first:end]) / s for c, s in scale.items()]
-            return np.nan_to_num(np.concatenate(parts), nan=DIVERGED_GAP, posinf=DIVERGED_GAP, neginf=-DIVERGED_GAP)
+            return np.nan_to_num(
+                np.concatenate(parts), nan=DIVERGED_GAP, posinf=DIVERGED_GAP, neginf=-DIVERGED_GAP
+            )
 
         best = least_squares(residual, guess / spread, diff_step=1e-4, max_nfev=12).x
         return self._free(record, control, first, end, np.asarray(best) * spread)
@@ -157,7 +170,9 @@ class _Player:
                 out[n + i] = samples[first] / observer.row[i]
         return out
 
-    def _free(self, record: CaseRecord, control: Array, first: int, end: int, state: Array) -> dict[str, Array]:
+    def _free(
+        self, record: CaseRecord, control: Array, first: int, end: int, state: Array
+    ) -> dict[str, Array]:
         n, step = len(self.qadr), float(self.model.opt.timestep)
         q, v = self.rest.copy(), np.zeros(self.model.nv)
         q[self.qadr] += state[:n]
@@ -167,19 +182,25 @@ class _Player:
         position, velocity = run(
             self.model, self.hook, [Window(begin, q, v)], control, max(steps, 2), rested=first == 0
         )
-        times = (np.arange(first, end)) * record.step - begin * step
+        times = np.asarray(np.arange(first, end) * record.step - begin * step, dtype=np.float64)
         return self._observed(position[0], velocity[0], times)
 
     def _observed(self, position: Array, velocity: Array, times: Array) -> dict[str, Array]:
         motion = sampled(position, velocity, self.model, times)
-        orders = (motion.position[:, self.qadr] - self.rest[self.qadr], motion.velocity[:, self.dadr], motion.acceleration[:, self.dadr])
+        orders = (
+            motion.position[:, self.qadr] - self.rest[self.qadr],
+            motion.velocity[:, self.dadr],
+            motion.acceleration[:, self.dadr],
+        )
         return {o.channel: orders[o.order] @ o.row for o in self.replay.structure.observers}
 
     def _periodic(self, record: CaseRecord, columns: dict[str, Array]) -> dict[str, Array]:
         n, step = len(record), float(self.model.opt.timestep)
         steps = int(np.ceil(n * record.step / step - 1e-9))
-        control = np.tile(controls(record, columns, self.model, steps, self.replay.case.load_interpolation), (PERIODS, 1))
+        control = np.tile(
+            controls(record, columns, self.model, steps, self.replay.case.load_interpolation), (PERIODS, 1)
+        )
         start = [Window(0, self.rest, np.zeros(self.model.nv))]
         position, velocity = run(self.model, self.hook, start, control, len(control), rested=True)
-        times = ((PERIODS - 1) * n + np.arange(n)) * record.step
+        times = np.asarray(((PERIODS - 1) * n + np.arange(n)) * record.step, dtype=np.float64)
         return self._observed(position[0], velocity[0], times)

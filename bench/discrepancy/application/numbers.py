@@ -54,7 +54,9 @@ def _set(target: Target, kind: str, name: str, value: float, label: str) -> tupl
     elif kind == "gear":
         _set_gear(actuator, value)
     else:
-        raise UnknownNameError("parameter of the verdict", label, ["mass:BODY", "stiffness:JOINT", "kp:ACTUATOR"])
+        raise UnknownNameError(
+            "parameter of the verdict", label, ["mass:BODY", "stiffness:JOINT", "kp:ACTUATOR"]
+        )
     return "actuator", actuator.name
 
 
@@ -86,11 +88,18 @@ def wrong_number(target: Target, effect: NamedEffect, nominal: Collection[str]) 
         return damping_error(target, effect)
     label = effect.channel or effect.where
     if label in nominal:
-        return Change(effect.name, label, "number", f"the estimate of '{label}' holds it ({100 * v['relative_error']:+.3g} %)")
+        return Change(
+            effect.name,
+            label,
+            "number",
+            f"the estimate of '{label}' holds it ({100 * v['relative_error']:+.3g} %)",
+        )
     kind, _, name = label.partition(":")
     value = current(target.nominal, kind, name or target.named("")) * (1.0 + v["relative_error"])
     anchor = _set(target, kind, name, value, label)
-    return Change(effect.name, label, "number", f"{kind} -> {value:.6g} ({100 * v['relative_error']:+.3g} %)", (anchor,))
+    return Change(
+        effect.name, label, "number", f"{kind} -> {value:.6g} ({100 * v['relative_error']:+.3g} %)", (anchor,)
+    )
 
 
 def current(model: mujoco.MjModel, kind: str, name: str) -> float:
@@ -103,7 +112,9 @@ def current(model: mujoco.MjModel, kind: str, name: str) -> float:
         return float(model.body(name).mass[0])
     if kind in ("stiffness", "damping"):
         return float(np.ravel(getattr(model.joint(name), kind))[0])
-    raise UnknownNameError("parameter of the verdict", f"{kind}:{name}", ["mass:BODY", "stiffness:JOINT", "damping:JOINT"])
+    raise UnknownNameError(
+        "parameter of the verdict", f"{kind}:{name}", ["mass:BODY", "stiffness:JOINT", "damping:JOINT"]
+    )
 
 
 def _inertial(target: Target, effect: NamedEffect) -> Change:

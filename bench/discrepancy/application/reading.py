@@ -54,7 +54,9 @@ def _effect(e: Any) -> NamedEffect:
         name=e.name,
         where=e.where,
         probability=e.probability,
-        parameters={name: Estimate(_number(x.value), _number(x.std), x.unit) for name, x in e.parameters.items()},
+        parameters={
+            name: Estimate(_number(x.value), _number(x.std), x.unit) for name, x in e.parameters.items()
+        },
         channel=e.channel,
         equation=e.equation,
         law=e.law,
@@ -64,5 +66,10 @@ def _effect(e: Any) -> NamedEffect:
 
 def _nominal(p: Any) -> NominalEstimate:
     return NominalEstimate(
-        p.name, _number(p.value), _number(p.std), _number(p.stated), _number(p.stated_std), _number(p.shift_in_std)
+        p.name,
+        _number(p.value),
+        _number(p.std),
+        _number(p.stated),
+        _number(p.stated_std),
+        _number(p.shift_in_std),
     )

@@ -34,7 +34,7 @@ def hook_of(applied: Applied) -> Hook | None:
     if not text:
         return None
     space: dict[str, Any] = {}
-    exec(f"import math\nimport mujoco\nimport numpy as np\n{text}", space)  # noqa: S102  (written by this module's own code)
+    exec(f"import math\nimport mujoco\nimport numpy as np\n{text}", space)
     return space["before_step"]
 
 
@@ -66,7 +66,13 @@ class Window(NamedTuple):
 
 
 def run(
-    model: mujoco.MjModel, hook: Hook | None, windows: list[Window], control: Array, steps: int, *, rested: bool
+    model: mujoco.MjModel,
+    hook: Hook | None,
+    windows: list[Window],
+    control: Array,
+    steps: int,
+    *,
+    rested: bool,
 ) -> tuple[Array, Array]:
     """Run windows of `steps` steps; return positions (n_windows, steps + 1, nq) and velocities (n_windows, steps + 1, nv).
 
@@ -93,7 +99,8 @@ def run(
         rows.append(control[np.minimum(window.first + np.arange(steps), len(control) - 1)])
     with native.running(own):
         if hook is None:
-            states, _ = rollout.rollout(own, mujoco.MjData(own), np.array(starts), np.array(rows))
+            found, _ = rollout.rollout(own, mujoco.MjData(own), np.array(starts), np.array(rows))
+            states = np.asarray(found, dtype=np.float64)
         else:
             states = np.array([_stepped(own, hook, s, c) for s, c in zip(starts, rows, strict=True)])
     whole = np.concatenate([np.array(starts)[:, None, :], states], axis=1)
@@ -121,7 +128,10 @@ def _activations(model: mujoco.MjModel, control: Array, *, rested: bool) -> Arra
             int(mujoco.mjtDyn.mjDYN_FILTER), int(mujoco.mjtDyn.mjDYN_FILTEREXACT)
         ):  # fmt: skip
             continue
-        at, share = int(model.actuator_actadr[u]), 1.0 - np.exp(-step / max(float(model.actuator_dynprm[u, 0]), 1e-12))
+        at, share = (
+            int(model.actuator_actadr[u]),
+            1.0 - np.exp(-step / max(float(model.actuator_dynprm[u, 0]), 1e-12)),
+        )
         late = round(float(model.actuator_delay[u]) / step)
         held = 0.0 if rested else control[0, u]
         seen = np.concatenate([np.full(late, held), control[:, u]])
@@ -132,7 +142,9 @@ def _activations(model: mujoco.MjModel, control: Array, *, rested: bool) -> Arra
     return out
 
 
-def _remember(model: mujoco.MjModel, data: mujoco.MjData, control: Array, first: int, *, rested: bool) -> None:
+def _remember(
+    model: mujoco.MjModel, data: mujoco.MjData, control: Array, first: int, *, rested: bool
+) -> None:
     """Fill the buffers of delayed actuators with the controls before a step."""
     step = float(model.opt.timestep)
     for u in range(model.nu):

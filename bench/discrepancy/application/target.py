@@ -126,7 +126,9 @@ class Target:
                 setting(model)
             self.later.clear()
 
-    def stop(self, place: str, limits: tuple[float, float], stiffness: float, damping: float, *, own: bool) -> str:
+    def stop(
+        self, place: str, limits: tuple[float, float], stiffness: float, damping: float, *, own: bool
+    ) -> str:
         """Give a place stops that are springs with dampers and never pull, exactly; return the name of what carries them.
 
         MuJoCo's limit of impedance d pushes with about ``d / (1 - d) (a_ref - a) / A``, A the inverse inertia of the joint and
@@ -144,7 +146,11 @@ class Target:
         item: Any = self.joint_or_tendon(place)
         kind, angle = self.kind(place), self.angle(place)
         i = mujoco.mj_name2id(self.nominal, mujoco.mjtObj.mjOBJ_JOINT, item.name)
-        if not own or item.limited == mujoco.mjtLimited.mjLIMITED_TRUE or (i >= 0 and self.nominal.jnt_limited[i]):
+        if (
+            not own
+            or item.limited == mujoco.mjtLimited.mjLIMITED_TRUE
+            or (i >= 0 and self.nominal.jnt_limited[i])
+        ):
             item, kind, angle = self.tendon_on(place, "stop"), "fixed", 1.0
         name = item.name
         item.range = (limits[0] * angle, limits[1] * angle)
@@ -250,5 +256,10 @@ def as_mujoco(item: Any) -> None:
     own = {"classname", "info", "userdata", *kept}
     for key in dir(plain):
         entry = getattr(type(plain), key)
-        if not key.startswith("_") and key not in own and isinstance(entry, property) and entry.fset is not None:
+        if (
+            not key.startswith("_")
+            and key not in own
+            and isinstance(entry, property)
+            and entry.fset is not None
+        ):
             setattr(item, key, getattr(plain, key))

@@ -11,7 +11,14 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.discrepancy.application.applying import INTEGRATORS, Applied, Findings, Options, apply, specification
+from bench.discrepancy.application.applying import (
+    INTEGRATORS,
+    Applied,
+    Findings,
+    Options,
+    apply,
+    specification,
+)
 from bench.discrepancy.application.joint_replay import JointReplay
 from bench.discrepancy.application.linear_replay import LinearReplay
 from bench.discrepancy.articulated.diagnosis import applies
@@ -171,7 +178,9 @@ def verify(
     def figures(options: Options) -> tuple[Figure, ...]:
         before, after = errors(nothing, options), errors(findings, options)
         return tuple(
-            Figure(g.dof, _rms(before[g.dof]), _rms(after[g.dof]), g.after, g.noise_floor) for g in gaps if g.dof in before
+            Figure(g.dof, _rms(before[g.dof]), _rms(after[g.dof]), g.after, g.noise_floor)
+            for g in gaps
+            if g.dof in before
         )
 
     option = specification(path).option
@@ -180,7 +189,7 @@ def verify(
     found = figures(Options())
     if not found:
         raise ModelError(
-            f"the verdict judges {', '.join(g.dof or 'one coordinate' for g in gaps)}, the case something else; give the case of the verdict"
+            f"the verdict judges {', '.join(g.dof or 'one coordinate' for g in gaps)}, the case something else; give the verdict's case"
         )
     out = Verification(step, INTEGRATORS[integrator], found)
     fine = errors(nothing, Options(step / settings.converged, mujoco.mjtIntegrator.mjINT_RK4, hard=True))
@@ -210,7 +219,10 @@ def _remedied(
         (f"a step of {out.step / part:.3g} s", out.step / part, None) for part in settings.refinements
     ]
     if out.integrator != "RK4":
-        trials.insert(0, (f"the integrator RK4 at the step of {out.step:.3g} s", out.step, mujoco.mjtIntegrator.mjINT_RK4))
+        trials.insert(
+            0,
+            (f"the integrator RK4 at the step of {out.step:.3g} s", out.step, mujoco.mjtIntegrator.mjINT_RK4),
+        )
     best, label = out.figures, ""
     for name, step, integrator in trials:
         progress(f"with {name}")

@@ -12,6 +12,7 @@ from xml.sax.saxutils import quoteattr
 import mujoco
 
 from bench.discrepancy.application.applying import INTEGRATORS, Applied, Findings
+from bench.discrepancy.application.applying import told as one_line
 from bench.discrepancy.application.target import Change
 from bench.errors import ModelError
 from bench.files import replacing, write_text
@@ -48,7 +49,11 @@ def model_text(applied: Applied, folder: Path, source: str) -> str:
     for change in applied.changes:
         for kind, name in change.anchors:
             _annotate(lines, kind, name, change)
-    head = [f"<!-- {_clean(source)} as corrected by 'jointbench apply':", *(_listed(c) for c in applied.changes), "-->"]
+    head = [
+        f"<!-- {_clean(source)} as corrected by 'jointbench apply':",
+        *(_listed(c) for c in applied.changes),
+        "-->",
+    ]
     return "\n".join([*head, *lines]) + "\n"
 
 
@@ -85,7 +90,7 @@ def write_model(applied: Applied, path: Path, source: str) -> None:
         try:
             mujoco.MjModel.from_xml_path(str(temporary))
         except ValueError as error:
-            raise ModelError(f"MuJoCo does not read the corrected model again: {error}") from None
+            raise ModelError(f"MuJoCo does not read the corrected model again: {one_line(error)}") from None
 
 
 def hook_text(applied: Applied) -> str:
@@ -94,7 +99,7 @@ def hook_text(applied: Applied) -> str:
         return ""
     used = CARRIED if any("carried(" in line for line in applied.lines) else ""
     body = "\n".join(f"    {line}" for line in applied.lines)
-    return f"{used}\n\ndef before_step(model, data):\n    \"\"\"Call it before every mujoco.mj_step, controls set.\"\"\"\n{body}\n"
+    return f'{used}\n\ndef before_step(model, data):\n    """Call it before every mujoco.mj_step, controls set."""\n{body}\n'
 
 
 def snippet(applied: Applied, model: str) -> str:
@@ -111,12 +116,17 @@ def snippet(applied: Applied, model: str) -> str:
     out = ["import math", "from pathlib import Path", "", "import mujoco", "import numpy as np"]
     if elements:
         out += ["", "from bench.rig import Element, Rig", ""]
-        out += [f'path = Path(__file__).with_name({model!r})', f'rig = Rig.from_file(path, integrator="{integrator}")']
+        out += [
+            f"path = Path(__file__).with_name({model!r})",
+            f'rig = Rig.from_file(path, integrator="{integrator}")',
+        ]
         for e in elements:
             joints = ", ".join(repr(joint) for joint in e.joints)
             theta = [float(x) for x in e.theta]
             out.append(f"rig = rig.with_element(Element.of({e.law.name!r}, {joints}, theta={theta}))")
-        out.append("model = rig.model  # a mujoco.MjModel whose passive forces hold the laws, compiled: step it as any other")
+        out.append(
+            "model = rig.model  # a mujoco.MjModel whose passive forces hold the laws, compiled: step it as any other"
+        )
     else:
         out += ["", f"model = mujoco.MjModel.from_xml_path(str(Path(__file__).with_name({model!r})))"]
     return "\n".join(out) + "\n" + hook
@@ -130,7 +140,13 @@ def write_snippet(applied: Applied, path: Path, model: str) -> None:
 def ranges(findings: Findings) -> list[dict[str, Any]]:
     """Ranges for domain randomisation: 95 % intervals of what was found and re-estimated, from the posterior."""
     out = [
-        {"parameter": p.name, "mean": p.value, "std": p.std, "low": p.value - 1.96 * p.std, "high": p.value + 1.96 * p.std}
+        {
+            "parameter": p.name,
+            "mean": p.value,
+            "std": p.std,
+            "low": p.value - 1.96 * p.std,
+            "high": p.value + 1.96 * p.std,
+        }
         for p in findings.nominal
     ]
     for effect in findings.effects:
