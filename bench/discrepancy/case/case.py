@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bench.discrepancy.case.acquisition import INTERPOLATIONS, Antialias
+from bench.discrepancy.case.elements import declared_parameters
 from bench.discrepancy.case.schema import check_document
 from bench.errors import FileFormatError, RecordingError, UnknownNameError
 
@@ -239,6 +240,8 @@ def read_case(folder: str | Path) -> Case:
     except (json.JSONDecodeError, UnicodeDecodeError, RecursionError) as error:
         raise FileFormatError(f"'{path}' is not valid JSON: {error}") from None
     check_document(nominal, path)
+    elements = declared_parameters(nominal.get("elements", []), path)
+    nominal = {**nominal, "parameters": {**nominal["parameters"], **elements}}
     parameters = tuple(
         NominalParameter(name, float(entry["value"]), float(entry.get("std", 0.0)), entry.get("unit", ""))
         for name, entry in nominal["parameters"].items()

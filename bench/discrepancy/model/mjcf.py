@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 
 from bench import native
 from bench.discrepancy.case.case import Case, CaseChannel
+from bench.discrepancy.case.elements import declared_parameters
 from bench.discrepancy.model.mjcf_friction import nominal_frictions
 from bench.discrepancy.model.mjcf_gravity import gravity_springs, has_gravity, without_gravity
 from bench.discrepancy.model.mjcf_limits import check_reach, free_of_constraints
@@ -60,7 +61,9 @@ def mjcf_structure(case: Case) -> Structure:
     own = Rig.from_file(path)
     joints = sorted({c.target.removeprefix("joint:") for c in case.channels if c.target.startswith("joint:")})
     rig = free_of_constraints(own, joints, prefix=PROBE)
-    structural = [_structural(p.name, rig) for p in case.parameters]
+    own_names = declared_parameters(case.options.get("elements", []), case.name)
+    names = tuple(p.name for p in case.parameters if p.name not in own_names)
+    structural = [_structural(name, rig) for name in names]
     loads, responses = _channels(case, rig)
     parameters = [name for name in structural if not name.startswith("structure/frictionloss/")]
     try:
@@ -77,8 +80,7 @@ def mjcf_structure(case: Case) -> Structure:
         _observer(channel, row, order, n_dof, rig)
         for (channel, _, order), row in zip(responses, linear.observation, strict=False)
     )
-    stacks, fixed = _stacks(case, structural, linear, rig)
-    names = tuple(p.name for p in case.parameters)
+    stacks, fixed = _stacks(structural, linear, rig)
     # before gravity makes a stiffness of a mass: what is called the stiffness of a place is a spring of the model
     places = _places(case, rig, linear, names, stacks)
     springs: tuple[NominalSpring, ...] = ()
@@ -244,11 +246,11 @@ def _observer(channel: CaseChannel, row: Array, order: int | None, n_dof: int, r
 
 
 def _stacks(
-    case: Case, structural: Sequence[str], linear: LinearRig, rig: Rig
+    structural: Sequence[str], linear: LinearRig, rig: Rig
 ) -> tuple[tuple[Array, Array, Array], Array]:
     """Contributions of the parameters to mass, damping and stiffness, and what no parameter changes."""
     n_dof = len(linear.dofs)
-    stacks = tuple(np.zeros((len(case.parameters), n_dof, n_dof)) for _ in range(3))
+    stacks = tuple(np.zeros((len(structural), n_dof, n_dof)) for _ in range(3))
     fixed = np.array([matrix.copy() for matrix in linear.matrices[:3]])
     for i, name in enumerate(structural):
         if name not in linear.parameters:

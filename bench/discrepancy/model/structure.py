@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.discrepancy.case.case import Case
+from bench.discrepancy.model.nominal_elements import NominalElement, with_elements
 from bench.discrepancy.model.nominal_forces import NominalFriction, NominalSpring
 from bench.discrepancy.simulation.stick_slip import LinearStructure
 from bench.errors import FileFormatError
@@ -78,6 +79,7 @@ class Structure:
         fixed: Mass, damping and stiffness (3, n_dof, n_dof) that no parameter changes; None for none.
         frictions: Dry friction of the nominal model.
         springs: What its restoring forces are beyond their tangents.
+        elements: Laws of the bench that it holds besides.
     """
 
     dofs: tuple[str, ...]
@@ -92,11 +94,12 @@ class Structure:
     fixed: NDArray[np.float64] | None = None
     frictions: tuple[NominalFriction, ...] = ()
     springs: tuple[NominalSpring, ...] = ()
+    elements: tuple[NominalElement, ...] = ()
 
     @property
     def has_own_forces(self) -> bool:
         """Whether the nominal model has forces that no matrix holds."""
-        return bool(self.frictions or self.springs)
+        return bool(self.frictions or self.springs or self.elements)
 
     def at(self, values: NDArray[np.float64]) -> LinearStructure:
         """Return the matrices at parameter values (n_parameters,)."""
@@ -138,7 +141,7 @@ class Structure:
         linked = (np.abs(self.mass).sum(0) + np.abs(self.damping).sum(0) + np.abs(self.stiffness).sum(0)) > 0
         if self.fixed is not None:
             linked |= np.abs(self.fixed).sum(0) > 0
-        for force in (*self.frictions, *self.springs):
+        for force in (*self.frictions, *self.springs, *self.elements):
             linked |= np.outer(force.row, force.row) != 0
         linked |= np.eye(len(self.dofs), dtype=bool)
         for _ in self.dofs:
@@ -159,6 +162,13 @@ class Structure:
         ]
         active += [
             self.parameters.index(f.parameter) for f in self.frictions if f.parameter and np.any(f.row[keep])
+        ]
+        active += [
+            self.parameters.index(name)
+            for e in self.elements
+            if np.any(e.row[keep])
+            for name in e.parameters
+            if name
         ]
         active = sorted(set(active))
         loads = [i for i in range(len(self.loads)) if np.abs(self.inputs[keep, i]).sum() > 0]
@@ -183,6 +193,7 @@ class Structure:
             None if self.fixed is None else self.fixed[np.ix_(range(3), keep, keep)],
             tuple(f.restricted(keep) for f in self.frictions if np.any(f.row[keep])),
             tuple(s.restricted(keep, active) for s in self.springs if np.any(s.row[keep])),
+            tuple(e.restricted(keep) for e in self.elements if np.any(e.row[keep])),
         )
 
 
@@ -192,16 +203,13 @@ def structure_of(case: Case) -> Structure:
     Raises:
         FileFormatError: The rig is unknown, or a parameter or channel is missing.
     """
-    if case.rig == "sdof":
-        return _sdof(case)
-    if case.rig == "joint":
-        return _joint(case)
-    if case.rig == "damper":
-        return _damper(case)
+    bench = {"sdof": _sdof, "joint": _joint, "damper": _damper}
+    if case.rig in bench:
+        return with_elements(bench[case.rig](case), case)
     if case.rig.endswith(".xml"):
         from bench.discrepancy.model.mjcf import mjcf_structure  # noqa: PLC0415  (imports this module)
 
-        return mjcf_structure(case)
+        return with_elements(mjcf_structure(case), case)
     raise FileFormatError(
         f"rig '{case.rig}' is unknown; known: sdof, joint, damper, or the path of an MJCF file (ending in .xml)"
     )
@@ -281,6 +289,7 @@ def _damper(case: Case) -> Structure:
         ("displacement",),
         (Observer("force", 0, np.ones(1)),),
         (place,),
+        frictions=(NominalFriction(np.ones(1), "coulomb"),) if "coulomb" in names else (),
     )
 
 

@@ -50,7 +50,7 @@ from bench.discrepancy.search.fits import (
 )
 from bench.discrepancy.search.rivals import challenge, reduce_best, simplify
 from bench.discrepancy.search.scheduled import with_schedules
-from bench.discrepancy.search.soft_friction import soften
+from bench.discrepancy.search.soft_friction import soften, stand_in
 from bench.discrepancy.search.timed_force import with_timed_force
 
 QUICK = 6
@@ -110,6 +110,7 @@ def attribute(
         progress("rarer effects")
         screen.add(rare)
         _extend(search, screen, [nothing], count=6, among={p.key for p in rare})
+    stand_in(search)
     with_timed_force(search)
     with_schedules(search)
     for size in range(1, most):
