@@ -9,9 +9,13 @@ import numpy as np
 import pytest
 from planted_cases import MASS, motion_with, planted_case
 
-from bench.discrepancy import Case, NominalParameter, diagnose, read_case
+from bench.discrepancy import Case, CaseChannel, NominalParameter, diagnose, read_case, record_from_arrays
+from bench.discrepancy.case.case import without_load
+from bench.discrepancy.case.schema import check_units
+from bench.discrepancy.effects.catalogue import effect_named
 from bench.discrepancy.fitting.map_fit import fit
 from bench.discrepancy.likelihood.problem import Problem
+from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.model.structure import structure_of
 from bench.discrepancy.screening.screen import Screen
 from bench.errors import FileFormatError, ParameterError, UnknownNameError
@@ -28,7 +32,9 @@ def slipping(x, v, z):
     """A Jenkins element and a constant force."""
     rate, force = np.zeros(1), np.zeros(1)
     theta = LAWS["jenkins"].theta([STIFFNESS, LIMIT, 0.1])
-    LAWS["jenkins"].rate(0.0, [x], [v], z, theta, rate)
+    slip = LAWS["jenkins"].rate
+    assert slip is not None
+    slip(0.0, [x], [v], z, theta, rate)
     LAWS["jenkins"].force(0.0, [x], [v], z, theta, force)
     return force[0] + OFFSET, [rate[0]]
 
@@ -103,3 +109,47 @@ def test_a_declaration_that_makes_no_sense_is_refused(tmp_path, slipping_case):
     ):
         with pytest.raises(error):
             read(**wrong)
+
+
+def test_a_rotary_component_under_prescribed_motion_has_torque_and_angle():
+    rng, t = np.random.default_rng(2), np.arange(2000) / 500.0
+    records = []
+    for name, frequency in (("identification", 0.5), ("validation", 0.8)):
+        q = 1.5 * np.sin(2 * np.pi * frequency * t + 0.3)
+        v = np.gradient(q, t)
+        torque = 0.12 * np.sign(v) + 0.05 * v + rng.normal(0.0, 0.002, len(t))
+        records.append(record_from_arrays(name, t, {"angle": q, "torque": torque}))
+    case = Case(
+        "drive", "damper", (NominalParameter("damping", 0.05, 0.01, "N m s/rad"),),
+        (CaseChannel("angle", "rad", "prescribed", 1e-7), CaseChannel("torque", "N m", "response", 0.002)),
+        (records[0],), (records[1],),
+    )  # fmt: skip
+    check_units(case)
+    problem = Problem(case, structure_of(case), case.identification)
+    friction = Placed(effect_named("coulomb_friction"), problem.structure.places[0])
+    fitted = fit(problem, (friction,), start=np.array([0.0, 0.0]))
+    level = friction.effect.values(fitted.vector[1:], problem.scales_of(friction))[0]
+    assert level == pytest.approx(0.12, rel=0.01)
+    assert problem.structure.places[0].force_unit == "N m"
+
+
+def test_a_free_decay_needs_no_load_and_responses_alone_are_refused_in_words():
+    t = np.arange(2000) / 500.0
+    x = 0.02 * np.exp(-0.8 * t) * np.cos(30.0 * t)
+    noisy = x + 1e-5 * np.random.default_rng(1).standard_normal(len(t))
+    records = [
+        record_from_arrays(n, t, {"displacement": noisy}, at_rest=False)
+        for n in ("identification", "validation")
+    ]
+    parameters = (
+        NominalParameter("mass", 1.0, 0.01), NominalParameter("stiffness", 900.64, 20.0), NominalParameter("damping", 1.5, 0.3)
+    )  # fmt: skip
+    channels = (CaseChannel("displacement", "m", "response", 1e-5),)
+    case = Case("decay", "sdof", parameters, channels, (records[0],), (records[1],))
+    with pytest.raises(FileFormatError, match="responses alone"):
+        structure_of(case)
+    free = without_load(case)
+    problem = Problem(free, structure_of(free), free.identification)
+    fitted = fit(problem, (), start=np.zeros(len(problem.nominal)), iterations=40)
+    assert fitted.reduced < 1.1
+    assert problem.nominal[1] + problem.spread[1] * fitted.vector[1] == pytest.approx(1.6, rel=0.02)

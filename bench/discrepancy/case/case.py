@@ -33,6 +33,8 @@ ROLES = ("measured", "command", "prescribed", "response", "scheduling")
 TARGETS = ("sensor", "joint", "actuator")
 """Entries of a user's own MJCF that a channel can refer to."""
 
+NO_LOAD = "no load"
+"""Channel of a load that is zero throughout, of a model of the user's own that nothing drives."""
 SUFFIXES = (".csv", ".csv.gz")
 MIN_SAMPLES = 200
 """Shortest record that is accepted; below it no spectrum, and so no statement about noise, is possible."""
@@ -273,8 +275,34 @@ def read_case(folder: str | Path) -> Case:
         folder.name, str(nominal["rig"]), parameters, channels,
         tuple(groups["identification"]), tuple(groups["validation"]), folder, rest,
     )  # fmt: skip
+    case = without_load(case)
     case.load_interpolation  # noqa: B018  (an unknown one is refused here, not in the first simulation)
     return case
+
+
+def without_load(case: Case) -> Case:
+    """A case with a load that is zero throughout, where it has none and starts in motion: a free decay."""
+    own = {"sdof": "force"}.get(case.rig, NO_LOAD)
+    driven = any(
+        c.role in {"measured", "command", "prescribed"} or c.target.startswith("actuator:")
+        for c in case.channels
+    )
+    records = (*case.identification, *case.validation)
+    if driven or case.rig in {"damper", "joint"} or any(record.at_rest for record in records):
+        return case
+
+    def still(record: CaseRecord) -> CaseRecord:
+        zeros = np.zeros(len(record))
+        zeros.setflags(write=False)
+        return replace(record, values={**record.values, own: zeros})
+
+    channel = CaseChannel(own, "" if own == NO_LOAD else "N", "measured", 0.0)
+    identification, validation = (
+        tuple(map(still, group)) for group in (case.identification, case.validation)
+    )
+    return replace(
+        case, channels=(*case.channels, channel), identification=identification, validation=validation
+    )
 
 
 def _channel(name: str, entry: Mapping[str, object]) -> CaseChannel:

@@ -25,9 +25,15 @@ MISNOMERS = {
 """Keys that people write, and those that are meant."""
 MOTION = {
     "displacement": ("axial", "m"), "velocity": ("axial", "m/s"), "acceleration": ("axial", "m/s^2"),
-    "rotation": ("torsional", "rad"), "angular_velocity": ("torsional", "rad/s"),
+    "rotation": ("torsional", "rad"), "angle": ("torsional", "rad"), "angular_velocity": ("torsional", "rad/s"),
     "angular_acceleration": ("torsional", "rad/s^2"),
 }  # fmt: skip
+PRESCRIBED = (
+    ("displacement", "angle", "rotation"),
+    ("velocity", "angular_velocity"),
+    ("acceleration", "angular_acceleration"),
+)
+"""Names of the channels of a prescribed motion, by their order: linear, rotary."""
 LOADS = {"force": ("axial", "N"), "torque": ("torsional", "N m")}
 CONSTANTS = {
     ("mass", "axial"): ("kg",), ("inertia", "torsional"): ("kg m^2", "kg m^2/rad^2", "kg m^2/rad"),
@@ -179,7 +185,8 @@ def check_units(case: Case) -> None:
     for parameter in case.parameters:
         if not parameter.unit:
             continue
-        axis = "torsional" if "torsional" in parameter.name or "inertia" in parameter.name else "axial"
+        rotary = "torsional" in parameter.name or "inertia" in parameter.name or "axial" not in motion | loads
+        axis = "torsional" if rotary and "torsional" in motion | loads else "axial"
         kind = next((k for k, a in CONSTANTS if a == axis and k in parameter.name), None)
         if kind is None:
             continue

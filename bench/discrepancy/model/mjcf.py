@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench import native
-from bench.discrepancy.case.case import Case, CaseChannel
+from bench.discrepancy.case.case import NO_LOAD, Case, CaseChannel
 from bench.discrepancy.case.elements import declared_parameters
 from bench.discrepancy.model.mjcf_friction import nominal_frictions
 from bench.discrepancy.model.mjcf_gravity import gravity_springs, has_gravity, without_gravity
@@ -93,7 +93,9 @@ def mjcf_structure(case: Case) -> Structure:
         names, *stacks, inputs, tuple(channel.name for channel, _ in loads), observers,
         places, fixed, _frictions(own, linear, names, case.identification[0].step), springs,
     )  # fmt: skip
-    check_reach(case, structure, own, {channel.name: actuator for channel, actuator in loads}, linear.dofs)
+    check_reach(
+        case, structure, own, {channel.name: actuator for channel, actuator in loads if actuator}, linear.dofs
+    )
     return structure
 
 
@@ -133,6 +135,9 @@ def _channels(
     for channel in case.channels:
         if channel.role == "scheduling":
             continue
+        if channel.name == NO_LOAD:
+            loads.append((channel, ""))
+            continue
         kind, _, name = channel.target.rpartition(":")
         name = name or channel.name
         if channel.role == "prescribed":
@@ -158,7 +163,7 @@ def _channels(
     if not loads:
         raise FileFormatError(
             f"case '{case.name}' has no load; name a channel after an actuator of the model ({', '.join(rig.actuators) or 'none'}) "
-            'or give it an entry "actuator"'
+            'or give it an entry "actuator"; for a free decay say that it "starts_in_motion"'
         )
     if not responses:
         raise FileFormatError(
@@ -216,6 +221,9 @@ def _inputs(loads: Sequence[tuple[CaseChannel, str]], rig: Rig, linear: LinearRi
     cells = _cells(loads)
     out = np.zeros((len(linear.dofs), len(loads)))
     for j, (channel, actuator) in enumerate(loads):
+        if not actuator:
+            out[:, j] = 1.0
+            continue
         u = rig.actuators.index(actuator)
         out[:, j] = matrix[:, u]
         if cell := _sensor_of(channel):

@@ -15,11 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.discrepancy.case.case import Case
+from bench.discrepancy.case.schema import PRESCRIBED
 from bench.discrepancy.model.nominal_elements import NominalElement, with_elements
 from bench.discrepancy.model.nominal_forces import NominalFriction, NominalSpring
 from bench.discrepancy.simulation.stick_slip import LinearStructure
 from bench.errors import FileFormatError
 
+ANSWERS = ("force", "torque")
+"""What a component takes from a prescribed motion, linear and rotary."""
 ACCELERATION = 2
 """Order of an observer that reads accelerations."""
 
@@ -239,6 +242,11 @@ def _observers(case: Case, table: Sequence[tuple[str, int, NDArray[np.float64]]]
 
 def _sdof(case: Case) -> Structure:
     names = ("mass", "damping", "stiffness", "coulomb")
+    if not case.has("force") and all(c.role == "response" for c in case.channels):
+        raise FileFormatError(
+            f"case '{case.name}' has responses alone ({', '.join(c.name for c in case.channels)}): without what drove them nothing can be "
+            'said of the model. Record the force; or, for a free decay, say that it "starts_in_motion"'
+        )
     _require(case, ("mass",), ("force",))
     have = tuple(name for name in names if any(p.name == name for p in case.parameters))
     frictions = (NominalFriction(np.ones(1), "coulomb"),) if "coulomb" in have else ()
@@ -266,7 +274,15 @@ def _sdof(case: Case) -> Structure:
 
 def _damper(case: Case) -> Structure:
     """A massless component under prescribed motion; the mass only carries the bookkeeping of the coordinate."""
-    _require(case, (), ("displacement", "force"))
+    moved = next((c for c in case.channels if c.name in PRESCRIBED[0]), None)
+    answer = next((c for c in case.channels if c.name in ANSWERS), None)
+    if moved is None or answer is None:
+        have = ", ".join(c.name for c in case.channels)
+        raise FileFormatError(
+            f"case '{case.name}' (rig damper) needs a motion ({', '.join(PRESCRIBED[0])}) and what it takes ({', '.join(ANSWERS)}); "
+            f"it has {have}"
+        )
+    rotary = answer.name == "torque"
     names = tuple(p.name for p in case.parameters if p.name in {"stiffness", "damping", "coulomb"})
     stacks = [
         np.zeros((len(names), 1, 1)),
@@ -276,7 +292,7 @@ def _damper(case: Case) -> Structure:
         ),
     ]
     place = Place(
-        "", np.ones((1, 1)), case.channel("displacement").unit or "m", case.channel("force").unit or "N", (),
+        "", np.ones((1, 1)), moved.unit or ("rad" if rotary else "m"), answer.unit or ("N m" if rotary else "N"), (),
         "stiffness" if "stiffness" in names else "", "damping" if "damping" in names else "",
     )  # fmt: skip
     return Structure(
@@ -286,8 +302,8 @@ def _damper(case: Case) -> Structure:
         stacks[1],
         stacks[2],
         np.ones((1, 1)),
-        ("displacement",),
-        (Observer("force", 0, np.ones(1)),),
+        (moved.name,),
+        (Observer(answer.name, 0, np.ones(1)),),
         (place,),
         frictions=(NominalFriction(np.ones(1), "coulomb"),) if "coulomb" in names else (),
     )

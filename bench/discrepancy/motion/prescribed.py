@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from bench.discrepancy.case.case import Case, CaseRecord
+from bench.discrepancy.case.schema import PRESCRIBED
 from bench.discrepancy.likelihood.whitening import noise_floor
 from bench.discrepancy.motion.kalman_smoother import resting, smoother_of
 from bench.discrepancy.simulation.stick_slip import Motion
@@ -26,7 +27,6 @@ REVERSAL = 2.0
 UNUSUAL, EDGE_WIDTH = 1.5, 9
 """Error of a prescribed velocity, over its median, from which samples at an end of a record are not compared; and the number of
 samples over which it is averaged."""
-CHANNELS = ("displacement", "velocity", "acceleration")
 
 
 class Prescribed(NamedTuple):
@@ -96,10 +96,13 @@ def _edges(error: Array) -> NDArray[np.bool_]:
 
 def _samples(case: Case, record: CaseRecord) -> tuple[tuple[int, ...], Array, Array]:
     """Orders, samples (n, n_channels) and noise of the channels that tell a prescribed motion."""
-    have = [name for name in CHANNELS if case.has(name) and name in record.values]
+    order = {name: order for order, names in enumerate(PRESCRIBED) for name in names}
+    have = sorted(
+        (c.name for c in case.channels if c.name in order and c.name in record.values), key=order.__getitem__
+    )
     noise = [case.channel(name).noise_std or noise_floor(record.values[name]) for name in have]
     samples = np.column_stack([record.values[name] for name in have])
-    return tuple(CHANNELS.index(name) for name in have), samples, np.array(noise)
+    return tuple(order[name] for name in have), samples, np.array(noise)
 
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)

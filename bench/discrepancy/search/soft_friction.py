@@ -185,9 +185,8 @@ def frictional(problem: Problem) -> NDArray[np.bool_]:
     """Which entries (n_nominal,) of a vector are limits of the nominal model's own friction."""
     names = {friction.parameter for friction in problem.structure.frictions}
     names |= {name for e in problem.structure.elements if e.rubs for name in e.parameters}
-    out = np.zeros(len(problem.nominal), dtype=bool)
-    out[: problem.n_physical] = [name in names for name in problem.structure.parameters]
-    return out
+    names.discard("")
+    return np.array([name in names for name in problem.structure.parameters], dtype=bool)
 
 
 def _in_place(effect: Effect) -> Effect:
