@@ -6,7 +6,7 @@ NASTRAN := pyNastran==1.4.1 cpylog docopt-ng
 .PHONY: demo test lint types layers wheel results clean
 
 demo: .venv/core
-	$(BIN)/jointbench demo --out out/demo
+	$(BIN)/jointbench demo --out out/demo --force
 
 test: .venv/full lint types layers
 	$(BIN)/python -m pytest -n 2 --dist loadfile tests

@@ -12,7 +12,12 @@ from __future__ import annotations
 
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from bench import kernel_cache
+
+kernel_cache.provide(Path(__file__).parent)  # before numba is imported
 
 try:
     __version__ = version("jointbench")

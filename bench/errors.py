@@ -8,7 +8,13 @@ expect. The command line prints the message of a `BenchError` and nothing else.
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+import math
+from collections.abc import Iterable, Mapping
+from itertools import islice
+from typing import Any
+
+SHOWN_NAMES = 60
+"""Names that a message lists at most; the nearest one is told in any case."""
 
 
 class BenchError(Exception):
@@ -28,10 +34,60 @@ class UnknownNameError(BenchError, KeyError):
     """
 
     def __init__(self, kind: str, name: str, known: Iterable[str]) -> None:
-        names = sorted(known)
-        near = difflib.get_close_matches(name, names, n=1)
-        hint = f" Did you mean '{near[0]}'?" if near else ""
-        super().__init__(f"unknown {kind} '{name}'; known: {', '.join(names) or 'none'}.{hint}")
+        super().__init__(unknown_name(kind, name, known))
+
+
+def unknown_name(kind: str, name: str, known: Iterable[str]) -> str:
+    """The sentence about a name that is not among the known ones, with the nearest of these."""
+    names = sorted(map(str, known))
+    near = nearest(str(name), names)
+    hint = f" Did you mean '{near}'?" if near else ""
+    more = f", … ({len(names)} in all)" if len(names) > SHOWN_NAMES else ""
+    listed = ", ".join(names[:SHOWN_NAMES]) or "none"
+    return f"unknown {kind} '{shortened(str(name))[1:-1]}'; known: {listed}{more}.{hint}"
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """The known name that a misspelt one most resembles, capitals aside; empty where none does."""
+    folded = {other.casefold(): other for other in known}
+    near = difflib.get_close_matches(name[:100].casefold(), folded, n=1)
+    return folded[near[0]] if near else ""
+
+
+def shortened(value: Any, width: int = 60) -> str:
+    """A value on one line of about `width` characters, whatever its size and depth, as it may stand in a message."""
+    if isinstance(value, str):
+        text = repr(value[: width + 1])
+        return text if len(value) <= width else f"{text[:width]}…{text[0]}"
+    if isinstance(value, int) and not isinstance(value, bool) and value.bit_length() > 1000:
+        return f"an integer of some {int(value.bit_length() * math.log10(2.0)) + 1} digits"
+    if value is None or isinstance(value, bool):
+        return {None: "null", True: "true", False: "false"}[value]
+    if not isinstance(value, Mapping | list | tuple):
+        text = " ".join(repr(value).split())
+        return text if len(text) <= width else f"{text[:width]}…"
+    if isinstance(value, Mapping):
+        opened, closed = "{}"
+        parts = (f"{shortened(k, 20)}: {_inner(v, width // 3)}" for k, v in islice(value.items(), 4))
+    else:
+        opened, closed = "[]"
+        parts = (_inner(item, width // 3) for item in islice(value, 6))
+    text = opened
+    for index, part in enumerate(parts):
+        text += (", " if index else "") + part
+        if len(text) > width:
+            return f"{text[:width]}…{closed}"
+    shown = 4 if isinstance(value, Mapping) else 6
+    return text + (", …" if len(value) > shown else "") + closed
+
+
+def _inner(value: Any, width: int) -> str:
+    """A value within another one; what holds values itself is not opened, since it may nest without end."""
+    if isinstance(value, Mapping):
+        return "{…}" if value else "{}"
+    if isinstance(value, list | tuple):
+        return "[…]" if value else "[]"
+    return shortened(value, width)
 
 
 class ParameterError(BenchError, ValueError):
@@ -48,6 +104,17 @@ class RecordingError(BenchError, ValueError):
 
 class FileFormatError(BenchError, ValueError):
     """A file cannot be read: corrupted, truncated, or not of the format its name says."""
+
+
+class DocumentError(FileFormatError, ParameterError):
+    """An entry of a document (a rig, a plan, a nominal model, …) is not what its schema asks for."""
+
+
+class UnknownEntryError(DocumentError, UnknownNameError):
+    """A document has an entry, or names something, that is not known; the message tells the nearest known name."""
+
+    def __init__(self, message: str) -> None:
+        Exception.__init__(self, message)
 
 
 class ModelError(BenchError, ValueError):

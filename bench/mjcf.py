@@ -1,10 +1,16 @@
-"""The MJCF files that come with the bench."""
+"""The MJCF files that come with the bench, and the words of MJCF that documents use."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Literal
 
 from bench.errors import UnknownNameError
+
+IntegratorName = Literal["RK4", "Euler", "implicit", "implicitfast"]
+"""Integrators of MuJoCo."""
+StructureName = Literal["mass", "inertia", "stiffness", "damping", "frictionloss", "armature"]
+"""Structural quantities of a model that a document may change."""
 
 
 def model_path(name: str) -> Path:

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
+from bench import native
 from bench.errors import ParameterError, UnknownNameError
 from bench.identification.network import fit_network
 from bench.identification.polynomial import fit_polynomial
@@ -146,10 +147,11 @@ def recovered_forces(rig: Rig, recording: Recording) -> JointData:
     acceleration = make_interp_spline(recording.time, velocity, k=5).derivative()(recording.time)
     forces = np.empty((len(position), len(COORDINATES)))
     at = [int(model.joint(name).dofadr[0]) for name in COORDINATES]
-    for i in range(len(position)):
-        data.qpos[:], data.qvel[:], data.qacc[:] = position[i], velocity[i], acceleration[i]
-        mujoco.mj_inverse(model, data)
-        forces[i] = -data.qfrc_inverse[at]
+    with native.running(model):
+        for i in range(len(position)):
+            data.qpos[:], data.qvel[:], data.qacc[:] = position[i], velocity[i], acceleration[i]
+            mujoco.mj_inverse(model, data)
+            forces[i] = -data.qfrc_inverse[at]
     columns = [joints.index(name) for name in COORDINATES]
     return JointData(np.concatenate([position[:, columns], velocity[:, columns]], axis=1), forces)
 

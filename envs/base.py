@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
-from envs.benches import FLOATS, Benches, Options
+from bench.errors import ParameterError
+from envs.benches import FLOATS, Benches, Options, require_count
 from envs.setups import PAIRS, SDOF_LAWS, Setup, discrimination_setup, joint_setup, sdof_setup
 
 RENDER_MODES = ("rgb_array", "human")
@@ -21,15 +22,31 @@ def setup_of(kind: str, arguments: dict[str, Any]) -> Setup:
     Args:
         kind: "sdof", "joint" or "discrimination".
         arguments: Keyword arguments of the environment.
+
+    Raises:
+        BenchError: One of them has a value outside its range.
     """
     if kind == "sdof":
-        laws = tuple(arguments.pop("laws", SDOF_LAWS))
-        return sdof_setup(laws, arguments.pop("n_draws", 2 * len(laws)))
+        laws = _names("laws", arguments.pop("laws", SDOF_LAWS))
+        return sdof_setup(laws, require_count("n_draws", arguments.pop("n_draws", 2 * len(laws))))
+    n_draws = require_count("n_draws", arguments.pop("n_draws", 4))
     if kind == "joint":
-        return joint_setup(arguments.pop("n_draws", 4))
+        return joint_setup(n_draws)
     rig = arguments.pop("rig", "joint")
-    pairs = tuple(arguments.pop("pairs", PAIRS if rig == "joint" else PAIRS[:-1]))
-    return discrimination_setup(rig, pairs, arguments.pop("n_draws", 4))
+    pairs = _names("pairs", arguments.pop("pairs", PAIRS if rig == "joint" else PAIRS[:-1]))
+    return discrimination_setup(rig, pairs, n_draws)
+
+
+def _names(argument: str, given: Any) -> tuple[str, ...]:
+    """An argument that lists names.
+
+    Raises:
+        ParameterError: It is no list of strings, or an empty one.
+    """
+    names = tuple(given) if isinstance(given, tuple | list) else ()
+    if not names or not all(isinstance(name, str) for name in names):
+        raise ParameterError(f"{argument} is {given!r}; a list of at least one name is expected")
+    return names
 
 
 def make_benches(kind: str, n: int, threads: int, arguments: dict[str, Any]) -> Benches:

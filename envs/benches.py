@@ -20,6 +20,7 @@ from bench.errors import ParameterError, UnknownNameError
 from bench.excitation import Contrast, Draw, Ensemble, RigPrior, Rivals
 from bench.excitation.experiment import fan
 from bench.excitation.information import STEP, accumulate, misfit
+from bench.excitation.shaping import SHAPINGS
 from bench.excitation.station import Desk
 from bench.excitation.stepping import run_of
 from bench.excitation.windows import Window, advance, advance_prior, advance_rivals
@@ -54,12 +55,35 @@ class Options:
     terminate_when_certain: bool = False
 
     def __post_init__(self) -> None:
-        if self.enforcement not in ENFORCEMENTS:
-            raise UnknownNameError("enforcement of limits", self.enforcement, ENFORCEMENTS)
-        if self.average not in AVERAGES:
-            raise UnknownNameError("average of rewards", self.average, AVERAGES)
-        if not (math.isfinite(self.penalty) and self.penalty >= 0.0):
+        for kind, name, known in (
+            ("shaping of actions", self.shaping, SHAPINGS),
+            ("enforcement of limits", self.enforcement, ENFORCEMENTS),
+            ("average of rewards", self.average, AVERAGES),
+        ):
+            if name not in known:
+                raise UnknownNameError(kind, str(name), known)
+        if not (_is_number(self.penalty) and self.penalty >= 0.0):
             raise ParameterError(f"penalty is {self.penalty} nat; a number of at least 0 is expected")
+        for name in ("window", "duration"):
+            value = getattr(self, name)
+            if value is not None and not (_is_number(value) and value > 0.0):
+                raise ParameterError(f"{name} is {value} s; a positive number is expected")
+        require_count("n_knots", self.n_knots)
+
+
+def require_count(name: str, value: Any) -> int:
+    """The value of an argument that counts something.
+
+    Raises:
+        ParameterError: It is no whole number of at least one.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
+        raise ParameterError(f"{name} is {value}; a whole number of at least one is expected")
+    return int(value)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float | np.number) and math.isfinite(value)
 
 
 class Outcome(NamedTuple):
@@ -109,7 +133,8 @@ class SteppedBenches(ABC):
         """Set up the books; each bench must be `reset` before it is stepped.
 
         Raises:
-            ParameterError: A window is shorter than a step, or an episode shorter than a window.
+            ParameterError: A window is shorter than a step, an episode shorter than a window, or a window not made of `n_knots`
+                parts of whole steps.
         """
         self.setup, self.options, self.n = setup, options, n
         self.timestep = setup.rig.timestep
@@ -123,6 +148,10 @@ class SteppedBenches(ABC):
             raise ParameterError(
                 f"a window of {options.window} s and an episode of {options.duration} s came; a window takes at least one step "
                 f"of {self.timestep:g} s and an episode at least one window"
+            )
+        if options.shaping == "knots" and self.n_steps % options.n_knots:
+            raise ParameterError(
+                f"n_knots is {options.n_knots} in a window of {self.n_steps} steps; a number that divides them is expected"
             )
         self.station = setup.station(
             self.n_steps, self.n_windows, shaping=options.shaping, n_knots=options.n_knots
@@ -169,9 +198,12 @@ class SteppedBenches(ABC):
 
         Args:
             places: Benches, ascending ``(m,)``.
-            actions: Actions ``(m, width)``; clipped to −1 … 1.
+            actions: Actions ``(m, width)``, finite; clipped to −1 … 1.
+
+        Raises:
+            ParameterError: Actions of another shape, or not finite. No bench has moved.
         """
-        actions = np.clip(np.asarray(actions, dtype=float).reshape(len(places), -1), -1.0, 1.0)
+        actions = np.clip(self._checked(actions, len(places)), -1.0, 1.0)
         commands, exhausted = self.desk.commands(places, actions)
         measured, lost = self._measured(places, commands)
         reached = self.desk.book(places, measured)
@@ -201,6 +233,23 @@ class SteppedBenches(ABC):
             "violation": over.any(axis=1),
         }
         return Outcome(observation, gain - cost, terminated, truncated, info)
+
+    def _checked(self, actions: NDArray, m: int) -> NDArray[np.float64]:
+        given = np.asarray(actions)
+        if given.dtype.kind not in "fiu":
+            raise ParameterError(f"an action of type {given.dtype} came; real numbers in −1 … 1 are expected")
+        numbers = given.astype(float)
+        if numbers.shape != (m, self.width):
+            came, expected = numbers.shape, (m, self.width)
+            if m == 1 and numbers.ndim:  # the single environment's view of it
+                came, expected = came[1:], expected[1:]
+            raise ParameterError(f"an action of shape {came} came; {expected} is expected")
+        if not np.isfinite(numbers).all():
+            bench, entry = (int(i) for i in np.argwhere(~np.isfinite(numbers))[0])
+            raise ParameterError(
+                f"entry {entry} of the action of environment {bench} is {numbers[bench, entry]}; numbers in −1 … 1 are expected"
+            )
+        return numbers
 
     def _separated(self, places: NDArray) -> NDArray[np.float64]:
         """Share of a bench's pairs of rivals that are expected to be told apart with 99 % certainty ``(m,)``."""

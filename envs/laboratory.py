@@ -148,11 +148,10 @@ class Laboratories:
         Returns:
             Channels ``(m, n_steps, n_channels)`` at the start of each step.
         """
-        native.install()
         m, n_steps, _ = controls.shape
         full = np.zeros((m, n_steps, self._rig.model.nu))
         full[:, :, self._driven] = controls
-        with native.untimed():
+        with native.running(self._rig.model):
             record = self._batch.rollout(
                 n_steps,
                 full,
@@ -179,9 +178,15 @@ class Laboratories:
         hypotheses, n, channels, actuators, threads = saved["arguments"]
         self.__init__(hypotheses, n, channels=channels, actuators=actuators, threads=threads)
         self._batch.state[:] = saved["state"]
-        self._numbers[:] = saved["numbers"]
-        for at in self._marks.values():
-            self._numbers[:, at + 1] = self._silent[at + 1]  # numbers of laws hold in one process only
+        for (
+            name,
+            item,
+        ) in (
+            self._placed.items()
+        ):  # law numbers hold in one process, addresses in one model: theta alone is taken
+            mark, theta = self._marks[name], slice(item.theta, item.theta + len(item.element.theta))
+            self._numbers[:, mark] = np.where(saved["numbers"][:, mark] == native.MAGIC, native.MAGIC, 0.0)
+            self._numbers[:, theta] = saved["numbers"][:, theta]
         for quantity, values in saved["structure"].items():
             self._structure[quantity][:] = values
 

@@ -6,6 +6,7 @@ Importing this module imports torch and stable-baselines3 (extra `rl`); policies
 from __future__ import annotations
 
 import contextlib
+import io
 import json
 import math
 import os
@@ -26,6 +27,7 @@ from stable_baselines3.common.vec_env import VecEnvWrapper, VecNormalize
 from bench.errors import FileFormatError, ParameterError, UnknownNameError
 from bench.excitation.policy import Policy
 from bench.excitation.station import Station
+from bench.files import replacing, together, write_bytes, write_text
 from envs import IDS
 from envs.base import setup_of
 from envs.feedback import Feedback, braked_design, pump
@@ -374,8 +376,9 @@ class Trainer:
         self.model = _model(plan, self.env)
         if plan.start != "nothing":
             imitate(self.model, self.env, feedback, seed=plan.seed)
-        folder.mkdir(parents=True, exist_ok=True)
-        np.save(folder / "schedule.npy", feedback.schedule)
+        content = io.BytesIO()
+        np.save(content, feedback.schedule)
+        write_bytes(folder / "schedule.npy", content.getvalue())
         self.checkpoint(0)
 
     @property
@@ -401,14 +404,15 @@ class Trainer:
         score = evaluate(policy, self.plan.task, n=self.plan.n_held_out)
         best = max((row.score for row in self.curve), default=-math.inf)
         self.curve.append(score._replace(steps=steps, seconds=round(self.seconds, 1)))
-        if score.score > best:
-            policy.save(self.folder / "best.npz")
-        self.model.save(self.folder / "model.zip")
-        self.env.save(str(self.folder / "statistics.pkl"))
         document = {"plan": asdict(self.plan), "curve": [row._asdict() for row in self.curve]}
-        temporary = self.folder / "curve.json.part"
-        temporary.write_text(json.dumps(document, indent=1), encoding="utf-8")
-        temporary.replace(self.folder / "curve.json")
+        with together():  # a training that is resumed finds its model, statistics and curve of one moment
+            if score.score > best:
+                policy.save(self.folder / "best.npz")
+            with replacing(self.folder / "model.zip") as temporary:
+                self.model.save(temporary)
+            with replacing(self.folder / "statistics.pkl") as temporary:
+                self.env.save(str(temporary))
+            write_text(self.folder / "curve.json", json.dumps(document, indent=1))
 
     def run(
         self, *, seconds: float = math.inf, progress: Callable[[str, float], None] | None = None

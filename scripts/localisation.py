@@ -27,7 +27,9 @@ from numpy.typing import NDArray
 from bench.discrepancy import Case, CaseChannel, NominalParameter, record_from_arrays
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.localisation.state_map import CELLS, TIMES, WEAK, cell_index, state_maps
-from bench.discrepancy.model.structure import Observer, Place, Structure, structure_of
+from bench.discrepancy.model.rigs import structure_of
+from bench.discrepancy.model.structure import Place, Structure
+from bench.discrepancy.motion.observer import Observer
 from bench.discrepancy.simulation.prescribed_response import driven_force
 from bench.discrepancy.simulation.stick_slip import Elements, free_run
 from bench.laws.base import kernel

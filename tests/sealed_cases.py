@@ -13,7 +13,7 @@ from bench.discrepancy.effects.catalogue import effect_named
 from bench.discrepancy.fitting.map_fit import Fit, fit
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placements import placements
-from bench.discrepancy.model.structure import structure_of
+from bench.discrepancy.model.rigs import structure_of
 
 LATER = {
     "saturating_spring", "hertz_contact", "hidden_resonator", "displacement_dependent_damping", "stress_softening",

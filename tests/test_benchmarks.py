@@ -139,7 +139,7 @@ def test_sysid_is_given_the_same_problem(effect, tolerance):
     from bench.discrepancy.effects.catalogue import CATALOGUE
     from bench.discrepancy.likelihood.problem import Problem
     from bench.discrepancy.model.placements import placements
-    from bench.discrepancy.model.structure import structure_of
+    from bench.discrepancy.model.rigs import structure_of
 
     case = _case("gap", 5)
     structure = structure_of(case)

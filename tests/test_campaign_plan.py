@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import shutil
 import subprocess
 import sys
 import tomllib
+import tracemalloc
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,12 +18,26 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from bench.campaign import Choice, Integers, LogUniform, Normal, Plan, Uniform, plan_from_dict, read_plan
-from bench.campaign.distribution import Distribution, read_quantity
+from bench.campaign import (
+    Choice,
+    Integers,
+    LogUniform,
+    Normal,
+    Plan,
+    Uniform,
+    plan_from_dict,
+    read_plan,
+    run_campaign,
+    size,
+)
+from bench.campaign.distribution import Distribution
 from bench.campaign.drawing import dimension, draw_at, draws, point_of
 from bench.campaign.generation import Generator
 from bench.campaign.plan import leaves
+from bench.campaign.quantities import read_quantity
+from bench.campaign.tables import part_contents
 from bench.errors import BenchError, FileFormatError, ParameterError, UnknownNameError
+from bench.files import OutputError
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
@@ -162,7 +179,7 @@ def test_quantities_are_found_wherever_they_stand() -> None:
         ({"records": 0}, ParameterError, "at least 1"),
         ({"duration": 0.0999}, ParameterError, "whole number of samples"),
         ({"sampling": "grid"}, UnknownNameError, "latin_hypercube"),
-        ({"rigs": []}, ParameterError, "no rigs"),
+        ({"rigs": []}, ParameterError, "rigs: .* at least 1"),
         ({"rigs": [{"name": "a"}]}, ParameterError, "rig missing"),
         (
             {"rigs": [{"rig": "sdof", "elements": [{"law": "gpa", "joints": ["carriage"]}]}]},
@@ -185,7 +202,11 @@ def test_quantities_are_found_wherever_they_stand() -> None:
             "level",
         ),
         ({"excitations": [{"signals": {}}]}, ParameterError, "signals"),
-        ({"sensors": [{"chains": {"displacement": {"type": "noise"}}}]}, ParameterError, "list of stages"),
+        (
+            {"sensors": [{"chains": {"displacement": {"type": "noise"}}}]},
+            ParameterError,
+            "chains.displacement: .* a list is expected",
+        ),
         (
             {"excitations": [{"prescribe": "piston", "signals": {"shaker": {"type": "constant"}}}]},
             ParameterError,
@@ -235,7 +256,7 @@ def test_a_channel_of_a_withheld_element_is_refused() -> None:
 
 
 def test_large_hypercubes_are_refused_with_a_way_out() -> None:
-    plan = plan_from_dict(document(records=50_000_000, sampling="latin_hypercube"))
+    plan = plan_from_dict(document(records=50_000_000, records_per_part=1000, sampling="latin_hypercube"))
     with pytest.raises(ParameterError, match="sobol"):
         point_of(plan, 0)
 
@@ -277,3 +298,43 @@ def test_plan_is_a_value() -> None:
     assert isinstance(plan, Plan)
     with pytest.raises(dataclasses.FrozenInstanceError):
         plan.seed = 3  # type: ignore[misc]
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"records": 10**9}, r"1 000 000 000 records of 100 samples are 0\.4 TB a channel"),
+        ({"records": 10**18}, "at most 100000000 records"),
+        ({"records": 10**5000}, r"about 10\^5000 records"),
+        ({"records": 10**7, "records_per_part": 2}, "at most 1000000 parts"),
+        ({"records": 10**8, "records_per_part": 1000, "duration": 1.0}, "TB, which do not fit"),
+        ({"duration": 1e9}, r"64 records of 1e\+12 samples"),
+        ({"duration": 1e300}, "at most 2147483647 samples a record"),
+        ({"duration": 1e9, "sample_rate": 1e-6}, "TB while it is made"),
+        ({"sample_rate": 1e9}, "does not divide"),
+        ({"records_per_part": 10**7, "records": 10**7, "duration": 1.0}, "while it is made"),
+        ({"records": 10**7, "records_per_part": 1000, "sampling": "latin_hypercube"}, "sobol"),
+    ],
+)
+def test_plans_that_cannot_be_are_refused_with_their_size(
+    changes: dict, told: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On a machine of 64 GB with 1 TB free, before anything is allocated or written."""
+    monkeypatch.setattr(size, "memory_bytes", lambda: 64e9)
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: SimpleNamespace(free=1e12))
+    tracemalloc.start()
+    with pytest.raises((ParameterError, OutputError), match=told):
+        run_campaign(document(**changes), tmp_path / "never", threads=2)
+    assert tracemalloc.get_traced_memory()[1] < 50e6
+    tracemalloc.stop()
+    assert not (tmp_path / "never").exists()
+
+
+def test_the_size_of_a_part_is_what_it_takes() -> None:
+    """Against the arrays that a part and its batch really hold, within a factor of two: it is a bound to refuse by."""
+    generator = Generator(plan_from_dict(document(records=6, duration=20.0)))
+    tracemalloc.start()
+    contents = part_contents(generator, generator.part(0))
+    measured = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert 0.5 < size.part_bytes(generator) / (measured + sum(map(len, contents.values()))) < 2.0

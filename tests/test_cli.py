@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import json
 import math
+import os
+import subprocess
+import sys
 from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
@@ -93,7 +96,7 @@ def test_own_mjcf_with_an_element(tmp_path, capsys):
         ("clearance = 0.005", "clearanc = 0.005", "Did you mean 'clearance'"),
         ("clearance = 0.005", "clearance = -1.0", "a finite value in [0, inf] is expected"),
         ('joints = ["carriage"]', 'joints = ["cart"]', "unknown joint or tendon"),
-        ('joints = ["carriage"]', "", "needs the entries law and joints"),
+        ('joints = ["carriage"]', "", "an element needs law, joints; joints missing"),
         ('rig = "sdof"', 'rig = "sdoff"', "Did you mean 'sdof'"),
         ('rig = "sdof"', 'rig = "nowhere.xml"', "cannot read the model"),
         ('rig = "sdof"', 'machine = "sdof"', "unknown entry of a rig configuration 'machine'"),
@@ -152,3 +155,24 @@ def test_json_values_are_finite_and_plain():
     plain = json_values(document)
     assert plain == {"a": [1.0, None], "b": [{"x": None, "y": 2.0}], "c": {"d": "inf"}, "e": True}
     assert json.loads(json.dumps(plain, allow_nan=False)) == plain
+
+
+def test_version_is_told(capsys):
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out.startswith("jointbench ")
+
+
+@pytest.mark.slow
+def test_results_are_readable_whatever_the_locale_says():
+    code = "import sys; from bench.cli import main; sys.exit(main())"
+    plain = {k: v for k, v in os.environ.items() if not k.startswith(("LC_", "LANG", "PYTHONUTF8"))}
+    ascii_only = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+
+    def told(locale: dict[str, str]) -> bytes:
+        command = [sys.executable, "-c", code, "laws", "gap"]
+        return subprocess.run(command, env=plain | locale, capture_output=True, check=True).stdout
+
+    expected = told({"PYTHONIOENCODING": "utf-8"})
+    assert not expected.isascii()
+    assert told({"LANG": "C"}) == told(ascii_only) == expected
+    assert "\\u2026" in told({"PYTHONIOENCODING": "latin-1"}).decode("latin-1")  # … is none of its letters

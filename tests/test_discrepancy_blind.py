@@ -353,7 +353,7 @@ class Said:
         self.seconds = 0.1
 
     def to_json(self):
-        return {"verdict": "unknown", "named": [], "indistinguishable": [], "excluded": list(self.exclude)}
+        return {"verdict": "unknown", "named": [], "indistinguishable": [], "warnings": list(self.exclude)}
 
 
 def test_the_runner_obeys_the_protocol_skips_what_is_there_and_survives_a_failure(tmp_path, monkeypatch):
@@ -373,7 +373,7 @@ def test_the_runner_obeys_the_protocol_skips_what_is_there_and_survives_a_failur
     assert [p.name for p in written] == [f"{n}.json" for n in names]
     for name in names[:2]:
         truth = json.loads((answers / f"{name}.json").read_text())["effects"][0]["name"]
-        assert json.loads((results / f"{name}.json").read_text())["excluded"] == [truth]
+        assert json.loads((results / f"{name}.json").read_text())["warnings"] == [truth]
     failed = json.loads((results / "case-002.json").read_text())
     assert failed["verdict"] == "failed"
     assert "no luck" in failed["error"]

@@ -24,7 +24,7 @@ from planted_cases import (
 )
 
 from bench.discrepancy import diagnose
-from bench.discrepancy.checks.quantisation import quantisation_step, raised_noise
+from bench.discrepancy.case.channel_noise import quantisation_step, raised_noise
 from bench.discrepancy.effects.catalogue import CATALOGUE, effect_named
 from bench.discrepancy.effects.effect import unit_of
 from bench.laws import LAWS

@@ -16,7 +16,7 @@ from bench.discrepancy.effects.catalogue import effect_named
 from bench.discrepancy.fitting.map_fit import fit
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Placed
-from bench.discrepancy.model.structure import structure_of
+from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.screening.screen import Screen
 from bench.errors import FileFormatError, ParameterError, UnknownNameError
 from bench.laws import LAWS

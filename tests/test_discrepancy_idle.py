@@ -9,7 +9,7 @@ from bench.discrepancy.case.idle_loads import idle, idle_notes, without_idle_noi
 from bench.discrepancy.effects.catalogue import effect_named
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placements import placements
-from bench.discrepancy.model.structure import structure_of
+from bench.discrepancy.model.rigs import structure_of
 
 T = np.arange(5000) / 500.0
 

@@ -23,7 +23,7 @@ from bench.discrepancy.judgement.validation_discrepancy import nrmse
 from bench.discrepancy.likelihood import window_whitening as starts
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Placed
-from bench.discrepancy.model.structure import structure_of
+from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.screening.screen import Screen
 from bench.discrepancy.simulation.stick_slip import NO_ELEMENTS, Elements, LinearStructure, free_run
 from bench.errors import FileFormatError, ModelError, UnknownNameError

@@ -18,7 +18,7 @@ from bench.discrepancy import (
 from bench.discrepancy.case.acquisition import Antialias, upsampled
 from bench.discrepancy.effects.catalogue import CATALOGUE
 from bench.discrepancy.likelihood.problem import Problem
-from bench.discrepancy.model.structure import structure_of
+from bench.discrepancy.model.rigs import structure_of
 from bench.errors import FileFormatError, ParameterError, UnknownNameError
 
 RATE = 750.0

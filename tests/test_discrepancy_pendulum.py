@@ -15,7 +15,7 @@ from bench.discrepancy.effects.catalogue import effect_named
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.likelihood.whitening import whitened
 from bench.discrepancy.localisation.force_smoother import observers
-from bench.discrepancy.model.structure import structure_of
+from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.response.driving_loads import with_load_noise
 from bench.discrepancy.simulation.stick_slip import Elements
 from bench.errors import ModelError

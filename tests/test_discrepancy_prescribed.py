@@ -13,7 +13,7 @@ from bench.discrepancy.effects.catalogue import effect_named
 from bench.discrepancy.fitting.map_fit import fit
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Placed
-from bench.discrepancy.model.structure import structure_of
+from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.motion.prescribed import decided, held, prescribed_motion
 from bench.discrepancy.search.fits import consistent
 from bench.errors import RecordingError

@@ -17,7 +17,7 @@ from bench.discrepancy.blind.protocol import write_case
 from bench.discrepancy.case.schema import check_units
 from bench.discrepancy.checks.data_quality import compare, notes, refuse, unit_factor
 from bench.discrepancy.likelihood.problem import Problem
-from bench.discrepancy.model.structure import structure_of
+from bench.discrepancy.model.rigs import structure_of
 from bench.errors import BenchError, IdentificationError, RecordingError, UnitError
 
 
@@ -215,24 +215,29 @@ def rows(n=300, step=0.004, cell="0.1"):
 
 
 BROKEN: dict[str, tuple[dict, str]] = {
-    "not json": ({"nominal": "{"}, "is not valid JSON"),
-    "a list": ({"nominal": "[1, 2]"}, "holds a list"),
-    "no rig": ({"nominal": altered("rig", value=None)}, "no entry 'rig'"),
+    "not json": ({"nominal": "{"}, "as JSON"),
+    "a list": ({"nominal": "[1, 2]"}, "holds [1, 2]; a table of entries"),
+    "no rig": ({"nominal": altered("rig", value=None)}, "rig missing"),
     "unknown rig": ({"nominal": altered("rig", value="sdfo")}, "sdfo"),
-    "rig is a number": ({"nominal": altered("rig", value=3)}, "rig is a int"),
-    "parameters are a list": ({"nominal": altered("parameters", value=[1])}, "parameters is a list"),
-    "parameter is a number": ({"nominal": altered("parameters", "mass", value=2.0)}, "expected for instance"),
-    "value is text": ({"nominal": altered("parameters", "mass", "value", value="two")}, "finite number"),
+    "rig is a number": ({"nominal": altered("rig", value=3)}, "rig: 3 came; text is expected"),
+    "parameters are a list": ({"nominal": altered("parameters", value=[1])}, "parameters: [1] came; a table of entries is expected"),
+    "parameter is a number": ({"nominal": altered("parameters", "mass", value=2.0)}, "parameters.mass: 2.0 came"),
+    "value is text": ({"nominal": altered("parameters", "mass", "value", value="two")}, "mass.value: 'two' came"),
     "negative mass": ({"nominal": altered("parameters", "mass", "value", value=-2.0)}, "check its sign"),
-    "negative std": ({"nominal": altered("parameters", "mass", "std", value=-1)}, "zero or more"),
-    "misnamed std": ({"nominal": altered("parameters", "mass", value={"value": 2, "sigma": 1})}, "did you mean 'std'"),
+    "negative std": ({"nominal": altered("parameters", "mass", "std", value=-1)}, "parameters.mass.std: -1 came; a number of at least 0"),
+    "misnamed std": ({"nominal": altered("parameters", "mass", value={"value": 2, "sigma": 1})}, "Did you mean 'std'"),
+    "std left out": ({"nominal": altered("parameters", "mass", "std", value=None)}, "write 0 to mean certain"),
+    "foreign parameter": ({"nominal": altered("parameters", "dampnig", value={"value": 1, "std": 1})}, "Did you mean 'damping'"),
+    "foreign response": ({"nominal": altered("channels", "displacment", value={"unit": "m"})}, "Did you mean 'displacement'"),
+    "foreign option": ({"nominal": altered("load_interpolaton", value="linear")}, "Did you mean 'load_interpolation'"),
+    "capital entry": ({"nominal": altered("channels", "force", "Role", value="command")}, "Did you mean 'role'"),
     "no mass": ({"nominal": altered("parameters", "mass", value=None)}, "lacks the nominal parameter(s) mass"),
     "unknown unit": ({"nominal": altered("parameters", "mass", "unit", value="kgg")}, "unknown unit 'kgg'"),
     "units that clash": ({"nominal": altered("channels", "displacement", "unit", value="mm")}, "do not belong together"),
     "unknown role": ({"nominal": altered("channels", "force", "role", value="loadcell")}, "loadcell"),
-    "negative noise": ({"nominal": altered("channels", "force", "noise_std", value=-1)}, "from zero up"),
-    "no channels": ({"nominal": altered("channels", value={})}, "names no channel"),
-    "rate of zero": ({"nominal": altered("sample_rate_hz", value=0)}, "above zero"),
+    "negative noise": ({"nominal": altered("channels", "force", "noise_std", value=-1)}, "channels.force.noise_std: -1 came"),
+    "no channels": ({"nominal": altered("channels", value={})}, "channels: no channel besides time"),
+    "rate of zero": ({"nominal": altered("sample_rate_hz", value=0)}, "sample_rate_hz: 0 came; a number above 0"),
     "no validation": ({"validation": None}, "no validation*.csv"),
     "empty record": ({"validation": ""}, "lacks the column(s)"),
     "header only": ({"validation": HEADER}, "has 0 samples"),

@@ -18,7 +18,7 @@ from bench.discrepancy.judgement.predictive_check import contradicted
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.likelihood.whitening import timed
 from bench.discrepancy.model.placements import placements
-from bench.discrepancy.model.structure import structure_of
+from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.response.driving_loads import driving_loads
 from bench.discrepancy.screening.candidates import WORTH_A_FIT, followed
 from bench.discrepancy.screening.linear_amplitudes import Point

@@ -15,7 +15,7 @@ from bench.discrepancy.judgement.nonparametric_rival import likelier_force
 from bench.discrepancy.judgement.predictive_check import contradicted, fails
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placements import placements
-from bench.discrepancy.model.structure import structure_of
+from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.screening.score_test import lack_of_fit
 from bench.discrepancy.screening.screen import Screen
 from bench.discrepancy.search.coupled_effects import coupled_fits

@@ -11,7 +11,7 @@ from bench.discrepancy.blind.protocol import draw_case
 from bench.discrepancy.effects.catalogue import effect_named
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placements import placements
-from bench.discrepancy.model.structure import structure_of
+from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.numerics.least_squares import Prior, minimise
 from bench.discrepancy.numerics.spectral_product import whiten
 from bench.discrepancy.screening.candidates import refined

@@ -15,7 +15,7 @@ from bench.discrepancy.fitting.map_fit import fit
 from bench.discrepancy.judgement.posterior import closes
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placements import placements
-from bench.discrepancy.model.structure import structure_of
+from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.screening.screen import Screen
 from bench.discrepancy.search.load_interpolation import reading_notes
 from bench.discrepancy.verdict import Gap

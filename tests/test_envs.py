@@ -20,7 +20,7 @@ from bench.errors import BenchError, ModelError
 from bench.excitation import Hypothesis, Uncertain
 from bench.excitation.shaping import SHAPINGS, Shaping
 from envs import rendering, single
-from envs.benches import FLOATS, Benches, Options
+from envs.benches import FLOATS, Options
 from envs.laboratory import Laboratories, combined
 from envs.setups import PAIRS, SDOF_LAWS, discrimination_setup, joint_setup, sdof_setup
 
@@ -407,6 +407,15 @@ def test_documentation_states_every_argument_and_limit() -> None:
         (DISCRIMINATION, {"rig": "sdof", "pairs": ("axial_gap_coupling",)}, "pair of effects on rig 'sdof'"),
         (DISCRIMINATION, {"rig": "chain"}, "rig of the discrimination environment"),
         (SDOF, {"penalty": -1.0}, "penalty"),
+        (SDOF, {"penalty": None}, "penalty"),
+        (SDOF, {"window": float("nan")}, "window is nan"),
+        (SDOF, {"duration": float("inf")}, "duration is inf"),
+        (SDOF, {"n_knots": 1.5}, "n_knots is 1.5"),
+        (SDOF, {"n_knots": 3}, "n_knots is 3 in a window of 4 steps"),
+        (SDOF, {"n_draws": float("nan")}, "n_draws is nan"),
+        (SDOF, {"laws": 3}, "laws is 3"),
+        (SDOF, {"shaping": 3}, "knots"),
+        (DISCRIMINATION, {"pairs": ()}, "at least one name"),
         (SDOF, {"render_mode": "ansi"}, "rgb_array"),
     ],
 )
@@ -421,7 +430,26 @@ def test_unknown_arguments_and_steps_before_reset_are_errors() -> None:
         single.SDOFExcitationEnv(winow=0.1)
     with pytest.raises(gymnasium.error.ResetNeeded, match="reset"):
         single.SDOFExcitationEnv().step(np.zeros(1, dtype=np.float32))
-    benches = Benches(sdof_setup(), Options(n_knots=3), 1)
-    benches.reset(np.arange(1), [np.random.default_rng(0)])
-    with pytest.raises(BenchError, match="3 equal parts"):
-        benches.step(np.arange(1), np.zeros((1, 3)))
+
+
+@pytest.mark.parametrize(
+    ("action", "message"),
+    [
+        ([np.nan], "entry 0 of the action.*nan"),
+        ([-np.inf], "entry 0 of the action.*-inf"),
+        ([0.1, 0.2], r"shape \(2,\) came; \(1,\) is expected"),
+        ([[0.1]], r"shape \(1, 1\) came"),
+        (0.1, r"shape \(\) came"),
+        ([], r"shape \(0,\) came"),
+        (["much"], "real numbers"),
+        ([0.1j], "real numbers"),
+        ([None], "real numbers"),
+    ],
+)
+def test_an_action_that_is_none_is_refused_and_moves_nothing(action: Any, message: str) -> None:
+    env, other = make(SDOF), make(SDOF)
+    for each in (env, other):
+        each.reset(seed=3)
+    with pytest.raises(BenchError, match=message):
+        env.step(action)
+    np.testing.assert_array_equal(env.step(np.ones(1))[0], other.step(np.ones(1))[0])

@@ -296,7 +296,7 @@ BAD = [
     (lambda: Chain().start(-1.0), r"sample rate is -1.0 Hz"),
     (lambda: Chain().apply(np.zeros((3, 2)), RATE), r"block of shape \(3, 2\)"),
     (lambda: Chain(Gain(2.0)).process(Chain().start(RATE), [1.0]), r"belongs to Chain\(\)"),
-    (lambda: Chain.from_dict({}), r"list 'stages'"),
+    (lambda: Chain.from_dict({}), r"a chain needs stages; stages missing"),
 ]
 
 

@@ -378,9 +378,9 @@ def test_excite_between_rivals(tmp_path: Path, capsys: pytest.CaptureFixture[str
         ({'"gap.clearance"': '"gap.width"'}, [], "width"),
         ({"band = [0.5, 5.0]": "band = [0.5, 80.0]"}, ["--method", "sweep"], "half the step rate"),
         (
-            {"[experiment]": "[excitation]", "[experiment.uncertain]": "[excitation.uncertain]"},
+            {"[experiment]": "[experimnet]", "[experiment.uncertain]": "[experimnet.uncertain]"},
             [],
-            "no [experiment]",
+            "Did you mean 'experiment'",
         ),
     ],
 )

@@ -443,7 +443,7 @@ def test_sampling_that_cannot_work_says_why(signal, n, rate, message):
         ),
         (
             {"type": "harmonic", "frequenzy": 1.0},
-            r"unknown field of signal 'harmonic' 'frequenzy'.*'frequency'",
+            r"unknown entry of signal 'harmonic' 'frequenzy'.*'frequency'",
         ),
         ({"type": "sum", "signals": [{"type": "nothing"}]}, r"unknown signal type 'nothing'"),
     ],

@@ -46,6 +46,7 @@ def test_wheel_holds_code_models_data_and_licences_and_nothing_else(wheel):
         "bench/_data/friction_damper/LICENSE-CC-BY-SA-4.0.txt",
         "bench/_data/friction_damper/1Hz_80lb.parquet",
         "bench/_data/published_network.json",
+        "bench/_data/schemas/nominal.json",
     ):
         assert expected in names
     assert not [name for name in names if "__pycache__" in name or name.endswith((".nbi", ".nbc", ".so"))]

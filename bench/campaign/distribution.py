@@ -18,12 +18,12 @@ from __future__ import annotations
 import bisect
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import accumulate
 from typing import Any
 
-from bench.errors import ParameterError, UnknownNameError
+from bench.errors import ParameterError
 
 Value = float | int | str | bool
 """What a quantity of a plan comes out as."""
@@ -146,11 +146,6 @@ class Integers(Distribution):
     high: int
 
     def __post_init__(self) -> None:
-        for value in (self.low, self.high):
-            if isinstance(value, bool) or not isinstance(value, int):
-                raise ParameterError(
-                    f"integers = [{self.low!r}, {self.high!r}] came; two whole numbers are expected"
-                )
         if self.low > self.high:
             raise ParameterError(f"integers = [{self.low}, {self.high}] is empty; give the lower end first")
 
@@ -216,15 +211,6 @@ class Shared:
 Quantity = Value | Distribution | Shared
 """What a plan says of one quantity."""
 
-_FORMS: Mapping[str, tuple[str, ...]] = {
-    "uniform": (),
-    "log_uniform": (),
-    "normal": ("low", "high"),
-    "integers": (),
-    "choice": ("weights",),
-    "shared": ("times",),
-}
-
 
 def check_weights(owner: str, weights: Sequence[float]) -> None:
     """Raise `ParameterError` unless the weights are finite, not negative, and not all zero."""
@@ -238,56 +224,3 @@ def pick(u: float, weights: Sequence[float]) -> int:
     """Index whose share of the cumulated weights holds `u` in [0, 1)."""
     sums = list(accumulate(weights))
     return min(bisect.bisect_right(sums, u * sums[-1]), len(weights) - 1)
-
-
-def is_quantity_table(entry: object) -> bool:
-    """Whether a table of a plan stands for a distribution (and not for a signal, a stage, …)."""
-    return isinstance(entry, Mapping) and any(form in entry for form in _FORMS)
-
-
-def read_quantity(entry: Any, where: str) -> Quantity:
-    """A number, a name or a distribution from a plan.
-
-    Args:
-        entry: The value or table.
-        where: What the quantity is, for messages.
-
-    Raises:
-        UnknownNameError: No such distribution, or an option that it lacks.
-        ParameterError: Numbers that make no distribution.
-    """
-    if isinstance(entry, bool | int | float | str):
-        return entry
-    if not isinstance(entry, Mapping):
-        raise ParameterError(
-            f"{where} is {entry!r}; a number or a distribution as {{ uniform = [0.0, 1.0] }} is expected"
-        )
-    forms = [form for form in _FORMS if form in entry]
-    if len(forms) != 1:
-        raise UnknownNameError(f"distribution of {where}", ", ".join(map(str, entry)) or "{}", _FORMS)
-    form, options = forms[0], {key: value for key, value in entry.items() if key not in forms}
-    for key in options:
-        if key not in _FORMS[form]:
-            raise UnknownNameError(f"option of the distribution '{form}' of {where}", str(key), _FORMS[form])
-    try:
-        return _made(form, entry[form], options)
-    except (ParameterError, TypeError) as error:
-        raise ParameterError(f"{where}: {error}") from error
-
-
-def _made(form: str, argument: Any, options: Mapping[str, Any]) -> Quantity:
-    if form == "shared":
-        if not isinstance(argument, str):
-            raise ParameterError(
-                f"shared = {argument!r} came; the name of an entry of the plan's table shared is expected"
-            )
-        _finite("shared", **options)
-        return Shared(argument, **options)
-    if not isinstance(argument, list | tuple):
-        raise ParameterError(f"{form} = {argument!r} came; a list is expected")
-    if form == "choice":
-        return Choice(tuple(argument), tuple(options.get("weights", ())))
-    if len(argument) != 2:
-        raise ParameterError(f"{form} = {list(argument)!r} came; two numbers are expected")
-    made = {"uniform": Uniform, "log_uniform": LogUniform, "normal": Normal, "integers": Integers}[form]
-    return made(*argument, **options)

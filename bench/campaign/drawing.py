@@ -72,6 +72,7 @@ def point_of(plan: Plan, record: int) -> NDArray[np.float64]:
     if plan.sampling == "random":
         return record_streams(plan, record)[0].random(dimension(plan))
     if plan.sampling == "latin_hypercube":
+        check_design(plan)
         return _hypercube(plan.records, dimension(plan), plan.seed)[record]
     block, place = divmod(record, SOBOL_BLOCK)
     return _sobol(block, dimension(plan), plan.seed)[place]
@@ -147,12 +148,17 @@ def _value(quantity: Quantity, slots: Iterator[float], shared: Mapping[str, Valu
     return quantity
 
 
-def _hypercube(records: int, size: int, seed: int) -> NDArray[np.float64]:
-    if records * size > LARGEST_HYPERCUBE:
+def check_design(plan: Plan) -> None:
+    """Raise `ParameterError` where the points of a plan cannot be held."""
+    records, size = plan.records, dimension(plan)
+    if plan.sampling == "latin_hypercube" and records * size > LARGEST_HYPERCUBE:
         raise ParameterError(
             f"a Latin hypercube of {records} records in {size} quantities must be held whole in memory, and at most "
             f'{LARGEST_HYPERCUBE // size} records are allowed; use sampling = "sobol", which is made piece by piece'
         )
+
+
+def _hypercube(records: int, size: int, seed: int) -> NDArray[np.float64]:
     with _designing:
         return _hypercube_of(records, size, seed)
 

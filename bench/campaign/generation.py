@@ -18,7 +18,7 @@ from mujoco.batch import SimulationError as BatchError
 from numpy.typing import NDArray
 
 from bench import native
-from bench.campaign.drawing import Draw, draws, median_draw, record_streams
+from bench.campaign.drawing import Draw, check_design, draws, median_draw, record_streams
 from bench.campaign.plan import Plan
 from bench.campaign.variant import STATE, Rows, Variant, Variants, chains_of, drive_of, kept_channels
 from bench.errors import BenchError, ParameterError, SimulationError, UnknownNameError
@@ -93,6 +93,7 @@ class Generator:
         Raises:
             BenchError: What a record would fail with, whatever it draws.
         """
+        check_design(self.plan)
         for rig in range(len(self.plan.rigs)):
             variant = self.variants.full(rig)
             if _stride(variant, self.plan) < 1:
@@ -213,7 +214,7 @@ class Generator:
             [batch.bind("time")[:, None], batch.bind("qpos"), batch.bind("qvel"), batch.bind("act")], axis=1
         )
         record: list = ["sensordata", *([STATE] if inside else [])]
-        with native.untimed():
+        with native.running(model):
             result = batch.rollout(steps, controls, mujoco.mjtState.mjSTATE_CTRL, record)
         # a simulation in which MuJoCo found a bad state stops, and its clock with it
         whole = np.abs(batch.bind("time") - steps * variant.rig.timestep) < 0.5 * variant.rig.timestep

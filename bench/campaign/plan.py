@@ -11,10 +11,11 @@ import json
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 from bench.campaign.distribution import Distribution, Quantity, Shared, Value, check_weights
 from bench.errors import ParameterError, UnknownNameError
+from bench.signals.base import MAX_SAMPLES
 
 Sampling = Literal["random", "latin_hypercube", "sobol"]
 Precision = Literal["float32", "float64"]
@@ -24,6 +25,24 @@ ROWS_PER_PART = 500_000
 """Rows that a part aims at where the plan does not say: 14 MB for seven channels of float32."""
 MIN_PARTS = 64
 """Parts that a campaign is cut into where it has the records, so that many cores have work."""
+
+
+@dataclass(frozen=True)
+class PlanLimits:
+    """What a plan may ask for, whatever the machine.
+
+    Attributes:
+        records: Ten times the largest campaign that docs/scale.md reckons with, which fills the shared disks it names.
+        samples: Samples of a record, those of any signal.
+        parts: The manifest, with some 700 bytes for each, then stays within what a document may have.
+    """
+
+    records: int = 100_000_000
+    samples: int = MAX_SAMPLES
+    parts: int = 40_000
+
+
+PLAN_LIMITS = PlanLimits()
 
 Node = Any
 """A signal's or chain's dictionary in which a distribution may stand for a number."""
@@ -54,12 +73,6 @@ class ElementPlan:
     exact: bool = False
     withheld: bool = False
     probability: float = 1.0
-
-    def __post_init__(self) -> None:
-        if not 0.0 < self.probability <= 1.0:
-            raise ParameterError(
-                f"probability of element '{self.name}' is {self.probability!r}; a number in (0, 1] is expected"
-            )
 
     def to_dict(self) -> dict[str, Any]:
         """As in a plan."""
@@ -267,6 +280,7 @@ class Plan:
                 value = self.sample_rate
             if isinstance(value, bool | str | None) or not (math.isfinite(value) and value > 0.0):
                 raise ParameterError(f"{name} of the campaign is {value!r}; a positive number is expected")
+        self._check_size(PLAN_LIMITS)
         if (
             abs(self.duration * self.sample_rate - self.n_samples) > 1e-6 * self.n_samples
             or self.n_samples < 2
@@ -275,18 +289,29 @@ class Plan:
                 f"{self.duration:g} s at {self.sample_rate:g} Hz is not a whole number of samples (at least 2); "
                 "change the duration or the sample rate"
             )
-        for name, options in (("sampling", Sampling), ("precision", Precision), ("compression", Compression)):
-            if getattr(self, name) not in get_args(options):
-                raise UnknownNameError(f"{name} of the campaign", str(getattr(self, name)), get_args(options))
         self._check_members()
         if not self.records_per_part:
             whole = max(1, ROWS_PER_PART // self.n_samples)
             object.__setattr__(self, "records_per_part", max(1, min(whole, -(-self.records // MIN_PARTS))))
+            self._check_size(PLAN_LIMITS)
+
+    def _check_size(self, limits: PlanLimits) -> None:
+        samples = self.duration * self.sample_rate
+        parts = -(-self.records // self.records_per_part) if self.records_per_part else 0
+        for what, value, most, todo in (
+            ("records", self.records, limits.records, "make several campaigns, each with a seed of its own"),
+            ("samples a record", samples, limits.samples, "shorten the records, or lower the sample rate"),
+            ("parts", parts, limits.parts, "raise records_per_part"),
+        ):
+            if value > most:
+                width = 4 if self.precision == "float32" else 8
+                terabytes = min(self.records, 10**30) * samples * width / 1e12
+                raise ParameterError(
+                    f"the campaign is too large: {_short(self.records)} records of {_short(samples)} samples are "
+                    f"{terabytes:.3g} TB a channel, and at most {most} {what} can be asked for; {todo}"
+                )
 
     def _check_members(self) -> None:
-        for what, members in (("rigs", self.rigs), ("excitations", self.excitations)):
-            if not members:
-                raise ParameterError(f"the campaign has no {what}; at least one [[{what}]] is expected")
         names = [rig.name for rig in self.rigs]
         for what, members in (
             ("rigs", self.rigs),
@@ -401,6 +426,13 @@ def filled(node: Node, path: str, values: Mapping[str, Value]) -> Any:
     if isinstance(node, list | tuple):
         return [filled(value, f"{path}/{index}", values) for index, value in enumerate(node)]
     return node
+
+
+def _short(number: float) -> str:
+    """A number on a few characters, whatever its size."""
+    if isinstance(number, int) and number.bit_length() > 64:
+        return f"about 10^{math.floor(number.bit_length() * math.log10(2.0))}"
+    return f"{number:,}".replace(",", " ") if isinstance(number, int) else f"{number:g}"
 
 
 def _unique(what: str, names: list[str]) -> None:

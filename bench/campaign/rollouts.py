@@ -12,8 +12,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.campaign.store import CampaignError
+from bench.campaign.lock import CampaignError
 from bench.errors import ParameterError
+from bench.files import folder_made_in
+
+MINARI_ROOT = "MINARI_DATASETS_PATH"
+"""Environment variable by which Minari finds its data sets."""
 
 Policy = Callable[[Any, np.random.Generator], Any]
 """An action from an observation and a source of randomness."""
@@ -132,13 +136,13 @@ def write_minari(
         )
         for index, episode in enumerate(rollouts)
     ]
-    with _minari_root(folder) as root, warnings.catch_warnings():
+    root = Path(folder or os.environ.get(MINARI_ROOT) or Path.home() / ".minari" / "datasets").resolve()
+    if os.path.lexists(root / dataset):
+        raise CampaignError(f"the data set '{dataset}' exists in {root}; give it another version, as -v1")
+    with folder_made_in(root, dataset) as stage, _minari_root(stage), warnings.catch_warnings():
         warnings.simplefilter(
             "ignore", UserWarning
         )  # one for each field of the description that is not given
-        target = root / dataset
-        if target.exists():
-            raise CampaignError(f"the data set '{dataset}' exists in {root}; give it another version, as -v1")
         try:
             minari.create_dataset_from_buffers(
                 dataset,
@@ -154,20 +158,17 @@ def write_minari(
             )
         except ValueError as error:
             raise ParameterError(f"Minari does not take the data set '{dataset}': {error}") from error
-    return target
+    return root / dataset
 
 
 @contextmanager
-def _minari_root(folder: str | Path | None) -> Iterator[Path]:
-    """The root of Minari's data sets, which it finds by an environment variable only; put back afterwards."""
-    key = "MINARI_DATASETS_PATH"
-    before = os.environ.get(key)
-    if folder is not None:
-        os.environ[key] = str(Path(folder).resolve())
+def _minari_root(folder: Path) -> Iterator[None]:
+    """Make a folder the root of Minari's data sets, which it finds by an environment variable only; put back afterwards."""
+    before = os.environ.get(MINARI_ROOT)
+    os.environ[MINARI_ROOT] = str(folder)
     try:
-        yield Path(os.environ.get(key) or Path.home() / ".minari" / "datasets")
+        yield
     finally:
-        if folder is not None:
-            os.environ.pop(key)
-            if before is not None:
-                os.environ[key] = before
+        os.environ.pop(MINARI_ROOT)
+        if before is not None:
+            os.environ[MINARI_ROOT] = before

@@ -7,50 +7,55 @@
     records/part-000123.parquet   record, status, rig, excitation, sensors and what they drew
     answers/part-000123.parquet   only where the plan withholds something: the rest of what was drawn
     answers/answers.json      and the whole plan
-    journal.jsonl             one line a finished part, from which the manifest is made
+    journal.jsonl             one line a finished part, noted when it was written; the manifest is made from it
 
-A part is finished when its file in ``samples`` is there: it is written last, elsewhere, flushed to the disk and moved
-into place. Whatever is killed when, a folder holds whole parts and nothing else, and a resumed campaign does the others.
-The journal only saves hashing them again.
+A part is finished when the journal notes it and its files are those that were noted (`bench.campaign.parts`). Files are
+written elsewhere, flushed to the disk and moved into place, then noted. Whatever is killed when, a resumed campaign keeps
+what is finished and makes the rest again. What is not of the campaign is moved to ``.set_aside``, never removed.
 """
 
 from __future__ import annotations
 
 import contextlib
-import hashlib
 import json
 import os
-import secrets
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
+from bench.campaign.journal import Journal, journal_faults
+from bench.campaign.lock import CampaignError, locked
+from bench.campaign.parts import (
+    Layout,
+    any_part,
+    entry_of,
+    fault,
+    is_entry,
+    manifest_entries,
+    mark_of,
+    part_name,
+    public,
+    strangers,
+)
 from bench.campaign.plan import Plan
-from bench.errors import BenchError, FileFormatError
-from bench.files import OutputError, write_text
-from bench.provenance import software_versions
+from bench.campaign.versions import differing, versions
+from bench.errors import FileFormatError
+from bench.files import SYSTEM, OutputError, settle, write_bytes, write_text
 
 FORMAT = 1
 """Version of the layout."""
-FOLDERS = ("samples", "records", "answers")
-BYTES_DEPEND_ON = ("jointbench", "mujoco", "numpy", "scipy", "numba", "pyarrow")
-"""Distributions that must be the same when a campaign is resumed."""
 
 
-class CampaignError(BenchError, RuntimeError):
-    """A campaign cannot be run, resumed or read."""
+class Opened(NamedTuple):
+    """A campaign's folder at the start of a run.
 
+    Attributes:
+        entries: Entry by finished part.
+        found: What was not as it was written, a line each; it is made again or was set aside.
+    """
 
-def part_name(index: int) -> str:
-    """File name of a part."""
-    return f"part-{index:06d}.parquet"
-
-
-def versions() -> dict[str, str]:
-    """Versions of what the bytes of a campaign depend on, and of Python."""
-    from importlib.metadata import version  # noqa: PLC0415
-
-    return {**dict(software_versions()), "pyarrow": version("pyarrow")}
+    entries: dict[int, dict[str, Any]]
+    found: list[str]
 
 
 class Store:
@@ -62,6 +67,7 @@ class Store:
 
     def __init__(self, folder: str | Path) -> None:
         self.folder = Path(folder).resolve()
+        self.journal = Journal(self.folder / "journal.jsonl")
 
     @property
     def manifest_path(self) -> Path:
@@ -69,7 +75,7 @@ class Store:
         return self.folder / "manifest.json"
 
     def path(self, kind: str, part: int) -> Path:
-        """Path of a part in one of `FOLDERS`."""
+        """Path of a part in one of the folders of the data set."""
         return self.folder / kind / part_name(part)
 
     def manifest(self) -> dict[str, Any]:
@@ -78,27 +84,27 @@ class Store:
         Raises:
             FileFormatError: There is none, or it is no manifest of a campaign.
         """
+        from bench.campaign.schema import MANIFEST_LIMITS, ManifestDocument  # noqa: PLC0415  (pydantic, for those who read)
+        from bench.documents import checked, load_document  # noqa: PLC0415
+
         try:
-            document = json.loads(self.manifest_path.read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
-            raise FileFormatError(
-                f"'{self.folder}' is no campaign: {self.manifest_path.name} cannot be read ({error})"
-            ) from error
-        if not isinstance(document, dict) or document.get("format") != FORMAT:
+            document = load_document(self.manifest_path, limits=MANIFEST_LIMITS)
+        except FileFormatError as error:
+            raise FileFormatError(f"'{self.folder}' is no campaign: {error}") from error
+        if document.get("format") != FORMAT:
             raise FileFormatError(
                 f"'{self.manifest_path}' is no manifest of format {FORMAT}; a folder written by a campaign is expected"
             )
+        checked(ManifestDocument, document, str(self.manifest_path))
         return document
 
     @contextlib.contextmanager
-    def opened(
-        self, plan: Plan, channels: list[dict[str, str]], *, resume: bool
-    ) -> Iterator[dict[int, dict[str, Any]]]:
-        """Make or reopen the folder for a run, alone; gives the entries of the parts that are finished.
+    def opened(self, plan: Plan, channels: list[dict[str, str]], *, resume: bool) -> Iterator[Opened]:
+        """Make or reopen the folder for a run, alone; gives what is finished, and what was found amiss.
 
         Raises:
             CampaignError: It holds another campaign, one made with other versions, one at all without `resume`, other files,
-                or another process is at work in it.
+                links in the place of its folders, or another process is at work in it.
             OutputError: It cannot be written to.
         """
         try:
@@ -107,138 +113,197 @@ class Store:
             raise OutputError(
                 f"cannot write {self.folder}: {error.strerror}; choose another place"
             ) from error
-        with self._locked():
-            if self.manifest_path.exists():
-                self._check_same(plan, resume=resume)
-            elif any(not entry.name.startswith(".") for entry in self.folder.iterdir()):
-                raise CampaignError(f"'{self.folder}' holds other files; give a campaign a folder of its own")
-            else:  # before anything else, so that a folder begun is known as a campaign
+        layout, found = Layout.of(plan), list[str]()
+        with locked(self.folder):
+            begun = self._begun(plan, resume=resume, found=found)
+            if begun is None:  # before anything else, so that a folder begun is known as a campaign
                 self.write_manifest(plan, channels, {}, status="running")
             for torn in (*self.folder.glob(".manifest.json.*"), *self.folder.glob(".journal.jsonl.*")):
                 torn.unlink(missing_ok=True)
-            for name in FOLDERS if plan.withholds else FOLDERS[:2]:
-                (self.folder / name).mkdir(exist_ok=True)
-            partial = self.folder / ".partial"
-            partial.mkdir(exist_ok=True)
-            for torn in partial.iterdir():
-                torn.unlink(missing_ok=True)
+            self._make_folders(layout)
             if plan.withholds:
-                answers = {"plan": plan.to_dict(), "plan_sha256": plan.sha256}
-                write_text(
-                    self.folder / "answers" / "answers.json",
-                    json.dumps(answers, indent=1, ensure_ascii=False),
-                )
-            entries = self._finished(plan)
+                self._write_answers(plan)
+            found += self._set_aside(layout)
+            entries = self._finished(layout, begun or {}, found)
+            self.journal.write(layout.sha256, versions(), (entries[part] for part in sorted(entries)))
             self.write_manifest(plan, channels, entries, status="running")
-            yield entries
-
-    @contextlib.contextmanager
-    def _locked(self) -> Iterator[None]:
-        """Hold the folder; the system lets go of it when the process ends, however it ends."""
-        with (self.folder / ".lock").open("w") as lock:
             try:
-                import fcntl  # noqa: PLC0415  (not on Windows, where nobody keeps two runs apart)
+                yield Opened(entries, found)
+            finally:
+                self._clear_partial()
 
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except ImportError:
-                pass
-            except OSError as error:
+    def _begun(self, plan: Plan, *, resume: bool, found: list[str]) -> dict[str, Any] | None:
+        """The manifest of a campaign that was begun here, or what its journal tells instead; None where there is none."""
+        header = self.journal.read(plan.sha256).header
+        begun: dict[str, Any] | None = None
+        if os.path.lexists(self.manifest_path):
+            try:
+                begun = self.manifest()
+            except FileFormatError as error:
+                if header is None:
+                    raise
+                found.append(f"manifest.json is damaged and was made again from the journal ({error})")
+        elif header is not None:
+            found.append("manifest.json was missing and was made again from the journal")
+        if begun is None and header is None:
+            if any(not entry.name.startswith(".") for entry in self.folder.iterdir()):
                 raise CampaignError(
-                    f"another process is at work in '{self.folder}'; wait for it or stop it"
-                ) from error
-            yield
+                    f"'{self.folder}' holds other files, and neither a manifest nor a journal of a campaign; "
+                    "give a campaign a folder of its own"
+                )
+            return None
+        begun = begun or {**(header or {}), "plan": {}}
+        self._check_same(begun, plan, resume=resume)
+        return begun
 
-    def _check_same(self, plan: Plan, *, resume: bool) -> None:
-        manifest = self.manifest()
+    def _check_same(self, begun: Mapping[str, Any], plan: Plan, *, resume: bool) -> None:
         if not resume:
             raise CampaignError(
                 f"'{self.folder}' holds a campaign already; resume it, or choose another folder"
             )
-        if manifest["plan_sha256"] != plan.sha256:
+        if begun.get("plan_sha256") != plan.sha256:
             raise CampaignError(
-                f"'{self.folder}' holds a campaign of another plan ('{manifest['plan'].get('name')}'); "
+                f"'{self.folder}' holds a campaign of another plan ('{begun.get('name', '')}'); "
                 "choose another folder, or resume with the plan it was begun with"
             )
-        now = versions()
-        changed = [
-            f"{name} {manifest['versions'].get(name)} (now {now[name]})"
-            for name in BYTES_DEPEND_ON
-            if name in now and manifest["versions"].get(name) != now[name]
-        ]
+        then = begun.get("versions")
+        changed = differing(then if isinstance(then, Mapping) else {}, versions(), "now")
         if changed:
             raise CampaignError(
-                f"the campaign in '{self.folder}' was begun with {', '.join(changed)}; its records could differ in their "
+                f"the campaign in '{self.folder}' was begun with {changed}; its records could differ in their "
                 "last bits: resume with the same versions, or choose another folder"
             )
 
-    def _finished(self, plan: Plan) -> dict[int, dict[str, Any]]:
-        """Entries of the finished parts: from the journal, and read off the files where it lacks them."""
+    def _make_folders(self, layout: Layout) -> None:
+        for name in (*layout.kinds, ".partial", ".set_aside"):
+            path = self.folder / name
+            if path.is_symlink():
+                raise CampaignError(
+                    f"'{path}' is a link, and what it points to may be of others; move the folder itself here"
+                )
+            try:
+                path.mkdir(exist_ok=True)
+            except OSError as error:
+                raise OutputError(
+                    f"cannot make the folder {path}: {error.strerror}; move away what is there"
+                ) from error
+        self._clear_partial()
+
+    def _clear_partial(self) -> None:
+        """Remove the files that a stopped run was writing; nothing else of the campaign is ever removed."""
+        for torn in (self.folder / ".partial").iterdir():
+            with contextlib.suppress(OSError):
+                torn.unlink()
+
+    def _write_answers(self, plan: Plan) -> None:
+        path = self.folder / "answers" / "answers.json"
+        text = json.dumps({"plan": plan.to_dict(), "plan_sha256": plan.sha256}, indent=1, ensure_ascii=False)
+        if path.is_symlink() or not path.is_file() or path.read_bytes() != text.encode():
+            write_bytes(path, text.encode(), inside=self.folder / ".partial")
+
+    def _set_aside(self, layout: Layout) -> list[str]:
+        """Move what is not of the campaign out of the folders that readers take whole; tell what it was."""
+        told = []
+        for path, what in strangers(self.folder, layout):
+            self._move_aside(path)
+            told.append(f"{path.relative_to(self.folder)} {what} and was moved to .set_aside")
+        return told
+
+    def _aside(self, path: Path) -> Path:
+        """A free name for a file of the campaign's folder among what was set aside."""
+        name, number = "-".join(path.relative_to(self.folder).parts), 0
+        place = self.folder / ".set_aside"
+        while os.path.lexists(place / (f"{name}.{number}" if number else name)):
+            number += 1
+        return place / (f"{name}.{number}" if number else name)
+
+    def _move_aside(self, path: Path) -> None:
+        try:
+            SYSTEM.replace(path, self._aside(path))
+        except OSError as error:
+            raise OutputError(f"cannot move {path} away: {error.strerror}; move it by hand") from error
+
+    def _finished(
+        self, layout: Layout, begun: Mapping[str, Any], found: list[str]
+    ) -> dict[int, dict[str, Any]]:
+        """Entries of the finished parts: those of the journal, or where it lacks them of the manifest, that files agree with."""
+        noted = self.journal.read(layout.sha256)
+        told = manifest_entries(begun, layout)
+        status = str(begun.get("status", "running"))
+        present = any_part(self.folder, layout)
+        lost = journal_faults(self.journal, noted, layout, told, status=status, any_part=present)
+        if lost and self.journal.path.is_symlink():
+            self._move_aside(self.journal.path)
+        elif lost and self.journal.present:  # a copy: until it is made again it holds what is finished
+            write_bytes(self._aside(self.journal.path), self.journal.path.read_bytes())
+        found += [f"{line}; it was made again" for line in lost]
         entries: dict[int, dict[str, Any]] = {}
-        journal = self.folder / "journal.jsonl"
-        if journal.exists():
-            for line in journal.read_text(encoding="utf-8", errors="replace").splitlines():
-                with contextlib.suppress(ValueError):  # the last line of a killed run may be torn
-                    entry = json.loads(line)
-                    entries[entry["part"]] = entry
-        present = {
-            path.name: path.stat().st_size for path in (self.folder / "samples").glob("part-*.parquet")
-        }
-        for part in range(plan.n_parts):
-            size = present.get(part_name(part))
-            others = [self.path(kind, part) for kind in (FOLDERS[1:] if plan.withholds else FOLDERS[1:2])]
-            if size is None or not all(path.exists() for path in others):
-                entries.pop(part, None)
-            elif part not in entries or entries[part]["files"]["samples"]["bytes"] != size:
-                entries[part] = self.entry_from_files(plan, part)
-        text = "".join(json.dumps(entries[part]) + "\n" for part in sorted(entries))
-        write_text(journal, text)
+        for part in range(layout.n_parts):
+            entry = noted.entries.get(part) or told.get(part)
+            if entry is None or not is_entry(layout, public(entry)):
+                if status == "complete":  # what a stopped run leaves is nothing amiss
+                    found += [
+                        f"{name} is noted nowhere and is made again" for name in self._present(layout, part)
+                    ]
+                continue
+            try:
+                marks = {kind: mark_of(self.path(kind, part)) for kind in layout.kinds}
+            except OSError:
+                marks = {}
+            wrong = fault(self.folder, layout, entry, whole=False)
+            if wrong is None:
+                entries[part] = {**entry, "marks": marks}
+            else:
+                found.append(f"{wrong[0]}/{part_name(part)} {wrong[1]}; the part is made again")
         return entries
 
-    def entry_from_files(self, plan: Plan, part: int) -> dict[str, Any]:
-        """The entry of a finished part, from its files alone."""
-        import pyarrow.parquet as pq  # noqa: PLC0415
-
-        table = pq.ParquetFile(self.path("records", part)).read(columns=["record", "status"]).to_pydict()
-        failed = [r for r, status in zip(table["record"], table["status"], strict=True) if status != "ok"]
-        contents = {
-            kind: self.path(kind, part).read_bytes() for kind in FOLDERS if self.path(kind, part).exists()
-        }
-        return entry_of(plan, part, failed, contents)
+    def _present(self, layout: Layout, part: int) -> list[str]:
+        paths = [self.path(kind, part) for kind in layout.kinds]
+        return [str(path.relative_to(self.folder)) for path in paths if os.path.lexists(path)]
 
     def write_part(
         self, plan: Plan, part: int, failed: list[int], contents: Mapping[str, bytes]
     ) -> dict[str, Any]:
-        """Put the files of a part in place, the samples last; return its entry."""
-        for kind in reversed(FOLDERS):
-            if kind in contents:
-                self._put(self.path(kind, part), contents[kind])
-        return entry_of(plan, part, failed, contents)
+        """Put the files of a part in place; return the entry to be noted, made from the bytes in memory.
 
-    def _put(self, path: Path, content: bytes) -> None:
-        # not bench.files.replacing, whose temporary files lie beside their targets: readers take whole folders
-        temporary = self.folder / ".partial" / f"{path.parent.name}-{path.name}.{secrets.token_hex(4)}"
-        try:
-            with temporary.open("xb") as file:
-                file.write(content)
-                file.flush()
-                os.fsync(file.fileno())
-            os.replace(temporary, path)
-        except OSError as error:
-            temporary.unlink(missing_ok=True)
-            raise OutputError(
-                f"cannot write {path}: {error.strerror}; free some space and resume the campaign"
-            ) from error
-        if os.name == "posix":
-            folder = os.open(path.parent, os.O_RDONLY)
-            try:
-                os.fsync(folder)
-            finally:
-                os.close(folder)
+        Raises:
+            OutputError: They cannot be written.
+        """
+        entry = entry_of(Layout.of(plan), part, failed, contents)
+        for kind, content in contents.items():
+            # not beside their targets, since readers take whole folders
+            write_bytes(self.path(kind, part), content, inside=self.folder / ".partial", settled=False)
+        marks = {kind: mark_of(self.path(kind, part), content) for kind, content in contents.items()}
+        return {**entry, "marks": marks}
 
-    def journal(self, entry: Mapping[str, Any]) -> None:
-        """Note a finished part."""
-        with (self.folder / "journal.jsonl").open("a", encoding="utf-8") as file:
-            file.write(json.dumps(entry) + "\n")
+    def check_present(self, entries: Mapping[int, Mapping[str, Any]]) -> None:
+        """Raise `CampaignError` where a file that was noted is not there in its size: removed meanwhile, or on another disk."""
+        for part, entry in entries.items():
+            for kind, noted in entry["files"].items():
+                path = self.path(kind, part)
+                if not path.is_file() or path.stat().st_size != noted["bytes"]:
+                    raise CampaignError(
+                        f"{path} is not there as it was written; it was changed while the campaign ran, or lies on a disk that only "
+                        "its worker sees: resume the campaign"
+                    )
+
+    def note(self, plan_sha256: str, entry: Mapping[str, Any]) -> None:
+        """Note a finished part in the journal.
+
+        Raises:
+            OutputError: It cannot be written.
+        """
+        self.journal.note(plan_sha256, entry)
+
+    def journaled(self) -> dict[int, dict[str, Any]]:
+        """Entries of the journal by part, as far as they are as they were written.
+
+        Raises:
+            FileFormatError: The folder is no campaign.
+        """
+        layout = Layout.of_manifest(self.manifest())
+        entries = self.journal.read(layout.sha256).entries
+        return {part: entry for part, entry in entries.items() if is_entry(layout, public(entry))}
 
     def write_manifest(
         self,
@@ -256,7 +321,9 @@ class Store:
             entries: Entry by finished part.
             status: "running", "stopped" or "complete".
         """
-        done = [entries[part] for part in sorted(entries)]
+        for kind in Layout.of(plan).kinds if entries else ():  # names of parts are not waited for one by one
+            settle(self.folder / kind)
+        done = [public(entries[part]) for part in sorted(entries)]
         document = {
             "format": FORMAT,
             "name": plan.name,
@@ -272,24 +339,6 @@ class Store:
         write_text(self.manifest_path, json.dumps(document, indent=1, ensure_ascii=False))
 
 
-def entry_of(plan: Plan, part: int, failed: list[int], contents: Mapping[str, bytes]) -> dict[str, Any]:
-    """What journal and manifest say of a part."""
-    records = len(plan.part(part))
-    return {
-        "part": part,
-        "first": part * plan.records_per_part,
-        "records": records,
-        "ok": records - len(failed),
-        "failed": failed,
-        "rows": (records - len(failed)) * plan.n_samples,
-        "files": {
-            kind: {"bytes": len(contents[kind]), "sha256": hashlib.sha256(contents[kind]).hexdigest()}
-            for kind in FOLDERS
-            if kind in contents
-        },
-    }
-
-
 def counts(entries: list[Mapping[str, Any]] | list[dict[str, Any]]) -> dict[str, int]:
     """Sums over the entries of parts."""
     return {
@@ -299,28 +348,3 @@ def counts(entries: list[Mapping[str, Any]] | list[dict[str, Any]]) -> dict[str,
         "rows": sum(entry["rows"] for entry in entries),
         "bytes": sum(file["bytes"] for entry in entries for file in entry["files"].values()),
     }
-
-
-def verify(folder: str | Path) -> list[str]:
-    """Compare every file of a campaign with its hash in the manifest.
-
-    Returns:
-        What does not agree, a line a file; empty where all is as it was written.
-
-    Raises:
-        FileFormatError: The folder is no campaign.
-    """
-    store = Store(folder)
-    wrong = []
-    for entry in store.manifest()["parts"]:
-        for kind, file in entry["files"].items():
-            path = store.path(kind, entry["part"])
-            if kind == "answers" and not path.parent.exists():
-                continue  # sealed elsewhere
-            if not path.exists():
-                wrong.append(f"{path.relative_to(store.folder)} is missing")
-                continue
-            with path.open("rb") as stream:
-                if hashlib.file_digest(stream, "sha256").hexdigest() != file["sha256"]:
-                    wrong.append(f"{path.relative_to(store.folder)} differs from what was written")
-    return wrong

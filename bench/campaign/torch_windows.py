@@ -3,12 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 from torch.utils.data import IterableDataset, get_worker_info
 
-if TYPE_CHECKING:
-    from bench.campaign.windows import Windows
+
+class Tuple(Protocol):
+    """A named tuple."""
+
+    def _asdict(self) -> dict[str, Any]: ...
+
+
+class Divisible(Protocol):
+    """Windows that can be divided among processes, as `bench.campaign.windows.Windows` can."""
+
+    def share(self, rank: int, count: int) -> Iterator[Tuple]:
+        """Those of one process of several."""
+        ...
+
+    def __len__(self) -> int: ...
 
 
 class WindowDataset(IterableDataset):
@@ -18,7 +31,7 @@ class WindowDataset(IterableDataset):
         windows: The windows.
     """
 
-    def __init__(self, windows: Windows) -> None:
+    def __init__(self, windows: Divisible) -> None:
         self.windows = windows
 
     def __iter__(self) -> Iterator[dict[str, Any]]:

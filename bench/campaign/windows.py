@@ -7,7 +7,7 @@ one record are as far apart as the buffer is long.
 
 from __future__ import annotations
 
-import json
+import contextlib
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from pathlib import Path
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from bench.campaign.store import Store
 from bench.campaign.tables import records_per_group
-from bench.errors import ParameterError, UnknownNameError
+from bench.errors import BenchError, FileFormatError, ParameterError, UnknownNameError
 
 
 class Window(NamedTuple):
@@ -175,10 +175,16 @@ class Windows:
         """Records ``(count,)``, values ``(count, n_samples, n_channels)`` and parameters of one row group."""
         import pyarrow.parquet as pq  # noqa: PLC0415
 
-        with pq.ParquetFile(self._store.path("samples", part)) as file:
+        path = self._store.path("samples", part)
+        with _readable(path), pq.ParquetFile(path) as file:
             table = file.read_row_group(group, columns=["record", *self.channels], use_threads=False)
-        records = table.column("record").to_numpy()[:: self.n_samples]
-        columns = [table.column(name).to_numpy().reshape(count, self.n_samples) for name in self.channels]
+            if len(table) != count * self.n_samples:
+                raise FileFormatError(
+                    f"row group {group} of {path} has {len(table)} rows; {count} records of {self.n_samples} samples are expected: "
+                    "run the campaign again to make the part again"
+                )
+            records = table.column("record").to_numpy()[:: self.n_samples]
+            columns = [table.column(name).to_numpy().reshape(count, self.n_samples) for name in self.channels]
         drawn = np.empty((count, 0))
         if self.parameters:
             rows = self._drawn(part)
@@ -194,7 +200,7 @@ def _parameters(path: str, names: tuple[str, ...]) -> dict[int, NDArray[np.float
     """Parameters by record, of one part."""
     import pyarrow.parquet as pq  # noqa: PLC0415
 
-    with pq.ParquetFile(path) as file:
+    with _readable(path), pq.ParquetFile(path) as file:
         for name in names:
             if name not in file.schema_arrow.names:
                 raise UnknownNameError("column of the campaign's records", name, file.schema_arrow.names)
@@ -206,16 +212,29 @@ def _parameters(path: str, names: tuple[str, ...]) -> dict[int, NDArray[np.float
     return dict(zip(table.column("record").to_pylist(), np.stack(columns, axis=1), strict=True))
 
 
+@contextlib.contextmanager
+def _readable(path: str | Path) -> Iterator[None]:
+    """Tell what Arrow cannot read with the name of the file."""
+    import pyarrow as pa  # noqa: PLC0415
+
+    try:
+        yield
+    except BenchError:
+        raise
+    except (
+        pa.ArrowException,
+        OSError,
+        KeyError,
+        IndexError,
+    ) as error:  # the latter two: a column, a row group
+        raise FileFormatError(
+            f"cannot read {path}: {' '.join(str(error).split())}; run the campaign again to make the part again"
+        ) from error
+
+
 def _journaled(store: Store) -> dict[int, int]:
     """Finished parts of a campaign that is still running, and their records."""
-    found = {}
-    for line in (store.folder / "journal.jsonl").read_text(encoding="utf-8").splitlines():
-        try:
-            entry = json.loads(line)
-        except ValueError:  # the line that is just being written
-            continue
-        found[entry["part"]] = entry["ok"]
-    return found
+    return {part: entry["ok"] for part, entry in store.journaled().items()}
 
 
 def _stacked(held: Sequence[Window]) -> Window:

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import codecs
 import sys
 import warnings
 from collections.abc import Callable
+from io import TextIOWrapper
 from typing import Any
 
 import tyro
 from rich.console import Console
 
+from bench import __version__
+from bench.cli.console import Terminated, terminable
 from bench.cli.diagnosis import Blind, Diagnose
 from bench.cli.excite import Excite
 from bench.cli.rigs import Demo, Laws, Simulate, View
+from bench.cli.schema import Schema
 from bench.cli.studies import Campaign, Reproduce
 from bench.errors import BenchError
 
@@ -26,6 +31,7 @@ COMMANDS: dict[str, type] = {
     "blind": Blind,
     "reproduce": Reproduce,
     "campaign": Campaign,
+    "schema": Schema,
 }
 
 
@@ -35,25 +41,39 @@ def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
     )
 
 
+def _speak_unicode() -> None:
+    """Have both streams write UTF-8 where the locale (LANG=C, PYTHONIOENCODING) says ASCII: results have units and Greek letters."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            ascii_only = codecs.lookup(stream.encoding).name == "ascii"
+            # what another locale's alphabet lacks is told as its number rather than by a traceback
+            stream.reconfigure(encoding="utf-8" if ascii_only else None, errors="backslashreplace")
+
+
 def main(argv: list[str] | None = None) -> int:
-    """Run the command line; returns the exit status: 0 done, 2 refused with a message, 130 stopped by hand."""
+    """Run the command line; returns the exit status: 0 done, 2 refused with a message, 130 stopped by hand, 143 by the system."""
     warnings.showwarning = _show_warning
+    _speak_unicode()
+    if (sys.argv[1:] if argv is None else argv) == ["--version"]:
+        print(f"jointbench {__version__}")
+        return 0
     try:
         command: Callable[[], None] = tyro.extras.subcommand_cli_from_dict(
             COMMANDS,
             prog="jointbench",
-            description="A MuJoCo virtual test bench for nonlinear joints.",
+            description="A MuJoCo virtual test bench for nonlinear joints. --version prints the version.",
             args=argv,
         )
-        command()
+        with terminable():
+            command()
     except (BenchError, OSError) as error:
         Console(stderr=True, soft_wrap=True).print(
             f"jointbench: {error}", style="red", markup=False, highlight=False
         )
         return 2
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as stopped:
         print("jointbench: stopped", file=sys.stderr)
-        return 130
+        return stopped.status if isinstance(stopped, Terminated) else 130
     return 0
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -39,63 +38,71 @@ class Diagnose:
     """Effects to leave out of the catalogue."""
     most: int = 3
     """Largest number of effects named together."""
+    force: bool = False
+    """Overwrite files that exist."""
     progress: bool = True
     """Show what is being done, on standard error."""
 
     def __call__(self) -> None:
         """Run the command."""
-        from bench.files import write_text
-
         self._check_places()
         with _stages(self.progress) as stage:
             diagnosis = _diagnosed(self.folder, self.exclude, self.most, stage)
             document = diagnosis.verdict.to_json()
-            if self.html is not None:
-                from bench.discrepancy import write_report
-
-                stage(f"writing {self.html}")
-                write_report(diagnosis, self.html)
-            if self.rrd is not None:
-                from bench.discrepancy.report.rerun_recording import write_rerun
-
-                stage(f"writing {self.rrd}")
-                write_rerun(diagnosis, self.rrd)
+            written, problem = self._written(diagnosis, document, stage)
         if self.json == PRINTED:
             emit(document)
         else:
-            if self.json is not None:
-                write_text(self.json, json.dumps(document, indent=1, ensure_ascii=False))
             for part in summary(diagnosis.verdict):
                 Console().print(part, markup=False, highlight=False)
-            for path in (self.json, self.html, self.rrd):
-                if path is not None:
-                    print(f"written: {path}")
+            for path in written:
+                print(f"written: {path}")
         for warning in diagnosis.verdict.warnings:
             Console(stderr=True, soft_wrap=True).print(
                 f"note: {warning}", style="yellow", markup=False, highlight=False
             )
+        if problem is not None:
+            raise problem
+
+    def _written(
+        self, diagnosis: Diagnosis, document: dict[str, Any], stage: Callable[[str], None]
+    ) -> tuple[list[Path], Exception | None]:
+        """The files written, moved into place together; where one fails, the verdict alone, and what failed."""
+        from bench.files import OutputError, together, write_text
+
+        text = json.dumps(document, indent=1, ensure_ascii=False)
+        saved = [self.json] if self.json is not None and self.json != PRINTED else []
+        try:
+            with together():
+                for path in saved:
+                    write_text(path, text)
+                if self.html is not None:
+                    from bench.discrepancy import write_report
+
+                    stage(f"writing {self.html}")
+                    write_report(diagnosis, self.html)
+                if self.rrd is not None:
+                    from bench.discrepancy.report.rerun_recording import write_rerun
+
+                    stage(f"writing {self.rrd}")
+                    write_rerun(diagnosis, self.rrd)
+        except Exception as error:  # whatever a figure ran into: the verdict is told and kept
+            problem = OutputError(f"the report of this verdict cannot be written: {error}")
+            with contextlib.suppress(OutputError):
+                for path in saved:
+                    write_text(path, text)
+                return saved, problem
+            return [], problem
+        return [path for path in (*saved, self.html, self.rrd) if path is not None], None
 
     def _check_places(self) -> None:
         """Refuse places that cannot be written to before a minute is spent on the diagnosis."""
         from bench.errors import ParameterError
-        from bench.files import OutputError
+        from bench.targets import check_targets
 
         if self.most < 1:
             raise ParameterError(f"--most is {self.most}; at least one effect has to be allowed")
-        taken: set[Path] = set()
-        for path in (self.json, self.html, self.rrd):
-            if path is None or path == PRINTED:
-                continue
-            if path.is_dir():
-                raise OutputError(f"cannot write {path}: it is a folder; name a file in it")
-            nearest = next(parent for parent in path.resolve().parents if parent.exists())
-            if not nearest.is_dir() or not os.access(nearest, os.W_OK):
-                raise OutputError(
-                    f"cannot write {path}: {nearest} is no folder one may write to; choose another place"
-                )
-            if path.resolve() in taken:
-                raise OutputError(f"{path} is named for two results; give each a file of its own")
-            taken.add(path.resolve())
+        check_targets(self.json, self.html, self.rrd, force=self.force)
 
 
 PRINTED = Path("-")
@@ -201,13 +208,20 @@ class BlindMake:
     """Compute how well the records of each case can tell its effect, for the answers."""
     workers: int = 1
     """Processes."""
+    force: bool = False
+    """Write into folders that hold files of others."""
 
     def __call__(self) -> None:
         """Run the command."""
         import numpy as np
 
         from bench.discrepancy import BlindOptions, make_blind
+        from bench.discrepancy.blind.protocol import SEAL
+        from bench.targets import check_folder
 
+        begun = next(self.folder.glob(f"*/{SEAL}"), None) is not None  # by the same command, which goes on
+        for folder in (self.folder, self.answers):
+            check_folder(folder, force=self.force or begun)
         chosen = {key: value for key, value in vars(self).items() if key in BlindOptions.__dataclass_fields__}
         with Console(stderr=True).status("making cases") as status:
             names = make_blind(
@@ -266,18 +280,23 @@ class BlindScore:
     """File for the scores as a self-contained page."""
     markdown: Path | None = None
     """File for the scores as Markdown."""
+    force: bool = False
+    """Overwrite files that exist."""
 
     def __call__(self) -> None:
         """Run the command."""
         from bench.discrepancy import score_blind
         from bench.discrepancy.blind.score_report import markdown, page, tables
-        from bench.files import write_text
+        from bench.files import together, write_text
+        from bench.targets import check_targets
 
+        check_targets(self.html, self.markdown, force=self.force)
         score = score_blind(self.results, self.answers, cases=self.cases)
-        if self.html is not None:
-            page(score).write(self.html)
-        if self.markdown is not None:
-            write_text(self.markdown, markdown(score))
+        with together():
+            if self.html is not None:
+                page(score).write(self.html)
+            if self.markdown is not None:
+                write_text(self.markdown, markdown(score))
         if self.json:
             emit(score.to_json())
             return

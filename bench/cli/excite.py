@@ -54,6 +54,8 @@ class Excite:
     """Signals that dopt weighs."""
     seed: int = 0
     """Seed."""
+    force: bool = False
+    """Overwrite a file that exists."""
     json: bool = False
     """Print JSON."""
 
@@ -61,20 +63,22 @@ class Excite:
         """Run the command."""
         import numpy as np
 
+        from bench.documents import naming
         from bench.errors import ParameterError
         from bench.excitation import Rivals, design
         from bench.excitation.request import request
-        from bench.rig.configuration import read_document, rig_from_configuration
+        from bench.excitation.schema import ExcitationRequest
 
         self._check()
-        document = dict(read_document(self.configuration))
-        rig = rig_from_configuration(document, folder=self.configuration.parent)
-        if "experiment" not in document:
+        document = ExcitationRequest.read(self.configuration)
+        with naming(str(self.configuration)):
+            rig = document.build(self.configuration.parent)
+        if document.experiment is None:
             raise ParameterError(
                 f"{self.configuration} has no [experiment]; say what is unknown, measured and allowed (see docs/excitation.md)"
             )
         rng = np.random.default_rng(self.seed)
-        asked = request(rig, document["experiment"], draws=self.draws, rng=rng)
+        asked = request(rig, document.experiment, draws=self.draws, rng=rng)
         notes: list[str] = []
         with progress_bar(quiet=self.json) as show:
             if self.method == "policy":
@@ -114,7 +118,9 @@ class Excite:
     def _check(self) -> None:
         """Raise an error for arguments that do not go together."""
         from bench.errors import ParameterError, UnknownNameError
+        from bench.targets import check_targets
 
+        check_targets(self.out, force=self.force)
         if self.method not in METHODS:
             raise UnknownNameError("method", self.method, METHODS)
         if self.out.suffix not in {".csv", ".json"}:

@@ -22,6 +22,8 @@ class Demo:
 
     out: Path = Path("out/demo")
     """Folder for the results."""
+    force: bool = False
+    """Overwrite the results of an earlier run."""
     json: bool = False
     """Print the figures as JSON instead of a table."""
 
@@ -29,7 +31,9 @@ class Demo:
         """Run the command."""
         from bench import demo
         from bench.demo.report import summary, write
+        from bench.targets import check_folder
 
+        check_folder(self.out, force=self.force)
         with progress_bar(quiet=self.json) as progress:
             result = demo.compute(progress)
             files = write(result, self.out, progress)
@@ -84,8 +88,10 @@ class Simulate:
     """Rig, elements and excitation (see docs/configuration.md)."""
     out: Annotated[Path, tyro.conf.arg(aliases=["-o"])] = Path("record.parquet")
     """The record to write."""
-    seed: int = 0
-    """Seed of the excitation."""
+    force: bool = False
+    """Overwrite a record that exists."""
+    seed: int | None = None
+    """Seed of the excitation; that of the file by default, or 0."""
     json: bool = False
     """Print JSON."""
 
@@ -95,9 +101,12 @@ class Simulate:
 
         from bench.record_files import write_recording
         from bench.rig import simulate
+        from bench.targets import check_targets
 
-        rig, excitation = _configured(self.configuration)
-        record = simulate(rig, excitation, rng=np.random.default_rng(self.seed))
+        check_targets(self.out, force=self.force)
+        rig, excitation, seed = _configured(self.configuration)
+        rng = np.random.default_rng(seed if self.seed is None else self.seed)
+        record = simulate(rig, excitation, rng=rng)
         write_recording(self.out, record)
         rows = [
             {
@@ -125,8 +134,10 @@ class View:
     """One rig, or several to be compared (the first is the truth); the first one's excitation drives all."""
     out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
     """File to save (.rrd); opens the viewer where not given."""
-    seed: int = 0
-    """Seed of the excitation."""
+    force: bool = False
+    """Overwrite a file that exists."""
+    seed: int | None = None
+    """Seed of the excitation; that of the file by default, or 0."""
 
     def __call__(self) -> None:
         """Run the command."""
@@ -135,31 +146,32 @@ class View:
         from bench.errors import ParameterError
         from bench.rerun_log import log_comparison
         from bench.rig import simulate
+        from bench.targets import check_targets
 
+        check_targets(self.out, force=self.force)
         if not self.configurations:
             raise ParameterError(
                 "give at least one rig configuration (a TOML or JSON file; see docs/configuration.md)"
             )
-        _, excitation = _configured(self.configurations[0])
+        _, excitation, seed = _configured(self.configurations[0])
+        seed = seed if self.seed is None else self.seed
         rigs = {path.stem: _configured(path, need_excitation=False)[0] for path in self.configurations}
         records = {
-            name: simulate(rig, excitation, rng=np.random.default_rng(self.seed))
-            for name, rig in rigs.items()
+            name: simulate(rig, excitation, rng=np.random.default_rng(seed)) for name, rig in rigs.items()
         }
         log_comparison(self.out, rigs, records)
         if self.out is not None:
             print(f"{self.out}: open it with `rerun {self.out}`")
 
 
-def _configured(path: Path, *, need_excitation: bool = True) -> tuple[Any, Any]:
+def _configured(path: Path, *, need_excitation: bool = True) -> tuple[Any, Any, int]:
+    """Rig, excitation and seed of a file."""
     from bench.errors import ParameterError
-    from bench.rig.configuration import read_document, rig_from_configuration
-    from bench.signals import Excitation
+    from bench.rig.configuration import read_rig
 
-    document = read_document(path)
-    rig = rig_from_configuration(document, folder=path.parent)
-    if "excitation" not in document and need_excitation:
+    document, rig = read_rig(path)
+    if document.excitation is None and need_excitation:
         raise ParameterError(
             f"{path} has no [excitation]; say what drives the rig (see docs/configuration.md)"
         )
-    return rig, Excitation.from_dict(document["excitation"]) if "excitation" in document else None
+    return rig, document.drive, document.seed or 0

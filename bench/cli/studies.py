@@ -23,13 +23,17 @@ class Reproduce:
     """Folder for the page, the table and the pictures."""
     fresh: bool = False
     """Make again what was already made by the same code."""
+    force: bool = False
+    """Write into a folder that holds files of others, over those of the same names."""
     json: bool = False
     """Print JSON."""
 
     def __call__(self) -> None:
         """Run the command."""
         from bench.reproduction import reproduce
+        from bench.targets import check_folder
 
+        check_folder(self.out, force=self.force, own=("table.json", "[A-D][0-9]*.json"))
         with progress_bar(quiet=self.json) as progress:
             result = reproduce(self.items, self.out, fresh=self.fresh, progress=progress)
         if self.json:
@@ -90,6 +94,10 @@ class Campaign:
         if self.json:
             emit(result.to_dict())
             return
+        for line in result.found:
+            Console(stderr=True, soft_wrap=True).print(
+                f"note: {line}", style="yellow", markup=False, highlight=False
+            )
         failed = f", {result.failed} failed and set aside" if result.failed else ""
         print(
             f"{result.folder}: {result.records} records{failed}, {result.size / 1e6:.1f} MB, {result.seconds:.1f} s"

@@ -12,6 +12,7 @@ from bench.demo.joint import JointModel, Progress
 from bench.discrepancy import write_report, write_rerun
 from bench.discrepancy.report.figures import state_figure
 from bench.figures import bar_table, loops, time_histories
+from bench.files import together
 from bench.page import Page
 from bench.record_files import write_recording
 from bench.recording import Recording
@@ -71,18 +72,19 @@ def write(result: DemoResult, folder: Path, progress: Progress) -> list[Path]:
     Raises:
         OutputError: The folder cannot be written to.
     """
-    progress("writing the page", 1.0)
-    page = folder / "index.html"
-    _page(result).write(page)
-    progress("writing the rerun recording", 1.0)
-    viewer = folder / "joint.rrd"
-    log_joint(result, viewer)
-    progress("writing the diagnosis", 1.0)
+    page, viewer = folder / "index.html", folder / "joint.rrd"
     told = [folder / "diagnosis.html", folder / "diagnosis.rrd"]
-    write_report(result.diagnosis, told[0])
-    write_rerun(result.diagnosis, told[1])
-    progress("writing the records", 1.0)
-    return [page, viewer, *told, *_write_records(result, folder / "records")]
+    with together():
+        progress("writing the page", 1.0)
+        _page(result).write(page)
+        progress("writing the rerun recording", 1.0)
+        log_joint(result, viewer)
+        progress("writing the diagnosis", 1.0)
+        write_report(result.diagnosis, told[0])
+        write_rerun(result.diagnosis, told[1])
+        progress("writing the records", 1.0)
+        records = _write_records(result, folder / "records")
+    return [page, viewer, *told, *records]
 
 
 def _converged(result: DemoResult) -> list[JointModel]:

@@ -33,7 +33,7 @@ from bench.discrepancy.judgement.validation_discrepancy import gaps, nominal_pre
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.localisation.localise import Whereabouts, locate
 from bench.discrepancy.model.placement import Hypothesis
-from bench.discrepancy.model.structure import structure_of
+from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.next_test.discriminating_excitation import separate, told_apart
 from bench.discrepancy.search.explain import Explanation, close, explain, nominal_alone
 from bench.discrepancy.search.fits import names

@@ -97,8 +97,9 @@ def linear_structure(rig: Rig, channels: tuple[str, ...]) -> LinearStructure:
         )
     data = mujoco.MjData(bare)
     n = 3 * model.nv + len(rig.actuators)
-    constant = _respond(bare, data, np.zeros(n), len(rig.actuators))
-    rows = [_respond(bare, data, unit, len(rig.actuators)) - constant for unit in np.eye(n)]
+    with native.running(bare):
+        constant = _respond(bare, data, np.zeros(n), len(rig.actuators))
+        rows = [_respond(bare, data, unit, len(rig.actuators)) - constant for unit in np.eye(n)]
     table = np.column_stack([constant, *rows])
     structure = LinearStructure(table[: model.nv].copy(), table[model.nv :][columns].copy())
     _check(rig, structure, columns)
@@ -146,14 +147,14 @@ def element_forces(rig: Rig, q: NDArray, v: NDArray, u: NDArray, z: NDArray) -> 
 
 def _check(rig: Rig, structure: LinearStructure, columns: NDArray) -> None:
     """Compare the affine maps with the model, elements in place, at random states."""
-    native.install()
     model, n_actuators = rig.model, len(rig.actuators)
     data = mujoco.MjData(model)
     rng = np.random.default_rng(0)  # the states of a check: nothing of a result depends on them
     for _ in range(STATES):
         inputs = rng.uniform(-AMPLITUDE, AMPLITUDE, 3 * model.nv + n_actuators)
         inputs[2 * model.nv + n_actuators :] = 0.0
-        truth = _respond(model, data, inputs, n_actuators)
+        with native.running(model):
+            truth = _respond(model, data, inputs, n_actuators)
         inputs[2 * model.nv + n_actuators :] = element_forces(
             rig, data.qpos, data.qvel, data.ctrl, np.zeros(model.na)
         )

@@ -6,8 +6,11 @@ trained for (channels, scales, limits, windows), because its numbers mean someth
 
 from __future__ import annotations
 
+import io
 import json
+import math
 import zipfile
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,11 +20,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.errors import FileFormatError, ParameterError, UnknownNameError
+from bench.errors import FileFormatError, ParameterError, UnknownNameError, shortened
 from bench.excitation.station import Station
+from bench.files import write_bytes
 
 FOLDER = Path(__file__).resolve().parent.parent / "_data" / "policies"
 FORMAT = 1
+LARGEST = 64 * 2**20
+"""Bytes of all arrays of a policy at most: networks of some millions of weights, which no laboratory computer runs in a window."""
+_UNREADABLE = (
+    ValueError, EOFError, OSError, RuntimeError, NotImplementedError, MemoryError, zipfile.BadZipFile, zlib.error
+)  # fmt: skip
+"""What NumPy and zipfile raise for archives that are damaged, encrypted, or packed in a way they do not know."""
 CLIP = 10.0
 """Normalised observations are cut off there, as stable-baselines3's `VecNormalize` does."""
 
@@ -59,6 +69,7 @@ class Policy:
         for name in ("mean", "deviation", "schedule"):
             object.__setattr__(self, name, _frozen(getattr(self, name)))
         object.__setattr__(self, "about", MappingProxyType(dict(self.about)))
+        self._check_numbers()
         width = len(self.mean)
         for weight, bias in zip(self.weights, self.biases, strict=True):
             if weight.ndim != 2 or weight.shape[1] != width or bias.shape != weight.shape[:1]:
@@ -75,6 +86,32 @@ class Policy:
         if self.deviation.shape != self.mean.shape or not (self.deviation > 0.0).all():
             raise ParameterError(
                 f"policy '{self.name}' needs a positive deviation for each of its {len(self.mean)} observations"
+            )
+
+    def _check_numbers(self) -> None:
+        """Raise `ParameterError` unless all numbers, and what the layers make of any observation, are finite."""
+        named = {
+            **{f"the weights of layer {i}": array for i, array in enumerate(self.weights)},
+            **{f"the biases of layer {i}": array for i, array in enumerate(self.biases)},
+            "the mean": self.mean,
+            "the deviation": self.deviation,
+            "the schedule": self.schedule,
+        }
+        if len(self.weights) != len(self.biases) or self.mean.ndim != 1:
+            raise ParameterError(
+                f"policy '{self.name}' has {len(self.weights)} weights, {len(self.biases)} biases and a mean of shape "
+                f"{self.mean.shape}; one bias a weight, and one number an observation, are expected"
+            )
+        for name, array in named.items():
+            # observations are cut off at CLIP, hidden values at 1
+            sums = np.sum(np.abs(array, dtype=np.float64), axis=-1) * CLIP if array.ndim else array
+            if not np.all(np.asarray(sums) <= np.finfo(np.float32).max):
+                raise ParameterError(
+                    f"{name} of policy '{self.name}' hold NaN, infinity or numbers too large; finite numbers are expected"
+                )
+        if len(self.mean) != self.station.n_observations:
+            raise ParameterError(
+                f"policy '{self.name}' takes {len(self.mean)} observations; its station gives {self.station.n_observations}"
             )
 
     def __reduce__(self) -> tuple:
@@ -101,7 +138,14 @@ class Policy:
         return np.clip(value + self.station.scheduled(observation, self.schedule), -1.0, 1.0)
 
     def save(self, path: Path) -> None:
-        """Write the policy as a NumPy archive of plain arrays and a JSON text."""
+        """Write the policy as a NumPy archive of plain arrays and a JSON text, whole or not at all.
+
+        Args:
+            path: Path of the file; ".npz" is appended where it does not end so.
+
+        Raises:
+            OutputError: It cannot be written.
+        """
         about = {
             "format": FORMAT,
             "name": self.name,
@@ -111,9 +155,10 @@ class Policy:
         }
         layers = {f"weight_{i}": array for i, array in enumerate(self.weights)}
         layers |= {f"bias_{i}": array for i, array in enumerate(self.biases)}
-        path.parent.mkdir(parents=True, exist_ok=True)
         arrays = {"mean": self.mean, "deviation": self.deviation, "schedule": self.schedule, **layers}
-        np.savez_compressed(path, allow_pickle=False, document=np.array(json.dumps(about)), **arrays)
+        content = io.BytesIO()
+        np.savez_compressed(content, allow_pickle=False, document=np.array(json.dumps(about)), **arrays)
+        write_bytes(path if path.suffix == ".npz" else Path(f"{path}.npz"), content.getvalue())
 
     @classmethod
     def load(cls, path: Path) -> Policy:
@@ -122,34 +167,75 @@ class Policy:
         Raises:
             FileFormatError: The file is no policy, or of another format.
         """
+        from bench.documents import Limits as DocumentLimits  # noqa: PLC0415  (pydantic, for those who read documents)
+        from bench.documents import checked, naming, parse_json  # noqa: PLC0415
+        from bench.excitation.schema import PolicyHeader  # noqa: PLC0415
+
         try:
-            with np.load(path, allow_pickle=False) as archive:
-                arrays = {name: archive[name] for name in archive.files}
-            document = json.loads(str(arrays["document"]))
-        except (ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+            arrays = _arrays(path)
+            text = str(arrays.pop("document"))
+        except (*_UNREADABLE, KeyError) as error:
             raise FileFormatError(
                 f"{path} is no policy ({error}); one is written by scripts/train_excitation.py"
             ) from error
-        if document.get("format") != FORMAT:
-            raise FileFormatError(
-                f"{path} has the policy format {document.get('format')}; this version reads format {FORMAT}"
-            )
+        # infinity stands for no limit there
+        document = parse_json(text, str(path), limits=DocumentLimits(finite=False))
+        header = checked(PolicyHeader, document, str(path))
         count = sum(name.startswith("weight_") for name in arrays)
-        return cls(
-            document["name"],
-            tuple(arrays[f"weight_{i}"] for i in range(count)),
-            tuple(arrays[f"bias_{i}"] for i in range(count)),
-            arrays["mean"],
-            arrays["deviation"],
-            arrays["schedule"],
-            Station.from_dict(document["station"]),
-            document["bounded"],
-            document["about"],
-        )
+        layers = [f"{kind}_{i}" for kind in ("weight", "bias") for i in range(count)]
+        expected = {*layers, "mean", "deviation", "schedule"}
+        if not count or set(arrays) != expected:
+            odd = sorted(set(arrays) ^ expected)
+            raise FileFormatError(
+                f"{path} is no policy: of its arrays, {', '.join(map(shortened, odd[:5]))} {'is' if len(odd) == 1 else 'are'} "
+                "missing or too many; mean, deviation, schedule and a weight and a bias for each layer are expected"
+            )
+        with naming(str(path)):
+            return cls(
+                header.name,
+                tuple(arrays[name] for name in layers[:count]),
+                tuple(arrays[name] for name in layers[count:]),
+                arrays["mean"],
+                arrays["deviation"],
+                arrays["schedule"],
+                Station.from_entry(header.station),
+                header.bounded,
+                header.about,
+            )
+
+
+def _arrays(path: Path) -> dict[str, NDArray[Any]]:
+    """The arrays of an archive, none of which may claim more than the archive holds, nor all of them more than `LARGEST`."""
+    arrays: dict[str, NDArray[Any]] = {}
+    with zipfile.ZipFile(path) as archive:
+        if sum(member.file_size for member in archive.infolist()) > LARGEST:
+            raise ValueError(f"its arrays take more than {LARGEST} bytes")
+        for member in archive.infolist():
+            content = archive.read(member)
+            stream = io.BytesIO(content)
+            version = np.lib.format.read_magic(stream)
+            read = (
+                np.lib.format.read_array_header_1_0
+                if version == (1, 0)
+                else np.lib.format.read_array_header_2_0
+            )
+            shape, _, dtype = read(stream)
+            if dtype.kind not in "fiuU" or math.prod(shape) * dtype.itemsize > len(content):
+                raise ValueError(
+                    f"{member.filename} is {dtype} {shape}, of which the archive holds {len(content)} bytes"
+                )
+            stream.seek(0)
+            arrays[member.filename.removesuffix(".npy")] = np.lib.format.read_array(
+                stream, allow_pickle=False
+            )
+    return arrays
 
 
 def _frozen(array: NDArray) -> NDArray[np.float32]:
-    result = np.array(array, dtype=np.float32)
+    if np.asarray(array).dtype.kind not in "fiu":
+        raise ParameterError(f"an array of a policy holds {np.asarray(array).dtype}; numbers are expected")
+    with np.errstate(over="ignore"):  # infinity is refused with the name of its array
+        result = np.array(array, dtype=np.float32)
     result.flags.writeable = False
     return result
 

@@ -32,17 +32,17 @@ from typing import Any
 
 import numpy as np
 
+from bench.documents import checked
 from bench.errors import ParameterError, UnknownNameError
 from bench.excitation.experiment import Experiment
 from bench.excitation.limits import Limits
 from bench.excitation.methods import paired_experiment
 from bench.excitation.prior import Hypothesis, RigPrior, Uncertain
 from bench.excitation.rivals import Rivals
+from bench.excitation.schema import ExperimentEntry, RivalEntry
 from bench.rig import Rig
-from bench.rig.configuration import element_from_configuration
+from bench.signals.base import MAX_SAMPLES
 
-ENTRIES = ("duration", "band", "force", "energy", "stroke", "velocity", "noise", "uncertain", "rival")
-RIVAL_ENTRIES = ("elements", "uncertain")
 REFERENCE_SHARE = 0.375
 """Of the duration: the test under which rivals imitate each other."""
 FACTOR = 2.0
@@ -66,7 +66,9 @@ class Request:
     band: tuple[float, float]
 
 
-def request(rig: Rig, table: Mapping[str, Any], *, draws: int = 8, rng: np.random.Generator) -> Request:
+def request(
+    rig: Rig, table: ExperimentEntry | Mapping[str, Any], *, draws: int = 8, rng: np.random.Generator
+) -> Request:
     """Read the table `experiment` of a rig's file.
 
     Args:
@@ -76,67 +78,53 @@ def request(rig: Rig, table: Mapping[str, Any], *, draws: int = 8, rng: np.rando
         rng: Source of the draws.
 
     Raises:
-        UnknownNameError: An entry, actuator, channel or parameter is not known.
-        ParameterError: An entry is missing or out of range.
+        DocumentError: An entry is not known, missing, of the wrong kind or out of range.
+        UnknownNameError: The rig has no such actuator, channel or parameter.
+        ParameterError: The rig has nothing that is uncertain, or the test has too many steps.
     """
-    for key in table:
-        if key not in ENTRIES:
-            raise UnknownNameError("entry of an experiment", key, ENTRIES)
-    missing = [key for key in ("duration", "band", "force", "noise") if key not in table]
-    if missing:
+    asked = table if isinstance(table, ExperimentEntry) else checked(ExperimentEntry, table)
+    if not asked.duration <= MAX_SAMPLES * rig.timestep:
         raise ParameterError(
-            f"an experiment needs the entries duration, band, force and noise; missing: {', '.join(missing)}"
+            f"{asked.duration:g} s are more than {MAX_SAMPLES} steps of rig '{rig.name}'; shorten the test or lengthen the timestep"
         )
-    band = tuple(float(x) for x in table["band"])
-    if len(band) != 2:
-        raise ParameterError(f"the band is {list(band)}; lowest and highest frequency [Hz] are expected")
-    limits = Limits(**{key: table.get(key, {}) for key in ("force", "energy", "stroke", "velocity")})
+    limits = Limits(asked.force, asked.energy, asked.stroke, asked.velocity)
     for name in limits.actuators:
         if name not in rig.actuators:
             raise UnknownNameError(f"actuator of rig '{rig.name}'", name, rig.actuators)
     measured = tuple(channel.name for channel in rig.channels if channel.role == "measured")
-    for name in (*table["noise"], *limits.watched):
+    for name in (*asked.noise, *limits.watched):
         if name not in measured:
             raise UnknownNameError(f"measured channel of rig '{rig.name}'", name, measured)
-    described = Hypothesis(rig.name, rig, _uncertain(rig, table.get("uncertain", {})))
-    duration = float(table["duration"])
-    if "rival" in table:
-        rivals = Rivals(rig.name, described, _rival(rig, table["rival"], table.get("uncertain", {})))
+    described = Hypothesis(rig.name, rig, _uncertain(rig, asked.uncertain))
+    if asked.rival is not None:
+        rivals = Rivals(rig.name, described, _rival(rig, asked.rival, asked.uncertain))
         experiment = paired_experiment(
             rivals,
-            table["noise"],
+            asked.noise,
             limits,
             pairs=max(1, draws // 2),
-            duration=REFERENCE_SHARE * duration,
-            band=band,
+            duration=REFERENCE_SHARE * asked.duration,
+            band=asked.band,
             rng=rng,
         )
     else:
         prior = RigPrior((described,))
-        experiment = Experiment(prior, table["noise"], limits, prior.draws(draws, rng))
-    return Request(rig, experiment, duration, band)
+        experiment = Experiment(prior, asked.noise, limits, prior.draws(draws, rng))
+    return Request(rig, experiment, asked.duration, asked.band)
 
 
-def _rival(rig: Rig, entry: Mapping[str, Any], ranges: Mapping[str, Any]) -> Hypothesis:
+def _rival(rig: Rig, entry: RivalEntry, ranges: Mapping[str, tuple[float, float]]) -> Hypothesis:
     """The rig with other elements, and its own ranges beside those of the structure."""
-    for key in entry:
-        if key not in RIVAL_ENTRIES:
-            raise UnknownNameError("entry of a rival", key, RIVAL_ENTRIES)
-    if not entry.get("elements"):
-        raise ParameterError("a rival is another explanation of the joint; give its elements")
-    other = rig.with_(elements=tuple(element_from_configuration(item) for item in entry["elements"]))
+    other = rig.with_(elements=tuple(item.element() for item in entry.elements))
     shared = {name: bounds for name, bounds in ranges.items() if "." not in name}
     structure = _uncertain(other, shared) if shared else ()
-    return Hypothesis("rival", other, (*structure, *_uncertain(other, entry.get("uncertain", {}))))
+    return Hypothesis("rival", other, (*structure, *_uncertain(other, entry.uncertain)))
 
 
-def _uncertain(rig: Rig, ranges: Mapping[str, Any]) -> tuple[Uncertain, ...]:
+def _uncertain(rig: Rig, ranges: Mapping[str, tuple[float, float]]) -> tuple[Uncertain, ...]:
     if ranges:
-        for name, bounds in ranges.items():
-            if not isinstance(bounds, list | tuple) or len(bounds) != 2:
-                raise ParameterError(f"the range of '{name}' is {bounds}; [lowest, highest] is expected")
         return tuple(
-            Uncertain(name, float(low), float(high), "logarithmic" if low > 0.0 else "linear")
+            Uncertain(name, low, high, "logarithmic" if low > 0.0 else "linear")
             for name, (low, high) in ranges.items()
         )
     found = []

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,9 @@ from bench.errors import ParameterError
 from bench.excitation.information import noise_vector
 from bench.excitation.limits import Instrumented, Limits
 from bench.excitation.shaping import Shaping
+
+if TYPE_CHECKING:
+    from bench.excitation.schema import StationEntry
 
 
 @dataclass(frozen=True)
@@ -85,6 +88,12 @@ class Station(Instrumented):
         """Length of an action."""
         return len(self.actuators) * (self.n_knots if self.shaping == "knots" else 2)
 
+    @property
+    def n_observations(self) -> int:
+        """Length of an observation."""
+        samples = self.n_steps * (len(self.channels) + len(self.actuators))
+        return samples + self.width + 1 + len(self.actuators) + 2 + len(self.questions)
+
     def scheduled(
         self, observation: NDArray[np.float32], schedule: NDArray[np.float32]
     ) -> NDArray[np.float32]:
@@ -117,9 +126,21 @@ class Station(Instrumented):
 
     @classmethod
     def from_dict(cls, document: Mapping[str, Any]) -> Station:
-        """The station that `to_dict` described."""
-        rest = {name: value for name, value in document.items() if name != "limits"}
-        return cls(limits=Limits(**document["limits"]), **rest)
+        """The station that `to_dict` described.
+
+        Raises:
+            DocumentError: An entry is not known, missing, of the wrong kind or out of range.
+        """
+        from bench.documents import checked  # noqa: PLC0415  (pydantic, for those who read documents)
+        from bench.excitation.schema import StationEntry  # noqa: PLC0415
+
+        return cls.from_entry(checked(StationEntry, document))
+
+    @classmethod
+    def from_entry(cls, entry: StationEntry) -> Station:
+        """The station of a document."""
+        rest = {name: value for name, value in entry.given.items() if name != "limits"}
+        return cls(limits=Limits(**entry.limits.given), **rest)
 
 
 class Desk:
@@ -155,9 +176,7 @@ class Desk:
     @property
     def n_observations(self) -> int:
         """Length of an observation."""
-        station = self.station
-        samples = station.n_steps * (len(station.channels) + len(station.actuators))
-        return samples + self.shaping.width + 1 + len(station.actuators) + 2 + len(station.questions)
+        return self.station.n_observations
 
     def begin(self, places: NDArray[np.int64]) -> None:
         """Start anew on some rigs."""

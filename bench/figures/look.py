@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from bench.errors import ParameterError
-from bench.files import OutputError, replacing
+from bench.files import write_bytes
 
 REFERENCE_COLOUR = "#1a1a1a"
 COLOURS = ("#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
@@ -110,13 +110,7 @@ def save(figure: Figure, path: str | Path, *, dpi: float = 150.0) -> Path:
             f"a figure cannot be written as '{target.name}'; use a name in .png, .svg or .pdf"
         )
     content = _rendered(figure, kind, dpi)
-    with replacing(target) as temporary:
-        try:
-            temporary.write_bytes(content)
-        except OSError as error:
-            raise OutputError(
-                f"cannot write {target}: {error.strerror or error}; choose another place"
-            ) from error
+    write_bytes(target, content)
     return target
 
 

@@ -127,6 +127,8 @@ class AdaptiveLeastSquares:
         min_eigenvalue: Smallest trusted eigenvalue of the regressor's correlation matrix. 1e-8 is what double precision
             and clean signals bear; noise e (relative to z) makes estimates unreliable below about e^2 / number of
             samples in the window.
+        max_pull: Largest part of a parameter by which the start may still pull its estimate, for it to be trusted: what the
+            estimate would move by, were the start's own information left out (see `bench.identification.stream.judge_prior`).
         jump_ratio: Reset the covariance when the mean square of the recent normalised innovation exceeds its long
             average this many times; 0 for never. Tracks a sudden change without the noise that forgetting lets in.
         jump_time: Averaging time of the recent innovation [s].
@@ -157,6 +159,7 @@ class AdaptiveLeastSquares:
         window: float = 5.0,
         level_floor: float = 0.01,
         min_eigenvalue: float = 1e-8,
+        max_pull: float = 0.05,
         jump_ratio: float = 0.0,
         jump_time: float = 0.2,
         stuck_after: int = 100,
@@ -190,7 +193,8 @@ class AdaptiveLeastSquares:
             layout.NORMALISE: float(normalise),
             layout.T_REJECTED: math.inf,
             layout.T_RESET: -math.inf,
-            layout.TRUSTED: -1.0,
+            layout.EXCITED: -1.0,
+            layout.MAX_PULL: _setting("max_pull", max_pull, 0.0, "a positive fraction", strict=True),
             layout.SMALLEST: math.nan,
             layout.CONDITION: math.nan,
         }  # fmt: skip
@@ -201,7 +205,8 @@ class AdaptiveLeastSquares:
         self._header, self._theta, self._d, self._phi = views[:4]
         views[6][:] = 1.0 / np.array(model.scale)
         self._level, self._peak = views[7:9]
-        self._u = views[10]
+        self._u, self._start, self._pull = views[10], views[12], views[13]
+        self._pull[:] = math.inf
         self._report_time = math.nan
         self._last_seen: dict[str, int] = {}
         self._events_made = 0
@@ -213,6 +218,7 @@ class AdaptiveLeastSquares:
                     f"theta0 of shape {start.shape} came; {n} finite values are expected: {', '.join(model.names)}"
                 )
             self._theta[:] = start / model.to_physical
+            self._start[:] = self._theta
 
     def update(self, sample: Sample | Sequence[float]) -> bool:
         """Take one sample.
@@ -394,6 +400,7 @@ class AdaptiveLeastSquares:
     def reset_covariance(self) -> None:
         """Set P back to its start; the estimates stay (Ioannou and Sun 1996, section 4.3.7)."""
         stream.reset_covariance(self._header, self._d, self._u)
+        self._start[:] = self._theta
         self._header[layout.T_RESET] = (
             self._header[layout.T_LAST] if self._header[layout.STARTED] else -math.inf
         )
@@ -438,11 +445,20 @@ class AdaptiveLeastSquares:
             if math.isfinite(self._report_time)
             else (),
             trusted=self.trusted,
+            ruled_by_start=tuple(
+                name
+                for name, pull in zip(self.model.names, self._pull, strict=True)
+                if not pull <= self._header[layout.MAX_PULL]
+            ),
         )
 
     @property
     def trusted(self) -> bool:
-        """Whether the estimates may be trusted now: a full window, persistently excited, no channel standing still."""
+        """Whether the estimates may be trusted now.
+
+        A full window, persistently excited, no channel standing still, and no parameter that the start values and the initial
+        covariance still rule (`persistence.ruled_by_start`; a larger `initial_covariance` or a longer record helps).
+        """
         return bool(self._header[layout.TRUSTED] == 1.0 and self._header[layout.HELD] == 0.0)
 
     @property

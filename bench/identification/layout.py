@@ -23,12 +23,12 @@ fast = numba.njit(cache=True, error_model="numpy", nogil=True, fastmath={"reasso
 (
     N, N_FILTERS, KIND, ORDER_1, ORDER_2, MASS, RATE, Z_INVERSE, V_FLOOR, F_FLOOR, CROSSOVER, DENOISE_AFTER,
     USES_F, USES_X, USES_V, USES_A, BETA, BOUND, P0, STEP, GAP, STUCK, HALF_WINDOW, LEVEL_FLOOR, MIN_EIGENVALUE,
-    JUMP, JUMP_TIME, NORMALISE,
+    JUMP, JUMP_TIME, NORMALISE, MAX_PULL,
     STARTED, T_LAST, T_REJECTED, T_START, COEF_STEP, COEF_RATE, DECAY, B0, B1, C_DECAY, C_B0, C_B1, MU, GAIN, TRACE,
     HELD, HALF_TIME, COUNT, COUNT_BEFORE, HALVES, Z, Z_HAT, FAST, SLOW, POWER, T_RESET, USED, OUT_OF_PHASE,
-    SMALLEST, CONDITION, UNEXCITED, TRUSTED, REPORTS, SEEN,
-) = range(62)  # fmt: skip
-CONSTANT_RUN, LAST_VALUE, HEADER = 62, 66, 70
+    SMALLEST, CONDITION, UNEXCITED, EXCITED, PRIOR, TRUSTED, REPORTS, SEEN,
+) = range(65)  # fmt: skip
+CONSTANT_RUN, LAST_VALUE, HEADER = 65, 69, 73
 
 BOUC_WEN, SDOF, DAMPER_LOG, POLYNOMIAL, GIVEN = range(5)
 
@@ -58,7 +58,7 @@ def unowned(typing_context, array):
 
 
 def split(s):
-    """Split the flat state: header, theta, d, phi, b, work, inverse scales, levels, peaks, filters, u, Gramians."""
+    """Split the flat state: header, theta, d, phi, b, work, inverse scales, levels, peaks, filters, u, Gramians, start, pulls."""
     n = int(s[N])
     m = int(s[N_FILTERS])
     a = HEADER
@@ -77,6 +77,8 @@ def split(s):
         s[f:g].reshape(2, m),
         s[g : g + n * n].reshape(n, n),
         s[g + n * n : g + 3 * n * n].reshape(2, n, n),
+        s[g + 3 * n * n : g + 3 * n * n + n],
+        s[g + 3 * n * n + n : g + 3 * n * n + 2 * n],
     )
 
 
@@ -93,4 +95,4 @@ views: Any = jit(_views)
 
 def size(n: int, n_filters: int) -> int:
     """Length of the flat state for n parameters and n_filters filters."""
-    return HEADER + 8 * n + 2 * n_filters + 3 * n * n
+    return HEADER + 10 * n + 2 * n_filters + 3 * n * n

@@ -13,6 +13,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from bench import native
 from bench.errors import ModelError
 from bench.identification.parameter_address import Address
 from bench.rig import Rig
@@ -58,6 +59,10 @@ class Probe:
 
     def matrices(self) -> Matrices:
         """The matrices at rest."""
+        with native.running(self.model):
+            return self._matrices()
+
+    def _matrices(self) -> Matrices:
         nv, nu = self.model.nv, self.model.nu
         zero, still, eye = np.zeros(nv), np.zeros(nu), np.eye(nv)
         rest, mass, _ = self.force(zero, zero, still)
@@ -68,6 +73,10 @@ class Probe:
 
     def sensors(self, at: Matrices) -> Array:
         """Sensors as a map of position, velocity, acceleration, commands and 1: ``(n, 3 nv + nu + 1)``."""
+        with native.running(self.model):
+            return self._sensors(at)
+
+    def _sensors(self, at: Matrices) -> Array:
         nv, nu = self.model.nv, self.model.nu
         zero, still = np.zeros(nv), np.zeros(nu)
 

@@ -57,6 +57,7 @@ class PersistenceReport(NamedTuple):
         level: Root mean square of each column of the scaled regressor (n,).
         unexcited: Names of the parameters whose column has fallen silent.
         trusted: Whether estimates may be trusted.
+        ruled_by_start: Names of the parameters that the start values still pull too far; all of them before the first report.
     """
 
     time: float
@@ -65,6 +66,7 @@ class PersistenceReport(NamedTuple):
     level: NDArray[np.float64]
     unexcited: tuple[str, ...]
     trusted: bool
+    ruled_by_start: tuple[str, ...] = ()
 
 
 class PersistenceHistory(NamedTuple):

@@ -96,7 +96,7 @@ class MujocoEngine:
         padded = np.zeros((len(vectors), steps, model.nu))
         padded[:, :, :own] = record.controls
         clock = mujoco.mjtState.mjSTATE_TIME
-        with native.untimed():
+        with native.running(model):
             result = batch.rollout(steps, padded, mujoco.mjtState.mjSTATE_CTRL, [clock, "sensordata"])
         found = result["sensordata"][:, :: record.stride][:, :, self.columns]
         stopped = np.diff(result[clock][:, :, 0], axis=1, prepend=record.start_time) <= 0.0

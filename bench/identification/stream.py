@@ -39,6 +39,7 @@ from bench.identification.layout import (
     DROPPED,
     EXCITATION_BACK,
     EXCITATION_LOST,
+    EXCITED,
     FAST,
     FIRST_CHANNEL,
     GAIN,
@@ -51,6 +52,7 @@ from bench.identification.layout import (
     JUMP_TIME,
     LAST_VALUE,
     LEVEL_FLOOR,
+    MAX_PULL,
     MIN_EIGENVALUE,
     MOVING,
     MU,
@@ -58,6 +60,7 @@ from bench.identification.layout import (
     NOT_FINITE,
     P0,
     POWER,
+    PRIOR,
     RATE,
     REJECTED,
     REPORTED,
@@ -95,7 +98,8 @@ from bench.identification.stream_models import regress, set_step
 
 @jit
 def reset_covariance(h, d, u):
-    """P = P0 I."""
+    """P = P0 I: the estimate of now is the start from here on, see `advance`."""
+    h[PRIOR] = 1.0
     for j in range(d.size):
         d[j] = h[P0]
         for i in range(j):
@@ -118,6 +122,8 @@ def learn(h, theta, d, u, phi, b, z, step):
     growth = 1.0
     if h[BETA] > 0.0:
         growth = 1.0 / h[MU]
+        before = h[PRIOR]
+        h[PRIOR] = before * h[MU]
         # The trace is followed from above, and worked out only when it may be too large.
         if h[TRACE] * growth > h[BOUND]:
             for i in range(n):
@@ -130,6 +136,7 @@ def learn(h, theta, d, u, phi, b, z, step):
             after = growth * now - growth * growth * removed / alpha
             h[TRACE] = now
             if after > h[BOUND]:
+                h[PRIOR] = before
                 alpha = rho + (alpha - rho) / growth
                 error = z - z_hat
                 for i in range(n):
@@ -240,7 +247,43 @@ def accumulate(gram, phi):
 
 
 @jit
-def judge(h, level, peak, gram):
+def judge_prior(h, theta, d, u, level, start, pull):
+    """Whether the data rule every parameter; renews `pull`, how far the start still pulls each.
+
+    In information form the estimate solves ``(Q + S) theta = Q start + S theta_data``, with what is left of the start's
+    information, ``Q = q I / P0``, and P the inverse of ``Q + S``. So ``W = P Q`` is the weight of the start, and without it the
+    estimate would stand at ``theta + (I - W)^-1 W (theta - start)``. The start rules where W has an eigenvalue of a half and more:
+    it then knows more of some direction than the data do. Else each parameter's way from there is compared with the parameter, or
+    with what would make it a term of `LEVEL_FLOOR` of the largest, if it is less: a parameter may be zero.
+    """
+    n = d.size
+    weight = np.zeros((n, n))
+    largest = 0.0
+    if h[PRIOR] < 1e-200:  # a few thousand memories later; products of it would be slow, then zero
+        h[PRIOR] = 0.0
+    for i in range(n):
+        largest = max(largest, abs(theta[i]) * level[i])
+        for k in range(i + 1):
+            total = 0.0
+            for j in range(i, n):  # column j of U lies in row j, a one on its end
+                total += (u[j, i] if j > i else 1.0) * (u[j, k] if j > k else 1.0) * d[j]
+            weight[i, k] = total * h[PRIOR] / h[P0]
+            weight[k, i] = weight[i, k]
+    if not np.linalg.eigvalsh(weight)[n - 1] < 0.5:
+        pull[:] = math.inf
+        return False
+    way = np.linalg.solve(np.eye(n) - weight, np.dot(weight, theta - start))
+    free = True
+    for i in range(n):
+        floor = h[LEVEL_FLOOR] * largest / level[i] if level[i] > 0.0 else 0.0
+        scale = max(abs(theta[i]), floor)
+        pull[i] = abs(way[i]) / scale if scale > 0.0 else 0.0
+        free = free and pull[i] <= h[MAX_PULL]
+    return free
+
+
+@jit
+def judge(h, theta, d, u, level, peak, gram, start, pull):
     """Smallest eigenvalue of the correlation of the regressor over the last two half windows; renews the report."""
     n = level.size
     count = h[COUNT] + h[COUNT_BEFORE]
@@ -261,19 +304,21 @@ def judge(h, level, peak, gram):
     h[SMALLEST] = max(values[0], 0.0)
     h[CONDITION] = values[n - 1] / h[SMALLEST] if h[SMALLEST] > 0.0 else math.inf
     h[UNEXCITED] = unexcited
-    trusted = 1.0 if (unexcited == 0 and h[SMALLEST] >= h[MIN_EIGENVALUE] and count > n) else 0.0
+    excited = 1.0 if (unexcited == 0 and h[SMALLEST] >= h[MIN_EIGENVALUE] and count > n) else 0.0
     flag = REPORTED
-    if trusted == 0.0 and h[TRUSTED] != 0.0:
+    if excited == 0.0 and h[EXCITED] != 0.0:
         flag |= EXCITATION_LOST
-    elif trusted == 1.0 and h[TRUSTED] == 0.0:
+    elif excited == 1.0 and h[EXCITED] == 0.0:
         flag |= EXCITATION_BACK
-    h[TRUSTED] = trusted
+    h[EXCITED] = excited
+    free = judge_prior(h, theta, d, u, level, start, pull)
+    h[TRUSTED] = 1.0 if excited == 1.0 and free else 0.0
     h[REPORTS] += 1.0
     return flag
 
 
 @inlined
-def monitor(h, level, peak, gram, step):
+def monitor(h, theta, d, u, level, peak, gram, start, pull, step):
     """Turn the half windows; a report comes with every half, the first when the window is full."""
     h[HALF_TIME] += step
     if h[HALF_TIME] < h[HALF_WINDOW]:
@@ -282,7 +327,7 @@ def monitor(h, level, peak, gram, step):
     h[HALVES] += 1.0
     flag = 0
     if h[HALVES] >= 2.0:
-        flag = judge(h, level, peak, gram)
+        flag = judge(h, theta, d, u, level, peak, gram, start, pull)
     h[COUNT_BEFORE] = h[COUNT]
     h[COUNT] = 0.0
     for i in range(level.size):
@@ -293,20 +338,23 @@ def monitor(h, level, peak, gram, step):
 
 
 @inlined
-def advance(h, theta, d, phi, b, level, peak, u, gram, z, usable, step):
+def advance(h, theta, d, phi, b, level, peak, u, gram, start, pull, z, usable, step):
     """Learn from an admitted sample and turn the monitor."""
     flags = 0
     if usable and h[HELD] == 0.0:
         accumulate(gram[0], phi)
         h[COUNT] += 1.0
         flags |= learn(h, theta, d, u, phi, b, z, step)
+        if flags & RESET:
+            for i in range(theta.size):
+                start[i] = theta[i]
     elif not usable:
         flags |= UNUSED
-    return flags | monitor(h, level, peak, gram, step)
+    return flags | monitor(h, theta, d, u, level, peak, gram, start, pull, step)
 
 
 @inlined
-def sample(h, theta, d, phi, b, work, inverse, level, peak, y, u, gram, t, force, x, v, a):
+def sample(h, theta, d, phi, b, work, inverse, level, peak, y, u, gram, start, pull, t, force, x, v, a):
     """One sample of the stream; returns the flags it raised."""
     good = not (
         (h[USES_F] > 0.0 and not math.isfinite(force))
@@ -329,7 +377,7 @@ def sample(h, theta, d, phi, b, work, inverse, level, peak, y, u, gram, t, force
         # Overflow in a power of the input has entered the filters: they begin anew with the next sample.
         h[STARTED] = 0.0
         return flags | NOT_FINITE
-    flags |= advance(h, theta, d, phi, b, level, peak, u, gram, z, usable, step)
+    flags |= advance(h, theta, d, phi, b, level, peak, u, gram, start, pull, z, usable, step)
     if flags & RESET and h[RATE] > 0.0:
         # The filters still hold the system of before the change; a new start knows the new one only.
         h[STARTED] = 0.0
@@ -337,7 +385,7 @@ def sample(h, theta, d, phi, b, work, inverse, level, peak, y, u, gram, t, force
 
 
 @inlined
-def sample_given(h, theta, d, phi, b, level, peak, u, gram, inverse, t, z, row):
+def sample_given(h, theta, d, phi, b, level, peak, u, gram, start, pull, inverse, t, z, row):
     """One sample of a model whose regressor the caller forms."""
     good = math.isfinite(z)
     for i in range(phi.size):
@@ -352,21 +400,23 @@ def sample_given(h, theta, d, phi, b, level, peak, u, gram, inverse, t, z, row):
         if step == 0.0 or flags:
             return flags
     set_step(h, step)
-    return flags | advance(h, theta, d, phi, b, level, peak, u, gram, z * h[Z_INVERSE], True, step)
+    return flags | advance(
+        h, theta, d, phi, b, level, peak, u, gram, start, pull, z * h[Z_INVERSE], True, step
+    )
 
 
 @jit
 def update(s, t, force, x, v, a):
     """`sample` on the flat state."""
-    h, theta, d, phi, b, work, inverse, level, peak, y, u, gram = views(s)
-    return sample(h, theta, d, phi, b, work, inverse, level, peak, y, u, gram, t, force, x, v, a)
+    h, theta, d, phi, b, work, inverse, level, peak, y, u, gram, start, pull = views(s)
+    return sample(h, theta, d, phi, b, work, inverse, level, peak, y, u, gram, start, pull, t, force, x, v, a)
 
 
 @jit
 def update_given(s, t, z, row):
     """`sample_given` on the flat state."""
-    h, theta, d, phi, b, _, inverse, level, peak, _, u, gram = views(s)
-    return sample_given(h, theta, d, phi, b, level, peak, u, gram, inverse, t, z, row)
+    h, theta, d, phi, b, _, inverse, level, peak, _, u, gram, start, pull = views(s)
+    return sample_given(h, theta, d, phi, b, level, peak, u, gram, start, pull, inverse, t, z, row)
 
 
 @inlined
@@ -399,11 +449,29 @@ def write(h, theta, phi, level, k, flag, every, out_theta, out_phi, out_z, flags
 @jit
 def run(s, time, force, x, v, a, every, out_theta, out_phi, out_z, flags, reports):
     """A whole record through `sample`."""
-    h, theta, d, phi, b, work, inverse, level, peak, y, u, gram = views(s)
+    h, theta, d, phi, b, work, inverse, level, peak, y, u, gram, start, pull = views(s)
     h[REPORTS] = 0.0
     for k in range(time.size):
         flag = sample(
-            h, theta, d, phi, b, work, inverse, level, peak, y, u, gram, time[k], force[k], x[k], v[k], a[k]
+            h,
+            theta,
+            d,
+            phi,
+            b,
+            work,
+            inverse,
+            level,
+            peak,
+            y,
+            u,
+            gram,
+            start,
+            pull,
+            time[k],
+            force[k],
+            x[k],
+            v[k],
+            a[k],
         )
         write(h, theta, phi, level, k, flag, every, out_theta, out_phi, out_z, flags, reports)
 
@@ -411,8 +479,10 @@ def run(s, time, force, x, v, a, every, out_theta, out_phi, out_z, flags, report
 @jit
 def run_given(s, time, z, rows, every, out_theta, out_phi, out_z, flags, reports):
     """A whole record through `sample_given`."""
-    h, theta, d, phi, b, _, inverse, level, peak, _, u, gram = views(s)
+    h, theta, d, phi, b, _, inverse, level, peak, _, u, gram, start, pull = views(s)
     h[REPORTS] = 0.0
     for k in range(time.size):
-        flag = sample_given(h, theta, d, phi, b, level, peak, u, gram, inverse, time[k], z[k], rows[k])
+        flag = sample_given(
+            h, theta, d, phi, b, level, peak, u, gram, start, pull, inverse, time[k], z[k], rows[k]
+        )
         write(h, theta, phi, level, k, flag, every, out_theta, out_phi, out_z, flags, reports)

@@ -35,6 +35,19 @@ def call_kernel(typingctx, address, t, q, v, z, theta, out):
 
 
 @intrinsic
+def call_with_address(typingctx, function, address):
+    """Call the C function ``void(void*)`` at integer `function`."""
+    signature = types.void(types.int64, types.int64)
+
+    def codegen(context, builder, signature, args):
+        function_type = ir.FunctionType(ir.VoidType(), [ir.IntType(64)])
+        builder.call(builder.inttoptr(args[0], function_type.as_pointer()), args[1:])
+        return context.get_dummy_value()
+
+    return signature, codegen
+
+
+@intrinsic
 def pointer_at(typingctx, address):
     """Turn an integer address into a pointer to float64."""
     signature = _pointer(types.int64)

@@ -96,7 +96,7 @@ _SIZED: Mapping[str, Callable[[int], ForceLaw]] = MappingProxyType(
     {"iwan": iwan_law, "timed_force": timed_force_law, "generalised_bouc_wen": generalised_bouc_wen_law}
 )
 
-_MODELS: Mapping[str, Callable[[Sequence[float]], ForceLaw]] = MappingProxyType(
+MODELS: Mapping[str, Callable[[Sequence[float]], ForceLaw]] = MappingProxyType(
     {"polynomial": polynomial_law_of, "network": network_law_of}
 )
 """Laws of identified models: no default size, so not in `LAWS`; found by name and header."""
@@ -113,8 +113,8 @@ def find_law(name: str, header: Sequence[float] = ()) -> ForceLaw:
         UnknownNameError: No law has that name.
         ParameterError: The law has no such header.
     """
-    if name in _MODELS and header:
-        return _MODELS[name](header)
+    if name in MODELS and header:
+        return MODELS[name](header)
     if name not in LAWS:
         raise UnknownNameError("law", name, LAWS)
     law = LAWS[name]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bench.errors import ParameterError, UnknownNameError
+from bench.errors import ParameterError
 from bench.measurement.anti_alias import AntiAlias
 from bench.measurement.base import Memory, Stage
 from bench.measurement.bias import Bias
@@ -172,13 +172,9 @@ class Chain:
         """The chain that `to_dict` (or a section of a TOML file) stands for.
 
         Raises:
-            UnknownNameError: An entry, the type of a stage or a field of it is unknown.
-            ParameterError: A value is out of range or the order is wrong.
+            DocumentError: An entry, the type of a stage or a field of it is unknown, missing or out of range, or the order is wrong.
         """
-        for key in data:
-            if key != "stages":
-                raise UnknownNameError("entry of a chain", str(key), ["stages"])
-        stages = data.get("stages")
-        if not isinstance(stages, list | tuple):
-            raise ParameterError(f"a chain is a table with a list 'stages'; {dict(data)!r} came")
-        return cls(*(Stage.from_dict(stage) for stage in stages))
+        from bench.documents import checked  # noqa: PLC0415  (pydantic, for those who read documents)
+        from bench.measurement.schema import ChainDocument  # noqa: PLC0415
+
+        return checked(ChainDocument, data).chain()

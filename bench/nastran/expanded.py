@@ -200,7 +200,8 @@ def _structure(rig: Rig) -> tuple[NDArray, NDArray, NDArray, NDArray]:
 
     def forces(q: NDArray, v: NDArray, command: NDArray) -> NDArray[np.float64]:
         data.qpos[:], data.qvel[:], data.ctrl[:] = q, v, command
-        mujoco.mj_forward(model, data)
+        with native.running(model):
+            mujoco.mj_forward(model, data)
         return data.qfrc_passive + data.qfrc_actuator + data.qfrc_constraint - data.qfrc_bias
 
     none, unit = np.zeros(n), np.eye(n)

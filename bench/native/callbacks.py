@@ -3,6 +3,9 @@
 One pair of stateless C functions serves every model of the process: all that they need is read from the model they
 are called with. They take no lock, allocate nothing and never touch Python, so that rollouts and batches run them on
 any number of threads with bit-identical results.
+
+Nothing that a model holds is trusted: a law is called only where the number has the token of this process beside it, and only
+with addresses that lie within the model. Where they do not, all passive forces become NaN, rather than leave a force out.
 """
 
 from __future__ import annotations
@@ -12,8 +15,9 @@ from numba import types
 
 from bench.laws.base import MAX_COORDINATES
 from bench.laws.calling import advance, call_kernel, load_int, load_int32, pointer_at, stack_array
-from bench.native.encoding import HEADER, MAGIC
+from bench.native.encoding import HEADER, MAGIC, MAX_TERMS
 from bench.native.table import (
+    CAPACITY,
     D_ACT,
     D_ACT_DOT,
     D_CTRL,
@@ -22,12 +26,20 @@ from bench.native.table import (
     D_QVEL,
     D_TIME,
     FIRST_LAW,
+    FORCE,
+    LAW_WORDS,
     M_ACTUATOR_ACTADR,
     M_ACTUATOR_DYNPRM,
+    M_NA,
     M_NNUMERIC,
+    M_NQ,
+    M_NU,
     M_NUMERIC_ADR,
     M_NUMERIC_DATA,
     M_NUMERIC_SIZE,
+    M_NV,
+    RATE,
+    TOKEN,
     table_address,
 )
 
@@ -47,28 +59,55 @@ def _pointer(table, base, field):
 
 
 @numba.njit(error_model="numpy", inline="always")
-def _coordinates(row, qpos, qvel, ctrl, q, v):
+def _law(table, row):
+    """Address of the three words of the row's law in the table; 0 where this process did not give it out."""
+    if not 0.0 <= row[1] < CAPACITY:
+        return 0
+    words = table + 8 * (FIRST_LAW + LAW_WORDS * int(row[1]))
+    if pointer_at(words + 8 * TOKEN)[0] != row[2]:
+        return 0
+    return words
+
+
+@numba.njit(error_model="numpy", inline="always")
+def _coordinates(row, size, nq, nv, table, model, qpos, qvel, ctrl, q, v):
+    """Read the coordinates; returns whether everything that the row refers to lies within it and within the model."""
+    if not 1.0 <= row[3] <= _LENGTH:
+        return False
     at = HEADER
-    for i in range(int(row[2])):
+    for i in range(int(row[3])):
+        if at + 2 > size or not 1.0 <= row[at + 1] <= MAX_TERMS:
+            return False
         terms = int(row[at + 1])
+        if at + 2 + 3 * terms > size:
+            return False
         position = 0.0
         velocity = 0.0
         if row[at] == 0.0:
             for k in range(terms):
                 term = at + 2 + 3 * k
+                if not (0.0 <= row[term] < nq and 0.0 <= row[term + 1] < nv):
+                    return False
                 position += row[term + 2] * qpos[int(row[term])]
                 velocity += row[term + 2] * qvel[int(row[term + 1])]
         else:
+            if not 0.0 <= row[at + 2] < _word(table, model, M_NU):
+                return False
             position = ctrl[int(row[at + 2])]
         q[i] = position
         v[i] = velocity
         at += 2 + 3 * terms
+    if row[4] != 0.0 and not (
+        row[4] > 0.0 and row[5] >= 0.0 and row[5] + row[4] <= _word(table, model, M_NA)
+    ):
+        return False
+    return at <= row[6] <= size
 
 
 @numba.njit(error_model="numpy", inline="always")
 def _subtract_force(row, f, qfrc):
     at = HEADER
-    for i in range(int(row[2])):
+    for i in range(int(row[3])):
         terms = int(row[at + 1])
         if row[at] == 0.0:
             for k in range(terms):
@@ -84,6 +123,8 @@ def passive(model, data):
     count = _word(table, model, M_NNUMERIC)
     if count == 0:
         return
+    nq = float(_word(table, model, M_NQ))
+    nv = float(_word(table, model, M_NV))
     addresses = _word(table, model, M_NUMERIC_ADR)
     sizes = _word(table, model, M_NUMERIC_SIZE)
     numbers = _pointer(table, model, M_NUMERIC_DATA)
@@ -97,21 +138,21 @@ def passive(model, data):
     v = stack_array(_LENGTH)
     f = stack_array(_LENGTH)
     for i in range(count):
-        row = advance(numbers, load_int32(addresses + 4 * i))
-        if load_int32(sizes + 4 * i) <= HEADER or row[0] != MAGIC:
+        size = load_int32(sizes + 4 * i)
+        if size <= HEADER:
             continue
-        _coordinates(row, qpos, qvel, ctrl, q, v)
-        n = int(row[2])
-        law = int(row[1])
-        if law < 0:  # never bound in this process: let it show, rather than leave the force out
-            for k in range(n):
-                f[k] = NOT_A_NUMBER
-        else:
-            for k in range(n):
-                f[k] = 0.0
-            force = load_int(table + 8 * (FIRST_LAW + 2 * law))
-            states = advance(act, int(row[4])) if row[4] > 0.0 else act
-            call_kernel(force, time, q, v, states, advance(row, int(row[5])), f)
+        row = advance(numbers, load_int32(addresses + 4 * i))
+        if row[0] != MAGIC:
+            continue
+        law = _law(table, row)
+        if law == 0 or not _coordinates(row, size, nq, nv, table, model, qpos, qvel, ctrl, q, v):
+            for k in range(_word(table, model, M_NV)):  # let it show, rather than leave the force out
+                qfrc[k] = NOT_A_NUMBER
+            continue
+        for k in range(int(row[3])):
+            f[k] = 0.0
+        states = advance(act, int(row[5])) if row[5] > 0.0 else act
+        call_kernel(load_int(law + 8 * FORCE), time, q, v, states, advance(row, int(row[6])), f)
         _subtract_force(row, f, qfrc)
 
 
@@ -122,23 +163,34 @@ def act_dyn(model, data, actuator):
     prm = advance(_pointer(table, model, M_ACTUATOR_DYNPRM), DYNPRM * actuator)
     if prm[0] != MAGIC:
         return 0.0
+    if not 0.0 <= prm[1] < _word(table, model, M_NNUMERIC):
+        return NOT_A_NUMBER
+    numeric = int(prm[1])
+    size = load_int32(_word(table, model, M_NUMERIC_SIZE) + 4 * numeric)
+    if size <= HEADER:
+        return NOT_A_NUMBER
     addresses = _word(table, model, M_NUMERIC_ADR)
-    row = advance(_pointer(table, model, M_NUMERIC_DATA), load_int32(addresses + 4 * int(prm[1])))
-    act = _pointer(table, data, D_ACT)
-    first = int(load_int32(_word(table, model, M_ACTUATOR_ACTADR) + 4 * actuator))
-    rates = advance(_pointer(table, data, D_ACT_DOT), first)
-    law = int(row[1])
-    if law < 0:
-        rates[0] = NOT_A_NUMBER
+    row = advance(_pointer(table, model, M_NUMERIC_DATA), load_int32(addresses + 4 * numeric))
+    first = load_int32(_word(table, model, M_ACTUATOR_ACTADR) + 4 * actuator)
+    law = _law(table, row)
+    if law == 0 or row[4] < 1.0 or row[5] != first:
         return NOT_A_NUMBER
     q = stack_array(_LENGTH)
     v = stack_array(_LENGTH)
     qpos = _pointer(table, data, D_QPOS)
     qvel = _pointer(table, data, D_QVEL)
-    _coordinates(row, qpos, qvel, _pointer(table, data, D_CTRL), q, v)
+    nq = float(_word(table, model, M_NQ))
+    nv = float(_word(table, model, M_NV))
+    ctrl = _pointer(table, data, D_CTRL)
+    if not _coordinates(row, size, nq, nv, table, model, qpos, qvel, ctrl, q, v):
+        return NOT_A_NUMBER
+    act = _pointer(table, data, D_ACT)
+    rates = advance(_pointer(table, data, D_ACT_DOT), first)
     time = pointer_at(data + load_int(table + 8 * D_TIME))[0]
-    rate = load_int(table + 8 * (FIRST_LAW + 2 * law + 1))
-    call_kernel(rate, time, q, v, advance(act, first), advance(row, int(row[5])), rates)
+    rate = load_int(law + 8 * RATE)
+    if rate == 0:
+        return NOT_A_NUMBER
+    call_kernel(rate, time, q, v, advance(act, first), advance(row, int(row[6])), rates)
     return rates[0]
 
 

@@ -20,8 +20,9 @@ from bench.errors import NativeError
 TESTED_MUJOCO = ("4.0.0", "4.1.0")
 """Tested range: from the first version (included) to the second (excluded)."""
 
+MODEL_SIZES = ("nq", "nv", "nu", "na", "nnumeric")
 MODEL_FIELDS = (
-    "nnumeric",
+    *MODEL_SIZES,
     "numeric_adr",
     "numeric_size",
     "numeric_data",
@@ -123,12 +124,14 @@ def _check_against_live_arrays(table: dict[str, int]) -> None:
 
     wrong = [
         name
-        for owner, prefix, names in ((model, "m.", MODEL_FIELDS[1:]), (data, "d.", DATA_FIELDS[1:]))
+        for owner, prefix, names in (
+            (model, "m.", MODEL_FIELDS[len(MODEL_SIZES) :]),
+            (data, "d.", DATA_FIELDS[1:]),
+        )
         for name in (prefix + field for field in names)
         if word(name) != getattr(owner, name[2:]).ctypes.data
     ]
-    if word("m.nnumeric") != model.nnumeric:
-        wrong.append("m.nnumeric")
+    wrong += [f"m.{name}" for name in MODEL_SIZES if word(f"m.{name}") != getattr(model, name)]
     if np.int64(word("d.time")).view(np.float64) != data.time:
         wrong.append("d.time")
     for array, dtype in (

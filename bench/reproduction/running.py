@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from bench import model_path
-from bench.files import write_text
+from bench.files import together, write_text
 from bench.provenance import provenance, software_versions
 from bench.reproduction.item import Item, Progress, Result
 from bench.reproduction.registry import Entry, find_entries
@@ -94,9 +94,12 @@ def reproduce(
     progress("writing the page", 1.0)
     reproduction = Reproduction(tuple(results), (), sum(result.seconds for result in results))
     files = [folder / name for name in ("index.html", "table.md", "table.json")]
-    to_page(results, folder).write(files[0])
-    write_text(files[1], to_markdown(results))
-    write_text(files[2], json.dumps(reproduction.to_dict(), indent=1, ensure_ascii=False, allow_nan=False))
+    with together():
+        to_page(results, folder).write(files[0])
+        write_text(files[1], to_markdown(results))
+        write_text(
+            files[2], json.dumps(reproduction.to_dict(), indent=1, ensure_ascii=False, allow_nan=False)
+        )
     pictures = [folder / name for result in results for name, _ in result.pictures]
     return Reproduction(reproduction.results, (*files, *pictures), reproduction.seconds)
 

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple, Protocol, get_args
 from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from bench import native
 from bench.errors import ModelError, ParameterError, UnknownNameError
+from bench.mjcf import StructureName
 from bench.native import Coordinate
 from bench.rig.element import Element
-
-if TYPE_CHECKING:
-    from bench.rig.description import Rig
 
 INTEGRATORS = {
     "RK4": mujoco.mjtIntegrator.mjINT_RK4,
@@ -23,10 +23,49 @@ INTEGRATORS = {
     "implicit": mujoco.mjtIntegrator.mjINT_IMPLICIT,
     "implicitfast": mujoco.mjtIntegrator.mjINT_IMPLICITFAST,
 }
-STRUCTURE = ("mass", "inertia", "stiffness", "damping", "frictionloss", "armature")
+STRUCTURE: tuple[str, ...] = get_args(StructureName)
 """Structural quantities that `Rig.with_structure` changes."""
 
 EXACT_SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)
+
+
+class Buildable(Protocol):
+    """What of a rig a model is built from; `bench.rig.Rig` says what each is."""
+
+    @property
+    def name(self) -> str:
+        """Name, for messages."""
+        ...
+
+    @property
+    def mjcf(self) -> str:
+        """The model as MJCF text."""
+        ...
+
+    @property
+    def folder(self) -> str:
+        """Folder that meshes and includes are looked for in."""
+        ...
+
+    @property
+    def timestep(self) -> float:
+        """Integration step [s]."""
+        ...
+
+    @property
+    def integrator(self) -> str:
+        """One of `INTEGRATORS`."""
+        ...
+
+    @property
+    def elements(self) -> tuple[Element, ...]:
+        """The elements."""
+        ...
+
+    @property
+    def structure(self) -> tuple[tuple[str, str, float], ...]:
+        """Changes of the MJCF's own numbers."""
+        ...
 
 
 class Placed(NamedTuple):
@@ -74,9 +113,10 @@ def _includes(text: str, folder: Path) -> dict[str, bytes]:
     return found
 
 
-def specify(rig: Rig, built: Built | None = None) -> mujoco.MjSpec:
+def specify(rig: Buildable, built: Built | None = None) -> mujoco.MjSpec:
     """The rig as an MjSpec, its elements' rows empty, or as they are in `built`."""
     spec = parse(rig.mjcf, rig.folder, f"rig '{rig.name}'")
+    _refuse_foreign_elements(spec, rig)
     spec.option.timestep = rig.timestep
     spec.option.integrator = INTEGRATORS[rig.integrator]
     spec.option.disableflags |= (
@@ -93,11 +133,31 @@ def specify(rig: Rig, built: Built | None = None) -> mujoco.MjSpec:
             )
             start = int(built.model.numeric_adr[numeric])
             data = built.model.numeric_data[start : start + int(built.model.numeric_size[numeric])].copy()
-            data[1] = -1.0  # the law's number holds in this process only
+            data[native.OWN] = native.UNBOUND
         spec.add_numeric(name=native.PREFIX + element.name, data=data, size=len(data))
         if element.law.states:
             _add_state_actuator(spec, element, index)
     return spec
+
+
+def _refuse_foreign_elements(spec: mujoco.MjSpec, rig: Buildable) -> None:
+    """Refuse MJCF that marks something of its own as an element: law numbers and addresses are no matter of a file."""
+    marked = [f"numeric '{item.name}'" for item in spec.numerics if _is_marked(item.name, item.data)]
+    marked += [
+        f"actuator '{item.name}'"
+        for item in spec.actuators
+        if _is_marked(item.name, item.dynprm if item.dyntype == mujoco.mjtDyn.mjDYN_USER else ())
+    ]
+    if marked:
+        raise ModelError(
+            f"the MJCF of rig '{rig.name}' marks {', '.join(marked[:3])} as an element of the bench (a name that begins with "
+            f"'{native.PREFIX}', or the first number {native.MAGIC:.0f}); elements belong to the rig, not to its MJCF. Remove it there "
+            "and give the rig the element; a model exported by Rig.to_xml is loaded by MuJoCo itself and bench.native.bind"
+        )
+
+
+def _is_marked(name: str, numbers: Sequence[float] | NDArray[np.float64]) -> bool:
+    return name.startswith(native.PREFIX) or (len(numbers) > 0 and numbers[0] == native.MAGIC)
 
 
 def _leave_out_drawings(spec: mujoco.MjSpec) -> None:
@@ -134,9 +194,14 @@ def _add_state_actuator(spec: mujoco.MjSpec, element: Element, index: int) -> No
     actuator.biastype = mujoco.mjtBias.mjBIAS_NONE
 
 
-def build(rig: Rig, *, drawings: bool = False) -> Built:
+def build(rig: Buildable, *, drawings: bool = False) -> Built:
     """Compile a rig, with or without what is only drawn; see `Rig.built` for what it raises."""
     native.install()
+    with native.quiet():
+        return _build(rig, drawings)
+
+
+def _build(rig: Buildable, drawings: bool) -> Built:
     spec = specify(rig)
     if not drawings:
         _leave_out_drawings(spec)
@@ -168,7 +233,7 @@ def build(rig: Rig, *, drawings: bool = False) -> Built:
     return Built(model, tuple(placed), own)
 
 
-def _check_targets(spec: mujoco.MjSpec, rig: Rig, element: Element) -> None:
+def _check_targets(spec: mujoco.MjSpec, rig: Buildable, element: Element) -> None:
     known = [joint.name for joint in spec.joints] + [tendon.name for tendon in spec.tendons]
     for joint in element.joints:
         if joint not in known:

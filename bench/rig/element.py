@@ -129,13 +129,9 @@ class Element:
         """Read the JSON form of an element whose law is in the registry.
 
         Raises:
-            UnknownNameError: The law is not in the registry.
+            DocumentError: The law is not in the registry, or an entry is not known, missing, of the wrong kind or out of range.
         """
-        return cls.of(
-            find_law(document["law"], document.get("header", ())),
-            *document["joints"],
-            theta=document["theta"],
-            inputs=tuple(document.get("inputs", ())),
-            name=document.get("name", ""),
-            exact=bool(document.get("exact", False)),
-        )
+        from bench.documents import checked  # noqa: PLC0415  (pydantic, for those who read documents)
+        from bench.rig.schema import ElementDocument  # noqa: PLC0415
+
+        return checked(ElementDocument, document).element()

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 
 import mujoco
 import numpy as np
 from mujoco.batch import Batch
+from mujoco.batch import SimulationError as BatchError
 from numpy.typing import ArrayLike, NDArray
 
 from bench import native
@@ -21,6 +21,7 @@ from bench.rig.building import Placed
 from bench.rig.description import Rig
 from bench.rig.element import Element
 from bench.signals import Excitation
+from bench.signals.base import MAX_SAMPLES
 
 STATE = (
     mujoco.mjtState.mjSTATE_TIME
@@ -62,8 +63,8 @@ def controls_of(rig: Rig, drive: Drive, rng: np.random.Generator | None = None) 
     for name in columns:
         if name not in rig.actuators:
             raise UnknownNameError(f"actuator of rig '{rig.name}'", name, rig.actuators)
-    hold = round(1.0 / (rate * rig.timestep))
-    if hold < 1 or abs(hold * rate * rig.timestep - 1.0) > 1e-6:
+    hold = _whole_steps(rate, rig)
+    if hold < 1:
         raise ParameterError(
             f"a sample rate of {rate:g} Hz does not divide the {1.0 / rig.timestep:g} steps a second of rig '{rig.name}'; "
             "resample the drive or set the rig's timestep"
@@ -73,7 +74,13 @@ def controls_of(rig: Rig, drive: Drive, rng: np.random.Generator | None = None) 
         raise ParameterError(
             f"the drive of rig '{rig.name}' has channels of different lengths: {sorted(lengths)} samples"
         )
-    controls = np.zeros((lengths.pop() * hold, len(rig.actuators)))
+    length = lengths.pop()
+    if length * hold > MAX_SAMPLES:
+        raise ParameterError(
+            f"{length} samples, each held for {hold} steps of rig '{rig.name}', are {length * hold} steps; at most {MAX_SAMPLES} "
+            "are expected: lengthen the timestep, or make several records"
+        )
+    controls = np.zeros((length * hold, len(rig.actuators)))
     for name, values in columns.items():
         if not np.all(np.isfinite(values)):
             at = int(np.flatnonzero(~np.isfinite(values))[0])
@@ -158,11 +165,20 @@ def simulate_batch(
     ]
 
 
+def _whole_steps(rate: float, rig: Rig) -> int:
+    """Steps of a rig in one sample; 0 where they are no whole number, or more than any record has."""
+    share = rate * rig.timestep
+    if not share * MAX_SAMPLES >= 1.0:
+        return 0
+    steps = round(1.0 / share)
+    return steps if abs(steps * share - 1.0) <= 1e-6 else 0
+
+
 def _stride(rig: Rig, sample_rate: float | None) -> int:
     if sample_rate is None:
         return 1
-    stride = round(1.0 / (sample_rate * rig.timestep))
-    if stride < 1 or abs(stride * sample_rate * rig.timestep - 1.0) > 1e-6:
+    stride = _whole_steps(sample_rate, rig)
+    if stride < 1:
         raise ParameterError(
             f"a record of {sample_rate:g} Hz does not divide the {1.0 / rig.timestep:g} steps a second of the rig"
         )
@@ -194,25 +210,20 @@ def _roll(
     start = np.concatenate(
         [np.zeros((len(rigs), 1)), batch.bind("qpos"), batch.bind("qvel"), batch.bind("act")], axis=1
     )
-    with _own_report(), native.untimed():
-        result = batch.rollout(n, padded, mujoco.mjtState.mjSTATE_CTRL, [STATE, "sensordata"])
+    with native.running(*{id(rig.model): rig.model for rig in rigs}.values()):
+        try:
+            result = batch.rollout(n, padded, mujoco.mjtState.mjSTATE_CTRL, [STATE, "sensordata"])
+        except BatchError as error:
+            place = int(error.ids[0])
+            raise SimulationError(
+                f"MuJoCo gave up on the simulation of rig '{rigs[place].name}': {batch.error(place)}. Simplify the model (contacts "
+                "take most memory), or give it more with <size memory=…>",
+                time=float("nan"),
+            ) from error
     states = np.concatenate([start[:, None, :], result[STATE]], axis=1)
     for i, rig in enumerate(rigs):
         _check_finite(rig, states[i], controls[i])
     return states[:, :-1], result["sensordata"], controls
-
-
-@contextmanager
-def _own_report() -> Iterator[None]:
-    """Keep MuJoCo from printing its warnings and leaving MUJOCO_LOG.TXT behind: a divergence is reported as an error."""
-    theirs = mujoco.get_mju_user_warning()
-    if theirs is None:
-        mujoco.set_mju_user_warning(lambda message: None)
-    try:
-        yield
-    finally:
-        if theirs is None:
-            mujoco.set_mju_user_warning(None)
 
 
 def _set_initial(

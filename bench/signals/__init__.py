@@ -18,8 +18,8 @@
 them.
 """
 
-from bench.signals.base import Signal
-from bench.signals.composition import Concatenation, Scaled, Sum, Tapered, scaled
+from bench.signals.base import Scaled, Signal, Sum
+from bench.signals.composition import Concatenation, Tapered, scaled
 from bench.signals.elementary import Constant, Harmonic, ImpulseTrain, Ramp
 from bench.signals.excitation import Excitation
 from bench.signals.measures import crest_factor, energy, rms

@@ -1,4 +1,4 @@
-"""Signals made of signals: sum, concatenation, scaling, fading in and out."""
+"""Signals made of signals: concatenation, scaling to a size, fading in and out."""
 
 from __future__ import annotations
 
@@ -8,30 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.errors import ParameterError
-from bench.signals.base import Signal
-from bench.signals.measures import energy, rms
-from bench.signals.streams import named_streams
-
-
-@dataclass(frozen=True)
-class Sum(Signal, name="sum"):
-    """The sum of signals, each with a random stream of its own.
-
-    Attributes:
-        signals: The signals.
-    """
-
-    signals: tuple[Signal, ...]
-
-    def __post_init__(self) -> None:
-        _check_signals(self)
-
-    def _values(self, n: int, sample_rate: float, rng: np.random.Generator | None) -> NDArray[np.float64]:
-        streams = _streams(rng, len(self.signals))
-        total = np.zeros(n)
-        for signal, stream in zip(self.signals, streams, strict=True):
-            total += signal.sample(n, sample_rate, stream)
-        return total
+from bench.signals.base import Scaled, Signal, check_signal, check_signals, streams_of
 
 
 @dataclass(frozen=True)
@@ -48,7 +25,7 @@ class Concatenation(Signal, name="concatenation"):
     durations: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        _check_signals(self)
+        check_signals(self, self.signals)
         if len(self.signals) > 1 or len(tuple(self.durations)) > 0:
             self._reals("durations", "s", above=0.0)
         if len(self.signals) - len(self.durations) not in (0, 1):
@@ -58,7 +35,7 @@ class Concatenation(Signal, name="concatenation"):
             )
 
     def _values(self, n: int, sample_rate: float, rng: np.random.Generator | None) -> NDArray[np.float64]:
-        streams = _streams(rng, len(self.signals))
+        streams = streams_of(rng, len(self.signals))
         edges = [0, *(round(end * sample_rate) for end in np.cumsum(self.durations))]
         if len(self.durations) < len(self.signals):
             edges.append(max(n, edges[-1]))
@@ -68,54 +45,6 @@ class Concatenation(Signal, name="concatenation"):
             if kept > 0:  # sampled whole, then cut: the waveform does not depend on where the record ends
                 x[begin : begin + kept] = signal.sample(end - begin, sample_rate, stream)[:kept]
         return x
-
-
-@dataclass(frozen=True)
-class Scaled(Signal, name="scaled"):
-    """A signal times a constant, given as such or by what the result shall have.
-
-    Attributes:
-        signal: The signal.
-        gain: Factor.
-        peak: Largest magnitude of the record.
-        rms: Root mean square of the record.
-        energy: Energy ``dt sum(x^2)`` of the record, in the unit of the channel squared times s.
-    """
-
-    signal: Signal
-    gain: float | None = None
-    peak: float | None = None
-    rms: float | None = None
-    energy: float | None = None
-
-    def __post_init__(self) -> None:
-        _check_signal(self, self.signal)
-        self._real("gain", optional=True)
-        for name in ("peak", "rms", "energy"):
-            self._real(name, above=0.0, optional=True)
-        given = [name for name in ("gain", "peak", "rms", "energy") if getattr(self, name) is not None]
-        if len(given) != 1:
-            raise ParameterError(
-                "a signal is scaled by exactly one of gain, peak, rms, energy; "
-                f"{', '.join(given) or 'none'} came"
-            )
-
-    def _values(self, n: int, sample_rate: float, rng: np.random.Generator | None) -> NDArray[np.float64]:
-        x = self.signal.sample(n, sample_rate, rng)
-        if self.gain is not None:
-            return self.gain * x
-        largest = float(np.max(np.abs(x)))
-        if largest == 0.0:
-            raise ParameterError(
-                f"signal '{self.signal.name}' is zero throughout the record and cannot be scaled"
-            )
-        x = x / largest
-        if self.peak is not None:
-            return self.peak * x
-        if self.rms is not None:
-            return (self.rms / rms(x)) * x
-        assert self.energy is not None  # the last of the four, of which one is given
-        return np.sqrt(self.energy / energy(x, 1.0 / sample_rate)) * x
 
 
 @dataclass(frozen=True)
@@ -134,7 +63,7 @@ class Tapered(Signal, name="tapered"):
     fade_out: float = 0.0
 
     def __post_init__(self) -> None:
-        _check_signal(self, self.signal)
+        check_signal(self, self.signal)
         self._real("fade_in", "s", at_least=0.0)
         self._real("fade_out", "s", at_least=0.0)
 
@@ -174,23 +103,3 @@ def scaled(
         ParameterError: Not exactly one of the four is given, or it is not positive (`gain` may be).
     """
     return Scaled(signal, gain=gain, peak=peak, rms=rms, energy=energy)
-
-
-def _streams(rng: np.random.Generator | None, count: int) -> list[np.random.Generator | None]:
-    """One stream for each part, by its place: a part appended does not change those before it."""
-    if rng is None:
-        return [None] * count
-    return list(named_streams(rng, [str(k) for k in range(count)]).values())
-
-
-def _check_signals(owner: Sum | Concatenation) -> None:
-    if not isinstance(owner.signals, list | tuple) or not owner.signals:
-        raise ParameterError(f"signal '{owner.name}' needs a list of signals; {owner.signals!r} came")
-    for signal in owner.signals:
-        _check_signal(owner, signal)
-    object.__setattr__(owner, "signals", tuple(owner.signals))
-
-
-def _check_signal(owner: Signal, signal: object) -> None:
-    if not isinstance(signal, Signal):
-        raise ParameterError(f"signal '{owner.name}' is made of signals; {signal!r} came")

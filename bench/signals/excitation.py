@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.errors import ParameterError, UnknownNameError
-from bench.signals.base import Signal
+from bench.errors import ParameterError
+from bench.signals.base import MAX_SAMPLES, Signal
 from bench.signals.streams import named_streams
 
 
@@ -48,6 +48,11 @@ class Excitation:
                 )
             object.__setattr__(self, field, float(value))
         object.__setattr__(self, "signals", MappingProxyType(dict(self.signals)))
+        if not self.duration * self.sample_rate <= MAX_SAMPLES:
+            raise ParameterError(
+                f"{self.duration:g} s at {self.sample_rate:g} Hz are {self.duration * self.sample_rate:g} samples; at most "
+                f"{MAX_SAMPLES} are expected: shorten the excitation, or make several records"
+            )
         if self.n_samples < 1:
             raise ParameterError(
                 f"{self.duration:g} s at {self.sample_rate:g} Hz is less than one sample; "
@@ -106,18 +111,9 @@ class Excitation:
         """The excitation that `to_dict` (or a section of a TOML file) stands for.
 
         Raises:
-            UnknownNameError: An entry, the type of a signal or a field of it is unknown.
-            ParameterError: An entry is missing or out of range.
+            DocumentError: An entry, the type of a signal or a field of it is unknown, missing, of the wrong kind or out of range.
         """
-        expected = ("duration", "sample_rate", "signals")
-        for key in data:
-            if key not in expected:
-                raise UnknownNameError("entry of an excitation", str(key), expected)
-        missing = [key for key in expected if key not in data]
-        if missing or not isinstance(data["signals"], Mapping):
-            raise ParameterError(
-                f"an excitation needs duration [s], sample_rate [Hz] and a table of signals; "
-                f"got {', '.join(data) or 'nothing'}"
-            )
-        signals = {name: Signal.from_dict(signal) for name, signal in data["signals"].items()}
-        return cls(signals, data["duration"], data["sample_rate"])
+        from bench.documents import checked  # noqa: PLC0415  (pydantic, for those who read documents)
+        from bench.signals.schema import ExcitationDocument  # noqa: PLC0415
+
+        return checked(ExcitationDocument, data).excitation()

@@ -21,7 +21,8 @@ import numpy as np
 
 from bench.campaign import Plan, plan_from_dict, run_campaign
 from bench.campaign.execution import cores, generator_of, payload_of
-from bench.campaign.store import Store, part_name
+from bench.campaign.parts import part_name
+from bench.campaign.store import Store
 from bench.campaign.tables import part_contents
 from benchmarks.new_process import in_new_process, memory_row
 from benchmarks.timing import Row, interleave, ratio_row

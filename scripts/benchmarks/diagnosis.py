@@ -28,7 +28,7 @@ from bench.discrepancy import BlindOptions, BlindScore, diagnose, make_blind, re
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.judgement.validation_discrepancy import DIVERGED_GAP, coordinates, noise_level, nrmse
 from bench.discrepancy.likelihood.problem import Problem
-from bench.discrepancy.model.structure import structure_of
+from bench.discrepancy.model.rigs import structure_of
 from bench.files import write_text
 from benchmarks.new_process import in_new_process, memory_row
 from benchmarks.timing import Row

@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.likelihood.problem import Problem
-from bench.discrepancy.model.structure import Place, Structure, structure_of
+from bench.discrepancy.model.rigs import structure_of
+from bench.discrepancy.model.structure import Place, Structure
 
 Array = NDArray[np.float64]
 Column = Callable[[Array, Array, Array, float | Array], Array]

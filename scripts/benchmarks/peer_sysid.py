@@ -35,7 +35,8 @@ from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.likelihood.whitening import whitened
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.model.placements import placements
-from bench.discrepancy.model.structure import Structure, structure_of
+from bench.discrepancy.model.rigs import structure_of
+from bench.discrepancy.model.structure import Structure
 from bench.discrepancy.simulation.stick_slip import Motion
 from benchmarks.peer_model import Compiled
 

@@ -71,7 +71,7 @@ class _Group(NamedTuple):
 
 def _odds_of(pure: Case, true: Mapping[str, float], truth: Mapping[str, str]) -> dict[str, Any]:
     # the diagnosis is imported where it is asked: a maker that was told to leave this out runs without it
-    from bench.discrepancy.model.structure import structure_of  # noqa: PLC0415
+    from bench.discrepancy.model.rigs import structure_of  # noqa: PLC0415
 
     structure = structure_of(pure)
     parts = [structure.restricted(group) for group in structure.groups()]

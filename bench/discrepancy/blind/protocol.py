@@ -28,9 +28,11 @@ from typing import Any
 import numpy as np
 
 from bench.discrepancy.blind.drawing import BlindOptions, draw_case
+from bench.discrepancy.blind.schema import ANSWER_LIMITS, ProtocolDocument
 from bench.discrepancy.case.case import Case
+from bench.documents import parse_json
 from bench.errors import BenchError, FileFormatError, ParameterError
-from bench.files import replacing, write_text
+from bench.files import together, write_bytes, write_text
 
 __all__ = ["BlindOptions", "draw_case", "make_blind", "run_blind", "write_case"]
 
@@ -89,19 +91,24 @@ def _make_one(task: tuple[str, Path, Path, int, int, BlindOptions]) -> str:
     salt = rng.bytes(16).hex()  # drawn first, so that it also tells whether a case at hand is of this seed
     if sealed.is_file() and answer_file.is_file():
         text = answer_file.read_text(encoding="utf-8")
-        if sealed.read_text().strip() == _digest(text) and json.loads(text).get("salt") == salt:
+        if sealed.read_text().strip() == _digest(text) and _salt(text, answer_file) == salt:
             return f"{name} is there"
         raise FileFormatError(
             f"'{folder / name}' is a case of another seed, or was changed; give an empty folder, or remove it"
         )
     case, answer = draw_case(name, rng, options)
     text = json.dumps(answer | {"salt": salt}, indent=1)
-    if options.leave_one_out:
-        write_text(folder / name / PROTOCOL, json.dumps({"exclude": answer["struck"]}))
-    write_case(case, folder / name)
-    write_text(answer_file, text)
-    write_text(sealed, _digest(text) + "\n")
+    with together():  # no case without its answer
+        if options.leave_one_out:
+            write_text(folder / name / PROTOCOL, json.dumps({"exclude": answer["struck"]}))
+        write_case(case, folder / name)
+        write_text(answer_file, text)
+        write_text(sealed, _digest(text) + "\n")
     return f"{name} made"
+
+
+def _salt(text: str, file: Path) -> Any:
+    return parse_json(text, str(file), limits=ANSWER_LIMITS).get("salt")
 
 
 def _digest(text: str) -> str:
@@ -133,8 +140,7 @@ def write_case(case: Case, folder: str | Path) -> None:
         text = io.StringIO()
         header = ",".join(["time", *record.values])
         np.savetxt(text, table, delimiter=",", header=header, comments="", fmt="%.8g")
-        with replacing(folder / f"{record.name}.csv.gz") as temporary:
-            temporary.write_bytes(gzip.compress(text.getvalue().encode(), mtime=0))
+        write_bytes(folder / f"{record.name}.csv.gz", gzip.compress(text.getvalue().encode(), mtime=0))
     nominal = {
         "rig": case.rig,
         "sample_rate_hz": 1.0 / case.identification[0].step,
@@ -171,6 +177,7 @@ def run_blind(
 
     Raises:
         FileFormatError: There is no case.
+        DocumentError: The protocol of a case has an entry that is not known or of the wrong kind.
     """
     folder, results = Path(folder), Path(results)
     cases = sorted(path.parent for path in folder.glob("*/nominal.json"))
@@ -178,7 +185,7 @@ def run_blind(
         raise FileFormatError(f"no case folder (one with nominal.json) in '{folder}'")
     targets = [results / f"{path.name}.json" for path in cases]
     tasks = [
-        (path, target, options)
+        (path, target, _struck(path, options))
         for path, target in zip(cases, targets, strict=True)
         if again or not target.is_file()
     ]
@@ -189,14 +196,19 @@ def run_blind(
     return targets
 
 
+def _struck(path: Path, options: dict[str, Any]) -> dict[str, Any]:
+    """The options, with what the protocol of a case strikes; read before any case is diagnosed."""
+    protocol = path / PROTOCOL
+    if not protocol.is_file():
+        return options
+    struck = ProtocolDocument.read(protocol).exclude
+    return options | {"exclude": tuple(sorted({*options.get("exclude", ()), *struck}))}
+
+
 def _run_one(task: tuple[Path, Path, dict[str, Any]]) -> str:
     from bench.discrepancy.diagnosis import diagnose_folder  # noqa: PLC0415  (the maker does not need it)
 
     path, target, options = task
-    protocol = path / PROTOCOL
-    if protocol.is_file():
-        struck = json.loads(protocol.read_text(encoding="utf-8")).get("exclude", [])
-        options = options | {"exclude": tuple({*options.get("exclude", ()), *struck})}
     try:
         verdict = diagnose_folder(path, **options).verdict
     except KeyboardInterrupt:

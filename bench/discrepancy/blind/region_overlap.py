@@ -34,8 +34,9 @@ def region_scores(result: Mapping[str, Any], answer: Mapping[str, Any]) -> list[
                 continue
             for region in location.get("regions") or [location.get("state_region") or {}]:
                 if region:  # a region that does not depend on the coordinate lies everywhere along it
-                    marked = _widened(region.get(coordinate, (-reach, reach)), 2.0 * reach / CELLS)
-                    found |= _inside(middle, [marked])
+                    low, high = region.get(coordinate, (None, None))  # null: without a limit
+                    limits = (-reach if low is None else low, reach if high is None else high)
+                    found |= _inside(middle, [_widened(limits, 2.0 * reach / CELLS)])
         both = np.sum(truth & found)
         out.append(float(2.0 * both / max(np.sum(truth) + np.sum(found), 1)))
     return out

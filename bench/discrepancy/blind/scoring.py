@@ -12,7 +12,6 @@ What counts as right, by the class of a case:
 from __future__ import annotations
 
 import hashlib
-import json
 import math
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
@@ -24,8 +23,11 @@ import numpy as np
 
 from bench.discrepancy.blind.proportions import Share, calibration_error, reliability, share_of
 from bench.discrepancy.blind.region_overlap import region_scores
+from bench.discrepancy.blind.schema import ANSWER_LIMITS, AnswerDocument
 from bench.discrepancy.blind.strata import bands_of, by_band
 from bench.discrepancy.effects.catalogue import CATALOGUE
+from bench.discrepancy.verdict_schema import ResultDocument
+from bench.documents import checked, load_document, parse_json, read_text
 from bench.errors import FileFormatError
 from bench.files import json_values
 
@@ -143,6 +145,7 @@ def score_blind(results: str | Path, answers: str | Path, *, cases: str | Path |
 
     Raises:
         FileFormatError: No result has an answer, or an answer does not match its hash.
+        DocumentError: A result or an answer has an entry that is missing or of the wrong kind.
     """
     return summary(score_cases(results, answers, cases=cases))
 
@@ -155,14 +158,13 @@ def score_cases(results: str | Path, answers: str | Path, *, cases: str | Path |
         file = answers / path.name
         if not file.is_file():
             continue
-        text = file.read_text(encoding="utf-8")
+        text = read_text(file, ANSWER_LIMITS.json_bytes)
         _check_seal(text, path.stem, cases)
-        try:
-            out.append(_scored(path.stem, json.loads(path.read_text(encoding="utf-8")), json.loads(text)))
-        except (json.JSONDecodeError, KeyError, TypeError) as error:
-            raise FileFormatError(
-                f"'{path}' or its answer '{file}' is not what a diagnosis and a maker of cases write: {error!r}"
-            ) from error
+        answer = parse_json(text, str(file), limits=ANSWER_LIMITS)
+        checked(AnswerDocument, answer, str(file))
+        result = load_document(path)
+        checked(ResultDocument, result, str(path))
+        out.append(_scored(path.stem, result, answer))
     if not out:
         raise FileFormatError(f"no result in '{results}' has an answer in '{answers}'")
     return out
@@ -217,7 +219,9 @@ def _right(
         return True
     if len(missed) == len(extra) == 1:
         (name, where), (other, place) = *missed, *extra
-        return where == place and any({name, other} <= set(entry) for entry in result["indistinguishable"])
+        return where == place and any(
+            {name, other} <= set(entry) for entry in result.get("indistinguishable") or ()
+        )
     return False
 
 
@@ -285,7 +289,8 @@ def summary(scored: Sequence[Scored]) -> BlindScore:
 def _least_odds(answer: Mapping[str, Any]) -> float:
     """Smaller one of the expected log odds that an answer states; minus infinity where it states none."""
     odds = answer.get("detectability") or {}
-    return min(odds.get("log_odds_rival", -math.inf), odds.get("log_odds_none", -math.inf))
+    stated = [odds.get(name) for name in ("log_odds_rival", "log_odds_none")]
+    return min(-math.inf if value is None else value for value in stated)
 
 
 def _tellable(s: Scored) -> bool:
@@ -328,7 +333,7 @@ def _held(s: Scored) -> bool:
 def _ratios(result: Mapping[str, Any]) -> list[float]:
     gaps = result.get("gaps") or ([result["gap"]] if result.get("gap") else [])
     return [
-        g["after"] / g["noise_floor"] if g["after"] is not None else math.inf
+        g["after"] / g["noise_floor"] if g.get("after") is not None else math.inf
         for g in gaps
         if g.get("noise_floor")
     ]

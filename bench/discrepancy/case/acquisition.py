@@ -12,10 +12,10 @@ above half the sample rate and is folded back is not followed: a filter worth it
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Callable
+from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,8 @@ from bench.errors import ParameterError, UnknownNameError
 
 Array = NDArray[np.float64]
 
-INTERPOLATIONS = ("linear", "band_limited", "zero_order_hold")
+Interpolation = Literal["linear", "band_limited", "zero_order_hold"]
+INTERPOLATIONS = get_args(Interpolation)
 """Readings of a load between its samples."""
 
 REACH = 48
@@ -69,6 +70,10 @@ def upsampled(samples: Array, factor: int, *, interpolation: str = "linear", per
     return np.ascontiguousarray(dense[first : first + len(fine)])
 
 
+FilterKind = Literal["butterworth", "bessel", "fir", "delay"]
+"""Kinds of filters."""
+
+
 @dataclass(frozen=True)
 class Antialias:
     """Filter that a response passed on its way into a record.
@@ -90,7 +95,7 @@ class Antialias:
         array([1.+0.j])
     """
 
-    kind: str
+    kind: FilterKind
     cutoff_hz: float = 0.0
     order: int = 4
     rate_hz: float = 0.0
@@ -102,8 +107,8 @@ class Antialias:
     records: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        if self.kind not in KINDS:
-            raise UnknownNameError("kind of antialias filter", self.kind, KINDS)
+        if self.kind not in RESPONSES:
+            raise UnknownNameError("kind of antialias filter", self.kind, RESPONSES)
         designed = self.kind == "fir" and not self.coefficients
         if (designed or self.kind in {"butterworth", "bessel"}) and not self.cutoff_hz > 0.0:
             raise ParameterError(
@@ -120,21 +125,6 @@ class Antialias:
             raise ParameterError(
                 f"the FIR antialias filter has {self.taps} taps; give taps (3 or more) or coefficients"
             )
-
-    @classmethod
-    def from_json(cls, entry: Mapping[str, object]) -> Antialias:
-        """Read an ``antialias`` entry of a channel in ``nominal.json``: the attributes by their names.
-
-        Raises:
-            UnknownNameError: There is no such attribute, or the kind is unknown.
-            ParameterError: A value makes no filter.
-        """
-        known = [field.name for field in fields(cls)]
-        for key in entry:
-            if key not in known:
-                raise UnknownNameError("entry of an antialias filter", key, known)
-        values: dict = {k: tuple(v) if isinstance(v, list) else v for k, v in entry.items()}
-        return cls(**values)
 
     def passed(self, record: str) -> bool:
         """Whether a record passed the filter."""
@@ -200,13 +190,10 @@ def _analogue(filtered: Antialias, frequency: Array) -> NDArray[np.complex128]:
     return np.asarray(response, dtype=np.complex128)
 
 
-RESPONSES: dict[str, Callable[[Antialias, Array], NDArray[np.complex128]]] = {
+RESPONSES: dict[FilterKind, Callable[[Antialias, Array], NDArray[np.complex128]]] = {
     "butterworth": _analogue,
     "bessel": _analogue,
     "fir": _fir,
     "delay": lambda filtered, frequency: np.ones(len(frequency), dtype=complex),
 }
 """Frequency responses by kind."""
-
-KINDS = tuple(RESPONSES)
-"""Kinds of filters."""

@@ -14,7 +14,7 @@ first two, what is not stated is looked for in the records (`between_samples`, `
 from __future__ import annotations
 
 import gzip
-import json
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -24,14 +24,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from bench.discrepancy.case.acquisition import INTERPOLATIONS, Antialias
 from bench.discrepancy.case.elements import declared_parameters
-from bench.discrepancy.case.schema import check_document
+from bench.discrepancy.case.schema import NominalDocument
 from bench.errors import FileFormatError, RecordingError, UnknownNameError
-
-ROLES = ("measured", "command", "prescribed", "response", "scheduling")
-"""Roles of a channel: a measured load, a commanded load, a prescribed motion, a response, and what laws may depend on besides."""
-
-TARGETS = ("sensor", "joint", "actuator")
-"""Entries of a user's own MJCF that a channel can refer to."""
 
 NO_LOAD = "no load"
 """Channel of a load that is zero throughout, of a model of the user's own that nothing drives."""
@@ -64,7 +58,8 @@ class CaseChannel:
     Attributes:
         name: Column name.
         unit: Unit.
-        role: One of `ROLES`.
+        role: A measured load, a commanded load ("command"), a "prescribed" motion, a "response", or "scheduling", what
+            laws may depend on besides.
         noise_std: One-sigma noise; None where it is not stated.
         antialias: Filter that a response passed before it was sampled; None where there was none, or the loads passed it too.
         target: Entry of the user's own MJCF that it stands for: "sensor:NAME", "joint:NAME" or "actuator:NAME"; found by
@@ -227,6 +222,7 @@ def read_case(folder: str | Path) -> Case:
 
     Raises:
         FileFormatError: A file is missing or malformed.
+        DocumentError: ``nominal.json`` has an entry that is not known, missing, of the wrong kind or out of range.
         RecordingError: A record cannot be used.
     """
     folder = Path(folder)
@@ -237,22 +233,23 @@ def read_case(folder: str | Path) -> Case:
         )
     if not path.is_file():
         raise FileFormatError(f"no nominal.json in '{folder}'; a case folder needs one beside its records")
-    try:
-        nominal = json.loads(path.read_text(encoding="utf-8"))
-    except (json.JSONDecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise FileFormatError(f"'{path}' is not valid JSON: {error}") from None
-    check_document(nominal, path)
-    elements = declared_parameters(nominal.get("elements", []), path)
-    nominal = {**nominal, "parameters": {**nominal["parameters"], **elements}}
+    nominal = NominalDocument.read(path)
     parameters = tuple(
-        NominalParameter(name, float(entry["value"]), float(entry.get("std", 0.0)), entry.get("unit", ""))
-        for name, entry in nominal["parameters"].items()
+        NominalParameter(name, entry.value, entry.std, entry.unit)
+        for name, entry in nominal.parameters.items()
     )
-    channels = tuple(_channel(name, entry) for name, entry in nominal["channels"].items() if name != "time")
-    rest = {key: value for key, value in nominal.items() if key not in {"rig", "parameters", "channels"}}
-    moving = rest.get("starts_in_motion", [])
-    in_motion = set() if isinstance(moving, bool) else set(moving)
-    periodic = set(rest.get("periodic", []))
+    declared = declared_parameters(nominal.elements, path)
+    parameters += tuple(NominalParameter(name, *entry) for name, entry in declared.items())
+    channels = tuple(
+        CaseChannel(
+            name, entry.unit, nominal.role_of(name), entry.noise_std, entry.filter(), entry.target, entry.quantity or ""
+        )
+        for name, entry in nominal.channels.items()
+        if name != "time"
+    )  # fmt: skip
+    moving = nominal.starts_in_motion
+    in_motion = set(moving) if isinstance(moving, tuple) else set()
+    periodic = set(nominal.periodic)
     groups: dict[str, list[CaseRecord]] = {"identification": [], "validation": []}
     for file in sorted(folder.iterdir()):
         stem = next((file.name.removesuffix(s) for s in SUFFIXES if file.name.endswith(s)), None)
@@ -261,7 +258,7 @@ def read_case(folder: str | Path) -> Case:
         for group, records in groups.items():
             if stem.startswith(group):
                 record = _read_record(
-                    file, stem, channels, nominal, moving is not True and stem not in in_motion
+                    file, stem, channels, nominal.sample_rate_hz, moving is not True and stem not in in_motion
                 )
                 records.append(replace(record, periodic=stem in periodic))
     for group, records in groups.items():
@@ -272,12 +269,10 @@ def read_case(folder: str | Path) -> Case:
         if name not in have:
             raise UnknownNameError("record", name, have)
     case = Case(
-        folder.name, str(nominal["rig"]), parameters, channels,
-        tuple(groups["identification"]), tuple(groups["validation"]), folder, rest,
+        folder.name, nominal.rig, parameters, channels,
+        tuple(groups["identification"]), tuple(groups["validation"]), folder, nominal.options,
     )  # fmt: skip
-    case = without_load(case)
-    case.load_interpolation  # noqa: B018  (an unknown one is refused here, not in the first simulation)
-    return case
+    return without_load(case)
 
 
 def without_load(case: Case) -> Case:
@@ -305,39 +300,6 @@ def without_load(case: Case) -> Case:
     )
 
 
-def _channel(name: str, entry: Mapping[str, object]) -> CaseChannel:
-    role = str(entry.get("role", "measured" if name in {"force", "torque"} else "response"))
-    if role not in ROLES:
-        raise UnknownNameError(f"role of channel '{name}'", role, ROLES)
-    noise = entry.get("noise_std")
-    antialias = entry.get("antialias")
-    if antialias is not None and role != "response":
-        raise FileFormatError(
-            f"channel '{name}' has an antialias filter but the role '{role}'; a filter that loads and responses passed alike "
-            "cancels and need not be stated, and one that only a load passed cannot be undone: state it on responses only"
-        )
-    if antialias is not None and not isinstance(antialias, Mapping):
-        raise FileFormatError(
-            f"the antialias filter of channel '{name}' is {antialias!r}; expected an object with a 'kind'"
-        )
-    return CaseChannel(
-        name,
-        str(entry.get("unit", "")),
-        role,
-        None if noise is None else float(str(noise)),
-        None if antialias is None else Antialias.from_json(antialias),
-        _target(name, entry),
-        str(entry.get("quantity", "")),
-    )
-
-
-def _target(name: str, entry: Mapping[str, object]) -> str:
-    given = [f"{kind}:{entry[kind]}" for kind in TARGETS if kind in entry]
-    if len(given) > 1:
-        raise FileFormatError(f"channel '{name}' refers to {' and '.join(given)}; one of them is expected")
-    return given[0] if given else ""
-
-
 def _check_header(file: Path, names: list[str], channels: tuple[CaseChannel, ...]) -> None:
     missing = [c.name for c in channels if c.name not in names]
     if missing:
@@ -353,7 +315,7 @@ def _check_header(file: Path, names: list[str], channels: tuple[CaseChannel, ...
 
 
 def _read_record(
-    file: Path, stem: str, channels: tuple[CaseChannel, ...], nominal: Mapping[str, object], at_rest: bool
+    file: Path, stem: str, channels: tuple[CaseChannel, ...], sample_rate: float | None, at_rest: bool
 ) -> CaseRecord:
     try:
         opener = gzip.open if file.suffix == ".gz" else open
@@ -362,7 +324,7 @@ def _read_record(
             _check_header(file, names, channels)
             lines = [line for line in stream if line.strip()]
             table = np.loadtxt(lines, delimiter=",", ndmin=2) if lines else np.zeros((0, len(names)))
-    except (ValueError, OSError, EOFError, UnicodeDecodeError) as error:
+    except (ValueError, OSError, EOFError, UnicodeDecodeError, zlib.error) as error:
         raise FileFormatError(f"'{file}' is no readable CSV table with a header line: {error}") from None
     if table.shape[1] != len(names):
         raise FileFormatError(
@@ -371,8 +333,8 @@ def _read_record(
     columns = {name: table[:, i] for i, name in enumerate(names) if i < table.shape[1]}
     if "time" in columns:
         time = columns["time"]
-    elif "sample_rate_hz" in nominal:
-        time = np.arange(len(table)) / float(str(nominal["sample_rate_hz"]))
+    elif sample_rate is not None:
+        time = np.arange(len(table)) / sample_rate
     else:
         raise FileFormatError(
             f"'{file}' has no column 'time' and nominal.json no sample_rate_hz; one of them is needed"

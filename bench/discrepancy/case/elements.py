@@ -10,7 +10,7 @@ what is left out has the default of the law.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
 from typing import Any
 
 from bench.errors import FileFormatError, UnknownNameError
@@ -18,18 +18,20 @@ from bench.laws import LAWS, ForceLaw
 
 ENTRIES = ("law", "name", "place", "parameters")
 """Entries of an element."""
+PARAMETER = ("value", "std", "unit")
+"""Entries of an uncertain parameter of one."""
 
 
-def declared_parameters(elements: Any, path: object) -> dict[str, Mapping[str, Any]]:
-    """Nominal parameters that the elements of a ``nominal.json`` add, name by name, as entries of "parameters".
+def declared_parameters(elements: Any, path: object) -> dict[str, tuple[float, float, str]]:
+    """Nominal parameters that the elements of a ``nominal.json`` add, name by name: value, one-sigma uncertainty, unit.
 
     Raises:
         FileFormatError: An element is not of the form expected.
         UnknownNameError: Its law, or a parameter of it, is none.
     """
-    if not isinstance(elements, list):
+    if not isinstance(elements, list | tuple):
         raise FileFormatError(f"'{path}': elements is {elements!r}; a list of objects with a law is expected")
-    out: dict[str, Mapping[str, Any]] = {}
+    out: dict[str, tuple[float, float, str]] = {}
     names: set[str] = set()
     for element in elements:
         law, name = law_of(element, path)
@@ -42,12 +44,31 @@ def declared_parameters(elements: Any, path: object) -> dict[str, Mapping[str, A
                     f"parameter of the element '{name}' (law {law.name})", parameter, law.parameter_names
                 )
             if isinstance(entry, dict):
-                out[f"{name}.{parameter}"] = entry
-            elif isinstance(entry, bool) or not isinstance(entry, int | float):
+                out[f"{name}.{parameter}"] = _uncertain(
+                    entry, f"'{path}': '{parameter}' of the element '{name}'"
+                )
+            elif not _is_number(entry):
                 raise FileFormatError(
                     f"'{path}': '{parameter}' of the element '{name}' is {entry!r}; a number, or an object with value and std, is expected"
                 )
     return out
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _uncertain(entry: dict[str, Any], what: str) -> tuple[float, float, str]:
+    """Value, uncertainty and unit of a parameter."""
+    for key in entry:
+        if key not in PARAMETER:
+            raise UnknownNameError(f"entry of {what}", str(key), PARAMETER)
+    value, std, unit = entry.get("value"), entry.get("std"), entry.get("unit", "")
+    if not (_is_number(value) and _is_number(std) and std >= 0.0 and isinstance(unit, str)):
+        raise FileFormatError(
+            f"{what} is {entry!r}; a value and its one-sigma std (0 to mean certain) are expected"
+        )
+    return float(value), float(std), unit
 
 
 def law_of(element: Any, path: object) -> tuple[ForceLaw, str]:

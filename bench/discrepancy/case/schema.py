@@ -1,28 +1,252 @@
-"""What may stand in ``nominal.json``: entries of the right kind, numbers in range, units that belong together.
+"""The document ``nominal.json``: what the nominal model claims, how sure it is, and what the records hold.
 
-A number of the wrong kind or a unit that does not fit is refused here, with the place and the remedy, before it can become
-a diagnosis that makes no sense.
+The models say which entries there are, and what each may be; `check_units` says whether the units of a case fit their quantities and
+one another, with the remedy, before one that does not can become a diagnosis that makes no sense.
 """
 
 from __future__ import annotations
 
 import contextlib
-import math
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from bench.errors import FileFormatError, ParameterError, UnitError
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
+
+from bench.discrepancy.case.acquisition import Antialias, Interpolation
+from bench.documents import (
+    Document,
+    Entry,
+    Flag,
+    Label,
+    Listed,
+    Name,
+    NotNegative,
+    Number,
+    Positive,
+    Table,
+    refuse,
+    telling,
+)
+from bench.documents.derived import entry_of
+from bench.errors import UnitError, unknown_name
 from bench.recording.units import check_unit, conversion
 
 if TYPE_CHECKING:
     from bench.discrepancy.case.case import Case
 
-EXAMPLE = '{"value": 2.1, "std": 0.02, "unit": "kg"}'
-MISNOMERS = {
-    "parameter": {"sigma": "std", "uncertainty": "std", "stdev": "std", "nominal": "value"},
-    "channel": {"noise": "noise_std", "std": "noise_std", "sigma": "noise_std", "units": "unit"},
-}
-"""Keys that people write, and those that are meant."""
+_MOUNTS = tuple(
+    f"mount_{kind}_{axis}_{body}"
+    for axis in ("axial", "torsional")
+    for kind in ("stiffness", "damping")
+    for body in (1, 2)
+)
+PARAMETERS: dict[str, tuple[str, ...]] = {
+    "sdof": ("mass", "stiffness", "damping", "coulomb", "slip_stiffness", "force_offset"),
+    "damper": ("stiffness", "damping", "coulomb", "slip_stiffness", "force_offset"),
+    "joint": (
+        "mass_1", "mass_2", "inertia_1", "inertia_2", *_MOUNTS,
+        "joint_stiffness_axial", "joint_damping_axial", "joint_stiffness_torsional", "joint_damping_torsional",
+    ),
+}  # fmt: skip
+"""Nominal parameters of the bench's rigs. An MJCF of the user's own says itself which it has (`mjcf_structure`)."""
+RIGS = tuple(PARAMETERS)
+"""The bench's rigs that a nominal model may be."""
+RESPONSES: dict[str, tuple[str, ...]] = {
+    "sdof": ("displacement", "velocity", "acceleration"),
+    "damper": (
+        "force", "displacement", "velocity", "acceleration", "torque", "angle", "rotation", "angular_velocity", "angular_acceleration",
+    ),
+    "joint": tuple(
+        f"{quantity}_{body}"
+        for quantity in ("displacement", "velocity", "acceleration", "rotation", "angular_velocity", "angular_acceleration")
+        for body in (1, 2)
+    ),
+}  # fmt: skip
+"""Responses of the bench's rigs."""
+MEASURED = ("force", "torque")
+"""Channels of the bench's rigs that are measured loads unless they say otherwise."""
+
+Role = Literal["measured", "command", "prescribed", "response", "scheduling"]
+"""A measured load, a commanded load, a prescribed motion, a response, and what laws may depend on besides."""
+
+
+def _known_rig(name: Any) -> Any:
+    if isinstance(name, str) and name not in PARAMETERS and not name.endswith(".xml"):
+        refuse(unknown_name("rig (or path ending in .xml)", name, PARAMETERS), unknown=True)
+    return name
+
+
+def _known_unit(unit: str) -> str:
+    if unit:
+        with telling():
+            check_unit(unit)
+    return unit
+
+
+RigName = Annotated[
+    Name,
+    BeforeValidator(_known_rig),
+    Field(json_schema_extra={"anyOf": [{"enum": list(PARAMETERS)}, {"pattern": r"\.xml$"}]}),
+]
+Unit = Annotated[Label, Field(max_length=64), AfterValidator(_known_unit)]
+
+
+class ParameterEntry(Entry):
+    """A nominal parameter."""
+
+    entry_name = "a nominal parameter"
+    entry_misnomers = {"sigma": "std", "uncertainty": "std", "stdev": "std", "nominal": "value"}  # noqa: RUF012  (read only)
+    entry_hints = {  # noqa: RUF012
+        "value": 'as {"value": 2.1, "std": 0.02, "unit": "kg"}',
+        "std": "its one-sigma uncertainty; write 0 to mean certain",
+    }
+
+    value: Number
+    """Nominal value."""
+    std: NotNegative
+    """One-sigma uncertainty; 0 to mean certain."""
+    unit: Unit = ""
+    """Unit."""
+
+
+AntialiasEntry = entry_of(Antialias, lambda hint: None, kind="an antialias filter", name="AntialiasEntry")
+
+
+class ChannelEntry(Entry):
+    """A channel of the records."""
+
+    entry_name = "a channel"
+    entry_misnomers = {"noise": "noise_std", "std": "noise_std", "sigma": "noise_std"}  # noqa: RUF012
+
+    unit: Unit = ""
+    """Unit."""
+    role: Role | None = None
+    """What it is; by default the loads of a rig are measured, and everything else is a response."""
+    noise_std: NotNegative | None = None
+    """One-sigma noise of the channel at rest; left out where it is not known."""
+    antialias: AntialiasEntry | None = None  # pyright: ignore[reportInvalidTypeForm]  (a model made at run time)
+    """Filter that a response passed before it was sampled."""
+    sensor: Name | None = None
+    """Sensor of your own MJCF that it stands for."""
+    joint: Name | None = None
+    """Joint of your own MJCF that it stands for; give the quantity too."""
+    actuator: Name | None = None
+    """Actuator of your own MJCF that it stands for."""
+    quantity: Literal["position", "velocity", "acceleration"] | None = None
+    """What of a joint."""
+
+    @model_validator(mode="after")
+    def _refers_to_one_thing(self) -> ChannelEntry:
+        targets = [
+            f"{kind} '{getattr(self, kind)}'"
+            for kind in ("sensor", "joint", "actuator")
+            if getattr(self, kind)
+        ]
+        if len(targets) > 1:
+            refuse(f"a channel refers to {' and '.join(targets)}; one of them is expected")
+        if self.joint and self.quantity is None:
+            refuse(
+                f"a channel of joint '{self.joint}' needs its quantity: position, velocity or acceleration"
+            )
+        if self.antialias is not None:
+            with telling("antialias"):
+                self.filter()
+        return self
+
+    @property
+    def target(self) -> str:
+        """Entry of the MJCF that it stands for, as "sensor:NAME"; empty where it says none."""
+        for kind in ("sensor", "joint", "actuator"):
+            if getattr(self, kind):
+                return f"{kind}:{getattr(self, kind)}"
+        return ""
+
+    def filter(self) -> Antialias | None:
+        """The filter that it passed; None where there was none."""
+        return None if self.antialias is None else Antialias(**self.antialias.given)
+
+
+class NominalDocument(Document):
+    """The nominal model of a case, and its channels."""
+
+    entry_name = "a nominal model"
+    rig: RigName
+    """A rig of the bench (sdof, damper, joint), or the path of an MJCF file in the same folder."""
+    parameters: Table[ParameterEntry]
+    """Nominal parameters by name; of an MJCF as "stiffness:JOINT", "mass:BODY", …"""
+    channels: Table[ChannelEntry]
+    """Channels by the heading of their column."""
+    sample_rate_hz: Positive | None = None
+    """Sample rate of records without a column for the time [Hz]."""
+    load_interpolation: Interpolation | None = None
+    """How the loads ran between their samples; found out where nothing is said."""
+    starts_in_motion: Flag | Listed[Name] | None = None
+    """Records that do not start at rest, or whether all do not; found out where nothing is said."""
+    periodic: Listed[Name] = ()
+    """Records that are whole periods of a steady state."""
+    places: Annotated[Listed[Name], Field(min_length=1)] | None = None
+    """Joints and fixed tendons of an MJCF where effects may sit; all that move by default."""
+    elements: Listed[dict[str, Any]] = ()
+    """Laws of the bench that the model holds besides, see `case.elements`."""
+    limits: Table[Positive] = Field(default_factory=dict)
+    """Largest magnitude of a channel that the next test may reach; those of the records by default."""
+    window_s: Positive | None = None
+    """Length of the windows that records of a rig that nothing holds are cut into [s]."""
+
+    @model_validator(mode="after")
+    def _names_are_known(self) -> NominalDocument:
+        if not [name for name in self.channels if name != "time"]:
+            refuse("no channel besides time; name the loads and the responses", "channels")
+        for name, channel in self.channels.items():
+            role = self.role_of(name)
+            if channel.antialias is not None and role != "response":
+                refuse(
+                    f"an antialias filter of a channel whose role is {role}; a filter that loads and responses passed alike cancels "
+                    "and need not be stated, and one that only a load passed cannot be undone: state it on responses only",
+                    "channels", name, "antialias",
+                )  # fmt: skip
+        for name in self.limits:
+            if name not in self.channels:
+                refuse(unknown_name("channel", name, self.channels), "limits", unknown=True)
+        if self.rig in PARAMETERS:
+            self._fit_the_rig(PARAMETERS[self.rig], RESPONSES[self.rig])
+        return self
+
+    def _fit_the_rig(self, parameters: tuple[str, ...], responses: tuple[str, ...]) -> None:
+        """Refuse what a rig of the bench does not have, and numbers that none of its parameters can have."""
+        for name, entry in self.parameters.items():
+            if name not in parameters:
+                refuse(
+                    unknown_name(f"parameter of rig '{self.rig}'", name, parameters),
+                    "parameters",
+                    unknown=True,
+                )
+            inertial = name.startswith(("mass", "inertia"))
+            signed = name == "force_offset"
+            if (entry.value < 0.0 and not signed) or (inertial and entry.value == 0.0):
+                expected = "a positive number" if inertial else "zero or more"
+                refuse(
+                    f"{entry.value:g} came; {expected} is expected: check its sign",
+                    "parameters",
+                    name,
+                    "value",
+                )
+        for name in self.channels:
+            if self.role_of(name) == "response" and name not in {*responses, "time"}:
+                refuse(
+                    unknown_name(f"response of rig '{self.rig}'", name, responses), "channels", unknown=True
+                )
+
+    def role_of(self, name: str) -> Role:
+        """Role of a channel."""
+        return self.channels[name].role or ("measured" if name in MEASURED else "response")
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """What is stated besides rig, parameters and channels."""
+        apart = {"rig", "parameters", "channels", "schema_"}
+        return {name: value for name, value in self.given.items() if name not in apart and value is not None}
+
+
 MOTION = {
     "displacement": ("axial", "m"), "velocity": ("axial", "m/s"), "acceleration": ("axial", "m/s^2"),
     "rotation": ("torsional", "rad"), "angle": ("torsional", "rad"), "angular_velocity": ("torsional", "rad/s"),
@@ -41,116 +265,8 @@ CONSTANTS = {
     ("damping", "axial"): ("N s/m",), ("damping", "torsional"): ("N m s/rad", "N m s"),
 }  # fmt: skip
 """Kind of a nominal parameter and its axis, to the SI units it may have."""
-RIGS = ("sdof", "joint", "damper")
 MISMATCH = 1e-3
 """Relative difference of two conversion factors beyond which units do not belong together."""
-
-
-def check_document(document: Any, path: Path) -> None:
-    """Check the entries of a ``nominal.json``.
-
-    Args:
-        document: What the file holds.
-        path: The file, for messages.
-
-    Raises:
-        FileFormatError: An entry is missing or of the wrong kind.
-        ParameterError: A number is outside its range.
-    """
-    if not isinstance(document, dict):
-        raise FileFormatError(
-            f"'{path}' holds {_kind(document)}; an object with rig, parameters and channels is expected"
-        )
-    for key in ("rig", "parameters", "channels"):
-        if key not in document:
-            raise FileFormatError(f"'{path}' has no entry '{key}'; expected rig, parameters and channels")
-    if not isinstance(document["rig"], str):
-        raise FileFormatError(
-            f"'{path}': rig is {_kind(document['rig'])}; a name or the path of an MJCF file is expected"
-        )
-    for key in ("parameters", "channels"):
-        if not isinstance(document[key], dict):
-            raise FileFormatError(
-                f"'{path}': {key} is {_kind(document[key])}; an object, name by name, is expected"
-            )
-    for name, entry in document["parameters"].items():
-        _check_parameter(name, entry, path, document["rig"] in RIGS)
-    if not [name for name in document["channels"] if name != "time"]:
-        raise FileFormatError(f"'{path}' names no channel besides time; name the loads and the responses")
-    for name, entry in document["channels"].items():
-        _check_channel(name, entry, path)
-    if "sample_rate_hz" in document and not _number(document["sample_rate_hz"]) > 0.0:
-        raise FileFormatError(
-            f"'{path}': sample_rate_hz is {document['sample_rate_hz']!r}; a number above zero [Hz] is expected"
-        )
-
-
-def _check_parameter(name: str, entry: Any, path: Path, known_rig: bool) -> None:
-    if not isinstance(entry, dict) or "value" not in entry:
-        _point_out(entry, "parameter", name, path)
-        raise FileFormatError(f"'{path}': parameter '{name}' is {entry!r}; expected for instance {EXAMPLE}")
-    _point_out(entry, "parameter", name, path)
-    value, std = _number(entry["value"]), _number(entry.get("std", 0.0))
-    if not math.isfinite(value):
-        raise FileFormatError(
-            f"'{path}': the value of '{name}' is {entry['value']!r}; a finite number is expected"
-        )
-    if not (math.isfinite(std) and std >= 0.0):
-        raise ParameterError(
-            f"'{path}': the std of '{name}' is {entry['std']!r}; its one-sigma uncertainty is expected, zero or more"
-        )
-    _check_unit_text(entry.get("unit", ""), f"parameter '{name}'", path)
-    inertial = name.startswith(("mass", "inertia"))
-    if known_rig and (value < 0.0 or (inertial and value == 0.0)):
-        raise ParameterError(
-            f"'{path}': '{name}' is {value:g}; {'a positive number' if inertial else 'zero or more'} is expected: "
-            "check its sign"
-        )
-
-
-def _check_channel(name: str, entry: Any, path: Path) -> None:
-    if not isinstance(entry, dict):
-        raise FileFormatError(
-            f"'{path}': channel '{name}' is {entry!r}; expected for instance "
-            '{"unit": "m", "noise_std": 2e-5}'
-        )
-    _point_out(entry, "channel", name, path)
-    _check_unit_text(entry.get("unit", ""), f"channel '{name}'", path)
-    noise = entry.get("noise_std")
-    if noise is not None and not (math.isfinite(_number(noise)) and _number(noise) >= 0.0):
-        raise ParameterError(
-            f"'{path}': noise_std of '{name}' is {noise!r}; a number from zero up is expected, "
-            "or leave it out where it is not known"
-        )
-
-
-def _check_unit_text(unit: Any, where: str, path: Path) -> None:
-    if not isinstance(unit, str):
-        raise FileFormatError(f"'{path}': the unit of {where} is {unit!r}; text such as \"N/m\" is expected")
-    if unit:
-        try:
-            check_unit(unit)
-        except UnitError as error:
-            raise UnitError(f"'{path}', {where}: {error}") from None
-
-
-def _point_out(entry: Any, kind: str, name: str, path: Path) -> None:
-    if not isinstance(entry, dict):
-        return
-    for wrong, right in MISNOMERS[kind].items():
-        if wrong in entry and right not in entry:
-            raise FileFormatError(
-                f"'{path}': {kind} '{name}' has an entry '{wrong}'; did you mean '{right}'?"
-            )
-
-
-def _kind(value: Any) -> str:
-    return "nothing" if value is None else f"a {type(value).__name__}"
-
-
-def _number(value: Any) -> float:
-    """The value as a float; NaN where it is no number."""
-    return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else math.nan
 
 
 def check_units(case: Case) -> None:
@@ -165,7 +281,7 @@ def check_units(case: Case) -> None:
     Raises:
         UnitError: A unit does not fit its quantity, or two do not belong together.
     """
-    if case.rig not in RIGS:
+    if case.rig not in PARAMETERS:
         return
     motion: dict[str, tuple[str, str, float]] = {}
     loads: dict[str, tuple[str, str, float]] = {}

@@ -17,9 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.discrepancy.case.case import Case, CaseRecord
-from bench.discrepancy.checks.quantisation import quantisation_step
+from bench.discrepancy.case.channel_noise import noise_floor, quantisation_step
 from bench.discrepancy.likelihood.problem import Array, Problem
-from bench.discrepancy.likelihood.whitening import noise_floor
 from bench.errors import IdentificationError, RecordingError
 
 UNITS = {

@@ -20,9 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.discrepancy.case.case import Case, CaseRecord
-from bench.discrepancy.likelihood.whitening import noise_floor
+from bench.discrepancy.case.channel_noise import noise_floor
 from bench.discrepancy.likelihood.window_whitening import channels_of, drifts
-from bench.discrepancy.model.structure import Structure, structure_of
+from bench.discrepancy.model.rigs import structure_of
+from bench.discrepancy.model.structure import Structure
 from bench.discrepancy.simulation.linear_response import linear_run
 from bench.discrepancy.simulation.stick_slip import LinearStructure
 

@@ -14,55 +14,18 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.discrepancy.case.channel_noise import quantisation_step
 from bench.discrepancy.verdict import Estimate, NamedEffect
 
 if TYPE_CHECKING:
     from bench.discrepancy.case.case import CaseChannel
     from bench.discrepancy.effects.effect import Effect
     from bench.discrepancy.likelihood.problem import Problem
-    from bench.discrepancy.model.structure import Observer
+    from bench.discrepancy.motion.observer import Observer
 
-LATTICE = 0.02
-"""Distance from a lattice point, in steps, that the rounding of a text file may leave."""
-REPEATED = 0.5
-"""Part of the samples that must repeat an earlier value, before a lattice is looked for."""
 COARSE = 4.0
 """Step over noise from which the quantisation outweighs the noise."""
-
-
-def quantisation_step(samples: NDArray[np.float64]) -> float:
-    """Step of the lattice on which all samples lie; zero where there is none.
-
-    Args:
-        samples: (n,).
-    """
-    values = np.unique(samples)
-    if len(values) < 3 or len(values) > (1.0 - REPEATED) * len(samples):
-        return 0.0
-    gaps = np.diff(values)
-    # a text file may print the same lattice point in two ways that differ in the last digit
-    gaps = gaps[gaps > 1e-7 * float(np.ptp(values))]
-    step = float(gaps.min())
-    multiples = np.round(gaps / step)
-    step = float(gaps.sum() / multiples.sum())
-    if np.max(np.abs(gaps / step - np.round(gaps / step))) > LATTICE:
-        return 0.0
-    return step
-
-
-def raised_noise(noise: float, samples: NDArray[np.float64]) -> float:
-    """Noise of a channel with that of its quantisation, where the latter is the coarser one.
-
-    Args:
-        noise: One-sigma noise as stated.
-        samples: (n,).
-    """
-    step = quantisation_step(samples)
-    if step <= noise:
-        return noise
-    return float(np.hypot(noise, step / np.sqrt(12.0)))
 
 
 def recorded(problem: Problem, catalogue: Sequence[Effect]) -> tuple[NamedEffect, ...]:

@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.discrepancy.case.case import Case, CaseRecord
-from bench.discrepancy.checks.quantisation import raised_noise
+from bench.discrepancy.case.channel_noise import noise_floor, raised_noise
 from bench.discrepancy.effects.effect import Scales
 from bench.discrepancy.likelihood.noise_covariance import sensor_gains, whitening_behind
 from bench.discrepancy.likelihood.time_varying_noise import whitening_together
-from bench.discrepancy.likelihood.whitening import RecordData, band_bins, noise_floor, projected, timed
+from bench.discrepancy.likelihood.whitening import RecordData, band_bins, projected, timed
 from bench.discrepancy.likelihood.window_whitening import (
     cut,
     drifts,
@@ -33,15 +33,16 @@ from bench.discrepancy.likelihood.window_whitening import (
     with_starts,
     without_starts,
 )
-from bench.discrepancy.model.nominal_forces import with_own_forces
+from bench.discrepancy.model.nominal_elements import with_own_forces
 from bench.discrepancy.model.placement import Hypothesis, Placed
-from bench.discrepancy.model.structure import ACCELERATION, Place, Structure
+from bench.discrepancy.model.structure import Place, Structure
 from bench.discrepancy.motion.measured import measured_motion
+from bench.discrepancy.motion.observer import ACCELERATION
 from bench.discrepancy.motion.prescribed import Prescribed, decided, prescribed_motion
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.response.driving_loads import driving_loads, fewest_steps, run_in
-from bench.discrepancy.response.step_size import rates, speeds, steps
 from bench.discrepancy.simulation.prescribed_response import driven_force
+from bench.discrepancy.simulation.step_size import rates, speeds, steps
 from bench.discrepancy.simulation.stick_slip import COLUMNS, Elements, Motion
 
 Array = NDArray[np.float64]
@@ -315,7 +316,8 @@ class Problem:
             motion = self.motion_of(record if known else self.records[0])
             laws = self.structure.elements
             cache[record.name] = max(
-                law.rate(law.theta(self.structure, self.nominal), motion, record.step) for law in laws
+                law.rate(law.theta(self.structure.parameters, self.nominal), motion, record.step)
+                for law in laws
             )
         return cache[record.name]
 

@@ -22,7 +22,7 @@ from scipy.linalg import cholesky, solve_triangular
 
 from bench.discrepancy.case.case import CaseRecord
 from bench.discrepancy.likelihood.whitening import fast_length
-from bench.discrepancy.model.structure import ACCELERATION
+from bench.discrepancy.motion.observer import ACCELERATION
 
 if TYPE_CHECKING:
     from bench.discrepancy.likelihood.problem import Problem

@@ -52,14 +52,6 @@ def fast_length(n: int) -> int:
     return int(fft.next_fast_len(n, real=True) or n)
 
 
-def noise_floor(x: Array) -> float:
-    """White noise of a channel whose noise is not stated, from the flattest quarter of its spectrum."""
-    spectrum = np.abs(np.fft.rfft((x - x.mean()) * np.hanning(len(x)))) ** 2 / (len(x) * 0.375)
-    upper = spectrum[len(spectrum) // 2 :]
-    blocks = [np.mean(block) for block in np.array_split(upper, 8)]
-    return float(np.sqrt(max(min(blocks), (1e-6 * np.std(x)) ** 2, 1e-300)))
-
-
 def band_bins(responses: Array, noise: Array) -> int:
     """Number of frequency bins up to where every response has sunk into its noise."""
     n = fast_length(len(responses))

@@ -27,7 +27,7 @@ import numpy as np
 
 from bench.discrepancy.case.case import CaseRecord
 from bench.discrepancy.likelihood.problem import Array, Problem
-from bench.discrepancy.model.nominal_forces import own_force
+from bench.discrepancy.model.nominal_elements import own_force
 from bench.discrepancy.model.structure import Place, Structure
 from bench.discrepancy.simulation.stick_slip import LinearStructure, Motion
 

@@ -34,7 +34,8 @@ from bench.discrepancy.model.mjcf_friction import nominal_frictions
 from bench.discrepancy.model.mjcf_gravity import gravity_springs, has_gravity, without_gravity
 from bench.discrepancy.model.mjcf_limits import check_reach, free_of_constraints
 from bench.discrepancy.model.nominal_forces import NominalFriction, NominalSpring
-from bench.discrepancy.model.structure import Observer, Place, Structure
+from bench.discrepancy.model.structure import Place, Structure
+from bench.discrepancy.motion.observer import Observer
 from bench.errors import BenchError, FileFormatError, ModelError, UnknownNameError
 from bench.identification.linear_rig import LinearRig, current
 from bench.native.encoding import Coordinate

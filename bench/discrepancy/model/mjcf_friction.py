@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.discrepancy.model.nominal_forces import NominalFriction
-from bench.discrepancy.response.step_size import MAX_SUBSTEPS
+from bench.discrepancy.simulation.step_size import MAX_SUBSTEPS
 
 Array = NDArray[np.float64]
 LEAST, MOST = 1e-4, 0.9999

@@ -14,6 +14,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from bench import native
 from bench.discrepancy.model.nominal_forces import PIECES, NominalSpring
 from bench.discrepancy.numerics.cubic_spline import spline_through
 from bench.errors import ModelError
@@ -109,7 +110,8 @@ def _torque_of(model: mujoco.MjModel) -> Callable[[Array], Array]:
     def torque(q: Array) -> Array:
         mujoco.mj_resetData(model, data)
         data.qpos[:] = q
-        mujoco.mj_forward(model, data)
+        with native.running(model):
+            mujoco.mj_forward(model, data)
         return data.qfrc_bias - data.qfrc_gravcomp
 
     return torque

@@ -8,8 +8,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from bench import native
 from bench.discrepancy.case.case import Case, CaseRecord
-from bench.discrepancy.likelihood.whitening import noise_floor
+from bench.discrepancy.case.channel_noise import noise_floor
 from bench.discrepancy.model.structure import Structure
 from bench.discrepancy.motion.measured import measured_motion
 from bench.errors import ModelError, UnknownNameError
@@ -138,7 +139,8 @@ def _check_contacts(case: Case, structure: Structure, rig: Rig, dofs: NDArray[np
         for sample in np.unique(np.linspace(0, len(position) - 1, POSES).astype(int)):
             data.qpos[:] = model.qpos0
             data.qpos[addresses] += position[sample]
-            mujoco.mj_fwdPosition(model, data)
+            with native.quiet():
+                mujoco.mj_fwdPosition(model, data)
             touching = [c for c in data.contact[: data.ncon] if c.dist < 0.0]
             if touching:
                 first, second = (model.geom(int(g)).name or f"geom {int(g)}" for g in touching[0].geom)

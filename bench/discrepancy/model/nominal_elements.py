@@ -1,189 +1,106 @@
-"""Laws of the bench as parts of a nominal model, with parameters that may be uncertain.
-
-They are declared in ``nominal.json`` (`case.elements`). Some parameters of the bench's rigs stand for an element:
-``slip_stiffness`` beside ``coulomb`` makes the friction an elastic slip (a Jenkins element), ``force_offset`` is a constant force.
-"""
+"""The nominal model's own forces as elements of the integrator, and along a given motion."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.discrepancy.case.elements import law_of
-from bench.discrepancy.simulation.prescribed_response import driven_force, driven_states
-from bench.discrepancy.simulation.stick_slip import Elements, Motion
-from bench.errors import ParameterError, UnknownNameError
-from bench.laws import LAWS, ForceLaw
-
-if TYPE_CHECKING:
-    from bench.discrepancy.case.case import Case
-    from bench.discrepancy.model.structure import Place, Structure
+from bench.discrepancy.effects.friction_limits import soft_coulomb_limit
+from bench.discrepancy.model.nominal_forces import PIECES, NominalFriction
+from bench.discrepancy.model.structure import Structure
+from bench.discrepancy.numerics.cubic_spline import cubic
+from bench.discrepancy.simulation.stick_slip import ROW, SCALE, THETA, Elements, Motion, full
+from bench.laws.base import kernel
 
 Array = NDArray[np.float64]
-STEPS = 16
-"""Integration steps a sample of a motion that hidden states follow."""
-PROBES, NUDGE = 40, 1e-4
-"""Samples at which the rate of a law is asked for, and the change of a hidden state, over its largest, that it is told by."""
-CHANGE = 1e-3
-"""Relative change of a parameter by which the change of a force is told."""
 
 
-FRICTION = {
-    "coulomb": "limit", "stribeck": "limit", "soft_coulomb": "limit", "dahl": "limit", "lugre": "coulomb", "jenkins": "limit",
-    "jenkins_backlash": "limit_positive", "bouc_wen": "", "iwan": "limit",
-}  # fmt: skip
-"""Laws that are friction, which another friction may stand in the place of, with their parameter that is its limit."""
+@kernel
+def spline_force(t, q, v, z, theta, f):
+    """A cubic spline over the displacement: its reach, then B-spline coefficients of `PIECES` equal pieces."""
+    x = min(max(q[0] / theta[0], -1.0), 1.0)
+    f[0] += cubic(theta, 1, PIECES, 0.5 * PIECES * (1.0 + x))
 
 
-@dataclass(frozen=True)
-class NominalElement:
-    """A law of the nominal model.
+def with_own_forces(
+    elements: Elements, structure: Structure, values: Array, replaced: Sequence[Array] = ()
+) -> Elements:
+    """Elements preceded by the nominal model's own forces.
 
-    Attributes:
-        law: The law, of one coordinate.
-        row: (n_dof,) coordinate that it acts on.
-        parameters: Names of the nominal parameters that are its parameters, one each; empty where one is exact.
-        values: (n,) its parameters where they are exact.
+    Args:
+        elements: Force laws of a hypothesis.
+        structure: The nominal model.
+        values: (n_parameters,) its parameters.
+        replaced: Coordinates (n_dof,) along which its dry friction is left out.
     """
-
-    law: ForceLaw
-    row: Array
-    parameters: tuple[str, ...]
-    values: Array
-
-    def theta(self, structure: Structure, values: Array) -> Array:
-        """Theta of the law at nominal parameter values (n_parameters,), kept within the law's bounds."""
-        own = self.values.copy()
-        for i, name in enumerate(self.parameters):
-            if name:
-                own[i] = values[structure.parameters.index(name)]
-        low, high = np.array([p.bounds for p in self.law.parameters]).T
-        return np.concatenate([self.law.header, np.clip(own, low, high)])
-
-    @property
-    def rubs(self) -> bool:
-        """Whether it is friction."""
-        return self.law.name in FRICTION
-
-    def level(self, structure: Structure, values: Array) -> float:
-        """Limit of its friction at nominal parameter values (n_parameters,); zero where the law names none."""
-        name = FRICTION.get(self.law.name, "")
-        if name not in self.law.parameter_names:
-            return 0.0
-        return float(
-            self.theta(structure, values)[len(self.law.header) + self.law.parameter_names.index(name)]
-        )
-
-    def acts_along(self, row: Array) -> bool:
-        """Whether it acts on a coordinate (n_dof,), and on it alone."""
-        return bool(np.array_equal(self.row, row))
-
-    def entry(self, row: int, theta: int, state: int) -> list[int]:
-        """Its row of an element table."""
-        rate = self.law.rate.address if self.law.rate else 0
-        return [self.law.force.address, rate, 0, 1, row, theta, state, len(self.law.states), 0]
-
-    def alone(self, theta: Array) -> Elements:
-        """The law on its own coordinate."""
-        table = np.array([self.entry(0, 0, 0)], dtype=np.int64)
-        return Elements(table, np.ones((1, 1)), np.append(theta, 0.0), self.law.start())
-
-    def along(self, theta: Array, motion: Motion, step: float) -> Array:
-        """Force (n,) along a motion."""
-        q, v = (samples @ self.row[:, None] for samples in motion[:2])
-        substeps = STEPS if self.law.rate else 1
-        return driven_force(self.alone(theta), position=q, velocity=v, step=step, substeps=substeps)[:, 0]
-
-    def change(
-        self, structure: Structure, values: Array, parameter: int, motion: Motion, step: float
-    ) -> Array:
-        """Change (n,) of the force along a motion with a unit of a nominal parameter."""
-        size = CHANGE * abs(values[parameter]) or CHANGE
-        moved = values.copy()
-        moved[parameter] += size
-        ends = [self.along(self.theta(structure, v), motion, step) for v in (values, moved)]
-        return (ends[1] - ends[0]) / size
-
-    def rate(self, theta: Array, motion: Motion, step: float) -> float:
-        """Fastest rate of the hidden states along a motion [1/s]; zero where there are none."""
-        if self.law.rate is None:
-            return 0.0
-        q, v = (samples @ self.row[:, None] for samples in motion[:2])
-        at = np.unique(np.linspace(0, len(q) - 1, PROBES).astype(np.int64))
-        states = driven_states(self.alone(theta), position=q, velocity=v, step=step, substeps=STEPS, at=at)
-        size = NUDGE * (np.abs(states).max(axis=0) + 1e-300)
-        fastest = 0.0
-        for k, z in zip(at, states, strict=True):
-            before, after = np.zeros(len(z)), np.zeros(len(z))
-            self.law.rate(0.0, q[k], v[k], z, theta, before)
-            for i in range(len(z)):
-                self.law.rate(0.0, q[k], v[k], z + size * (np.arange(len(z)) == i), theta, after)
-                fastest = max(fastest, float(np.abs(after - before).max() / size[i]))
-        return fastest
-
-    def restricted(self, keep: Sequence[int]) -> NominalElement:
-        """The same on some degrees of freedom."""
-        return replace(self, row=self.row[list(keep)])
-
-
-def with_elements(structure: Structure, case: Case) -> Structure:
-    """A structure with the elements that a case declares; their uncertain parameters become parameters of the structure.
-
-    Raises:
-        UnknownNameError: An element is at a place that the structure has not.
-        ParameterError: A value is out of the bounds of the law.
-    """
-    added = [_declared(element, structure, case) for element in case.options.get("elements", [])]  # pyright: ignore
-    one = next((p for p in structure.places if len(p.rows) == 1), None)
-    frictions, given = structure.frictions, {p.name for p in case.parameters}
-    if one is not None and case.rig in {"sdof", "damper"}:
-        if "slip_stiffness" in given:
-            if "coulomb" not in given:
-                raise ParameterError(
-                    "'slip_stiffness' is given without 'coulomb', the force at which it slips; add it"
-                )
-            frictions = ()
-            added.append(
-                _element(LAWS["jenkins"], one, {"stiffness": "slip_stiffness", "limit": "coulomb"}, {})
-            )
-        if "force_offset" in given:
-            added.append(_element(LAWS["constant_force"], one, {"F0": "force_offset"}, {}))
-    if not added:
-        return structure
-    new = [n for e in added for n in e.parameters if n and n not in structure.parameters]
-    empty = np.zeros((len(new), len(structure.dofs), len(structure.dofs)))
-    mass, damping, stiffness = (
-        np.concatenate([stack, empty]) for stack in (structure.mass, structure.damping, structure.stiffness)
-    )
-    return replace(
-        structure, parameters=(*structure.parameters, *dict.fromkeys(new)), mass=mass, damping=damping, stiffness=stiffness,
-        frictions=frictions, elements=tuple(added), springs=tuple(structure.springs),
-    )  # fmt: skip
-
-
-def _declared(element: Any, structure: Structure, case: Case) -> NominalElement:
-    law, name = law_of(element, case.folder or case.name)
-    places = {place.name: place for place in structure.places if len(place.rows) == 1}
-    wanted = element.get("place", next(iter(places)) if len(places) == 1 else "")
-    if wanted not in places and len(places) == 1 and wanted in structure.dofs:
-        wanted = next(iter(places))
-    if wanted not in places:
-        raise UnknownNameError(f"place of the element '{name}'", str(wanted), places)
-    entries = element.get("parameters", {})
-    free = {key: f"{name}.{key}" for key, entry in entries.items() if isinstance(entry, dict)}
-    return _element(
-        law, places[wanted], free, {key: float(x) for key, x in entries.items() if key not in free}
+    frictions, springs = _kept(structure, replaced), structure.springs
+    laws = [e for e in structure.elements if not (e.rubs and any(e.acts_along(row) for row in replaced))]
+    if not (frictions or springs or laws):
+        return elements
+    theta = [friction.theta(structure.parameters, values) for friction in frictions]
+    theta += [np.append(spring.reach, spring.coefficients(values)) for spring in springs]
+    theta += [law.theta(structure.parameters, values) for law in laws]
+    firsts = np.cumsum([0, *(len(own) for own in theta)])
+    own = [[0, 0, soft_coulomb_limit.address, 1, i, firsts[i], 0, 0] for i in range(len(frictions))]
+    others = len(frictions) + len(springs)
+    own += [[spline_force.address, 0, 0, 1, i, firsts[i], 0, 0] for i in range(len(frictions), others)]
+    own = [[*entry, 0] for entry in own]
+    start = elements.start
+    for i, law in enumerate(laws, start=others):
+        own.append(law.entry(i, int(firsts[i]), len(start)))
+        start = np.concatenate([start, law.law.start()])
+    table = full(elements.table).copy()
+    table[:, ROW] += len(own)
+    table[:, THETA] += firsts[-1]
+    table[:, SCALE] += firsts[-1] * (table[:, SCALE] != 0)
+    return Elements(
+        np.vstack([np.array(own, dtype=np.int64), table]),
+        np.vstack([*(force.row for force in (*frictions, *springs, *laws)), elements.rows]),
+        np.concatenate([*theta, elements.theta]),
+        start,
     )
 
 
-def _element(
-    law: ForceLaw, place: Place, free: Mapping[str, str], exact: Mapping[str, float]
-) -> NominalElement:
-    values = law.theta(None, **exact)[len(law.header) :]
-    return NominalElement(
-        law, place.rows[0], tuple(free.get(name, "") for name in law.parameter_names), values
-    )
+def _kept(structure: Structure, replaced: Sequence[Array]) -> tuple[NominalFriction, ...]:
+    return tuple(f for f in structure.frictions if not any(f.acts_along(row) for row in replaced))
+
+
+def own_friction(structure: Structure, values: Array, motion: Motion, row: Array, step: float) -> Array:
+    """Force (n,) of the nominal model's own dry friction along one coordinate (n_dof,)."""
+    force = np.zeros(len(motion.position))
+    for friction in structure.frictions:
+        if friction.acts_along(row):
+            force += friction.along(friction.level(structure.parameters, values), motion)
+    for law in structure.elements:
+        if law.rubs and law.acts_along(row):
+            force += law.along(law.theta(structure.parameters, values), motion, step)
+    return force
+
+
+def own_force(structure: Structure, values: Array, motion: Motion, step: float) -> Array:
+    """Force (n, n_dof) that the nominal model's own forces take from the structure along a motion of such a step [s]."""
+    force = np.zeros_like(motion.position)
+    for friction in structure.frictions:
+        force += np.outer(friction.along(friction.level(structure.parameters, values), motion), friction.row)
+    for spring in structure.springs:
+        force += np.outer(spring.along(spring.coefficients(values), motion.position), spring.row)
+    for law in structure.elements:
+        force += np.outer(law.along(law.theta(structure.parameters, values), motion, step), law.row)
+    return force
+
+
+def own_change(structure: Structure, parameter: int, motion: Motion, values: Array, step: float) -> Array:
+    """Change of `own_force` (n, n_dof) with a unit of a nominal parameter about its values (n_parameters,)."""
+    force = np.zeros_like(motion.position)
+    for friction in structure.frictions:
+        if friction.parameter == structure.parameters[parameter]:
+            force += np.outer(friction.change(max(values[parameter], 0.0), motion), friction.row)
+    for spring in structure.springs:
+        if parameter < len(spring.slopes):
+            force += np.outer(spring.along(spring.slopes[parameter], motion.position), spring.row)
+    for law in structure.elements:
+        if structure.parameters[parameter] in law.parameters:
+            force += np.outer(law.change(structure.parameters, values, parameter, motion, step), law.row)
+    return force

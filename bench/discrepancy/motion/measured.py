@@ -8,8 +8,8 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
-from bench.discrepancy.model.structure import Observer
 from bench.discrepancy.motion.kalman_smoother import smooth_motion
+from bench.discrepancy.motion.observer import Observer
 from bench.discrepancy.simulation.stick_slip import Motion
 
 Array = NDArray[np.float64]

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from bench.discrepancy.case.case import Case, CaseRecord
+from bench.discrepancy.case.channel_noise import noise_floor
 from bench.discrepancy.case.schema import PRESCRIBED
-from bench.discrepancy.likelihood.whitening import noise_floor
 from bench.discrepancy.motion.kalman_smoother import resting, smoother_of
 from bench.discrepancy.simulation.stick_slip import Motion
 

@@ -1,1 +1,1 @@
-"""From a parameter vector and a record to channels: step size, driving loads."""
+"""From a parameter vector and a record to channels: the loads that drive a free run."""

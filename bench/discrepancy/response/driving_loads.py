@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from bench.discrepancy.case.acquisition import upsampled
 from bench.discrepancy.case.case import CaseRecord
-from bench.discrepancy.response.step_size import MAX_SUBSTEPS
+from bench.discrepancy.simulation.step_size import MAX_SUBSTEPS
 from bench.discrepancy.simulation.stick_slip import LinearStructure
 
 if TYPE_CHECKING:

@@ -25,14 +25,14 @@ from bench.discrepancy.fitting.map_fit import Fit
 from bench.discrepancy.likelihood.problem import Array, Problem
 from bench.discrepancy.likelihood.whitening import whitened
 from bench.discrepancy.likelihood.window_whitening import channels_of, in_motion
-from bench.discrepancy.model.nominal_forces import own_change, own_force, own_friction
+from bench.discrepancy.model.nominal_elements import own_change, own_force, own_friction
 from bench.discrepancy.model.placement import Hypothesis, Placed
 from bench.discrepancy.numerics.least_squares import Prior, minimise
 from bench.discrepancy.numerics.threads import in_threads
-from bench.discrepancy.response.step_size import steps
 from bench.discrepancy.screening.linear_amplitudes import SIGNAL_STEP, Node, Point, products, read, spanning
 from bench.discrepancy.simulation.linear_response import linear_run
 from bench.discrepancy.simulation.prescribed_response import driven_force
+from bench.discrepancy.simulation.step_size import steps
 from bench.discrepancy.simulation.stick_slip import Elements, LinearStructure
 
 REFINED = 1e-3

@@ -23,7 +23,8 @@ from bench.discrepancy.likelihood.problem import Array, Problem, band_bins
 from bench.discrepancy.likelihood.whitening import whitened
 from bench.discrepancy.model.placement import Hypothesis, Placed
 from bench.discrepancy.model.placements import placements
-from bench.discrepancy.model.structure import Structure, structure_of
+from bench.discrepancy.model.rigs import structure_of
+from bench.discrepancy.model.structure import Structure
 from bench.discrepancy.screening.candidates import leading
 from bench.discrepancy.screening.score_test import LackOfFit, lack_of_fit
 from bench.discrepancy.screening.screen import Screen

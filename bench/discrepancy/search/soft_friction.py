@@ -176,8 +176,9 @@ def _softened(problem: Problem, fitted: Fit) -> Iterator[Task]:
 
 def nominal_level(problem: Problem, placed: Placed, values: Array) -> float | None:
     """Limit of the nominal model's own friction along a place; None where it has none."""
+    names = problem.structure.parameters
     own = [*problem.structure.frictions, *(e for e in problem.structure.elements if e.rubs)]
-    levels = [f.level(problem.structure, values) for f in own if f.acts_along(placed.place.rows[0])]
+    levels = [f.level(names, values) for f in own if f.acts_along(placed.place.rows[0])]
     return sum(levels) if levels else None
 
 

@@ -21,7 +21,7 @@ from bench.discrepancy.case.case import CaseRecord
 from bench.discrepancy.effects.effect import RARE, Effect, FreeParameter, Scales, Values
 from bench.discrepancy.fitting.map_fit import Fit
 from bench.discrepancy.likelihood.problem import Problem
-from bench.discrepancy.model.nominal_forces import own_force
+from bench.discrepancy.model.nominal_elements import own_force
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.model.structure import Place
 from bench.discrepancy.numerics.threads import in_threads

@@ -1,1 +1,1 @@
-"""Time integration: stick-slip systems, linear and prescribed responses."""
+"""Time integration: steps, stick-slip systems, linear and prescribed responses."""

@@ -1,0 +1,61 @@
+"""Noise of a channel, read off its samples where it is not stated: its flattest spectrum, and its quantisation.
+
+A converter of step q leaves the samples on multiples of q, and an error of variance ``q^2 / 12`` that no fit removes
+(Widrow's pseudo-noise).
+
+References:
+    B. Widrow, I. Kollar, Quantization Noise, 2008, ch. 4.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+LATTICE = 0.02
+"""Distance from a lattice point, in steps, that the rounding of a text file may leave."""
+REPEATED = 0.5
+"""Part of the samples that must repeat an earlier value, before a lattice is looked for."""
+
+
+def noise_floor(x: Array) -> float:
+    """White noise of a channel whose noise is not stated, from the flattest quarter of its spectrum."""
+    spectrum = np.abs(np.fft.rfft((x - x.mean()) * np.hanning(len(x)))) ** 2 / (len(x) * 0.375)
+    upper = spectrum[len(spectrum) // 2 :]
+    blocks = [np.mean(block) for block in np.array_split(upper, 8)]
+    return float(np.sqrt(max(min(blocks), (1e-6 * np.std(x)) ** 2, 1e-300)))
+
+
+def quantisation_step(samples: NDArray[np.float64]) -> float:
+    """Step of the lattice on which all samples lie; zero where there is none.
+
+    Args:
+        samples: (n,).
+    """
+    values = np.unique(samples)
+    if len(values) < 3 or len(values) > (1.0 - REPEATED) * len(samples):
+        return 0.0
+    gaps = np.diff(values)
+    # a text file may print the same lattice point in two ways that differ in the last digit
+    gaps = gaps[gaps > 1e-7 * float(np.ptp(values))]
+    step = float(gaps.min())
+    multiples = np.round(gaps / step)
+    step = float(gaps.sum() / multiples.sum())
+    if np.max(np.abs(gaps / step - np.round(gaps / step))) > LATTICE:
+        return 0.0
+    return step
+
+
+def raised_noise(noise: float, samples: NDArray[np.float64]) -> float:
+    """Noise of a channel with that of its quantisation, where the latter is the coarser one.
+
+    Args:
+        noise: One-sigma noise as stated.
+        samples: (n,).
+    """
+    step = quantisation_step(samples)
+    if step <= noise:
+        return noise
+    return float(np.hypot(noise, step / np.sqrt(12.0)))

@@ -1,0 +1,98 @@
+"""Imports: no circle of files, no room too large, nothing loose beside the rooms of the diagnosis."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from graphlib import CycleError, TopologicalSorter
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+DIAGNOSIS = ROOT / "bench" / "discrepancy"
+OWED = {
+    ("bench.discrepancy.case.schema", "bench.discrepancy.case.case"),
+    ("bench.discrepancy.response.driving_loads", "bench.discrepancy.likelihood.problem"),
+    ("bench.discrepancy.likelihood.noise_covariance", "bench.discrepancy.likelihood.problem"),
+    ("bench.discrepancy.likelihood.time_varying_noise", "bench.discrepancy.likelihood.problem"),
+    ("bench.discrepancy.likelihood.window_whitening", "bench.discrepancy.likelihood.problem"),
+}
+"""Imports for type checkers that close a circle until the problem is cut in two and the schema takes what it uses."""
+LARGEST_ROOM, MOST_LOOSE = 2500, 4
+"""Lines of a room of the diagnosis, and files beside its rooms."""
+
+
+def modules() -> dict[str, Path]:
+    """Every module of the project, a package by its ``__init__``."""
+    found = {}
+    for package in ("bench", "envs"):
+        for path in (ROOT / package).rglob("*.py"):
+            parts = path.relative_to(ROOT).with_suffix("").parts
+            found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    return found
+
+
+def imported(name: str, tree: ast.AST, package: bool, known: set[str]) -> Iterator[str]:
+    """Modules that a module imports anywhere: within functions and for type checkers only as well."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names if alias.name in known)
+        elif isinstance(node, ast.ImportFrom):
+            parts = name.split(".") if package else name.split(".")[:-1]
+            base = ".".join(parts[: len(parts) - node.level + 1]) if node.level else ""
+            source = ".".join(part for part in (base, node.module) if part)
+            for alias in node.names:
+                inner = f"{source}.{alias.name}"
+                yield inner if inner in known else source
+
+
+def graph(sources: dict[str, tuple[str, bool]]) -> dict[str, set[str]]:
+    """Module to the modules it imports, from texts and whether each is a package."""
+    known = set(sources)
+    return {
+        name: {m for m in imported(name, ast.parse(text), package, known) if m in known and m != name}
+        for name, (text, package) in sources.items()
+    }
+
+
+def circle(edges: dict[str, set[str]]) -> list[str]:
+    """A circle of imports; empty where there is none."""
+    try:
+        TopologicalSorter(edges).prepare()
+    except CycleError as error:
+        return list(error.args[1])
+    return []
+
+
+def test_no_file_imports_itself_by_way_of_others():
+    sources = {name: (path.read_text(), path.name == "__init__.py") for name, path in modules().items()}
+    assert len(sources) > 200
+    edges = graph(sources)
+    for name, target in OWED:
+        edges[name].remove(target)  # what is paid is to be struck off
+    assert circle(edges) == []
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "from bench.a import x",
+        "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from bench.a import x",
+        "def f():\n    from .a import x",
+        "from bench import a",
+        "import bench.a",
+    ],
+)
+def test_circles_are_found(text):
+    sources = {"bench": ("", True), "bench.a": ("import bench.b", False), "bench.b": (text, False)}
+    assert set(circle(graph(sources))) == {"bench.a", "bench.b"}
+
+
+def test_diagnosis_lives_in_rooms():
+    loose = [path.name for path in DIAGNOSIS.glob("*.py")]
+    assert len(loose) <= MOST_LOOSE, loose
+    for room in (path for path in DIAGNOSIS.iterdir() if path.is_dir() and path.name != "__pycache__"):
+        lines = sum(len(path.read_text().splitlines()) for path in room.glob("*.py"))
+        if room.name != "blind":
+            assert lines <= LARGEST_ROOM, room.name
