@@ -21,7 +21,8 @@ class BenchError(Exception):
     """Base class of all errors raised on purpose by the bench."""
 
     def __str__(self) -> str:  # KeyError would print the repr of its argument
-        return str(self.args[0]) if self.args else ""
+        # one line, whatever line breaks the names in a file have
+        return " ".join(str(self.args[0]).splitlines()) if self.args else ""
 
 
 class UnknownNameError(BenchError, KeyError):
@@ -145,3 +146,7 @@ class IdentificationError(BenchError, ValueError):
 
 class RangeWarning(UserWarning):
     """A reduced-order model was used outside the range of the data it was identified from."""
+
+
+class RecordWarning(UserWarning):
+    """Something in a record's file was assumed, repaired or left out, or is doubtful; the text says what."""

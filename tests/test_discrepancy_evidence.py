@@ -14,7 +14,7 @@ AXIAL = Place("axial", np.eye(1), "m", "N")
 
 def explanation(log_posterior, *names):
     placed = tuple(Placed(effect_named(name), AXIAL) for name in names)
-    return SimpleNamespace(hypothesis=placed, log_posterior=log_posterior, noise_stated=True)
+    return SimpleNamespace(hypothesis=placed, log_posterior=log_posterior, scaled=True)
 
 
 def test_effects_that_do_nearly_as_well_in_the_place_of_one_stand_in_a_set_with_it():

@@ -377,9 +377,9 @@ WRONG_CSV = {
     "too long": ("time,x [m]\n0,1\n0.1,1,2\n", "2 columns at line 3"),
     "twice": ("time,x,x\n0,1,2\n1,2,3\n", "several columns headed 'x'"),
     "one line": ("time,x [m]\n0,1\n", "single line"),
-    "dates": (
-        "time,x [m]\n2024-05-01 10:00:00,1\n2024-05-01 10:00:01,2\n",
-        "line 2 holds '2024-05-01 10:00:00'",
+    "dates of unclear order": (
+        "time,x [m]\n01/05/2024 10:00:00,1\n01/05/2024 10:00:01,2\n",
+        "line 2 holds '01/05/2024 10:00:00'",
     ),
     "binary": ("a\0b\n", "no text file"),
 }

@@ -38,6 +38,8 @@ class Diagnose:
     """Effects to leave out of the catalogue."""
     most: int = 3
     """Largest number of effects named together."""
+    budget: float = float("inf")
+    """Seconds after which no further stage of the search is begun; the verdict is then the best one so far and says what was not tried."""
     force: bool = False
     """Overwrite files that exist."""
     progress: bool = True
@@ -47,7 +49,7 @@ class Diagnose:
         """Run the command."""
         self._check_places()
         with _stages(self.progress) as stage:
-            diagnosis = _diagnosed(self.folder, self.exclude, self.most, stage)
+            diagnosis = _diagnosed(self, stage)
             document = diagnosis.verdict.to_json()
             written, problem = self._written(diagnosis, document, stage)
         if self.json == PRINTED:
@@ -102,6 +104,8 @@ class Diagnose:
 
         if self.most < 1:
             raise ParameterError(f"--most is {self.most}; at least one effect has to be allowed")
+        if not self.budget > 0.0:
+            raise ParameterError(f"--budget is {self.budget:g} s; give more than zero")
         check_targets(self.json, self.html, self.rrd, force=self.force)
 
 
@@ -118,7 +122,7 @@ def _stages(shown: bool) -> Iterator[Callable[[str], None]]:
         yield lambda text: bar.update(task, description=text)
 
 
-def _diagnosed(folder: Path, exclude: tuple[str, ...], most: int, stage: Callable[[str], None]) -> Diagnosis:
+def _diagnosed(asked: Diagnose, stage: Callable[[str], None]) -> Diagnosis:
     """The diagnosis of a folder; what numerics cannot cope with is told like any other input that cannot be used."""
     import numpy as np
 
@@ -126,10 +130,12 @@ def _diagnosed(folder: Path, exclude: tuple[str, ...], most: int, stage: Callabl
     from bench.errors import IdentificationError
 
     try:
-        return diagnose_folder(folder, exclude=exclude, most=most, progress=stage)
+        return diagnose_folder(
+            asked.folder, exclude=asked.exclude, most=asked.most, progress=stage, budget=asked.budget
+        )
     except (np.linalg.LinAlgError, ArithmeticError) as error:
         raise IdentificationError(
-            f"the numbers of '{folder}' cannot be worked with ({error}); check nominal values, units and noise_std: "
+            f"the numbers of '{asked.folder}' cannot be worked with ({error}); check nominal values, units and noise_std: "
             "one of them is probably off by orders of magnitude"
         ) from error
 
@@ -141,15 +147,22 @@ def summary(verdict: Verdict) -> list[Any]:
         verdict: The verdict.
     """
     parts: list[Any] = [verdict.explanation]
-    if verdict.named:
-        table = Table("effect", "where", "probability", "parameters", title="Missing from the model")
-        for effect in verdict.named:
+    for effects, title in (
+        (verdict.named, "Missing from the model"),
+        (verdict.nearest, "What comes nearest"),
+    ):
+        if not effects:
+            continue
+        table = Table("effect", "where", "probability", "closes", "parameters", title=title)
+        for effect in effects:
             values = "\n".join(
                 f"{name} = {p.value:.5g} ± {p.std:.2g} {p.unit if p.unit != '1' else ''}".rstrip()
                 for name, p in effect.parameters.items()
             )
             where = " ".join(text for text in (effect.where, effect.channel) if text)
-            table.add_row(effect.name, where, f"{effect.probability:.3f}", Text(values))
+            low, high = effect.closed_ci95
+            closes = f"{100 * effect.closed:.0f} % ({100 * low:.0f} … {100 * high:.0f})"
+            table.add_row(effect.name, where, f"{effect.probability:.3f}", closes, Text(values))
         parts.append(table)
     table = Table(
         "gap", "before", "parameters only", "after", "noise", "closed", title="How far the gap shrinks"
@@ -163,6 +176,8 @@ def summary(verdict: Verdict) -> list[Any]:
             closed,
         )
     parts.append(table)
+    if verdict.left:
+        parts.append(verdict.left)
     for names in verdict.indistinguishable:
         parts.append(f"These records cannot tell {' from '.join(names)}.")
     proposal = verdict.next_excitation

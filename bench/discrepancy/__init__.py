@@ -16,9 +16,9 @@ if TYPE_CHECKING:
         CaseChannel,
         CaseRecord,
         NominalParameter,
-        read_case,
         record_from_arrays,
     )
+    from bench.discrepancy.case.reading import read_case
     from bench.discrepancy.diagnosis import Diagnosis, diagnose, diagnose_folder
     from bench.discrepancy.report.html_page import write_report
     from bench.discrepancy.report.rerun_recording import write_rerun
@@ -36,7 +36,7 @@ _HOMES = {
     "diagnose": "diagnosis",
     "diagnose_folder": "diagnosis",
     "make_blind": "blind.protocol",
-    "read_case": "case.case",
+    "read_case": "case.reading",
     "record_from_arrays": "case.case",
     "run_blind": "blind.protocol",
     "score_blind": "blind.scoring",

@@ -8,16 +8,25 @@ the nominal model gather (`locate`).
 
 from __future__ import annotations
 
+import math
 import time
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from bench.discrepancy.case.case import Case, read_case
+from bench.discrepancy.articulated.diagnosis import (
+    ArticulatedDiagnosis,
+    applies,
+    diagnose_articulated,
+    drives_only,
+)
+from bench.discrepancy.articulated.effects import CATALOGUE as ARTICULATED
+from bench.discrepancy.case.case import Case
 from bench.discrepancy.case.idle_loads import idle_notes, without_idle_noise
+from bench.discrepancy.case.reading import read_case
 from bench.discrepancy.case.schema import check_units
 from bench.discrepancy.checks.data_quality import notes, refuse
 from bench.discrepancy.checks.initial_motion import with_starts_found
@@ -27,18 +36,21 @@ from bench.discrepancy.effects.effect import Effect
 from bench.discrepancy.effects.nonparametric import CLOSURES
 from bench.discrepancy.fitting.initial_state_fit import start_warnings
 from bench.discrepancy.judgement import posterior as evidence
-from bench.discrepancy.judgement.nonparametric_rival import Rival, likelier_force
-from bench.discrepancy.judgement.predictive_check import contradicted
+from bench.discrepancy.judgement.closing import complete, nominal_estimates, with_closed
+from bench.discrepancy.judgement.nonparametric_rival import Rival
+from bench.discrepancy.judgement.two_regimes import How, Progress, found_of
 from bench.discrepancy.judgement.validation_discrepancy import gaps, nominal_prediction
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.localisation.localise import Whereabouts, locate
+from bench.discrepancy.localisation.remainder import remainder
 from bench.discrepancy.model.placement import Hypothesis
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.next_test.discriminating_excitation import separate, told_apart
-from bench.discrepancy.search.explain import Explanation, close, explain, nominal_alone
+from bench.discrepancy.numerics.deadline import Deadline
+from bench.discrepancy.search.explain import Explanation, close, nominal_alone
 from bench.discrepancy.search.fits import names
 from bench.discrepancy.search.forward_selection import STALLED
-from bench.discrepancy.search.load_interpolation import promising_readings, reading_notes
+from bench.discrepancy.search.load_interpolation import reading_notes
 from bench.discrepancy.verdict import Gap, Kind, NamedEffect, Ranked, Verdict
 from bench.errors import UnknownNameError
 
@@ -47,8 +59,6 @@ SEED = 20060501
 
 WORSE = 1.1
 """Gap with a closure over that without, on any judged coordinate, from which the closure is withdrawn."""
-
-Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True)
@@ -81,8 +91,9 @@ def diagnose(
     most: int = 3,
     rng: np.random.Generator | None = None,
     progress: Progress = lambda text: None,
-) -> Diagnosis:
-    """Diagnose a case.
+    budget: float = math.inf,
+) -> Diagnosis | ArticulatedDiagnosis:
+    """Diagnose a case; one of an articulated MJCF by `diagnose_articulated`, with the catalogue of joints, drives and encoders.
 
     Args:
         case: Nominal model and records.
@@ -91,55 +102,55 @@ def diagnose(
         most: Largest number of effects named together.
         rng: For the bootstrap intervals; a fixed seed where None.
         progress: Called with a line of text at every stage.
+        budget: Seconds after which no further stage of the search is begun; the verdict is then the best one so far, and its
+            warnings say what was not tried.
 
     Raises:
         UnknownNameError: A name in `exclude` is not in the catalogue.
         RecordingError: The records cannot be used.
     """
+    if applies(case):
+        with threadpool_limits(1, user_api="blas"):
+            return diagnose_articulated(case, exclude=exclude, most=most, rng=rng, progress=progress)
     rng = np.random.default_rng(SEED) if rng is None else rng
     known = [effect.name for effect in catalogue]
     for name in exclude:
-        if name not in known:
+        if name not in known and name not in {effect.name for effect in ARTICULATED}:
             raise UnknownNameError("effect", name, known)
     chosen = [effect for effect in catalogue if effect.name not in exclude]
     # fits run in threads of their own; threads of BLAS within them would only get in each other's way
     with threadpool_limits(1, user_api="blas"):
-        return _diagnose(case, chosen, most, rng, progress)
+        found = _diagnose(case, How(chosen, most, progress, Deadline(budget)), rng)
+        if found.verdict.verdict == "unknown" and drives_only(case):
+            # what no force on the joint explains may sit in its drive
+            progress("effects of drives and encoders")
+            other = diagnose_articulated(case, exclude=exclude, most=most, rng=rng, progress=progress)
+            if other.verdict.verdict == "effect" and other.verdict.gap.after < found.verdict.gap.after:
+                return other
+        return found
 
 
-def _diagnose(
-    case: Case, catalogue: Sequence[Effect], most: int, rng: np.random.Generator, progress: Progress
-) -> Diagnosis:
-    began = time.perf_counter()
+def _diagnose(case: Case, how: How, rng: np.random.Generator) -> Diagnosis:
+    began, progress, catalogue = time.perf_counter(), how.progress, how.catalogue
     progress("looking at the records")
     check_units(case)
     told = case = with_starts_found(case)
     refuse(Problem(case, structure_of(case), case.identification))
     quiet = without_idle_noise(told)
-    case, explanations = _explained(quiet, catalogue, most, progress)
+    case, finding = found_of(quiet, how, rng)
     problem = Problem(case, structure_of(case), case.identification)
-    best = explanations[0]
-    kind, probabilities = evidence.judge(explanations)
-    doubt, rival = "", None
-    if kind != "none":
-        progress(f"doubts about {names(best.hypothesis)}")
-        rival = likelier_force(explanations)
-    if kind == "effect":
-        doubt = _doubt(case, problem, best, rival, rng)
-    if doubt:
-        kind, probabilities = "unknown", evidence.OUTSIDE_THE_CATALOGUE
+    explanations, kind, rival = finding.explanations, finding.kind, finding.rival
+    best, probabilities, words = explanations[0], finding.probabilities, finding.words
     seen, fitted = recorded(problem, catalogue), kind
-    words = evidence.plain_words(kind, explanations, doubt=doubt)
-    if rival is not None and not doubt and rival.explanation.consistent:
-        words += evidence.enough(rival.closure)
     if seen and kind == "none":
         kind = "effect"
-        probabilities |= {"effect": 1.0 - probabilities["unknown"], "none": 0.0}
+        probabilities = probabilities | {"effect": 1.0 - probabilities["unknown"], "none": 0.0}
     progress("gap on the judging records")
-    final, closure, found = _shrunk(case, problem, explanations, kind, rival, rng)
+    closest = finding.closest or evidence.nearest(explanations)
+    final, closure, found = _shrunk(case, problem, explanations, kind, rival, rng, closest)
     widest = max(found, key=lambda gap: gap.before / max(gap.noise_floor, 1e-12))
-    if kind == "unknown" and not doubt:
-        words += evidence.closes(names(evidence.nearest(explanations).hypothesis), widest)
+    if kind == "unknown" and not finding.doubt:
+        words += evidence.closes(names(closest.hypothesis), widest)
     where = locate(
         problem,
         nominal_alone(explanations),
@@ -147,17 +158,23 @@ def _diagnose(
         borne_out=rival is not None or kind == "effect",
         unknown=kind == "unknown",
     )
+    named = with_closed(case, problem, finding.named, explanations, rng) if finding.named else ()
+    nearest = finding.nearest
+    if finding.closest is not None:
+        nearest = with_closed(case, problem, nearest, (finding.closest, *explanations), rng)
     verdict = Verdict(
         verdict=kind,
-        named=(*evidence.named(explanations), *seen) if kind == "effect" else (),
-        ranking=(*(Ranked(e.name, e.where, e.probability) for e in seen), *evidence.ranking(explanations)),
-        indistinguishable=evidence.indistinguishable(explanations) if kind != "unknown" else (),
+        named=(*named, *seen) if kind == "effect" else (),
+        ranking=(*(Ranked(e.name, e.where, e.probability) for e in seen), *finding.ranking),
+        indistinguishable=finding.indistinguishable if kind != "unknown" else (),
         locations=where.locations,
         gap=widest,
         gaps=found,
         probabilities=probabilities,
         explanation=_told(words, seen),
         warnings=(
+            *_untried(how.deadline),
+            *finding.notes,
             *notes(case, problem),
             *idle_notes(told, quiet),
             *reading_notes(quiet, case),
@@ -169,35 +186,19 @@ def _diagnose(
         ),
         splits=where.splits,
         seconds=time.perf_counter() - began,
+        complete=kind != "unknown" and complete(found, sharp=not finding.coarse),
+        remainder=remainder(problem, final, widest),
+        nominal=nominal_estimates(final),
+        nearest=nearest,
     )
     return Diagnosis(case, problem, tuple(explanations), verdict, final, where)
 
 
-def _explained(
-    case: Case, catalogue: Sequence[Effect], most: int, progress: Progress
-) -> tuple[Case, list[Explanation]]:
-    """The explanations of a case, and the case with what they tell of things that nobody stated: its loads and its starts."""
-    explanations = explain(case, catalogue, most=most, progress=progress)
-    for read in promising_readings(case, explanations):
-        progress(f"once more, the loads read as {read.load_interpolation}")
-        again = explain(read, catalogue, most=most, progress=progress)
-        if again[0].log_posterior > explanations[0].log_posterior:
-            case, explanations = read, again
-            break
-    started = with_starts_found(case, explanations[0].predict)
-    if any(a.at_rest != b.at_rest for a, b in zip(case.identification, started.identification, strict=True)):
-        progress("once more, from the initial states estimated")
-        explanations = explain(started, catalogue, most=most, progress=progress)
-    return started, explanations
-
-
-def _doubt(
-    case: Case, problem: Problem, best: Explanation, rival: Rival | None, rng: np.random.Generator
-) -> str:
-    """What speaks against an explanation that leaves nothing but noise; empty where nothing does."""
-    if rival is not None:
-        return evidence.outdone(rival.closure)
-    return evidence.FAILS if contradicted(case, problem, best, rng) else ""
+def _untried(deadline: Deadline) -> tuple[str, ...]:
+    """What there was no time for, in words."""
+    if not deadline.skipped:
+        return ()
+    return (f"there was no time for {'; '.join(deadline.skipped)}: a larger --budget may change the verdict",)
 
 
 def _shrunk(
@@ -207,6 +208,7 @@ def _shrunk(
     kind: Kind,
     rival: Rival | None,
     rng: np.random.Generator,
+    nearest: Explanation,
 ) -> tuple[Explanation, str, tuple[Gap, ...]]:
     """How far the gap shrinks: the explanation behind `Gap.after`, the closure in it if any, and the gaps."""
     best, nothing = explanations[0], nominal_alone(explanations)
@@ -215,9 +217,9 @@ def _shrunk(
     stages += [(label, e.predict) for label, e in _path(explanations)]
     if kind == "unknown":
         final, closure = _closed(best, nothing, rival)
-        nearest = evidence.nearest(explanations)
         label = names(nearest.hypothesis)
-        stages += [(label, nearest.predict)] if label not in dict(stages) else []
+        tells = label not in dict(stages) and all(_finite(nearest.predict(r)) for r in case.validation)
+        stages += [(label, nearest.predict)] if tells else []
     stages.append((names(final.hypothesis), final.predict))
     found = gaps(case, problem, stages=stages, rng=rng, final=_model(final))
     if kind == "unknown" and any(gap.after > WORSE * gap.parameters_only for gap in found):
@@ -226,6 +228,10 @@ def _shrunk(
         stages[-1] = ("no closure helps", nothing.predict)
         found = gaps(case, problem, stages=stages, rng=rng, final=_model(final))
     return final, closure, found
+
+
+def _finite(run: Mapping[str, np.ndarray]) -> bool:
+    return all(np.isfinite(samples).all() for samples in run.values())
 
 
 def _closed(best: Explanation, nothing: Explanation, rival: Rival | None) -> tuple[Explanation, str]:
@@ -254,7 +260,7 @@ def _told(words: str, seen: Sequence[NamedEffect]) -> str:
     return words + told
 
 
-def diagnose_folder(folder: str | Path, **options) -> Diagnosis:
+def diagnose_folder(folder: str | Path, **options) -> Diagnosis | ArticulatedDiagnosis:
     """Diagnose the case in a folder; the options are those of `diagnose`."""
     return diagnose(read_case(folder), **options)
 

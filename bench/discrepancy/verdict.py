@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal
 
 from bench.files import json_values
@@ -32,6 +32,8 @@ class NamedEffect:
         equation: The effect in one line.
         law: Name of the force law in `bench.laws`, for effects that are one.
         theta: Parameters of that law, ready for an element.
+        closed: Part of the judging records' discrepancy that comes back without it, everything else fitted again.
+        closed_ci95: Block-bootstrap interval of `closed`.
     """
 
     name: str
@@ -42,6 +44,29 @@ class NamedEffect:
     equation: str = ""
     law: str = ""
     theta: tuple[float, ...] = ()
+    closed: float = 0.0
+    closed_ci95: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class NominalEstimate:
+    """A nominal parameter as the explanation has it.
+
+    Attributes:
+        name: Its name.
+        value: Estimate, named errors of it included.
+        std: One-sigma uncertainty.
+        stated: Value that was stated.
+        stated_std: Uncertainty that was stated.
+        shift_in_std: Deviation from the stated value in units of the stated uncertainty, named errors not included.
+    """
+
+    name: str
+    value: float
+    std: float
+    stated: float
+    stated_std: float
+    shift_in_std: float
 
 
 @dataclass(frozen=True)
@@ -155,6 +180,11 @@ class Verdict:
         next_excitation: Excitation that would separate the rivals; empty where there are none.
         splits: Residuals by channel, band, time and state.
         seconds: Wall time.
+        complete: Whether what is named leaves nothing but noise.
+        remainder: What is left on the judging records: "nrmse", "over_noise" (times what noise leaves), "of_before" (part of the gap
+            before), and the "channel", "band_hz" and "time_s" that hold most of it in the records for identification.
+        nearest: Where nothing is named because something unknown is missing, the effects of the catalogue that come nearest.
+        nominal: Nominal parameters as the explanation behind `gap.after` has them.
     """
 
     verdict: Kind
@@ -171,6 +201,29 @@ class Verdict:
     next_excitation: dict[str, Any] = field(default_factory=dict)
     splits: tuple[Split, ...] = ()
     seconds: float = 0.0
+    complete: bool = False
+    remainder: dict[str, Any] = field(default_factory=dict)
+    nominal: tuple[NominalEstimate, ...] = ()
+    nearest: tuple[NamedEffect, ...] = ()
+
+    @property
+    def left(self) -> str:
+        """What is left, in words; empty where it is nothing but noise."""
+        if self.complete or not self.remainder:
+            return ""
+        own = self.remainder
+        noise = "" if own.get("over_noise") is None else f", {own['over_noise']:.3g} times what noise leaves"
+        place = ""
+        if own.get("channel"):
+            (low, high), (first, last) = own["band_hz"], own["time_s"]
+            place = (
+                f"; most of it in '{own['channel']}', {low:.3g} to {high:.3g} Hz, {first:.3g} to {last:.3g} s"
+            )
+        return f"Left on the judging records: NRMSE {own['nrmse']:.3g}{noise}{place}."
+
+    def timed(self, seconds: float) -> Verdict:
+        """The verdict with its wall time [s]."""
+        return replace(self, seconds=seconds)
 
     def to_json(self) -> dict[str, Any]:
         """Return the verdict as JSON values; numbers that are not finite become None."""

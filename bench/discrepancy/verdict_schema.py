@@ -10,13 +10,23 @@ from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field, Strict
 
-from bench.discrepancy.verdict import Estimate, Gap, Location, NamedEffect, Ranked, Split, Verdict
+from bench.discrepancy.verdict import (
+    Estimate,
+    Gap,
+    Location,
+    NamedEffect,
+    NominalEstimate,
+    Ranked,
+    Split,
+    Verdict,
+)
 from bench.documents import AS_NUMBER, Document, Entry, Label, Listed, Name, Number, Probability, Text
 from bench.documents.derived import entry_of
 
 _ENTRIES: dict[type[Any], tuple[str, tuple[str, ...]]] = {
     Estimate: ("an estimate", ("value",)),
     NamedEffect: ("a named effect", ("name", "probability")),
+    NominalEstimate: ("a nominal parameter", ("name",)),
     Ranked: ("a ranked effect", ("name", "probability")),
     Location: ("a location", ()),
     Split: ("a split", ()),

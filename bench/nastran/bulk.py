@@ -21,6 +21,7 @@ from typing import Literal, TypeVar, get_args
 
 from bench.errors import FileFormatError, UnknownNameError
 from bench.files import write_text
+from bench.limits import READING_LIMITS, ReadingLimits, regular_file, size_text
 from bench.nastran.cards import Card, Field, Place, RawCard, interpret
 from bench.nastran.numbers import integer_text, real_text
 
@@ -28,7 +29,7 @@ Format = Literal["small", "large", "free"]
 
 C = TypeVar("C", bound=Card)
 
-_MAX_INCLUDES = 10
+_DEEPEST = 10
 _QUOTES = "'\"‘’`"
 
 
@@ -47,16 +48,17 @@ class Deck:
         return tuple(card for card in self.cards if isinstance(card, kind))
 
 
-def read_deck(path: str | Path) -> Deck:
+def read_deck(path: str | Path, *, limits: ReadingLimits = READING_LIMITS) -> Deck:
     """Read a deck and the files it includes.
 
     Args:
-        path: The file; ``INCLUDE 'name'`` is looked for beside it.
+        path: The file; ``INCLUDE 'name'`` is looked for beside it, and not outside its folder.
+        limits: What deck and included files may cost together.
 
     Raises:
         FileFormatError: The file cannot be read, or a card is malformed; names file, line, card and field.
     """
-    return _deck(_lines(Path(path), 0))
+    return _deck(_Reader(Path(path).parent, limits).lines(Path(path), ()))
 
 
 def parse_deck(text: str, *, source: str = "deck") -> Deck:
@@ -65,43 +67,75 @@ def parse_deck(text: str, *, source: str = "deck") -> Deck:
     Raises:
         FileFormatError: A card is malformed, or the text includes a file.
     """
-    return _deck(_numbered(text, source, None, 0))
+    return _deck(_Reader(None, READING_LIMITS).numbered(text, source, ()))
 
 
 def _deck(lines: Iterable[tuple[Place, str]]) -> Deck:
     return Deck(tuple(interpret(raw) for raw in raw_cards(lines)))
 
 
-def _lines(path: Path, depth: int) -> Iterator[tuple[Place, str]]:
-    try:
-        text = path.read_bytes().decode("utf-8", errors="replace")
-    except OSError as error:
-        raise FileFormatError(f"cannot read {path}: {error.strerror or error}") from error
-    return _numbered(text, path.name, path.parent, depth)
+class _Reader:
+    """Lines of a deck and of what it includes, counted against the limits."""
 
+    def __init__(self, home: Path | None, limits: ReadingLimits) -> None:
+        self.home, self.limits = home, limits
+        self.files, self.bytes = 0, 0
 
-def _numbered(text: str, source: str, folder: Path | None, depth: int) -> Iterator[tuple[Place, str]]:
-    lines = text.splitlines()
-    upper = [" ".join(line.split("$")[0].upper().split()) for line in lines]
-    start = upper.index("BEGIN BULK") + 1 if "BEGIN BULK" in upper else 0
-    for number in range(start, len(lines)):
-        place = Place(source, number + 1)
-        line = lines[number].split("$")[0].expandtabs(8).rstrip()
-        if upper[number].startswith("ENDDATA"):
-            return
-        if not upper[number].startswith("INCLUDE"):
-            if line:
-                yield place, line
-            continue
-        name = line.strip()[len("INCLUDE") :].strip().strip(_QUOTES)
-        if folder is None or depth >= _MAX_INCLUDES or not name:
-            why = (
-                "has no file name"
-                if not name
-                else "cannot be followed: write the deck to files, nested at most ten deep"
+    def lines(self, path: Path, chain: tuple[Path, ...]) -> Iterator[tuple[Place, str]]:
+        """Lines of a file; `chain` are the files that led to it."""
+        try:
+            content = regular_file(path, self.limits.model_bytes).read_bytes()
+        except (OSError, FileFormatError) as error:
+            raise FileFormatError(f"cannot read {path}: {error}") from error
+        self.files, self.bytes = self.files + 1, self.bytes + len(content)
+        if self.files > self.limits.included or self.bytes > self.limits.model_bytes:
+            raise FileFormatError(
+                f"the deck includes {self.files - 1} files of {size_text(self.bytes)}; at most {self.limits.included} files of "
+                f"{size_text(self.limits.model_bytes)} are read: merge them"
             )
-            raise FileFormatError(f"{place}: INCLUDE '{name}' {why}")
-        yield from _lines(folder / name, depth + 1)
+        return self.numbered(content.decode("utf-8", errors="replace"), path.name, (*chain, path.resolve()))
+
+    def numbered(self, text: str, source: str, chain: tuple[Path, ...]) -> Iterator[tuple[Place, str]]:
+        """Lines of a text without comments, each with its place; includes followed."""
+        lines = text.splitlines()
+        upper = [" ".join(line.split("$")[0].upper().split()) for line in lines]
+        start = upper.index("BEGIN BULK") + 1 if "BEGIN BULK" in upper else 0
+        for number in range(start, len(lines)):
+            place = Place(source, number + 1)
+            line = lines[number].split("$")[0].expandtabs(8).rstrip()
+            if upper[number].startswith("ENDDATA"):
+                return
+            if not upper[number].startswith("INCLUDE"):
+                if line:
+                    yield place, line
+                continue
+            name = line.strip()[len("INCLUDE") :].strip().strip(_QUOTES)
+            yield from self.lines(self._included(name, place, chain), chain)
+
+    def _included(self, name: str, place: Place, chain: tuple[Path, ...]) -> Path:
+        """Path of an included file.
+
+        Raises:
+            FileFormatError: It has no name, lies outside the deck's folder, includes itself or is nested too deeply.
+        """
+        why = "has no file name" if not name else ""
+        if name and (self.home is None or len(chain) > _DEEPEST):
+            why = "cannot be followed: write the deck to files, nested at most ten deep"
+        if why or self.home is None:
+            raise FileFormatError(f"{place}: INCLUDE {name[:100]!r} {why}")
+        try:
+            path = chain[-1].parent / name if chain else self.home / name
+            inside = path.resolve().is_relative_to(self.home.resolve())
+            own = path.resolve() in chain
+        except (OSError, ValueError, RuntimeError) as error:
+            raise FileFormatError(f"{place}: INCLUDE {name[:100]!r} cannot be followed: {error}") from None
+        if not inside:
+            raise FileFormatError(
+                f"{place}: INCLUDE {name[:100]!r} lies outside the folder of the deck; copy the file there, and include the copy"
+            )
+        if own:
+            raise FileFormatError(f"{place}: INCLUDE {name[:100]!r} includes itself; remove that line")
+        return path
 
 
 def raw_cards(lines: Iterable[tuple[Place, str]]) -> Iterator[RawCard]:

@@ -7,12 +7,14 @@ two lines count as one.
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple, Self, TypeVar
 
 from bench.errors import FileFormatError
+from bench.limits import READING_LIMITS
 from bench.nastran.numbers import parse_integer, parse_real
 
 Field = int | float | str | None
@@ -47,7 +49,7 @@ class RawCard(NamedTuple):
 
     def real(self, i: int, what: str, default: float | None = None) -> float:
         """Data field i (from 0) as a real number; `default` where it is blank."""
-        return self._value(i, what, parse_real, default, "a real number with a decimal point")
+        return self._value(i, what, _parse_finite, default, "a real number with a decimal point")
 
     def text(self, i: int, what: str, default: str | None = None) -> str:
         """Data field i (from 0) as a name of at most eight letters and digits; `default` where it is blank."""
@@ -59,7 +61,7 @@ class RawCard(NamedTuple):
 
     def fail(self, i: int, what: str, expected: str) -> FileFormatError:
         """The error that names line, card, field, what was found and what was expected."""
-        found = "blank" if self.blank(i) else f"'{self.fields[i]}'"
+        found = "blank" if self.blank(i) else f"'{self.fields[i][:80]}'"
         place = self.places[i] if i < len(self.places) else self.place
         return FileFormatError(
             f"{place}: card {self.name}, field {i % 8 + 2} ({what}): {found} found, {expected} expected"
@@ -74,6 +76,13 @@ class RawCard(NamedTuple):
             return parse(self.fields[i])
         except ValueError as error:
             raise self.fail(i, what, str(error)) from error
+
+
+def _parse_finite(text: str) -> float:
+    value = parse_real(text)
+    if not math.isfinite(value):
+        raise ValueError("a real number of at most 1.8+308")
+    return value
 
 
 def _parse_name(text: str) -> str:
@@ -140,6 +149,8 @@ class ScalarPoints(Card):
             first, last = raw.integer(0, "first point"), raw.integer(2, "last point")
             if last < first:
                 raise raw.fail(2, "last point", f"a number from {first} on")
+            if last - first >= READING_LIMITS.model_items:
+                raise raw.fail(2, "last point", f"at most {READING_LIMITS.model_items} points")
             return cls(tuple(range(first, last + 1)), raw.name)
         used = [i for i in range(len(raw.fields)) if not raw.blank(i)] or [0]
         return cls(tuple(raw.integer(i, "point") for i in used), raw.name)

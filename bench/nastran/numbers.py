@@ -35,7 +35,9 @@ def parse_integer(text: str) -> int:
     Raises:
         ValueError: The text is no integer.
     """
-    if _INTEGER.match(text) is None:
+    if (
+        _INTEGER.match(text) is None or len(text) > 20
+    ):  # Nastran's own have eight digits, in large fields sixteen
         raise ValueError("an integer")
     return int(text)
 

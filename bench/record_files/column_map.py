@@ -49,6 +49,8 @@ class Variable(NamedTuple):
     """Any shape; whatever the file holds."""
     unit: str = ""
     """What the file tells of its unit."""
+    sample: str = ""
+    """Of a column of text, where it begins: "line 5 holds 'abc'"."""
 
 
 def name_and_unit(heading: str) -> tuple[str, str]:
@@ -63,13 +65,16 @@ def base_name(source: str) -> str:
     return match["name"].strip() if match else source
 
 
-def find(variables: Mapping[str, Variable], source: str, *, file: str) -> tuple[NDArray[np.float64], str]:
+def find(
+    variables: Mapping[str, Variable], source: str, *, file: str, kinds: str = "biuf"
+) -> tuple[NDArray, str]:
     """Values ``(n,)`` and unit of a source.
 
     Args:
         variables: What the file holds, by name.
         source: Column, array or line of an array.
         file: Name of the file, for messages.
+        kinds: Kinds of NumPy that are accepted; the values keep theirs.
 
     Raises:
         UnknownNameError: The file has no such column or array.
@@ -77,20 +82,20 @@ def find(variables: Mapping[str, Variable], source: str, *, file: str) -> tuple[
     """
     exact = _lookup(variables, source)
     if exact is not None:
-        return _line(exact.values, source, file), exact.unit
+        return _line(exact, exact.values, source, file, kinds), exact.unit
     match = _INDEXED.match(source)
     variable = _lookup(variables, match["name"].strip()) if match else None
     if match is None or variable is None:
-        raise UnknownNameError(f"column of '{file}'", source, variables)
+        raise UnknownNameError(f"column of '{file}'", source, [name[:60] for name in list(variables)[:60]])
     try:
         index = tuple(slice(None) if part.strip() == ":" else int(part) for part in match["index"].split(","))
         values = np.asarray(variable.values)[index]
-    except (ValueError, IndexError):
+    except (ValueError, IndexError, OverflowError):
         raise FileFormatError(
             f"'{source}' does not fit '{match['name']}' of '{file}', an array of shape {np.shape(variable.values)}; "
             "one ':' and one number a further dimension are expected, counted from 0, as in 'data[:, 2]'"
         ) from None
-    return _line(values, source, file), variable.unit
+    return _line(variable, values, source, file, kinds), variable.unit
 
 
 def _lookup(variables: Mapping[str, Variable], name: str) -> Variable | None:
@@ -100,15 +105,19 @@ def _lookup(variables: Mapping[str, Variable], name: str) -> Variable | None:
     return variables[short[0]] if len(short) == 1 else None
 
 
-def _line(values: NDArray, source: str, file: str) -> NDArray[np.float64]:
+def _line(variable: Variable, values: NDArray, source: str, file: str, kinds: str) -> NDArray:
+    if variable.sample:
+        raise FileFormatError(
+            f"column '{source}' of '{file}' does not hold numbers: {variable.sample}; correct that cell, or name another column"
+        )
     line = np.squeeze(np.asarray(values))
-    if line.dtype.kind not in "biuf":
+    if line.dtype.kind not in kinds:
         raise FileFormatError(
             f"'{source}' of '{file}' does not hold real numbers (it is {line.dtype}); choose another column"
         )
     if line.ndim != 1:
-        raise FileFormatError(
-            f"'{source}' of '{file}' has shape {np.shape(values)}; name one line of it, as in '{source}[:, 0]', "
-            "with columns={channel name: source}"
-        )
-    return line.astype(float)
+        single = "a single line, of one number; at least two are expected" if line.ndim == 0 else (
+            f"shape {np.shape(values)}; name one line of it, as in '{source}[:, 0]', with columns={{channel name: source}}"
+        )  # fmt: skip
+        raise FileFormatError(f"'{source}' of '{file}' has {single}")
+    return line

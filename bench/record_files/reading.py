@@ -1,29 +1,89 @@
-"""Reading a record from any file: the suffix says the format, the column map says what is what."""
+"""Reading a record from any file into a recording on a uniform clock, with every doubt told."""
 
 from __future__ import annotations
 
 import hashlib
+import math
 import os
+import warnings
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.errors import FileFormatError, RecordingError, UnitError
-from bench.record_files.arrays import read_hdf5, read_mat, read_npz
-from bench.record_files.column_map import ColumnMap, Variable, base_name, find, name_and_unit
-from bench.record_files.parquet import read_parquet
-from bench.record_files.text import first_text, read_csv
+from bench.errors import RecordingError, RecordWarning, UnitError
+from bench.limits import READING_LIMITS, ReadingLimits
+from bench.record_files.column_map import ColumnMap
+from bench.record_files.columns import READABLE, read_columns
 from bench.recording import Recording
-from bench.recording.clock import JITTER
-from bench.recording.units import conversion
+from bench.recording.channel import channels_from
+from bench.recording.clock import JITTER, grid
+from bench.recording.jumps import hidden_dropouts
+from bench.recording.mending import mended
 
-READABLE = (".parquet", ".csv", ".csv.gz", ".mat", ".npz", ".h5", ".hdf5")
-"""Suffixes of the files that `read_recording` understands."""
+__all__ = ["READABLE", "Noted", "on_one_clock", "read_recording"]
 
-_TIME_NAMES = ("time", "t")
+
+class Noted(NamedTuple):
+    """Channels on a uniform clock."""
+
+    time: NDArray[np.float64]
+    """``(n,)`` [s]."""
+    sample_rate: float
+    """[Hz]."""
+    values: NDArray[np.float64]
+    """``(n, n_channels)``, each column contiguous in memory."""
+    report: dict[str, Any]
+    """What was repaired."""
+    notes: tuple[str, ...]
+    """What was repaired or is doubtful, in sentences."""
+
+
+def on_one_clock(
+    time: NDArray[np.float64],
+    arrays: Mapping[str, NDArray[np.float64]],
+    *,
+    sample_rate: float = 0.0,
+    bridge: bool = True,
+    jitter: float = JITTER,
+) -> Noted:
+    """Channels brought to a uniform clock, as every command does it: see `bench.recording.mending.mended`.
+
+    Besides, samples that seem to be missing although the times run through are told by the jump that they leave
+    (`bench.recording.jumps`).
+
+    Args:
+        time: Times [s], ``(n,)``.
+        arrays: Values by channel name, each ``(n,)``.
+        sample_rate: Rate that the clock must have [Hz]; 0 to find it.
+        bridge: Whether short dropouts are bridged, or refused.
+        jitter: Largest deviation that is taken for uniform, as a fraction of the step.
+
+    Raises:
+        RecordingError: A channel of another length, or as `mended`.
+    """
+    for name, values in arrays.items():
+        if np.shape(values) != np.shape(time):
+            raise RecordingError(
+                f"channel '{name}' has shape {np.shape(values)}; {np.shape(time)} is expected, as long as the clock"
+            )
+    stacked = np.empty((len(time), len(arrays)), order="F")
+    for k, values in enumerate(arrays.values()):
+        stacked[:, k] = values
+    clock, rate, stacked, report, notes = mended(
+        time, stacked, list(arrays), sample_rate=sample_rate, jitter=jitter, bridge=bridge
+    )
+    places = hidden_dropouts(stacked)
+    if places:
+        where = ", ".join(f"t = {clock[k]:.6g} s" for k in places)
+        notes = (
+            *notes,
+            f"all channels jump at {where}, although the times run through: samples seem to be missing there (a dropout whose times "
+            "were renumbered); cut the record there",
+        )
+    return Noted(clock, rate, stacked, report, notes)
 
 
 def read_recording(
@@ -37,12 +97,14 @@ def read_recording(
     meta: Mapping[str, Any] | None = None,
     gaps: Literal["raise", "interpolate"] = "raise",
     jitter: float = JITTER,
+    limits: ReadingLimits = READING_LIMITS,
 ) -> Recording:
-    """Read a record: the bench's own Parquet, or a CSV(.gz), MAT, npz, HDF5 or plain Parquet file.
+    """Read a record: the bench's own Parquet, or a text table, MAT, npz, HDF5 or plain Parquet file.
 
     A file of the bench tells everything itself. For the others, name the columns and give units that the headings do not
     tell. Values stay in the file's units: convert with `Recording.to_si` or `Recording.to_units`. Name and SHA-256 of the
-    file go to ``meta["source"]``.
+    file go to ``meta["source"]``. What is doubtful in the file (jitter that was interpolated away, columns of text, a last line
+    that was cut, samples that seem to be missing, times that are hardly seconds) is warned of, and kept in ``meta["warnings"]``.
 
     Args:
         path: Path of the file.
@@ -53,12 +115,15 @@ def read_recording(
         sample_rate: Samples a second [Hz] where the file has no time, or none to be trusted, over that of the column map.
         settle: Seconds left out of scores [s]; None for what the file says, else zero.
         meta: Provenance to add.
-        gaps: What to do about dropped samples: as `Recording.from_arrays`.
-        jitter: As `Recording.from_arrays`.
+        gaps: What to do about dropped samples and values that are not finite: refuse them, or bridge up to ten in a row.
+        jitter: Largest deviation of a time from the uniform clock that is taken for none, as a fraction of the step; from there
+            to 30 % the record is interpolated onto the uniform clock.
+        limits: What the file may cost in memory.
 
     Raises:
-        FileNotFoundError: There is no such file.
-        FileFormatError: Unknown suffix, not of the format that its suffix says, truncated, changed, no numbers in it.
+        MissingFileError: There is no such file.
+        FileFormatError: Unknown suffix, not of the format that its suffix says, truncated, changed, no numbers in it, no regular
+            file, or beyond the limits.
         RecordingError: The record in it cannot be used: no time, no unit, gaps, NaN, columns of different lengths.
         UnitError: A unit is unknown or does not fit.
         UnknownNameError: The file has no such column.
@@ -67,10 +132,11 @@ def read_recording(
         >>> read_recording("test.csv", columns={"force": "Load Cell 1"}, units={"force": "kip"})  # doctest: +SKIP
     """
     path = Path(path)
-    if not path.is_file():
-        raise FileNotFoundError(f"there is no file '{path}'")
     layout = _layout(columns, units, time, sample_rate)
-    contents = _contents(path, layout)
+    try:
+        contents = read_columns(path, layout, limits=limits)
+    except UnitError as error:
+        raise UnitError(f"'{path}': {error}") from None
     if isinstance(contents, Recording):
         if columns is not None or units or time or sample_rate or gaps != "raise":
             raise RecordingError(
@@ -78,23 +144,51 @@ def read_recording(
                 "and use select, renamed, to_units or resample on what is read"
             )
         return contents.with_(settle=settle, meta=meta) if settle is not None or meta else contents
-    source = {"file": path.name, "sha256": hashlib.sha256(path.read_bytes()).hexdigest()}
     try:
-        arrays, told, clock = _assembled(contents, layout, path)
-        return Recording.from_arrays(
-            clock,
-            arrays,
-            units=told | dict(layout.units),
+        if gaps not in ("raise", "interpolate"):
+            raise RecordingError(f"gaps is {gaps!r}; 'raise' or 'interpolate' is expected")
+        clock = contents.clock
+        if clock is None and not (math.isfinite(layout.sample_rate) and layout.sample_rate > 0.0):
+            raise RecordingError("without a time, sample_rate is needed: a finite number > 0 [Hz]")
+        n = len(next(iter(contents.arrays.values())))
+        seconds = grid(0.0, layout.sample_rate, n) if clock is None else clock.seconds
+        noted = on_one_clock(
+            seconds,
+            contents.arrays,
+            sample_rate=layout.sample_rate,
+            bridge=gaps == "interpolate",
+            jitter=jitter,
+        )
+        source = {"file": path.name, "sha256": _digest(path)}
+        if clock is not None and clock.start:
+            source["start"] = clock.start
+        doubts = (clock.doubt,) if clock is not None and clock.doubt else ()
+        notes = tuple(f"'{path}': {note}" for note in (*contents.notes, *doubts, *noted.notes))
+        told: dict[str, Any] = {"source": source}
+        if noted.report:
+            told["repaired"] = noted.report
+        if notes:
+            told["warnings"] = notes
+        channels = channels_from(
+            list(contents.arrays),
+            units=contents.units | dict(layout.units),
             quantities=layout.quantities,
             roles=layout.roles,
+        )
+        contents.arrays.clear()  # the recording makes its own copy of the values
+        recording = Recording(
+            noted.time,
+            noted.values,
+            channels,
             settle=settle or 0.0,
-            meta={"source": source, **(meta or {})},
-            sample_rate=layout.sample_rate,
-            gaps=gaps,
-            jitter=jitter,
+            meta={**told, **(meta or {})},
+            sample_rate=noted.sample_rate,
         )
     except (RecordingError, UnitError) as error:
         raise type(error)(f"'{path}': {error}") from None
+    for note in notes:
+        warnings.warn(note, RecordWarning, stacklevel=2)
+    return recording
 
 
 def _layout(
@@ -115,92 +209,6 @@ def _layout(
     )
 
 
-def _contents(path: Path, layout: ColumnMap) -> Recording | dict[str, Variable]:
-    suffix = "".join(path.suffixes[-2:]).lower() if path.suffix.lower() == ".gz" else path.suffix.lower()
-    if suffix == ".parquet":
-        return read_parquet(path)
-    if suffix in (".csv", ".csv.gz"):
-        return read_csv(path)
-    if suffix == ".npz":
-        return read_npz(path)
-    if suffix == ".mat":
-        return read_mat(path)
-    if suffix in (".h5", ".hdf5"):
-        sources = [*layout.columns.values(), *([layout.time] if layout.time else [])]
-        named = bool(layout.columns) and bool(layout.time or layout.sample_rate)
-        return read_hdf5(path, {part for s in sources for part in (s, base_name(s))} if named else None)
-    raise FileFormatError(f"'{path}' has the suffix '{suffix}'; readable are {', '.join(READABLE)}")
-
-
-def _assembled(
-    variables: dict[str, Variable], layout: ColumnMap, path: Path
-) -> tuple[dict[str, NDArray[np.float64]], dict[str, str], NDArray[np.float64] | None]:
-    """Arrays by channel name, the units that the file tells, and the times [s] or None."""
-    clock_source = layout.time or next(
-        (heading for heading in variables if name_and_unit(heading)[0].lower() in _TIME_NAMES), ""
-    )
-    clock = None
-    if not layout.sample_rate or layout.time:
-        if not clock_source:
-            raise RecordingError(
-                f"no column is named 'time' or 't' (it has {_listing(variables)}); name it with time=, or give sample_rate="
-            )
-        clock, unit = _numbers(variables, clock_source, path)
-        scale, _ = conversion(layout.time_unit or unit or "s", "s")
-        clock = clock if scale == 1.0 else scale * clock
-    sources = layout.columns or _all_lines(variables, clock_source, clock, path)
-    if not sources:
-        raise RecordingError(
-            f"no column of numbers stands beside the time (it has {_listing(variables)}); name lines of its arrays, "
-            "as in columns={'force': 'data[:, 2]'}"
-        )
-    arrays, told = {}, {}
-    for channel, source in sources.items():
-        arrays[channel], unit = _numbers(variables, source, path)
-        if unit:
-            told[channel] = unit
-    return arrays, told, clock
-
-
-def _numbers(variables: dict[str, Variable], source: str, path: Path) -> tuple[NDArray[np.float64], str]:
-    try:
-        return find(variables, source, file=path.name)
-    except FileFormatError as error:
-        headings = [heading for heading in variables if source in (heading, name_and_unit(heading)[0])]
-        if not _is_csv(path) or not headings:
-            raise
-        if np.size(variables[headings[0]].values) == 1:
-            raise FileFormatError(
-                f"'{path}' has a single line of numbers; at least two are expected"
-            ) from None
-        where = first_text(path, headings[0])
-        raise FileFormatError(
-            f"column '{source}' of '{path.name}' does not hold numbers only: {where}; correct that cell, or name the "
-            "columns that are wanted with columns={channel name: heading}"
-        ) from error
-
-
-def _all_lines(
-    variables: dict[str, Variable], clock_source: str, clock: NDArray[np.float64] | None, path: Path
-) -> dict[str, str]:
-    """Every column or one-dimensional array of numbers, as a channel of its own name.
-
-    Other things in a MAT, npz or HDF5 file are passed over. In a CSV file, where one wrong cell makes a column text,
-    every column counts, so that none is lost in silence.
-    """
-    lines = {}
-    for heading, variable in variables.items():
-        line = np.squeeze(np.asarray(variable.values))
-        fits = line.ndim == 1 and line.dtype.kind in "biuf" and (clock is None or line.size == clock.size)
-        if heading != clock_source and (fits or _is_csv(path)):
-            lines[name_and_unit(heading)[0]] = heading
-    return lines
-
-
-def _is_csv(path: Path) -> bool:
-    return ".csv" in (suffix.lower() for suffix in path.suffixes[-2:])
-
-
-def _listing(variables: dict[str, Variable]) -> str:
-    parts = [f"'{name}' {np.shape(variable.values)}" for name, variable in list(variables.items())[:12]]
-    return ", ".join(parts + ["…"] * (len(variables) > 12)) or "nothing"
+def _digest(path: Path) -> str:
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()

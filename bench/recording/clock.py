@@ -7,7 +7,6 @@ put on an exactly uniform clock ``start + k / sample_rate``, which is what filte
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -46,63 +45,30 @@ def uniform_clock(
     Raises:
         RecordingError: Not increasing, gaps, not uniform, not finite, fewer than two samples.
     """
-    t = _increasing(time)
-    places = _places(t, sample_rate)
-    missing = np.diff(places) - 1
-    if np.any(missing > 0):
-        raise RecordingError(
-            f"the record has gaps: {_gap_text(t, missing)}. Cut the record there, or bridge short gaps with gaps='interpolate'"
-        )
-    return float(t[0]), _rate(t, places, sample_rate, jitter)
+    t = increasing(time)
+    places = places_of(t, sample_rate)
+    refuse_gaps(t, places)
+    return float(t[0]), rate_of(t, places, sample_rate, jitter)
 
 
-def repair(
-    time: ArrayLike, values: NDArray[np.float64], *, sample_rate: float = 0.0, jitter: float = JITTER
-) -> tuple[NDArray[np.float64], float, NDArray[np.float64], dict[str, Any]]:
-    """Bridge dropped samples and values that are not finite by shape-preserving interpolation.
-
-    Piecewise cubic Hermite interpolation (PCHIP) passes through the neighbours and never overshoots them, so that a
-    repaired dropout cannot become the peak of a record. Samples that are there keep their values.
-
-    Args:
-        time: Times of the samples [s], ``(n,)``.
-        values: ``(n, n_channels)``, NaN or infinite where a sample is lost.
-        sample_rate: Sample rate that the clock must have [Hz]; 0 to find it.
-        jitter: Largest deviation from the repaired clock accepted, as a fraction of the step.
-
-    Returns:
-        Uniform time ``(m,)`` [s], sample rate [Hz], values ``(m, n_channels)``, and a report: the number of
-        missing samples, each gap as (time of the last sample before it, samples), values lost by column.
+def refuse_gaps(t: NDArray[np.float64], places: NDArray[np.int64]) -> None:
+    """Refuse a clock with missing samples, and say where they are.
 
     Raises:
-        RecordingError: More than `LONGEST_REPAIR` successive samples are lost, or some at either end; not increasing,
-            not uniform.
+        RecordingError: Samples are missing.
     """
-    from scipy.interpolate import PchipInterpolator  # noqa: PLC0415
-
-    t = _increasing(time)
-    places = _places(t, sample_rate)
-    missing = np.diff(places) - 1
-    rate = _rate(t, places, sample_rate, jitter)
-    n = int(places[-1]) + 1
-    clock = grid(float(t[0]), rate, n)
-    filled = np.full((n, values.shape[1]), np.nan)
-    filled[places] = values
-    lost: dict[int, int] = {}
-    for column in range(values.shape[1]):
-        good = np.isfinite(filled[:, column])
-        if good.all():
-            continue
-        _refuse_long(clock, good)
-        known = np.flatnonzero(good)
-        filled[~good, column] = PchipInterpolator(known, filled[known, column])(np.flatnonzero(~good))
-        lost[column] = int(np.count_nonzero(~np.isfinite(values[:, column])))
-    gaps = [[float(t[i]), int(missing[i])] for i in np.flatnonzero(missing)]
-    report = {"method": "pchip", "missing_samples": int(missing.sum()), "gaps": gaps, "values": lost}
-    return clock, rate, filled, report
+    if places[-1] >= len(places):
+        raise RecordingError(
+            f"the record has gaps: {gap_text(t, places)}. Cut the record there, or bridge short gaps with gaps='interpolate'"
+        )
 
 
-def _increasing(time: ArrayLike) -> NDArray[np.float64]:
+def increasing(time: ArrayLike) -> NDArray[np.float64]:
+    """Times as an array ``(n,)`` that increases.
+
+    Raises:
+        RecordingError: No numbers, not finite, fewer than two, standing still or going backwards; says where.
+    """
     try:
         t = np.asarray(time, dtype=float)
     except (TypeError, ValueError):
@@ -129,31 +95,81 @@ def _increasing(time: ArrayLike) -> NDArray[np.float64]:
     return t
 
 
-def _places(t: NDArray[np.float64], sample_rate: float) -> NDArray[np.int64]:
-    """Place of each sample on the uniform clock; the median step is blind to gaps in less than half of the record."""
+def places_of(t: NDArray[np.float64], sample_rate: float) -> NDArray[np.int64]:
+    """Place of each sample on the uniform clock ``(n,)``; the median step is blind to gaps in less than half of the record.
+
+    Args:
+        t: Increasing times [s], ``(n,)``.
+        sample_rate: Sample rate that the clock must have [Hz]; 0 to find it.
+
+    Raises:
+        RecordingError: The sample rate is no finite number > 0.
+    """
     if not (math.isfinite(sample_rate) and sample_rate >= 0.0):
         raise RecordingError(f"sample_rate is {sample_rate}; a finite number > 0 [Hz] is expected")
     steps = np.diff(t)
     step = 1.0 / sample_rate if sample_rate > 0.0 else float(np.median(steps))
-    # a step of less than half the usual one stays a step: it is jitter, which _rate measures and refuses
-    return np.concatenate([[0], np.cumsum(np.maximum(np.rint(steps / step), 1.0))]).astype(np.int64)
+    ratios = steps / step if step > 0.0 else np.full(len(steps), np.inf)
+    if not np.all(np.isfinite(ratios)) or float(np.sum(ratios)) > 2.0**53:
+        raise RecordingError(
+            f"the steps of time go from {steps.min():.3g} to {steps.max():.3g} s, which no clock does; repair the times, or give "
+            "sample_rate instead"
+        )
+    # a step of less than half the usual one stays a step: it is jitter, which rate_of measures and refuses
+    places = np.concatenate([[0], np.cumsum(np.maximum(np.rint(ratios), 1.0))]).astype(np.int64)
+    if places[-1] >= len(t) and not sample_rate and _is_jitter(t):
+        return np.arange(len(t))
+    return places
 
 
-def _rate(t: NDArray[np.float64], places: NDArray[np.int64], sample_rate: float, jitter: float) -> float:
-    """The sample rate [Hz], once the times have been found to lie on its clock."""
-    rate = sample_rate or _roundest(t, places)
-    late = (t - t[0]) * rate - places
+def _is_jitter(t: NDArray[np.float64]) -> bool:
+    """Whether steps of more than 1.5 are two samples that jitter, one early and one late, and nothing is missing.
+
+    A missing sample shifts all that come after it by a whole step: the line that fits best then leaves half a step on either side.
+    """
+    k = np.arange(len(t), dtype=float)
+    slope = float(np.sum((k - k.mean()) * (t - t.mean())) / np.sum((k - k.mean()) ** 2))
+    late = (t - t.mean()) / slope - (k - k.mean())
+    return len(t) > 20 and float(np.max(np.abs(late - np.median(late)))) < 0.35
+
+
+def rate_of(t: NDArray[np.float64], places: NDArray[np.int64], sample_rate: float, jitter: float) -> float:
+    """The sample rate [Hz], once the times have been found to lie on its clock.
+
+    Args:
+        t: Increasing times [s], ``(n,)``.
+        places: Place of each on the clock, ``(n,)``.
+        sample_rate: Rate that the clock must have [Hz]; 0 to find it.
+        jitter: Largest deviation accepted, as a fraction of the step.
+
+    Raises:
+        RecordingError: A sample lies further off the clock; says which.
+    """
+    rate = sample_rate or roundest(t, places)
+    late = lateness(t, places, rate)
     k = int(np.argmax(np.abs(late)))
     if abs(late[k]) > jitter:
-        raise RecordingError(
-            f"the clock is not uniform: sample {k} at t = {t[k]:.9g} s lies {100.0 * abs(late[k]):.3g} % of a step off a clock "
-            f"of {rate:.9g} Hz, and {100.0 * jitter:g} % are allowed. Interpolate the record onto a uniform clock, give "
-            "sample_rate instead of the time if the times are only rounded, or allow more with jitter="
-        )
+        raise not_uniform(t, late, rate, k, jitter)
     return rate
 
 
-def _roundest(t: NDArray[np.float64], places: NDArray[np.int64]) -> float:
+def lateness(t: NDArray[np.float64], places: NDArray[np.int64], rate: float) -> NDArray[np.float64]:
+    """How much later each sample comes than the clock says ``(n,)``, as a fraction of the step."""
+    return (t - t[0]) * rate - places
+
+
+def not_uniform(
+    t: NDArray[np.float64], late: NDArray[np.float64], rate: float, k: int, allowed: float
+) -> RecordingError:
+    """The error about the sample that lies furthest off the clock."""
+    return RecordingError(
+        f"the clock is not uniform: sample {k} at t = {t[k]:.9g} s lies {100.0 * abs(late[k]):.3g} % of a step off a clock "
+        f"of {rate:.9g} Hz, and {100.0 * allowed:g} % are allowed. Interpolate the record onto a uniform clock, give "
+        "sample_rate instead of the time if the times are only rounded, or allow more with jitter="
+    )
+
+
+def roundest(t: NDArray[np.float64], places: NDArray[np.int64]) -> float:
     """The sample rate with the fewest digits that the clock cannot tell from its own.
 
     Last minus first time gives 1024.0000003 Hz for a clock of 1024 Hz printed with six decimals. Any rate that drifts
@@ -170,7 +186,9 @@ def _roundest(t: NDArray[np.float64], places: NDArray[np.int64]) -> float:
     return rate
 
 
-def _gap_text(t: NDArray[np.float64], missing: NDArray[np.int64]) -> str:
+def gap_text(t: NDArray[np.float64], places: NDArray[np.int64]) -> str:
+    """How many samples are missing, and after which times."""
+    missing = np.diff(places) - 1
     where = np.flatnonzero(missing)
     shown = ", ".join(f"{missing[i]} after t = {t[i]:.9g} s" for i in where[:5])
     more = f", and {where.size - 5} more gaps" if where.size > 5 else ""
@@ -178,17 +196,20 @@ def _gap_text(t: NDArray[np.float64], missing: NDArray[np.int64]) -> str:
     return f"{total} sample{'s' * (total != 1)} missing ({shown}{more})"
 
 
-def _refuse_long(clock: NDArray[np.float64], good: NDArray[np.bool_]) -> None:
-    if not (good[0] and good[-1]):
-        edge = clock[0] if not good[0] else clock[-1]
-        raise RecordingError(
-            f"values are lost at the end of the record (t = {edge:.9g} s), where nothing can be interpolated; cut them off"
-        )
-    known = np.flatnonzero(good)
-    lost = np.diff(known) - 1
-    k = int(np.argmax(lost))
-    if lost[k] > LONGEST_REPAIR:
-        raise RecordingError(
-            f"{lost[k]} successive samples are lost after t = {clock[known[k]]:.9g} s; at most {LONGEST_REPAIR} are "
-            "interpolated. Cut the record there and use the parts"
-        )
+def suspected_unit(t: NDArray[np.float64]) -> str:
+    """The unit that times which were taken for seconds are more likely in: "ms", "us", "ns", or "" where seconds it is.
+
+    Since 1970 less than 1e11 s have passed, and more than 1e11 ms. Otherwise the step tells: a test bench samples more often than
+    twice a second, and at 2 Hz to 2 kHz a step is 0.5 to 500 ms, and so on by thousands.
+
+    Args:
+        t: Times ``(n,)``, n >= 2, as numbers.
+    """
+    first, step = abs(float(t[0])), float(np.median(np.diff(t)))
+    for least, unit in ((1e17, "ns"), (1e14, "us"), (1e11, "ms")):
+        if first >= least:
+            return unit
+    for least, unit in ((5e5, "ns"), (5e2, "us"), (0.5, "ms")):
+        if step >= least:
+            return unit
+    return ""

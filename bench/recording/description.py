@@ -16,8 +16,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from bench.errors import RecordingError, UnitError, UnknownNameError
 from bench.recording.channel import Channel, channels_from
-from bench.recording.clock import JITTER, grid, repair, uniform_clock
+from bench.recording.clock import JITTER, grid, uniform_clock
 from bench.recording.frozen import frozen
+from bench.recording.mending import mended
 from bench.recording.units import conversion, si_unit
 
 
@@ -110,8 +111,9 @@ class Recording:
             meta: Provenance.
             sample_rate: Samples a second [Hz]; 0 to find it from the time.
             gaps: What to do about dropped samples and values that are not finite: refuse them, or bridge up to ten in a
-                row by shape-preserving interpolation, reported in ``meta["repaired"]``.
-            jitter: Largest deviation of a time from the uniform clock that is accepted, as a fraction of the step.
+                row by shape-preserving interpolation, and interpolate away a clock that jitters by up to 30 % of a step; both
+                are reported in ``meta["repaired"]``.
+            jitter: Largest deviation of a time from the uniform clock that is taken for none, as a fraction of the step.
 
         Raises:
             RecordingError: As the class; a channel without unit or of another length.
@@ -130,11 +132,12 @@ class Recording:
             time = grid(0.0, sample_rate, len(values))
         meta = dict(meta or {})
         if gaps == "interpolate":
-            time, rate, values, report = repair(time, values, sample_rate=sample_rate, jitter=jitter)
-            lost = report.pop("values")
-            if lost:  # a missing sample is lost in every channel, so that a gap alone lands here too
-                counts = {channels[column].name: count for column, count in lost.items() if count}
-                meta["repaired"] = report | {"values": counts}
+            names = [channel.name for channel in channels]
+            time, rate, values, report, _ = mended(
+                time, values, names, sample_rate=sample_rate, jitter=jitter
+            )
+            if report:
+                meta["repaired"] = report
         else:
             start, rate = uniform_clock(time, sample_rate=sample_rate, jitter=jitter)
             time = grid(start, rate, np.size(time))

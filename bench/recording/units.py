@@ -40,6 +40,9 @@ SI_UNITS: dict[str, str] = {
 }
 """Quantities a channel may declare, and the SI unit of each."""
 
+LONGEST = 64
+"""Most characters of a unit; the longest of pint's own names has 40."""
+
 _PLAIN = {"1", *SI_UNITS.values()}
 _ALPHABET = re.compile(r"[\w\s*/^().·%°+-]*")
 _POWER = re.compile(r"(?<=[\w)])(?:\^|\*\*)\s*[-+]?[0-9](?:\.[0-9]{1,2})?(?![\w.]|\s*(?:\^|\*\*))")
@@ -68,6 +71,10 @@ def _registry() -> Any:
 @cache
 def _parsed(unit: str) -> tuple[Any, str]:
     """The pint unit and its root units as text."""
+    if len(unit) > LONGEST:  # pint's time grows with the square of a name's length
+        raise UnitError(
+            f"'{unit[:20]}…' has {len(unit)} characters; a unit has at most {LONGEST}, such as 'N m' or 'm/s^2'"
+        )
     registry = _registry()
     try:
         text = _SUPERSCRIPT.sub(lambda match: "^" + match[0].translate(_DIGITS), unit)

@@ -16,6 +16,7 @@ from bench.errors import ModelError, ParameterError, UnknownNameError
 from bench.mjcf import StructureName
 from bench.native import Coordinate
 from bench.rig.element import Element
+from bench.rig.mjcf_files import included_files
 
 INTEGRATORS = {
     "RK4": mujoco.mjtIntegrator.mjINT_RK4,
@@ -92,25 +93,12 @@ def parse(text: str, folder: str, label: str) -> mujoco.MjSpec:
         ModelError: It is no valid MJCF.
     """
     try:
-        spec = mujoco.MjSpec.from_string(text, include=_includes(text, Path(folder)))
+        spec = mujoco.MjSpec.from_string(text, include=included_files(text, Path(folder)))
     except (ValueError, ElementTree.ParseError) as error:
         raise ModelError(f"the MJCF of {label} cannot be read: {error}") from error
     if folder:
         spec.modelfiledir = folder
     return spec
-
-
-def _includes(text: str, folder: Path) -> dict[str, bytes]:
-    """Contents of the files that the MJCF includes, and of those that they include."""
-    found: dict[str, bytes] = {}
-    for node in ElementTree.fromstring(text).iter("include"):
-        name = node.get("file", "")
-        try:
-            found[name] = (folder / name).read_bytes()
-        except OSError as error:
-            raise ModelError(f"cannot read the file '{name}' that the MJCF includes: {error}") from error
-        found |= _includes(found[name].decode("utf-8"), folder)
-    return found
 
 
 def specify(rig: Buildable, built: Built | None = None) -> mujoco.MjSpec:

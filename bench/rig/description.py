@@ -16,6 +16,7 @@ from bench.recording import Channel
 from bench.rig.building import INTEGRATORS, STRUCTURE, Built, build, parse, specify
 from bench.rig.channels import channels_of
 from bench.rig.element import Element
+from bench.rig.mjcf_files import model_text
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,10 +68,7 @@ class Rig:
             ModelError: The file cannot be read or compiled.
         """
         file = Path(path)
-        try:
-            text = file.read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError) as error:
-            raise ModelError(f"cannot read the model {file}: {error}") from error
+        text = model_text(file)
         settings.setdefault("folder", str(file.parent))
         if "timestep" not in settings:
             settings["timestep"] = float(parse(text, settings["folder"], str(file)).option.timestep)

@@ -133,6 +133,10 @@ class ChannelEntry(Entry):
     """Actuator of your own MJCF that it stands for."""
     quantity: Literal["position", "velocity", "acceleration"] | None = None
     """What of a joint."""
+    side: Literal["motor", "link"] | None = None
+    """Where the encoder of a geared joint sits; both are tried where it is not said."""
+    resolution: NotNegative = 0.0
+    """Step of an encoder."""
 
     @model_validator(mode="after")
     def _refers_to_one_thing(self) -> ChannelEntry:

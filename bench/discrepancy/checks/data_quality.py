@@ -106,7 +106,7 @@ def notes(case: Case, problem: Problem) -> tuple[str, ...]:
         case: The case.
         problem: Its identification records and nominal model on all degrees of freedom.
     """
-    found: list[str] = []
+    found: list[str] = [note for record in (*case.identification, *case.validation) for note in record.notes]
     for check in (_unstated, _short, _clock, _repeated, _saturated, _understated, _still, _tipping):
         found += check(case, problem)
     channels = tuple(_between_channels(problem))

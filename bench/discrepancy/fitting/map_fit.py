@@ -45,7 +45,7 @@ class Fit:
     vector: Array
     chi2: float
     cost: float
-    n_residuals: int
+    n_residuals: float
     precision: Array
     log_evidence: float
     settled: bool = False

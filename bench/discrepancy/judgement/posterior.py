@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -86,7 +86,7 @@ def weights(explanations: Sequence[Explanation]) -> np.ndarray:
     """
     logs = np.array([e.log_posterior for e in explanations])
     logs[logs > logs[0]] = -np.inf
-    if not explanations[0].noise_stated:
+    if not explanations[0].scaled:
         # The noise is whatever the first explanation leaves, and hardly more independent than the visits to a state;
         # what has more parameters was passed over because it is not much better.
         best = explanations[0]
@@ -129,7 +129,7 @@ def _judge_unscaled(explanations: Sequence[Explanation]) -> tuple[Kind, dict[str
 def marginal(explanations: Sequence[Explanation]) -> dict[tuple[str, str], float]:
     """Probability that each (name, place) belongs to the truth."""
     total: dict[tuple[str, str], float] = {}
-    known = 1.0 - OUTSIDE if explanations[0].noise_stated else 1.0
+    known = 1.0 - OUTSIDE if explanations[0].scaled else 1.0
     for share, explanation in zip(weights(explanations), explanations, strict=True):
         for key in {(p.effect.name, p.place.name) for p in explanation.hypothesis}:
             total[key] = total.get(key, 0.0) + known * float(share)
@@ -175,9 +175,15 @@ def _behind(explanations: Sequence[Explanation], other: Explanation) -> float:
 
 def named(explanations: Sequence[Explanation]) -> tuple[NamedEffect, ...]:
     """Effects of the best explanation with their parameters."""
-    probabilities = marginal(explanations)
+    return effects_of(explanations[0], marginal(explanations))
+
+
+def effects_of(
+    explanation: Explanation, probabilities: Mapping[tuple[str, str], float]
+) -> tuple[NamedEffect, ...]:
+    """Effects of an explanation with their parameters, and their probabilities by (name, place)."""
     out = []
-    for problem, fitted in explanations[0].parts:
+    for problem, fitted in explanation.parts:
         deviations = np.sqrt(np.diag(fitted.covariance))
         start = len(problem.nominal)
         for placed in fitted.hypothesis:

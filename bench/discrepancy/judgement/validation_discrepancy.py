@@ -102,6 +102,29 @@ def gaps(
     return tuple(out)
 
 
+def discrepancies(problem: Problem, records: Sequence[CaseRecord], predict: Prediction) -> Array:
+    """NRMSE (n_coordinates,) of a prediction on every judged coordinate of some records."""
+    runs = [predict(record) for record in records]
+    return np.array(
+        [
+            nrmse(
+                np.concatenate([_combine(record.values, channels) for record in records]),
+                np.concatenate([_combine(run, channels) for run in runs]),
+            )
+            for _, channels in coordinates(problem.structure)
+        ]
+    )
+
+
+def noise_floors(problem: Problem, records: Sequence[CaseRecord]) -> Array:
+    """NRMSE (n_coordinates,) that noise alone leaves of every judged coordinate of some records."""
+    found = []
+    for _, channels in coordinates(problem.structure):
+        whole = np.concatenate([_combine(record.values, channels) for record in records])
+        found.append(noise_level(problem, channels, records) / max(float(np.std(whole)), 1e-300))
+    return np.array(found)
+
+
 def closed_share(before: float, after: float, floor: float) -> float:
     """``(before - after) / (before - floor)``; one where there was nothing to close."""
     if before - floor <= 1e-3 * floor:

@@ -18,10 +18,12 @@ from numpy.typing import NDArray
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.case.channel_noise import noise_floor, raised_noise
 from bench.discrepancy.effects.effect import Scales
+from bench.discrepancy.likelihood.model_error import ModelError
 from bench.discrepancy.likelihood.noise_covariance import sensor_gains, whitening_behind
 from bench.discrepancy.likelihood.time_varying_noise import whitening_together
 from bench.discrepancy.likelihood.whitening import RecordData, band_bins, projected, timed
 from bench.discrepancy.likelihood.window_whitening import (
+    Windows,
     cut,
     drifts,
     in_motion,
@@ -61,6 +63,8 @@ class Problem:
         bins: Frequency bins of every record, where they have to agree with those of another problem.
         substeps: Integration steps a sample; chosen by the fastest rate where None.
         refinement: Multiple of the steps so chosen, as far as `pace` lets it.
+        within: Stated standard deviations that a nominal parameter may move.
+        error: Error of the model that residuals are weighed by besides their noise; None where noise is all that they hold.
         nominal: (n_nominal,) values of the structure's parameters, initial states of records in motion after them.
         spread: (n_nominal,) their one-sigma uncertainties.
         noise: (n_channels,) noise of the response channels.
@@ -76,6 +80,8 @@ class Problem:
     bins: Mapping[str, int] | None = None
     substeps: int | None = None
     refinement: int = 1
+    error: ModelError | None = None
+    within: float = np.inf
     nominal: Array = field(init=False)
     spread: Array = field(init=False)
     noise: Array = field(init=False)
@@ -126,14 +132,37 @@ class Problem:
             if self.bins and record.name in self.bins
             else band_bins(responses, self.noise)
         )
-        windows = windows_of(self, record, n_bins, self.split(*passed)[0])
+        windows = self._weighed_windows(windows_of(self, record, n_bins, self.split(*passed)[0]))
         compared = decided(self.prescribed(record)) if self.driven else None
-        whitening = whitening_behind(self, record, n_bins, passed, compared)
+        whitening = self._weighed(whitening_behind(self, record, n_bins, passed, compared), record)
         together = None
-        if self.structure.springs and not self.windowed:
+        if self.structure.springs and not self.windowed and self.error is None:
             gains = sensor_gains(self, record, passed)
             together = whitening_together(self, record, n_bins, self.split(*passed)[0], gains)
         return RecordData(record, loads, responses, n_bins, whitening, windows, compared, together)
+
+    def _weighed(self, whitening: NDArray[np.complex128], record: CaseRecord) -> NDArray[np.complex128]:
+        """A whitening by noise (n_bins, n_channels, n_channels), by the error of the model besides."""
+        if self.error is None:
+            return whitening
+        n_bins, n_channels = whitening.shape[:2]
+        factor = np.linalg.inv(whitening)
+        beyond = self.error.of(record.name, self.structure.channels, n_bins)
+        covariance = factor @ np.conj(np.swapaxes(factor, 1, 2)) + np.eye(n_channels) * beyond[:, None, :]
+        weights = self.error.weights(n_bins)
+        white = np.linalg.inv(np.linalg.cholesky(covariance)) * np.sqrt(weights)[:, None, None]
+        return np.asarray(white, dtype=np.complex128)
+
+    def _weighed_windows(self, windows: Windows | None) -> Windows | None:
+        """Windows, weighed by the error of the model besides."""
+        if windows is None or self.error is None:
+            return windows
+        factor = np.sqrt(self._window_weight(windows) / self.error.scale)
+        return windows._replace(weights=windows.weights * factor)
+
+    def _window_weight(self, windows: Windows) -> float:
+        """How much each residual of windows counts."""
+        return 1.0 if self.error is None else self.error.window_weight(windows.n_residuals)
 
     def behind(self, hypothesis: Hypothesis, vector: Array) -> Problem:
         """The same records, their noise as an explanation passes it on."""
@@ -374,6 +403,12 @@ class Problem:
         out.refinement = refinement
         return out
 
+    def bounded(self, within: float) -> Problem:
+        """A copy whose nominal parameters move by so many stated standard deviations at most."""
+        out = copy.copy(self)
+        out.within = within
+        return out
+
     def beside(self, records: Sequence[CaseRecord]) -> Problem:
         """A copy of all records and further ones that start at rest; the scales of the effects stay, and so do vectors."""
         out = copy.copy(self)
@@ -518,16 +553,27 @@ class Problem:
         return all((self.case.channel(name).noise_std or 0.0) > 0.0 for name in self.structure.channels)
 
     @property
+    def scaled(self) -> bool:
+        """Whether chi-squared has an absolute meaning: by the stated noise, or by the error of the model."""
+        return self.noise_stated or self.error is not None
+
+    @property
     def driven(self) -> bool:
         """Whether the motion is prescribed and the force is the response."""
         return self.case.rig == "damper"
 
     @property
-    def n_residuals(self) -> int:
-        """Number of real residuals, that is degrees of freedom of chi-squared before the fit."""
-        return sum(
-            2 * d.n_bins * len(self.noise) if d.windows is None else d.windows.n_residuals for d in self.data
-        )
+    def n_residuals(self) -> float:
+        """Number of real residuals, that is degrees of freedom of chi-squared before the fit; of weighed ones their weights."""
+        return sum(self._count(d) for d in self.data)
+
+    def _count(self, data: RecordData) -> float:
+        """Number of residuals of a record, each by the weight that it has."""
+        if data.windows is not None:
+            return data.windows.n_residuals * self._window_weight(data.windows)
+        if self.error is None:
+            return 2 * data.n_bins * len(self.noise)
+        return 2.0 * len(self.noise) * float(np.sum(self.error.weights(data.n_bins)))
 
     def prior(self, hypothesis: Hypothesis) -> tuple[Array, Array, Array, Array]:
         """Mean, standard deviation, lower and upper bound of the vector of a hypothesis."""
@@ -536,6 +582,9 @@ class Problem:
         low, high = [np.full(n, -np.inf)], [np.full(n, np.inf)]
         positive = (self.nominal > 0) & (self.spread > 0) & (np.arange(n) < self.n_physical)
         low[0][positive] = -0.98 * self.nominal[positive] / self.spread[positive]
+        physical = np.arange(n) < self.n_physical
+        low[0][physical] = np.maximum(low[0][physical], -self.within)
+        high[0][physical] = self.within
         for placed in hypothesis:
             p = placed.effect.parameters
             mean.append(np.array([x.mean for x in p]))

@@ -220,6 +220,26 @@ def _joined(entries: list[_Excess]) -> _Excess:
     )
 
 
+def left_by(problem: Problem, explanation: Explanation) -> dict[str, Any] | None:
+    """Channel, band and interval that hold most of what an explanation leaves beyond noise; None where it leaves no more.
+
+    Args:
+        problem: Records and structure on all degrees of freedom.
+        explanation: An explanation.
+    """
+    found = _excess(problem, explanation)
+    beyond = {name: e.chi2 - e.count for name, e in found.items()}
+    if not beyond or max(beyond.values()) <= 0.0:
+        return None
+    name = max(beyond, key=lambda n: beyond[n])
+    own = found[name]
+    return {
+        "channel": name,
+        "band_hz": _holding(own.frequency, own.power - 2.0),
+        "time_s": _holding(own.time, own.signal**2 - 1.0),
+    }
+
+
 def _residual_splits(problem: Problem, excess: dict[str, _Excess]) -> list[Split]:
     """Splits of the free run's residual by channel, and of every channel's by band and by time."""
     if not excess:

@@ -12,10 +12,12 @@ from typing import Any
 
 import numpy as np
 
+from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis
 from bench.discrepancy.diagnosis import Diagnosis
 from bench.discrepancy.judgement.validation_discrepancy import coordinates
 from bench.discrepancy.localisation.localise import box
 from bench.discrepancy.localisation.state_map import StateMap
+from bench.discrepancy.report.articulated import articulated_page
 from bench.discrepancy.report.model_update import recipes
 from bench.discrepancy.report.simulated_records import MEASURED, NOMINAL, variants
 from bench.discrepancy.verdict import Split
@@ -33,8 +35,10 @@ def simulated(diagnosis: Diagnosis) -> dict[str, Recording]:
     return variants(diagnosis)
 
 
-def page(diagnosis: Diagnosis) -> Page:
+def page(diagnosis: Diagnosis | ArticulatedDiagnosis) -> Page:
     """Build the report of a diagnosis."""
+    if isinstance(diagnosis, ArticulatedDiagnosis):
+        return articulated_page(diagnosis)
     verdict = diagnosis.verdict
     out = Page(
         f"Diagnosis of {diagnosis.case.name}", verdict.explanation, f"{verdict.seconds:.1f} s of computation"
@@ -52,7 +56,7 @@ def page(diagnosis: Diagnosis) -> Page:
     return out
 
 
-def write_report(diagnosis: Diagnosis, path: str | Path) -> None:
+def write_report(diagnosis: Diagnosis | ArticulatedDiagnosis, path: str | Path) -> None:
     """Write the report of a diagnosis as one HTML file."""
     page(diagnosis).write(path)
 
@@ -65,7 +69,7 @@ def _verdict_section(out: Page, diagnosis: Diagnosis) -> None:
         ("verdict", "probability"),
         [(k, f"{p:.3f}") for k, p in verdict.probabilities.items()],
     )
-    for effect in verdict.named:
+    for effect in (*verdict.named, *verdict.nearest):
         where = f" ({effect.where})" if effect.where else ""
         rows = [
             (
@@ -75,12 +79,15 @@ def _verdict_section(out: Page, diagnosis: Diagnosis) -> None:
             for name, e in effect.parameters.items()
         ]  # fmt: skip
         section.table(
-            f"{effect.name}{where}, probability {effect.probability:.3f}: {effect.equation}",
+            f"{'' if verdict.named else 'Nearest: '}{effect.name}{where}, probability {effect.probability:.3f}, closes "
+            f"{100 * effect.closed:.0f} % of what is missing without it: {effect.equation}",
             ("parameter", "value", "one-sigma", "95 % interval", "unit"),
             rows,
         )
     for group in verdict.indistinguishable:
         section.text(f"These records cannot tell apart: {', '.join(group)}.")
+    if verdict.left:
+        section.text(verdict.left)
     for warning in verdict.warnings:
         section.text(f"Note: {warning}.")
 

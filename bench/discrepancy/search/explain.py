@@ -19,12 +19,14 @@ from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.effects.effect import Effect
 from bench.discrepancy.fitting.initial_state_fit import predict
 from bench.discrepancy.fitting.map_fit import Fit, fit
+from bench.discrepancy.likelihood.model_error import ModelError
 from bench.discrepancy.likelihood.problem import Array, Problem, band_bins
 from bench.discrepancy.likelihood.whitening import whitened
 from bench.discrepancy.model.placement import Hypothesis, Placed
 from bench.discrepancy.model.placements import placements
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.model.structure import Structure
+from bench.discrepancy.numerics.deadline import NEVER, Deadline
 from bench.discrepancy.screening.candidates import leading
 from bench.discrepancy.screening.score_test import LackOfFit, lack_of_fit
 from bench.discrepancy.screening.screen import Screen
@@ -99,7 +101,7 @@ class Explanation:
 
         Not asked of windows: their motion is known as measured only, and its noise is that of the residuals.
         """
-        if not self.consistent or any(problem.windowed for problem, _ in self.parts):
+        if not self.consistent or any(problem.windowed or problem.error for problem, _ in self.parts):
             return (False,) * len(self.parts)
         explained = nothing.chi2 - self.chi2
         return tuple(
@@ -111,6 +113,16 @@ class Explanation:
     def noise_stated(self) -> bool:
         """Whether the noise of every response channel is stated, so that chi-squared has an absolute meaning."""
         return all(problem.noise_stated for problem, _ in self.parts)
+
+    @property
+    def scaled(self) -> bool:
+        """Whether chi-squared has an absolute meaning, by the noise or by the error of the model."""
+        return all(problem.scaled for problem, _ in self.parts)
+
+    @property
+    def coarse(self) -> bool:
+        """Whether residuals are weighed by the error of the model, not by their noise alone."""
+        return any(problem.error is not None for problem, _ in self.parts)
 
     @property
     def chi2(self) -> float:
@@ -149,6 +161,8 @@ def explain(
     *,
     most: int = 3,
     progress: Callable[[str], None] = lambda text: None,
+    error: ModelError | None = None,
+    deadline: Deadline = NEVER,
 ) -> list[Explanation]:
     """Search the explanations of a case; by decreasing posterior.
 
@@ -157,25 +171,28 @@ def explain(
         catalogue: Effects to consider.
         most: Largest number of effects in a group.
         progress: Called with a line of text at every stage.
+        error: Error of the model that residuals are weighed by besides their noise.
+        deadline: When no further stage is begun.
     """
     structure = structure_of(case)
     groups = structure.groups()
     if len(groups) == 1:
         search = _attributed(
-            Problem(case, structure, case.identification),
+            Problem(case, structure, case.identification, error=error),
             placements(case, structure, catalogue),
             most=most,
             progress=progress,
+            deadline=deadline,
         )
         problem = search.problem
         found = [Explanation(((problem, fitted),)) for fitted in search.ranked()]
-        return _nothing_left_first(found) if problem.noise_stated else _parsimonious(found)
+        return _nothing_left_first(found) if problem.scaled else _parsimonious(found)
     bins = _common_bins(case, structure)
-    whole = Problem(case, structure, case.identification, bins)
+    whole = Problem(case, structure, case.identification, bins, error=error)
     prepared = []
     for group in groups:
         part = structure.restricted(group)
-        problem = Problem(case, part, case.identification, bins)
+        problem = Problem(case, part, case.identification, bins, error=error)
         progress(f"screening of {', '.join(part.dofs)}")
         prepared.append(prepare(problem, placements(case, part, catalogue)))
     odd = [entry for entry in prepared if not consistent(entry[0].ranked(0)[0])]
@@ -193,10 +210,18 @@ def explain(
             problem = entry[0].problem
             progress(f"degrees of freedom {', '.join(problem.structure.dofs)}")
             chosen = placements(case, problem.structure, catalogue)
-            search = attribute(problem, chosen, most=1 if hopeless else 2, progress=progress, prepared=entry)
+            search = attribute(
+                problem,
+                chosen,
+                most=1 if hopeless else 2,
+                progress=progress,
+                prepared=entry,
+                deadline=deadline,
+            )
             hopeless = hopeless or search.ranked()[0].reduced > HOPELESS_GROUP
     found = _nothing_left_first(_combined([entry[0] for entry in prepared]))
-    if odd and not deep and not _leaves_nothing(found):
+    missing = odd and not deep and not _leaves_nothing(found)
+    if missing and deadline.allows("effects that couple the degrees of freedom"):
         coupled_fits(coupled, catalogue, most, progress)
     # what falls apart is doubted better group by group
     known = {key_of(e.hypothesis) for e in found}
@@ -205,22 +230,28 @@ def explain(
 
 
 def _attributed(
-    problem: Problem, candidates: Sequence[Placed], *, most: int, progress: Callable[[str], None]
+    problem: Problem,
+    candidates: Sequence[Placed],
+    *,
+    most: int,
+    progress: Callable[[str], None],
+    deadline: Deadline,
 ) -> Search:
     """`attribute`, and once more where the best explanation makes more of the noise of what drives it than the nominal model.
 
     A law that the velocity enters strongly passes much of the noise of a prescribed motion on, and a sensor of twice the gain that of
     a measured load; the right one would be refuted by it.
     """
-    search = attribute(problem, candidates, most=most, progress=progress)
+    search = attribute(problem, candidates, most=most, progress=progress, deadline=deadline)
     best = search.ranked()[0]
     sensors = any(placed.effect.site == "sensor" for placed in best.hypothesis)
-    if (problem.driven or sensors) and problem.noise_stated and best.hypothesis and near(best):
+    stated = problem.noise_stated and problem.error is None
+    if (problem.driven or sensors) and stated and best.hypothesis and near(best):
         behind = problem.behind(best.hypothesis, best.vector)
         left = float(np.sum(behind.residual(best.hypothesis, best.vector) ** 2))
         if abs(left - best.chi2) > NOISIER * best.n_residuals:
             progress(f"the noise behind {names(best.hypothesis)}")
-            return attribute(behind, candidates, most=most, progress=progress)
+            return attribute(behind, candidates, most=most, progress=progress, deadline=deadline)
     return search
 
 
@@ -319,7 +350,7 @@ def close(best: Explanation, nothing: Explanation, closures: Sequence[Effect]) -
     parts, used = [], []
     for (problem, fitted), lacks in zip(best.parts, best.lacking(nothing), strict=True):
         current = fitted
-        if lacks or not consistent(fitted):
+        if lacks or not consistent(fitted) or problem.error is not None:
             candidates = placements(problem.case, problem.structure, closures)
             screen = Screen(problem, candidates)
             current = fit(problem, (), start=np.zeros(len(problem.nominal)), iterations=THOROUGH)

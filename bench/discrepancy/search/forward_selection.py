@@ -19,6 +19,7 @@ from bench.discrepancy.effects.effect import Effect
 from bench.discrepancy.fitting.map_fit import Fit, fit
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Hypothesis, Placed
+from bench.discrepancy.numerics.deadline import NEVER, Deadline
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.screening.candidates import (
     SHORT,
@@ -81,6 +82,7 @@ def attribute(
     most: int = 3,
     progress: Callable[[str], None] = lambda text: None,
     prepared: Prepared | None = None,
+    deadline: Deadline = NEVER,
 ) -> Search:
     """Search the hypotheses of up to `most` effects.
 
@@ -90,6 +92,7 @@ def attribute(
         most: Largest number of effects.
         progress: Called with a line of text at every stage.
         prepared: What `prepare` returned for the same arguments, where it was called before.
+        deadline: When no further stage is begun.
 
     Returns:
         All fits made.
@@ -101,19 +104,10 @@ def attribute(
         points = about(screen, nothing, explained=True).ranked()
         if not points or points[0].gain < NOTICEABLE:
             return search
-    _extend(search, screen, [nothing], count=8)
-    soften(search, 1)
-    if not consistent(search.ranked()[0]) and all(o.order > 0 for o in problem.structure.observers):
-        _simulated(search, candidates)
-    rare = [p for p in candidates if p.effect.rare]
-    if rare and not consistent(search.ranked()[0]):
-        progress("rarer effects")
-        screen.add(rare)
-        _extend(search, screen, [nothing], count=6, among={p.key for p in rare})
-    stand_in(search)
-    with_timed_force(search)
-    with_schedules(search)
+    _single(search, screen, candidates, progress, deadline)
     for size in range(1, most):
+        if not consistent(search.ranked()[0]) and not deadline.allows(f"{size + 1} effects together"):
+            break
         if near(search.ranked()[0]):
             integrate_finer(search)
         best = search.ranked()[0]
@@ -124,7 +118,7 @@ def attribute(
             if len(best.hypothesis) != size:
                 break
             # what is down to the noise and lacks a force all the same may be neither of two effects
-            lacks = not problem.windowed and lack_of_fit(problem, best).significant(
+            lacks = not (problem.windowed or problem.error) and lack_of_fit(problem, best).significant(
                 nothing.chi2 - best.chi2, effects=SEVERAL
             )
             if not lacks and not _promising(screen, best):
@@ -141,14 +135,38 @@ def attribute(
         soften(search, size + 1)
         reduce_best(search)
     best = search.ranked()[0]
-    if not problem.noise_stated:
+    if not problem.scaled:
         simplify(search, candidates)
-    elif near(best):
+    elif near(best) and deadline.allows("rivals of what was found, from further starts"):
         progress(f"rivals of {names(best.hypothesis)}")
         challenge(search, screen)
         soften(search, len(search.ranked()[0].hypothesis))
         shake(search)
     return search
+
+
+def _single(
+    search: Search,
+    screen: Screen,
+    candidates: Sequence[Placed],
+    progress: Callable[[str], None],
+    deadline: Deadline,
+) -> None:
+    """Fit single effects: the common ones, then the rarer ones and those that no screening holds where these leave something."""
+    nothing = search.ranked(0)[0]
+    _extend(search, screen, [nothing], count=8)
+    soften(search, 1)
+    if not consistent(search.ranked()[0]) and all(o.order > 0 for o in search.problem.structure.observers):
+        _simulated(search, candidates)
+    rare = [p for p in candidates if p.effect.rare]
+    if rare and not consistent(search.ranked()[0]) and deadline.allows("rarer effects"):
+        progress("rarer effects")
+        screen.add(rare)
+        _extend(search, screen, [nothing], count=6, among={p.key for p in rare})
+    stand_in(search)
+    if deadline.allows("forces from outside and friction that follows a channel"):
+        with_timed_force(search)
+        with_schedules(search)
 
 
 def worth_extending(search: Search, screen: Screen, size: int, most: int) -> list[Fit]:
@@ -257,7 +275,7 @@ def _offers(
     inertia = [] if among else local.inertia_points(base, ground)
     most = max((p.gain for p in [*points, *inertia]), default=0.0)
     excess = base.chi2 - base.n_residuals
-    if named and problem.noise_stated and not consistent(base) and most < UNPROMISING * excess:
+    if named and problem.scaled and not consistent(base) and most < UNPROMISING * excess:
         return _Offers(base, [], [])
 
     def task(point: Point) -> Task:

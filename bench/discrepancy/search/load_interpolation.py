@@ -60,13 +60,13 @@ def _ladder(explanations: Sequence[Explanation]) -> Iterator[Explanation]:
         ranked = [e for e in explanations if len(e.hypothesis) == size]
         if ranked:
             yield max(ranked, key=lambda e: e.log_posterior)
-    if not (best.consistent and best.noise_stated):
+    if not (best.consistent and best.scaled):
         yield best
 
 
 def _promises(read: Case, rung: Explanation, best: Explanation) -> bool:
     """Whether the effects of an explanation, fitted in another reading, leave little enough for a search in it."""
-    noise = sum(fitted.n_residuals for _, fitted in best.parts) if best.noise_stated else 0
+    noise = sum(fitted.n_residuals for _, fitted in best.parts) if best.scaled else 0
     limit = rung.chi2 - INSTEAD * (rung.chi2 - best.chi2)
     if rung is best:
         limit = noise + BETTER * (best.chi2 - noise)
@@ -90,7 +90,7 @@ def _promises(read: Case, rung: Explanation, best: Explanation) -> bool:
 def _read(case: Case, problem: Problem) -> Problem:
     """A problem of the same records and structure whose loads are read as a case says."""
     bins = {data.record.name: data.n_bins for data in problem.data}
-    return Problem(case, problem.structure, problem.records, bins)
+    return Problem(case, problem.structure, problem.records, bins, error=problem.error)
 
 
 def reading_notes(told: Case, read: Case) -> tuple[str, ...]:

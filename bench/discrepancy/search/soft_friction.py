@@ -187,7 +187,9 @@ def frictional(problem: Problem) -> NDArray[np.bool_]:
     names = {friction.parameter for friction in problem.structure.frictions}
     names |= {name for e in problem.structure.elements if e.rubs for name in e.parameters}
     names.discard("")
-    return np.array([name in names for name in problem.structure.parameters], dtype=bool)
+    out = np.zeros(len(problem.nominal), dtype=bool)
+    out[: problem.n_physical] = [name in names for name in problem.structure.parameters[: problem.n_physical]]
+    return out
 
 
 def _in_place(effect: Effect) -> Effect:

@@ -1,0 +1,80 @@
+"""What each named effect closes of the gap, whether that is all, and where the nominal parameters have gone.
+
+An effect closes the part of the judging records' discrepancy that comes back when it is taken out and everything else is fitted again,
+with an interval from blocks of these records, which chose nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from bench.discrepancy.case.case import Case
+from bench.discrepancy.judgement.coarse import without
+from bench.discrepancy.judgement.validation_discrepancy import gaps
+from bench.discrepancy.likelihood.problem import Problem
+from bench.discrepancy.search.explain import Explanation, nominal_alone
+from bench.discrepancy.search.fits import key_of
+from bench.discrepancy.verdict import Gap, NamedEffect, NominalEstimate
+
+WITHIN_NOISE = 1.3
+"""Discrepancy over that of noise alone up to which an explanation is complete."""
+
+
+def with_closed(
+    case: Case,
+    problem: Problem,
+    named: Sequence[NamedEffect],
+    explanations: Sequence[Explanation],
+    rng: np.random.Generator,
+) -> tuple[NamedEffect, ...]:
+    """Named effects with what each of them closes, the one that closes most first.
+
+    Args:
+        case: The case.
+        problem: Its problem on all degrees of freedom.
+        named: Effects of the first explanation, in its order.
+        explanations: All of them.
+        rng: For the bootstrap.
+    """
+    best, nothing = explanations[0], nominal_alone(explanations)
+    known = {key_of(e.hypothesis): e for e in explanations}
+    out = []
+    for i, (effect, placed) in enumerate(zip(named, best.hypothesis, strict=True)):
+        rest = known.get(key_of(tuple(p for p in best.hypothesis if p is not placed)))
+        rest = rest or (nothing if len(best.hypothesis) == 1 else without(best, i))
+        found = gaps(
+            case,
+            problem,
+            stages=[("without", rest.predict), ("", rest.predict), ("with", best.predict)],
+            rng=rng,
+        )
+        most = max(found, key=lambda gap: gap.before - gap.after)
+        out.append(replace(effect, closed=most.closed, closed_ci95=most.closed_ci95))
+    return tuple(sorted(out, key=lambda effect: -effect.closed))
+
+
+def nominal_estimates(explanation: Explanation) -> tuple[NominalEstimate, ...]:
+    """The nominal parameters as an explanation has them."""
+    out: dict[str, NominalEstimate] = {}
+    for problem, fitted in explanation.parts:
+        values, _ = problem.split(fitted.hypothesis, fitted.vector)
+        deviations = np.sqrt(np.maximum(np.diag(fitted.covariance), 0.0))
+        for i, name in enumerate(problem.structure.parameters[: problem.n_physical]):
+            if problem.spread[i] > 0.0:
+                out[name] = NominalEstimate(
+                    name=name,
+                    value=float(values[i]),
+                    std=float(problem.spread[i] * deviations[i]),
+                    stated=float(problem.nominal[i]),
+                    stated_std=float(problem.spread[i]),
+                    shift_in_std=float(fitted.vector[i]),
+                )
+    return tuple(out.values())
+
+
+def complete(found: Sequence[Gap], *, sharp: bool) -> bool:
+    """Whether what an explanation leaves is noise: by the stated one, or by what is left on the judging records."""
+    return sharp or all(gap.after <= WITHIN_NOISE * gap.noise_floor for gap in found)

@@ -1,0 +1,240 @@
+"""What is said where the error of the model, not noise, decides what an explanation leaves.
+
+Explanations are compared by blocks that their fits did not see (`held_out`). Among those within one standard error of the best
+the simplest and commonest is named, and they are declared a set. An effect beside others is named if it closes a material part of the
+discrepancy. The judging records choose nothing; they veto: what does not shrink their discrepancy is not named.
+
+References:
+    L. Breiman, J. Friedman, R. Olshen, C. Stone, Classification and Regression Trees, 1984, section 3.4.3 (one standard error).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bench.discrepancy.case.case import Case
+from bench.discrepancy.fitting.map_fit import fit
+from bench.discrepancy.judgement.held_out import HeldOut, held_out, shares
+from bench.discrepancy.judgement.validation_discrepancy import discrepancies, noise_floors
+from bench.discrepancy.likelihood.problem import Array, Problem
+from bench.discrepancy.search.explain import Explanation, nominal_alone
+from bench.discrepancy.search.fits import LOG_PRIOR_EFFECT, THOROUGH, key_of
+
+
+@dataclass(frozen=True)
+class CoarseSettings:
+    """When an effect is named.
+
+    Attributes:
+        finalists: Explanations that are compared by blocks.
+        reach: Difference in log posterior, of the coarsened likelihood, within which one is a finalist.
+        within: Stated standard deviations that a nominal parameter may move. Gaussian tails are an assumption about small deviations; what
+            lies farther off is a finding, and has to be named as an error of that parameter.
+        material: Part of the discrepancy of the nominal model, its parameters re-estimated, that an effect closes to be named.
+        pays: Part of the discrepancy of the judging records that a named explanation may leave at most: half of its power.
+        most: The same where the noise is rightly stated and all that a law of the catalogue leaves is therefore not it.
+        outside: Share of effects that no catalogue holds among what is named, at least.
+        telling: Difference of the scores (odds of 7) below which the samples cannot tell two explanations apart.
+    """
+
+    finalists: int = 10
+    reach: float = 12.0
+    within: float = 4.0
+    material: float = 0.1
+    pays: float = 0.7
+    most: float = 0.5
+    outside: float = 0.05
+    telling: float = 4.0
+
+
+SETTINGS = CoarseSettings()
+ABOUT_NOISE, UNCHANGED = 1.1, 1.02
+"""Times the noise below which a judged discrepancy is nothing but that, and change of it that is none."""
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """Explanations weighed by prediction.
+
+    Attributes:
+        chosen: What is named; nothing where it has no effect.
+        found: All finalists on held-out blocks, the chosen one first.
+        weights: (n,) probability of each, as if one of them were true.
+        within: Those within one standard error of the best.
+        vetoed: Whether the judging records refused what the others would have named.
+        left: Part of the power of the judged discrepancy, beyond noise, that the chosen one leaves.
+    """
+
+    chosen: HeldOut
+    found: tuple[HeldOut, ...]
+    weights: Array
+    within: tuple[HeldOut, ...]
+    vetoed: bool
+    left: float
+
+    @property
+    def outside(self) -> float:
+        """Probability that no effect of the catalogue is the cause: what is left might hold what explains the rest as well."""
+        return float(np.clip(self.left, SETTINGS.outside, 1.0))
+
+
+def judge(
+    case: Case,
+    problem: Problem,
+    explanations: Sequence[Explanation],
+    rng: np.random.Generator,
+    *,
+    trusted: bool = False,
+    settings: CoarseSettings = SETTINGS,
+) -> Judged:
+    """Weigh explanations by prediction.
+
+    Args:
+        case: The case.
+        problem: Its problem on all degrees of freedom.
+        explanations: By decreasing posterior, the nominal model alone among them.
+        rng: For the bootstrap over blocks.
+        trusted: Whether the noise is stated, and nothing contradicts it: what is named has to close most of the discrepancy then.
+        settings: When an effect is named.
+    """
+    nothing = bounded(nominal_alone(explanations), settings.within)
+    with_effects = [e for e in explanations if e.hypothesis][: 2 * settings.finalists]
+    ranked = sorted((bounded(e, settings.within) for e in with_effects), key=lambda e: -e.log_posterior)
+    near = [e for e in ranked if e.log_posterior > ranked[0].log_posterior - settings.reach]
+    found = [held_out(e) for e in [*near[: settings.finalists], nothing]]
+    tolls = np.array([_log_prior(entry.explanation) for entry in found])
+    best = found[int(np.argmin([entry.total - 2.0 * toll for entry, toll in zip(found, tolls, strict=True)]))]
+    known = Discrepancies(case, problem)
+    base = _pruned(best, found, known, settings)
+    # what is larger than what is material has been weighed already
+    found = [
+        e
+        for e in found
+        if len(e.explanation.hypothesis) <= len(base.explanation.hypothesis) and e is not base
+    ]
+    found = [base, *found]
+    weights = shares(found, np.array([_log_prior(e.explanation) for e in found]), rng)
+    within = tuple(entry for entry in found if _as_good(entry, base, settings))
+    vetoed, part = False, settings.most if trusted else settings.pays
+    for entry in sorted(within, key=_plainness):
+        e = entry.explanation
+        if not e.hypothesis or known.pays(e, nothing, part):
+            return Judged(entry, tuple(found), weights, within, vetoed, known.left(e, nothing))
+        vetoed = True
+    return Judged(found[-1], tuple(found), weights, within, True, 1.0)
+
+
+def bounded(explanation: Explanation, within: float) -> Explanation:
+    """An explanation whose nominal parameters stay within so many stated standard deviations, fitted again where they do not."""
+    parts = []
+    for problem, fitted in explanation.parts:
+        if np.any(np.abs(fitted.vector[: problem.n_physical]) > within):
+            narrow = problem.bounded(within)
+            parts.append((narrow, fit(narrow, fitted.hypothesis, start=fitted.vector, iterations=THOROUGH)))
+        else:
+            parts.append((problem, fitted))
+    return Explanation(tuple(parts))
+
+
+def _log_prior(explanation: Explanation) -> float:
+    return sum(LOG_PRIOR_EFFECT + placed.effect.log_prior for placed in explanation.hypothesis)
+
+
+def _as_good(entry: HeldOut, best: HeldOut, settings: CoarseSettings) -> bool:
+    """Whether an explanation predicts as well as the best one: within a standard error, or what so few samples cannot tell."""
+    worse, error = entry.worse_than(best)
+    return entry is best or worse <= max(error, settings.telling)
+
+
+def _plainness(entry: HeldOut) -> tuple[int, int, float, float]:
+    """What comes first is simpler: fewer effects, fewer parameters, commoner ones, and then what predicts better."""
+    e = entry.explanation
+    return (len(e.hypothesis), e.n_free, -sum(p.effect.log_prior for p in e.hypothesis), entry.total)
+
+
+class Discrepancies:
+    """NRMSE of explanations, on the judged coordinate where the nominal model is farthest off; kept by explanation."""
+
+    def __init__(self, case: Case, problem: Problem) -> None:
+        self.case, self.problem = case, problem
+        self._floor = noise_floors(problem, case.validation)
+        self._kept: dict[tuple[int, bool], Array] = {}
+
+    def of(self, explanation: Explanation, *, judging: bool) -> Array:
+        """NRMSE (n_coordinates,) of an explanation, on the judging records or on those for identification."""
+        key = id(explanation), judging
+        if key not in self._kept:
+            records = self.case.validation if judging else self.case.identification
+            self._kept[key] = discrepancies(self.problem, records, explanation.predict)
+        return self._kept[key]
+
+    def closed(self, explanation: Explanation, without: Explanation, nothing: Explanation) -> float:
+        """Part of the discrepancy of `nothing`, on the records for identification, that goes with what one has and the other lacks."""
+        before, left, right = (self.of(e, judging=False) for e in (nothing, without, explanation))
+        return float(np.max((left - right) / np.maximum(before, 1e-300)))
+
+    def pays(self, explanation: Explanation, nothing: Explanation, part: float) -> bool:
+        """Whether an explanation leaves at most a part of the judging records' discrepancy, beyond noise, on some coordinate and no
+        more than all of it on any."""
+        before, after = self._judged(nothing, explanation)
+        shrinks = self._beyond(after) <= part * self._beyond(before)
+        worse = after > np.maximum(before, ABOUT_NOISE * self._floor) * UNCHANGED
+        return bool(np.isfinite(after).all() and np.any(shrinks) and not np.any(worse))
+
+    def left(self, explanation: Explanation, nothing: Explanation) -> float:
+        """Part of the power of the judging records' discrepancy, beyond noise, that an explanation leaves where it is largest."""
+        before, after = (self._beyond(x) for x in self._judged(nothing, explanation))
+        widest = int(np.argmax(before))
+        return float(min((after[widest] / max(before[widest], 1e-300)) ** 2, 1.0))
+
+    def _judged(self, nothing: Explanation, explanation: Explanation) -> tuple[Array, Array]:
+        return self.of(nothing, judging=True), self.of(explanation, judging=True)
+
+    def _beyond(self, found: Array) -> Array:
+        return np.sqrt(np.maximum(found**2 - self._floor**2, 0.0))
+
+
+def _pruned(
+    entry: HeldOut, found: Sequence[HeldOut], known: Discrepancies, settings: CoarseSettings
+) -> HeldOut:
+    """An explanation without the effects that close nothing material beside the others."""
+    nothing = next(e for e in found if not e.explanation.hypothesis)
+    while entry.explanation.hypothesis:
+        smaller = [(i, without(entry.explanation, i)) for i in range(len(entry.explanation.hypothesis))]
+        if len(smaller) == 1:
+            smaller = [(0, nothing.explanation)]
+        closed = [known.closed(entry.explanation, rest, nothing.explanation) for _, rest in smaller]
+        least = int(np.argmin(closed))
+        if closed[least] >= settings.material:
+            return entry
+        rest = smaller[least][1]
+        known_already = {key_of(e.explanation.hypothesis): e for e in found}
+        entry = known_already.get(key_of(rest.hypothesis)) or held_out(rest)
+    return entry
+
+
+def without(explanation: Explanation, index: int) -> Explanation:
+    """An explanation without one of its effects, fitted again from where it was.
+
+    Args:
+        explanation: Fitted.
+        index: Of the effect in its hypothesis.
+    """
+    parts = []
+    for problem, fitted in explanation.parts:
+        if not 0 <= index < len(fitted.hypothesis):
+            parts.append((problem, fitted))
+            index -= len(fitted.hypothesis)
+            continue
+        _, etas = problem.split(fitted.hypothesis, fitted.vector)
+        rest = fitted.hypothesis[:index] + fitted.hypothesis[index + 1 :]
+        kept = np.concatenate([fitted.vector[: len(problem.nominal)], *etas[:index], *etas[index + 1 :]])
+        starts = np.array(
+            [kept, np.concatenate([np.zeros(len(problem.nominal)), *etas[:index], *etas[index + 1 :]])]
+        )
+        parts.append((problem, fit(problem, rest, start=starts, iterations=THOROUGH)))
+        index = -1
+    return Explanation(tuple(parts))

@@ -1,0 +1,195 @@
+"""A case of which the error of the model decides: its explanations searched again by that error, weighed, and put into words."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+
+from bench.discrepancy.case.case import Case
+from bench.discrepancy.judgement import posterior as evidence
+from bench.discrepancy.judgement.coarse import SETTINGS, Judged, judge
+from bench.discrepancy.judgement.finding import Finding
+from bench.discrepancy.likelihood.model_error import ModelError, crude_error, error_left, own_noise
+from bench.discrepancy.likelihood.problem import Problem
+from bench.discrepancy.model.rigs import structure_of
+from bench.discrepancy.numerics.deadline import NEVER, Deadline
+from bench.discrepancy.search.explain import Explanation
+from bench.discrepancy.search.fits import names
+from bench.discrepancy.verdict import Kind, Ranked
+
+Search = Callable[[Case, ModelError], tuple[Case, list[Explanation]]]
+"""Searches the explanations of a case, weighed by an error; the case comes back with what they tell of it."""
+REFERENCE = 2
+"""Effects, at most, of the explanation that tells the error of the model: more of them take its error for effects."""
+ROUNDS = 3
+"""Estimates of the error, at most."""
+UNDERSTATED, QUIETEST = 1.5, 0.1
+"""Noise over the stated one from which that is said, and part of a spectrum that may be quieter: of spectra smoothed over half an octave
+the quietest bins scatter by some tenths."""
+SETTLED = 0.5
+"""Part of the power of an estimated error above which what an explanation leaves is as estimated."""
+
+
+def coarse_explanations(
+    case: Case, search: Search, known: Sequence[Explanation], deadline: Deadline = NEVER
+) -> tuple[Case, list[Explanation]]:
+    """Explanations of a case, weighed by the error of the model.
+
+    Args:
+        case: The case.
+        search: How explanations are searched.
+        known: Explanations by the stated noise; empty where none is stated.
+        deadline: When no further estimate of the error is begun.
+    """
+    error = _left(case, known) if known else crude_error(case, structure_of(case))
+    case, explanations = search(case, error)
+    for _ in range(1, ROUNDS):
+        settled = bool(known) and reference(explanations).reduced > SETTLED
+        if settled or not deadline.allows("a further estimate of the error of the model"):
+            break
+        known = explanations
+        case, explanations = search(case, _left(case, known))
+    return case, explanations
+
+
+def reference(explanations: Sequence[Explanation]) -> Explanation:
+    """The explanation of few effects that leaves least."""
+    return min((e for e in explanations if len(e.hypothesis) <= REFERENCE), key=lambda e: e.chi2)
+
+
+def _left(case: Case, explanations: Sequence[Explanation]) -> ModelError:
+    """The error that the best of some explanations leaves."""
+    structure, best = structure_of(case), reference(explanations)
+    problem = Problem(case, structure, case.identification)
+    if problem.windowed:
+        before = best.parts[0][0].error
+        return ModelError({}, max(best.reduced * (1.0 if before is None else before.scale), 1.0))
+    return error_left(problem.data, structure, best.predict)
+
+
+def coarse_finding(
+    case: Case, problem: Problem, explanations: Sequence[Explanation], rng: np.random.Generator
+) -> Finding:
+    """Weigh explanations by prediction and say what is missing.
+
+    Args:
+        case: The case.
+        problem: Its problem on all degrees of freedom.
+        explanations: Weighed by the error of the model, by decreasing posterior.
+        rng: For bootstraps.
+    """
+    understated = tuple(_understated(problem, explanations[0]))
+    judged = judge(case, problem, explanations, rng, trusted=problem.noise_stated and not understated)
+    chosen, nearest = judged.chosen.explanation, _nearest(judged)
+    probabilities = _marginal(judged)
+    # noise that is stated and is not all that is left is something that is missing, whatever it be
+    unexplained = judged.vetoed or problem.noise_stated
+    kind: Kind = "effect" if chosen.hypothesis else ("unknown" if unexplained else "none")
+    others = [entry.explanation for entry in judged.found if entry is not judged.chosen]
+    order = np.argsort(
+        [-w for w, e in zip(judged.weights, judged.found, strict=True) if e is not judged.chosen]
+    )
+    return Finding(
+        kind=kind,
+        probabilities=_probabilities(kind, judged),
+        explanations=(chosen, *(others[i] for i in order)),
+        named=evidence.effects_of(chosen, probabilities) if kind == "effect" else (),
+        ranking=tuple(Ranked(*key, p) for key, p in sorted(probabilities.items(), key=lambda item: -item[1])),
+        indistinguishable=_sets(judged),
+        words=_words(kind, judged, nearest),
+        nearest=evidence.effects_of(nearest, probabilities) if kind == "unknown" else (),
+        closest=nearest if kind == "unknown" and nearest.hypothesis else None,
+        notes=understated,
+        coarse=True,
+    )
+
+
+def _probabilities(kind: Kind, judged: Judged) -> dict[str, float]:
+    """Probabilities of the verdicts."""
+    if kind == "unknown":
+        return {"effect": SETTINGS.outside, "none": 0.0, "unknown": 1.0 - SETTINGS.outside}
+    pairs = zip(judged.weights, judged.found, strict=True)
+    nothing = float(sum(weight for weight, entry in pairs if not entry.explanation.hypothesis))
+    outside = judged.outside if kind == "effect" else SETTINGS.outside
+    known = 1.0 - outside
+    return {"effect": known * (1.0 - nothing), "none": known * nothing, "unknown": outside}
+
+
+def _nearest(judged: Judged) -> Explanation:
+    """The likeliest explanation that has an effect; the chosen one where there is none."""
+    pairs = sorted(zip(judged.weights, judged.found, strict=True), key=lambda pair: -pair[0])
+    return next((e.explanation for _, e in pairs if e.explanation.hypothesis), judged.chosen.explanation)
+
+
+def _understated(problem: Problem, best: Explanation) -> Iterator[str]:
+    """Channels whose noise is larger than stated, wherever one looks in their spectra."""
+    error = best.parts[0][0].error
+    for name in problem.structure.channels:
+        stated = problem.case.channel(name).noise_std
+        if error is None or not stated or problem.windowed:
+            continue
+        c = problem.structure.channels.index(name)
+        least = [
+            np.quantile(error.power[data.record.name, name] / own_noise(data)[:, c], QUIETEST)
+            for data in problem.data
+        ]
+        factor = float(np.sqrt(1.0 + min(least)))
+        if factor > UNDERSTATED:
+            yield (
+                f"the noise of '{name}' is larger than stated, by a factor of {factor:.2g}: hardly anywhere in its spectrum does an "
+                "explanation leave less; measure it at rest"
+            )
+
+
+def _marginal(judged: Judged) -> dict[tuple[str, str], float]:
+    """Probability that each (name, place) belongs to the truth."""
+    total: dict[tuple[str, str], float] = {}
+    for weight, entry in zip(judged.weights, judged.found, strict=True):
+        for key in {(p.effect.name, p.place.name) for p in entry.explanation.hypothesis}:
+            total[key] = total.get(key, 0.0) + (1.0 - judged.outside) * float(weight)
+    return total
+
+
+def _sets(judged: Judged) -> tuple[tuple[str, ...], ...]:
+    """Names that may stand for one another in what was chosen."""
+    chosen = judged.chosen.explanation
+    own = {p.key: p for p in chosen.hypothesis}
+    sets: dict[str, set[str]] = {}
+    for entry in judged.within:
+        theirs = {p.key: p for p in entry.explanation.hypothesis}
+        if not theirs or not own or entry is judged.chosen:
+            continue
+        lost = [own[key] for key in own.keys() - theirs.keys()]
+        gained = [theirs[key] for key in theirs.keys() - own.keys()]
+        if len(lost) != 1 or len(gained) != 1:
+            lost, gained = list(chosen.hypothesis), list(entry.explanation.hypothesis)
+        label, instead = (" + ".join(sorted(p.effect.name for p in part)) for part in (lost, gained))
+        if label != instead:
+            sets.setdefault(label, {label}).add(instead)
+    return tuple(tuple(sorted(entry)) for entry in sets.values())
+
+
+def _words(kind: Kind, judged: Judged, nearest: Explanation) -> str:
+    chosen = judged.chosen.explanation
+    if kind == "effect":
+        return (
+            f"Missing from the model: {names(chosen.hypothesis)}. What is left is more than the stated noise, or no noise is stated: "
+            "the model stays wrong in small ways, and explanations were weighed by what they predict of blocks that they did not see."
+        )
+    if kind == "none":
+        return "No effect of the catalogue predicts the records better than the nominal model does with its parameters re-estimated."
+    if not nearest.hypothesis:
+        return (
+            "The nominal model leaves more than the stated noise, and no effect of the catalogue predicts the records better than it does "
+            "with its parameters re-estimated."
+        )
+    fate = (
+        "but does not shrink the discrepancy of the judging records"
+        if judged.vetoed
+        else "but does not predict the records better than the nominal model does with its parameters re-estimated"
+    )
+    return (
+        "Something is missing from the model, and no catalogued effect is it. "
+        f"The nearest is {names(nearest.hypothesis)}, {fate}."
+    )

@@ -1,0 +1,175 @@
+"""Held-out blocks: how well an explanation predicts parts of the records that its fit did not see.
+
+Each record is cut into blocks of time. What a fit without one block would predict there follows to first order from the fit to all of
+them: the block's own pull on the parameters is taken back (an infinitesimal jackknife; exact where the response is linear in the
+parameters). Blocks are the unit of evidence: differences of two explanations have a standard error over them, and the pulls of the
+blocks on the parameters tell how far these are known if the model is wrong (the sandwich of the jackknife).
+
+References:
+    R. Giordano, R. Liu, M. I. Jordan, T. Broderick, A Swiss army infinitesimal jackknife, AISTATS 2019.
+    H. White, Maximum likelihood estimation of misspecified models, Econometrica 50 (1982) 1-25 (the sandwich).
+    Y. Yao, A. Vehtari, D. Simpson, A. Gelman, Using stacking to average Bayesian predictive distributions, Bayesian Analysis 13 (2018)
+        (weights averaged over a bootstrap of what was held out).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.discrepancy.fitting.map_fit import Fit, free_entries
+from bench.discrepancy.likelihood.problem import Problem
+from bench.discrepancy.likelihood.whitening import fast_length
+from bench.discrepancy.numerics.least_squares import DIFFERENCES, differences
+from bench.discrepancy.search.explain import Explanation
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class HeldOutSettings:
+    """How records are cut and compared.
+
+    Attributes:
+        blocks: Blocks of each record.
+        draws: Draws of the bootstrap over blocks.
+    """
+
+    blocks: int = 12
+    draws: int = 500
+
+
+SETTINGS = HeldOutSettings()
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOut:
+    """An explanation on blocks that its fit did not see.
+
+    Attributes:
+        explanation: It, the precision of its parameters lowered to what the blocks bear out.
+        scores: (n_blocks,) weighed squared residuals of each block, from the fit without it.
+    """
+
+    explanation: Explanation
+    scores: Array
+
+    @property
+    def total(self) -> float:
+        """Sum of the scores."""
+        return float(np.sum(self.scores))
+
+    def worse_than(self, other: HeldOut) -> tuple[float, float]:
+        """By how much the scores exceed those of another explanation, and the standard error of that over blocks."""
+        by_block = self.scores - other.scores
+        return float(by_block.sum()), float(np.sqrt(len(by_block)) * np.std(by_block, ddof=1))
+
+
+def held_out(explanation: Explanation, settings: HeldOutSettings = SETTINGS) -> HeldOut:
+    """Predict blocks of the records from fits without them.
+
+    Args:
+        explanation: Fitted.
+        settings: How records are cut.
+    """
+    parts, scores = [], []
+    for problem, fitted in explanation.parts:
+        residual = problem.residual(fitted.hypothesis, fitted.vector)
+        changes = _changes(problem, fitted, residual)
+        blocks = list(_blocks(problem, np.column_stack([residual, changes]), settings.blocks))
+        cost = np.eye(changes.shape[1]) + changes.T @ changes
+        pulls, own = [], []
+        for block in blocks:
+            left, columns = block[:, 0], block[:, 1:]
+            pull = columns.T @ left
+            # a block may hold all that is known of a parameter: the prior keeps the rest invertible
+            without = cost - columns.T @ columns
+            moved = left + columns @ np.linalg.solve(without, pull)
+            pulls.append(pull)
+            own.append(float(moved @ moved))
+        scores.append(own)
+        parts.append((problem, _sandwiched(problem, fitted, cost, np.array(pulls))))
+    return HeldOut(Explanation(tuple(parts)), np.sum(np.array(scores), axis=0))
+
+
+def _changes(problem: Problem, fitted: Fit, residual: Array) -> Array:
+    """Changes (n, n_free) of the residuals by one prior standard deviation of each free entry; none where a run diverges."""
+    _, std, _, high = problem.prior(fitted.hypothesis)
+    free = free_entries(problem, fitted.hypothesis)
+    for step in DIFFERENCES:
+        found = differences(
+            lambda vector: problem.residual(fitted.hypothesis, vector),
+            fitted.vector,
+            residual,
+            free=free,
+            steps=step * std[free],
+            high=high[free],
+        )
+        if found is not None:
+            return found / step
+    return np.zeros((len(residual), len(free)))
+
+
+def _blocks(problem: Problem, columns: Array, count: int) -> Iterator[Array]:
+    """Rows of whitened residuals and of their changes, block by block; records are joined block by block.
+
+    Args:
+        problem: Records.
+        columns: (n, k) as `Problem.residual` orders the rows.
+        count: Blocks of each record.
+    """
+    at, pieces = 0, []
+    for data in problem.data:
+        n_channels, k = len(problem.noise), columns.shape[1]
+        if data.windows is not None:
+            rows = len(data.windows.firsts) * len(data.windows.weights)
+            windows = columns[at : at + rows].reshape(len(data.windows.firsts), -1, k)
+            parts = [part.reshape(-1, k) for part in np.array_split(windows, count)]
+        else:
+            rows = 2 * data.n_bins * n_channels
+            white = columns[at : at + rows].reshape(2, data.n_bins, n_channels * k)
+            length = fast_length(len(data.responses))
+            # Parseval: the sum of squares over time is that over the bins
+            in_time = np.fft.irfft(white[0] + 1j * white[1], length, axis=0) * np.sqrt(length / 2.0)
+            in_time = in_time[: len(data.responses)].reshape(-1, n_channels, k)
+            parts = [part.reshape(-1, k) for part in np.array_split(in_time, count)]
+        at += rows
+        pieces.append(parts)
+    for parts in pieces:
+        yield from parts
+
+
+def _sandwiched(problem: Problem, fitted: Fit, cost: Array, pulls: Array) -> Fit:
+    """A fit whose covariance is the larger one of the posterior's and of the sandwich's, entry by entry of the diagonal."""
+    _, std, _, _ = problem.prior(fitted.hypothesis)
+    free = free_entries(problem, fitted.hypothesis)
+    inverse = np.linalg.inv(cost)
+    count = len(pulls)
+    centred = pulls - pulls.mean(axis=0)
+    sandwich = inverse @ (centred.T @ centred) @ inverse * (count / max(count - 1, 1))
+    wider = np.sqrt(np.maximum(np.diag(sandwich) / np.diag(inverse), 1.0))
+    covariance = inverse * np.outer(wider, wider)
+    precision = fitted.precision.copy()
+    precision[np.ix_(free, free)] = np.linalg.inv(covariance) / np.outer(std[free], std[free])
+    return replace(fitted, precision=precision)
+
+
+def shares(
+    found: Sequence[HeldOut], priors: Array, rng: np.random.Generator, draws: int = SETTINGS.draws
+) -> Array:
+    """Weights (n,) of explanations by what they predict, averaged over a Bayesian bootstrap of the blocks.
+
+    Args:
+        found: Explanations on the same blocks.
+        priors: (n,) log prior of each.
+        rng: For the bootstrap.
+        draws: How many.
+    """
+    table = np.array([entry.scores for entry in found])
+    times = rng.dirichlet(np.ones(table.shape[1]), size=draws) * table.shape[1]
+    logs = -0.5 * times @ table.T + priors
+    weights = np.exp(logs - logs.max(axis=1, keepdims=True))
+    return np.asarray((weights / weights.sum(axis=1, keepdims=True)).mean(axis=0), dtype=np.float64)

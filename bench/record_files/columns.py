@@ -1,0 +1,180 @@
+"""The columns of a record's file, whatever its format: one way in for every command that reads records.
+
+The suffix says the format, a `ColumnMap` what is what. What comes out are plain arrays with the units and times that the file tells;
+`bench.record_files.reading` makes recordings of them, the diagnosis its cases.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.errors import FileFormatError, RecordingError
+from bench.limits import READING_LIMITS, ReadingLimits, regular_file
+from bench.record_files.arrays import read_hdf5, read_mat, read_npz
+from bench.record_files.column_map import ColumnMap, Variable, base_name, find, name_and_unit
+from bench.record_files.parquet import read_parquet
+from bench.record_files.text import read_csv
+from bench.record_files.times import Clock, clock_of, is_time, time_source
+from bench.recording import Recording
+
+TEXT = (".csv", ".tsv", ".txt", ".dat", ".asc")
+"""Suffixes of text tables, which may be gzipped."""
+
+READABLE = (
+    *(".parquet", ".csv", ".csv.gz", ".mat", ".npz", ".h5", ".hdf5"),
+    *(f"{suffix}{packed}" for suffix in TEXT[1:] for packed in ("", ".gz")),
+)
+"""Suffixes of the files that are read, in small or capital letters."""
+
+
+class Columns(NamedTuple):
+    """What a file holds of a record."""
+
+    clock: Clock | None
+    """Its times; None where a sample rate stands in for them."""
+    arrays: dict[str, NDArray[np.float64]]
+    """Values by channel name, each ``(n,)``."""
+    units: dict[str, str]
+    """Units that the file tells, by channel name."""
+    notes: tuple[str, ...]
+    """What was left out, assumed or doubtful in the file."""
+    time: NDArray[np.float64] | None = None
+    """Times on a clock that is known to be uniform [s]; None where `clock` says what is known."""
+
+
+def suffix_of(path: str | os.PathLike[str]) -> str:
+    """The suffix by which a file's format is known, in small letters: ".csv", ".csv.gz", ".parquet", …."""
+    suffixes = [suffix.lower() for suffix in Path(path).suffixes]
+    return "".join(suffixes[-2:]) if suffixes[-1:] == [".gz"] else "".join(suffixes[-1:])
+
+
+def read_columns(
+    path: str | os.PathLike[str],
+    layout: ColumnMap,
+    *,
+    time_optional: bool = False,
+    limits: ReadingLimits = READING_LIMITS,
+) -> Columns | Recording:
+    """Read the columns of a record, or the recording that a file of the bench holds whole.
+
+    Args:
+        path: Path of the file.
+        layout: What is what; without columns, every line of numbers as long as the time is a channel of its own name.
+        time_optional: Whether a file without a time is accepted, since somebody knows its sample rate.
+        limits: What the file may cost.
+
+    Raises:
+        MissingFileError: There is no such file.
+        FileFormatError: Unknown suffix, not of the format that its suffix says, truncated, changed, no numbers in it, no regular
+            file, or beyond the limits.
+        RecordingError: No time in it.
+        UnknownNameError: The file has no such column.
+        UnitError: The unit of the time is none.
+    """
+    file = regular_file(path, limits.file_bytes)
+    try:
+        contents, notes = _contents(file, layout, limits)
+        if isinstance(contents, Recording):
+            return contents
+        return _assembled(contents, layout, file, notes, time_optional)
+    except MemoryError:
+        raise FileFormatError(
+            f"'{file}' needs more memory than there is; cut it into parts, or name fewer columns"
+        ) from None
+
+
+def _contents(
+    path: Path, layout: ColumnMap, limits: ReadingLimits
+) -> tuple[Recording | dict[str, Variable], tuple[str, ...]]:
+    suffix = suffix_of(path)
+    wanted = _wanted(layout)
+    if suffix == ".parquet":
+        return read_parquet(path, wanted, limits=limits), ()
+    if suffix.removesuffix(".gz") in TEXT:
+        return read_csv(path, wanted, limits=limits)
+    if suffix == ".npz":
+        return read_npz(path, wanted, limits=limits), ()
+    if suffix == ".mat":
+        return read_mat(path, limits=limits), ()
+    if suffix in (".h5", ".hdf5"):
+        return read_hdf5(path, wanted, limits=limits), ()
+    raise FileFormatError(f"'{path}' has the suffix '{suffix}'; readable are {', '.join(READABLE)}")
+
+
+def _wanted(layout: ColumnMap) -> Callable[[str], bool] | None:
+    """Which columns of a file are wanted; None for all."""
+    if not layout.columns:
+        return None
+    sources = [*layout.columns.values(), *([layout.time] if layout.time else [])]
+    names = {part for source in sources for part in (source, base_name(source))}
+    any_time = not layout.time and not layout.sample_rate
+
+    def wanted(heading: str) -> bool:
+        return heading in names or name_and_unit(heading)[0] in names or (any_time and is_time(heading))
+
+    return wanted
+
+
+def _assembled(
+    variables: dict[str, Variable],
+    layout: ColumnMap,
+    path: Path,
+    notes: tuple[str, ...],
+    time_optional: bool,
+) -> Columns:
+    clock = None
+    source = layout.time or time_source(variables)
+    if (not layout.sample_rate or layout.time) and (source or not time_optional):
+        if not source:
+            raise RecordingError(
+                f"'{path}': no column is named 'time' or 't' (it has {_listing(variables)}); name it with time=, or give sample_rate="
+            )
+        values, unit = find(variables, source, file=path.name, kinds="biufmM")
+        clock = clock_of(values, layout.time_unit, source, told=unit)
+        notes = (*notes, *clock.notes)
+    sources = dict(layout.columns)
+    if not sources:
+        sources, passed = _all_lines(variables, source, None if clock is None else clock.seconds, path)
+        notes = (*notes, *passed)
+    if not sources:
+        raise RecordingError(
+            f"'{path}': no column of numbers stands beside the time (it has {_listing(variables)}); name lines of its arrays, "
+            "as in columns={'force': 'data[:, 2]'}"
+        )
+    arrays, told = {}, {}
+    for channel, place in sources.items():
+        values, unit = find(variables, place, file=path.name)
+        arrays[channel] = values.astype(float, copy=False)
+        if unit:
+            told[channel] = unit
+    return Columns(clock, arrays, told, notes)
+
+
+def _all_lines(
+    variables: dict[str, Variable], clock_source: str, clock: NDArray[np.float64] | None, path: Path
+) -> tuple[dict[str, str], list[str]]:
+    """Every column or one-dimensional array of numbers, as a channel of its own name, and what is passed over.
+
+    Other things in a MAT, npz or HDF5 file are passed over; of a text table, columns of text are, and said.
+    """
+    lines, passed = {}, []
+    table = suffix_of(path).removesuffix(".gz") in TEXT
+    for heading, variable in variables.items():
+        line = np.squeeze(np.asarray(variable.values))
+        fits = line.ndim == 1 and line.dtype.kind in "biuf" and (clock is None or line.size == clock.size)
+        if variable.sample:
+            passed.append(f"the column '{heading[:60]}' holds text ({variable.sample}) and is left out")
+        elif heading != clock_source and (fits or table):
+            lines[name_and_unit(heading)[0]] = heading
+    return lines, passed
+
+
+def _listing(variables: dict[str, Variable]) -> str:
+    parts = [f"'{name[:60]}' {np.shape(variable.values)}" for name, variable in list(variables.items())[:12]]
+    return ", ".join(parts + ["…"] * (len(variables) > 12)) or "nothing"

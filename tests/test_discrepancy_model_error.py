@@ -1,0 +1,173 @@
+"""Models that are wrong in small ways: how their error is weighed, what is named all the same, and what is not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from planted_cases import MASS, NOISE, STIFFNESS, linear_motion, motion_with, planted_case
+
+from bench.discrepancy import diagnose
+from bench.discrepancy.effects.catalogue import effect_named
+from bench.discrepancy.fitting.map_fit import fit
+from bench.discrepancy.judgement.held_out import HeldOut, held_out, shares
+from bench.discrepancy.likelihood.model_error import (
+    band_weights,
+    crude_error,
+    error_left,
+    own_noise,
+    smoothed,
+)
+from bench.discrepancy.likelihood.problem import Problem
+from bench.discrepancy.model.rigs import structure_of
+from bench.discrepancy.search.explain import Explanation
+
+FEW = [
+    effect_named(name)
+    for name in (
+        "cubic_stiffness",
+        "gap",
+        "coulomb_friction",
+        "quadratic_damping",
+        "stiffness_drift",
+        "mass_error",
+    )
+]
+UNSTATED = {"force": None, "displacement": None, "acceleration": None}
+UNDERSTATED = {"force": 0.0, **{name: 0.4 * NOISE[name] for name in ("displacement", "acceleration")}}
+
+
+def resonating(x, v, z):
+    """Cubic spring, and besides a hidden part of the mass on a spring of its own, at 12 Hz, damped by 5 %."""
+    hidden, omega = 0.005 * MASS, 2.0 * np.pi * 12.0
+    pull = hidden * (omega**2 * (x - z[0]) + 0.1 * omega * (v - z[1]))
+    return 8e5 * x**3 + pull, [z[1], pull / hidden]
+
+
+def only_resonating(x, v, z):
+    cubic, rates = resonating(x, v, z)
+    return cubic - 8e5 * x**3, rates
+
+
+def humming(x, a, force):
+    """A little of what mains do to sensors, slow noise, and a late clock."""
+    n = len(x)
+    rng = np.random.default_rng(3)
+    slow = np.cumsum(rng.standard_normal(n))
+    slow -= np.linspace(slow[0], slow[-1], n)
+    hum = np.sin(2.0 * np.pi * 50.0 * np.arange(n) / 500.0)
+    return (
+        x + 0.02 * np.std(x) * (slow / np.std(slow) + hum),
+        a + 0.02 * np.std(a) * hum,
+    )
+
+
+def problem_of(case, error=None):
+    return Problem(case, structure_of(case), case.identification, error=error)
+
+
+def test_an_octave_counts_as_so_many_samples_however_finely_it_is_sampled():
+    for n in (300, 2048, 2500):
+        weights = band_weights(n, 4.0)
+        assert weights.max() == 1.0
+        for first in (64, 128):
+            assert np.sum(weights[first : 2 * first]) == pytest.approx(4.0)
+    assert band_weights(2048 + 1024, 4.0)[2048:].sum() == pytest.approx(2.0)  # half an octave
+
+
+def test_a_spectrum_is_smoothed_over_a_part_of_an_octave_and_keeps_its_level():
+    power = np.random.default_rng(1).exponential(3.0, (2000, 1))
+    level = smoothed(power)
+    assert np.std(level[500:]) < 0.2
+    assert np.mean(level) == pytest.approx(3.0, rel=0.05)
+
+
+def test_the_error_is_never_below_noise_and_makes_the_reference_consistent():
+    case = planted_case(lambda f: motion_with(f, resonating, 2), humming)
+    plain = problem_of(case)
+    nominal = fit(plain, (), start=np.zeros(3))
+    assert nominal.reduced > 100.0
+    predict = Explanation(((plain, nominal),)).predict
+    weighed = problem_of(case, error_left(plain.data, plain.structure, predict))
+    # the covariance that residuals are whitened by, the weights taken back
+    assert weighed.error is not None
+    for before, after in zip(plain.data, weighed.data, strict=True):
+        counted = weighed.error.weights(after.n_bins)[:, None]
+        assert np.all(own_noise(after) * counted >= own_noise(before) * (1.0 - 1e-9))
+    left = weighed.residual((), nominal.vector)
+    assert float(left @ left) < 1.3 * weighed.n_residuals
+    assert 60.0 < weighed.n_residuals < 120.0
+    # what so few samples say moves no parameter by tens of its stated deviations
+    assert np.abs(fit(weighed, (), start=np.zeros(3)).vector).max() < np.abs(nominal.vector).max()
+
+
+def test_what_a_block_would_be_predicted_without_it_is_what_a_fit_without_it_predicts():
+    case = planted_case(noise=UNSTATED)
+    problem = problem_of(case, crude_error(case, structure_of(case)))
+    fitted = fit(problem, (), start=np.zeros(3), tolerance=1e-9)
+    found = held_out(Explanation(((problem, fitted),)))
+    assert len(found.scores) == 12
+    inside = float(np.sum(problem.residual((), fitted.vector) ** 2))
+    assert found.total > inside  # a block that was not seen is predicted worse
+    assert found.total < 1.5 * inside + 3.0
+
+
+def test_weights_average_over_what_blocks_say():
+    rng = np.random.default_rng(0)
+    alike = [HeldOut(Explanation(()), np.ones(12)), HeldOut(Explanation(()), np.ones(12))]
+    assert shares(alike, np.zeros(2), rng) == pytest.approx([0.5, 0.5])
+    one_block = np.zeros(12)
+    one_block[3] = 40.0
+    lucky = [HeldOut(Explanation(()), np.zeros(12)), HeldOut(Explanation(()), one_block)]
+    steady = [HeldOut(Explanation(()), np.zeros(12)), HeldOut(Explanation(()), np.full(12, 40.0 / 12))]
+    # what a single block decides is less certain than what all of them say
+    assert shares(lucky, np.zeros(2), rng)[1] > 1e3 * shares(steady, np.zeros(2), rng)[1]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("noise", [NOISE, UNSTATED, UNDERSTATED], ids=["stated", "unstated", "understated"])
+def test_an_effect_is_named_over_a_background_that_no_model_has(noise):
+    case = planted_case(lambda f: motion_with(f, resonating, 2), humming, noise=noise)
+    verdict = diagnose(case, catalogue=FEW).verdict
+    assert verdict.verdict == "effect"
+    first = verdict.named[0]
+    assert first.name == "cubic_stiffness"
+    assert not verdict.complete
+    assert verdict.gap.after < 0.3 * verdict.gap.parameters_only
+    low, high = first.closed_ci95
+    assert low <= first.closed <= high
+    assert first.closed > 0.5
+    k3 = first.parameters["k3"]
+    assert abs(k3.value - 8e5) < 3.0 * k3.std
+    assert k3.std > 2e-3 * k3.value  # nothing is known to a thousandth from a model that is wrong by more
+    assert all(abs(p.shift_in_std) < 3.0 for p in verdict.nominal)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("noise", [NOISE, UNSTATED], ids=["stated", "unstated"])
+def test_a_background_alone_is_not_named_with_certainty(noise):
+    case = planted_case(lambda f: motion_with(f, only_resonating, 2), humming, noise=noise)
+    verdict = diagnose(case, catalogue=FEW).verdict
+    assert not [e for e in verdict.named if e.probability >= 0.9]
+
+
+@pytest.mark.slow
+def test_a_mass_beyond_its_uncertainty_is_named_and_not_moved_in_silence():
+    def heavy(force):
+        return linear_motion(force, mass=1.3 * MASS, stiffness=STIFFNESS)
+
+    case = planted_case(heavy, humming, noise=UNSTATED)
+    verdict = diagnose(case, catalogue=FEW).verdict
+    assert [e.name for e in verdict.named] == ["mass_error"]
+    assert verdict.named[0].parameters["relative_error"].value == pytest.approx(0.29, abs=0.03)
+    assert all(abs(p.shift_in_std) < 3.0 for p in verdict.nominal)
+
+
+@pytest.mark.slow
+def test_noise_that_nobody_stated_is_no_effect():
+    case = planted_case(noise=UNSTATED)
+    verdict = diagnose(case, catalogue=FEW).verdict
+    assert verdict.verdict == "none"
+    quiet = replace(case, validation=case.identification)
+    assert diagnose(quiet, catalogue=FEW).verdict.verdict == "none"
