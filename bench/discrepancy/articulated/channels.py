@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from bench.discrepancy.case.case import Case, CaseChannel
-from bench.discrepancy.likelihood.whitening import noise_floor
+from bench.discrepancy.case.channel_noise import noise_floor
 from bench.errors import FileFormatError, UnknownNameError
 
 SENSORS = {
