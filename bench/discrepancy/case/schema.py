@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from bench.discrepancy.case.acquisition import Antialias, Interpolation
+from bench.discrepancy.case.single_axis import LOADS as LOAD_NAMES
+from bench.discrepancy.case.single_axis import MOTIONS
 from bench.documents import (
     Document,
     Entry,
@@ -51,10 +53,8 @@ PARAMETERS: dict[str, tuple[str, ...]] = {
 RIGS = tuple(PARAMETERS)
 """The bench's rigs that a nominal model may be."""
 RESPONSES: dict[str, tuple[str, ...]] = {
-    "sdof": ("displacement", "velocity", "acceleration"),
-    "damper": (
-        "force", "displacement", "velocity", "acceleration", "torque", "angle", "rotation", "angular_velocity", "angular_acceleration",
-    ),
+    "sdof": tuple(name for names in MOTIONS for name in names),
+    "damper": (*LOAD_NAMES, *(name for names in MOTIONS for name in names)),
     "joint": tuple(
         f"{quantity}_{body}"
         for quantity in ("displacement", "velocity", "acceleration", "rotation", "angular_velocity", "angular_acceleration")
@@ -256,12 +256,6 @@ MOTION = {
     "rotation": ("torsional", "rad"), "angle": ("torsional", "rad"), "angular_velocity": ("torsional", "rad/s"),
     "angular_acceleration": ("torsional", "rad/s^2"),
 }  # fmt: skip
-PRESCRIBED = (
-    ("displacement", "angle", "rotation"),
-    ("velocity", "angular_velocity"),
-    ("acceleration", "angular_acceleration"),
-)
-"""Names of the channels of a prescribed motion, by their order: linear, rotary."""
 LOADS = {"force": ("axial", "N"), "torque": ("torsional", "N m")}
 CONSTANTS = {
     ("mass", "axial"): ("kg",), ("inertia", "torsional"): ("kg m^2", "kg m^2/rad^2", "kg m^2/rad"),

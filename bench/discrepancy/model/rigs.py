@@ -8,16 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.discrepancy.case.case import Case
-from bench.discrepancy.case.schema import PRESCRIBED
+from bench.discrepancy.case.single_axis import MOTIONS, load_channel, motion_channels, turns
 from bench.discrepancy.model.declared_elements import with_elements
 from bench.discrepancy.model.mjcf import mjcf_structure
 from bench.discrepancy.model.nominal_forces import NominalFriction
 from bench.discrepancy.model.structure import Place, Structure
 from bench.discrepancy.motion.observer import Observer
 from bench.errors import FileFormatError
-
-ANSWERS = ("force", "torque")
-"""What a component takes from a prescribed motion, linear and rotary."""
 
 
 def structure_of(case: Case) -> Structure:
@@ -60,21 +57,21 @@ def _observers(case: Case, table: Sequence[tuple[str, int, NDArray[np.float64]]]
 
 def _sdof(case: Case) -> Structure:
     names = ("mass", "damping", "stiffness", "coulomb")
-    if not case.has("force") and all(c.role == "response" for c in case.channels):
+    load, motion = load_channel(case), motion_channels(case)
+    if not case.has(load) and all(c.role == "response" for c in case.channels):
         raise FileFormatError(
             f"case '{case.name}' has responses alone ({', '.join(c.name for c in case.channels)}): without what drove them nothing can be "
-            'said of the model. Record the force; or, for a free decay, say that it "starts_in_motion"'
+            f'said of the model. Record the {load}; or, for a free decay, say that it "starts_in_motion"'
         )
-    _require(case, ("mass",), ("force",))
+    _require(case, ("mass",), (load,))
     have = tuple(name for name in names if any(p.name == name for p in case.parameters))
     frictions = (NominalFriction(np.ones(1), "coulomb"),) if "coulomb" in have else ()
     stacks = [np.array([[[1.0 if name == kind else 0.0]] for name in have]) for kind in names[:3]]
     one = np.ones(1)
-    length = next((c.unit for c in case.channels if c.name == "displacement"), "m") or "m"
-    observers = _observers(case, (("displacement", 0, one), ("velocity", 1, one), ("acceleration", 2, one)))
+    observers = _observers(case, tuple((motion.get(i, names[0]), i, one) for i, names in enumerate(MOTIONS)))
     place = Place(
-        "", np.ones((1, 1)), length, case.channel("force").unit or "N", ("mass",),
-        "stiffness" if "stiffness" in have else "", "damping" if "damping" in have else "",
+        "", np.ones((1, 1)), *_units(case), ("mass",),
+        "stiffness" if "stiffness" in have else "", "damping" if "damping" in have else "", "carriage",
     )  # fmt: skip
     return Structure(
         ("x",),
@@ -83,24 +80,25 @@ def _sdof(case: Case) -> Structure:
         stacks[1],
         stacks[2],
         np.ones((1, 1)),
-        ("force",),
+        (load,),
         observers,
         (place,),
         frictions=frictions,
     )
 
 
+def _units(case: Case) -> tuple[str, str]:
+    """Units of the position and of the force along the coordinate of a rig that has one."""
+    position, load = motion_channels(case).get(0, ""), load_channel(case)
+    length, force = ("rad", "N m") if turns(case) else ("m", "N")
+    own = case.channel(position).unit if position else ""
+    return own or length, case.channel(load).unit or force
+
+
 def _damper(case: Case) -> Structure:
     """A massless component under prescribed motion; the mass only carries the bookkeeping of the coordinate."""
-    moved = next((c for c in case.channels if c.name in PRESCRIBED[0]), None)
-    answer = next((c for c in case.channels if c.name in ANSWERS), None)
-    if moved is None or answer is None:
-        have = ", ".join(c.name for c in case.channels)
-        raise FileFormatError(
-            f"case '{case.name}' (rig damper) needs a motion ({', '.join(PRESCRIBED[0])}) and what it takes ({', '.join(ANSWERS)}); "
-            f"it has {have}"
-        )
-    rotary = answer.name == "torque"
+    load, position = load_channel(case), motion_channels(case).get(0, MOTIONS[0][0])
+    _require(case, (), (position, load))
     names = tuple(p.name for p in case.parameters if p.name in {"stiffness", "damping", "coulomb"})
     stacks = [
         np.zeros((len(names), 1, 1)),
@@ -110,8 +108,8 @@ def _damper(case: Case) -> Structure:
         ),
     ]
     place = Place(
-        "", np.ones((1, 1)), moved.unit or ("rad" if rotary else "m"), answer.unit or ("N m" if rotary else "N"), (),
-        "stiffness" if "stiffness" in names else "", "damping" if "damping" in names else "",
+        "", np.ones((1, 1)), *_units(case), (),
+        "stiffness" if "stiffness" in names else "", "damping" if "damping" in names else "", "piston",
     )  # fmt: skip
     return Structure(
         ("x",),
@@ -120,8 +118,8 @@ def _damper(case: Case) -> Structure:
         stacks[1],
         stacks[2],
         np.ones((1, 1)),
-        (moved.name,),
-        (Observer(answer.name, 0, np.ones(1)),),
+        (position,),
+        (Observer(load, 0, np.ones(1)),),
         (place,),
         frictions=(NominalFriction(np.ones(1), "coulomb"),) if "coulomb" in names else (),
     )

@@ -11,7 +11,7 @@ from scipy import ndimage
 
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.case.channel_noise import noise_floor
-from bench.discrepancy.case.schema import PRESCRIBED
+from bench.discrepancy.case.single_axis import motion_channels
 from bench.discrepancy.motion.kalman_smoother import resting, smoother_of
 from bench.discrepancy.simulation.stick_slip import Motion
 
@@ -96,13 +96,11 @@ def _edges(error: Array) -> NDArray[np.bool_]:
 
 def _samples(case: Case, record: CaseRecord) -> tuple[tuple[int, ...], Array, Array]:
     """Orders, samples (n, n_channels) and noise of the channels that tell a prescribed motion."""
-    order = {name: order for order, names in enumerate(PRESCRIBED) for name in names}
-    have = sorted(
-        (c.name for c in case.channels if c.name in order and c.name in record.values), key=order.__getitem__
-    )
+    told = {order: name for order, name in motion_channels(case).items() if name in record.values}
+    have = list(told.values())
     noise = [case.channel(name).noise_std or noise_floor(record.values[name]) for name in have]
     samples = np.column_stack([record.values[name] for name in have])
-    return tuple(order[name] for name in have), samples, np.array(noise)
+    return tuple(told), samples, np.array(noise)
 
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
