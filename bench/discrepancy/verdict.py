@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal
 
 from bench.files import json_values
@@ -25,7 +25,7 @@ class NamedEffect:
 
     Attributes:
         name: Name in the catalogue.
-        where: Place; empty on a rig with one joint.
+        where: Place: a joint or tendon of the model, "carriage", "piston", or an axis of the joint rig.
         probability: Posterior probability that it belongs to the explanation.
         parameters: Estimates by name.
         channel: Channel or nominal parameter it acts on, for actuator, sensor and inertia effects.
@@ -220,6 +220,10 @@ class Verdict:
                 f"; most of it in '{own['channel']}', {low:.3g} to {high:.3g} Hz, {first:.3g} to {last:.3g} s"
             )
         return f"Left on the judging records: NRMSE {own['nrmse']:.3g}{noise}{place}."
+
+    def timed(self, seconds: float) -> Verdict:
+        """The verdict with its wall time [s]."""
+        return replace(self, seconds=seconds)
 
     def to_json(self) -> dict[str, Any]:
         """Return the verdict as JSON values; numbers that are not finite become None."""

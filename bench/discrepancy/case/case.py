@@ -59,6 +59,8 @@ class CaseChannel:
         target: Entry of the user's own MJCF that it stands for: "sensor:NAME", "joint:NAME" or "actuator:NAME"; found by
             the channel's own name where empty.
         quantity: "position", "velocity" or "acceleration" of a joint.
+        side: "motor" or "link": where the encoder of a joint with a gear sits.
+        resolution: Step of the encoder; zero where it is not stated.
     """
 
     name: str
@@ -68,6 +70,8 @@ class CaseChannel:
     antialias: Antialias | None = None
     target: str = ""
     quantity: str = ""
+    side: str = ""
+    resolution: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -69,7 +69,8 @@ def read_case(folder: str | Path) -> Case:
     )
     channels = tuple(
         CaseChannel(
-            name, entry.unit, nominal.role_of(name), entry.noise_std, entry.filter(), entry.target, entry.quantity or ""
+            name, entry.unit, nominal.role_of(name), entry.noise_std, entry.filter(), entry.target, entry.quantity or "",
+            entry.side or "", entry.resolution,
         )
         for name, entry in nominal.channels.items()
         if name != "time"

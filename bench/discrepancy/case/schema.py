@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from bench.discrepancy.case.acquisition import Antialias, Interpolation
+from bench.discrepancy.case.single_axis import LOADS as LOAD_NAMES
+from bench.discrepancy.case.single_axis import MOTIONS
 from bench.documents import (
     Document,
     Entry,
@@ -51,8 +53,8 @@ PARAMETERS: dict[str, tuple[str, ...]] = {
 RIGS = tuple(PARAMETERS)
 """The bench's rigs that a nominal model may be."""
 RESPONSES: dict[str, tuple[str, ...]] = {
-    "sdof": ("displacement", "velocity", "acceleration"),
-    "damper": ("force", "displacement", "velocity", "acceleration"),
+    "sdof": tuple(name for names in MOTIONS for name in names),
+    "damper": (*LOAD_NAMES, *(name for names in MOTIONS for name in names)),
     "joint": tuple(
         f"{quantity}_{body}"
         for quantity in ("displacement", "velocity", "acceleration", "rotation", "angular_velocity", "angular_acceleration")
@@ -131,6 +133,10 @@ class ChannelEntry(Entry):
     """Actuator of your own MJCF that it stands for."""
     quantity: Literal["position", "velocity", "acceleration"] | None = None
     """What of a joint."""
+    side: Literal["motor", "link"] | None = None
+    """Where the encoder of a geared joint sits; both are tried where it is not said."""
+    resolution: NotNegative = 0.0
+    """Step of an encoder."""
 
     @model_validator(mode="after")
     def _refers_to_one_thing(self) -> ChannelEntry:

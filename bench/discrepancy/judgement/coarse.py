@@ -11,13 +11,14 @@ References:
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.fitting.map_fit import fit
 from bench.discrepancy.judgement.held_out import HeldOut, held_out, shares
+from bench.discrepancy.judgement.steady import diverges, steadied
 from bench.discrepancy.judgement.validation_discrepancy import discrepancies, noise_floors
 from bench.discrepancy.likelihood.problem import Array, Problem
 from bench.discrepancy.search.explain import Explanation, nominal_alone
@@ -119,12 +120,22 @@ def judge(
     weights = shares(found, np.array([_log_prior(e.explanation) for e in found]), rng)
     within = tuple(entry for entry in found if _as_good(entry, base, settings))
     vetoed, part = False, settings.most if trusted else settings.pays
-    for entry in sorted(within, key=_plainness):
+    for own in sorted(within, key=_plainness):
+        entry = _steady(own, case, rng)
         e = entry.explanation
         if not e.hypothesis or known.pays(e, nothing, part):
+            found = [entry if other is own else other for other in found]
             return Judged(entry, tuple(found), weights, within, vetoed, known.left(e, nothing))
         vetoed = True
     return Judged(found[-1], tuple(found), weights, within, True, 1.0)
+
+
+def _steady(entry: HeldOut, case: Case, rng: np.random.Generator) -> HeldOut:
+    """An explanation on held-out blocks, moved within its uncertainty where it diverges on the judging records."""
+    if not entry.explanation.hypothesis or not diverges(entry.explanation, case.validation):
+        return entry
+    moved = steadied(entry.explanation, case.validation, rng)
+    return entry if moved is None else replace(entry, explanation=moved)
 
 
 def bounded(explanation: Explanation, within: float) -> Explanation:

@@ -29,6 +29,8 @@ from numpy.typing import NDArray
 
 from bench import native
 from bench.discrepancy.case.case import Case, CaseChannel
+from bench.discrepancy.model.mjcf_couplings import LINK, constrained, rows_of, stiff_modes, without_equalities
+from bench.discrepancy.model.mjcf_file import rig_of
 from bench.discrepancy.model.mjcf_friction import nominal_frictions
 from bench.discrepancy.model.mjcf_gravity import gravity_springs, has_gravity, without_gravity
 from bench.discrepancy.model.mjcf_limits import check_reach, free_of_constraints
@@ -58,11 +60,10 @@ def mjcf_structure(case: Case) -> Structure:
         FileFormatError: An entry is not of the form expected.
     """
     path = Path(case.folder or ".") / case.rig
-    own = Rig.from_file(path)
-    joints = sorted({c.target.removeprefix("joint:") for c in case.channels if c.target.startswith("joint:")})
-    rig = free_of_constraints(own, joints, prefix=PROBE)
+    own = rig_of(case)
+    rig, links = plain_rig(case, own)
     structural = [_structural(p.name, rig) for p in case.parameters]
-    loads, responses = _channels(case, rig)
+    loads, responses = loads_and_responses(case, rig)
     parameters = [name for name in structural if not name.startswith("structure/frictionloss/")]
     try:
         linear, bent = _linear(rig, [sensor for _, sensor, _ in responses] + _cells(loads), parameters)
@@ -93,7 +94,18 @@ def mjcf_structure(case: Case) -> Structure:
         places, fixed, _frictions(own, linear, names, case.identification[0].step), springs,
     )  # fmt: skip
     check_reach(case, structure, own, {channel.name: actuator for channel, actuator in loads}, linear.dofs)
-    return structure
+    structure = constrained(
+        structure, rows_of(own.model, links, structure.dofs), [next(iter(link)) for link in links]
+    )
+    values = np.array([p.value for p in case.parameters])
+    return constrained(structure, stiff_modes(structure, values, min(r.step for r in case.identification)))
+
+
+def plain_rig(case: Case, own: Rig) -> tuple[Rig, list[dict[str, float]]]:
+    """The user's model without what is no matrix, with sensors for channels that refer to joints; and its linear equalities."""
+    joints = sorted({c.target.removeprefix("joint:") for c in case.channels if c.target.startswith("joint:")})
+    coupled, links = without_equalities(own)
+    return free_of_constraints(coupled, joints, prefix=PROBE), links
 
 
 def _linear(rig: Rig, channels: Sequence[str], parameters: Sequence[str]) -> tuple[LinearRig, bool]:
@@ -122,7 +134,7 @@ def _structural(name: str, rig: Rig) -> str:
     return f"structure/{kind}/{target}"
 
 
-def _channels(
+def loads_and_responses(
     case: Case, rig: Rig
 ) -> tuple[list[tuple[CaseChannel, str]], list[tuple[CaseChannel, str, int | None]]]:
     """Loads with their actuator or its force sensor; responses with their sensor, and the order where a joint is meant."""
@@ -283,7 +295,7 @@ def _frictions(own: Rig, linear: LinearRig, names: Sequence[str], step: float) -
     frictional = [
         name
         for name in tendons
-        if f"frictionloss:{name}" in names or model.tendon(name).frictionloss[0] > 0.0
+        if f"frictionloss:{name}" in names or model.tendon_frictionloss[model.tendon(name).id] > 0.0
     ]
     rows = [(name, _row(model, name, linear.dofs)) for name in (*joints, *frictional)]
     return nominal_frictions(model, rows, names, step)
@@ -294,7 +306,7 @@ def _places(
 ) -> tuple[Place, ...]:
     model = rig.model
     joints = [model.joint(int(model.dof_jntid[dof])).name for dof in linear.dofs]
-    tendons = [model.tendon(i).name for i in range(model.ntendon)]
+    tendons = [name for i in range(model.ntendon) if not (name := model.tendon(i).name).startswith(LINK)]
     known = [name for name in (*joints, *tendons) if name and (name in joints or _is_fixed(model, name))]
     wanted = case.options.get("places", known)
     if not isinstance(wanted, (list, tuple)) or not wanted:
@@ -316,7 +328,7 @@ def _places(
             Place(
                 "" if len(wanted) == 1 else name, row[None, :], "rad" if hinge else "m", "N m" if hinge else "N",
                 tuple(names[i] for i in own[0]),
-                next((names[i] for i in own[2]), ""), next((names[i] for i in own[1]), ""),
+                next((names[i] for i in own[2]), ""), next((names[i] for i in own[1]), ""), name,
             )
         )  # fmt: skip
     return tuple(out)

@@ -8,7 +8,7 @@ the deviation of each nominal parameter becomes one column of a linear least-squ
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -24,13 +24,14 @@ class Place:
     """Where an effect can sit.
 
     Attributes:
-        name: "" on a rig with one joint; "axial", "torsional", "joint" on the joint rig; a joint name otherwise.
+        name: "" where there is one place only; "axial", "torsional", "joint" on the joint rig; a joint name otherwise.
         rows: (n_coordinates, n_dof) relative coordinates.
         position_unit: Unit of the coordinate.
         force_unit: Unit of the force on it.
         mass: Names of the nominal parameters that are inertias moved along this coordinate.
         stiffness: Name of the nominal stiffness that acts on this coordinate; empty where there is none.
         damping: Likewise for the damping.
+        label: What to call it where `name` is empty.
     """
 
     name: str
@@ -40,6 +41,12 @@ class Place:
     mass: tuple[str, ...] = ()
     stiffness: str = ""
     damping: str = ""
+    label: str = ""
+
+    @property
+    def site(self) -> str:
+        """Its name in words: never empty on a rig that is known."""
+        return self.name or self.label
 
 
 @dataclass(frozen=True)
@@ -157,7 +164,7 @@ class Structure:
                 if np.abs(o.row[keep]).sum() > 0
             ),
             tuple(
-                Place(p.name, p.rows[:, keep], p.position_unit, p.force_unit, p.mass, p.stiffness, p.damping)
+                replace(p, rows=p.rows[:, keep])
                 for p in self.places
                 if np.abs(p.rows[:, keep]).sum() == np.abs(p.rows).sum()
             ),

@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
+from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis
 from bench.discrepancy.judgement.validation_discrepancy import coordinates
 from bench.discrepancy.likelihood.problem import Array
 from bench.discrepancy.localisation.localise import box
 from bench.discrepancy.localisation.state_map import StateMap
+from bench.discrepancy.report.articulated import write_articulated_rerun
 from bench.discrepancy.report.simulated_records import MEASURED, place_channels, variants
 
 if TYPE_CHECKING:
@@ -25,7 +27,7 @@ SMALLEST_GAP = 0.02
 """The same as a part of the channel's standard deviation: a gap below it nobody would see."""
 
 
-def write_rerun(diagnosis: Diagnosis, path: str | Path) -> None:
+def write_rerun(diagnosis: Diagnosis | ArticulatedDiagnosis, path: str | Path) -> None:
     """Write the first judging record of a diagnosis, measured and simulated, as a ``.rrd`` file.
 
     Args:
@@ -37,6 +39,9 @@ def write_rerun(diagnosis: Diagnosis, path: str | Path) -> None:
     """
     from bench.rerun_log import log_comparison  # noqa: PLC0415  (rerun, for pictures only)
 
+    if isinstance(diagnosis, ArticulatedDiagnosis):
+        write_articulated_rerun(diagnosis, path)
+        return
     runs = variants(diagnosis)
     loops = []
     for found in diagnosis.where.maps:

@@ -1,0 +1,244 @@
+"""Maximum a posteriori fits of hypotheses about an articulated model.
+
+The joints share nothing but the masses of the bodies. So a hypothesis about one joint is fitted with that joint's runs alone; what the
+others know of the masses enters as a quadratic form, once their own parameters are eliminated (`Others`). The residuals of a joint are
+divided by the scale that the last fit left on it, at least one: the fit of one joint is then not ruled by another at which something
+else is missing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.discrepancy.articulated.problem import ArticulatedProblem, Hypothesis, misfit_of
+from bench.discrepancy.numerics.least_squares import Prior, minimise
+from bench.discrepancy.numerics.threads import in_threads
+
+Array = NDArray[np.float64]
+REACH = 4.0
+"""Longest step of a fit, in prior standard deviations."""
+DIFFERENCE = 1e-4
+"""Difference of a parameter, in prior standard deviations, for what the joints know of the masses."""
+
+
+@dataclass(frozen=True, eq=False)
+class ArticulatedFit:
+    """A fitted hypothesis.
+
+    Attributes:
+        hypothesis: Its effects.
+        vector: Estimates.
+        covariance: Of the vector; the residuals' scale is that which they leave, at least one.
+        chi2: (n_joints,) sums of squared whitened innovations.
+        count: (n_joints,) their numbers.
+        log_posterior: Laplace approximation of the log posterior of the hypothesis, up to a constant.
+    """
+
+    hypothesis: Hypothesis
+    vector: Array
+    covariance: Array
+    chi2: Array
+    count: Array
+    log_posterior: float
+
+    @classmethod
+    def at(cls, problem: ArticulatedProblem, hypothesis: Hypothesis, vector: Array) -> ArticulatedFit:
+        """A hypothesis as it stands at a vector (whose further entries are left out), not fitted and without a posterior."""
+        size = problem.size(hypothesis)
+        residuals = [problem.residual(j, hypothesis, vector[:size]) for j in range(len(problem.joints))]
+        chi2 = np.array([float(r @ r) for r in residuals])
+        count = np.array([float(len(r)) for r in residuals])
+        _, std, _, _ = problem.prior(hypothesis)
+        return cls(hypothesis, vector[:size], np.diag(std**2), chi2, count, -np.inf)
+
+    @property
+    def reduced(self) -> Array:
+        """Mean squared whitened innovation of every joint; one where nothing is missing."""
+        return self.chi2 / self.count
+
+    @property
+    def scale(self) -> Array:
+        """Scale (n_joints,) of the residuals, at least one."""
+        return np.sqrt(np.maximum(self.reduced, 1.0))
+
+
+@dataclass(frozen=True, eq=False)
+class Others:
+    """What a fit says of every joint, for fits of hypotheses about a few of them.
+
+    Attributes:
+        base: The fit.
+        factors: (n_joints,) of triangular (n_masses, n_masses) factors of the information on the masses' deviations.
+        targets: (n_joints,) of what factor times deviation should be (n_masses,).
+    """
+
+    base: ArticulatedFit
+    factors: tuple[Array, ...]
+    targets: tuple[Array, ...]
+
+    @classmethod
+    def of(cls, problem: ArticulatedProblem, base: ArticulatedFit) -> Others:
+        """Linearise every joint about a fit and eliminate its own parameters."""
+        masses = list(problem.masses)
+
+        def eliminated(j: int) -> tuple[Array, Array]:
+            own = [*problem.locals(j), *_own_effects(problem, base.hypothesis, j)]
+            columns = own + masses
+            jacobian, residual = linearised(problem, base, j, columns)
+            _, std, _, _ = problem.prior(base.hypothesis)
+            mean, _, _, _ = problem.prior(base.hypothesis)
+            rows = np.zeros((len(own), len(columns)))
+            rows[np.arange(len(own)), np.arange(len(own))] = 1.0 / std[own]
+            deviation = (base.vector[own] - mean[own]) / std[own]
+            stacked = np.column_stack([np.vstack([jacobian, rows]), np.concatenate([residual, deviation])])
+            r = np.linalg.qr(stacked, mode="r")
+            k, m = len(own), len(masses)
+            factor, left = r[k : k + m, k : k + m], r[k : k + m, -1]
+            return factor, factor @ base.vector[masses] - left
+
+        found = in_threads(eliminated, range(len(problem.joints)))
+        return cls(base, tuple(f for f, _ in found), tuple(t for _, t in found))
+
+
+def _own_effects(problem: ArticulatedProblem, hypothesis: Hypothesis, j: int) -> list[int]:
+    """Entries of a vector that belong to free parameters of effects at joint `j` alone."""
+    out, at = [], len(problem.nominal)
+    for placed in hypothesis:
+        for p in placed.effect.parameters:
+            if problem.reached((placed,)) == (j,) and not p.fixed:
+                out.append(at)
+            at += 1
+    return out
+
+
+def linearised(
+    problem: ArticulatedProblem, base: ArticulatedFit, j: int, columns: Sequence[int]
+) -> tuple[Array, Array]:
+    """Jacobian (n, n_columns) and residual (n,) of joint `j` at a fit, in units of the scale that it leaves there."""
+    _, std, _, high = problem.prior(base.hypothesis)
+    residual = problem.residual(j, base.hypothesis, base.vector) / base.scale[j]
+
+    def column(i: int) -> Array:
+        step = (
+            DIFFERENCE * std[i] if base.vector[i] + DIFFERENCE * std[i] <= high[i] else -DIFFERENCE * std[i]
+        )
+        moved = base.vector.copy()
+        moved[i] += step
+        return (problem.residual(j, base.hypothesis, moved) / base.scale[j] - residual) / step
+
+    return np.column_stack([column(i) for i in columns]) if len(columns) else np.zeros(
+        (len(residual), 0)
+    ), residual
+
+
+def fit(
+    problem: ArticulatedProblem,
+    hypothesis: Hypothesis,
+    start: Array,
+    *,
+    scale: Array,
+    iterations: int,
+    others: Others | None = None,
+    limit: float = np.inf,
+) -> ArticulatedFit:
+    """Fit a hypothesis.
+
+    Args:
+        problem: Records and priors.
+        hypothesis: Effects.
+        start: Vector to start from, or several (k, n).
+        scale: (n_joints,) of the residuals.
+        iterations: Most steps.
+        others: What is known of the joints that the hypothesis does not change beyond its base's; they are all run where None.
+        limit: Cost that has to be within sight.
+    """
+    starts = np.atleast_2d(start)
+    n_joints = len(problem.joints)
+    new = hypothesis[len(others.base.hypothesis) :] if others else hypothesis
+    active = problem.reached(new) if others and new else tuple(range(n_joints))
+    passive = [j for j in range(n_joints) if j not in active]
+    masses = list(problem.masses)
+
+    def residual_at(vector: Array) -> Array:
+        parts = in_threads(lambda j: problem.residual(j, hypothesis, vector) / scale[j], active)
+        for j in passive:
+            assert others is not None
+            parts.append(others.factors[j] @ vector[masses] - others.targets[j])
+        return np.concatenate(parts)
+
+    mean, std, low, high = problem.prior(hypothesis)
+    free = _free(problem, hypothesis, active if passive else None)
+    found = minimise(
+        residual_at, starts, prior=Prior(mean, std, low, high), free=free, reach=np.full(len(free), REACH),
+        iterations=iterations, limit=limit,
+    )  # fmt: skip
+    return _summary(problem, hypothesis, found.vector, found.curvature, free, scale, active, others)
+
+
+def _free(
+    problem: ArticulatedProblem, hypothesis: Hypothesis, active: Sequence[int] | None
+) -> NDArray[np.int64]:
+    """Entries that a fit moves: all that are free, or those of the active joints and the masses."""
+    out = [
+        i for i, p in enumerate(problem.nominal) if active is None or p.kind == "mass" or p.joint in active
+    ]
+    at = len(problem.nominal)
+    for placed in hypothesis:
+        for p in placed.effect.parameters:
+            mine = active is None or any(j in active for j in problem.reached((placed,)))
+            if not p.fixed and mine:
+                out.append(at)
+            at += 1
+    return np.array(out, dtype=np.int64)
+
+
+def _summary(
+    problem: ArticulatedProblem,
+    hypothesis: Hypothesis,
+    vector: Array,
+    curvature: Array,
+    free: NDArray[np.int64],
+    scale: Array,
+    active: Sequence[int],
+    others: Others | None,
+) -> ArticulatedFit:
+    n_joints = len(problem.joints)
+    chi2, count = np.zeros(n_joints), np.zeros(n_joints)
+    for j in range(n_joints):
+        if j in active or others is None:
+            residual = problem.residual(j, hypothesis, vector)
+            chi2[j], count[j] = float(residual @ residual), len(residual)
+        else:
+            # what the other joints lose by masses that suit this one
+            masses = list(problem.masses)
+            base = others.base
+            now = others.factors[j] @ vector[masses] - others.targets[j]
+            then = others.factors[j] @ base.vector[masses] - others.targets[j]
+            chi2[j] = base.chi2[j] + scale[j] ** 2 * float(now @ now - then @ then)
+            count[j] = base.count[j]
+    total = sum(misfit_of(c, int(n)) for c, n in zip(chi2, count, strict=True))
+    mean, std, _, _ = problem.prior(hypothesis)
+    covariance = np.zeros((len(vector), len(vector)))
+    inverse = np.linalg.pinv(curvature)
+    covariance[np.ix_(free, free)] = inverse * np.outer(std[free], std[free])
+    every = _free(problem, hypothesis, None)
+    deviation = ((vector - mean) / std)[every]
+    sign, logdet = np.linalg.slogdet(curvature)
+    occam = -0.5 * float(logdet) if sign > 0 else 0.0
+    if others is not None and len(free) < len(every):
+        occam += _occam_of_rest(others, set(free.tolist()), std)
+    log_posterior = -0.5 * total - 0.5 * float(deviation @ deviation) + occam
+    return ArticulatedFit(hypothesis, vector, covariance, chi2, count, log_posterior)
+
+
+def _occam_of_rest(others: Others, moved: set[int], std: Array) -> float:
+    """Occam factor of the parameters that a fit did not move, as its base had it: the same in all that are compared."""
+    covariance = others.base.covariance / np.outer(
+        std[: len(others.base.vector)], std[: len(others.base.vector)]
+    )
+    rest = [i for i in range(len(covariance)) if i not in moved and covariance[i, i] > 0.0]
+    return 0.0 if not rest else 0.5 * float(np.linalg.slogdet(covariance[np.ix_(rest, rest)])[1])

@@ -1,0 +1,293 @@
+"""One joint of an articulated model free, all others moving as measured: a prediction-error run, compiled.
+
+Along the measured motion the equation of joint *j* is that of one degree of freedom with time-varying coefficients,
+
+    M_jj(t) q'' + b_j(t) + K_j(t) (q - q_m(t)) + f(q, q', z) = tau(t, q, q'),
+
+with ``b_j`` what the inverse dynamics of the nominal model asks of the joint besides its own acceleration, and ``K_j`` its derivative by
+the angle: both are read off MuJoCo once a record. At every sample the prediction is held against the encoder, and the state is moved by a
+constant gain times the innovation; without noise of the torque that gain is zero and the run is a free one (output error).
+
+The step is a leapfrog one: half a drift, a kick, half a drift. Damping, bristles and a servo's velocity gain are implicit in the kick,
+and dry friction is its proximal map (it truly sticks), so that no stiffness of the friction limits the step.
+
+References:
+    L. Ljung, *System Identification*, 2nd ed. 1999, section 4.3 and chapter 7 (innovations form, prediction errors);
+    J. J. Moreau, *Unilateral contact and dry friction in finite freedom dynamics*, 1988 (implicit dry friction);
+    C. Canudas de Wit et al., IEEE Trans. Autom. Control 40 (1995) 419-425 (bristles).
+"""
+
+from __future__ import annotations
+
+import math
+from enum import IntEnum
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Slot(IntEnum):
+    """Entries of the parameter vector of a run; zero switches an effect off, except where noted."""
+
+    GEAR = 0  # factor of the actuator's force
+    SERVO = 1  # 1: the input is a position target, 0: it is a force
+    KP = 2
+    KV = 3
+    LOW = 4  # limits of the actuator's force
+    HIGH = 5
+    DAMPING = 6
+    STIFFNESS = 7
+    REFERENCE = 8  # angle without spring force
+    INERTIA = 9  # inertia besides that of the coefficients, on the motor's side
+    LIMIT = 10  # dry friction: limit, relative rise at rest, Stribeck velocity, part of the torque carried
+    RISE = 11
+    STRIBECK = 12
+    CARRIED = 13
+    QUADRATIC = 14
+    OFFSET = 15
+    BRISTLE_LIMIT = 16
+    BRISTLE_STIFFNESS = 17
+    BRISTLE_DAMPING = 18
+    COGGING = 19  # amplitude, periods a turn, phase
+    PERIODS = 20
+    PHASE = 21
+    STOP = 22  # stiffness, position, damping, side (+1, -1)
+    STOP_AT = 23
+    STOP_DAMPING = 24
+    STOP_SIDE = 25
+    DEADBAND = 26  # half width, of the servo's position error or of the force
+    LAG = 27  # time constant [s]
+    DELAY = 28  # of the input [s]
+    TRAIN = 29  # 1: an elastic drive train between motor and link
+    TRAIN_STIFFNESS = 30
+    TRAIN_DAMPING = 31
+    CLEARANCE = 32  # half of the play
+    MOTOR = 33  # inertia of the motor, at the joint
+    ENCODER = 34  # 0: on the motor, 1: on the link
+    SPEED_LIMIT = 35  # speed at which the force available has fallen to zero; 0: no such limit
+    RATIO = (
+        36  # reading of the encoder that a servo acts on over the true position; one where nothing is wrong
+    )
+
+    ON_LINK = 37  # 1: damping acts on the link's side of a train
+
+
+SLOTS = len(Slot)
+
+
+FAR = 1e6
+"""Error from which a run counts as diverged [rad, m, or these per second]."""
+
+_inlined = numba.njit(cache=True, error_model="numpy", nogil=True, inline="always")
+
+
+@_inlined
+def _input(u, k, shift):
+    """Input at the middle of step `k`, delayed by `shift` steps."""
+    at = k - shift
+    if at <= 0.0:
+        return u[0]
+    low = int(at)
+    if low >= u.shape[0] - 1:
+        return u[u.shape[0] - 1]
+    return u[low] + (at - low) * (u[low + 1] - u[low])
+
+
+@_inlined
+def _beyond(x, width):
+    """What of `x` lies beyond a dead band of half width `width`."""
+    if x > width:
+        return x - width
+    if x < -width:
+        return x + width
+    return 0.0
+
+
+@_inlined
+def _actuator(p, command, q, v, lagged, keep):
+    """Force of the actuator at the joint, the part of its velocity gain that the step may take implicitly, and the state of its lag."""
+    implicit = 0.0
+    if p[1] > 0.5:  # a servo
+        wanted = p[2] * _beyond(command - p[36] * q, p[26]) - p[3] * p[36] * v
+        implicit = p[3] * p[36]
+    else:
+        wanted = p[2] * _beyond(command, p[26])
+    if p[27] > 0.0:
+        lagged = wanted if math.isnan(lagged) else wanted + (lagged - wanted) * keep
+        wanted = lagged
+        implicit = 0.0
+    low, high = p[4], p[5]
+    if p[35] > 0.0:  # the force available falls with the speed
+        high = min(high, high * max(0.0, 1.0 - v / p[35]))
+        low = max(low, low * max(0.0, 1.0 + v / p[35]))
+    if wanted > high or wanted < low:
+        wanted = min(max(wanted, low), high)
+        implicit = 0.0
+    return p[0] * wanted, p[0] * implicit, lagged
+
+
+@_inlined
+def _stop(p, x, w):
+    """Force of the one-sided stop on the joint; it only pushes."""
+    depth = p[25] * (x - p[23])
+    if p[22] > 0.0 and depth > 0.0:
+        return -p[25] * max(p[22] * depth + p[24] * p[25] * w, 0.0)
+    return 0.0
+
+
+@_inlined
+def _friction_limit(p, v, load):
+    """Limit of the dry friction."""
+    limit = p[10]
+    if p[11] != 0.0:
+        ratio = v / p[12]
+        limit *= 1.0 + p[11] * math.exp(-ratio * ratio)
+    return limit + p[13] * load
+
+
+@_inlined
+def _bristles(p, v, z):
+    """Force of the bristles at velocity `v`, and the damping that the step may take implicitly."""
+    if p[16] <= 0.0:
+        return 0.0, 0.0
+    damping = p[18] * (1.0 - p[17] / p[16] * z * math.copysign(1.0, v))
+    implicit = 0.5 * max(damping, 0.0)
+    return -p[17] * z - (damping - implicit) * v, implicit
+
+
+@_inlined
+def _slid(p, z, v, step):
+    """The bristles after a step of sliding at velocity `v`; exact where that is constant."""
+    if p[16] <= 0.0:
+        return z
+    steady = math.copysign(p[16] / p[17], v)
+    return steady + (z - steady) * math.exp(-p[17] * abs(v) * step / p[16])
+
+
+@_inlined
+def _kick_train(p, mass, step, motor_force, link_force, damping, implicit, bristle, limit, q, v, ql, vl):
+    """New velocities of motor and link: implicit in the damping of the train, dry friction on the motor by its proximal map."""
+    motor, link = p[33] + p[9], mass - p[33]
+    on_motor, on_link = (0.0, damping) if p[37] > 0.5 else (damping, 0.0)
+    beyond = _beyond(q - ql, p[32])
+    torque = p[30] * beyond
+    grip = p[31] if beyond != 0.0 else 0.0
+    a11 = motor / step + 0.5 * (on_motor + implicit) + grip + bristle
+    a22 = link / step + 0.5 * on_link + grip
+    b1 = motor / step * v + motor_force - torque - 0.5 * (on_motor - implicit) * v
+    b2 = link / step * vl + link_force + torque - 0.5 * on_link * vl
+    det = a11 - grip * grip / a22
+    free = (b1 + grip * b2 / a22) / det
+    new = math.copysign(max(abs(free) - limit / det, 0.0), free)
+    return new, (b2 + grip * new) / a22
+
+
+@_inlined
+def _set_anew(p, bias, q, on_link):
+    """Positions of motor and link that rest at an encoder's reading `q`, the train wound up by what the link weighs."""
+    if p[29] <= 0.5:
+        return q, q
+    weight = bias + p[7] * (q - p[8])
+    wound = weight / p[30] + math.copysign(p[32], weight)
+    return (q + wound, q) if on_link else (q, q - wound)
+
+
+@numba.njit(cache=True, error_model="numpy", nogil=True)
+def run(
+    p, mass, bias, slope, reference, load, u, step, n_sub, y, v_measured, gain, starts, every, out, states
+):
+    """Predict the encoder of one joint sample by sample.
+
+    Args:
+        p: (SLOTS,) parameters, see `Slot`.
+        mass, bias, slope, reference: (n_steps,) coefficients of the equation at the middle of every step.
+        load: (n_steps,) torque that the gear carries (magnitude), for friction that grows with it.
+        u: (n_steps,) input.
+        step: Length of a step [s].
+        n_sub: Steps a sample.
+        y: (n,) measured positions.
+        v_measured: (n,) measured velocities, or (0,).
+        gain: (2, 2) of the innovations of position and velocity into position and velocity.
+        starts: (n_windows, 2) position and velocity at the first sample of every window.
+        every: Samples a window; at its end the state is set anew.
+        out: (n, 2) innovations; overwritten.
+        states: (n, 4) predicted position and velocity on the encoder's side, then of the link where there is a train; overwritten.
+    """
+    n = y.shape[0]
+    train = p[29] > 0.5
+    on_link = train and p[34] > 0.5
+    q, v, ql, vl, z = 0.0, 0.0, 0.0, 0.0, 0.0
+    lagged = math.nan
+    keep = math.exp(-step / p[27]) if p[27] > 0.0 else 0.0
+    for i in range(n):
+        if i % every == 0:
+            q, ql = _set_anew(p, bias[min(i * n_sub, bias.shape[0] - 1)], starts[i // every, 0], on_link)
+            v = vl = starts[i // every, 1]
+        states[i, 0], states[i, 1] = (ql, vl) if on_link else (q, v)
+        states[i, 2], states[i, 3] = ql, vl
+        out[i, 0] = y[i] - states[i, 0]
+        out[i, 1] = v_measured[i] - states[i, 1] if v_measured.shape[0] > 0 else 0.0
+        if not (abs(out[i, 0]) < FAR and abs(out[i, 1]) < FAR):
+            out[i:] = math.nan
+            return
+        if i == n - 1:
+            break
+        q += gain[0, 0] * out[i, 0] + gain[0, 1] * out[i, 1]
+        ql += gain[0, 0] * out[i, 0] + gain[0, 1] * out[i, 1]
+        v += gain[1, 0] * out[i, 0] + gain[1, 1] * out[i, 1]
+        vl += gain[1, 0] * out[i, 0] + gain[1, 1] * out[i, 1]
+        for k in range(i * n_sub, (i + 1) * n_sub):
+            q += 0.5 * step * v
+            ql += 0.5 * step * vl
+            force, implicit, lagged = _actuator(p, _input(u, k, p[28] / step), q, v, lagged, keep)
+            bristle_force, bristle = _bristles(p, v, z)
+            own = force + bristle_force - p[19] * math.sin(p[20] * q + p[21])
+            x, w = (ql, vl) if train else (q, v)
+            rest = p[15] - bias[k] - slope[k] * (x - reference[k]) - p[7] * (x - p[8]) + _stop(p, x, w)
+            limit = _friction_limit(p, v, load[k])
+            damping = p[6] + p[14] * abs(v)
+            before = v
+            if train:
+                v, vl = _kick_train(
+                    p, mass[k], step, own, rest, damping, implicit, bristle, limit, q, v, ql, vl
+                )
+            else:
+                inertia = (mass[k] + p[9]) / step
+                a = inertia + 0.5 * (damping + implicit) + bristle
+                free = (inertia * v + own + rest - 0.5 * (damping - implicit) * v) / a
+                v = math.copysign(max(abs(free) - limit / a, 0.0), free)
+                vl = v
+            z = _slid(p, z, 0.5 * (before + v), step)
+            q += 0.5 * step * v
+            ql += 0.5 * step * vl
+
+
+def predict(
+    p: NDArray[np.float64],
+    arrays: tuple[NDArray[np.float64], ...],
+    u: NDArray[np.float64],
+    step: float,
+    n_sub: int,
+    measured: tuple[NDArray[np.float64], NDArray[np.float64]],
+    gain: NDArray[np.float64],
+    starts: NDArray[np.float64],
+    every: int | None = None,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Run `run`; return innovations (n, 2) and states (n, 4). NaN where it diverged.
+
+    Args:
+        p: (SLOTS,).
+        arrays: mass, bias, slope, reference, load, each (n_steps,).
+        u: (n_steps,) input.
+        step: Length of a step [s].
+        n_sub: Steps a sample.
+        measured: Positions (n,) and velocities (n,) or (0,).
+        gain: (2, 2).
+        starts: (n_windows, 2) states at the beginning of every window.
+        every: Samples a window; one window where None.
+    """
+    n = len(measured[0])
+    out, states = np.zeros((n, 2)), np.zeros((n, 4))
+    run(p, *arrays, u, step, n_sub, *measured, gain, np.atleast_2d(starts), every or n, out, states)
+    return out, states

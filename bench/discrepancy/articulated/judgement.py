@@ -1,0 +1,139 @@
+"""What may be said of an articulated model: effects that predict, how much each closes, what is left.
+
+The search proposes; records that it has not seen decide. On them every joint runs free (in windows where no servo holds it), and a further
+effect stays if it takes more off the squared error than twice its standard error over blocks. An explanation is complete if no joint
+keeps more than the noise, as well as its size is known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.discrepancy.articulated.fitting import ArticulatedFit
+from bench.discrepancy.articulated.problem import ArticulatedProblem
+from bench.discrepancy.numerics.threads import in_threads
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class JudgementSettings:
+    """Settings of the judgement.
+
+    Attributes:
+        blocks: Blocks of a judging record, over which an improvement has to be sure; some periods of the motion each.
+        sure: Standard errors by which a further effect has to improve on the judging records.
+        noise_known: Relative accuracy to which the stated noise is taken to be known: what leaves no more than this beyond it is complete.
+        material: Part of the discrepancy that the effects together have to close for them to be called its cause.
+        rival: Difference in log posterior (odds of 100) within which explanations stand for one another.
+        outside: Probability kept for what no catalogue holds, also where a catalogued effect explains the records; that of the linear
+            structures (`judgement.posterior`).
+    """
+
+    blocks: int = 24
+    sure: float = 2.0
+    noise_known: float = 0.05
+    material: float = 0.5
+    rival: float = 4.6
+    outside: float = 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """Squared errors of free runs of the judging records.
+
+    Attributes:
+        power: (n_blocks, n_joints) mean squares over those of the joint's own motion.
+        floor: (n_joints,) what noise alone leaves.
+    """
+
+    power: Array
+    floor: Array
+
+    @property
+    def discrepancy(self) -> Array:
+        """NRMSE (n_joints,)."""
+        return np.sqrt(self.power.mean(axis=0))
+
+    @property
+    def excess(self) -> Array:
+        """Excess over the noise, block by block (n_blocks,), summed over the joints."""
+        return np.asarray((self.power - self.floor**2).sum(axis=1))
+
+
+def predict(
+    problem: ArticulatedProblem, found: ArticulatedFit | None, settings: JudgementSettings
+) -> Prediction:
+    """Free runs of a problem's records with a fit's model; with the nominal model as it is where None."""
+    hypothesis = found.hypothesis if found else ()
+    vector = found.vector if found else np.zeros(len(problem.nominal))
+    elastic = problem.settled(hypothesis, vector)
+    jobs = [(j, r) for r in range(len(problem.records)) for j in range(len(problem.joints))]
+    motions = elastic.motions(hypothesis, vector)
+    errors = in_threads(lambda job: elastic.free_run(job[0], hypothesis, vector, motions[job[1]]), jobs)
+    rows, floors = [], []
+    for r, prepared in enumerate(problem.records):
+        columns, floor = [], []
+        for j in range(len(problem.joints)):
+            size = max(float(np.std(prepared.joints[j].position)), float(np.max(prepared.joints[j].noise)))
+            error = np.nan_to_num(errors[jobs.index((j, r))], nan=1e3 * size)
+            factor = 1.0 + motions[r].joints[j].encoder.gain
+            columns.append(
+                [float(np.mean(b**2)) for b in np.array_split(error * factor / size, settings.blocks)]
+            )
+            floor.append(prepared.joints[j].free_run_noise() / size)
+        rows.append(np.array(columns).T)
+        floors.append(floor)
+    return Prediction(np.minimum(np.vstack(rows), 1e6), np.sqrt(np.mean(np.square(floors), axis=0)))
+
+
+def ladder(fits: Sequence[ArticulatedFit]) -> list[ArticulatedFit]:
+    """The best fit with its predecessors: the nominal model alone, then one effect more at a time."""
+    best = fits[0]
+    out = [best]
+    for size in range(len(best.hypothesis) - 1, -1, -1):
+        shorter = [f for f in fits if f.hypothesis == best.hypothesis[:size]]
+        out.insert(0, max(shorter, key=lambda f: f.log_posterior))
+    return out
+
+
+def kept(
+    problem: ArticulatedProblem, rungs: Sequence[ArticulatedFit], settings: JudgementSettings
+) -> tuple[int, list[Prediction]]:
+    """How many effects of a ladder the judging records bear out, and the predictions of every rung.
+
+    Effects are kept up to the last that improves on what was kept before it by more than the standard error allows for, and that takes
+    away more than it leaves. Nothing is added to what is complete.
+    """
+    predictions = [predict(problem, rung, settings) for rung in rungs]
+    last = 0
+    for k in range(1, len(rungs)):
+        if complete(rungs[last], settings):
+            break
+        difference = predictions[last].excess - predictions[k].excess
+        error = float(np.std(difference, ddof=1)) / np.sqrt(len(difference))
+        gained, left = float(np.mean(difference)), float(np.mean(predictions[k].excess))
+        if gained > max(settings.sure * error, left if last else 0.0):
+            last = k
+    return last, predictions
+
+
+def complete(found: ArticulatedFit, settings: JudgementSettings) -> bool:
+    """Whether no joint keeps more than the noise."""
+    return bool(np.all(found.reduced <= (1.0 + settings.noise_known) ** 2))
+
+
+def closed(
+    before: Prediction, after: Prediction, first: Prediction, rng: np.random.Generator
+) -> tuple[float, tuple[float, float]]:
+    """Part of the first discrepancy that lies between two predictions, and its block-bootstrap interval; of the squares of NRMSE."""
+    table = np.column_stack([before.excess - after.excess, first.excess])
+    draws = table[rng.integers(len(table), size=(1000, len(table)))].sum(axis=1)
+    shares = draws[:, 0] / np.maximum(draws[:, 1], 1e-12)
+    low, high = np.percentile(shares, [2.5, 97.5])
+    total = float(table[:, 0].sum() / max(float(table[:, 1].sum()), 1e-12))
+    return min(total, 1.0), (float(min(low, 1.0)), float(min(high, 1.0)))

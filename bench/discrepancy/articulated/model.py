@@ -1,0 +1,342 @@
+"""An articulated nominal model: an MJCF tree of hinges and slides on a fixed base, its drives, and its uncertain parameters.
+
+What the equation of one joint needs is read off MuJoCo along a motion: the torque of the inverse dynamics, the joint's own inertia, and
+the derivatives of that torque by the posture and by the inertial parameters. Damping, friction, springs, armature and drives are kept
+apart, since runs of single joints carry them themselves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.errors import ModelError, UnknownNameError
+
+Array = NDArray[np.float64]
+MOVING = {int(mujoco.mjtJoint.mjJNT_HINGE): "rad", int(mujoco.mjtJoint.mjJNT_SLIDE): "m"}
+"""Types of joint that a model may have, with the unit of their coordinate."""
+INERTIAL = ("mass", "inertia")
+"""Parameters of bodies."""
+LOCAL = ("damping", "frictionloss", "armature", "stiffness")
+"""Parameters of joints."""
+DRIVES = ("kp", "kv", "gear")
+"""Parameters of actuators."""
+DIFFERENCE = 1e-6
+"""Step of central differences of the inverse dynamics [rad or m], a cube root of rounding."""
+
+
+class Drive(NamedTuple):
+    """The actuator of a joint.
+
+    Attributes:
+        name: Its name in the model.
+        servo: Whether its input is a position target; otherwise a force.
+        gear: Joint torque over actuator force.
+        kp: Position gain of a servo, or gain of the input.
+        kv: Velocity gain of a servo.
+        low, high: Limits of the actuator's force.
+        lowest, highest: Limits of its input.
+        lag: Time constant of a first-order filter before it [s]; zero where there is none.
+    """
+
+    name: str
+    servo: bool
+    gear: float
+    kp: float
+    kv: float
+    low: float
+    high: float
+    lowest: float
+    highest: float
+    lag: float
+
+
+class Joint(NamedTuple):
+    """A joint.
+
+    Attributes:
+        name: Its name.
+        dof: Its degree of freedom.
+        body: Body that it moves.
+        unit: Unit of its coordinate.
+        damping, friction, armature, stiffness, reference: Passive parameters of the model.
+        range: Its stops; infinite where it has none.
+        drive: Its actuator; None where it has none.
+    """
+
+    name: str
+    dof: int
+    body: str
+    unit: str
+    damping: float
+    friction: float
+    armature: float
+    stiffness: float
+    reference: float
+    range: tuple[float, float]
+    drive: Drive | None
+
+
+class Dynamics(NamedTuple):
+    """Inverse dynamics along a motion.
+
+    Attributes:
+        torque: (n, n_joints) torque that the bodies ask of every joint, armature, damping, springs and friction not counted.
+        inertia: (n, n_joints) of the bodies about every joint, the diagonal of the mass matrix.
+    """
+
+    torque: Array
+    inertia: Array
+
+
+@dataclass(frozen=True, eq=False)
+class ArticulatedModel:
+    """The model with its bodies' parameters at given values.
+
+    Attributes:
+        model: The compiled model without damping, friction, springs, armature, limits and contacts.
+        joints: Its joints in the order of its degrees of freedom.
+        bodies: Names of the bodies that move.
+        tips: Body to the position of its tip in its own frame, where a payload would sit: a site called ``…tip``, else the joint of
+            its only child, else its own centre of mass.
+    """
+
+    model: mujoco.MjModel
+    joints: tuple[Joint, ...]
+    bodies: tuple[str, ...]
+    tips: Mapping[str, Array]
+
+    @classmethod
+    def from_file(cls, path: str | Path) -> ArticulatedModel:
+        """Read an MJCF.
+
+        Raises:
+            ModelError: It cannot be read, or something in it is no hinge or slide on a fixed base.
+        """
+        return cls.of(compiled_model(path), str(path))
+
+    @classmethod
+    def of(cls, model: mujoco.MjModel, name: str = "model") -> ArticulatedModel:
+        """Take a compiled model apart; it is copied."""
+        _refuse(model, name)
+        joints = tuple(_joint(model, i) for i in range(model.njnt))
+        bare = _bare(model)
+        bodies = tuple(model.body(i).name for i in range(1, model.nbody) if model.body_dofnum[i] > 0)
+        return cls(bare, joints, bodies, {body: _tip(model, body) for body in bodies})
+
+    def joint(self, name: str) -> Joint:
+        """Return a joint by name.
+
+        Raises:
+            UnknownNameError: There is none.
+        """
+        for joint in self.joints:
+            if joint.name == name:
+                return joint
+        raise UnknownNameError("joint", name, [j.name for j in self.joints])
+
+    def mass(self, body: str) -> float:
+        """Mass of a body [kg]."""
+        return float(self.model.body_mass[self.model.body(body).id])
+
+    def with_mass(self, body: str, mass: float) -> ArticulatedModel:
+        """The model with another mass of a body, its centre of mass and inertia about it as they are."""
+        out = self._copied()
+        out.model.body_mass[out.model.body(body).id] = mass
+        return out
+
+    def with_payload(self, body: str, mass: float, at: Array | None = None) -> ArticulatedModel:
+        """The model with a point mass fixed to a body, at its tip where no position (3,) [m] in its frame is given."""
+        out = self._copied()
+        i = out.model.body(body).id
+        _add_point(out.model, i, mass, self.tips[body] if at is None else at)
+        return out
+
+    def with_centre(self, body: str, shift: Array) -> ArticulatedModel:
+        """The model with the centre of mass of a body moved by `shift` (3,) [m] in the body's frame, the inertia about it kept."""
+        out = self._copied()
+        out.model.body_ipos[out.model.body(body).id] += shift
+        return out
+
+    def with_gravity_turned(self, turn: Array) -> ArticulatedModel:
+        """The model on a base tilted by the rotation vector `turn` (3,) [rad]."""
+        out = self._copied()
+        quaternion = np.zeros(4)
+        angle = float(np.linalg.norm(turn))
+        axis = turn / angle if angle > 0 else np.array([1.0, 0.0, 0.0])
+        mujoco.mju_axisAngle2Quat(quaternion, axis, -angle)
+        gravity = np.zeros(3)
+        mujoco.mju_rotVecQuat(gravity, np.array(out.model.opt.gravity), quaternion)
+        out.model.opt.gravity[:] = gravity
+        return out
+
+    def _copied(self) -> ArticulatedModel:
+        import copy  # noqa: PLC0415
+
+        return replace(self, model=copy.copy(self.model))
+
+    def dynamics(self, q: Array, v: Array, a: Array) -> Dynamics:
+        """Inverse dynamics along positions, velocities and accelerations (n, n_joints)."""
+        model = self.model
+        data = mujoco.MjData(model)
+        torque, inertia = np.empty_like(q), np.empty_like(q)
+        # the mass matrix is stored by rows, its lower triangle, so that a row ends on the diagonal
+        diagonal = np.array(model.M_rowadr) + np.array(model.M_rownnz) - 1
+        for k in range(len(q)):
+            data.qpos[:] = q[k]
+            data.qvel[:] = v[k]
+            data.qacc[:] = a[k]
+            mujoco.mj_inverse(model, data)
+            torque[k] = data.qfrc_inverse
+            inertia[k] = data.M[diagonal]
+        return Dynamics(torque, inertia)
+
+    def slopes(self, q: Array, v: Array, a: Array) -> Array:
+        """Derivative (n, n_joints) of the torque on every joint by its own position."""
+        out = np.empty_like(q)
+        for j in range(q.shape[1]):
+            step = np.zeros(q.shape[1])
+            step[j] = DIFFERENCE
+            ahead = self.dynamics(q + step, v, a).torque[:, j]
+            behind = self.dynamics(q - step, v, a).torque[:, j]
+            out[:, j] = (ahead - behind) / (2.0 * DIFFERENCE)
+        return out
+
+
+def compiled_model(path: str | Path) -> mujoco.MjModel:
+    """Compile an MJCF.
+
+    Raises:
+        ModelError: MuJoCo does not read it.
+    """
+    try:
+        return mujoco.MjModel.from_xml_path(str(path))
+    except ValueError as error:
+        raise ModelError(f"'{path}' is no MJCF that MuJoCo reads: {error}") from None
+
+
+def _refuse(model: mujoco.MjModel, name: str) -> None:
+    for i in range(model.njnt):
+        if int(model.jnt_type[i]) not in MOVING:
+            kind = mujoco.mjtJoint(int(model.jnt_type[i])).name.removeprefix("mjJNT_").lower()
+            raise ModelError(
+                f"joint '{model.joint(i).name}' of '{name}' is a {kind} joint; hinges and slides on a fixed base are expected: hang the "
+                "robot up (remove the free joint), lock a ball joint, or cut out the limb that was tested"
+            )
+
+
+def _joint(model: mujoco.MjModel, i: int) -> Joint:
+    dof = int(model.jnt_dofadr[i])
+    limited = bool(model.jnt_limited[i])
+    drives = [_drive(model, u) for u in range(model.nu) if _drives(model, u, i)]
+    if len(drives) > 1:
+        raise ModelError(
+            f"joint '{model.joint(i).name}' has {len(drives)} actuators ({', '.join(d.name for d in drives)}); one a joint is expected: "
+            "keep the one whose command or torque was recorded"
+        )
+    return Joint(
+        model.joint(i).name,
+        dof,
+        model.body(int(model.jnt_bodyid[i])).name,
+        MOVING[int(model.jnt_type[i])],
+        float(np.ravel(model.dof_damping[dof])[0]),
+        float(model.dof_frictionloss[dof]),
+        float(model.dof_armature[dof]),
+        float(np.ravel(model.jnt_stiffness[i])[0]),
+        float(model.qpos_spring[model.jnt_qposadr[i]]),
+        (float(model.jnt_range[i, 0]), float(model.jnt_range[i, 1])) if limited else (-np.inf, np.inf),
+        drives[0] if drives else None,
+    )
+
+
+def _drives(model: mujoco.MjModel, u: int, joint: int) -> bool:
+    kinds = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
+    return int(model.actuator_trntype[u]) in kinds and int(model.actuator_trnid[u, 0]) == joint
+
+
+def _drive(model: mujoco.MjModel, u: int) -> Drive:
+    name = model.actuator(u).name
+    gain, bias = model.actuator_gainprm[u], model.actuator_biasprm[u]
+    affine = int(model.actuator_biastype[u]) == int(mujoco.mjtBias.mjBIAS_AFFINE)
+    if int(model.actuator_gaintype[u]) != int(mujoco.mjtGain.mjGAIN_FIXED) or (
+        not affine and int(model.actuator_biastype[u]) != int(mujoco.mjtBias.mjBIAS_NONE)
+    ):
+        raise ModelError(
+            f"actuator '{name}' has a gain or bias that is neither fixed nor affine; a motor, position or velocity actuator is expected"
+        )
+    servo = affine and bias[1] != 0.0
+    lag = 0.0
+    if int(model.actuator_dyntype[u]) in (
+        int(mujoco.mjtDyn.mjDYN_FILTER),
+        int(mujoco.mjtDyn.mjDYN_FILTEREXACT),
+    ):
+        lag = float(model.actuator_dynprm[u, 0])
+    elif int(model.actuator_dyntype[u]) != int(mujoco.mjtDyn.mjDYN_NONE):
+        raise ModelError(
+            f"actuator '{name}' has an activation that is no first-order filter; none or 'filter' is expected"
+        )
+    forces = model.actuator_forcerange[u] if model.actuator_forcelimited[u] else (-np.inf, np.inf)
+    inputs = model.actuator_ctrlrange[u] if model.actuator_ctrllimited[u] else (-np.inf, np.inf)
+    joint = int(model.actuator_trnid[u, 0])
+    if model.jnt_actfrclimited[joint]:
+        gear = float(model.actuator_gear[u, 0])
+        own = np.sort(np.array(model.jnt_actfrcrange[joint]) / gear)
+        forces = (max(forces[0], own[0]), min(forces[1], own[1]))
+    return Drive(
+        name, servo, float(model.actuator_gear[u, 0]), float(gain[0]), float(-bias[2]) if affine else 0.0,
+        float(forces[0]), float(forces[1]), float(inputs[0]), float(inputs[1]), lag,
+    )  # fmt: skip
+
+
+def _bare(model: mujoco.MjModel) -> mujoco.MjModel:
+    """The bodies alone: nothing but inertia and gravity."""
+    import copy  # noqa: PLC0415
+
+    bare = copy.copy(model)
+    bare.dof_damping[:] = 0.0
+    bare.dof_frictionloss[:] = 0.0
+    bare.dof_armature[:] = 0.0
+    bare.jnt_stiffness[:] = 0.0
+    disabled = (
+        mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
+        | mujoco.mjtDisableBit.mjDSBL_ACTUATION
+        | mujoco.mjtDisableBit.mjDSBL_SENSOR
+    )
+    bare.opt.disableflags |= int(disabled)
+    return bare
+
+
+def _tip(model: mujoco.MjModel, body: str) -> Array:
+    i = model.body(body).id
+    for s in range(model.nsite):
+        if int(model.site_bodyid[s]) == i and model.site(s).name.endswith("tip"):
+            return np.array(model.site_pos[s])
+    children = [c for c in range(1, model.nbody) if int(model.body_parentid[c]) == i]
+    return np.array(model.body_pos[children[0]] if len(children) == 1 else model.body_ipos[i])
+
+
+def _add_point(model: mujoco.MjModel, i: int, mass: float, at: Array) -> None:
+    """Add a point mass to body `i`: the exact composite of the two."""
+    old_mass, old_at = float(model.body_mass[i]), np.array(model.body_ipos[i])
+    turn = np.zeros(9)
+    mujoco.mju_quat2Mat(turn, model.body_iquat[i])
+    turn = turn.reshape(3, 3)
+    inertia = turn @ np.diag(model.body_inertia[i]) @ turn.T
+    total = old_mass + mass
+    centre = (old_mass * old_at + mass * at) / total
+    for part, position in ((old_mass, old_at), (mass, at)):
+        d = position - centre
+        inertia += part * (d @ d * np.eye(3) - np.outer(d, d))
+    values, vectors = np.linalg.eigh(inertia)
+    if np.linalg.det(vectors) < 0:
+        vectors[:, 0] = -vectors[:, 0]
+    quaternion = np.zeros(4)
+    mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(vectors).ravel())
+    model.body_mass[i], model.body_ipos[i] = total, centre
+    model.body_inertia[i], model.body_iquat[i] = values, quaternion

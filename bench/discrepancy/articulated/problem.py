@@ -1,0 +1,411 @@
+"""The statistical problem of an articulated model: whitened innovations of every joint, priors, and their derivatives.
+
+The vector of a hypothesis holds the deviations of the nominal parameters in units of their standard uncertainty, then the parameters of its
+effects. Only masses are shared by the joints; whatever sits at one joint or drive changes that joint's runs alone.
+
+What a wrong model leaves is larger than the noise, and differs from joint to joint. Its scale is a parameter too, with the stated
+noise as its lower bound: minus twice the profiled log-likelihood of a joint with n residuals of mean square r is ``n`` times
+``r`` for r <= 1 and ``1 + ln r`` beyond (`misfit_of`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from threading import Lock
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.discrepancy.articulated.effects import ArticulatedEffect, JointScales
+from bench.discrepancy.articulated.joint_run import SLOTS, Slot, predict
+from bench.discrepancy.articulated.model import ArticulatedModel, Joint
+from bench.discrepancy.articulated.records import (
+    Encoder,
+    JointRecord,
+    PreparedRecord,
+    corrected,
+    prepare,
+    relinked,
+)
+from bench.discrepancy.case.case import Case, CaseRecord
+from bench.errors import UnknownNameError
+
+Array = NDArray[np.float64]
+LOCAL_SLOTS = {
+    "damping": Slot.DAMPING,
+    "armature": Slot.INERTIA,
+    "frictionloss": Slot.LIMIT,
+    "stiffness": Slot.STIFFNESS,
+    "kp": Slot.KP,
+    "kv": Slot.KV,
+    "gear": Slot.GEAR,
+}
+"""Entries of a joint's parameter vector that nominal parameters set."""
+KEPT_MOTIONS = 24
+"""Corrected records kept: one sensor effect's derivatives over all identification records."""
+DIVERGED = 1e6
+"""Residual, in units of its noise, that stands for a run that is not finite."""
+
+
+@dataclass(frozen=True)
+class Placed:
+    """An effect at a place: a joint, a body or an actuator.
+
+    Attributes:
+        effect: The effect.
+        where: Name of the joint, body or actuator.
+        joint: Index of the joint whose runs it changes, or whose encoder it is; of the joint that carries the body.
+        scales: Scales of that joint.
+    """
+
+    effect: ArticulatedEffect
+    where: str
+    joint: int
+    scales: JointScales
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """Name and place."""
+        return self.effect.name, self.where
+
+
+Hypothesis = tuple[Placed, ...]
+
+
+@dataclass(frozen=True)
+class Nominal:
+    """A nominal parameter: what it sets, its value and standard uncertainty."""
+
+    name: str
+    kind: str
+    target: str
+    joint: int
+    value: float
+    std: float
+
+
+@dataclass(eq=False)
+class ArticulatedProblem:
+    """Records, model and priors.
+
+    Attributes:
+        case: The case.
+        model: The model at its nominal parameters.
+        records: Prepared records.
+        nominal: Uncertain nominal parameters: masses first, then joint by joint.
+    """
+
+    case: Case
+    model: ArticulatedModel
+    records: tuple[PreparedRecord, ...]
+    nominal: tuple[Nominal, ...] = field(init=False)
+    _corrected: dict[tuple, tuple[PreparedRecord, ...]] = field(init=False, default_factory=dict)
+    _correcting: Lock = field(init=False, default_factory=Lock)
+
+    def __post_init__(self) -> None:
+        self.nominal = nominal_parameters(self.case, self.model)
+
+    @classmethod
+    def of(cls, case: Case, model: ArticulatedModel, records: Sequence[CaseRecord]) -> ArticulatedProblem:
+        """Prepare records."""
+        return cls(case, model, tuple(prepare(case, model, record) for record in records))
+
+    @property
+    def joints(self) -> tuple[Joint, ...]:
+        """The joints."""
+        return self.model.joints
+
+    @cached_property
+    def masses(self) -> tuple[int, ...]:
+        """Indices of the nominal parameters that all joints share."""
+        return tuple(i for i, p in enumerate(self.nominal) if p.kind == "mass")
+
+    def locals(self, j: int) -> tuple[int, ...]:
+        """Indices of the nominal parameters of joint `j` alone."""
+        return tuple(i for i, p in enumerate(self.nominal) if p.kind != "mass" and p.joint == j)
+
+    def size(self, hypothesis: Hypothesis) -> int:
+        """Length of the vector of a hypothesis."""
+        return len(self.nominal) + sum(len(placed.effect.parameters) for placed in hypothesis)
+
+    def etas(self, hypothesis: Hypothesis, vector: Array) -> list[Array]:
+        """The part of a vector that belongs to each effect."""
+        out, at = [], len(self.nominal)
+        for placed in hypothesis:
+            stop = at + len(placed.effect.parameters)
+            out.append(vector[at:stop])
+            at = stop
+        return out
+
+    def reached(self, hypothesis: Hypothesis) -> tuple[int, ...]:
+        """Joints whose runs an effect of a hypothesis changes."""
+        out: set[int] = set()
+        for placed in hypothesis:
+            site = placed.effect.site
+            out |= {placed.joint} if site in ("joint", "actuator") else set(range(len(self.joints)))
+        return tuple(sorted(out))
+
+    def motions(self, hypothesis: Hypothesis, vector: Array) -> tuple[PreparedRecord, ...]:
+        """The records, their encoders corrected as a hypothesis has it."""
+        wrong: dict[str, Encoder] = {}
+        for placed, eta in zip(hypothesis, self.etas(hypothesis, vector), strict=True):
+            if placed.effect.encoder is not None:
+                name = self.joints[placed.joint].name
+                new = placed.effect.encoder(placed.effect.values(eta, placed.scales))
+                old = wrong.get(name, Encoder())
+                wrong[name] = Encoder(*(a + b for a, b in zip(old, new, strict=True)))
+        if not wrong:
+            return self.records
+        key = tuple(sorted(wrong.items()))
+        with self._correcting:
+            if key not in self._corrected:
+                while len(self._corrected) >= KEPT_MOTIONS:
+                    self._corrected.pop(next(iter(self._corrected)))
+                self._corrected[key] = tuple(corrected(self.case, self.model, r, wrong) for r in self.records)
+            return self._corrected[key]
+
+    def softened(self, level: float) -> ArticulatedProblem:
+        """The same problem with torque noise of at least `level` times the RMS torque where no servo holds a joint.
+
+        A free run that nothing corrects remembers every error of a wrong model to its end: the misfit of an elastic or slipping drive
+        has then a minimum at the truth and many beside it. Corrected a little at every sample, it forgets.
+        """
+        if all(joint.drive is not None and joint.drive.servo for joint in self.joints):
+            return self
+        records = []
+        for prepared in self.records:
+            joints = []
+            for record in prepared.joints:
+                drive = record.joint.drive
+                torque = (
+                    0.0
+                    if drive is None or drive.servo
+                    else level * float(np.std(record.command)) * abs(drive.gear * drive.kp)
+                )
+                joints.append(replace(record, process=torque) if torque > record.process else record)
+            records.append(replace(prepared, joints=tuple(joints)))
+        return ArticulatedProblem(self.case, self.model, tuple(records))
+
+    def settled(self, hypothesis: Hypothesis, vector: Array) -> ArticulatedProblem:
+        """The same problem with the links of elastic joints where a fit has them; itself where there are none behind their motors."""
+        elastic = [
+            placed.joint
+            for placed in hypothesis
+            if placed.effect.train and not self.records[0].joints[placed.joint].on_link
+        ]
+        if not elastic:
+            return self
+        records = []
+        for raw, prepared in zip(self.records, self.motions(hypothesis, vector), strict=True):
+            links = {j: self.innovations(j, hypothesis, vector, prepared)[1][:, 2:] for j in elastic}
+            records.append(relinked(self.case, self.model, raw, links))
+        return ArticulatedProblem(self.case, self.model, tuple(records))
+
+    def slots(self, j: int, hypothesis: Hypothesis, vector: Array, *, on_link: bool) -> Array:
+        """Parameter vector (SLOTS,) of the runs of joint `j`."""
+        joint = self.joints[j]
+        p = base_slots(joint, on_link)
+        for i in self.locals(j):
+            entry = self.nominal[i]
+            p[LOCAL_SLOTS[entry.kind]] += entry.std * vector[i]
+        for placed, eta in zip(hypothesis, self.etas(hypothesis, vector), strict=True):
+            if placed.effect.slots is not None and placed.joint == j:
+                placed.effect.slots(placed_values(placed, eta), p)
+        return p
+
+    def innovations(
+        self, j: int, hypothesis: Hypothesis, vector: Array, prepared: PreparedRecord
+    ) -> tuple[Array, Array]:
+        """Innovations (n, n_measured) and states (n, 4), see `joint_run.run`, of joint `j` in a record; NaN where it diverged."""
+        record = prepared.joints[j]
+        out, states = self._run(j, hypothesis, vector, record, record.gain, record.start, None)
+        return out[:, : record.n_measured], states
+
+    def free_run(self, j: int, hypothesis: Hypothesis, vector: Array, prepared: PreparedRecord) -> Array:
+        """Measured less predicted positions (n,) of joint `j`, run without corrections from the measured states of its windows."""
+        record, motion = prepared.joints[j], prepared.motion
+        every = record.window or len(record.position)
+        starts = np.column_stack([motion.position[::every, j], motion.velocity[::every, j]])
+        out, _ = self._run(j, hypothesis, vector, record, np.zeros((2, 2)), starts, every)
+        return out[:, 0]
+
+    def _run(
+        self,
+        j: int,
+        hypothesis: Hypothesis,
+        vector: Array,
+        record: JointRecord,
+        gain: Array,
+        starts: Array,
+        every: int | None,
+    ) -> tuple[Array, Array]:
+        bias, inertia = self._coefficients(record, hypothesis, vector)
+        p = self.slots(j, hypothesis, vector, on_link=record.on_link)
+        p[Slot.RATIO] = record.servo_ratio
+        return predict(
+            p, (inertia, bias, record.slope, record.reference, record.load), record.servo_command, record.step,
+            record.n_sub, (record.position, record.velocity), gain, starts, every,
+        )  # fmt: skip
+
+    def _coefficients(
+        self, record: JointRecord, hypothesis: Hypothesis, vector: Array
+    ) -> tuple[Array, Array]:
+        bias, inertia = record.bias, record.inertia
+        for i in self.masses:
+            if vector[i] != 0.0:
+                change = record.changes[self.nominal[i].target] * (self.nominal[i].std * vector[i])
+                bias, inertia = bias + change[0], inertia + change[1]
+        for placed, eta in zip(hypothesis, self.etas(hypothesis, vector), strict=True):
+            if placed.effect.site != "body":
+                continue
+            values = placed.effect.values(eta, placed.scales)
+            if "payload" in values:
+                change = record.payloads[placed.where] * values["payload"]
+            else:
+                shift = np.array(list(values.values()))
+                change = np.tensordot(shift, record.centres[placed.where], axes=1)
+            bias, inertia = bias + change[0], inertia + change[1]
+        return bias, np.maximum(inertia, 1e-3 * record.inertia)
+
+    def residual(self, j: int, hypothesis: Hypothesis, vector: Array) -> Array:
+        """Whitened innovations of joint `j` over all records; their mean square is one where nothing is missing."""
+        out = []
+        for original, prepared in zip(self.records, self.motions(hypothesis, vector), strict=True):
+            innovation, _ = self.innovations(j, hypothesis, vector, prepared)
+            # a corrected log has another noise; residuals are compared in units of what was logged
+            innovation = innovation * (original.joints[j].noise / prepared.joints[j].noise)
+            whitened = innovation @ original.joints[j].whitening.T
+            out.append(np.nan_to_num(whitened, nan=DIVERGED, posinf=DIVERGED, neginf=-DIVERGED).ravel())
+        return np.concatenate(out)
+
+    def prior(self, hypothesis: Hypothesis) -> tuple[Array, Array, Array, Array]:
+        """Mean, standard deviation, lower and upper bound of a vector."""
+        n = len(self.nominal)
+        mean, std = [np.zeros(n)], [np.ones(n)]
+        low = np.array([-0.95 * p.value / p.std if p.value > 0 else -np.inf for p in self.nominal])
+        lows, highs = [low], [np.full(n, np.inf)]
+        for placed in hypothesis:
+            p = placed.effect.parameters
+            mean.append(np.array([x.mean for x in p]))
+            std.append(np.array([x.std for x in p]))
+            lows.append(np.array([x.bounds[0] for x in p]))
+            highs.append(np.array([x.bounds[1] for x in p]))
+        return np.concatenate(mean), np.concatenate(std), np.concatenate(lows), np.concatenate(highs)
+
+    def scales(self, j: int) -> JointScales:
+        """Scales of joint `j` over all records."""
+        joint = self.joints[j]
+        drive = joint.drive
+        assert drive is not None
+        forces, inputs, q, v = [], [], [], []
+        for prepared in self.records:
+            record = prepared.joints[j]
+            error = record.command - record.reference if drive.servo else record.command
+            force = np.clip(drive.kp * error, drive.low, drive.high)
+            forces.append(force)
+            inputs.append(error)
+            q.append(prepared.motion.position[:, j])
+            v.append(prepared.motion.velocity[:, j])
+        q_all, v_all = np.concatenate(q), np.concatenate(v)
+        force = np.concatenate(forces)
+        middle = 0.5 * float(q_all.max() + q_all.min())
+        return JointScales(
+            float(np.sqrt(np.mean(force**2))) * abs(drive.gear) or 1.0,
+            float(np.abs(force).max()) or 1.0,
+            0.5 * float(np.ptp(q_all)) or 1.0,
+            float(np.abs(v_all).max()) or 1.0,
+            float(np.mean(self.records[0].joints[j].inertia)),
+            float(np.sqrt(np.mean(np.concatenate(inputs) ** 2))) or 1.0,
+            self.model.mass(joint.body) or 1.0,
+            float(np.linalg.norm(self.model.tips[joint.body])) or 1.0,
+            middle,
+        )
+
+
+def misfit_of(chi2: float, count: int) -> float:
+    """Minus twice the profiled log-likelihood of `count` residuals of a sum of squares, their scale unknown but at least one."""
+    mean = chi2 / count
+    return count * (mean if mean <= 1.0 else 1.0 + float(np.log(mean)))
+
+
+def base_slots(joint: Joint, on_link: bool) -> Array:
+    """Parameter vector (SLOTS,) of a joint's nominal model."""
+    p = np.zeros(SLOTS)
+    drive = joint.drive
+    assert drive is not None
+    p[Slot.GEAR], p[Slot.SERVO] = drive.gear, float(drive.servo)
+    p[Slot.KP], p[Slot.KV] = drive.kp, drive.kv
+    p[Slot.LOW], p[Slot.HIGH], p[Slot.LAG] = drive.low, drive.high, drive.lag
+    p[Slot.DAMPING], p[Slot.LIMIT] = joint.damping, joint.friction
+    p[Slot.STIFFNESS], p[Slot.REFERENCE] = joint.stiffness, joint.reference
+    p[Slot.MOTOR], p[Slot.ENCODER], p[Slot.STRIBECK], p[Slot.RATIO] = joint.armature, float(on_link), 1.0, 1.0
+    return p
+
+
+def placed_values(placed: Placed, eta: Array) -> Mapping[str, float]:
+    """Physical values of an effect at its place; a stop's position is counted from the zero of the joint."""
+    values = placed.effect.values(eta, placed.scales)
+    if placed.effect.name == "one_sided_stop":
+        values["position"] += placed.scales.middle
+    return values
+
+
+def nominal_parameters(case: Case, model: ArticulatedModel) -> tuple[Nominal, ...]:
+    """The uncertain parameters of ``nominal.json``: masses first, then joint by joint.
+
+    Raises:
+        UnknownNameError: A parameter names nothing in the model.
+    """
+    joints = {joint.name: j for j, joint in enumerate(model.joints)}
+    drives = {joint.drive.name: j for j, joint in enumerate(model.joints) if joint.drive is not None}
+    bodies = {body: i for i, body in enumerate(model.bodies)}
+    masses, others = [], []
+    for parameter in case.parameters:
+        kind, _, target = parameter.name.partition(":")
+        if kind == "mass":
+            known: Mapping[str, int] = bodies
+        elif kind in ("kp", "kv", "gear"):
+            known = drives
+        elif kind in LOCAL_SLOTS:
+            known = joints
+        else:
+            raise UnknownNameError("parameter", parameter.name, [f"{k}:NAME" for k in ("mass", *LOCAL_SLOTS)])
+        if target not in known:
+            raise UnknownNameError(f"target of parameter '{parameter.name}'", target, list(known))
+        if parameter.std > 0.0:
+            entry = Nominal(parameter.name, kind, target, known[target], parameter.value, parameter.std)
+            (masses if kind == "mass" else others).append(entry)
+    return (*masses, *sorted(others, key=lambda p: p.joint))
+
+
+def placements(problem: ArticulatedProblem, catalogue: Sequence[ArticulatedEffect]) -> list[Placed]:
+    """Every effect at every place where it may sit."""
+    out = []
+    for j, joint in enumerate(problem.joints):
+        scales = problem.scales(j)
+        drive = joint.drive
+        assert drive is not None
+        velocity = problem.records[0].joints[j].n_measured > 1
+        for effect in catalogue:
+            if effect.servo is not None and effect.servo != drive.servo:
+                continue
+            if effect.needs == "velocity" and not velocity:
+                continue
+            where = {"joint": joint.name, "sensor": joint.name, "actuator": drive.name, "body": joint.body}[
+                effect.site
+            ]
+            out.append(Placed(effect, where, j, scales))
+    return out
+
+
+__all__ = [
+    "ArticulatedProblem",
+    "Hypothesis",
+    "Nominal",
+    "Placed",
+    "misfit_of",
+    "nominal_parameters",
+    "placements",
+]

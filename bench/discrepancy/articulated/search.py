@@ -1,0 +1,375 @@
+"""Search for what is missing from an articulated model: effects at all places are screened, the most promising fitted, one by one.
+
+A screened effect is one run (or a few, over a grid) of the joints that it changes. The change that it makes, less what the nominal
+parameters could do as well, is regressed on the residuals: what that takes away is what the effect promises.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.discrepancy.articulated.fitting import ArticulatedFit, Others, fit, linearised
+from bench.discrepancy.articulated.problem import ArticulatedProblem, Hypothesis, Placed, misfit_of
+from bench.discrepancy.numerics.threads import in_threads
+
+Array = NDArray[np.float64]
+UNSCALED = ("actuator_saturation", "backlash", "joint_compliance", "one_sided_stop")
+"""Effects whose first parameter is no amplitude of the force."""
+
+
+@dataclass(frozen=True)
+class SearchSettings:
+    """Settings of the search.
+
+    Attributes:
+        most: Largest number of effects named together.
+        fitted: Screened effects that are fitted in a round, at most.
+        least: Of those, the ones that are fitted whatever they promise.
+        hope: The others are fitted while they promise more than this part of what the best fit so far has gained: a screening is a
+            linearisation, and errs by less than that where it matters.
+        starts: Grid points from which one effect is fitted.
+        iterations: Steps of a fit.
+        refits: Fits of the nominal model alone, each with the scales that the last one left.
+        softening: Noise of the torque, as parts of its RMS, with which effects are screened and fitted one after the other before the
+            stated noise holds (`ArticulatedProblem.softened`): from what a crude model errs by to what motor currents tell.
+        strained: Deviation of a nominal parameter, in its stated standard uncertainties, from which it counts as a finding.
+        finalists: Effects that are fitted again without it.
+        worth: Log posterior that a further effect has to add, ten to one being 2.3 and a hundred to one 4.6.
+    """
+
+    most: int = 3
+    fitted: int = 10
+    least: int = 3
+    hope: float = 0.5
+    starts: int = 2
+    iterations: int = 20
+    refits: int = 3
+    worth: float = 4.6
+    softening: tuple[float, ...] = (0.2, 0.02)
+    strained: float = 3.0
+    finalists: int = 5
+
+
+@dataclass(frozen=True, eq=False)
+class Screened:
+    """A grid point of an effect on top of a fit.
+
+    Attributes:
+        placed: The effect.
+        eta: Its parameters, the amplitude scaled to what the regression likes best.
+        gain: Decrease of twice the negative log-likelihood that it promises.
+    """
+
+    placed: Placed
+    eta: Array
+    gain: float
+
+
+class _Ground:
+    """What a fit leaves on some joints, without what its own parameters could still do about it."""
+
+    def __init__(self, problem: ArticulatedProblem, base: ArticulatedFit, joints: Sequence[int]) -> None:
+        self.joints = tuple(joints)
+        columns = [
+            i
+            for i in range(len(base.vector))
+            if base.covariance[i, i] > 0.0 and self._moves(problem, base, i)
+        ]
+        parts = in_threads(lambda j: linearised(problem, base, j, columns), self.joints)
+        mean, std, _, _ = problem.prior(base.hypothesis)
+        rows = np.zeros((len(columns), len(columns)))
+        rows[np.arange(len(columns)), np.arange(len(columns))] = 1.0 / std[columns]
+        self.residuals = {j: r for j, (_, r) in zip(self.joints, parts, strict=True)}
+        self.n_prior = len(columns)
+        self.basis, _ = np.linalg.qr(np.vstack([*(jacobian for jacobian, _ in parts), rows]))
+        left = np.concatenate([*(r for _, r in parts), (base.vector[columns] - mean[columns]) / std[columns]])
+        self.left = self.without(left)
+
+    def _moves(self, problem: ArticulatedProblem, base: ArticulatedFit, i: int) -> bool:
+        n = len(problem.nominal)
+        if i < n:
+            return problem.nominal[i].kind == "mass" or problem.nominal[i].joint in self.joints
+        for placed in base.hypothesis:
+            n += len(placed.effect.parameters)
+            if i < n:
+                return any(j in self.joints for j in problem.reached((placed,)))
+        return False
+
+    def without(self, change: Array) -> Array:
+        return change - self.basis @ (self.basis.T @ change)
+
+
+def screen(problem: ArticulatedProblem, base: ArticulatedFit, candidates: Sequence[Placed]) -> list[Screened]:
+    """Screen effects on top of a fit; the most promising first."""
+    everything = tuple(range(len(problem.joints)))
+    grounds = {joints: _Ground(problem, base, joints) for joints in [*((j,) for j in everything), everything]}
+
+    def look(placed: Placed) -> list[Screened]:
+        ground = grounds[tuple(problem.reached((placed,)))]
+        hypothesis = (*base.hypothesis, placed)
+        power, count = float(ground.left @ ground.left), len(ground.left) - ground.n_prior
+        drive = problem.joints[placed.joint].drive
+        found = []
+        for eta in grid(placed, servo=bool(drive and drive.servo), sides=_sides(problem, placed)):
+            vector = np.concatenate([base.vector, eta])
+            change = ground.without(
+                np.concatenate([
+                    *(problem.residual(j, hypothesis, vector) / base.scale[j] - ground.residuals[j] for j in ground.joints),
+                    np.zeros(ground.n_prior),
+                ])
+            )  # fmt: skip
+            size = float(change @ change)
+            if not np.isfinite(size) or size <= 0.0:
+                continue
+            along = -float(ground.left @ change) / size
+            if along <= 0.0 and not placed.effect.parameters[0].signed:
+                continue
+            taken = min(size * along**2, (1.0 - 1e-9) * power)
+            chi2 = np.array([base.chi2[j] for j in ground.joints])
+            # the joints' scales are those of the fit: what is taken lowers each in proportion
+            gain = sum(
+                misfit_of(c, int(base.count[j])) - misfit_of(c * (1.0 - taken / power), int(base.count[j]))
+                for c, j in zip(chi2, ground.joints, strict=True)
+            ) if power > count else taken  # fmt: skip
+            found.append(Screened(placed, _scaled(placed, eta, along), float(gain)))
+        return sorted(found, key=lambda p: -p.gain)
+
+    points = [p for found in in_threads(look, candidates) for p in found]
+    return sorted(points, key=lambda p: -p.gain)
+
+
+def _scaled(placed: Placed, eta: Array, along: float) -> Array:
+    """A grid point with its amplitude changed by a factor."""
+    out, first = eta.copy(), placed.effect.parameters[0]
+    if placed.effect.name in UNSCALED:
+        return out
+    linear = [k for k, p in enumerate(placed.effect.parameters) if p.signed and not p.fixed]
+    for k in linear if first.signed else ():
+        out[k] = np.clip(eta[k] * along, *placed.effect.parameters[k].bounds)
+    if not first.signed:
+        out[0] = np.clip(eta[0] + np.log(np.clip(along, 0.02, 50.0)), *first.bounds)
+    return out
+
+
+def grid(placed: Placed, *, servo: bool, sides: Sequence[float]) -> list[Array]:
+    """Values of the parameters that are tried; a small amplitude where the effect is linear in it.
+
+    Whether a wrong encoder is in the loop is asked of servos only, and on which side of an elastic drive it sits where nobody says.
+    """
+    effect = placed.effect
+    if effect.name == "cogging":
+        return [np.array([s, c, n]) for n in effect.parameters[2].grid for s, c in ((0.03, 0.0), (0.0, 0.03))]
+    if effect.name == "com_error":
+        return [0.03 * axis for axis in np.eye(3)]
+    axes = []
+    for k, p in enumerate(effect.parameters):
+        default = 0.1 * p.std if p.signed and k == 0 else p.mean
+        values = p.grid or (default,)
+        if p.name == "in_loop" and not servo:
+            values = values[:1]
+        axes.append(sides if p.name == "encoder_on_link" else values)
+    return [np.array(point) for point in product(*axes)]
+
+
+def _sides(problem: ArticulatedProblem, placed: Placed) -> tuple[float, ...]:
+    """Sides of an elastic drive where the encoder of a joint may sit."""
+    side = problem.records[0].joints[placed.joint].side
+    return {"motor": (0.0,), "link": (1.0,)}.get(side, (0.0, 1.0))
+
+
+def _by_effect(points: Sequence[Screened], starts: int) -> list[list[Screened]]:
+    """Grid points effect by effect, the most promising effects and points first."""
+    out: dict[tuple[str, str], list[Screened]] = {}
+    for point in points:
+        mine = out.setdefault(point.placed.key, [])
+        if len(mine) < starts:
+            mine.append(point)
+    return list(out.values())
+
+
+def nominal_fit(problem: ArticulatedProblem, settings: SearchSettings) -> ArticulatedFit:
+    """The nominal model alone, with the scales of the joints that it leaves."""
+    vector = np.zeros(len(problem.nominal))
+    left = [float(np.mean(problem.residual(j, (), vector) ** 2)) for j in range(len(problem.joints))]
+    scale = np.sqrt(np.maximum(left, 1.0))
+    current = fit(problem, (), vector, scale=scale, iterations=settings.iterations)
+    for _ in range(settings.refits - 1):
+        before = current.scale
+        current = fit(problem, (), current.vector, scale=before, iterations=settings.iterations)
+        if np.allclose(before, current.scale, rtol=0.05):
+            break
+    return current
+
+
+def search(
+    problem: ArticulatedProblem,
+    candidates: Sequence[Placed],
+    *,
+    settings: SearchSettings | None = None,
+    progress: Callable[[str], None] = lambda text: None,
+) -> list[ArticulatedFit]:
+    """All fitted hypotheses, the likeliest first."""
+    settings = settings or SearchSettings()
+    progress("nominal model")
+    current = nominal_fit(problem, settings)
+    found = [current]
+    for count in range(1, settings.most + 1):
+        taken = {placed.key for placed in current.hypothesis}
+        rest = [c for c in candidates if c.key not in taken]
+        best, fits = _round(
+            problem, current, rest, settings, lambda text, n=count: progress(f"effect {n}: {text}")
+        )
+        found += fits
+        if best is None or best.log_posterior < current.log_posterior + settings.worth:
+            break
+        current = best
+        settled = problem.settled(current.hypothesis, current.vector)
+        if settled is not problem:
+            problem = settled
+            current = fit(
+                problem,
+                current.hypothesis,
+                current.vector,
+                scale=current.scale,
+                iterations=settings.iterations,
+            )
+            found.append(current)
+    return sorted(found, key=lambda f: -f.log_posterior)
+
+
+def _round(
+    problem: ArticulatedProblem,
+    base: ArticulatedFit,
+    candidates: Sequence[Placed],
+    settings: SearchSettings,
+    progress: Callable[[str], None],
+) -> tuple[ArticulatedFit | None, list[ArticulatedFit]]:
+    """One effect more: screened and fitted where runs forget, the best of them fitted again as they are.
+
+    Returns:
+        The best, all joints free, and all that were fitted as they are.
+    """
+    first: list[ArticulatedFit] = []
+    for level in settings.softening:
+        soft = problem.softened(level)
+        if first:
+            first = [_again(soft, f, settings) for f in first]
+            continue
+        ground = fit(
+            soft, base.hypothesis, base.vector, scale=_scale_of(soft, base), iterations=settings.iterations
+        )
+        progress("screening")
+        points = _by_effect(screen(soft, ground, candidates), settings.starts)
+        progress("fits")
+        first = _fits(soft, ground, points, settings)
+        if soft is problem:  # servos hold every joint: nothing forgets more than it does anyway
+            break
+    others = Others.of(problem, base)
+    fits = []
+    first = [f for f in first if sound(problem, f)] or first
+    for one in sorted(first, key=lambda f: -f.log_posterior)[: settings.finalists]:
+        new = fit(
+            problem,
+            one.hypothesis,
+            one.vector,
+            scale=_scale_of(problem, one),
+            iterations=settings.iterations,
+            others=others,
+        )
+        # once more with the scale that it leaves: what a joint says of the masses counts for more then
+        fits.append(
+            fit(
+                problem,
+                one.hypothesis,
+                new.vector,
+                scale=new.scale,
+                iterations=settings.iterations,
+                others=others,
+            )
+        )
+    fits = [f for f in fits if sound(problem, f)]
+    if not fits:
+        return None, fits
+    best = max(fits, key=lambda f: f.log_posterior)
+    whole = fit(problem, best.hypothesis, best.vector, scale=best.scale, iterations=settings.iterations)
+    return whole, [*(f for f in fits if f is not best), whole]
+
+
+def _again(problem: ArticulatedProblem, found: ArticulatedFit, settings: SearchSettings) -> ArticulatedFit:
+    """A fit once more in another problem, on the joints that its last effect changes."""
+    base = ArticulatedFit.at(problem, found.hypothesis[:-1], found.vector)
+    return fit(
+        problem, found.hypothesis, found.vector, scale=_scale_of(problem, found), iterations=settings.iterations,
+        others=Others.of(problem, base),
+    )  # fmt: skip
+
+
+def sound(problem: ArticulatedProblem, found: ArticulatedFit) -> bool:
+    """Whether a fit is finite and no parameter of its effects sits at a bound."""
+    if not (np.isfinite(found.log_posterior) and np.isfinite(found.vector).all()):
+        return False
+    at = len(problem.nominal)
+    for placed in found.hypothesis:
+        for p in placed.effect.parameters:
+            low, high = p.bounds
+            inside = low + AT_BOUND < found.vector[at] < high - AT_BOUND
+            if not (inside or p.fixed or p.name in BOUNDED):
+                return False
+            at += 1
+    return True
+
+
+AT_BOUND = 1e-6
+"""Distance from a bound at which a parameter sits on it: rounding."""
+BOUNDED = ("motor_share", "position")
+"""Parameters whose bounds are physical: a share is at most one, a stop lies where the joint goes."""
+
+
+def _scale_of(problem: ArticulatedProblem, found: ArticulatedFit) -> Array:
+    """Scale (n_joints,) of the residuals of a fit's model in a problem, at least one."""
+    joints = range(len(problem.joints))
+    left = in_threads(
+        lambda j: float(np.mean(problem.residual(j, found.hypothesis, found.vector) ** 2)), joints
+    )
+    return np.sqrt(np.maximum(left, 1.0))
+
+
+def _fits(
+    problem: ArticulatedProblem,
+    base: ArticulatedFit,
+    points: Sequence[Sequence[Screened]],
+    settings: SearchSettings,
+) -> list[ArticulatedFit]:
+    """Fits of the most promising effects on top of a fit, on the joints that they change."""
+    others = Others.of(problem, base)
+    out: list[ArticulatedFit] = []
+    gained = 0.0
+    strained = {
+        p.joint for p, x in zip(problem.nominal, base.vector, strict=False) if abs(x) > settings.strained
+    }
+    for k, mine in enumerate(points):
+        # where a number of the model was moved too far, all numbers that may be wrong instead are tried
+        instead = mine[0].placed.effect.number and mine[0].placed.joint in strained
+        hopeful = k < settings.fitted and mine[0].gain >= settings.hope * gained
+        if not (k < settings.least or hopeful or instead):
+            continue
+        hypothesis: Hypothesis = (*base.hypothesis, mine[0].placed)
+        # nominal parameters that stood in for what was missing are also tried where they were stated
+        untouched = np.concatenate([np.zeros(len(problem.nominal)), base.vector[len(problem.nominal) :]])
+        starts = np.array(
+            [np.concatenate([at, point.eta]) for point in mine for at in (base.vector, untouched)]
+        )
+        new = fit(
+            problem, hypothesis, starts, scale=base.scale, iterations=settings.iterations, others=others
+        )
+        new = fit(
+            problem, hypothesis, new.vector, scale=new.scale, iterations=settings.iterations, others=others
+        )
+        out.append(new)
+        gained = max(gained, 2.0 * (new.log_posterior - base.log_posterior))
+    return out
