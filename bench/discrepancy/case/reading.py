@@ -33,6 +33,9 @@ from bench.recording.units import conversion
 GROUPS = ("identification", "validation")
 """What the names of records begin with: those that serve to find the effect, and those that judge."""
 
+MOST_LISTED = 8
+"""Unused columns that a note lists by name."""
+
 _THOUSANDS = {1: "ms", 2: "us", 3: "ns"}
 
 
@@ -158,6 +161,10 @@ def _read_record(file: Path, name: str, known: _Channels, units: dict[str, str],
         time, notes = _times(contents, known)
     except (RecordingError, UnitError, UnknownNameError) as error:
         raise _at(file, error) from None
+    if contents.unused:
+        listed = ", ".join(f"'{heading[:60]}'" for heading in contents.unused[:MOST_LISTED])
+        more = f" and {len(contents.unused) - MOST_LISTED} more" if len(contents.unused) > MOST_LISTED else ""
+        notes = (*notes, f"columns that nominal.json does not name are not used: {listed}{more}")
     return record_from_arrays(name, time, arrays, at_rest=at_rest, notes=(*contents.notes, *notes))
 
 
