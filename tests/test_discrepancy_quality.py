@@ -233,7 +233,9 @@ BROKEN: dict[str, tuple[dict, str]] = {
     "capital entry": ({"nominal": altered("channels", "force", "Role", value="command")}, "Did you mean 'role'"),
     "no mass": ({"nominal": altered("parameters", "mass", value=None)}, "lacks the nominal parameter(s) mass"),
     "unknown unit": ({"nominal": altered("parameters", "mass", "unit", value="kgg")}, "unknown unit 'kgg'"),
-    "units that clash": ({"nominal": altered("channels", "displacement", "unit", value="mm")}, "do not belong together"),
+    "units that clash": (
+        {"nominal": altered("channels", "displacement", "unit", value="mm")}, "what the nominal model predicts from 'force'",
+    ),
     "unknown role": ({"nominal": altered("channels", "force", "role", value="loadcell")}, "loadcell"),
     "negative noise": ({"nominal": altered("channels", "force", "noise_std", value=-1)}, "channels.force.noise_std: -1 came"),
     "no channels": ({"nominal": altered("channels", value={})}, "channels: no channel besides time"),

@@ -25,7 +25,7 @@ class NamedEffect:
 
     Attributes:
         name: Name in the catalogue.
-        where: Place; empty on a rig with one joint.
+        where: Place: a joint or tendon of the model, "carriage", "piston", or an axis of the joint rig.
         probability: Posterior probability that it belongs to the explanation.
         parameters: Estimates by name.
         channel: Channel or nominal parameter it acts on, for actuator, sensor and inertia effects.

@@ -210,7 +210,8 @@ def _run_one(task: tuple[Path, Path, dict[str, Any]]) -> str:
 
     path, target, options = task
     try:
-        verdict = diagnose_folder(path, **options).verdict
+        # a planted polarity or gain is to be named here, not refused as one of the recording
+        verdict = diagnose_folder(path, **{"anyway": True, **options}).verdict
     except KeyboardInterrupt:
         raise
     except Exception as error:  # one case that fails is one wrong answer, not the end of the run
