@@ -23,7 +23,7 @@ from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.case.channel_noise import noise_floor
 from bench.discrepancy.case.single_axis import motion_channels
 from bench.discrepancy.likelihood.problem import Problem
-from bench.discrepancy.model.nominal_forces import own_force
+from bench.discrepancy.model.nominal_elements import own_force
 from bench.errors import UnitError
 from bench.recording.units import conversion, read_as, si_unit
 
@@ -402,7 +402,7 @@ def _implied_loads(problem: Problem, record: CaseRecord, settings: ScaleSettings
         + motion.velocity @ linear.damping
         + motion.position @ linear.stiffness
     )
-    force = force + own_force(structure, values, motion)
+    force = force + own_force(structure, values, motion, record.step)
     implied = np.asarray(force[:, 0] / structure.inputs[0, 0], dtype=np.float64)
     load = record.values[structure.loads[0]]
     bands = _bands(spectra(load, implied, record.step, (float(problem.load_noise[0]), 0.0), settings))
