@@ -12,13 +12,12 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 DIAGNOSIS = ROOT / "bench" / "discrepancy"
 OWED = {
-    ("bench.discrepancy.case.schema", "bench.discrepancy.case.case"),
     ("bench.discrepancy.response.driving_loads", "bench.discrepancy.likelihood.problem"),
     ("bench.discrepancy.likelihood.noise_covariance", "bench.discrepancy.likelihood.problem"),
     ("bench.discrepancy.likelihood.time_varying_noise", "bench.discrepancy.likelihood.problem"),
     ("bench.discrepancy.likelihood.window_whitening", "bench.discrepancy.likelihood.problem"),
 }
-"""Imports for type checkers that close a circle until the problem is cut in two and the schema takes what it uses."""
+"""Imports for type checkers that close a circle until the problem is cut in two."""
 LARGEST_ROOM, MOST_LOOSE = 2500, 4
 """Lines of a room of the diagnosis, and files beside its rooms."""
 
