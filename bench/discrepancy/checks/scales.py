@@ -23,7 +23,7 @@ from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.case.channel_noise import noise_floor
 from bench.discrepancy.case.single_axis import motion_channels
 from bench.discrepancy.likelihood.problem import Problem
-from bench.discrepancy.model.nominal_forces import own_force
+from bench.discrepancy.model.nominal_elements import own_force
 from bench.errors import UnitError
 from bench.recording.units import conversion, read_as, si_unit
 
