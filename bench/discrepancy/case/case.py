@@ -8,7 +8,7 @@ What is known of the acquisition goes there too: ``"load_interpolation": "linear
 loads between their samples, ``"starts_in_motion": ["validation", …]`` (or true, for all of them) for records that do not start at
 rest, ``"periodic": ["identification_2", …]`` for records that are whole periods of a steady state, and
 ``"antialias": {"kind": "butterworth", "order": 4, "cutoff_hz": 300}`` at a response channel that was filtered on its way. Of the
-first two, what is not stated is looked for in the records (`between_samples`, `moving_starts`).
+first two, what is not stated is looked for in the records (`search.load_interpolation`, `checks.initial_motion`).
 """
 
 from __future__ import annotations

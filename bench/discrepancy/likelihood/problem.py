@@ -62,7 +62,7 @@ class Problem:
         records: Records to be explained.
         bins: Frequency bins of every record, where they have to agree with those of another problem.
         substeps: Integration steps a sample; chosen by the fastest rate where None.
-        refinement: Multiple of the steps so chosen, as far as `pace` lets it.
+        refinement: Multiple of the steps so chosen, as far as `step_size` lets it.
         within: Stated standard deviations that a nominal parameter may move.
         error: Error of the model that residuals are weighed by besides their noise; None where noise is all that they hold.
         nominal: (n_nominal,) values of the structure's parameters, initial states of records in motion after them.
@@ -192,14 +192,14 @@ class Problem:
         return channels
 
     def lead_in(self, record: CaseRecord) -> int:
-        """Samples of run-in before a periodic record, see `driving.run_in`."""
+        """Samples of run-in before a periodic record, see `driving_loads.run_in`."""
         if not record.periodic or self.driven or self.windowed:
             return 0
         return run_in(self.structure.at(self.nominal), len(record), record.step)
 
     @cached_property
     def finest(self) -> int:
-        """Fewest integration steps a sample, see `driving.fewest_steps`."""
+        """Fewest integration steps a sample, see `driving_loads.fewest_steps`."""
         return fewest_steps(self)
 
     def motion(self, index: int) -> Motion:
@@ -517,7 +517,7 @@ class Problem:
         )
 
     def _speeds(self, placed: Placed, record: CaseRecord) -> Array:
-        """Cached speeds along the coordinate of an effect, see `pace.speeds`; (1,) where the record was not measured."""
+        """Cached speeds along the coordinate of an effect, see `step_size.speeds`; (1,) where the record was not measured."""
         if not any(own is record for own in self.records):
             return np.array([self.scales_of(placed).velocity])
         cache = self.__dict__.setdefault("_speeds_along", {})

@@ -1,7 +1,7 @@
 """Explanations: hypotheses for all degrees of freedom together, and how well they predict.
 
 A rig may fall apart into groups of degrees of freedom that its linear structure does not couple: the axial and the torsional
-motion of a joint. Each group is searched on its own. Effects that couple groups (`coupled`) are tried alone before; other effects
+motion of a joint. Each group is searched on its own. Effects that couple groups (`coupled_effects`) are tried alone before; other effects
 are searched beside them at once where the groups promise far less than a coupling does, else when the groups alone leave more than
 noise, or a force. Chi-squared and evidence add over groups, so all explanations can be compared.
 """
