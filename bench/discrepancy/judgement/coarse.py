@@ -163,10 +163,13 @@ def _as_good(entry: HeldOut, best: HeldOut, settings: CoarseSettings) -> bool:
     return entry is best or worse <= max(error, settings.telling)
 
 
-def _plainness(entry: HeldOut) -> tuple[int, int, float, float]:
-    """What comes first is simpler: fewer effects, fewer parameters, commoner ones, and then what predicts better."""
+def _plainness(entry: HeldOut) -> tuple[int, float, float]:
+    """What comes first is simpler: fewer effects, then fewer parameters and commoner effects, and then what predicts better.
+
+    A parameter counts as a unit of log prior, which is what it gains on average where nothing is to be gained.
+    """
     e = entry.explanation
-    return (len(e.hypothesis), e.n_free, -sum(p.effect.log_prior for p in e.hypothesis), entry.total)
+    return (len(e.hypothesis), e.n_free - sum(p.effect.log_prior for p in e.hypothesis), entry.total)
 
 
 class Discrepancies:
