@@ -20,7 +20,9 @@ from bench.discrepancy.case.case import (
     CaseRecord,
     NominalParameter,
     record_from_arrays,
+    without_load,
 )
+from bench.discrepancy.case.elements import declared_parameters
 from bench.discrepancy.case.schema import NominalDocument
 from bench.errors import BenchError, FileFormatError, RecordingError, UnitError, UnknownNameError
 from bench.record_files.column_map import ColumnMap
@@ -70,6 +72,8 @@ def read_case(folder: str | Path) -> Case:
         NominalParameter(name, entry.value, entry.std, entry.unit)
         for name, entry in nominal.parameters.items()
     )
+    declared = declared_parameters(nominal.elements, path)
+    parameters += tuple(NominalParameter(name, *entry) for name, entry in declared.items())
     channels = tuple(
         CaseChannel(
             name, entry.unit, nominal.role_of(name), entry.noise_std, entry.filter(), entry.target, entry.quantity or "",
@@ -100,10 +104,11 @@ def read_case(folder: str | Path) -> Case:
         for group in GROUPS
     }
     channels = tuple(c if c.unit else replace(c, unit=units.get(c.name, "")) for c in channels)
-    return Case(
+    case = Case(
         folder.name, nominal.rig, parameters, channels,
         records["identification"], records["validation"], folder, nominal.options,
     )  # fmt: skip
+    return without_load(case)
 
 
 def _record_files(folder: Path) -> dict[str, dict[str, Path]]:

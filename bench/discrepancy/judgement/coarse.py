@@ -66,6 +66,7 @@ class Judged:
         weights: (n,) probability of each, as if one of them were true.
         within: Those within one standard error of the best.
         vetoed: Whether the judging records refused what the others would have named.
+        nominal: Largest judged discrepancy of the nominal model, its parameters re-estimated within their uncertainty.
         left: Part of the power of the judged discrepancy, beyond noise, that the chosen one leaves.
     """
 
@@ -74,6 +75,7 @@ class Judged:
     weights: Array
     within: tuple[HeldOut, ...]
     vetoed: bool
+    nominal: float
     left: float
 
     @property
@@ -119,15 +121,16 @@ def judge(
     found = [base, *found]
     weights = shares(found, np.array([_log_prior(e.explanation) for e in found]), rng)
     within = tuple(entry for entry in found if _as_good(entry, base, settings))
+    worst = float(np.max(known.of(nothing, judging=True)))
     vetoed, part = False, settings.most if trusted else settings.pays
     for own in sorted(within, key=_plainness):
         entry = _steady(own, case, rng)
         e = entry.explanation
         if not e.hypothesis or known.pays(e, nothing, part):
             found = [entry if other is own else other for other in found]
-            return Judged(entry, tuple(found), weights, within, vetoed, known.left(e, nothing))
+            return Judged(entry, tuple(found), weights, within, vetoed, worst, known.left(e, nothing))
         vetoed = True
-    return Judged(found[-1], tuple(found), weights, within, True, 1.0)
+    return Judged(found[-1], tuple(found), weights, within, True, worst, 1.0)
 
 
 def _steady(entry: HeldOut, case: Case, rng: np.random.Generator) -> HeldOut:
