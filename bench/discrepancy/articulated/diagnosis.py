@@ -195,7 +195,7 @@ def _verdict(
     stated: bool,
 ) -> Verdict:
     final, base = rungs[last], rungs[0]
-    whole = stated and complete(final, settings)
+    whole = stated and complete(problem, final, settings)
     explained, _ = closed(predictions[0], predictions[last], predictions[0], rng)
     kind: Kind = "effect" if last else "none"
     if not whole and (not last or explained < settings.material):
