@@ -119,7 +119,7 @@ def test_pages_name_modules_that_exist():
         ("bench.rig", True),
         ("bench.rig.Rig", True),
         ("bench.rig.nothing", False),
-        ("bench.discrepancy.swinging_noise", False),
+        ("bench.discrepancy.no_such_room", False),
         ("nothing_of_the_kind", False),
     ],
 )

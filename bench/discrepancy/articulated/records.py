@@ -10,6 +10,7 @@ model once, as one draw.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
@@ -317,6 +318,15 @@ class PreparedRecord:
     record: CaseRecord
     motion: Motion
     joints: tuple[JointRecord, ...]
+
+    def read_by(self, encoders: Mapping[str, Encoder]) -> PreparedRecord:
+        """The record with encoders that differ in what reads them alone."""
+        joints = []
+        for joint in self.joints:
+            new = copy.copy(joint)
+            object.__setattr__(new, "encoder", encoders.get(joint.joint.name, joint.encoder))
+            joints.append(new)
+        return replace(self, joints=tuple(joints))
 
 
 def prepare(case: Case, model: ArticulatedModel, record: CaseRecord) -> PreparedRecord:
