@@ -52,6 +52,8 @@ class CoarseSettings:
 
 
 SETTINGS = CoarseSettings()
+ALIKE = 2.0
+"""Standard errors of a difference within which two explanations are declared a set."""
 ABOUT_NOISE, UNCHANGED = 1.1, 1.02
 """Times the noise below which a judged discrepancy is nothing but that, and change of it that is none."""
 
@@ -65,6 +67,7 @@ class Judged:
         found: All finalists on held-out blocks, the chosen one first.
         weights: (n,) probability of each, as if one of them were true.
         within: Those within one standard error of the best.
+        alike: Those that the blocks do not tell from the chosen one: two standard errors.
         vetoed: Whether the judging records refused what the others would have named.
         nominal: Largest judged discrepancy of the nominal model, its parameters re-estimated within their uncertainty.
         left: Part of the power of the judged discrepancy, beyond noise, that the chosen one leaves.
@@ -74,6 +77,7 @@ class Judged:
     found: tuple[HeldOut, ...]
     weights: Array
     within: tuple[HeldOut, ...]
+    alike: tuple[HeldOut, ...]
     vetoed: bool
     nominal: float
     left: float
@@ -128,9 +132,10 @@ def judge(
         e = entry.explanation
         if not e.hypothesis or known.pays(e, nothing, part):
             found = [entry if other is own else other for other in found]
-            return Judged(entry, tuple(found), weights, within, vetoed, worst, known.left(e, nothing))
+            alike = tuple(other for other in found if _as_good(other, base, settings, ALIKE))
+            return Judged(entry, tuple(found), weights, within, alike, vetoed, worst, known.left(e, nothing))
         vetoed = True
-    return Judged(found[-1], tuple(found), weights, within, True, worst, 1.0)
+    return Judged(found[-1], tuple(found), weights, within, within, True, worst, 1.0)
 
 
 def _steady(entry: HeldOut, case: Case, rng: np.random.Generator) -> HeldOut:
@@ -157,10 +162,10 @@ def _log_prior(explanation: Explanation) -> float:
     return sum(LOG_PRIOR_EFFECT + placed.effect.log_prior for placed in explanation.hypothesis)
 
 
-def _as_good(entry: HeldOut, best: HeldOut, settings: CoarseSettings) -> bool:
+def _as_good(entry: HeldOut, best: HeldOut, settings: CoarseSettings, errors: float = 1.0) -> bool:
     """Whether an explanation predicts as well as the best one: within a standard error, or what so few samples cannot tell."""
     worse, error = entry.worse_than(best)
-    return entry is best or worse <= max(error, settings.telling)
+    return entry is best or worse <= max(errors * error, settings.telling)
 
 
 def _plainness(entry: HeldOut) -> tuple[int, float, float]:

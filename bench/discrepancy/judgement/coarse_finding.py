@@ -161,7 +161,7 @@ def _sets(judged: Judged) -> tuple[tuple[str, ...], ...]:
     chosen = judged.chosen.explanation
     own = {p.key: p for p in chosen.hypothesis}
     sets: dict[str, set[str]] = {}
-    for entry in judged.within:
+    for entry in judged.alike:
         theirs = {p.key: p for p in entry.explanation.hypothesis}
         if not theirs or not own or entry is judged.chosen:
             continue
