@@ -334,6 +334,16 @@ def test_values_that_contradict_the_model_are_told_with_what_they_are_the_sum_of
     assert "'table' 2.4 kg, 'tool' 0.6 kg" in note
 
 
+def test_columns_that_nobody_names_are_listed(tmp_path):
+    folder = made(tmp_path, {})
+    for name in ("identification", "validation"):
+        file = folder / f"{name}.csv"
+        head, *rows = file.read_text().splitlines()
+        file.write_text("\n".join([f"{head},tension", *(f"{row},1.5" for row in rows)]) + "\n")
+    notes = read_case(folder).identification[0].notes
+    assert [note for note in notes if "'tension'" in note and "not used" in note]
+
+
 @pytest.mark.slow
 def test_a_free_decay_needs_no_load(tmp_path):
     text = MODEL.format(**{**PLAIN, "actuator": "", "joint": 'ref="0"'})
@@ -399,7 +409,7 @@ def gap(before: float, after: float, floor: float, interval=(0.5, 0.7)) -> Gap:
     ("entry", "words"),
     [
         (gap(0.00201, 0.00197, 0.002), "nothing to close: it is that of the noise"),
-        (gap(0.5, 0.01, 0.01), "over 99.9 %"),
+        (gap(0.5, 0.01, 0.01, (0.9999, 1.0)), "over 99.9 %"),
         (gap(0.5, 0.2, 0.01), "61.2 % (50.0 to 70.0)"),
         (gap(0.5, 0.2, 0.01, (-400.0, 3.0)), "61.2 % (below -100 to over 99.9)"),
         (gap(0.5, 1.0, 0.01), "none: it grows to 2 times"),

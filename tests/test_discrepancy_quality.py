@@ -298,7 +298,7 @@ def test_stopped_by_hand_leaves_nothing_behind(tmp_path, capsys, monkeypatch):
     def stopped(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("bench.discrepancy.diagnosis.explain", stopped)
+    monkeypatch.setattr("bench.discrepancy.diagnosis.found_of", stopped)
     out = tmp_path / "verdict.json"
     assert main(["diagnose", str(folder), "--json", str(out), "--no-progress"]) == 130
     assert "Traceback" not in capsys.readouterr().err

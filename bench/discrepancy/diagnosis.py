@@ -1,9 +1,9 @@
 """The diagnosis of a case: where the gap lies, which effect causes it, how far it shrinks.
 
-The steps, each in its own module: read the case (`case`), find what it leaves unstated of its records (`moving_starts`,
-`between_samples`), screen and fit the catalogue (`screen`, `fit`, `attribute`, `explain`), weigh the explanations (`evidence`),
-doubt the best one (`free_rival`, `contradiction`), run the judging records with each (`shrink`), and say where the residuals of
-the nominal model gather (`locate`).
+The steps, each in its own room: read the case (`case`), find what it leaves unstated of its records (`checks.initial_motion`,
+`search.load_interpolation`), screen the catalogue and fit what is promising (`screening`, `fitting`, `search`), weigh the
+explanations and doubt the best one (`judgement`), run the judging records with each (`judgement.validation_discrepancy`), and say
+where the residuals of the nominal model gather (`localisation`). docs/architecture.md draws the rooms.
 """
 
 from __future__ import annotations

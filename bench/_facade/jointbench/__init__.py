@@ -11,11 +11,12 @@ Example:
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
-
 from jointbench._own import follow, own
 
+TYPE_CHECKING = False  # `typing` would be imported whenever Python starts
 if TYPE_CHECKING:
+    from typing import Any
+
     from bench import *  # noqa: F403
 
 follow()

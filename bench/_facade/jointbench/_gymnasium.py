@@ -8,12 +8,14 @@ until then it costs nothing but its own import, and where gymnasium is never imp
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
-from importlib.abc import MetaPathFinder
-from importlib.machinery import ModuleSpec
 from importlib.util import find_spec
-from types import ModuleType
-from typing import Any
+
+TYPE_CHECKING = False  # `typing` would be imported whenever Python starts
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from importlib.machinery import ModuleSpec
+    from types import ModuleType
+    from typing import Any
 
 REGISTRATION = "gymnasium.envs.registration"
 IDS = (
@@ -37,7 +39,7 @@ def register() -> None:
             )
 
 
-class Waiting(MetaPathFinder):
+class Waiting:
     """Registers once gymnasium's registry is there; finds nothing itself."""
 
     def find_spec(
@@ -66,7 +68,7 @@ def wait() -> None:
     if REGISTRATION in sys.modules:
         register()
     elif not any(isinstance(finder, Waiting) for finder in sys.meta_path):
-        sys.meta_path.insert(0, Waiting())
+        sys.meta_path.insert(0, Waiting())  # pyright: ignore[reportArgumentType]
 
 
 wait()

@@ -6,18 +6,20 @@ name has to be the bench's; `envs` imports its parts relative to itself, so wher
 
 from __future__ import annotations
 
+import os
 import sys
-from collections.abc import Sequence
 from importlib import import_module
-from importlib.abc import Loader, MetaPathFinder
 from importlib.machinery import ModuleSpec
 from importlib.util import find_spec, module_from_spec, spec_from_file_location
-from pathlib import Path
-from types import ModuleType
+
+TYPE_CHECKING = False  # `typing` and `pathlib` would be imported whenever Python starts
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from types import ModuleType
 
 FACADE = __name__.partition(".")[0]
-_FOLDER = Path(__file__).resolve().parent
-ROOT = _FOLDER.parents[2] if _FOLDER.parent.name == "_facade" else _FOLDER.parent
+_ABOVE = os.path.dirname(os.path.dirname(os.path.realpath(__file__)))
+ROOT = os.path.dirname(os.path.dirname(_ABOVE)) if os.path.basename(_ABOVE) == "_facade" else _ABOVE
 """Folder that holds `bench` and `envs`: that of this package where it is installed, the checkout where it is not."""
 
 
@@ -55,12 +57,13 @@ def follow() -> None:
 
 
 def _is_own(file: str | None, name: str) -> bool:
-    return file is not None and Path(file).resolve() == ROOT / name / "__init__.py"
+    return file is not None and os.path.realpath(file) == os.path.join(ROOT, name, "__init__.py")
 
 
 def _spec(module: str, package: str) -> ModuleSpec:
-    folder = ROOT / package
-    found = spec_from_file_location(module, folder / "__init__.py", submodule_search_locations=[str(folder)])
+    folder = os.path.join(ROOT, package)
+    file = os.path.join(folder, "__init__.py")
+    found = spec_from_file_location(module, file, submodule_search_locations=[folder])
     assert found is not None
     return found
 
@@ -78,7 +81,7 @@ def _load(module: str, package: str) -> ModuleType:
     return made
 
 
-class _Alias(MetaPathFinder):
+class _Alias:
     """Finds ``jointbench.x`` as ``bench.x``, and ``jointbench.envs`` as the bench's own `envs`."""
 
     def find_spec(
@@ -99,10 +102,10 @@ class _Alias(MetaPathFinder):
             name = f"bench.{part}"
             if find_spec(name) is None:
                 return None
-        return ModuleSpec(fullname, _Existing(name), is_package=True)
+        return ModuleSpec(fullname, _Existing(name), is_package=True)  # pyright: ignore[reportArgumentType]
 
 
-class _Existing(Loader):
+class _Existing:
     """Gives out a module under a further name."""
 
     def __init__(self, name: str) -> None:

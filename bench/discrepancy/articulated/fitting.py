@@ -20,7 +20,9 @@ from bench.discrepancy.numerics.threads import in_threads
 
 Array = NDArray[np.float64]
 REACH = 4.0
-"""Longest step of a fit, in prior standard deviations."""
+"""Longest step of a fit in the parameters of effects, in prior standard deviations."""
+NOMINAL_REACH = 40.0
+"""The same in nominal parameters, whose priors are narrow and in which the equations are linear."""
 DIFFERENCE = 1e-4
 """Difference of a parameter, in prior standard deviations, for what the joints know of the masses."""
 
@@ -171,16 +173,16 @@ def fit(
         return np.concatenate(parts)
 
     mean, std, low, high = problem.prior(hypothesis)
-    free = _free(problem, hypothesis, active if passive else None)
+    free = free_entries(problem, hypothesis, active if passive else None)
+    reach = np.where(free < len(problem.nominal), NOMINAL_REACH, REACH)
     found = minimise(
-        residual_at, starts, prior=Prior(mean, std, low, high), free=free, reach=np.full(len(free), REACH),
-        iterations=iterations, limit=limit,
+        residual_at, starts, prior=Prior(mean, std, low, high), free=free, reach=reach, iterations=iterations, limit=limit,
     )  # fmt: skip
     return _summary(problem, hypothesis, found.vector, found.curvature, free, scale, active, others)
 
 
-def _free(
-    problem: ArticulatedProblem, hypothesis: Hypothesis, active: Sequence[int] | None
+def free_entries(
+    problem: ArticulatedProblem, hypothesis: Hypothesis, active: Sequence[int] | None = None
 ) -> NDArray[np.int64]:
     """Entries that a fit moves: all that are free, or those of the active joints and the masses."""
     out = [
@@ -225,7 +227,7 @@ def _summary(
     covariance = np.zeros((len(vector), len(vector)))
     inverse = np.linalg.pinv(curvature)
     covariance[np.ix_(free, free)] = inverse * np.outer(std[free], std[free])
-    every = _free(problem, hypothesis, None)
+    every = free_entries(problem, hypothesis, None)
     deviation = ((vector - mean) / std)[every]
     sign, logdet = np.linalg.slogdet(curvature)
     occam = -0.5 * float(logdet) if sign > 0 else 0.0

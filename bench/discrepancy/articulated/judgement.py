@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from bench.discrepancy.articulated.fitting import ArticulatedFit
 from bench.discrepancy.articulated.problem import ArticulatedProblem
+from bench.discrepancy.articulated.records import encoders_of
 from bench.discrepancy.numerics.threads import in_threads
 
 Array = NDArray[np.float64]
@@ -32,6 +33,8 @@ class JudgementSettings:
         rival: Difference in log posterior (odds of 100) within which explanations stand for one another.
         outside: Probability kept for what no catalogue holds, also where a catalogued effect explains the records; that of the linear
             structures (`judgement.posterior`).
+        strained: Deviation of a nominal parameter, in its stated standard uncertainties, beyond which it is not believed (one normal
+            number in 16000 is as far out): predictions are made with it there, and what needs more is not complete.
     """
 
     blocks: int = 24
@@ -40,6 +43,7 @@ class JudgementSettings:
     material: float = 0.5
     rival: float = 4.6
     outside: float = 0.01
+    strained: float = 4.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +74,9 @@ def predict(
 ) -> Prediction:
     """Free runs of a problem's records with a fit's model; with the nominal model as it is where None."""
     hypothesis = found.hypothesis if found else ()
-    vector = found.vector if found else np.zeros(len(problem.nominal))
+    vector = found.vector.copy() if found else np.zeros(len(problem.nominal))
+    n = len(problem.nominal)
+    vector[:n] = np.clip(vector[:n], -settings.strained, settings.strained)
     elastic = problem.settled(hypothesis, vector)
     jobs = [(j, r) for r in range(len(problem.records)) for j in range(len(problem.joints))]
     motions = elastic.motions(hypothesis, vector)
@@ -112,7 +118,7 @@ def kept(
     predictions = [predict(problem, rung, settings) for rung in rungs]
     last = 0
     for k in range(1, len(rungs)):
-        if complete(rungs[last], settings):
+        if complete(problem, rungs[last], settings):
             break
         difference = predictions[last].excess - predictions[k].excess
         error = float(np.std(difference, ddof=1)) / np.sqrt(len(difference))
@@ -122,9 +128,28 @@ def kept(
     return last, predictions
 
 
-def complete(found: ArticulatedFit, settings: JudgementSettings) -> bool:
-    """Whether no joint keeps more than the noise."""
-    return bool(np.all(found.reduced <= (1.0 + settings.noise_known) ** 2))
+def complete(problem: ArticulatedProblem, found: ArticulatedFit, settings: JudgementSettings) -> bool:
+    """Whether no joint keeps more than the noise, and no nominal parameter is strained for it."""
+    noise = (1.0 + settings.noise_known) ** 2 + np.array([
+        settings.sure * _of_steps(problem, j) for j in range(len(problem.joints))
+    ])  # fmt: skip
+    far = np.abs(found.vector[: len(problem.nominal)]) > settings.strained
+    return bool(np.all(found.reduced <= noise) and not far.any())
+
+
+def _of_steps(problem: ArticulatedProblem, j: int) -> float:
+    """Standard error of the mean square of an encoder's noise that comes of its steps, relative to the stated noise.
+
+    While a reading stays the same its error hardly changes: of a uniform error, whose square has the standard deviation
+    ``step^2 / sqrt(180)``, there are as many draws as the reading changes.
+    """
+    channel = encoders_of(problem.case, problem.joints[j]).channels[0]
+    if channel.resolution <= 0.0:
+        return 0.0
+    readings = [np.diff(prepared.joints[j].position) for prepared in problem.records]
+    changes = sum(int(np.count_nonzero(np.abs(d) > 0.5 * channel.resolution)) for d in readings)
+    noise = float(problem.records[0].joints[j].noise[0])
+    return channel.resolution**2 / np.sqrt(180.0 * max(changes, 1)) / noise**2
 
 
 def closed(

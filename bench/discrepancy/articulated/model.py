@@ -16,6 +16,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.discrepancy.articulated.inverse import along
 from bench.errors import ModelError, UnknownNameError
 
 Array = NDArray[np.float64]
@@ -183,19 +184,7 @@ class ArticulatedModel:
 
     def dynamics(self, q: Array, v: Array, a: Array) -> Dynamics:
         """Inverse dynamics along positions, velocities and accelerations (n, n_joints)."""
-        model = self.model
-        data = mujoco.MjData(model)
-        torque, inertia = np.empty_like(q), np.empty_like(q)
-        # the mass matrix is stored by rows, its lower triangle, so that a row ends on the diagonal
-        diagonal = np.array(model.M_rowadr) + np.array(model.M_rownnz) - 1
-        for k in range(len(q)):
-            data.qpos[:] = q[k]
-            data.qvel[:] = v[k]
-            data.qacc[:] = a[k]
-            mujoco.mj_inverse(model, data)
-            torque[k] = data.qfrc_inverse
-            inertia[k] = data.M[diagonal]
-        return Dynamics(torque, inertia)
+        return Dynamics(*along(self.model, q, v, a))
 
     def slopes(self, q: Array, v: Array, a: Array) -> Array:
         """Derivative (n, n_joints) of the torque on every joint by its own position."""

@@ -158,13 +158,19 @@ class ArticulatedProblem:
                 wrong[name] = Encoder(*(a + b for a, b in zip(old, new, strict=True)))
         if not wrong:
             return self.records
-        key = tuple(sorted(wrong.items()))
+        # whether a servo acts on a wrong reading changes its runs and not the motion
+        key = tuple(sorted((name, encoder._replace(in_loop=0.0)) for name, encoder in wrong.items()))
         with self._correcting:
             if key not in self._corrected:
                 while len(self._corrected) >= KEPT_MOTIONS:
                     self._corrected.pop(next(iter(self._corrected)))
-                self._corrected[key] = tuple(corrected(self.case, self.model, r, wrong) for r in self.records)
-            return self._corrected[key]
+                self._corrected[key] = tuple(
+                    corrected(self.case, self.model, r, dict(key)) for r in self.records
+                )
+            found = self._corrected[key]
+        if not any(encoder.in_loop for encoder in wrong.values()):
+            return found
+        return tuple(r.read_by(wrong) for r in found)
 
     def softened(self, level: float) -> ArticulatedProblem:
         """The same problem with torque noise of at least `level` times the RMS torque where no servo holds a joint.

@@ -1,6 +1,6 @@
 """Records of an articulated model, prepared: for every joint the coefficients of its equation along the measured motion, and its noise.
 
-The motion is smoothed from the encoders (`smoothing`). Where an encoder is wrong, the log is corrected first (`Encoder`) and everything
+The motion is smoothed from the encoders (`kalman_smoother`). Where an encoder is wrong, its log is corrected first (`Encoder`), and all
 follows from the corrected one, since a posture that is wrong at one joint is felt by all.
 
 The gain of the innovations is the stationary Kalman gain of the joint about its mean inertia. Its process noise is the stated noise of the
@@ -10,6 +10,7 @@ model once, as one draw.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
@@ -317,6 +318,15 @@ class PreparedRecord:
     record: CaseRecord
     motion: Motion
     joints: tuple[JointRecord, ...]
+
+    def read_by(self, encoders: Mapping[str, Encoder]) -> PreparedRecord:
+        """The record with encoders that differ in what reads them alone."""
+        joints = []
+        for joint in self.joints:
+            new = copy.copy(joint)
+            object.__setattr__(new, "encoder", encoders.get(joint.joint.name, joint.encoder))
+            joints.append(new)
+        return replace(self, joints=tuple(joints))
 
 
 def prepare(case: Case, model: ArticulatedModel, record: CaseRecord) -> PreparedRecord:

@@ -13,7 +13,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.discrepancy.articulated.fitting import ArticulatedFit, Others, fit, linearised
+from bench.discrepancy.articulated.fitting import ArticulatedFit, Others, fit, free_entries, linearised
 from bench.discrepancy.articulated.problem import ArticulatedProblem, Hypothesis, Placed, misfit_of
 from bench.discrepancy.numerics.threads import in_threads
 
@@ -63,11 +63,13 @@ class Screened:
         placed: The effect.
         eta: Its parameters, the amplitude scaled to what the regression likes best.
         gain: Decrease of twice the negative log-likelihood that it promises.
+        start: The vector from which it is fitted: that of the fit, moved by what the regression says of it.
     """
 
     placed: Placed
     eta: Array
     gain: float
+    start: Array
 
 
 class _Ground:
@@ -75,20 +77,24 @@ class _Ground:
 
     def __init__(self, problem: ArticulatedProblem, base: ArticulatedFit, joints: Sequence[int]) -> None:
         self.joints = tuple(joints)
-        columns = [
-            i
-            for i in range(len(base.vector))
-            if base.covariance[i, i] > 0.0 and self._moves(problem, base, i)
-        ]
+        self.base = base
+        free = set(free_entries(problem, base.hypothesis).tolist())
+        columns = [i for i in range(len(base.vector)) if i in free and self._moves(problem, base, i)]
+        self.columns = columns
         parts = in_threads(lambda j: linearised(problem, base, j, columns), self.joints)
         mean, std, _, _ = problem.prior(base.hypothesis)
         rows = np.zeros((len(columns), len(columns)))
         rows[np.arange(len(columns)), np.arange(len(columns))] = 1.0 / std[columns]
         self.residuals = {j: r for j, (_, r) in zip(self.joints, parts, strict=True)}
         self.n_prior = len(columns)
-        self.basis, _ = np.linalg.qr(np.vstack([*(jacobian for jacobian, _ in parts), rows]))
-        left = np.concatenate([*(r for _, r in parts), (base.vector[columns] - mean[columns]) / std[columns]])
-        self.left = self.without(left)
+        self.basis, self.triangle = np.linalg.qr(np.vstack([*(jacobian for jacobian, _ in parts), rows]))
+        self.whole = np.concatenate([
+            *(r for _, r in parts), (base.vector[columns] - mean[columns]) / std[columns]
+        ])  # fmt: skip
+        self.left = self.without(self.whole)
+        ends = np.cumsum([len(r) for _, r in parts])
+        self.slices = [slice(end - len(r), end) for end, (_, r) in zip(ends, parts, strict=True)]
+        _, _, self.low, self.high = problem.prior(base.hypothesis)
 
     def _moves(self, problem: ArticulatedProblem, base: ArticulatedFit, i: int) -> bool:
         n = len(problem.nominal)
@@ -103,6 +109,23 @@ class _Ground:
     def without(self, change: Array) -> Array:
         return change - self.basis @ (self.basis.T @ change)
 
+    def misfit(self, left: Array) -> float:
+        """Minus twice the log-likelihood of residuals in units of the scales, those of the prior included."""
+        total = float(left[self.slices[-1].stop :] @ left[self.slices[-1].stop :])
+        for j, part in zip(self.joints, self.slices, strict=True):
+            chi2 = float(left[part] @ left[part]) * float(self.base.scale[j]) ** 2
+            total += misfit_of(chi2, part.stop - part.start)
+        return total
+
+    def moved(self, change: Array) -> Array:
+        """The vector of the fit, its own parameters moved to where a change of the residuals wants them."""
+        step, *_ = np.linalg.lstsq(self.triangle, -self.basis.T @ (self.whole + change))
+        out = self.base.vector.copy()
+        out[self.columns] += step
+        inside = 1e-6 * (self.high - self.low)
+        inside[~np.isfinite(inside)] = 1e-6
+        return np.clip(out, self.low + inside, self.high - inside)
+
 
 def screen(problem: ArticulatedProblem, base: ArticulatedFit, candidates: Sequence[Placed]) -> list[Screened]:
     """Screen effects on top of a fit; the most promising first."""
@@ -112,31 +135,27 @@ def screen(problem: ArticulatedProblem, base: ArticulatedFit, candidates: Sequen
     def look(placed: Placed) -> list[Screened]:
         ground = grounds[tuple(problem.reached((placed,)))]
         hypothesis = (*base.hypothesis, placed)
-        power, count = float(ground.left @ ground.left), len(ground.left) - ground.n_prior
+        before = ground.misfit(ground.left)
         drive = problem.joints[placed.joint].drive
         found = []
         for eta in grid(placed, servo=bool(drive and drive.servo), sides=_sides(problem, placed)):
             vector = np.concatenate([base.vector, eta])
-            change = ground.without(
-                np.concatenate([
-                    *(problem.residual(j, hypothesis, vector) / base.scale[j] - ground.residuals[j] for j in ground.joints),
-                    np.zeros(ground.n_prior),
-                ])
-            )  # fmt: skip
+            raw = np.concatenate([
+                *(problem.residual(j, hypothesis, vector) / base.scale[j] - ground.residuals[j] for j in ground.joints),
+                np.zeros(ground.n_prior),
+            ])  # fmt: skip
+            change = ground.without(raw)
             size = float(change @ change)
             if not np.isfinite(size) or size <= 0.0:
                 continue
             along = -float(ground.left @ change) / size
             if along <= 0.0 and not placed.effect.parameters[0].signed:
                 continue
-            taken = min(size * along**2, (1.0 - 1e-9) * power)
-            chi2 = np.array([base.chi2[j] for j in ground.joints])
-            # the joints' scales are those of the fit: what is taken lowers each in proportion
-            gain = sum(
-                misfit_of(c, int(base.count[j])) - misfit_of(c * (1.0 - taken / power), int(base.count[j]))
-                for c, j in zip(chi2, ground.joints, strict=True)
-            ) if power > count else taken  # fmt: skip
-            found.append(Screened(placed, _scaled(placed, eta, along), float(gain)))
+            gain = before - ground.misfit(ground.left + along * change)
+            factor = 1.0 if placed.effect.name in UNSCALED else along
+            found.append(
+                Screened(placed, _scaled(placed, eta, along), float(gain), ground.moved(factor * raw))
+            )
         return sorted(found, key=lambda p: -p.gain)
 
     points = [p for found in in_threads(look, candidates) for p in found]
@@ -183,13 +202,23 @@ def _sides(problem: ArticulatedProblem, placed: Placed) -> tuple[float, ...]:
 
 
 def _by_effect(points: Sequence[Screened], starts: int) -> list[list[Screened]]:
-    """Grid points effect by effect, the most promising effects and points first."""
+    """Grid points effect by effect, the most promising effects first, and of each the `starts` most promising points."""
     out: dict[tuple[str, str], list[Screened]] = {}
-    for point in points:
-        mine = out.setdefault(point.placed.key, [])
-        if len(mine) < starts:
-            mine.append(point)
-    return list(out.values())
+    for point in sorted(points, key=lambda p: -p.gain):
+        out.setdefault(point.placed.key, []).append(point)
+    return [mine[:starts] for mine in out.values()]
+
+
+def _strained(problem: ArticulatedProblem, base: ArticulatedFit, settings: SearchSettings) -> set[int]:
+    """Joints one of whose nominal parameters a fit has moved too far."""
+    return {p.joint for p, x in zip(problem.nominal, base.vector, strict=False) if abs(x) > settings.strained}
+
+
+def _untouched(problem: ArticulatedProblem, base: ArticulatedFit) -> ArticulatedFit:
+    """A fit with the nominal parameters as stated."""
+    vector = base.vector.copy()
+    vector[: len(problem.nominal)] = 0.0
+    return ArticulatedFit.at(problem, base.hypothesis, vector)
 
 
 def nominal_fit(problem: ArticulatedProblem, settings: SearchSettings) -> ArticulatedFit:
@@ -264,9 +293,13 @@ def _round(
             soft, base.hypothesis, base.vector, scale=_scale_of(soft, base), iterations=settings.iterations
         )
         progress("screening")
-        points = _by_effect(screen(soft, ground, candidates), settings.starts)
+        points = screen(soft, ground, candidates)
+        if _strained(
+            soft, ground, settings
+        ):  # what stands in for the missing hides it; also from what was stated
+            points += screen(soft, _untouched(soft, ground), candidates)
         progress("fits")
-        first = _fits(soft, ground, points, settings)
+        first = _fits(soft, ground, _by_effect(points, settings.starts), settings)
         if soft is problem:  # servos hold every joint: nothing forgets more than it does anyway
             break
     others = Others.of(problem, base)
@@ -349,9 +382,7 @@ def _fits(
     others = Others.of(problem, base)
     out: list[ArticulatedFit] = []
     gained = 0.0
-    strained = {
-        p.joint for p, x in zip(problem.nominal, base.vector, strict=False) if abs(x) > settings.strained
-    }
+    strained = _strained(problem, base, settings)
     for k, mine in enumerate(points):
         # where a number of the model was moved too far, all numbers that may be wrong instead are tried
         instead = mine[0].placed.effect.number and mine[0].placed.joint in strained
@@ -359,13 +390,26 @@ def _fits(
         if not (k < settings.least or hopeful or instead):
             continue
         hypothesis: Hypothesis = (*base.hypothesis, mine[0].placed)
-        # nominal parameters that stood in for what was missing are also tried where they were stated
+        # nominal parameters that stood in for what was missing are also tried where they were stated, and fitted from there:
+        # a start of less misfit need not be the nearer one
         untouched = np.concatenate([np.zeros(len(problem.nominal)), base.vector[len(problem.nominal) :]])
-        starts = np.array(
-            [np.concatenate([at, point.eta]) for point in mine for at in (base.vector, untouched)]
-        )
-        new = fit(
-            problem, hypothesis, starts, scale=base.scale, iterations=settings.iterations, others=others
+        starts = [
+            np.array([np.concatenate([point.start, point.eta]) for point in mine]),
+            np.array([np.concatenate([at, point.eta]) for point in mine for at in (base.vector, untouched)]),
+        ]
+        new = max(
+            (
+                fit(
+                    problem,
+                    hypothesis,
+                    start,
+                    scale=base.scale,
+                    iterations=settings.iterations,
+                    others=others,
+                )
+                for start in (starts if strained else [np.vstack(starts)])
+            ),
+            key=lambda f: f.log_posterior,
         )
         new = fit(
             problem, hypothesis, new.vector, scale=new.scale, iterations=settings.iterations, others=others

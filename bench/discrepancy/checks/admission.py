@@ -66,9 +66,10 @@ def admitted(declared: Case, *, anyway: bool = False) -> Admitted:
     problem = Problem(case, structure_of(case), case.identification)
     refuse(problem)
     doubts = suspicions(declared, problem)
-    if doubts and not anyway:
-        more = f" (and {len(doubts) - 1} more such)" if len(doubts) > 1 else ""
-        raise UnitError(f"{doubts[0]}{more}; --anyway diagnoses the records as they are")
+    for first in doubts:
+        if not anyway:
+            more = f" (and {len(doubts) - 1} more such)" if len(doubts) > 1 else ""
+            raise UnitError(f"{first}{more}; --anyway diagnoses the records as they are")
     if reference is not None:
         apart = unlike_mujoco(problem, reference, (*case.identification, *case.validation))
         if apart and not anyway:

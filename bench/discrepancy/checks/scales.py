@@ -402,7 +402,7 @@ def _implied_loads(problem: Problem, record: CaseRecord, settings: ScaleSettings
         + motion.velocity @ linear.damping
         + motion.position @ linear.stiffness
     )
-    force = force + own_force(structure, values, motion)
+    force = force + own_force(structure, values, motion, record.step)
     implied = np.asarray(force[:, 0] / structure.inputs[0, 0], dtype=np.float64)
     load = record.values[structure.loads[0]]
     bands = _bands(spectra(load, implied, record.step, (float(problem.load_noise[0]), 0.0), settings))

@@ -52,6 +52,8 @@ class CoarseSettings:
 
 
 SETTINGS = CoarseSettings()
+ALIKE = 2.0
+"""Standard errors of a difference within which two explanations are declared a set."""
 ABOUT_NOISE, UNCHANGED = 1.1, 1.02
 """Times the noise below which a judged discrepancy is nothing but that, and change of it that is none."""
 
@@ -65,7 +67,9 @@ class Judged:
         found: All finalists on held-out blocks, the chosen one first.
         weights: (n,) probability of each, as if one of them were true.
         within: Those within one standard error of the best.
+        alike: Those that the blocks do not tell from the chosen one: two standard errors.
         vetoed: Whether the judging records refused what the others would have named.
+        nominal: Largest judged discrepancy of the nominal model, its parameters re-estimated within their uncertainty.
         left: Part of the power of the judged discrepancy, beyond noise, that the chosen one leaves.
     """
 
@@ -73,7 +77,9 @@ class Judged:
     found: tuple[HeldOut, ...]
     weights: Array
     within: tuple[HeldOut, ...]
+    alike: tuple[HeldOut, ...]
     vetoed: bool
+    nominal: float
     left: float
 
     @property
@@ -119,15 +125,17 @@ def judge(
     found = [base, *found]
     weights = shares(found, np.array([_log_prior(e.explanation) for e in found]), rng)
     within = tuple(entry for entry in found if _as_good(entry, base, settings))
+    worst = float(np.max(known.of(nothing, judging=True)))
     vetoed, part = False, settings.most if trusted else settings.pays
     for own in sorted(within, key=_plainness):
         entry = _steady(own, case, rng)
         e = entry.explanation
         if not e.hypothesis or known.pays(e, nothing, part):
             found = [entry if other is own else other for other in found]
-            return Judged(entry, tuple(found), weights, within, vetoed, known.left(e, nothing))
+            alike = tuple(other for other in found if _as_good(other, base, settings, ALIKE))
+            return Judged(entry, tuple(found), weights, within, alike, vetoed, worst, known.left(e, nothing))
         vetoed = True
-    return Judged(found[-1], tuple(found), weights, within, True, 1.0)
+    return Judged(found[-1], tuple(found), weights, within, within, True, worst, 1.0)
 
 
 def _steady(entry: HeldOut, case: Case, rng: np.random.Generator) -> HeldOut:
@@ -154,16 +162,19 @@ def _log_prior(explanation: Explanation) -> float:
     return sum(LOG_PRIOR_EFFECT + placed.effect.log_prior for placed in explanation.hypothesis)
 
 
-def _as_good(entry: HeldOut, best: HeldOut, settings: CoarseSettings) -> bool:
+def _as_good(entry: HeldOut, best: HeldOut, settings: CoarseSettings, errors: float = 1.0) -> bool:
     """Whether an explanation predicts as well as the best one: within a standard error, or what so few samples cannot tell."""
     worse, error = entry.worse_than(best)
-    return entry is best or worse <= max(error, settings.telling)
+    return entry is best or worse <= max(errors * error, settings.telling)
 
 
-def _plainness(entry: HeldOut) -> tuple[int, int, float, float]:
-    """What comes first is simpler: fewer effects, fewer parameters, commoner ones, and then what predicts better."""
+def _plainness(entry: HeldOut) -> tuple[int, float, float]:
+    """What comes first is simpler: fewer effects, then fewer parameters and commoner effects, and then what predicts better.
+
+    A parameter counts as a unit of log prior, which is what it gains on average where nothing is to be gained.
+    """
     e = entry.explanation
-    return (len(e.hypothesis), e.n_free, -sum(p.effect.log_prior for p in e.hypothesis), entry.total)
+    return (len(e.hypothesis), e.n_free - sum(p.effect.log_prior for p in e.hypothesis), entry.total)
 
 
 class Discrepancies:

@@ -28,7 +28,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench import native
-from bench.discrepancy.case.case import Case, CaseChannel
+from bench.discrepancy.case.case import NO_LOAD, Case, CaseChannel
+from bench.discrepancy.case.elements import declared_parameters
 from bench.discrepancy.model.mjcf_couplings import LINK, constrained, rows_of, stiff_modes, without_equalities
 from bench.discrepancy.model.mjcf_file import rig_of
 from bench.discrepancy.model.mjcf_friction import nominal_frictions
@@ -62,7 +63,10 @@ def mjcf_structure(case: Case) -> Structure:
     path = Path(case.folder or ".") / case.rig
     own = rig_of(case)
     rig, links = plain_rig(case, own)
-    structural = [_structural(p.name, rig) for p in case.parameters]
+    declared = declared_parameters(case.options.get("elements", []), case.name)
+    believed = {p.name: p.value for p in case.parameters if p.name not in declared}
+    names = tuple(believed)
+    structural = [_structural(name, rig) for name in names]
     loads, responses = loads_and_responses(case, rig)
     parameters = [name for name in structural if not name.startswith("structure/frictionloss/")]
     try:
@@ -79,8 +83,7 @@ def mjcf_structure(case: Case) -> Structure:
         _observer(channel, row, order, n_dof, rig)
         for (channel, _, order), row in zip(responses, linear.observation, strict=False)
     )
-    stacks, fixed = _stacks(case, structural, linear, rig)
-    names = tuple(p.name for p in case.parameters)
+    stacks, fixed = _stacks(structural, linear, rig)
     # before gravity makes a stiffness of a mass: what is called the stiffness of a place is a spring of the model
     places = _places(case, rig, linear, names, stacks)
     springs: tuple[NominalSpring, ...] = ()
@@ -93,11 +96,12 @@ def mjcf_structure(case: Case) -> Structure:
         names, *stacks, inputs, tuple(channel.name for channel, _ in loads), observers,
         places, fixed, _frictions(own, linear, names, case.identification[0].step), springs,
     )  # fmt: skip
-    check_reach(case, structure, own, {channel.name: actuator for channel, actuator in loads}, linear.dofs)
+    driving = {channel.name: actuator for channel, actuator in loads if actuator}
+    check_reach(case, structure, own, driving, linear.dofs)
     structure = constrained(
         structure, rows_of(own.model, links, structure.dofs), [next(iter(link)) for link in links]
     )
-    values = np.array([p.value for p in case.parameters])
+    values = np.array(list(believed.values()))
     return constrained(structure, stiff_modes(structure, values, min(r.step for r in case.identification)))
 
 
@@ -144,6 +148,9 @@ def loads_and_responses(
     for channel in case.channels:
         if channel.role == "scheduling":
             continue
+        if channel.name == NO_LOAD:
+            loads.append((channel, ""))
+            continue
         kind, _, name = channel.target.rpartition(":")
         name = name or channel.name
         if channel.role == "prescribed":
@@ -169,7 +176,7 @@ def loads_and_responses(
     if not loads:
         raise FileFormatError(
             f"case '{case.name}' has no load; name a channel after an actuator of the model ({', '.join(rig.actuators) or 'none'}) "
-            'or give it an entry "actuator"'
+            'or give it an entry "actuator"; for a free decay say that it "starts_in_motion"'
         )
     if not responses:
         raise FileFormatError(
@@ -227,6 +234,9 @@ def _inputs(loads: Sequence[tuple[CaseChannel, str]], rig: Rig, linear: LinearRi
     cells = _cells(loads)
     out = np.zeros((len(linear.dofs), len(loads)))
     for j, (channel, actuator) in enumerate(loads):
+        if not actuator:
+            out[:, j] = 1.0
+            continue
         u = rig.actuators.index(actuator)
         out[:, j] = matrix[:, u]
         if cell := _sensor_of(channel):
@@ -257,11 +267,11 @@ def _observer(channel: CaseChannel, row: Array, order: int | None, n_dof: int, r
 
 
 def _stacks(
-    case: Case, structural: Sequence[str], linear: LinearRig, rig: Rig
+    structural: Sequence[str], linear: LinearRig, rig: Rig
 ) -> tuple[tuple[Array, Array, Array], Array]:
     """Contributions of the parameters to mass, damping and stiffness, and what no parameter changes."""
     n_dof = len(linear.dofs)
-    stacks = tuple(np.zeros((len(case.parameters), n_dof, n_dof)) for _ in range(3))
+    stacks = tuple(np.zeros((len(structural), n_dof, n_dof)) for _ in range(3))
     fixed = np.array([matrix.copy() for matrix in linear.matrices[:3]])
     for i, name in enumerate(structural):
         if name not in linear.parameters:

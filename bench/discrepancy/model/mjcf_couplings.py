@@ -124,7 +124,8 @@ def constrained(structure: Structure, constraints: Array, dependent: Sequence[st
     # columns of the dependents first, then those with the largest part in a constraint
     favour = np.array([1e3 if name in dependent else 1.0 for name in structure.dofs])
     scaled = constraints / np.linalg.norm(constraints, axis=1)[:, None]
-    _, _, order = linalg.qr(scaled * favour, mode="full", pivoting=True)
+    # SciPy's types leave open how many arrays come
+    order = np.asarray(tuple(linalg.qr(scaled * favour, pivoting=True))[-1], dtype=np.int64)
     gone = np.sort(order[: len(constraints)])
     kept = np.setdiff1d(np.arange(n_dof), gone)
     motion = np.zeros((n_dof, len(kept)))

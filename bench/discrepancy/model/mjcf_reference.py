@@ -51,9 +51,8 @@ def actuators_of(case: Case, rig: Rig) -> dict[str, str]:
         FileFormatError: A channel is none of the model's.
         UnknownNameError: A channel names nothing in the model.
     """
-    return {
-        channel.name: actuator for channel, actuator in loads_and_responses(case, plain_rig(case, rig)[0])[0]
-    }
+    loads, _ = loads_and_responses(case, plain_rig(case, rig)[0])
+    return {channel.name: actuator for channel, actuator in loads if actuator}
 
 
 def reference_of(case: Case, rig: Rig) -> Reference:
@@ -66,8 +65,9 @@ def reference_of(case: Case, rig: Rig) -> Reference:
     probed = _probed(case, rig)
     values: dict[str, dict[str, float]] = {}
     for parameter in case.parameters:
-        kind, _, name = parameter.name.partition(":")
-        values.setdefault(kind, {})[name] = parameter.value
+        kind, colon, name = parameter.name.partition(":")
+        if colon:  # others are of laws beside the model
+            values.setdefault(kind, {})[name] = parameter.value
     model = probed.with_structure(**values).model
     loads, responses = loads_and_responses(case, plain_rig(case, rig)[0])
     columns = [channel.name for channel in probed.channels[len(probed.actuators) :]]
@@ -78,6 +78,8 @@ def reference_of(case: Case, rig: Rig) -> Reference:
     }
     inputs = {}
     for channel, name in loads:
+        if not name:
+            continue
         index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name)
         # a force sensor reads what the actuator's gain makes of a command
         gain = float(model.actuator_gainprm[index, 0]) if channel.target.startswith("sensor:") else 1.0

@@ -22,8 +22,9 @@ SLIDES = {
     "position": ("m",), "velocity": ("m/s",), "acceleration": ("m/s^2",), "load": ("N",),
     "inertia": ("kg",), "stiffness": ("N/m",), "damping": ("N s/m",),
 }  # fmt: skip
-DRIVES = ("A", "V", "1", "Pa")
-"""Units of what may drive an actuator whose gear or gain turns it into a force."""
+DRIVES = ("A", "V", "1", "Pa", "rad", "m", "rad/s", "m/s")
+"""Units of what may drive an actuator whose gear or gain turns it into a force: the target of a servo, too, written as a motor beside a
+spring or a damper of the joint."""
 PARAMETERS = {"stiffness": "stiffness", "damping": "damping", "armature": "inertia", "frictionloss": "load"}
 
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.case.single_axis import MOTIONS, load_channel, motion_channels, turns
+from bench.discrepancy.model.declared_elements import with_elements
 from bench.discrepancy.model.mjcf import mjcf_structure
 from bench.discrepancy.model.nominal_forces import NominalFriction
 from bench.discrepancy.model.structure import Place, Structure
@@ -22,14 +23,11 @@ def structure_of(case: Case) -> Structure:
     Raises:
         FileFormatError: The rig is unknown, or a parameter or channel is missing.
     """
-    if case.rig == "sdof":
-        return _sdof(case)
-    if case.rig == "joint":
-        return _joint(case)
-    if case.rig == "damper":
-        return _damper(case)
+    bench = {"sdof": _sdof, "joint": _joint, "damper": _damper}
+    if case.rig in bench:
+        return with_elements(bench[case.rig](case), case)
     if case.rig.endswith(".xml"):
-        return mjcf_structure(case)
+        return with_elements(mjcf_structure(case), case)
     raise FileFormatError(
         f"rig '{case.rig}' is unknown; known: sdof, joint, damper, or the path of an MJCF file (ending in .xml)"
     )
@@ -60,6 +58,11 @@ def _observers(case: Case, table: Sequence[tuple[str, int, NDArray[np.float64]]]
 def _sdof(case: Case) -> Structure:
     names = ("mass", "damping", "stiffness", "coulomb")
     load, motion = load_channel(case), motion_channels(case)
+    if not case.has(load) and all(c.role == "response" for c in case.channels):
+        raise FileFormatError(
+            f"case '{case.name}' has responses alone ({', '.join(c.name for c in case.channels)}): without what drove them nothing can be "
+            f'said of the model. Record the {load}; or, for a free decay, say that it "starts_in_motion"'
+        )
     _require(case, ("mass",), (load,))
     have = tuple(name for name in names if any(p.name == name for p in case.parameters))
     frictions = (NominalFriction(np.ones(1), "coulomb"),) if "coulomb" in have else ()
@@ -118,6 +121,7 @@ def _damper(case: Case) -> Structure:
         (position,),
         (Observer(load, 0, np.ones(1)),),
         (place,),
+        frictions=(NominalFriction(np.ones(1), "coulomb"),) if "coulomb" in names else (),
     )
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.discrepancy.model.nominal_forces import NominalFriction, NominalSpring
+from bench.discrepancy.model.nominal_laws import NominalElement
 from bench.discrepancy.motion.observer import Observer
 from bench.discrepancy.simulation.stick_slip import LinearStructure
 
@@ -66,6 +67,7 @@ class Structure:
         fixed: Mass, damping and stiffness (3, n_dof, n_dof) that no parameter changes; None for none.
         frictions: Dry friction of the nominal model.
         springs: What its restoring forces are beyond their tangents.
+        elements: Laws of the bench that it holds besides.
     """
 
     dofs: tuple[str, ...]
@@ -80,11 +82,12 @@ class Structure:
     fixed: NDArray[np.float64] | None = None
     frictions: tuple[NominalFriction, ...] = ()
     springs: tuple[NominalSpring, ...] = ()
+    elements: tuple[NominalElement, ...] = ()
 
     @property
     def has_own_forces(self) -> bool:
         """Whether the nominal model has forces that no matrix holds."""
-        return bool(self.frictions or self.springs)
+        return bool(self.frictions or self.springs or self.elements)
 
     def at(self, values: NDArray[np.float64]) -> LinearStructure:
         """Return the matrices at parameter values (n_parameters,)."""
@@ -126,7 +129,7 @@ class Structure:
         linked = (np.abs(self.mass).sum(0) + np.abs(self.damping).sum(0) + np.abs(self.stiffness).sum(0)) > 0
         if self.fixed is not None:
             linked |= np.abs(self.fixed).sum(0) > 0
-        for force in (*self.frictions, *self.springs):
+        for force in (*self.frictions, *self.springs, *self.elements):
             linked |= np.outer(force.row, force.row) != 0
         linked |= np.eye(len(self.dofs), dtype=bool)
         for _ in self.dofs:
@@ -147,6 +150,13 @@ class Structure:
         ]
         active += [
             self.parameters.index(f.parameter) for f in self.frictions if f.parameter and np.any(f.row[keep])
+        ]
+        active += [
+            self.parameters.index(name)
+            for e in self.elements
+            if np.any(e.row[keep])
+            for name in e.parameters
+            if name
         ]
         active = sorted(set(active))
         loads = [i for i in range(len(self.loads)) if np.abs(self.inputs[keep, i]).sum() > 0]
@@ -171,4 +181,5 @@ class Structure:
             None if self.fixed is None else self.fixed[np.ix_(range(3), keep, keep)],
             tuple(f.restricted(keep) for f in self.frictions if np.any(f.row[keep])),
             tuple(s.restricted(keep, active) for s in self.springs if np.any(s.row[keep])),
+            tuple(e.restricted(keep) for e in self.elements if np.any(e.row[keep])),
         )

@@ -51,7 +51,7 @@ from bench.discrepancy.search.fits import (
 )
 from bench.discrepancy.search.rivals import challenge, reduce_best, simplify
 from bench.discrepancy.search.scheduled import with_schedules
-from bench.discrepancy.search.soft_friction import soften
+from bench.discrepancy.search.soft_friction import soften, stand_in
 from bench.discrepancy.search.timed_force import with_timed_force
 
 QUICK = 6
@@ -168,6 +168,7 @@ def _single(
         progress("rarer effects")
         screen.add(rare)
         _extend(search, screen, [nothing], count=6, among={p.key for p in rare})
+    stand_in(search)
     if deadline.allows("forces from outside and friction that follows a channel"):
         with_timed_force(search)
         with_schedules(search)

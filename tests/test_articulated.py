@@ -1,0 +1,178 @@
+"""Arms and servos: what MuJoCo simulates with something left out of the model is named, at its joint, and nothing where nothing is."""
+
+from __future__ import annotations
+
+import json
+
+import mujoco
+import numpy as np
+import pytest
+
+from bench.discrepancy import diagnose, read_case
+from bench.discrepancy.articulated.diagnosis import applies
+from bench.discrepancy.articulated.judgement import JudgementSettings, complete
+from bench.discrepancy.report.html_page import write_report
+from bench.discrepancy.report.rerun_recording import write_rerun
+from bench.errors import BenchError
+
+RATE, FINE, LENGTH = 100.0, 10, 8.0
+"""Samples a second, steps a sample of the simulation that stands for the robot, and seconds."""
+NOISE = 2e-4
+KP = {"shoulder": 60.0, "elbow": 40.0}
+LIMIT, PAYLOAD = 0.4, 0.25
+LINK = """<body name="{body}" pos="0 0 {z}"><joint name="{joint}" type="hinge" axis="0 1 0" damping="{damping}" armature="0.02"
+  frictionloss="{friction}"/><inertial pos="0 0 -0.12" mass="{mass}" diaginertia="0.004 0.004 0.0006"/>{child}
+  <site name="{body}_tip" pos="0 0 -0.25"/></body>"""
+
+
+def mjcf(*, servo, friction=0.0, payload=0.0):
+    """A hanging two-link arm."""
+    load = f'<geom type="sphere" size="0.001" mass="{payload}" pos="0 0 -0.25"/>' if payload else ""
+    if payload:  # on a body of its own: an inertial element of the link outweighs geoms
+        load = f'<body name="load" pos="0 0 -0.25"><inertial pos="0 0 0" mass="{payload}" diaginertia="1e-9 1e-9 1e-9"/></body>'
+    fore = LINK.format(
+        body="fore", joint="elbow", z=-0.25, damping=0.1, friction=friction, mass=0.5, child=load
+    )
+    arm = LINK.format(body="upper", joint="shoulder", z=0.0, damping=0.2, friction=0.0, mass=1.0, child=fore)
+    drives = "".join(
+        f'<position name="{j}_drive" joint="{j}" kp="{kp}"/>'
+        if servo
+        else f'<motor name="{j}_drive" joint="{j}"/>'
+        for j, kp in KP.items()
+    )
+    return (
+        f'<mujoco><option gravity="0 0 -9.81" timestep="{1.0 / RATE / FINE}" integrator="implicitfast"/>'
+        f"<worldbody>{arm}</worldbody><actuator>{drives}</actuator></mujoco>"
+    )
+
+
+def targets(seed):
+    """Targets (n, 2) of the joints [rad]: sines that begin at rest."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(int(LENGTH * RATE)) / RATE
+    out = np.zeros((len(t), 2))
+    for j in range(2):
+        for f in (0.25, 0.6, 1.1):
+            out[:, j] += 0.35 * np.sin(2 * np.pi * f * t + rng.uniform(0, 2 * np.pi))
+    return out * np.minimum(t / 0.5, 1.0)[:, None] ** 2
+
+
+def record(truth, seed, *, servo, offset=0.0):
+    """Columns of a log; a torque-driven arm follows the targets by a loop that the log does not mention."""
+    model = mujoco.MjModel.from_xml_string(truth)
+    data = mujoco.MjData(model)
+    rng = np.random.default_rng(100 + seed)
+    wanted = targets(seed)
+    rows = []
+    for goal in wanted:
+        command = goal if servo else 20.0 * (goal - data.qpos) - 1.0 * data.qvel
+        rows.append([*command, *data.qpos])
+        data.ctrl[:] = command
+        mujoco.mj_step(model, data, FINE)
+    table = np.array(rows)
+    table[:, 2:] += NOISE * rng.standard_normal((len(table), 2))
+    table[:, 3] += offset
+    return np.column_stack([np.arange(len(table)) / RATE, table])
+
+
+def write_case(folder, truth, *, servo, offset=0.0, nominal=None):
+    """A case folder; the records of a truth beside the model without anything."""
+    (folder / "model.xml").write_text(nominal or mjcf(servo=servo))
+    parameters = {
+        "mass:upper": {"value": 1.0, "std": 0.03, "unit": "kg"},
+        "mass:fore": {"value": 0.5, "std": 0.015, "unit": "kg"},
+    }
+    channels = {"time": {"unit": "s"}}
+    for j, kp in KP.items():
+        parameters[f"damping:{j}"] = {
+            "value": 0.2 if j == "shoulder" else 0.1, "std": 0.03, "unit": "N m s/rad",
+        }  # fmt: skip
+        unit = "rad" if servo else "N m"
+        channels[f"{j}_in"] = {"unit": unit, "role": "command", "actuator": f"{j}_drive", "noise_std": 0.0}
+        if servo:
+            parameters[f"kp:{j}_drive"] = {"value": kp, "std": 0.05 * kp, "unit": "N m/rad"}
+    for j in KP:
+        channels[f"{j}_q"] = {"unit": "rad", "joint": j, "quantity": "position", "noise_std": NOISE}
+    document = {
+        "rig": "model.xml", "sample_rate_hz": RATE, "parameters": parameters, "channels": channels,
+        "load_interpolation": "zero_order_hold",
+    }  # fmt: skip
+    (folder / "nominal.json").write_text(json.dumps(document))
+    for k, name in enumerate(("identification", "validation")):
+        table = record(truth, k, servo=servo, offset=offset)
+        header = ",".join(["time", *(f"{j}_in" for j in KP), *(f"{j}_q" for j in KP)])
+        np.savetxt(folder / f"{name}.csv", table, delimiter=",", header=header, comments="", fmt="%.9g")
+    return folder
+
+
+CASES = {
+    "friction of a servo's joint": (
+        True, {"friction": LIMIT}, 0.0, ("coulomb_friction", "elbow"), ("limit", LIMIT, 0.1),
+    ),
+    "payload of a driven arm": (
+        False, {"payload": PAYLOAD}, 0.0, ("mass_error", "fore"), ("payload", PAYLOAD, 0.1),
+    ),
+    "encoder offset": (True, {}, 0.08, ("position_offset", "elbow"), ("offset", 0.08, 0.1)),
+}  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", CASES)
+def test_what_was_left_out_is_named_at_its_place(tmp_path, name):
+    servo, more, offset, wanted, (parameter, value, within) = CASES[name]
+    folder = write_case(tmp_path, mjcf(servo=servo, **more), servo=servo, offset=offset)
+    verdict = diagnose(read_case(folder)).verdict
+    assert verdict.verdict == "effect"
+    assert [(e.name, e.where) for e in verdict.named] == [wanted]
+    assert verdict.named[0].parameters[parameter].value == pytest.approx(value, rel=within)
+    assert all(gap.after < 1.6 * gap.noise_floor for gap in verdict.gaps)
+
+
+@pytest.mark.slow
+def test_a_servo_arm_without_fault_is_clean_and_everything_is_written(tmp_path):
+    case = read_case(write_case(tmp_path, mjcf(servo=True), servo=True))
+    assert applies(case)
+    found = diagnose(case)
+    assert found.verdict.verdict == "none"
+    assert found.verdict.complete
+    assert not found.verdict.named
+    json.loads(json.dumps(found.verdict.to_json()))
+    write_report(found, tmp_path / "report.html")
+    write_rerun(found, tmp_path / "run.rrd")
+    assert "shoulder" in (tmp_path / "report.html").read_text()
+    assert (tmp_path / "run.rrd").stat().st_size > 1000
+    # a nominal number moved out of what was stated is not believed, however well it fits
+    strained = found.final.vector.copy()
+    strained[0] = JudgementSettings().strained + 1.0
+    assert complete(found.problem, found.final, JudgementSettings())
+    moved = type(found.final)(
+        found.final.hypothesis, strained, found.final.covariance, found.final.chi2, found.final.count, 0.0
+    )
+    assert not complete(found.problem, moved, JudgementSettings())
+
+
+BESIDE = '<body name="more">{joint}<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body></worldbody>'
+REFUSED = {
+    "free joint": ("</worldbody>", BESIDE.format(joint='<freejoint name="base"/>')),
+    "ball joint": ("</worldbody>", BESIDE.format(joint='<joint name="wrist" type="ball"/>')),
+    "2 actuators": ("<actuator>", '<actuator><motor name="second" joint="elbow"/>'),
+}
+
+
+@pytest.mark.parametrize("says", REFUSED)
+def test_models_that_it_cannot_take_are_refused_in_one_line(tmp_path, says):
+    nominal = mjcf(servo=True).replace(*REFUSED[says], 1)
+    folder = write_case(tmp_path, mjcf(servo=True), servo=True, nominal=nominal)
+    with pytest.raises(BenchError, match=says) as error:
+        diagnose(read_case(folder))
+    assert "\n" not in str(error.value)
+
+
+def test_a_joint_that_nothing_measures_is_refused_with_what_to_do(tmp_path):
+    folder = write_case(tmp_path, mjcf(servo=True), servo=True)
+    document = json.loads((folder / "nominal.json").read_text())
+    document["channels"]["elbow_q"] = {"unit": "rad", "joint": "elbow", "quantity": "velocity", "noise_std": NOISE}  # fmt: skip
+    (folder / "nominal.json").write_text(json.dumps(document))
+    with pytest.raises(BenchError, match="elbow") as error:
+        diagnose(read_case(folder))
+    assert "\n" not in str(error.value)
