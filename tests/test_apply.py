@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -60,7 +61,7 @@ RATE, FINER = 500.0, 5
 """Sample rate [Hz], and steps of the truth in a step of the model."""
 
 
-def effect(name, where="", channel="", law="", theta=(), **values):
+def effect(name: str, where: str = "", channel: str = "", law: str = "", theta=(), **values: Any):
     estimates = {key: Estimate(float(value), 0.01 * abs(value), "") for key, value in values.items()}
     return NamedEffect(
         name, where, 0.99, estimates, channel=channel, equation=name, law=law, theta=tuple(theta)
@@ -354,17 +355,9 @@ def test_a_train_becomes_two_joints(tmp_path, name, side):
     stiffness = 120.0 if width else 25.0
     # the servo acts on the motor in either case; the encoder of the log sits on the side
     case = arm_case(tmp_path, *geared(stiffness, 0.3, width), read=lambda q: q[:, [0, 1 if side else 2]])
-    play = {"half_clearance": width} if width else {}
-    found = effect(
-        name,
-        "elbow",
-        "elbow",
-        stiffness=stiffness,
-        damping=0.3,
-        motor_share=0.6,
-        encoder_on_link=side,
-        **play,
-    )
+    values: dict[str, Any] = {"half_clearance": width} if width else {}
+    values |= {"stiffness": stiffness, "damping": 0.3, "motor_share": 0.6, "encoder_on_link": side}
+    found = effect(name, "elbow", "elbow", **values)
     figures = {f.dof: f for f in verified(case, [found], ("shoulder", "elbow")).figures}
     assert figures["elbow"].after < 0.15 * figures["elbow"].before + 0.01, figures
 
@@ -441,7 +434,7 @@ def test_what_mjcf_cannot_hold_becomes_a_snippet_that_runs(tmp_path):
     write_model(applied, tmp_path / "new.xml", "arm.xml")
     code = snippet(applied, "new.xml")
     (tmp_path / "new.py").write_text(code)
-    space = {"__file__": str(tmp_path / "new.py"), "__name__": "snippet"}
+    space: dict[str, Any] = {"__file__": str(tmp_path / "new.py"), "__name__": "snippet"}
     exec(compile(code, "new.py", "exec"), space)
     model = space["model"]
     data = mujoco.MjData(model)
