@@ -57,7 +57,7 @@ ARM = """
 </mujoco>
 """
 NAMES = ("identification", "validation")
-RATE, FINER = 500.0, 5
+RATE, FINER = 500.0, 4
 """Sample rate [Hz], and steps of the truth in a step of the model."""
 
 
@@ -104,7 +104,7 @@ def measured(xml, wrong, commands, before_step=None, settle=0):
     return out
 
 
-def stage_case(folder: Path, wrong=lambda spec: None, before_step=None, n=800, level=12.0, noise=0.0) -> Case:
+def stage_case(folder: Path, wrong=lambda spec: None, before_step=None, n=600, level=12.0, noise=0.0) -> Case:
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "stage.xml").write_text(STAGE)
     records = []
@@ -122,14 +122,14 @@ def stage_case(folder: Path, wrong=lambda spec: None, before_step=None, n=800, l
     )  # fmt: skip
 
 
-def arm_case(folder: Path, wrong=lambda spec: None, before_step=None, n=800, read=None) -> Case:
+def arm_case(folder: Path, wrong=lambda spec: None, before_step=None, n=600, read=None) -> Case:
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "arm.xml").write_text(ARM)
     records = []
     for seed, name in enumerate(NAMES):
         rng = np.random.default_rng(10 + seed)
         target = np.column_stack([smooth(rng, n, 0.2, 2.0, 0.4), smooth(rng, n, 0.2, 2.5, 0.5)])
-        q = measured(ARM, wrong, target, before_step, settle=300)
+        q = measured(ARM, wrong, target, before_step, settle=200)
         q = q[:, :2] if read is None else read(q)
         columns = {"t1": target[:, 0], "t2": target[:, 1], "q1": q[:, 0], "q2": q[:, 1]}
         records.append(record_from_arrays(name, np.arange(n) / RATE, columns, at_rest=False))
