@@ -130,9 +130,9 @@ def kept(
 
 def complete(problem: ArticulatedProblem, found: ArticulatedFit, settings: JudgementSettings) -> bool:
     """Whether no joint keeps more than the noise, and no nominal parameter is strained for it."""
-    noise = (1.0 + settings.noise_known) ** 2 + np.array([
-        settings.sure * _of_steps(problem, j) for j in range(len(problem.joints))
-    ])  # fmt: skip
+    # the mean square of n residuals is known to sqrt(2 / n)
+    steps = np.array([_of_steps(problem, j) for j in range(len(problem.joints))])
+    noise = (1.0 + settings.noise_known) ** 2 + settings.sure * np.hypot(steps, np.sqrt(2.0 / found.count))
     far = np.abs(found.vector[: len(problem.nominal)]) > settings.strained
     return bool(np.all(found.reduced <= noise) and not far.any())
 
