@@ -15,21 +15,24 @@ from bench.discrepancy.report.html_page import write_report
 from bench.discrepancy.report.rerun_recording import write_rerun
 from bench.errors import BenchError
 
-RATE, FINE, LENGTH = 100.0, 10, 8.0
+RATE, FINE, LENGTH = 100.0, 20, 6.0
 """Samples a second, steps a sample of the simulation that stands for the robot, and seconds."""
 NOISE = 2e-4
 KP = {"shoulder": 60.0, "elbow": 40.0}
 LIMIT, PAYLOAD = 0.4, 0.25
 LINK = """<body name="{body}" pos="0 0 {z}"><joint name="{joint}" type="hinge" axis="0 1 0" damping="{damping}" armature="0.02"
-  frictionloss="{friction}"/><inertial pos="0 0 -0.12" mass="{mass}" diaginertia="0.004 0.004 0.0006"/>{child}
+  frictionloss="{friction}" solreffriction="0.002 1" solimpfriction="0.9999 0.9999 0.001 0.5 2"/>
+  <inertial pos="0 0 -0.12" mass="{mass}" diaginertia="0.004 0.004 0.0006"/>{child}
   <site name="{body}_tip" pos="0 0 -0.25"/></body>"""
+
+LOAD = (
+    '<body name="load" pos="0 0 -0.25"><inertial pos="0 0 0" mass="{}" diaginertia="1e-9 1e-9 1e-9"/></body>'
+)
 
 
 def mjcf(*, servo, friction=0.0, payload=0.0):
     """A hanging two-link arm."""
-    load = f'<geom type="sphere" size="0.001" mass="{payload}" pos="0 0 -0.25"/>' if payload else ""
-    if payload:  # on a body of its own: an inertial element of the link outweighs geoms
-        load = f'<body name="load" pos="0 0 -0.25"><inertial pos="0 0 0" mass="{payload}" diaginertia="1e-9 1e-9 1e-9"/></body>'
+    load = "" if not payload else LOAD.format(payload)
     fore = LINK.format(
         body="fore", joint="elbow", z=-0.25, damping=0.1, friction=friction, mass=0.5, child=load
     )
@@ -41,7 +44,7 @@ def mjcf(*, servo, friction=0.0, payload=0.0):
         for j, kp in KP.items()
     )
     return (
-        f'<mujoco><option gravity="0 0 -9.81" timestep="{1.0 / RATE / FINE}" integrator="implicitfast"/>'
+        f'<mujoco><option gravity="0 0 -9.81" timestep="{1.0 / RATE / FINE}" integrator="RK4"/>'
         f"<worldbody>{arm}</worldbody><actuator>{drives}</actuator></mujoco>"
     )
 

@@ -37,6 +37,7 @@ from bench.discrepancy.effects.nonparametric import CLOSURES
 from bench.discrepancy.fitting.initial_state_fit import start_warnings
 from bench.discrepancy.judgement import posterior as evidence
 from bench.discrepancy.judgement.closing import complete, nominal_estimates, with_closed
+from bench.discrepancy.judgement.coarse import SETTINGS
 from bench.discrepancy.judgement.nonparametric_rival import Rival
 from bench.discrepancy.judgement.two_regimes import How, Progress, found_of
 from bench.discrepancy.judgement.validation_discrepancy import gaps, nominal_prediction
@@ -127,11 +128,14 @@ def diagnose(
     # fits run in threads of their own; threads of BLAS within them would only get in each other's way
     with threadpool_limits(1, user_api="blas"):
         found = _diagnose(case, How(chosen, most, progress, Deadline(budget)), rng, anyway)
-        if found.verdict.verdict == "unknown" and drives_only(case):
-            # what no force on the joint explains may sit in its drive
+        if found.verdict.verdict != "none" and not found.verdict.complete and drives_only(case):
+            # what no force on the joint explains to the noise may sit in its drive
             progress("effects of drives and encoders")
             other = diagnose_articulated(case, exclude=exclude, most=most, rng=rng, progress=progress)
-            if other.verdict.verdict == "effect" and other.verdict.gap.after < found.verdict.gap.after:
+            left, theirs = found.verdict.gap, other.verdict.gap
+            # free runs of one kind in both: parts of what each began with are compared
+            nearer = theirs.after / theirs.before < SETTINGS.most * left.after / left.before
+            if other.verdict.verdict == "effect" and (other.verdict.complete or nearer):
                 return other
         return found
 

@@ -245,9 +245,10 @@ CATALOGUE: tuple[ArticulatedEffect, ...] = (
             FreeParameter(
                 "mu", mean=math.log(0.1), std=1.0, bounds=(-7.0, 1.0), grid=log_grid(0.1), unit="1"
             ),
+            FreeParameter("of_actuator", fixed=True, signed=True, grid=(0.0, 1.0), unit="1"),
         ),
-        "f = (F0 + mu |torque carried|) sgn(v)",
-        _set(LIMIT="limit_0", CARRIED="mu"),
+        "f = (F0 + mu |torque carried|) sgn(v), that of the link, or of the actuator",
+        _set(LIMIT="limit_0", CARRIED="mu", CARRIED_BY="of_actuator"),
     ),
     ArticulatedEffect(
         "force_offset",

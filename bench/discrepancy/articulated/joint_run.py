@@ -71,6 +71,7 @@ class Slot(IntEnum):
     )
 
     ON_LINK = 37  # 1: damping acts on the link's side of a train
+    CARRIED_BY = 38  # 0: friction grows with the torque on the link, 1: with that of the actuator
 
 
 SLOTS = len(Slot)
@@ -245,7 +246,7 @@ def run(
             own = force + bristle_force - p[19] * math.sin(p[20] * q + p[21])
             x, w = (ql, vl) if train else (q, v)
             rest = p[15] - bias[k] - slope[k] * (x - reference[k]) - p[7] * (x - p[8]) + _stop(p, x, w)
-            limit = _friction_limit(p, v, load[k])
+            limit = _friction_limit(p, v, abs(force) if p[38] > 0.5 else load[k])
             damping = p[6] + p[14] * abs(v)
             before = v
             if train:

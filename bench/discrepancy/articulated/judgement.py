@@ -35,6 +35,8 @@ class JudgementSettings:
             structures (`judgement.posterior`).
         strained: Deviation of a nominal parameter, in its stated standard uncertainties, beyond which it is not believed (one normal
             number in 16000 is as far out): predictions are made with it there, and what needs more is not complete.
+        small: Part of the discrepancy that a further effect has to close where it does not complete the explanation, the accuracy to which
+            laws of friction hold on real joints.
     """
 
     blocks: int = 24
@@ -44,6 +46,7 @@ class JudgementSettings:
     rival: float = 4.6
     outside: float = 0.01
     strained: float = 4.0
+    small: float = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +116,8 @@ def kept(
     """How many effects of a ladder the judging records bear out, and the predictions of every rung.
 
     Effects are kept up to the last that improves on what was kept before it by more than the standard error allows for, and that takes
-    away more than it leaves. Nothing is added to what is complete.
+    away more than it leaves. Nothing is added to what is complete, and nothing small where even then something is left: it stands in
+    for a little of the form of the law that is not right.
     """
     predictions = [predict(problem, rung, settings) for rung in rungs]
     last = 0
@@ -123,16 +127,18 @@ def kept(
         difference = predictions[last].excess - predictions[k].excess
         error = float(np.std(difference, ddof=1)) / np.sqrt(len(difference))
         gained, left = float(np.mean(difference)), float(np.mean(predictions[k].excess))
-        if gained > max(settings.sure * error, left if last else 0.0):
+        small = 0.0 if not last or complete(problem, rungs[k], settings) else settings.small
+        least = small * float(np.mean(predictions[0].excess))
+        if gained > max(settings.sure * error, left if last else 0.0, least):
             last = k
     return last, predictions
 
 
 def complete(problem: ArticulatedProblem, found: ArticulatedFit, settings: JudgementSettings) -> bool:
     """Whether no joint keeps more than the noise, and no nominal parameter is strained for it."""
-    noise = (1.0 + settings.noise_known) ** 2 + np.array([
-        settings.sure * _of_steps(problem, j) for j in range(len(problem.joints))
-    ])  # fmt: skip
+    # the mean square of n residuals is known to sqrt(2 / n)
+    steps = np.array([_of_steps(problem, j) for j in range(len(problem.joints))])
+    noise = (1.0 + settings.noise_known) ** 2 + settings.sure * np.hypot(steps, np.sqrt(2.0 / found.count))
     far = np.abs(found.vector[: len(problem.nominal)]) > settings.strained
     return bool(np.all(found.reduced <= noise) and not far.any())
 

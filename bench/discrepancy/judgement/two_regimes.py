@@ -1,8 +1,9 @@
 """The two regimes: noise where it explains what is left, the error of the model where it does not.
 
-Where the noise is stated, explanations are searched by it first. What reaches it is judged by evidence, doubted by free forces and by the
-judging records, and stays as it is. What does not, and is no single free force either, is searched again, weighed by the error of the model
-(`coarse_finding`); so is everything where no noise is stated.
+Where the noise is stated, explanations are searched by it first. What reaches it, without moving a nominal parameter far outside what was
+stated of it, is judged by evidence, doubted by free forces and by the judging records, and stays as it is. What does not, and is no
+single free force either, is searched again, weighed by the error of the model (`coarse_finding`); so is everything where no noise is
+stated.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from bench.discrepancy.case.case import Case
 from bench.discrepancy.checks.initial_motion import with_starts_found
 from bench.discrepancy.effects.effect import Effect
 from bench.discrepancy.judgement import posterior as evidence
+from bench.discrepancy.judgement.coarse import SETTINGS
 from bench.discrepancy.judgement.coarse_finding import REFERENCE, coarse_explanations, coarse_finding
 from bench.discrepancy.judgement.finding import Finding
 from bench.discrepancy.judgement.nonparametric_rival import Rival, likelier_force
@@ -71,12 +73,21 @@ def found_of(case: Case, how: How, rng: np.random.Generator) -> tuple[Case, Find
         case, known = _explained(case, replace(how, deadline=how.deadline.part(0.5)))
         sharp = _sharp(case, known, how, rng)
         outside = sharp.rival is not None and sharp.rival.explanation.consistent
-        if sharp.kind != "unknown" or outside or sharp.doubt:
+        believed = sharp.kind != "unknown" and not strained(sharp.explanations[0], SETTINGS.within)
+        if believed or outside or sharp.doubt:
             return case, sharp
     how.progress("weighed by the error of the model")
     case, explanations = coarse_explanations(case, search, known, how.deadline)
     problem = Problem(case, structure_of(case), case.identification)
     return case, coarse_finding(case, problem, explanations, rng)
+
+
+def strained(explanation: Explanation, within: float) -> bool:
+    """Whether an explanation moves a nominal parameter by more than `within` of its stated standard deviations."""
+    return any(
+        bool(np.any(np.abs(fitted.vector[: problem.n_physical]) > within))
+        for problem, fitted in explanation.parts
+    )
 
 
 def _sharp(case: Case, explanations: list[Explanation], how: How, rng: np.random.Generator) -> Finding:
