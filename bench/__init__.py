@@ -45,7 +45,7 @@ _HOMES = {
     "chain_rig": "bench.rig.library",
     "Excitation": "bench.signals",
     "compare": "bench.reduction",
-    "reduce": "bench.reduction",
+    "reduced_joint": "bench.reduction",
 }
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ if TYPE_CHECKING:
     from bench.mjcf import model_path
     from bench.record_files import read_recording, write_recording
     from bench.recording import Channel, Recording
-    from bench.reduction import compare, reduce
+    from bench.reduction import compare, reduced_joint
     from bench.rig import Element, Rig, simulate, simulate_batch
     from bench.rig.library import chain_rig, damper_rig, joint_rig, laboratory_joint_rig, sdof_rig
     from bench.signals import Excitation
@@ -76,7 +76,7 @@ __all__ = [
     "laboratory_joint_rig",
     "model_path",
     "read_recording",
-    "reduce",
+    "reduced_joint",
     "sdof_rig",
     "simulate",
     "simulate_batch",
@@ -85,6 +85,8 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
+    if name == "reduce":  # the former name of reduced_joint, which warns
+        return import_module("bench.reduction").reduce
     if name in _HOMES:
         return getattr(import_module(_HOMES[name]), name)
     raise AttributeError(f"module 'bench' has no attribute '{name}'")

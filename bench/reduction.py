@@ -1,14 +1,15 @@
 """The reduced-order joint: an identified model takes the true joint's place, and the two systems are compared.
 
 Identification sees what a laboratory sees: `joint_data` (in `bench.identification.restoring_force`) recovers the joint's
-restoring forces from loads, accelerations and the known mounts; `reduce` turns them into an `Element` that any rig can
+restoring forces from loads, accelerations and the known mounts; `reduced_joint` turns them into an `Element` that any rig can
 hold, and `compare` drives the true and the reduced rig alike.
 """
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -35,7 +36,7 @@ def element_from(
     return Element(model.law, tuple(joints), model.theta, name=name, validity=model.range)
 
 
-def reduce(
+def reduced_joint(
     data: JointData,
     joints: Sequence[str],
     *,
@@ -115,3 +116,14 @@ def channel_nmse(measured: Recording, simulated: Recording) -> dict[str, float]:
         and channel.name in simulated.names
         and np.ptp(measured[channel.name][scored]) > 0.0
     }
+
+
+def __getattr__(name: str) -> Any:
+    if name != "reduce":
+        raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
+    warnings.warn(
+        "bench.reduce is called bench.reduced_joint now; the old name goes with the next version",
+        DeprecationWarning,
+        stacklevel=3,  # past `bench`, by which the name is asked for
+    )
+    return reduced_joint

@@ -8,8 +8,9 @@ import numpy as np
 from gymnasium import spaces
 
 from bench.errors import ParameterError
-from envs.benches import FLOATS, Benches, Options, require_count
-from envs.setups import PAIRS, SDOF_LAWS, Setup, discrimination_setup, joint_setup, sdof_setup
+
+from .benches import FLOATS, Benches, Options, require_count
+from .setups import PAIRS, SDOF_LAWS, Setup, discrimination_setup, joint_setup, sdof_setup
 
 RENDER_MODES = ("rgb_array", "human")
 

@@ -24,8 +24,9 @@ from bench.excitation.shaping import SHAPINGS
 from bench.excitation.station import Desk
 from bench.excitation.stepping import run_of
 from bench.excitation.windows import Window, advance, advance_prior, advance_rivals
-from envs.laboratory import Laboratories
-from envs.setups import Setup
+
+from .laboratory import Laboratories
+from .setups import Setup
 
 ENFORCEMENTS = ("terminate", "cost")
 AVERAGES = ("prior", "posterior")

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from bench.excitation.methods import controls_from, design
 from bench.excitation.station import Station
-from envs.setups import Setup
+
+from .setups import Setup
 
 GAIN = 1.6
 """Of a D-optimal design behind a brake: it is made for rigs that move most, and most rigs move by 0.6 of what is allowed."""

@@ -23,10 +23,11 @@ from bench.excitation.bayes_factor import accumulate_contrast
 from bench.excitation.information import STEP, accumulate
 from bench.excitation.station import Desk
 from bench.excitation.stepping import Packed, integrate_cases
-from envs.base import options_of, setup_of
-from envs.benches import Options, SteppedBenches, sensed
-from envs.setups import Setup, made, rival_experiment
-from envs.vector import BenchVectorEnv
+
+from .base import options_of, setup_of
+from .benches import Options, SteppedBenches, sensed
+from .setups import Setup, made, rival_experiment
+from .vector import BenchVectorEnv
 
 FLOOR = 0.005
 """Error in prior standard deviations that the value takes for nothing, root mean square over the parameters. Sensitivities grow without

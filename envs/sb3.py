@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvStepReturn
 
-from envs import IDS
-from envs.practice import PracticeVectorEnv
-from envs.vector import BenchVectorEnv
+from . import IDS
+from .practice import PracticeVectorEnv
+from .vector import BenchVectorEnv
 
 KINDS: dict[str, str] = dict(zip(IDS, PracticeVectorEnv.KINDS, strict=True))
 

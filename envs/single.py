@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from bench.errors import UnknownNameError
 from bench.excitation import Draw
-from envs.base import RENDER_MODES, action_space, info_of, make_benches, observation_space, rest_info
-from envs.rendering import Picture
+
+from .base import RENDER_MODES, action_space, info_of, make_benches, observation_space, rest_info
+from .rendering import Picture
 
 _HERE = np.zeros(1, dtype=np.int64)
 

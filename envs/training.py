@@ -28,11 +28,12 @@ from bench.errors import FileFormatError, ParameterError, UnknownNameError
 from bench.excitation.policy import Policy
 from bench.excitation.station import Station
 from bench.files import replacing, together, write_bytes, write_text
-from envs import IDS
-from envs.base import setup_of
-from envs.feedback import Feedback, braked_design, pump
-from envs.practice import PracticeVectorEnv
-from envs.sb3 import KINDS, BenchVecEnv
+
+from . import IDS
+from .base import setup_of
+from .feedback import Feedback, braked_design, pump
+from .practice import PracticeVectorEnv
+from .sb3 import KINDS, BenchVecEnv
 
 TASKS: dict[str, tuple[str, dict[str, Any]]] = {
     "sdof": (IDS[0], {}),

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from bench.errors import ParameterError, UnknownNameError
 from bench.excitation.ensemble import available_threads
-from envs.base import action_space, make_benches, observation_space, rest_info
-from envs.rendering import Picture
+
+from .base import action_space, make_benches, observation_space, rest_info
+from .rendering import Picture
 
 
 class BenchVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any]]):

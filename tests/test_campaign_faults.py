@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 import pytest
 from campaign_plan import SDOF, document
@@ -19,6 +21,8 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition,
 import bench.files
 from bench.campaign import CampaignError, Windows, run_campaign, tables, verify
 from bench.campaign.generation import Generator
+from bench.campaign.journal import Journal
+from bench.campaign.store import Store
 from bench.errors import FileFormatError
 from bench.files import OutputError
 
@@ -128,6 +132,7 @@ class Campaigns(RuleBasedStateMachine):
             run_campaign(PLAN, self.root / "whole", threads=1)
             run_campaign(OTHER, self.root / "other", threads=1)
         self.whole = data(self.root / "whole")
+        self.told = json.loads(self.whole["manifest.json"])
         self.begun = self.sure = self.hurt = False
 
     def teardown(self) -> None:
@@ -143,7 +148,7 @@ class Campaigns(RuleBasedStateMachine):
                 self.sure, self.hurt = True, False
             except (OutputError, Killed):
                 self.sure = False
-            except CampaignError:  # both manifest and journal gone, in a folder that holds parts
+            except (CampaignError, FileFormatError):  # refused: nothing tells whose the folder is
                 assert not self._known()
         self.begun = self.folder.exists()
 
@@ -165,7 +170,16 @@ class Campaigns(RuleBasedStateMachine):
         self.begun, self.sure, self.hurt = True, True, False
 
     def _known(self) -> bool:
-        return any((self.folder / name).is_file() for name in ("manifest.json", "journal.jsonl"))
+        """Whether the manifest tells that the folder is this campaign's or, where it cannot be read, the journal does."""
+        try:
+            manifest = Store(self.folder).manifest()
+        except FileFormatError:
+            header = Journal(self.folder / "journal.jsonl").read(self.told["plan_sha256"]).header
+            return header is not None and self._ours(header)
+        return self._ours(manifest)
+
+    def _ours(self, document: Mapping[str, Any]) -> bool:
+        return all(document[key] == self.told[key] for key in ("plan_sha256", "versions"))
 
     def _visible(self) -> bool:
         return self.folder.exists() and any(not path.name.startswith(".") for path in self.folder.iterdir())

@@ -142,6 +142,15 @@ def test_an_effect_is_named_over_a_background_that_no_model_has(noise):
     assert abs(k3.value - 8e5) < 3.0 * k3.std
     assert k3.std > 2e-3 * k3.value  # nothing is known to a thousandth from a model that is wrong by more
     assert all(abs(p.shift_in_std) < 3.0 for p in verdict.nominal)
+    assert any("larger than stated" in note for note in verdict.warnings) == (noise is UNDERSTATED)
+
+
+def test_what_there_is_no_time_for_is_left_out_and_said():
+    case = planted_case(lambda f: motion_with(f, resonating, 2), humming, noise=NOISE, n=1500)
+    verdict = diagnose(case, catalogue=FEW, budget=1e-6).verdict
+    assert verdict.verdict in {"effect", "unknown"}
+    note = next(text for text in verdict.warnings if "no time for" in text)
+    assert "2 effects together" in note
 
 
 @pytest.mark.slow

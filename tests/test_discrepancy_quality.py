@@ -233,7 +233,9 @@ BROKEN: dict[str, tuple[dict, str]] = {
     "capital entry": ({"nominal": altered("channels", "force", "Role", value="command")}, "Did you mean 'role'"),
     "no mass": ({"nominal": altered("parameters", "mass", value=None)}, "lacks the nominal parameter(s) mass"),
     "unknown unit": ({"nominal": altered("parameters", "mass", "unit", value="kgg")}, "unknown unit 'kgg'"),
-    "units that clash": ({"nominal": altered("channels", "displacement", "unit", value="mm")}, "do not belong together"),
+    "units that clash": (
+        {"nominal": altered("channels", "displacement", "unit", value="mm")}, "what the nominal model predicts from 'force'",
+    ),
     "unknown role": ({"nominal": altered("channels", "force", "role", value="loadcell")}, "loadcell"),
     "negative noise": ({"nominal": altered("channels", "force", "noise_std", value=-1)}, "channels.force.noise_std: -1 came"),
     "no channels": ({"nominal": altered("channels", value={})}, "channels: no channel besides time"),
@@ -296,7 +298,7 @@ def test_stopped_by_hand_leaves_nothing_behind(tmp_path, capsys, monkeypatch):
     def stopped(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("bench.discrepancy.diagnosis.explain", stopped)
+    monkeypatch.setattr("bench.discrepancy.diagnosis.found_of", stopped)
     out = tmp_path / "verdict.json"
     assert main(["diagnose", str(folder), "--json", str(out), "--no-progress"]) == 130
     assert "Traceback" not in capsys.readouterr().err

@@ -12,13 +12,18 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 DIAGNOSIS = ROOT / "bench" / "discrepancy"
 OWED = {
-    ("bench.discrepancy.case.schema", "bench.discrepancy.case.case"),
     ("bench.discrepancy.response.driving_loads", "bench.discrepancy.likelihood.problem"),
     ("bench.discrepancy.likelihood.noise_covariance", "bench.discrepancy.likelihood.problem"),
     ("bench.discrepancy.likelihood.time_varying_noise", "bench.discrepancy.likelihood.problem"),
     ("bench.discrepancy.likelihood.window_whitening", "bench.discrepancy.likelihood.problem"),
 }
-"""Imports for type checkers that close a circle until the problem is cut in two and the schema takes what it uses."""
+"""Imports for type checkers that close a circle until the problem is cut in two."""
+UPWARDS = {("bench.discrepancy.screening.candidates", "bench.discrepancy.search.fits")}
+"""Imports that the contract of rooms lists as owed."""
+LEAVES = {"verdict", "verdict_schema"}
+"""Types of results, which any room may use: no room, and not drawn."""
+TOO_LARGE = {"articulated": 3500, "blind": 3500}
+"""Rooms that owe a cut, and what they must not grow beyond until then [lines]."""
 LARGEST_ROOM, MOST_LOOSE = 2500, 4
 """Lines of a room of the diagnosis, and files beside its rooms."""
 
@@ -94,5 +99,40 @@ def test_diagnosis_lives_in_rooms():
     assert len(loose) <= MOST_LOOSE, loose
     for room in (path for path in DIAGNOSIS.iterdir() if path.is_dir() and path.name != "__pycache__"):
         lines = sum(len(path.read_text().splitlines()) for path in room.glob("*.py"))
-        if room.name != "blind":
-            assert lines <= LARGEST_ROOM, room.name
+        assert lines <= TOO_LARGE.get(room.name, LARGEST_ROOM), room.name
+
+
+def drawn(page: str) -> set[tuple[str, str]]:
+    """Arrows of the picture on the page of the architecture."""
+    picture = page.split("```mermaid")[1].split("```", maxsplit=1)[0]
+    return {tuple(line.strip().split(" --> ")) for line in picture.splitlines() if " --> " in line}  # type: ignore[misc]
+
+
+def rooms_imported() -> set[tuple[str, str]]:
+    """Imports between rooms, without those that longer ways imply; what is owed left out."""
+    sources = {name: (path.read_text(), path.name == "__init__.py") for name, path in modules().items()}
+    prefix = "bench.discrepancy."
+    edges: dict[str, set[str]] = {}
+    for name, targets in graph(sources).items():
+        for target in targets:
+            both = (
+                name.startswith(prefix) and target.startswith(prefix) and (name, target) not in OWED | UPWARDS
+            )
+            room, other = name.removeprefix(prefix).split(".")[0], target.removeprefix(prefix).split(".")[0]
+            if both and room != other and not {room, other} & LEAVES:
+                edges.setdefault(room, set()).add(other)
+
+    def reached(room: str) -> set[str]:
+        below = edges.get(room, set())
+        return below | {further for other in below for further in reached(other)}
+
+    return {
+        (room, other)
+        for room, below in edges.items()
+        for other in below
+        if not any(other in reached(between) for between in below - {other})
+    }
+
+
+def test_architecture_is_drawn_as_it_is():
+    assert drawn((ROOT / "docs" / "architecture.md").read_text()) == rooms_imported()

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from bench import Element, compare, joint_rig, reduce
+import bench
+from bench import Element, compare, joint_rig, reduced_joint
 from bench.demo.joint import PEAK, PEAK_TORQUE, laboratory_view
 from bench.errors import UnknownNameError
 from bench.rig import simulate
@@ -33,7 +34,9 @@ def linear_rig():
 def test_polynomial_of_a_linear_joint_is_that_joint(linear_rig, rng):
     """Order one holds the linear joint exactly: what is left is rounding, amplified by four seconds of motion."""
     record = simulate(linear_rig, excitation(), rng=rng)
-    reduced = reduce(laboratory_view([record], linear_rig), AXES, model="polynomial", orders=(1, 1, 1, 1))
+    reduced = reduced_joint(
+        laboratory_view([record], linear_rig), AXES, model="polynomial", orders=(1, 1, 1, 1)
+    )
     comparison = compare(linear_rig, linear_rig.with_(elements=(reduced,)), excitation(), seed=7)
     assert comparison.true.content_hash != comparison.reduced.content_hash
     assert {"axial", "torsional", "displacement_1", "acceleration_2_x"} <= set(comparison.nmse)
@@ -45,7 +48,7 @@ def test_reduced_joint_takes_the_true_ones_channels_and_knows_its_range(rng):
     rig = joint_rig()
     record = simulate(rig, excitation(level=1.0), rng=rng)
     data = laboratory_view([record], rig)
-    reduced = reduce(data, AXES, model="network", n_hidden=6, n_restarts=1, max_iterations=40, rng=rng)
+    reduced = reduced_joint(data, AXES, model="network", n_hidden=6, n_restarts=1, max_iterations=40, rng=rng)
     assert reduced.validity is not None
     assert not reduced.validity.outside(data.states).any()
     assert reduced.validity.outside(2.0 * data.states).any()
@@ -58,4 +61,9 @@ def test_reduced_joint_takes_the_true_ones_channels_and_knows_its_range(rng):
 def test_unknown_model_is_refused(linear_rig, rng):
     data = laboratory_view([simulate(linear_rig, excitation(0.5), rng=rng)], linear_rig)
     with pytest.raises(UnknownNameError, match="unknown reduced-order model 'spline'"):
-        reduce(data, AXES, model="spline")  # type: ignore[arg-type]
+        reduced_joint(data, AXES, model="spline")  # type: ignore[arg-type]
+
+
+def test_the_former_name_warns():
+    with pytest.warns(DeprecationWarning, match="reduced_joint"):
+        assert bench.reduce is reduced_joint

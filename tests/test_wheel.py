@@ -23,6 +23,13 @@ assert record["carriage.gap/force"].max() > 0.0
 from bench.data import friction_damper_names
 assert len(friction_damper_names()) == 8
 assert "torch" not in sys.modules
+import jointbench
+assert jointbench.Rig is bench.Rig
+"""
+MAKE = """
+import gymnasium
+environment = gymnasium.make("JointBench/SDOFExcitation-v0")
+environment.reset(seed=0)
 """
 
 
@@ -38,7 +45,12 @@ def wheel(tmp_path_factory) -> Path:
 def test_wheel_holds_code_models_data_and_licences_and_nothing_else(wheel):
     names = zipfile.ZipFile(wheel).namelist()
     tops = {name.split("/")[0] for name in names}
-    assert {top for top in tops if not top.endswith(".dist-info")} == {"bench", "envs"}
+    assert {top for top in tops if not top.endswith(".dist-info")} == {
+        "bench",
+        "envs",
+        "jointbench",
+        "jointbench_gymnasium.pth",
+    }
     for expected in (
         "bench/_models/sdof.xml",
         "bench/_models/assets/apparatus.xml",
@@ -46,9 +58,11 @@ def test_wheel_holds_code_models_data_and_licences_and_nothing_else(wheel):
         "bench/_data/friction_damper/LICENSE-CC-BY-SA-4.0.txt",
         "bench/_data/friction_damper/1Hz_80lb.parquet",
         "bench/_data/published_network.json",
+        "jointbench/__init__.py",
         "bench/_data/schemas/nominal.json",
     ):
         assert expected in names
+    assert not [name for name in names if "_facade" in name]
     assert not [name for name in names if "__pycache__" in name or name.endswith((".nbi", ".nbc", ".so"))]
     metadata = zipfile.ZipFile(wheel).read(next(name for name in names if name.endswith("METADATA"))).decode()
     core = [
@@ -63,7 +77,12 @@ def test_wheel_works_in_an_empty_environment(wheel, tmp_path):
     venv.create(environment, with_pip=True)
     python = environment / "bin" / "python"
     subprocess.run([python, "-m", "pip", "install", "--quiet", str(wheel)], check=True, capture_output=True)
+    for own in ("bench", "envs"):  # a user's folders, which `python -c` has first on its path
+        (tmp_path / "work" / own).mkdir(parents=True)
+        (tmp_path / "work" / own / "__init__.py").touch()
     subprocess.run([python, "-c", USE], check=True, cwd=tmp_path)
+    subprocess.run([python, "-c", MAKE], check=True, cwd=tmp_path)
+    subprocess.run([python, "-c", MAKE], check=True, cwd=tmp_path / "work")
     laws = subprocess.run(
         [environment / "bin" / "jointbench", "laws", "--json"],
         check=True,

@@ -13,6 +13,7 @@ import tyro
 from rich.console import Console
 
 from bench import __version__
+from bench.cli.application import Apply
 from bench.cli.console import Terminated, terminable
 from bench.cli.diagnosis import Blind, Diagnose
 from bench.cli.excite import Excite
@@ -28,6 +29,7 @@ COMMANDS: dict[str, type] = {
     "view": View,
     "excite": Excite,
     "diagnose": Diagnose,
+    "apply": Apply,
     "blind": Blind,
     "reproduce": Reproduce,
     "campaign": Campaign,

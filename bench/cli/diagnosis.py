@@ -38,6 +38,8 @@ class Diagnose:
     """Effects to leave out of the catalogue."""
     most: int = 3
     """Largest number of effects named together."""
+    anyway: bool = False
+    """Go on where a unit, a sign or a part of the model stands against the diagnosis; what it was becomes a note."""
     budget: float = float("inf")
     """Seconds after which no further stage of the search is begun; the verdict is then the best one so far and says what was not tried."""
     force: bool = False
@@ -131,7 +133,12 @@ def _diagnosed(asked: Diagnose, stage: Callable[[str], None]) -> Diagnosis:
 
     try:
         return diagnose_folder(
-            asked.folder, exclude=asked.exclude, most=asked.most, progress=stage, budget=asked.budget
+            asked.folder,
+            exclude=asked.exclude,
+            most=asked.most,
+            anyway=asked.anyway,
+            progress=stage,
+            budget=asked.budget,
         )
     except (np.linalg.LinAlgError, ArithmeticError) as error:
         raise IdentificationError(
@@ -146,6 +153,8 @@ def summary(verdict: Verdict) -> list[Any]:
     Args:
         verdict: The verdict.
     """
+    from bench.discrepancy.judgement.shares import closed_words, interval, probability
+
     parts: list[Any] = [verdict.explanation]
     for effects, title in (
         (verdict.named, "Missing from the model"),
@@ -160,22 +169,18 @@ def summary(verdict: Verdict) -> list[Any]:
                 for name, p in effect.parameters.items()
             )
             where = " ".join(text for text in (effect.where, effect.channel) if text)
-            low, high = effect.closed_ci95
-            closes = f"{100 * effect.closed:.0f} % ({100 * low:.0f} … {100 * high:.0f})"
-            table.add_row(effect.name, where, f"{effect.probability:.3f}", closes, Text(values))
+            closes = interval(effect.closed, effect.closed_ci95)
+            table.add_row(effect.name, where, probability(effect.probability), closes, Text(values))
         parts.append(table)
-    table = Table(
-        "gap", "before", "parameters only", "after", "noise", "closed", title="How far the gap shrinks"
-    )
     for gap in verdict.gaps:
-        closed = f"{100 * gap.closed:.1f} % ({100 * gap.closed_ci95[0]:.1f} … {100 * gap.closed_ci95[1]:.1f})"
         label = f"{gap.dof}: {gap.metric}" if gap.dof else gap.metric
-        table.add_row(
-            label,
-            *(f"{x:.3g}" for x in (gap.before, gap.parameters_only, gap.after, gap.noise_floor)),
-            closed,
-        )
-    parts.append(table)
+        table = Table("model", "NRMSE", "closed", title=f"How far the gap shrinks ({label})")
+        steps = gap.steps or (("nominal", gap.before), ("after", gap.after))
+        for name, value in steps[:-1]:
+            table.add_row(name, f"{value:.3g}", "" if value == gap.before else closed_words(gap, value))
+        table.add_row(steps[-1][0], f"{steps[-1][1]:.3g}", closed_words(gap))
+        table.add_row("noise alone", f"{gap.noise_floor:.3g}", "")
+        parts.append(table)
     if verdict.left:
         parts.append(verdict.left)
     for names in verdict.indistinguishable:

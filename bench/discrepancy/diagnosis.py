@@ -1,9 +1,9 @@
 """The diagnosis of a case: where the gap lies, which effect causes it, how far it shrinks.
 
-The steps, each in its own module: read the case (`case`), find what it leaves unstated of its records (`moving_starts`,
-`between_samples`), screen and fit the catalogue (`screen`, `fit`, `attribute`, `explain`), weigh the explanations (`evidence`),
-doubt the best one (`free_rival`, `contradiction`), run the judging records with each (`shrink`), and say where the residuals of
-the nominal model gather (`locate`).
+The steps, each in its own room: read the case (`case`), find what it leaves unstated of its records (`checks.initial_motion`,
+`search.load_interpolation`), screen the catalogue and fit what is promising (`screening`, `fitting`, `search`), weigh the
+explanations and doubt the best one (`judgement`), run the judging records with each (`judgement.validation_discrepancy`), and say
+where the residuals of the nominal model gather (`localisation`). docs/architecture.md draws the rooms.
 """
 
 from __future__ import annotations
@@ -11,8 +11,9 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -27,9 +28,8 @@ from bench.discrepancy.articulated.effects import CATALOGUE as ARTICULATED
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.case.idle_loads import idle_notes, without_idle_noise
 from bench.discrepancy.case.reading import read_case
-from bench.discrepancy.case.schema import check_units
-from bench.discrepancy.checks.data_quality import notes, refuse
-from bench.discrepancy.checks.initial_motion import with_starts_found
+from bench.discrepancy.checks.admission import admitted
+from bench.discrepancy.checks.data_quality import notes
 from bench.discrepancy.checks.quantisation import recorded
 from bench.discrepancy.effects.catalogue import CATALOGUE
 from bench.discrepancy.effects.effect import Effect
@@ -60,6 +60,8 @@ SEED = 20060501
 WORSE = 1.1
 """Gap with a closure over that without, on any judged coordinate, from which the closure is withdrawn."""
 
+Placed = TypeVar("Placed", NamedEffect, Ranked)
+
 
 @dataclass(frozen=True)
 class Diagnosis:
@@ -89,6 +91,7 @@ def diagnose(
     catalogue: Sequence[Effect] = CATALOGUE,
     exclude: Collection[str] = (),
     most: int = 3,
+    anyway: bool = False,
     rng: np.random.Generator | None = None,
     progress: Progress = lambda text: None,
     budget: float = math.inf,
@@ -100,6 +103,7 @@ def diagnose(
         catalogue: Effects to consider.
         exclude: Names of effects to leave out of the catalogue.
         most: Largest number of effects named together.
+        anyway: Whether factors, signs and parts of the model that stand against a diagnosis are noted rather than refused.
         rng: For the bootstrap intervals; a fixed seed where None.
         progress: Called with a line of text at every stage.
         budget: Seconds after which no further stage of the search is begun; the verdict is then the best one so far, and its
@@ -108,6 +112,8 @@ def diagnose(
     Raises:
         UnknownNameError: A name in `exclude` is not in the catalogue.
         RecordingError: The records cannot be used.
+        UnitError: A unit does not fit the model, or a channel is off by a factor or a sign that no missing force makes.
+        ModelError: The model holds what a nominal simulation cannot, and the records reach it.
     """
     if applies(case):
         with threadpool_limits(1, user_api="blas"):
@@ -120,7 +126,7 @@ def diagnose(
     chosen = [effect for effect in catalogue if effect.name not in exclude]
     # fits run in threads of their own; threads of BLAS within them would only get in each other's way
     with threadpool_limits(1, user_api="blas"):
-        found = _diagnose(case, How(chosen, most, progress, Deadline(budget)), rng)
+        found = _diagnose(case, How(chosen, most, progress, Deadline(budget)), rng, anyway)
         if found.verdict.verdict == "unknown" and drives_only(case):
             # what no force on the joint explains may sit in its drive
             progress("effects of drives and encoders")
@@ -130,12 +136,10 @@ def diagnose(
         return found
 
 
-def _diagnose(case: Case, how: How, rng: np.random.Generator) -> Diagnosis:
+def _diagnose(case: Case, how: How, rng: np.random.Generator, anyway: bool) -> Diagnosis:
     began, progress, catalogue = time.perf_counter(), how.progress, how.catalogue
     progress("looking at the records")
-    check_units(case)
-    told = case = with_starts_found(case)
-    refuse(Problem(case, structure_of(case), case.identification))
+    told, admission = admitted(case, anyway=anyway)
     quiet = without_idle_noise(told)
     case, finding = found_of(quiet, how, rng)
     problem = Problem(case, structure_of(case), case.identification)
@@ -162,10 +166,11 @@ def _diagnose(case: Case, how: How, rng: np.random.Generator) -> Diagnosis:
     nearest = finding.nearest
     if finding.closest is not None:
         nearest = with_closed(case, problem, nearest, (finding.closest, *explanations), rng)
+    ranked = (*(Ranked(e.name, e.where, e.probability) for e in seen), *finding.ranking)
     verdict = Verdict(
         verdict=kind,
-        named=(*named, *seen) if kind == "effect" else (),
-        ranking=(*(Ranked(e.name, e.where, e.probability) for e in seen), *finding.ranking),
+        named=_somewhere(problem, (*named, *seen)) if kind == "effect" else (),
+        ranking=_somewhere(problem, ranked),
         indistinguishable=finding.indistinguishable if kind != "unknown" else (),
         locations=where.locations,
         gap=widest,
@@ -173,6 +178,7 @@ def _diagnose(case: Case, how: How, rng: np.random.Generator) -> Diagnosis:
         probabilities=probabilities,
         explanation=_told(words, seen),
         warnings=(
+            *admission,
             *_untried(how.deadline),
             *finding.notes,
             *notes(case, problem),
@@ -248,6 +254,12 @@ def _model(explanation: Explanation) -> tuple[Hypothesis, np.ndarray] | None:
     """Effects and vector of an explanation in one part; None where it has several."""
     fits = [fitted for _, fitted in explanation.parts]
     return (fits[0].hypothesis, fits[0].vector) if len(fits) == 1 else None
+
+
+def _somewhere(problem: Problem, found: Sequence[Placed]) -> tuple[Placed, ...]:
+    """Effects with the name of the only place where they need none to be told apart."""
+    sites = {place.name: place.site for place in problem.structure.places}
+    return tuple(replace(effect, where=effect.where or sites.get("", "")) for effect in found)
 
 
 def _told(words: str, seen: Sequence[NamedEffect]) -> str:

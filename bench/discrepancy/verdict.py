@@ -25,7 +25,7 @@ class NamedEffect:
 
     Attributes:
         name: Name in the catalogue.
-        where: Place; empty on a rig with one joint.
+        where: Place: a joint or tendon of the model, "carriage", "piston", or an axis of the joint rig.
         probability: Posterior probability that it belongs to the explanation.
         parameters: Estimates by name.
         channel: Channel or nominal parameter it acts on, for actuator, sensor and inertia effects.
@@ -185,6 +185,7 @@ class Verdict:
             before), and the "channel", "band_hz" and "time_s" that hold most of it in the records for identification.
         nearest: Where nothing is named because something unknown is missing, the effects of the catalogue that come nearest.
         nominal: Nominal parameters as the explanation behind `gap.after` has them.
+        applied: What `jointbench apply` made of it in the user's own model: "changes", and "figures" before and after.
     """
 
     verdict: Kind
@@ -205,6 +206,7 @@ class Verdict:
     remainder: dict[str, Any] = field(default_factory=dict)
     nominal: tuple[NominalEstimate, ...] = ()
     nearest: tuple[NamedEffect, ...] = ()
+    applied: dict[str, Any] = field(default_factory=dict)
 
     @property
     def left(self) -> str:

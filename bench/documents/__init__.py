@@ -32,6 +32,7 @@ from bench.documents.model import (
     checked_as,
     naming,
     refuse,
+    schema_of,
     telling,
     told,
 )
@@ -65,6 +66,7 @@ __all__ = [
     "parse_json",
     "read_text",
     "refuse",
+    "schema_of",
     "telling",
     "told",
 ]

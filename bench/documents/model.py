@@ -11,6 +11,7 @@ from __future__ import annotations
 import contextlib
 import functools
 from collections.abc import Callable, Iterator, Mapping
+from importlib import import_module
 from pathlib import Path
 from typing import Any, ClassVar, NoReturn, ParamSpec, Self, TypeVar
 
@@ -252,3 +253,12 @@ def _expected(detail: Any) -> str:
     if kind == "missing":  # of a list of fixed length: tables are looked through before
         return "one value more"
     return detail["msg"][:1].lower() + detail["msg"][1:]
+
+
+def schema_of(package: str) -> Any:
+    """The module that says what the documents of a package look like: its `schema`.
+
+    Models are made from the classes that they describe. A class that reads itself from a document asks for its model here, since
+    importing it would close a circle.
+    """
+    return import_module(f"{package}.schema")

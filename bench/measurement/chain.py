@@ -174,7 +174,6 @@ class Chain:
         Raises:
             DocumentError: An entry, the type of a stage or a field of it is unknown, missing or out of range, or the order is wrong.
         """
-        from bench.documents import checked  # noqa: PLC0415  (pydantic, for those who read documents)
-        from bench.measurement.schema import ChainDocument  # noqa: PLC0415
+        from bench.documents import checked, schema_of  # noqa: PLC0415  (pydantic, for those who read documents)
 
-        return checked(ChainDocument, data).chain()
+        return checked(schema_of("bench.measurement").ChainDocument, data).chain()

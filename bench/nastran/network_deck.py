@@ -130,7 +130,7 @@ def network_weights(network: Element | NetworkWeights) -> NetworkWeights:
         if network.law.name != "network":
             raise ParameterError(
                 f"element '{network.name}' holds the law '{network.law.name}'; only a network can be written as a deck "
-                "(identify one with bench.reduce(kind='network'))"
+                "(identify one with bench.reduced_joint(model='network'))"
             )
         k, width = (int(entry) for entry in network.law.header)
         parts = np.split(network.theta[2:], np.cumsum([2 * k * width, width, k * width]))

@@ -46,6 +46,8 @@ class Columns(NamedTuple):
     """What was left out, assumed or doubtful in the file."""
     time: NDArray[np.float64] | None = None
     """Times on a clock that is known to be uniform [s]; None where `clock` says what is known."""
+    unused: tuple[str, ...] = ()
+    """Headings of columns that nobody asked for."""
 
 
 def suffix_of(path: str | os.PathLike[str]) -> str:
@@ -79,10 +81,12 @@ def read_columns(
     """
     file = regular_file(path, limits.file_bytes)
     try:
-        contents, notes = _contents(file, layout, limits)
+        passed: list[str] = []
+        contents, notes = _contents(file, layout, limits, passed)
         if isinstance(contents, Recording):
             return contents
-        return _assembled(contents, layout, file, notes, time_optional)
+        found = _assembled(contents, layout, file, notes, time_optional)
+        return found._replace(unused=tuple(dict.fromkeys(passed)))
     except MemoryError:
         raise FileFormatError(
             f"'{file}' needs more memory than there is; cut it into parts, or name fewer columns"
@@ -90,10 +94,10 @@ def read_columns(
 
 
 def _contents(
-    path: Path, layout: ColumnMap, limits: ReadingLimits
+    path: Path, layout: ColumnMap, limits: ReadingLimits, passed: list[str]
 ) -> tuple[Recording | dict[str, Variable], tuple[str, ...]]:
     suffix = suffix_of(path)
-    wanted = _wanted(layout)
+    wanted = _wanted(layout, passed)
     if suffix == ".parquet":
         return read_parquet(path, wanted, limits=limits), ()
     if suffix.removesuffix(".gz") in TEXT:
@@ -107,8 +111,8 @@ def _contents(
     raise FileFormatError(f"'{path}' has the suffix '{suffix}'; readable are {', '.join(READABLE)}")
 
 
-def _wanted(layout: ColumnMap) -> Callable[[str], bool] | None:
-    """Which columns of a file are wanted; None for all."""
+def _wanted(layout: ColumnMap, passed: list[str]) -> Callable[[str], bool] | None:
+    """Which columns of a file are wanted, None for all; headings of the others are added to `passed`."""
     if not layout.columns:
         return None
     sources = [*layout.columns.values(), *([layout.time] if layout.time else [])]
@@ -116,7 +120,11 @@ def _wanted(layout: ColumnMap) -> Callable[[str], bool] | None:
     any_time = not layout.time and not layout.sample_rate
 
     def wanted(heading: str) -> bool:
-        return heading in names or name_and_unit(heading)[0] in names or (any_time and is_time(heading))
+        if heading in names or name_and_unit(heading)[0] in names or (any_time and is_time(heading)):
+            return True
+        if heading and not is_time(heading):
+            passed.append(heading)
+        return False
 
     return wanted
 

@@ -59,13 +59,33 @@ _MEANT = {  # what engineers write, and what they mean by it
     ("torque", "lb ft"): "lbf ft",
     ("torque", "ft-lb"): "lbf ft",
 }
+_NAMES = (  # what pint lacks, or takes for something nobody measures with: its Nm counts yarn (m/g)
+    "newton_meter = newton * meter = Nm",
+    "newton_centimeter = newton * centimeter = Ncm",
+    "newton_millimeter = newton * millimeter = Nmm",
+    "newton_second = newton * second = Ns",
+    "newton_meter_second = newton * meter * second = Nms",
+    "revolution_of_a_shaft = turn = rev",
+    "degree_per_second = degree / second = dps",
+    "RPM = revolutions_per_minute",
+    "gn = standard_gravity",
+)
+_READ_AS = (  # words of a unit that fit a mechanical quantity only as something else of the same name
+    {"lb": "lbf", "lbs": "lbf", "pound": "lbf", "pounds": "lbf", "oz": "ozf"},
+    {"g": "standard_gravity", "G": "standard_gravity", "mg": "millistandard_gravity"},
+    {"mil": "thou", "mils": "thou"},
+)
+_WORD = re.compile(r"[^\W\d_]+")
 
 
 @cache
 def _registry() -> Any:
     import pint  # noqa: PLC0415  (0.6 s that a simulation in SI units need not pay)
 
-    return pint.UnitRegistry()
+    registry = pint.UnitRegistry(on_redefinition="ignore")
+    for definition in _NAMES:
+        registry.define(definition)
+    return registry
 
 
 @cache
@@ -146,6 +166,38 @@ def conversion(source: str, target: str) -> tuple[float, float]:
             f"'{source}' to '{target}' is a logarithmic conversion; give the channel in a linear unit"
         )
     return (one, 0.0) if zero == 0.0 else (one - zero, zero)
+
+
+def _reworded(unit: str, words: dict[str, str]) -> str:
+    return _WORD.sub(lambda match: words.get(match[0], match[0]), unit)
+
+
+@cache
+def read_as(unit: str, targets: tuple[str, ...]) -> tuple[str, str]:
+    """The unit that is meant where a quantity is known: "g" of an acceleration is no gram, "lb" of a force no mass.
+
+    Args:
+        unit: Unit as it was written.
+        targets: SI units of the quantity; several where it is written in more than one way ("N m/rad" and "N m").
+
+    Returns:
+        The unit to be used for it, which is `unit` itself where that fits, and the target that it fits.
+
+    Raises:
+        UnitError: The unit is unknown, or fits none of the targets in any reading.
+    """
+    candidates = [unit, *(_reworded(unit, words) for words in _READ_AS)]
+    reason: UnitError | None = None
+    for candidate in dict.fromkeys([*candidates, candidates[1].replace("-", " ")]):
+        for target in targets:
+            try:
+                conversion(candidate, target)
+            except UnitError as error:
+                reason = reason or error
+            else:
+                return candidate, target
+    assert reason is not None
+    raise reason
 
 
 @cache

@@ -131,7 +131,6 @@ class Element:
         Raises:
             DocumentError: The law is not in the registry, or an entry is not known, missing, of the wrong kind or out of range.
         """
-        from bench.documents import checked  # noqa: PLC0415  (pydantic, for those who read documents)
-        from bench.rig.schema import ElementDocument  # noqa: PLC0415
+        from bench.documents import checked, schema_of  # noqa: PLC0415  (pydantic, for those who read documents)
 
-        return checked(ElementDocument, document).element()
+        return checked(schema_of("bench.rig").ElementDocument, document).element()

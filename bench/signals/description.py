@@ -72,10 +72,9 @@ class Described:
                 of the wrong kind or out of range.
             ParameterError: The type is another than the class this is called on.
         """
-        from bench.documents import checked_as  # noqa: PLC0415  (pydantic, for those who read documents)
-        from bench.signals.schema import adapter  # noqa: PLC0415
+        from bench.documents import checked_as, schema_of  # noqa: PLC0415  (pydantic, for those who read documents)
 
-        made = checked_as(adapter(cls._family), data)
+        made = checked_as(schema_of("bench.signals").adapter(cls._family), data)
         if not isinstance(made, cls):
             raise ParameterError(f"a {cls.kind} '{cls.name}' is expected; one of type '{made.name}' came")
         return made

@@ -113,7 +113,6 @@ class Excitation:
         Raises:
             DocumentError: An entry, the type of a signal or a field of it is unknown, missing, of the wrong kind or out of range.
         """
-        from bench.documents import checked  # noqa: PLC0415  (pydantic, for those who read documents)
-        from bench.signals.schema import ExcitationDocument  # noqa: PLC0415
+        from bench.documents import checked, schema_of  # noqa: PLC0415  (pydantic, for those who read documents)
 
-        return checked(ExcitationDocument, data).excitation()
+        return checked(schema_of("bench.signals").ExcitationDocument, data).excitation()

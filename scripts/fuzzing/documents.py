@@ -200,7 +200,7 @@ def make_case(folder: Path) -> None:
 def read_case(folder: Path) -> None:
     """Read a case and build its structure."""
     from bench.discrepancy.case.reading import read_case as read
-    from bench.discrepancy.model.structure import structure_of
+    from bench.discrepancy.model.rigs import structure_of
 
     structure_of(read(folder))
 

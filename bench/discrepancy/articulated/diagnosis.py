@@ -85,7 +85,7 @@ class ArticulatedDiagnosis:
 
 
 def applies(case: Case) -> bool:
-    """Whether the rig of a case is an MJCF that is articulated: servos, parameters of drives, or inertia that changes with posture."""
+    """Whether the rig of a case is an MJCF of several joints with servos, parameters of drives, or inertia that changes with posture."""
     path = Path(case.folder or ".") / case.rig
     if case.rig in ("sdof", "joint", "damper") or not path.is_file():
         return False
@@ -95,8 +95,9 @@ def applies(case: Case) -> bool:
         model = mujoco.MjModel.from_xml_path(str(path))
     except ValueError:
         return False
-    servo = np.any(np.asarray(model.actuator_biasprm)[:, 1] != 0.0) if model.nu else False
-    return bool(servo) or _posture_matters(model)
+    # one joint on its own is a linear structure first: forces on it have a larger catalogue there
+    servos = model.nv > 1 and model.nu and np.any(np.asarray(model.actuator_biasprm)[:, 1] != 0.0)
+    return bool(servos) or _posture_matters(model)
 
 
 def drives_only(case: Case) -> bool:

@@ -1,6 +1,6 @@
 """Records of an articulated model, prepared: for every joint the coefficients of its equation along the measured motion, and its noise.
 
-The motion is smoothed from the encoders (`smoothing`). Where an encoder is wrong, the log is corrected first (`Encoder`) and everything
+The motion is smoothed from the encoders (`kalman_smoother`). Where an encoder is wrong, its log is corrected first (`Encoder`), and all
 follows from the corrected one, since a posture that is wrong at one joint is felt by all.
 
 The gain of the innovations is the stationary Kalman gain of the joint about its mean inertia. Its process noise is the stated noise of the

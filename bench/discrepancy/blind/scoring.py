@@ -172,7 +172,9 @@ def score_cases(results: str | Path, answers: str | Path, *, cases: str | Path |
 
 def _scored(name: str, result: Mapping[str, Any], answer: Mapping[str, Any]) -> Scored:
     truth = tuple((e["name"], e.get("where", "") or "") for e in answer["effects"])
-    said = tuple((e["name"], e.get("where", "") or "") for e in result["named"])
+    # a rig with one place has a name for it that answers need not state
+    placed = any(where for _, where in truth)
+    said = tuple((e["name"], (e.get("where", "") or "") if placed else "") for e in result["named"])
     kind = "struck" if answer.get("struck") else str(answer["class"])
     right = _right(result, set(said), set(truth), kind)
     families = None

@@ -8,13 +8,13 @@ What is known of the acquisition goes there too: ``"load_interpolation": "linear
 loads between their samples, ``"starts_in_motion": ["validation", …]`` (or true, for all of them) for records that do not start at
 rest, ``"periodic": ["identification_2", …]`` for records that are whole periods of a steady state, and
 ``"antialias": {"kind": "butterworth", "order": 4, "cutoff_hz": 300}`` at a response channel that was filtered on its way. Of the
-first two, what is not stated is looked for in the records (`between_samples`, `moving_starts`).
+first two, what is not stated is looked for in the records (`search.load_interpolation`, `checks.initial_motion`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +24,8 @@ from bench.discrepancy.case.acquisition import INTERPOLATIONS, Antialias
 from bench.errors import RecordingError, UnknownNameError
 from bench.record_files.reading import on_one_clock
 
+NO_LOAD = "no load"
+"""Channel of a load that is zero throughout, of a model of the user's own that nothing drives."""
 MIN_SAMPLES = 200
 """Shortest record that is accepted; below it no spectrum, and so no statement about noise, is possible."""
 
@@ -199,3 +201,28 @@ def record_from_arrays(
         columns[channel] = column
     told = tuple(f"record '{name}': {note}" for note in (*notes, *noted.notes))
     return CaseRecord(name, 1.0 / noted.sample_rate, float(noted.time[0]), columns, at_rest, periodic, told)
+
+
+def without_load(case: Case) -> Case:
+    """A case with a load that is zero throughout, where it has none and starts in motion: a free decay."""
+    own = {"sdof": "force"}.get(case.rig, NO_LOAD)
+    driven = any(
+        c.role in {"measured", "command", "prescribed"} or c.target.startswith("actuator:")
+        for c in case.channels
+    )
+    records = (*case.identification, *case.validation)
+    if driven or case.rig in {"damper", "joint"} or any(record.at_rest for record in records):
+        return case
+
+    def still(record: CaseRecord) -> CaseRecord:
+        zeros = np.zeros(len(record))
+        zeros.setflags(write=False)
+        return replace(record, values={**record.values, own: zeros})
+
+    channel = CaseChannel(own, "" if own == NO_LOAD else "N", "measured", 0.0)
+    identification, validation = (
+        tuple(map(still, group)) for group in (case.identification, case.validation)
+    )
+    return replace(
+        case, channels=(*case.channels, channel), identification=identification, validation=validation
+    )

@@ -20,7 +20,9 @@ from bench.discrepancy.case.case import (
     CaseRecord,
     NominalParameter,
     record_from_arrays,
+    without_load,
 )
+from bench.discrepancy.case.elements import declared_parameters
 from bench.discrepancy.case.schema import NominalDocument
 from bench.errors import BenchError, FileFormatError, RecordingError, UnitError, UnknownNameError
 from bench.record_files.column_map import ColumnMap
@@ -30,6 +32,9 @@ from bench.recording.units import conversion
 
 GROUPS = ("identification", "validation")
 """What the names of records begin with: those that serve to find the effect, and those that judge."""
+
+MOST_LISTED = 8
+"""Unused columns that a note lists by name."""
 
 _THOUSANDS = {1: "ms", 2: "us", 3: "ns"}
 
@@ -67,6 +72,8 @@ def read_case(folder: str | Path) -> Case:
         NominalParameter(name, entry.value, entry.std, entry.unit)
         for name, entry in nominal.parameters.items()
     )
+    declared = declared_parameters(nominal.elements, path)
+    parameters += tuple(NominalParameter(name, *entry) for name, entry in declared.items())
     channels = tuple(
         CaseChannel(
             name, entry.unit, nominal.role_of(name), entry.noise_std, entry.filter(), entry.target, entry.quantity or "",
@@ -97,10 +104,11 @@ def read_case(folder: str | Path) -> Case:
         for group in GROUPS
     }
     channels = tuple(c if c.unit else replace(c, unit=units.get(c.name, "")) for c in channels)
-    return Case(
+    case = Case(
         folder.name, nominal.rig, parameters, channels,
         records["identification"], records["validation"], folder, nominal.options,
     )  # fmt: skip
+    return without_load(case)
 
 
 def _record_files(folder: Path) -> dict[str, dict[str, Path]]:
@@ -153,6 +161,10 @@ def _read_record(file: Path, name: str, known: _Channels, units: dict[str, str],
         time, notes = _times(contents, known)
     except (RecordingError, UnitError, UnknownNameError) as error:
         raise _at(file, error) from None
+    if contents.unused:
+        listed = ", ".join(f"'{heading[:60]}'" for heading in contents.unused[:MOST_LISTED])
+        more = f" and {len(contents.unused) - MOST_LISTED} more" if len(contents.unused) > MOST_LISTED else ""
+        notes = (*notes, f"columns that nominal.json does not name are not used: {listed}{more}")
     return record_from_arrays(name, time, arrays, at_rest=at_rest, notes=(*contents.notes, *notes))
 
 

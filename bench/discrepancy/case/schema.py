@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from bench.discrepancy.case.acquisition import Antialias, Interpolation
+from bench.discrepancy.case.single_axis import LOADS as LOAD_NAMES
+from bench.discrepancy.case.single_axis import MOTIONS
 from bench.documents import (
     Document,
     Entry,
@@ -40,8 +42,8 @@ _MOUNTS = tuple(
     for body in (1, 2)
 )
 PARAMETERS: dict[str, tuple[str, ...]] = {
-    "sdof": ("mass", "stiffness", "damping", "coulomb"),
-    "damper": ("stiffness", "damping", "coulomb"),
+    "sdof": ("mass", "stiffness", "damping", "coulomb", "slip_stiffness", "force_offset"),
+    "damper": ("stiffness", "damping", "coulomb", "slip_stiffness", "force_offset"),
     "joint": (
         "mass_1", "mass_2", "inertia_1", "inertia_2", *_MOUNTS,
         "joint_stiffness_axial", "joint_damping_axial", "joint_stiffness_torsional", "joint_damping_torsional",
@@ -51,8 +53,8 @@ PARAMETERS: dict[str, tuple[str, ...]] = {
 RIGS = tuple(PARAMETERS)
 """The bench's rigs that a nominal model may be."""
 RESPONSES: dict[str, tuple[str, ...]] = {
-    "sdof": ("displacement", "velocity", "acceleration"),
-    "damper": ("force", "displacement", "velocity", "acceleration"),
+    "sdof": tuple(name for names in MOTIONS for name in names),
+    "damper": (*LOAD_NAMES, *(name for names in MOTIONS for name in names)),
     "joint": tuple(
         f"{quantity}_{body}"
         for quantity in ("displacement", "velocity", "acceleration", "rotation", "angular_velocity", "angular_acceleration")
@@ -187,6 +189,8 @@ class NominalDocument(Document):
     """Records that are whole periods of a steady state."""
     places: Annotated[Listed[Name], Field(min_length=1)] | None = None
     """Joints and fixed tendons of an MJCF where effects may sit; all that move by default."""
+    elements: Listed[dict[str, Any]] = ()
+    """Laws of the bench that the model holds besides, see `case.elements`."""
     limits: Table[Positive] = Field(default_factory=dict)
     """Largest magnitude of a channel that the next test may reach; those of the records by default."""
     window_s: Positive | None = None
@@ -221,7 +225,8 @@ class NominalDocument(Document):
                     unknown=True,
                 )
             inertial = name.startswith(("mass", "inertia"))
-            if entry.value < 0.0 or (inertial and entry.value == 0.0):
+            signed = name == "force_offset"
+            if (entry.value < 0.0 and not signed) or (inertial and entry.value == 0.0):
                 expected = "a positive number" if inertial else "zero or more"
                 refuse(
                     f"{entry.value:g} came; {expected} is expected: check its sign",
@@ -248,7 +253,7 @@ class NominalDocument(Document):
 
 MOTION = {
     "displacement": ("axial", "m"), "velocity": ("axial", "m/s"), "acceleration": ("axial", "m/s^2"),
-    "rotation": ("torsional", "rad"), "angular_velocity": ("torsional", "rad/s"),
+    "rotation": ("torsional", "rad"), "angle": ("torsional", "rad"), "angular_velocity": ("torsional", "rad/s"),
     "angular_acceleration": ("torsional", "rad/s^2"),
 }  # fmt: skip
 LOADS = {"force": ("axial", "N"), "torque": ("torsional", "N m")}
@@ -294,7 +299,8 @@ def check_units(case: Case) -> None:
     for parameter in case.parameters:
         if not parameter.unit:
             continue
-        axis = "torsional" if "torsional" in parameter.name or "inertia" in parameter.name else "axial"
+        rotary = "torsional" in parameter.name or "inertia" in parameter.name or "axial" not in motion | loads
+        axis = "torsional" if rotary and "torsional" in motion | loads else "axial"
         kind = next((k for k, a in CONSTANTS if a == axis and k in parameter.name), None)
         if kind is None:
             continue

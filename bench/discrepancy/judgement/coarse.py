@@ -11,13 +11,14 @@ References:
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.fitting.map_fit import fit
 from bench.discrepancy.judgement.held_out import HeldOut, held_out, shares
+from bench.discrepancy.judgement.steady import diverges, steadied
 from bench.discrepancy.judgement.validation_discrepancy import discrepancies, noise_floors
 from bench.discrepancy.likelihood.problem import Array, Problem
 from bench.discrepancy.search.explain import Explanation, nominal_alone
@@ -51,6 +52,8 @@ class CoarseSettings:
 
 
 SETTINGS = CoarseSettings()
+ALIKE = 2.0
+"""Standard errors of a difference within which two explanations are declared a set."""
 ABOUT_NOISE, UNCHANGED = 1.1, 1.02
 """Times the noise below which a judged discrepancy is nothing but that, and change of it that is none."""
 
@@ -64,7 +67,9 @@ class Judged:
         found: All finalists on held-out blocks, the chosen one first.
         weights: (n,) probability of each, as if one of them were true.
         within: Those within one standard error of the best.
+        alike: Those that the blocks do not tell from the chosen one: two standard errors.
         vetoed: Whether the judging records refused what the others would have named.
+        nominal: Largest judged discrepancy of the nominal model, its parameters re-estimated within their uncertainty.
         left: Part of the power of the judged discrepancy, beyond noise, that the chosen one leaves.
     """
 
@@ -72,7 +77,9 @@ class Judged:
     found: tuple[HeldOut, ...]
     weights: Array
     within: tuple[HeldOut, ...]
+    alike: tuple[HeldOut, ...]
     vetoed: bool
+    nominal: float
     left: float
 
     @property
@@ -118,13 +125,25 @@ def judge(
     found = [base, *found]
     weights = shares(found, np.array([_log_prior(e.explanation) for e in found]), rng)
     within = tuple(entry for entry in found if _as_good(entry, base, settings))
+    worst = float(np.max(known.of(nothing, judging=True)))
     vetoed, part = False, settings.most if trusted else settings.pays
-    for entry in sorted(within, key=_plainness):
+    for own in sorted(within, key=_plainness):
+        entry = _steady(own, case, rng)
         e = entry.explanation
         if not e.hypothesis or known.pays(e, nothing, part):
-            return Judged(entry, tuple(found), weights, within, vetoed, known.left(e, nothing))
+            found = [entry if other is own else other for other in found]
+            alike = tuple(other for other in found if _as_good(other, base, settings, ALIKE))
+            return Judged(entry, tuple(found), weights, within, alike, vetoed, worst, known.left(e, nothing))
         vetoed = True
-    return Judged(found[-1], tuple(found), weights, within, True, 1.0)
+    return Judged(found[-1], tuple(found), weights, within, within, True, worst, 1.0)
+
+
+def _steady(entry: HeldOut, case: Case, rng: np.random.Generator) -> HeldOut:
+    """An explanation on held-out blocks, moved within its uncertainty where it diverges on the judging records."""
+    if not entry.explanation.hypothesis or not diverges(entry.explanation, case.validation):
+        return entry
+    moved = steadied(entry.explanation, case.validation, rng)
+    return entry if moved is None else replace(entry, explanation=moved)
 
 
 def bounded(explanation: Explanation, within: float) -> Explanation:
@@ -143,16 +162,19 @@ def _log_prior(explanation: Explanation) -> float:
     return sum(LOG_PRIOR_EFFECT + placed.effect.log_prior for placed in explanation.hypothesis)
 
 
-def _as_good(entry: HeldOut, best: HeldOut, settings: CoarseSettings) -> bool:
+def _as_good(entry: HeldOut, best: HeldOut, settings: CoarseSettings, errors: float = 1.0) -> bool:
     """Whether an explanation predicts as well as the best one: within a standard error, or what so few samples cannot tell."""
     worse, error = entry.worse_than(best)
-    return entry is best or worse <= max(error, settings.telling)
+    return entry is best or worse <= max(errors * error, settings.telling)
 
 
-def _plainness(entry: HeldOut) -> tuple[int, int, float, float]:
-    """What comes first is simpler: fewer effects, fewer parameters, commoner ones, and then what predicts better."""
+def _plainness(entry: HeldOut) -> tuple[int, float, float]:
+    """What comes first is simpler: fewer effects, then fewer parameters and commoner effects, and then what predicts better.
+
+    A parameter counts as a unit of log prior, which is what it gains on average where nothing is to be gained.
+    """
     e = entry.explanation
-    return (len(e.hypothesis), e.n_free, -sum(p.effect.log_prior for p in e.hypothesis), entry.total)
+    return (len(e.hypothesis), e.n_free - sum(p.effect.log_prior for p in e.hypothesis), entry.total)
 
 
 class Discrepancies:

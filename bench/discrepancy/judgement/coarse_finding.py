@@ -10,6 +10,7 @@ from bench.discrepancy.case.case import Case
 from bench.discrepancy.judgement import posterior as evidence
 from bench.discrepancy.judgement.coarse import SETTINGS, Judged, judge
 from bench.discrepancy.judgement.finding import Finding
+from bench.discrepancy.likelihood.model_error import SETTINGS as ERROR
 from bench.discrepancy.likelihood.model_error import ModelError, crude_error, error_left, own_noise
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.rigs import structure_of
@@ -18,8 +19,8 @@ from bench.discrepancy.search.explain import Explanation
 from bench.discrepancy.search.fits import names
 from bench.discrepancy.verdict import Kind, Ranked
 
-Search = Callable[[Case, ModelError], tuple[Case, list[Explanation]]]
-"""Searches the explanations of a case, weighed by an error; the case comes back with what they tell of it."""
+Search = Callable[[Case, ModelError, Sequence[Explanation]], tuple[Case, list[Explanation]]]
+"""Searches the explanations of a case, weighed by an error, beside those that are known; the case comes back with what they tell of it."""
 REFERENCE = 2
 """Effects, at most, of the explanation that tells the error of the model: more of them take its error for effects."""
 ROUNDS = 3
@@ -27,6 +28,9 @@ ROUNDS = 3
 UNDERSTATED, QUIETEST = 1.5, 0.1
 """Noise over the stated one from which that is said, and part of a spectrum that may be quieter: of spectra smoothed over half an octave
 the quietest bins scatter by some tenths."""
+WITHIN_ERROR = 2.0 * ERROR.least
+"""Discrepancy of the judging records, relative, up to which a nominal model of unstated noise is as right as a model can be: two standard
+deviations of what sensors are calibrated to."""
 SETTLED = 0.5
 """Part of the power of an estimated error above which what an explanation leaves is as estimated."""
 
@@ -43,13 +47,13 @@ def coarse_explanations(
         deadline: When no further estimate of the error is begun.
     """
     error = _left(case, known) if known else crude_error(case, structure_of(case))
-    case, explanations = search(case, error)
+    case, explanations = search(case, error, known)
     for _ in range(1, ROUNDS):
         settled = bool(known) and reference(explanations).reduced > SETTLED
         if settled or not deadline.allows("a further estimate of the error of the model"):
             break
         known = explanations
-        case, explanations = search(case, _left(case, known))
+        case, explanations = search(case, _left(case, known), known)
     return case, explanations
 
 
@@ -84,7 +88,7 @@ def coarse_finding(
     chosen, nearest = judged.chosen.explanation, _nearest(judged)
     probabilities = _marginal(judged)
     # noise that is stated and is not all that is left is something that is missing, whatever it be
-    unexplained = judged.vetoed or problem.noise_stated
+    unexplained = problem.noise_stated or (judged.vetoed and judged.nominal > WITHIN_ERROR)
     kind: Kind = "effect" if chosen.hypothesis else ("unknown" if unexplained else "none")
     others = [entry.explanation for entry in judged.found if entry is not judged.chosen]
     order = np.argsort(
@@ -145,9 +149,10 @@ def _understated(problem: Problem, best: Explanation) -> Iterator[str]:
 def _marginal(judged: Judged) -> dict[tuple[str, str], float]:
     """Probability that each (name, place) belongs to the truth."""
     total: dict[tuple[str, str], float] = {}
+    outside = SETTINGS.outside if judged.vetoed else judged.outside
     for weight, entry in zip(judged.weights, judged.found, strict=True):
         for key in {(p.effect.name, p.place.name) for p in entry.explanation.hypothesis}:
-            total[key] = total.get(key, 0.0) + (1.0 - judged.outside) * float(weight)
+            total[key] = total.get(key, 0.0) + (1.0 - outside) * float(weight)
     return total
 
 
@@ -156,7 +161,7 @@ def _sets(judged: Judged) -> tuple[tuple[str, ...], ...]:
     chosen = judged.chosen.explanation
     own = {p.key: p for p in chosen.hypothesis}
     sets: dict[str, set[str]] = {}
-    for entry in judged.within:
+    for entry in judged.alike:
         theirs = {p.key: p for p in entry.explanation.hypothesis}
         if not theirs or not own or entry is judged.chosen:
             continue

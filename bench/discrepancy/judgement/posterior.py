@@ -8,7 +8,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from bench.discrepancy.effects.effect import unit_of
-from bench.discrepancy.judgement.validation_discrepancy import closed_share
+from bench.discrepancy.judgement.shares import percent
+from bench.discrepancy.judgement.validation_discrepancy import AT_THE_NOISE, closed_share
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.search.explain import Explanation, nominal_alone, plainest
 from bench.discrepancy.search.fits import names
@@ -71,10 +72,10 @@ def closes(label: str, gap: Gap) -> str:
     """
     left = dict(gap.steps).get(label, math.inf)
     share = closed_share(gap.before, left, gap.noise_floor)
-    if share < MOSTLY:
+    if share < MOSTLY or gap.before <= AT_THE_NOISE * gap.noise_floor:
         return ""
     return (
-        f" On the judging records {label} closes {100.0 * min(share, 1.0):.3g} % of the gap all the same: it is much of what is "
+        f" On the judging records {label} closes {percent(share)} of the gap all the same: it is much of what is "
         "missing, or much like it."
     )
 

@@ -60,8 +60,10 @@ def found_of(case: Case, how: How, rng: np.random.Generator) -> tuple[Case, Find
         The case with what its explanations tell of things that nobody stated, and what was found.
     """
 
-    def search(case: Case, error: ModelError) -> tuple[Case, list[Explanation]]:
-        return _explained(case, replace(how, most=min(how.most, REFERENCE)), error)
+    few = replace(how, most=min(how.most, REFERENCE))
+
+    def search(case: Case, error: ModelError, known: Sequence[Explanation]) -> tuple[Case, list[Explanation]]:
+        return _explained(case, few, error, [e for e in known if len(e.hypothesis) <= few.most])
 
     known: list[Explanation] = []
     if Problem(case, structure_of(case), case.identification).noise_stated:
@@ -106,12 +108,20 @@ def _sharp(case: Case, explanations: list[Explanation], how: How, rng: np.random
     )
 
 
-def _explained(case: Case, how: How, error: ModelError | None = None) -> tuple[Case, list[Explanation]]:
+def _explained(
+    case: Case, how: How, error: ModelError | None = None, seeds: Sequence[Explanation] = ()
+) -> tuple[Case, list[Explanation]]:
     """The explanations of a case, and the case with what they tell of things that nobody stated: its loads and its starts."""
 
     def explanations_of(case: Case) -> list[Explanation]:
         return explain(
-            case, how.catalogue, most=how.most, progress=how.progress, error=error, deadline=how.deadline
+            case,
+            how.catalogue,
+            most=how.most,
+            progress=how.progress,
+            error=error,
+            deadline=how.deadline,
+            seeds=seeds,
         )
 
     explanations = explanations_of(case)

@@ -3,7 +3,7 @@
 The gap is rms(simulated - measured) / std(measured) of a position-like channel over whole judging records, simulated
 from rest with the measured loads and nothing else. On the joint it is that of the relative motion of each axis.
 Records that start in motion, and windows of records that would drift, begin at the state estimated from the record itself
-(`start_estimates`), every model's from the same samples; the metric says so.
+(`fitting.initial_state_fit`), every model's from the same samples; the metric says so.
 """
 
 from __future__ import annotations
@@ -24,6 +24,8 @@ from bench.discrepancy.verdict import Gap
 Prediction = Callable[[CaseRecord], Mapping[str, Array]]
 DIVERGED_GAP = 1e3
 """Gap that stands for a simulation that diverged."""
+AT_THE_NOISE = 1.05
+"""Discrepancy over its noise floor up to which there is nothing to close: the stated noise is known to a few percent at best."""
 BLOCKS = 24
 """Blocks of a judging record for the bootstrap: some periods each, so that blocks are nearly independent."""
 
@@ -127,7 +129,7 @@ def noise_floors(problem: Problem, records: Sequence[CaseRecord]) -> Array:
 
 def closed_share(before: float, after: float, floor: float) -> float:
     """``(before - after) / (before - floor)``; one where there was nothing to close."""
-    if before - floor <= 1e-3 * floor:
+    if before <= AT_THE_NOISE * floor:
         return 1.0
     return (before - after) / (before - floor)
 

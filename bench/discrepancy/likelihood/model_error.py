@@ -65,12 +65,14 @@ class ModelError:
         power: (record, channel) to the variance (n_bins,) of its spectrum, in the units of `RecordData.whitening`.
         scale: Of records in windows: their residual power over that of their noise.
         together: Channels that one missing force moves together.
+        crude: Whether it is a guess that nothing has been fitted for.
         settings: How it was estimated.
     """
 
     power: Mapping[tuple[str, str], Array]
     scale: float = 1.0
     together: float = 1.0
+    crude: bool = False
     settings: ErrorSettings = SETTINGS
 
     def of(self, record: str, channels: Sequence[str], n_bins: int) -> Array:
@@ -157,7 +159,7 @@ def crude_error(case: Case, structure: Structure, settings: ErrorSettings = SETT
         for name in structure.channels
     }
     power = {key: np.array([value]) for key, value in level.items()}
-    return ModelError(power, together=_together(structure), settings=settings)
+    return ModelError(power, together=_together(structure), crude=True, settings=settings)
 
 
 def _together(structure: Structure) -> float:

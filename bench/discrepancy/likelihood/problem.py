@@ -35,7 +35,7 @@ from bench.discrepancy.likelihood.window_whitening import (
     with_starts,
     without_starts,
 )
-from bench.discrepancy.model.nominal_elements import own_friction, with_own_forces
+from bench.discrepancy.model.nominal_elements import with_own_forces
 from bench.discrepancy.model.placement import Hypothesis, Placed
 from bench.discrepancy.model.structure import Place, Structure
 from bench.discrepancy.motion.measured import measured_motion
@@ -50,8 +50,6 @@ from bench.discrepancy.simulation.stick_slip import COLUMNS, Elements, Motion
 Array = NDArray[np.float64]
 MOTION_DRAWS = 8
 """Draws of the noise of a prescribed motion."""
-COULOMB = "coulomb"
-"""Nominal friction force of a component under prescribed motion."""
 
 
 @dataclass
@@ -64,7 +62,7 @@ class Problem:
         records: Records to be explained.
         bins: Frequency bins of every record, where they have to agree with those of another problem.
         substeps: Integration steps a sample; chosen by the fastest rate where None.
-        refinement: Multiple of the steps so chosen, as far as `pace` lets it.
+        refinement: Multiple of the steps so chosen, as far as `step_size` lets it.
         within: Stated standard deviations that a nominal parameter may move.
         error: Error of the model that residuals are weighed by besides their noise; None where noise is all that they hold.
         nominal: (n_nominal,) values of the structure's parameters, initial states of records in motion after them.
@@ -194,14 +192,14 @@ class Problem:
         return channels
 
     def lead_in(self, record: CaseRecord) -> int:
-        """Samples of run-in before a periodic record, see `driving.run_in`."""
+        """Samples of run-in before a periodic record, see `driving_loads.run_in`."""
         if not record.periodic or self.driven or self.windowed:
             return 0
         return run_in(self.structure.at(self.nominal), len(record), record.step)
 
     @cached_property
     def finest(self) -> int:
-        """Fewest integration steps a sample, see `driving.fewest_steps`."""
+        """Fewest integration steps a sample, see `driving_loads.fewest_steps`."""
         return fewest_steps(self)
 
     def motion(self, index: int) -> Motion:
@@ -308,12 +306,13 @@ class Problem:
         linear = self.structure.at(values)
         elements, rates = self.elements(hypothesis, etas, record)
         if own_forces:
-            replaced = [placed.place.rows[0] for placed in hypothesis if placed.effect.in_place]
-            elements = with_own_forces(elements, self.structure, values, replaced)
+            elements = self._with_own(elements, hypothesis, values)
         # The rate of a law is that at its largest velocity, where a step of one time constant is still accurate enough.
         own = np.sqrt(np.max(np.abs(linear.stiffness).sum(1) / np.diag(linear.mass)))
         own = max([own, *(friction.rate(linear.mass) for friction in self.structure.frictions)])
-        substeps = self._substeps(record.step * np.maximum(0.6 * rates, own))
+        substeps = self._substeps(
+            record.step * np.maximum(0.6 * np.maximum(rates, self._own_rate(record)), own)
+        )
         if lead and len(substeps) > 1:
             substeps = np.resize(substeps, lead + len(record))
         loads, factor = driving_loads(self, (hypothesis, etas), record, int(substeps.max()))
@@ -330,6 +329,26 @@ class Problem:
             motion=self.motion_of(record) if self.windowed else None,
         )
         return Motion(*(samples[lead:] for samples in motion))
+
+    def _with_own(self, elements: Elements, hypothesis: Hypothesis, values: Array) -> Elements:
+        """Elements with the nominal model's own forces, but for friction that an effect stands in the place of."""
+        replaced = [placed.place.rows[0] for placed in hypothesis if placed.effect.in_place]
+        return with_own_forces(elements, self.structure, values, replaced)
+
+    def _own_rate(self, record: CaseRecord) -> float:
+        """Cached fastest rate of the laws of the nominal model [1/s]; that of a measured record where one was not measured."""
+        cache = self.__dict__.setdefault("_own_rates", {})
+        if not self.structure.elements:
+            return 0.0
+        if record.name not in cache:
+            known = any(own is record for own in (*self.case.identification, *self.case.validation))
+            motion = self.motion_of(record if known else self.records[0])
+            laws = self.structure.elements
+            cache[record.name] = max(
+                law.rate(law.theta(self.structure.parameters, self.nominal), motion, record.step)
+                for law in laws
+            )
+        return cache[record.name]
 
     def _substeps(self, phase: Array) -> NDArray[np.int64]:
         """Integration steps of samples in which the fastest law changes by a `phase` (n,), or (1,) of all of them."""
@@ -361,9 +380,8 @@ class Problem:
         motion = self.motion_of(record)
         linear = self.structure.at(values)
         force = motion.position @ linear.stiffness + motion.velocity @ linear.damping
-        if COULOMB in self.structure.parameters and not any(p.effect.in_place for p in hypothesis):
-            force += values[self.structure.parameters.index(COULOMB)] * np.sign(motion.velocity)
         elements, rates = self.elements(hypothesis, etas, record)
+        elements = self._with_own(elements, hypothesis, values)
         if len(elements.table):
             row = elements.rows.T
             driven = driven_force(
@@ -371,21 +389,13 @@ class Problem:
                 position=motion.position @ row,
                 velocity=motion.velocity @ row,
                 step=record.step,
-                substeps=steps(record.step * rates),
+                substeps=steps(record.step * np.maximum(rates, self._own_rate(record))),
                 start_time=record.start,
             )
             if not np.isfinite(driven).all():
                 return np.full_like(force, np.nan)
             force += driven @ elements.rows
         return self.sensed(hypothesis, etas, force, record.step)
-
-    def own_friction(self, motion: Motion, row: Array) -> Array:
-        """Force (n,) of the nominal model's own dry friction along one coordinate (n_dof,)."""
-        if self.driven:
-            own = COULOMB in self.structure.parameters
-            level = self.nominal[self.structure.parameters.index(COULOMB)] if own else 0.0
-            return level * np.sign(motion.velocity[:, 0])
-        return own_friction(self.structure, self.nominal, motion, row)
 
     def finer(self, refinement: int) -> Problem:
         """A copy that is integrated in other steps."""
@@ -507,7 +517,7 @@ class Problem:
         )
 
     def _speeds(self, placed: Placed, record: CaseRecord) -> Array:
-        """Cached speeds along the coordinate of an effect, see `pace.speeds`; (1,) where the record was not measured."""
+        """Cached speeds along the coordinate of an effect, see `step_size.speeds`; (1,) where the record was not measured."""
         if not any(own is record for own in self.records):
             return np.array([self.scales_of(placed).velocity])
         cache = self.__dict__.setdefault("_speeds_along", {})

@@ -34,7 +34,7 @@ class RecordData(NamedTuple):
         whitening: (n_bins, n_channels, n_channels) complex; whitening times the spectrum of the noise is white.
         windows: Windows that restart from the measured state; None where the whole record is one free run.
         compared: (n,) ones and zeros: samples that are compared; None for all.
-        together: (k, k) what whitens the lower bins together, see `swinging_noise`; None where every bin stands alone.
+        together: (k, k) what whitens the lower bins together, see `time_varying_noise`; None where every bin stands alone.
     """
 
     record: CaseRecord

@@ -26,7 +26,7 @@ import numba
 import numpy as np
 
 from bench.discrepancy.case.case import CaseRecord
-from bench.discrepancy.likelihood.problem import COULOMB, Array, Problem
+from bench.discrepancy.likelihood.problem import Array, Problem
 from bench.discrepancy.model.nominal_elements import own_force
 from bench.discrepancy.model.structure import Place, Structure
 from bench.discrepancy.simulation.stick_slip import LinearStructure, Motion
@@ -229,7 +229,7 @@ class ForceObserver:
         """Loads (n, n_inputs) of a record, and what the nominal model's own friction and bending springs exert along a motion."""
         loads = np.column_stack([record.values[name] for name in self.structure.loads])
         return (
-            np.hstack([loads, -own_force(self.structure, values, motion)])
+            np.hstack([loads, -own_force(self.structure, values, motion, record.step)])
             if self.structure.has_own_forces
             else loads
         )
@@ -365,8 +365,8 @@ class ForceObserver:
         linear = self.structure.at(values)
         motion = self.problem.motion_of(record)
         model = motion.position @ linear.stiffness + motion.velocity @ linear.damping
-        if COULOMB in self.structure.parameters:
-            model = model + values[self.structure.parameters.index(COULOMB)] * np.sign(motion.velocity)
+        if self.structure.has_own_forces:
+            model = model + own_force(self.structure, values, motion, record.step)
         measured = np.column_stack([record.values[name] for name in self.structure.channels])[:, :1]
         stds, _ = self._noise()
         passes = np.array(

@@ -2,13 +2,13 @@
 
 Two residuals are split. That of the free run of the nominal model, its parameters re-estimated, is whitened; what its
 power has beyond one is excess, and is split by channel, by frequency band and by time. That of the equations is the force
-missing along the measured motion (`missing_force`); it is split by displacement, velocity, travel since the last reversal, in
+missing along the measured motion (`force_smoother`); it is split by displacement, velocity, travel since the last reversal, in
 and out of contact, band and time (`state_map`). Shares of a split add up to one, and in each the false discovery rate is
-controlled. Channels that contradict one another whatever the force (`redundancy`) make it a fault of a sensor.
+controlled. Channels that contradict one another whatever the force (`parity_relations`) make it a fault of a sensor.
 
 No split knows which effect is named later. The regions are those of the force map, unless an effect that the records bear out
-acts in a part of the state space only: its law then tells them better than any map (`acting`). So does a free force, where the
-effect is unknown and the records tell that it has limits (`limited`).
+acts in a part of the state space only: its law then tells them better than any map (`law_regions`). So does a free force, where the
+effect is unknown and the records tell that it has limits (`bounded_force`).
 
 References:
     Y. Benjamini, Y. Hochberg, Journal of the Royal Statistical Society B 57 (1995) 289-300.

@@ -28,7 +28,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench import native
-from bench.discrepancy.case.case import Case, CaseChannel
+from bench.discrepancy.case.case import NO_LOAD, Case, CaseChannel
+from bench.discrepancy.case.elements import declared_parameters
+from bench.discrepancy.model.mjcf_couplings import LINK, constrained, rows_of, stiff_modes, without_equalities
+from bench.discrepancy.model.mjcf_file import rig_of
 from bench.discrepancy.model.mjcf_friction import nominal_frictions
 from bench.discrepancy.model.mjcf_gravity import gravity_springs, has_gravity, without_gravity
 from bench.discrepancy.model.mjcf_limits import check_reach, free_of_constraints
@@ -58,11 +61,13 @@ def mjcf_structure(case: Case) -> Structure:
         FileFormatError: An entry is not of the form expected.
     """
     path = Path(case.folder or ".") / case.rig
-    own = Rig.from_file(path)
-    joints = sorted({c.target.removeprefix("joint:") for c in case.channels if c.target.startswith("joint:")})
-    rig = free_of_constraints(own, joints, prefix=PROBE)
-    structural = [_structural(p.name, rig) for p in case.parameters]
-    loads, responses = _channels(case, rig)
+    own = rig_of(case)
+    rig, links = plain_rig(case, own)
+    declared = declared_parameters(case.options.get("elements", []), case.name)
+    believed = {p.name: p.value for p in case.parameters if p.name not in declared}
+    names = tuple(believed)
+    structural = [_structural(name, rig) for name in names]
+    loads, responses = loads_and_responses(case, rig)
     parameters = [name for name in structural if not name.startswith("structure/frictionloss/")]
     try:
         linear, bent = _linear(rig, [sensor for _, sensor, _ in responses] + _cells(loads), parameters)
@@ -78,8 +83,7 @@ def mjcf_structure(case: Case) -> Structure:
         _observer(channel, row, order, n_dof, rig)
         for (channel, _, order), row in zip(responses, linear.observation, strict=False)
     )
-    stacks, fixed = _stacks(case, structural, linear, rig)
-    names = tuple(p.name for p in case.parameters)
+    stacks, fixed = _stacks(structural, linear, rig)
     # before gravity makes a stiffness of a mass: what is called the stiffness of a place is a spring of the model
     places = _places(case, rig, linear, names, stacks)
     springs: tuple[NominalSpring, ...] = ()
@@ -92,8 +96,20 @@ def mjcf_structure(case: Case) -> Structure:
         names, *stacks, inputs, tuple(channel.name for channel, _ in loads), observers,
         places, fixed, _frictions(own, linear, names, case.identification[0].step), springs,
     )  # fmt: skip
-    check_reach(case, structure, own, {channel.name: actuator for channel, actuator in loads}, linear.dofs)
-    return structure
+    driving = {channel.name: actuator for channel, actuator in loads if actuator}
+    check_reach(case, structure, own, driving, linear.dofs)
+    structure = constrained(
+        structure, rows_of(own.model, links, structure.dofs), [next(iter(link)) for link in links]
+    )
+    values = np.array(list(believed.values()))
+    return constrained(structure, stiff_modes(structure, values, min(r.step for r in case.identification)))
+
+
+def plain_rig(case: Case, own: Rig) -> tuple[Rig, list[dict[str, float]]]:
+    """The user's model without what is no matrix, with sensors for channels that refer to joints; and its linear equalities."""
+    joints = sorted({c.target.removeprefix("joint:") for c in case.channels if c.target.startswith("joint:")})
+    coupled, links = without_equalities(own)
+    return free_of_constraints(coupled, joints, prefix=PROBE), links
 
 
 def _linear(rig: Rig, channels: Sequence[str], parameters: Sequence[str]) -> tuple[LinearRig, bool]:
@@ -122,7 +138,7 @@ def _structural(name: str, rig: Rig) -> str:
     return f"structure/{kind}/{target}"
 
 
-def _channels(
+def loads_and_responses(
     case: Case, rig: Rig
 ) -> tuple[list[tuple[CaseChannel, str]], list[tuple[CaseChannel, str, int | None]]]:
     """Loads with their actuator or its force sensor; responses with their sensor, and the order where a joint is meant."""
@@ -131,6 +147,9 @@ def _channels(
     loads, responses = [], []
     for channel in case.channels:
         if channel.role == "scheduling":
+            continue
+        if channel.name == NO_LOAD:
+            loads.append((channel, ""))
             continue
         kind, _, name = channel.target.rpartition(":")
         name = name or channel.name
@@ -157,7 +176,7 @@ def _channels(
     if not loads:
         raise FileFormatError(
             f"case '{case.name}' has no load; name a channel after an actuator of the model ({', '.join(rig.actuators) or 'none'}) "
-            'or give it an entry "actuator"'
+            'or give it an entry "actuator"; for a free decay say that it "starts_in_motion"'
         )
     if not responses:
         raise FileFormatError(
@@ -215,6 +234,9 @@ def _inputs(loads: Sequence[tuple[CaseChannel, str]], rig: Rig, linear: LinearRi
     cells = _cells(loads)
     out = np.zeros((len(linear.dofs), len(loads)))
     for j, (channel, actuator) in enumerate(loads):
+        if not actuator:
+            out[:, j] = 1.0
+            continue
         u = rig.actuators.index(actuator)
         out[:, j] = matrix[:, u]
         if cell := _sensor_of(channel):
@@ -245,11 +267,11 @@ def _observer(channel: CaseChannel, row: Array, order: int | None, n_dof: int, r
 
 
 def _stacks(
-    case: Case, structural: Sequence[str], linear: LinearRig, rig: Rig
+    structural: Sequence[str], linear: LinearRig, rig: Rig
 ) -> tuple[tuple[Array, Array, Array], Array]:
     """Contributions of the parameters to mass, damping and stiffness, and what no parameter changes."""
     n_dof = len(linear.dofs)
-    stacks = tuple(np.zeros((len(case.parameters), n_dof, n_dof)) for _ in range(3))
+    stacks = tuple(np.zeros((len(structural), n_dof, n_dof)) for _ in range(3))
     fixed = np.array([matrix.copy() for matrix in linear.matrices[:3]])
     for i, name in enumerate(structural):
         if name not in linear.parameters:
@@ -283,7 +305,7 @@ def _frictions(own: Rig, linear: LinearRig, names: Sequence[str], step: float) -
     frictional = [
         name
         for name in tendons
-        if f"frictionloss:{name}" in names or model.tendon(name).frictionloss[0] > 0.0
+        if f"frictionloss:{name}" in names or model.tendon_frictionloss[model.tendon(name).id] > 0.0
     ]
     rows = [(name, _row(model, name, linear.dofs)) for name in (*joints, *frictional)]
     return nominal_frictions(model, rows, names, step)
@@ -294,7 +316,7 @@ def _places(
 ) -> tuple[Place, ...]:
     model = rig.model
     joints = [model.joint(int(model.dof_jntid[dof])).name for dof in linear.dofs]
-    tendons = [model.tendon(i).name for i in range(model.ntendon)]
+    tendons = [name for i in range(model.ntendon) if not (name := model.tendon(i).name).startswith(LINK)]
     known = [name for name in (*joints, *tendons) if name and (name in joints or _is_fixed(model, name))]
     wanted = case.options.get("places", known)
     if not isinstance(wanted, (list, tuple)) or not wanted:
@@ -316,7 +338,7 @@ def _places(
             Place(
                 "" if len(wanted) == 1 else name, row[None, :], "rad" if hinge else "m", "N m" if hinge else "N",
                 tuple(names[i] for i in own[0]),
-                next((names[i] for i in own[2]), ""), next((names[i] for i in own[1]), ""),
+                next((names[i] for i in own[2]), ""), next((names[i] for i in own[1]), ""), name,
             )
         )  # fmt: skip
     return tuple(out)

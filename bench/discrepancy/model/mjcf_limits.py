@@ -43,13 +43,15 @@ def free_of_constraints(rig: Rig, joints: Sequence[str], *, prefix: str) -> Rig:
             name=prefix + name, type=mujoco.mjtSensor.mjSENS_JOINTPOS, objtype=mujoco.mjtObj.mjOBJ_JOINT, objname=name
         )  # fmt: skip
     for joint in spec.joints:
-        joint.limited = DISABLED
+        joint.limited = joint.actfrclimited = DISABLED
         joint.frictionloss = 0.0
     for tendon in spec.tendons:
-        tendon.limited = DISABLED
+        tendon.limited = tendon.actfrclimited = DISABLED
         tendon.frictionloss = 0.0
     for actuator in spec.actuators:
         actuator.ctrllimited = actuator.forcelimited = DISABLED
+    for sensor in spec.sensors:
+        sensor.cutoff = 0.0
     spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
     try:
         spec.compile()

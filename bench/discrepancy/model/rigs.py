@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.discrepancy.case.case import Case
+from bench.discrepancy.case.single_axis import MOTIONS, load_channel, motion_channels, turns
+from bench.discrepancy.model.declared_elements import with_elements
 from bench.discrepancy.model.mjcf import mjcf_structure
 from bench.discrepancy.model.nominal_forces import NominalFriction
 from bench.discrepancy.model.structure import Place, Structure
@@ -21,14 +23,11 @@ def structure_of(case: Case) -> Structure:
     Raises:
         FileFormatError: The rig is unknown, or a parameter or channel is missing.
     """
-    if case.rig == "sdof":
-        return _sdof(case)
-    if case.rig == "joint":
-        return _joint(case)
-    if case.rig == "damper":
-        return _damper(case)
+    bench = {"sdof": _sdof, "joint": _joint, "damper": _damper}
+    if case.rig in bench:
+        return with_elements(bench[case.rig](case), case)
     if case.rig.endswith(".xml"):
-        return mjcf_structure(case)
+        return with_elements(mjcf_structure(case), case)
     raise FileFormatError(
         f"rig '{case.rig}' is unknown; known: sdof, joint, damper, or the path of an MJCF file (ending in .xml)"
     )
@@ -58,16 +57,21 @@ def _observers(case: Case, table: Sequence[tuple[str, int, NDArray[np.float64]]]
 
 def _sdof(case: Case) -> Structure:
     names = ("mass", "damping", "stiffness", "coulomb")
-    _require(case, ("mass",), ("force",))
+    load, motion = load_channel(case), motion_channels(case)
+    if not case.has(load) and all(c.role == "response" for c in case.channels):
+        raise FileFormatError(
+            f"case '{case.name}' has responses alone ({', '.join(c.name for c in case.channels)}): without what drove them nothing can be "
+            f'said of the model. Record the {load}; or, for a free decay, say that it "starts_in_motion"'
+        )
+    _require(case, ("mass",), (load,))
     have = tuple(name for name in names if any(p.name == name for p in case.parameters))
     frictions = (NominalFriction(np.ones(1), "coulomb"),) if "coulomb" in have else ()
     stacks = [np.array([[[1.0 if name == kind else 0.0]] for name in have]) for kind in names[:3]]
     one = np.ones(1)
-    length = next((c.unit for c in case.channels if c.name == "displacement"), "m") or "m"
-    observers = _observers(case, (("displacement", 0, one), ("velocity", 1, one), ("acceleration", 2, one)))
+    observers = _observers(case, tuple((motion.get(i, names[0]), i, one) for i, names in enumerate(MOTIONS)))
     place = Place(
-        "", np.ones((1, 1)), length, case.channel("force").unit or "N", ("mass",),
-        "stiffness" if "stiffness" in have else "", "damping" if "damping" in have else "",
+        "", np.ones((1, 1)), *_units(case), ("mass",),
+        "stiffness" if "stiffness" in have else "", "damping" if "damping" in have else "", "carriage",
     )  # fmt: skip
     return Structure(
         ("x",),
@@ -76,16 +80,25 @@ def _sdof(case: Case) -> Structure:
         stacks[1],
         stacks[2],
         np.ones((1, 1)),
-        ("force",),
+        (load,),
         observers,
         (place,),
         frictions=frictions,
     )
 
 
+def _units(case: Case) -> tuple[str, str]:
+    """Units of the position and of the force along the coordinate of a rig that has one."""
+    position, load = motion_channels(case).get(0, ""), load_channel(case)
+    length, force = ("rad", "N m") if turns(case) else ("m", "N")
+    own = case.channel(position).unit if position else ""
+    return own or length, case.channel(load).unit or force
+
+
 def _damper(case: Case) -> Structure:
     """A massless component under prescribed motion; the mass only carries the bookkeeping of the coordinate."""
-    _require(case, (), ("displacement", "force"))
+    load, position = load_channel(case), motion_channels(case).get(0, MOTIONS[0][0])
+    _require(case, (), (position, load))
     names = tuple(p.name for p in case.parameters if p.name in {"stiffness", "damping", "coulomb"})
     stacks = [
         np.zeros((len(names), 1, 1)),
@@ -95,8 +108,8 @@ def _damper(case: Case) -> Structure:
         ),
     ]
     place = Place(
-        "", np.ones((1, 1)), case.channel("displacement").unit or "m", case.channel("force").unit or "N", (),
-        "stiffness" if "stiffness" in names else "", "damping" if "damping" in names else "",
+        "", np.ones((1, 1)), *_units(case), (),
+        "stiffness" if "stiffness" in names else "", "damping" if "damping" in names else "", "piston",
     )  # fmt: skip
     return Structure(
         ("x",),
@@ -105,9 +118,10 @@ def _damper(case: Case) -> Structure:
         stacks[1],
         stacks[2],
         np.ones((1, 1)),
-        ("displacement",),
-        (Observer("force", 0, np.ones(1)),),
+        (position,),
+        (Observer(load, 0, np.ones(1)),),
         (place,),
+        frictions=(NominalFriction(np.ones(1), "coulomb"),) if "coulomb" in names else (),
     )
 
 

@@ -8,13 +8,14 @@ the deviation of each nominal parameter becomes one column of a linear least-squ
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bench.discrepancy.model.nominal_forces import NominalFriction, NominalSpring
+from bench.discrepancy.model.nominal_laws import NominalElement
 from bench.discrepancy.motion.observer import Observer
 from bench.discrepancy.simulation.stick_slip import LinearStructure
 
@@ -24,13 +25,14 @@ class Place:
     """Where an effect can sit.
 
     Attributes:
-        name: "" on a rig with one joint; "axial", "torsional", "joint" on the joint rig; a joint name otherwise.
+        name: "" where there is one place only; "axial", "torsional", "joint" on the joint rig; a joint name otherwise.
         rows: (n_coordinates, n_dof) relative coordinates.
         position_unit: Unit of the coordinate.
         force_unit: Unit of the force on it.
         mass: Names of the nominal parameters that are inertias moved along this coordinate.
         stiffness: Name of the nominal stiffness that acts on this coordinate; empty where there is none.
         damping: Likewise for the damping.
+        label: What to call it where `name` is empty.
     """
 
     name: str
@@ -40,6 +42,12 @@ class Place:
     mass: tuple[str, ...] = ()
     stiffness: str = ""
     damping: str = ""
+    label: str = ""
+
+    @property
+    def site(self) -> str:
+        """Its name in words: never empty on a rig that is known."""
+        return self.name or self.label
 
 
 @dataclass(frozen=True)
@@ -59,6 +67,7 @@ class Structure:
         fixed: Mass, damping and stiffness (3, n_dof, n_dof) that no parameter changes; None for none.
         frictions: Dry friction of the nominal model.
         springs: What its restoring forces are beyond their tangents.
+        elements: Laws of the bench that it holds besides.
     """
 
     dofs: tuple[str, ...]
@@ -73,11 +82,12 @@ class Structure:
     fixed: NDArray[np.float64] | None = None
     frictions: tuple[NominalFriction, ...] = ()
     springs: tuple[NominalSpring, ...] = ()
+    elements: tuple[NominalElement, ...] = ()
 
     @property
     def has_own_forces(self) -> bool:
         """Whether the nominal model has forces that no matrix holds."""
-        return bool(self.frictions or self.springs)
+        return bool(self.frictions or self.springs or self.elements)
 
     def at(self, values: NDArray[np.float64]) -> LinearStructure:
         """Return the matrices at parameter values (n_parameters,)."""
@@ -119,7 +129,7 @@ class Structure:
         linked = (np.abs(self.mass).sum(0) + np.abs(self.damping).sum(0) + np.abs(self.stiffness).sum(0)) > 0
         if self.fixed is not None:
             linked |= np.abs(self.fixed).sum(0) > 0
-        for force in (*self.frictions, *self.springs):
+        for force in (*self.frictions, *self.springs, *self.elements):
             linked |= np.outer(force.row, force.row) != 0
         linked |= np.eye(len(self.dofs), dtype=bool)
         for _ in self.dofs:
@@ -141,6 +151,13 @@ class Structure:
         active += [
             self.parameters.index(f.parameter) for f in self.frictions if f.parameter and np.any(f.row[keep])
         ]
+        active += [
+            self.parameters.index(name)
+            for e in self.elements
+            if np.any(e.row[keep])
+            for name in e.parameters
+            if name
+        ]
         active = sorted(set(active))
         loads = [i for i in range(len(self.loads)) if np.abs(self.inputs[keep, i]).sum() > 0]
         return Structure(
@@ -157,11 +174,12 @@ class Structure:
                 if np.abs(o.row[keep]).sum() > 0
             ),
             tuple(
-                Place(p.name, p.rows[:, keep], p.position_unit, p.force_unit, p.mass, p.stiffness, p.damping)
+                replace(p, rows=p.rows[:, keep])
                 for p in self.places
                 if np.abs(p.rows[:, keep]).sum() == np.abs(p.rows).sum()
             ),
             None if self.fixed is None else self.fixed[np.ix_(range(3), keep, keep)],
             tuple(f.restricted(keep) for f in self.frictions if np.any(f.row[keep])),
             tuple(s.restricted(keep, active) for s in self.springs if np.any(s.row[keep])),
+            tuple(e.restricted(keep) for e in self.elements if np.any(e.row[keep])),
         )

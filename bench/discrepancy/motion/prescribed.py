@@ -11,6 +11,7 @@ from scipy import ndimage
 
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.case.channel_noise import noise_floor
+from bench.discrepancy.case.single_axis import motion_channels
 from bench.discrepancy.motion.kalman_smoother import resting, smoother_of
 from bench.discrepancy.simulation.stick_slip import Motion
 
@@ -26,7 +27,6 @@ REVERSAL = 2.0
 UNUSUAL, EDGE_WIDTH = 1.5, 9
 """Error of a prescribed velocity, over its median, from which samples at an end of a record are not compared; and the number of
 samples over which it is averaged."""
-CHANNELS = ("displacement", "velocity", "acceleration")
 
 
 class Prescribed(NamedTuple):
@@ -96,10 +96,11 @@ def _edges(error: Array) -> NDArray[np.bool_]:
 
 def _samples(case: Case, record: CaseRecord) -> tuple[tuple[int, ...], Array, Array]:
     """Orders, samples (n, n_channels) and noise of the channels that tell a prescribed motion."""
-    have = [name for name in CHANNELS if case.has(name) and name in record.values]
+    told = {order: name for order, name in motion_channels(case).items() if name in record.values}
+    have = list(told.values())
     noise = [case.channel(name).noise_std or noise_floor(record.values[name]) for name in have]
     samples = np.column_stack([record.values[name] for name in have])
-    return tuple(CHANNELS.index(name) for name in have), samples, np.array(noise)
+    return tuple(told), samples, np.array(noise)
 
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)

@@ -6,14 +6,16 @@ what to measure next, and how to put the effect into one's own model.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis
 from bench.discrepancy.diagnosis import Diagnosis
+from bench.discrepancy.judgement.shares import closed_words, percent, probability
 from bench.discrepancy.judgement.validation_discrepancy import coordinates
 from bench.discrepancy.localisation.localise import box
 from bench.discrepancy.localisation.state_map import StateMap
@@ -23,6 +25,9 @@ from bench.discrepancy.report.simulated_records import MEASURED, NOMINAL, varian
 from bench.discrepancy.verdict import Split
 from bench.page import Page, Section
 from bench.recording import Recording
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 CYCLES_SHOWN = 12
 """Cycles around the largest response that the overlays show."""
@@ -61,13 +66,21 @@ def write_report(diagnosis: Diagnosis | ArticulatedDiagnosis, path: str | Path) 
     page(diagnosis).write(path)
 
 
+def _draw(section: Section, make: Callable[[], Figure], caption: str) -> None:
+    """Add a picture; one that cannot be drawn (all numbers NaN, nothing in range) is a sentence instead of the end of the page."""
+    try:
+        section.figure(make(), caption)
+    except Exception as error:  # whatever matplotlib makes of numbers that are not finite, the verdict is worth more than a picture
+        section.text(f"Not drawn ({error or type(error).__name__}): {caption}")
+
+
 def _verdict_section(out: Page, diagnosis: Diagnosis) -> None:
     verdict = diagnosis.verdict
     section = out.section("Verdict")
     section.table(
         "Probabilities",
         ("verdict", "probability"),
-        [(k, f"{p:.3f}") for k, p in verdict.probabilities.items()],
+        [(k, probability(p)) for k, p in verdict.probabilities.items()],
     )
     for effect in (*verdict.named, *verdict.nearest):
         where = f" ({effect.where})" if effect.where else ""
@@ -79,8 +92,8 @@ def _verdict_section(out: Page, diagnosis: Diagnosis) -> None:
             for name, e in effect.parameters.items()
         ]  # fmt: skip
         section.table(
-            f"{'' if verdict.named else 'Nearest: '}{effect.name}{where}, probability {effect.probability:.3f}, closes "
-            f"{100 * effect.closed:.0f} % of what is missing without it: {effect.equation}",
+            f"{'' if verdict.named else 'Nearest: '}{effect.name}{where}, probability {probability(effect.probability)}, closes "
+            f"{percent(effect.closed)} of what is missing without it: {effect.equation}",
             ("parameter", "value", "one-sigma", "95 % interval", "unit"),
             rows,
         )
@@ -109,22 +122,26 @@ def _gap_section(out: Page, diagnosis: Diagnosis, runs: Mapping[str, Recording])
 
     section = out.section("How far the gap shrinks")
     for gap in diagnosis.verdict.gaps:
-        low, high = gap.closed_ci95
         section.table(
-            f"{gap.metric}{' (' + gap.dof + ')' if gap.dof else ''}: {100 * gap.closed:.1f} % closed "
-            f"(95 % interval {100 * low:.1f} to {100 * high:.1f} %)",
-            ("stage", "NRMSE"),
+            f"{gap.metric}{' (' + gap.dof + ')' if gap.dof else ''}; closed, with its 95 % interval: {closed_words(gap)}",
+            ("stage", "NRMSE", "closed"),
             [
-                *((label, f"{value:.4f}") for label, value in gap.steps),
-                ("noise floor", f"{gap.noise_floor:.4f}"),
+                *(
+                    (label, f"{value:.4f}", "" if i == 0 else closed_words(gap, value))
+                    for i, (label, value) in enumerate(gap.steps)
+                ),
+                ("noise floor", f"{gap.noise_floor:.4f}", ""),
             ],
         )
     gap = diagnosis.verdict.gap
     values = [value for _, value in gap.steps]
     if np.all(np.isfinite(values)):
         labels = [label.replace(" + ", "\n+ ") for label, _ in gap.steps[1:]]
-        figure = waterfall(labels, values, floor=gap.noise_floor, axis="NRMSE [1]")
-        section.figure(figure, "The gap after each step, and the floor that the noise sets.")
+        _draw(
+            section,
+            lambda: waterfall(labels, values, floor=gap.noise_floor, axis="NRMSE [1]"),
+            "The gap after each step, and the floor that the noise sets.",
+        )
     channels = [name for _, names in coordinates(diagnosis.problem.structure) for name, _ in names]
     window = _window(diagnosis, runs[MEASURED])
     before = {label: run for label, run in runs.items() if label in {MEASURED, NOMINAL}}
@@ -134,10 +151,12 @@ def _gap_section(out: Page, diagnosis: Diagnosis, runs: Mapping[str, Recording])
         (after, "The same after: measured and final model."),
     ):
         if len(shown) > 1:
-            section.figure(time_histories(shown, channels, window=window), caption)
+            _draw(section, partial(time_histories, shown, channels, window=window), caption)
     if len(runs) > 1:
-        section.figure(
-            error_histories(runs, channels), "What is left: simulated less measured, over the whole record."
+        _draw(
+            section,
+            lambda: error_histories(runs, channels),
+            "What is left: simulated less measured, over the whole record.",
         )
     if NOMINAL not in runs:
         section.text("The nominal model diverges on the judging record; it is not drawn.")
@@ -173,8 +192,9 @@ def _location_section(out: Page, diagnosis: Diagnosis, runs: Mapping[str, Record
     if residual:
         from bench.discrepancy.report.figures import shares  # noqa: PLC0415  (matplotlib)
 
-        section.figure(
-            shares(residual),
+        _draw(
+            section,
+            lambda: shares(residual),
             "Excess power of the free run's residuals by frequency and by time; filled parts are significant, false discoveries "
             "held at 5 %.",
         )
@@ -202,19 +222,22 @@ def _map(
     place = found.place
     title = f" ({place.name})" if place.name else ""
     section.text(f"Missing force{title}: {region_words(found)}")
-    section.figure(
-        state_figure(found),
+    _draw(
+        section,
+        lambda: state_figure(found),
         f"Force that the nominal model lacks along the measured motion{title}. Outlined cells differ from zero significantly; "
         "grey: never visited twice.",
     )
-    section.figure(
-        force_loops(runs, place.name),
+    _draw(
+        section,
+        lambda: force_loops(runs, place.name),
         f"The same force on the judging record{title}, beside that of the simulations, all through the same estimator.",
     )
     own = [s for s in splits if s.of == "missing force" and s.dof == name]
     if own:
-        section.figure(
-            shares(own, units=(place.position_unit, place.force_unit)),
+        _draw(
+            section,
+            lambda: shares(own, units=(place.position_unit, place.force_unit)),
             f"Shares of the squared missing force{title}; filled parts are significant.",
         )
 
@@ -249,7 +272,7 @@ def _ranking_section(out: Page, diagnosis: Diagnosis) -> None:
 
     verdict = diagnosis.verdict
     section = out.section("Which effect")
-    section.figure(ranking_bars(verdict.ranking), "Effects by posterior probability.")
+    _draw(section, lambda: ranking_bars(verdict.ranking), "Effects by posterior probability.")
     rows = [
         (
             " + ".join(f"{p.effect.name}{f' ({p.place.name})' if p.place.name else ''}" for p in e.hypothesis)
@@ -296,8 +319,9 @@ def _parameter_section(out: Page, diagnosis: Diagnosis) -> None:
             *problem.structure.parameters,
             *(f"{p.effect.name}: {q.name}" for p in fitted.hypothesis for q in p.effect.parameters),
         ]
-        section.figure(
-            correlation_map([labels[i] for i in free], correlation),
+        _draw(
+            section,
+            partial(correlation_map, [labels[i] for i in free], correlation),
             "Correlations of the estimates; a pair near one in magnitude is known as a combination only.",
         )
 

@@ -123,7 +123,7 @@ def _mjcf(
     native = _NATIVE.get(effect.name)
     if native is None:
         return "", "MuJoCo has no native form of it; use the element." if effect.law else ""
-    place = next((p for p in diagnosis.problem.structure.places if p.name == effect.where), None)
+    place = next((p for p in diagnosis.problem.structure.places if effect.where in {p.name, p.site}), None)
     stiffness = estimates.get(place.stiffness, 0.0) if place else 0.0
     damping = estimates.get(place.damping, 0.0) if place else 0.0
     own = _Own(effect, joint[0], stiffness, damping, diagnosis.case.identification[0].step)

@@ -53,7 +53,7 @@ def run_in(linear: LinearStructure, length: int, step: float) -> int:
 def driving_loads(
     problem: Problem, effects: tuple[Hypothesis, list[Array]], record: CaseRecord, substeps: int
 ) -> tuple[Array, int]:
-    """Loads as `system.free_run` takes them, and their rows a sample; run-in and actuator effects included.
+    """Loads as `stick_slip.free_run` takes them, and their rows a sample; run-in and actuator effects included.
 
     Args:
         problem: Structure and case; loads without actuator effects are kept in it.

@@ -22,10 +22,10 @@ import numpy as np
 from bench.discrepancy.case.case import CaseRecord
 from bench.discrepancy.effects.channel_operators import quantise
 from bench.discrepancy.fitting.map_fit import Fit
-from bench.discrepancy.likelihood.problem import COULOMB, Array, Problem
+from bench.discrepancy.likelihood.problem import Array, Problem
 from bench.discrepancy.likelihood.whitening import whitened
 from bench.discrepancy.likelihood.window_whitening import channels_of, in_motion
-from bench.discrepancy.model.nominal_elements import own_change, own_force
+from bench.discrepancy.model.nominal_elements import own_change, own_force, own_friction
 from bench.discrepancy.model.placement import Hypothesis, Placed
 from bench.discrepancy.numerics.least_squares import Prior, minimise
 from bench.discrepancy.numerics.threads import in_threads
@@ -130,7 +130,7 @@ class Screen:
         self.zero = problem.residual((), self.deviations)
         if problem.structure.has_own_forces and not problem.driven:
             self.zero = self._without_own_forces() - self.response(
-                lambda i: -own_force(problem.structure, values, problem.motion(i))
+                lambda i: -own_force(problem.structure, values, problem.motion(i), problem.records[i].step)
             )
         self.nominal = np.column_stack(in_threads(self._nominal_response, range(n)))
         self.inertia: list[Placed] = []
@@ -193,10 +193,8 @@ class Screen:
 
     def _deviation(self, index: int, parameter: int) -> Array:
         """Force that a deviation of one nominal parameter by its uncertainty takes from the structure."""
-        if self.problem.structure.parameters[parameter] == COULOMB:
-            return -self.problem.spread[parameter] * np.sign(self.problem.motion(index).velocity)
         motion, s = self.problem.motion(index), self.problem.structure
-        force = own_change(s, parameter, motion, self.problem.nominal[parameter])
+        force = own_change(s, parameter, motion, self.problem.nominal, self.problem.records[index].step)
         force += motion.acceleration @ s.mass[parameter].T + motion.velocity @ s.damping[parameter].T
         return -self.problem.spread[parameter] * (force + motion.position @ s.stiffness[parameter].T)
 
@@ -490,5 +488,5 @@ def force_along(problem: Problem, placed: Placed, eta: Array, index: int) -> Arr
         start_time=record.start,
     )
     if placed.effect.in_place:
-        force[:, 0] -= problem.own_friction(motion, rows[0])
+        force[:, 0] -= own_friction(problem.structure, problem.nominal, motion, rows[0], record.step)
     return force @ rows

@@ -1,7 +1,7 @@
 """Explanations: hypotheses for all degrees of freedom together, and how well they predict.
 
 A rig may fall apart into groups of degrees of freedom that its linear structure does not couple: the axial and the torsional
-motion of a joint. Each group is searched on its own. Effects that couple groups (`coupled`) are tried alone before; other effects
+motion of a joint. Each group is searched on its own. Effects that couple groups (`coupled_effects`) are tried alone before; other effects
 are searched beside them at once where the groups promise far less than a coupling does, else when the groups alone leave more than
 noise, or a force. Chi-squared and evidence add over groups, so all explanations can be compared.
 """
@@ -36,7 +36,9 @@ from bench.discrepancy.search.fits import (
     THOROUGH,
     WITHIN_REACH,
     Search,
+    Task,
     consistent,
+    converge,
     key_of,
     names,
     near,
@@ -57,6 +59,8 @@ NOISIER = 0.01
 """Change of the reduced chi-squared with the noise behind an explanation from which the search is repeated."""
 RECONSIDERED = 3
 """Explanations behind one in which something is left that are asked whether they leave nothing."""
+SEEDS = 8
+"""Explanations in other weights that are fitted again."""
 KEPT = 12
 """Hypotheses of a group that are combined with those of other groups."""
 
@@ -163,6 +167,7 @@ def explain(
     progress: Callable[[str], None] = lambda text: None,
     error: ModelError | None = None,
     deadline: Deadline = NEVER,
+    seeds: Sequence[Explanation] = (),
 ) -> list[Explanation]:
     """Search the explanations of a case; by decreasing posterior.
 
@@ -173,6 +178,7 @@ def explain(
         progress: Called with a line of text at every stage.
         error: Error of the model that residuals are weighed by besides their noise.
         deadline: When no further stage is begun.
+        seeds: Explanations of the same records in other weights, the best first, which are fitted again; of rigs that do not fall apart.
     """
     structure = structure_of(case)
     groups = structure.groups()
@@ -185,6 +191,7 @@ def explain(
             deadline=deadline,
         )
         problem = search.problem
+        converge(search, _again(search, seeds))
         found = [Explanation(((problem, fitted),)) for fitted in search.ranked()]
         return _nothing_left_first(found) if problem.scaled else _parsimonious(found)
     bins = _common_bins(case, structure)
@@ -227,6 +234,18 @@ def explain(
     known = {key_of(e.hypothesis) for e in found}
     found += [Explanation(((whole, f),)) for f in coupled.ranked() if key_of(f.hypothesis) not in known]
     return _nothing_left_first(sorted(found, key=lambda e: -e.log_posterior))
+
+
+def _again(search: Search, seeds: Sequence[Explanation]) -> list[Task]:
+    """Fits of the foremost of other explanations that a search has not come to: what explained enough ended it early."""
+    tasks = [(e.hypothesis, e.parts[0][1].vector) for e in seeds[:SEEDS] if len(e.parts) == 1]
+    starts = len(search.problem.nominal)
+    return [
+        (hypothesis, vector)
+        for hypothesis, vector in tasks
+        if key_of(hypothesis) not in search.fits
+        and len(vector) == starts + sum(len(placed.effect.parameters) for placed in hypothesis)
+    ]
 
 
 def _attributed(

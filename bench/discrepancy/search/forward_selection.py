@@ -51,7 +51,7 @@ from bench.discrepancy.search.fits import (
 )
 from bench.discrepancy.search.rivals import challenge, reduce_best, simplify
 from bench.discrepancy.search.scheduled import with_schedules
-from bench.discrepancy.search.soft_friction import soften
+from bench.discrepancy.search.soft_friction import soften, stand_in
 from bench.discrepancy.search.timed_force import with_timed_force
 
 QUICK = 6
@@ -137,11 +137,16 @@ def attribute(
     best = search.ranked()[0]
     if not problem.scaled:
         simplify(search, candidates)
-    elif near(best) and deadline.allows("rivals of what was found, from further starts"):
+    elif (
+        near(best)
+        and _worth_challenging(best, problem)
+        and deadline.allows("rivals of what was found, from further starts")
+    ):
         progress(f"rivals of {names(best.hypothesis)}")
-        challenge(search, screen)
+        challenge(search, screen, rounds=3 if problem.error is None else 1)
         soften(search, len(search.ranked()[0].hypothesis))
-        shake(search)
+        if problem.error is None:
+            shake(search)
     return search
 
 
@@ -163,9 +168,19 @@ def _single(
         progress("rarer effects")
         screen.add(rare)
         _extend(search, screen, [nothing], count=6, among={p.key for p in rare})
+    stand_in(search)
     if deadline.allows("forces from outside and friction that follows a channel"):
         with_timed_force(search)
         with_schedules(search)
+
+
+def _worth_challenging(best: Fit, problem: Problem) -> bool:
+    """Whether rivals of a hypothesis are worth further starts.
+
+    Where the error of the model weighs, few samples do not tell them apart by their last digits: those of a single effect are, unless
+    the error is a guess yet and what is found serves for no more than a better one.
+    """
+    return problem.error is None or (len(best.hypothesis) == 1 and not problem.error.crude)
 
 
 def worth_extending(search: Search, screen: Screen, size: int, most: int) -> list[Fit]:

@@ -29,7 +29,7 @@ from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.model.structure import Place
 from bench.discrepancy.search.fits import Search, Task, consistent, converge, key_of
-from bench.discrepancy.search.soft_friction import IDEAL, frictional, nominal_level
+from bench.discrepancy.search.soft_friction import IDEAL, RUBBING, frictional, nominal_level
 
 Array = NDArray[np.float64]
 SCHEDULED = 4
@@ -37,8 +37,6 @@ SCHEDULED = 4
 FAINT = 0.1
 """Part of the nominal model's own friction with which more of it begins."""
 SENSITIVITY = FreeParameter("sensitivity", signed=True, mean=1.0, std=0.5, bounds=(-4.0, 6.0))
-RUBBING = ("friction", "hysteresis")
-"""Families that may take the place of the nominal model's own friction."""
 LOADS = ("force", "torque")
 """Load channels of the bench's own rigs."""
 DIFFERS = "record_dependent_friction"

@@ -22,10 +22,9 @@ from bench.discrepancy.effects import friction_limits as limits
 from bench.discrepancy.effects.catalogue import FRICTION, effect_named
 from bench.discrepancy.effects.effect import Effect, FreeParameter, Scales, Values
 from bench.discrepancy.fitting.map_fit import Fit
-from bench.discrepancy.likelihood.problem import COULOMB as COULOMB_PARAMETER
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Placed
-from bench.discrepancy.search.fits import Search, Task, converge
+from bench.discrepancy.search.fits import Search, Task, consistent, converge
 from bench.laws.coulomb import COULOMB
 from bench.laws.soft_friction import SOFT_COULOMB
 
@@ -34,6 +33,10 @@ IDEAL = "coulomb_friction"
 """The effect that the others are variants of."""
 SOFTENED = 2
 """Hypotheses of one size whose friction is softened."""
+RUBBING = ("friction", "hysteresis")
+"""Families that may take the place of the nominal model's own friction."""
+STANDING_IN = 4
+"""Effects that are tried there: those that come nearest beside it."""
 CREEPS = (1e-4, 1e-3, 1e-2, 0.1)
 """Creep velocities, over the largest velocity, from which a fit may begin."""
 LEADS = (1e-3, 0.01)
@@ -97,6 +100,42 @@ def soften(search: Search, size: int) -> None:
     converge(search, tasks)
 
 
+def stand_in(search: Search) -> None:
+    """Fit friction and hysteresis alone in the place of the nominal model's own friction, where that is of the wrong kind.
+
+    Added to it, a law that springs back or has play can only undo what is there, with the nominal limit at its bound.
+
+    Args:
+        search: Fits so far; the new ones are added.
+    """
+    problem = search.problem
+    if not frictional(problem).any() or consistent(search.ranked()[0]):
+        return
+    tasks: list[Task] = []
+    for fitted in [f for f in search.ranked(1) if _rubs(f)][:STANDING_IN]:
+        (placed,), n = fitted.hypothesis, len(problem.nominal)
+        values, (eta,) = problem.split(fitted.hypothesis, fitted.vector)
+        loss = nominal_level(problem, placed, values)
+        if loss is None:
+            continue
+        scales, first = problem.scales_of(placed), placed.effect.parameters[0]
+        still = np.where(frictional(problem), 0.0, fitted.vector[:n])
+        starts = [np.append(still, eta)]
+        for grid in placed.effect.grid():
+            whole = grid.copy()
+            if first.name == FRICTION.name:
+                whole[0] = first.eta(first.value(eta[0], scales) + loss, scales)
+            starts.append(np.append(still, whole))
+        tasks.append(((Placed(_in_place(placed.effect), placed.place),), np.array(starts)))
+    converge(search, tasks)
+
+
+def _rubs(fitted: Fit) -> bool:
+    """Whether a hypothesis of one effect is friction or hysteresis of the catalogue."""
+    effect = fitted.hypothesis[0].effect
+    return effect.site == "joint" and effect.family in RUBBING and not effect.variant and not effect.modulated
+
+
 def _ideal_at(fitted: Fit) -> int | None:
     """Which effect of a hypothesis is ideal Coulomb friction."""
     for i, placed in enumerate(fitted.hypothesis):
@@ -137,18 +176,17 @@ def _softened(problem: Problem, fitted: Fit) -> Iterator[Task]:
 
 def nominal_level(problem: Problem, placed: Placed, values: Array) -> float | None:
     """Limit of the nominal model's own friction along a place; None where it has none."""
-    if problem.driven and COULOMB_PARAMETER in problem.structure.parameters:
-        return float(values[problem.structure.parameters.index(COULOMB_PARAMETER)])
-    for friction in problem.structure.frictions:
-        if friction.acts_along(placed.place.rows[0]):
-            return friction.level(problem.structure.parameters, values)
-    return None
+    names = problem.structure.parameters
+    own = [*problem.structure.frictions, *(e for e in problem.structure.elements if e.rubs)]
+    levels = [f.level(names, values) for f in own if f.acts_along(placed.place.rows[0])]
+    return sum(levels) if levels else None
 
 
 def frictional(problem: Problem) -> NDArray[np.bool_]:
     """Which entries (n_nominal,) of a vector are limits of the nominal model's own friction."""
     names = {friction.parameter for friction in problem.structure.frictions}
-    names |= {COULOMB_PARAMETER} if problem.driven else set()
+    names |= {name for e in problem.structure.elements if e.rubs for name in e.parameters}
+    names.discard("")
     out = np.zeros(len(problem.nominal), dtype=bool)
     out[: problem.n_physical] = [name in names for name in problem.structure.parameters[: problem.n_physical]]
     return out

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from bench.discrepancy.case.case import CaseRecord
 from bench.discrepancy.effects.effect import RARE, Effect, FreeParameter, Scales, Values
 from bench.discrepancy.fitting.map_fit import Fit
-from bench.discrepancy.likelihood.problem import COULOMB, Problem
+from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.nominal_elements import own_force
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.model.structure import Place
@@ -140,15 +140,11 @@ def missing_force(problem: Problem, record: CaseRecord, place: Place) -> Array:
     """External force (n,) along a coordinate that the nominal model lacks along the measured motion of a record."""
     motion, linear = problem.motion_of(record), problem.structure.at(problem.nominal)
     held = motion.position @ linear.stiffness.T + motion.velocity @ linear.damping.T
+    held = held + own_force(problem.structure, problem.nominal, motion, record.step)
     if problem.driven:
-        if COULOMB in problem.structure.parameters:
-            held = held + problem.nominal[problem.structure.parameters.index(COULOMB)] * np.sign(
-                motion.velocity
-            )
         return held[:, 0] - record.values[problem.structure.channels[0]]
     loads = np.column_stack([record.values[name] for name in problem.structure.loads])
-    left = motion.acceleration @ linear.mass.T + held + own_force(problem.structure, problem.nominal, motion)
-    left = left - loads @ problem.structure.inputs.T
+    left = motion.acceleration @ linear.mass.T + held - loads @ problem.structure.inputs.T
     return np.asarray(np.linalg.lstsq(place.rows.T, left.T, rcond=None)[0][0], dtype=np.float64)
 
 

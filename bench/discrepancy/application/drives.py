@@ -1,0 +1,164 @@
+"""Effects of actuators in MuJoCo's own terms, and of sensors, which are wrong in the log and not in the model."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from bench.discrepancy.application.forces import values_of
+from bench.discrepancy.application.target import Change, Target
+from bench.discrepancy.verdict import NamedEffect
+
+
+def _actuator(target: Target, effect: NamedEffect) -> Any:
+    return target.actuator(
+        effect.where if effect.where and effect.where in _actuators(target) else effect.channel
+    )
+
+
+def _actuators(target: Target) -> list[str]:
+    return [actuator.name for actuator in target.spec.actuators]
+
+
+def _done(effect: NamedEffect, actuator: Any, text: str, **more: Any) -> Change:
+    return Change(effect.name, actuator.name, "native", text, (("actuator", actuator.name),), **more)
+
+
+def delay(target: Target, effect: NamedEffect) -> Change:
+    """MuJoCo's delay of the control, along straight lines between steps."""
+    actuator = _actuator(target, effect)
+    late = next(iter(values_of(effect).values()))
+    before = float(actuator.delay)
+    actuator.delay = before + late
+    actuator.nsample = math.ceil(actuator.delay / target.step) + 2
+    actuator.interp = 1
+    return _done(effect, actuator, f"delay {before:.6g} -> {actuator.delay:.6g} s")
+
+
+def lag(target: Target, effect: NamedEffect) -> Change:
+    """MuJoCo's first-order filter of the control. What it filters of a servo is the target, not the force."""
+    actuator = _actuator(target, effect)
+    constant = next(iter(values_of(effect).values()))
+    if actuator.dyntype not in (
+        mujoco.mjtDyn.mjDYN_NONE, mujoco.mjtDyn.mjDYN_FILTER, mujoco.mjtDyn.mjDYN_FILTEREXACT
+    ):  # fmt: skip
+        return Change(
+            effect.name, actuator.name, "none", "the actuator has an activation of another kind already"
+        )
+    actuator.dyntype = mujoco.mjtDyn.mjDYN_FILTEREXACT
+    actuator.dynprm[0] = constant
+    actuator.actdim = 1
+    actuator.actearly = True
+    servo = " (of the servo's target; the diagnosis lags its force)" if actuator.biasprm[1] else ""
+    return _done(effect, actuator, f"a first-order filter of {constant:.6g} s{servo}")
+
+
+def gain(target: Target, effect: NamedEffect) -> Change:
+    """The force of an actuator, all of it, times a factor; of a reversed one minus one."""
+    actuator = _actuator(target, effect)
+    v = values_of(effect)
+    factor = 1.0 + v["relative_error"] if "relative_error" in v else -v.get("reversal", 1.0)
+    before = float(actuator.gainprm[0])
+    _freeze_damping(target, actuator)
+    actuator.gainprm[0] *= factor
+    actuator.biasprm[:3] = np.asarray(actuator.biasprm[:3]) * factor
+    if "relative_error" in v and _limited(target, actuator):
+        actuator.forcerange = np.sort(np.asarray(actuator.forcerange) * factor)
+    return _done(
+        effect, actuator, f"gain {before:.6g} -> {actuator.gainprm[0]:.6g}, and all of its force with it"
+    )
+
+
+def _freeze_damping(target: Target, actuator: Any) -> None:
+    """Write out the velocity gain of a servo that gives a damping ratio, so that it stays what it was."""
+    if actuator.biasprm[2] > 0.0:
+        i = target.nominal.actuator(actuator.name).id
+        actuator.biasprm[2] = float(target.nominal.actuator_biasprm[i, 2])
+
+
+def _limited(target: Target, actuator: Any) -> bool:
+    return bool(target.nominal.actuator_forcelimited[target.nominal.actuator(actuator.name).id])
+
+
+def servo_gain(target: Target, effect: NamedEffect) -> Change:
+    """The position gain of a servo."""
+    actuator = _actuator(target, effect)
+    return _done(
+        effect,
+        actuator,
+        set_kp(target, actuator, float(actuator.gainprm[0]) * (1.0 + values_of(effect)["relative_error"])),
+    )
+
+
+def set_kp(target: Target, actuator: Any, kp: float) -> str:
+    """Set the position gain of a servo, or the gain of another actuator; return what was done."""
+    before = float(actuator.gainprm[0])
+    _freeze_damping(target, actuator)
+    if actuator.biasprm[1]:
+        actuator.biasprm[1] = -kp
+    actuator.gainprm[0] = kp
+    return f"kp {before:.6g} -> {kp:.6g}"
+
+
+def saturation(target: Target, effect: NamedEffect) -> Change:
+    """The largest force of an actuator."""
+    actuator = _actuator(target, effect)
+    level = abs(next(iter(values_of(effect).values())))
+    level *= abs(float(actuator.gainprm[0])) if "level" in effect.parameters else 1.0
+    low, high = (-level, level)
+    if _limited(target, actuator):
+        low, high = max(low, float(actuator.forcerange[0])), min(high, float(actuator.forcerange[1]))
+    actuator.forcerange = (low, high)
+    actuator.forcelimited = mujoco.mjtLimited.mjLIMITED_TRUE
+    return _done(effect, actuator, f"forcerange {low:.6g} {high:.6g}")
+
+
+def deadband(target: Target, effect: NamedEffect) -> Change:
+    """No force within a band: the control is moved by as much before every step."""
+    actuator = _actuator(target, effect)
+    width = values_of(effect)["half_width"]
+    read = "data.actuator_length[u]" if actuator.biasprm[1] else "0.0"
+    lines = (
+        f"u = model.actuator({actuator.name!r}).id; error = data.ctrl[u] - {read}",
+        f"data.ctrl[u] = {read} + math.copysign(max(abs(error) - {width:.8g}, 0.0), error)",
+    )
+    text = f"a dead band of {width:.6g} to either side, by before_step in the snippet"
+    return Change(effect.name, actuator.name, "step", text, (("actuator", actuator.name),), lines=lines)
+
+
+def logged(target: Target, effect: NamedEffect) -> Change:
+    """A sensor that is wrong: the log is corrected, the model is not; a servo that acts on the wrong reading keeps it."""
+    v, name = values_of(effect), effect.where or effect.channel
+    numbers = ", ".join(f"{key} {value:.6g}" for key, value in v.items() if key != "in_loop")
+    channel = effect.channel or effect.where
+    text = f"changes the log, not the model: {effect.equation} on '{channel}', with {numbers}"
+    if v.get("in_loop", 0.0) < 0.5:
+        return Change(effect.name, name, "log", text)
+    servo = next((a for a in target.spec.actuators if a.target == name and a.biasprm[1]), None)
+    if servo is None:
+        return Change(effect.name, name, "log", text)
+    _freeze_damping(target, servo)
+    if "offset" in v:
+        servo.biasprm[0] += float(servo.biasprm[1]) * v["offset"]
+    else:
+        servo.biasprm[1:3] = np.asarray(servo.biasprm[1:3]) * (1.0 + v["relative_error"])
+    text += "; the servo acts on that reading, which its biasprm now says"
+    return Change(effect.name, name, "log", text, (("actuator", servo.name),))
+
+
+DRIVES: dict[str, Callable[[Target, NamedEffect], Change]] = {
+    "actuator_delay": delay,
+    "actuator_lag": lag,
+    "force_gain_error": gain,
+    "force_polarity": gain,
+    "servo_gain_error": servo_gain,
+    "actuator_saturation": saturation,
+    "actuator_deadband": deadband,
+}
+"""Effects of actuators."""
+LOGGED = ("displacement_", "acceleration_", "position_", "velocity_")
+"""Beginnings of the names of effects of a sensor."""

@@ -1,0 +1,295 @@
+"""Effects at a joint in MuJoCo's own terms: friction, springs, dampers, stops, trains; else as a law or as Python before the step."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from bench.discrepancy.application.target import FAR, PREFIX, Change, Target, as_mujoco, mobility
+from bench.discrepancy.model.mjcf_friction import frictionloss_of
+from bench.discrepancy.verdict import NamedEffect
+
+LEVER = 1e6
+"""Length over the force of a spring that stands for a constant force: a motion of one unit changes it by a millionth."""
+
+
+def values_of(effect: NamedEffect) -> dict[str, float]:
+    """Values of the parameters by name."""
+    return {name: float(estimate.value) for name, estimate in effect.parameters.items()}
+
+
+def coulomb_friction(target: Target, effect: NamedEffect) -> Change:
+    """``frictionloss``, as soft as found, otherwise as hard as the step of the model allows.
+
+    A soft one takes the place of a loss of the model; an ideal one of a linear structure is added to it, that of a drive is the whole.
+    """
+    v = values_of(effect)
+    item = target.joint_or_tendon(effect.where)
+    own = float(item.frictionloss)
+    limit = v.get("limit", v.get("friction_force", 0.0))
+    soft = [v.get(name, 0.0) for name in ("creep_velocity", "lead_time")]
+    level = limit if "limit" in v or any(soft) else limit + own
+    _set_friction(target, item, level, soft)
+    text = (
+        f"frictionloss {own:.6g} -> {level:.6g}; solreffriction as hard as a step of {target.step:.3g} s lets it be"
+        if not any(soft)
+        else f"frictionloss {own:.6g} -> {level:.6g}, as soft as the records say"
+    )
+    return Change(effect.name, item.name, "native", text, ((target.kind(effect.where), item.name),))
+
+
+def _set_friction(target: Target, item: Any, level: float, soft: Sequence[float] = (0.0, 0.0)) -> None:
+    item.frictionloss = level
+
+    def soften(model: mujoco.MjModel) -> None:
+        found = frictionloss_of(level, *soft, mobility=mobility(model, item.name), step=target.step)
+        reference = [float(x) for x in found["solreffriction"].split()]
+        impedance = [float(x) for x in found["solimpfriction"].split()]
+        item.solref_friction = reference
+        item.solimp_friction = (*impedance, 0.001, 0.5, 2.0)
+
+    target.later.append(soften)
+
+
+def harden(spec: mujoco.MjSpec) -> None:
+    """Make the dry friction of a model as hard as its step lets it be."""
+    for item in (*spec.joints, *spec.tendons):
+        if item.frictionloss > 0.0:
+            found = frictionloss_of(
+                float(item.frictionloss), 0.0, 0.0, mobility=1.0, step=float(spec.option.timestep)
+            )
+            item.solref_friction = [float(x) for x in found["solreffriction"].split()]
+            item.solimp_friction = (*(float(x) for x in found["solimpfriction"].split()), 0.001, 0.5, 2.0)
+
+
+def _modulated(limit: Callable[[dict[str, float]], str]) -> Callable[[Target, NamedEffect], Change]:
+    """Dry friction whose limit changes: ``frictionloss``, set anew before every step."""
+
+    def change(target: Target, effect: NamedEffect) -> Change:
+        item = target.joint_or_tendon(effect.where)
+        if target.kind(effect.where) != "joint":
+            return element(target, effect)
+        own = float(item.frictionloss)
+        own = 0.0 if "limit" in effect.parameters or "limit_0" in effect.parameters else own
+        first = next(iter(values_of(effect).values()))
+        _set_friction(target, item, own + abs(first))
+        loss = f"{own:.8g} + {limit(values_of(effect))}" if own else limit(values_of(effect))
+        lines = (
+            f"j = model.joint({item.name!r}); dof = j.dofadr[0]; q, v = data.qpos[j.qposadr[0]], data.qvel[dof]",
+            f"model.dof_frictionloss[dof] = max({loss}, 1e-12)",
+        )
+        text = "frictionloss whose level is set anew before every step, by before_step in the snippet"
+        return Change(effect.name, item.name, "step", text, (("joint", item.name),), lines=lines)
+
+    return change
+
+
+def _stribeck_limit(v: dict[str, float]) -> str:
+    level = v.get("limit", v.get("friction_force", 0.0))
+    rise = v.get("rise", v.get("static_excess", 0.0))
+    speed = v.get("velocity", v.get("stribeck_velocity", 1.0))
+    return f"{level:.8g} * (1.0 + {rise:.8g} * math.exp(-((v / {speed:.8g}) ** 2)))"
+
+
+def _carried_limit(v: dict[str, float]) -> str:
+    if "mu" in v:
+        return f"{v['limit_0']:.8g} + {v['mu']:.8g} * abs(carried(model, data)[dof])"
+    return f"{v['friction_per_displacement']:.8g} * abs(q)"
+
+
+def _timed_limit(v: dict[str, float]) -> str:
+    turn = f"math.sin(2.0 * math.pi * {v['frequency']:.8g} * data.time + {v['phase']:.8g})"
+    return f"{v['friction_force']:.8g} * (1.0 + {v['depth']:.8g} * {turn})"
+
+
+def _polynomial(attribute: str, power: int) -> Callable[[Target, NamedEffect], Change]:
+    """A higher coefficient of MuJoCo's stiffness or damping."""
+
+    def change(target: Target, effect: NamedEffect) -> Change:
+        coefficient = next(iter(values_of(effect).values()))
+        item: Any = target.joint_or_tendon(effect.where)
+        kind, name = target.kind(effect.where), item.name
+        if attribute == "stiffness" and kind == "joint":
+            zero = float(item.springref) / target.angle(name)
+            if abs(zero - target.at_rest(name)) > 1e-9:
+                item = target.tendon_on(effect.where, effect.name)
+                item.springlength = (target.at_rest(name),) * 2
+                kind = "fixed"
+        coefficients = np.array(getattr(item, attribute), dtype=float)
+        before = coefficients.copy()
+        coefficients[power] += coefficient
+        setattr(item, attribute, coefficients)
+        text = f"{attribute} {_numbers(before)} -> {_numbers(coefficients)}: {effect.equation}"
+        return Change(effect.name, name, "native", text, ((kind, item.name),))
+
+    return change
+
+
+def _numbers(row: Sequence[float] | np.ndarray) -> str:
+    return " ".join(f"{x:.6g}" for x in row)
+
+
+def damping_error(target: Target, effect: NamedEffect) -> Change:
+    """Viscous damping of a joint that a drive model lacks."""
+    item = target.joint_or_tendon(effect.where)
+    before = float(item.damping[0])
+    coefficients = np.array(item.damping, dtype=float)
+    coefficients[0] += values_of(effect)["added"]
+    item.damping = coefficients
+    text = f"damping {before:.6g} -> {coefficients[0]:.6g}"
+    return Change(effect.name, item.name, "native", text, (("joint", item.name),))
+
+
+def armature_error(target: Target, effect: NamedEffect) -> Change:
+    """Inertia of the motor behind the gear."""
+    item = target.joint_or_tendon(effect.where)
+    before = float(item.armature)
+    item.armature = before + values_of(effect)["added"]
+    text = f"armature {before:.6g} -> {item.armature:.6g}"
+    return Change(effect.name, item.name, "native", text, (("joint", item.name),))
+
+
+def force_offset(target: Target, effect: NamedEffect) -> Change:
+    """A constant force: a spring so long that its force is one."""
+    v = values_of(effect)
+    force = v["force"] if "force" in v else -v["offset"]
+    name = target.named(effect.where)
+    tendon = target.tendon_on(effect.where, effect.name)
+    stiffness = np.zeros_like(np.asarray(tendon.stiffness, dtype=float))
+    stiffness[0] = abs(force) / LEVER
+    tendon.stiffness = stiffness
+    tendon.springlength = (math.copysign(LEVER, force),) * 2
+    text = f"a constant force of {force:.6g} on '{name}', of a spring whose end is {LEVER:.0e} away"
+    return Change(effect.name, name, "native", text, (("fixed", tendon.name),))
+
+
+def gap(target: Target, effect: NamedEffect) -> Change:
+    """Stops on either side."""
+    v, name = values_of(effect), target.named(effect.where)
+    middle = target.at_rest(name)
+    if "clearance" in v:
+        limits = (middle - v["clearance"], middle + v["clearance"])
+        anchor = target.stop(effect.where, limits, v["stiffness"], 0.0, own=True)
+        anchors = (anchor,)
+        text = (
+            f"range with limits that are springs of {v['stiffness']:.6g}, {v['clearance']:.6g} to either side"
+        )
+    else:
+        up, down = v["clearance_positive"], v["clearance_negative"]
+        anchors = (
+            target.stop(effect.where, (-FAR, middle + up), v["stiffness_positive"], 0.0, own=True),
+            target.stop(effect.where, (middle - down, FAR), v["stiffness_negative"], 0.0, own=False),
+        )
+        text = f"limits that are springs: {v['stiffness_positive']:.6g} beyond {up:.6g}, {v['stiffness_negative']:.6g} below {-down:.6g}"
+    return Change(effect.name, name, "native", text, tuple(_anchor(a) for a in anchors))
+
+
+def one_sided_stop(target: Target, effect: NamedEffect) -> Change:
+    """A stop on one side."""
+    v, name = values_of(effect), target.named(effect.where)
+    at = v["position"] + target.at_rest(name)
+    limits = (-FAR, at) if v["side"] > 0.0 else (at, FAR)
+    anchor = target.stop(effect.where, limits, v["stiffness"], v.get("damping", 0.0), own=True)
+    text = f"range with a limit at {at:.6g} that is a spring of {v['stiffness']:.6g} and a damper of {v.get('damping', 0.0):.6g}"
+    return Change(effect.name, name, "native", text, (_anchor(anchor),))
+
+
+def _anchor(text: str) -> tuple[str, str]:
+    kind, _, name = text.partition(":")
+    return kind, name
+
+
+def elastic_train(target: Target, effect: NamedEffect) -> Change:
+    """Backlash or compliance of a drive: the joint becomes the motor's, and a second joint on the same axis is its train."""
+    v, name = values_of(effect), target.named(effect.where)
+    joint = target.spec.joint(name)
+    train = joint.parent.add_joint(
+        name=f"{PREFIX}{name}_train", type=joint.type, axis=joint.axis, pos=joint.pos
+    )
+    as_mujoco(train)
+    damping = np.zeros_like(np.asarray(train.damping, dtype=float))
+    stiffness = np.zeros_like(np.asarray(train.stiffness, dtype=float))
+    width = v.get("half_clearance", 0.0)
+    if width > 0.0:
+        target.stop(train.name, (-width, width), v["stiffness"], v["damping"], own=True)
+    else:
+        stiffness[0], damping[0] = v["stiffness"], v["damping"]
+    train.stiffness, train.damping = stiffness, damping
+    whole = float(joint.armature)
+    joint.armature = v["motor_share"] * whole
+    link = target.tendon_on(name, "link")
+    link.wrap_joint(train.name, 1.0)
+    link.armature = (1.0 - v["motor_share"]) * whole
+    if np.any(np.asarray(joint.stiffness)):
+        link.stiffness = joint.stiffness
+        link.springlength = (float(joint.springref) / target.angle(name),) * 2
+        joint.stiffness = np.zeros_like(np.asarray(joint.stiffness))
+    side = "motor"
+    if v.get("encoder_on_link", 0.0) > 0.5:
+        target.outputs[name], side = link.name, "link"
+        _read_link(target, name, link.name)
+    text = (
+        f"'{name}' is the motor's joint now (armature {whole:.6g} -> {joint.armature:.6g}), '{train.name}' the train behind it; "
+        f"the link's angle is the length of the tendon '{link.name}'; the encoder sits on the {side}"
+    )
+    return Change(
+        effect.name, name, "native", text, (("joint", name), ("joint", train.name), ("fixed", link.name))
+    )
+
+
+def _read_link(target: Target, joint: str, link: str) -> None:
+    """Have the sensors of a joint read its link."""
+    kinds = {
+        mujoco.mjtSensor.mjSENS_JOINTPOS: mujoco.mjtSensor.mjSENS_TENDONPOS,
+        mujoco.mjtSensor.mjSENS_JOINTVEL: mujoco.mjtSensor.mjSENS_TENDONVEL,
+    }
+    for sensor in target.spec.sensors:
+        if sensor.type in kinds and sensor.objname == joint:
+            sensor.type, sensor.objtype, sensor.objname = kinds[sensor.type], mujoco.mjtObj.mjOBJ_TENDON, link
+
+
+def element(target: Target, effect: NamedEffect) -> Change:
+    """A law of the bench as a native callback, for what MuJoCo has no form of that is exact enough."""
+    v, name = values_of(effect), target.named(effect.where)
+    law, theta = effect.law, effect.theta
+    if not law and effect.name == "presliding_friction":
+        law, theta = "lugre", (v["limit"], v["stiffness"], v["damping"], 0.0, 1.0, 0.0)
+    elif not law and effect.name == "cogging":
+        amplitude, phase = math.hypot(v["sine"], v["cosine"]), math.atan2(v["cosine"], v["sine"])
+        law, theta = "cogging", (amplitude, 2.0 * math.pi / v["periods_per_turn"], phase)
+    if not law:
+        return Change(
+            effect.name, name, "none", "neither MuJoCo nor the bench has a form of it; correct it where it is"
+        )
+    note = (
+        f"; it counts from the rest of the model, {target.at_rest(name):.4g}: shift the joint's ref"
+        if target.at_rest(name)
+        else ""
+    )
+    return Change(
+        effect.name, name, "callback", f"the law '{law}' as a native callback, in the snippet: {effect.equation}{note}",
+        (("joint", name),), (law, (name,), tuple(theta)),
+    )  # fmt: skip
+
+
+FORCES: dict[str, Callable[[Target, NamedEffect], Change]] = {
+    "coulomb_friction": coulomb_friction,
+    "stribeck_friction": _modulated(_stribeck_limit),
+    "load_dependent_friction": _modulated(_carried_limit),
+    "time_varying_friction": _modulated(_timed_limit),
+    "cubic_stiffness": _polynomial("stiffness", 2),
+    "quadratic_stiffness": _polynomial("stiffness", 1),
+    "quadratic_damping": _polynomial("damping", 1),
+    "force_offset": force_offset,
+    "armature_error": armature_error,
+    "gap": gap,
+    "asymmetric_gap": gap,
+    "one_sided_stop": one_sided_stop,
+    "joint_compliance": elastic_train,
+    "backlash": elastic_train,
+}
+"""Effects at a joint that have a form other than a law; those that are a wrong number are told apart in `numbers`."""

@@ -1,0 +1,260 @@
+"""Judging records of an articulated case run in the user's own model, in the metric of its verdict: one joint free at a time.
+
+The other joints follow the measured motion: they get an armature so large that nothing moves them but a servo of their own, which is fed
+position, velocity and acceleration. All of it is plain MuJoCo.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from bench.discrepancy.application.applying import Applied
+from bench.discrepancy.application.forces import values_of
+from bench.discrepancy.application.running import Window, controls, hook_of, run, sampled
+from bench.discrepancy.application.target import PREFIX, as_mujoco
+from bench.discrepancy.articulated.channels import bound
+from bench.discrepancy.articulated.effects import CATALOGUE
+from bench.discrepancy.articulated.model import ArticulatedModel, Joint
+from bench.discrepancy.articulated.records import WINDOW, Encoder, Motion, input_of, motion_of
+from bench.discrepancy.case.case import Case, CaseRecord
+from bench.discrepancy.verdict import NamedEffect
+
+Array = NDArray[np.float64]
+HEAVY = 1e6
+"""Armature of a joint that follows the measured motion, over its inertia: what it still feels of the others."""
+FAR_OFF = 1e3
+"""Error that stands for a run that diverged."""
+SERVO_RATE = 0.2
+"""Its servo's frequency [rad] a step: far below the limit of two of an explicit step."""
+
+
+@dataclass(frozen=True, eq=False)
+class JointReplay:
+    """The judging records of a case.
+
+    Attributes:
+        case: The case, its channels bound to joints and actuators.
+        model: The nominal model.
+    """
+
+    case: Case
+    model: ArticulatedModel
+
+    @classmethod
+    def of(cls, case: Case, nominal: mujoco.MjModel) -> JointReplay:
+        """Prepare the replay of a case."""
+        return cls(bound(case, nominal), ArticulatedModel.of(nominal, case.rig))
+
+    def errors(self, applied: Applied, effects: Sequence[NamedEffect]) -> dict[str, Array]:
+        """Measured less simulated positions over the standard deviation of the measured, by joint, all judging records in a row.
+
+        Args:
+            applied: The model they are run with.
+            effects: Logs of wrong encoders are corrected first; errors are those of the log.
+        """
+        wrong = encoders_wrong(effects)
+        found: dict[str, list[Array]] = {joint.name: [] for joint in self.model.joints}
+        raw = [motion_of(self.case, self.model, record, {}) for record in self.case.validation]
+        motions = [
+            motion_of(self.case, self.model, record, wrong, like) if wrong else like
+            for record, like in zip(self.case.validation, raw, strict=True)
+        ]
+        reference = applied.compiled()
+        for j, joint in enumerate(self.model.joints):
+            held = _held(applied, joint.name, reference)
+            factor = 1.0 + wrong.get(joint.name, Encoder()).gain
+            for record, motion, logged in zip(self.case.validation, motions, raw, strict=True):
+                error = self._error(applied, held, j, record, motion, wrong)
+                size = max(float(np.std(logged.samples[j][:, 0])), float(np.max(logged.noise[j])))
+                found[joint.name].append(
+                    np.nan_to_num(error * factor / size, nan=FAR_OFF, posinf=FAR_OFF, neginf=-FAR_OFF)
+                )
+        return {name: np.clip(np.concatenate(parts), -FAR_OFF, FAR_OFF) for name, parts in found.items()}
+
+    def _error(
+        self,
+        applied: Applied,
+        model: mujoco.MjModel,
+        j: int,
+        record: CaseRecord,
+        motion: Motion,
+        wrong: Mapping[str, Encoder],
+    ) -> Array:
+        """Measured less simulated positions (n,) of joint `j`."""
+        joint, step = self.model.joints[j], float(model.opt.timestep)
+        servo = joint.drive is not None and joint.drive.servo
+        every = len(record) if servo else max(2, round(WINDOW / record.step))
+        steps = int(np.ceil((len(record) - 1) * record.step / step - 1e-9)) + 1
+        late = wrong.get(joint.name, Encoder()).delay
+        columns = self._columns(record, joint.name, late)
+        control = controls(record, columns, model, steps, self.case.load_interpolation)
+        follow = _followed(self.model.joints, motion, record, model, steps, late)
+        for i, other in enumerate(self.model.joints):
+            if i != j:
+                control[:, model.actuator(_holder(other.name)).id] = follow.command[:, i]
+        firsts = list(range(0, len(record), every))
+        begins = [int(np.floor(first * record.step / step + 1e-6)) for first in firsts]
+        windows = [
+            self._start(applied, model, j, motion, first, follow, b)
+            for first, b in zip(firsts, begins, strict=True)
+        ]
+        length = int(np.ceil((min(every, len(record)) - 1) * record.step / step - 1e-9)) + 2
+        position, velocity = run(model, hook_of(applied), windows, control, length, rested=False)
+        out = []
+        for w, first in enumerate(firsts):
+            count = min(every, len(record) - first)
+            times = np.asarray((first + np.arange(count)) * record.step - begins[w] * step, dtype=np.float64)
+            simulated = sampled(position[w], velocity[w], model, times).position
+            out.append(simulated @ self._reading(applied, model, joint.name))
+        return motion.samples[j][:, 0] - np.concatenate(out)
+
+    def _columns(self, record: CaseRecord, joint: str, late: float) -> dict[str, Array]:
+        clock = np.arange(len(record)) * record.step
+        columns = {}
+        for other in self.model.joints:
+            channel = input_of(self.case, other)
+            samples = np.asarray(record.values[channel.name])
+            if late and other.name == joint:
+                samples = np.interp(clock - late, clock, samples)
+            if other.drive is not None:
+                columns[other.drive.name] = samples
+        return columns
+
+    def _reading(self, applied: Applied, model: mujoco.MjModel, joint: str) -> Array:
+        """Row (nq,) of the joint's encoder."""
+        row = np.zeros(model.nq)
+        row[model.joint(joint).qposadr[0]] = 1.0
+        if joint in applied.outputs:
+            row[model.joint(f"{PREFIX}{joint}_train").qposadr[0]] = 1.0
+        return row
+
+    def _start(
+        self,
+        applied: Applied,
+        model: mujoco.MjModel,
+        j: int,
+        motion: Motion,
+        first: int,
+        follow: _Followed,
+        begin: int,
+    ) -> Window:
+        """State at the first sample of a window: as measured; a train wound up by what its link weighs."""
+        data = mujoco.MjData(model)
+        for i, joint in enumerate(self.model.joints):
+            own = model.joint(joint.name)
+            here = begin < len(follow.position) and i != j
+            data.qpos[own.qposadr[0]] = follow.position[begin, i] if here else motion.position[first, i]
+            data.qvel[own.dofadr[0]] = follow.velocity[begin, i] if here else motion.velocity[first, i]
+        name = self.model.joints[j].name
+        train = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, f"{PREFIX}{name}_train")
+        if train >= 0:
+            mujoco.mj_forward(model, data)
+            dof, address = int(model.jnt_dofadr[train]), int(model.jnt_qposadr[train])
+            wound = _wound(model, train, float(data.qfrc_bias[dof]))
+            data.qpos[address] = -wound
+            if name in applied.outputs:
+                data.qpos[model.joint(name).qposadr[0]] += wound
+        return Window(begin, np.array(data.qpos), np.array(data.qvel))
+
+
+def _wound(model: mujoco.MjModel, train: int, weight: float) -> float:
+    """Deflection of a train under a torque."""
+    stiffness = float(np.ravel(model.jnt_stiffness[train])[0])
+    if stiffness > 0.0:
+        return weight / stiffness
+    if not model.jnt_limited[train]:
+        return 0.0
+    contact = -float(model.jnt_solref[train, 0]) / float(model.dof_invweight0[model.jnt_dofadr[train]])
+    return weight / max(contact, 1e-300) + float(np.copysign(model.jnt_range[train, 1], weight))
+
+
+def encoders_wrong(effects: Sequence[NamedEffect]) -> dict[str, Encoder]:
+    """Joint to what is wrong with its log."""
+    known = {entry.name: entry for entry in CATALOGUE}
+    out: dict[str, Encoder] = {}
+    for effect in effects:
+        entry = known.get(effect.name)
+        if entry is not None and entry.encoder is not None:
+            name = effect.where or effect.channel
+            new, old = entry.encoder(values_of(effect)), out.get(name, Encoder())
+            out[name] = Encoder(*(a + b for a, b in zip(old, new, strict=True)))
+    return out
+
+
+def _holder(joint: str) -> str:
+    return f"{PREFIX}{joint}_as_measured"
+
+
+def _held(applied: Applied, free: str, reference: mujoco.MjModel) -> mujoco.MjModel:
+    """The model with all joints but one, and what was added to that, following the measured motion."""
+    spec = applied.spec.copy()
+    step = float(spec.option.timestep)
+    data = mujoco.MjData(reference)
+    mujoco.mj_forward(reference, data)
+    full = np.zeros((reference.nv, reference.nv))
+    mujoco.mj_fullM(reference, data, full)
+    rate = SERVO_RATE / step
+    followed = {j.name for j in spec.joints if not j.name.startswith(PREFIX) and j.name != free}
+    followed |= {
+        f"{PREFIX}{name}_train" for name in applied.outputs if name != free
+    }  # its link is what was measured
+    for joint in [j for j in spec.joints if j.name in followed]:
+        inertia = HEAVY * float(
+            full[reference.joint(joint.name).dofadr[0], reference.joint(joint.name).dofadr[0]]
+        )
+        joint.armature = inertia
+        joint.limited = mujoco.mjtLimited.mjLIMITED_FALSE
+        holder: Any = spec.add_actuator(
+            name=_holder(joint.name), target=joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINT
+        )
+        as_mujoco(holder)
+        holder.gaintype, holder.biastype = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_AFFINE
+        holder.gainprm[0] = inertia * rate**2
+        holder.biasprm[:3] = (0.0, -inertia * rate**2, -2.0 * inertia * rate)
+    model = replace(applied, spec=spec).compiled()
+    _reweigh(model, reference)
+    return model
+
+
+def _reweigh(model: mujoco.MjModel, reference: mujoco.MjModel) -> None:
+    """Give constraints the inertia that they have in the model as it is."""
+    for i in range(reference.njnt):
+        at = int(model.joint(reference.joint(i).name).dofadr[0])
+        model.dof_invweight0[at] = reference.dof_invweight0[reference.jnt_dofadr[i]]
+    for i in range(reference.ntendon):
+        model.tendon_invweight0[model.tendon(reference.tendon(i).name).id] = reference.tendon_invweight0[i]
+
+
+@dataclass(frozen=True, eq=False)
+class _Followed:
+    """Positions, velocities (steps, n_joints) at the steps, and the commands of the servos that follow them."""
+
+    position: Array
+    velocity: Array
+    command: Array
+
+
+def _followed(
+    joints: Sequence[Joint],
+    motion: Motion,
+    record: CaseRecord,
+    model: mujoco.MjModel,
+    steps: int,
+    late: float,
+) -> _Followed:
+    """The measured motion as a servo of `_held` takes it; of a joint whose log is late, the others as late."""
+    step = float(model.opt.timestep)
+    clock = np.arange(len(record)) * record.step
+    times = np.clip(np.arange(steps) * step - late, 0.0, clock[-1])
+    q, v, a = (
+        CubicSpline(clock, part)(times) for part in (motion.position, motion.velocity, motion.acceleration)
+    )
+    rate = SERVO_RATE / step
+    return _Followed(q, v, q + 2.0 * v / rate + a / rate**2)

@@ -1,0 +1,178 @@
+"""Records run in plain MuJoCo: controls along straight lines, actuators' memories as the record left them, many windows at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+from mujoco import rollout
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from bench import native
+from bench.discrepancy.application.applying import Applied
+from bench.discrepancy.application.writing import hook_text
+from bench.discrepancy.case.case import CaseRecord
+
+Array = NDArray[np.float64]
+Hook = Callable[[mujoco.MjModel, mujoco.MjData], None]
+
+
+class Motion(NamedTuple):
+    """A run: positions (n, nq) and velocities (n, nv) at its samples, and accelerations (n, nv)."""
+
+    position: Array
+    velocity: Array
+    acceleration: Array
+
+
+def hook_of(applied: Applied) -> Hook | None:
+    """The very function that the snippet holds, compiled; None where there is none."""
+    text = hook_text(applied)
+    if not text:
+        return None
+    space: dict[str, Any] = {}
+    exec(f"import math\nimport mujoco\nimport numpy as np\n{text}", space)
+    return space["before_step"]
+
+
+def controls(
+    record: CaseRecord, columns: dict[str, Array], model: mujoco.MjModel, steps: int, interpolation: str
+) -> Array:
+    """Controls (steps, nu) of the actuators in `columns`, in the middle of every step; zero for the others."""
+    step = float(model.opt.timestep)
+    middles = (np.arange(steps) + 0.5) * step
+    clock = np.arange(len(record)) * record.step
+    out = np.zeros((steps, model.nu))
+    for name, samples in columns.items():
+        u = model.actuator(name).id
+        if interpolation == "zero_order_hold":
+            out[:, u] = samples[np.clip(np.searchsorted(clock, middles, side="right") - 1, 0, len(clock) - 1)]
+        elif interpolation == "band_limited":
+            out[:, u] = CubicSpline(clock, samples)(np.minimum(middles, clock[-1]))
+        else:
+            out[:, u] = np.interp(middles, clock, samples)
+    return out
+
+
+class Window(NamedTuple):
+    """A stretch of a record: its first step, and position (nq,) and velocity (nv,) there."""
+
+    first: int
+    position: Array
+    velocity: Array
+
+
+def run(
+    model: mujoco.MjModel,
+    hook: Hook | None,
+    windows: list[Window],
+    control: Array,
+    steps: int,
+    *,
+    rested: bool,
+) -> tuple[Array, Array]:
+    """Run windows of `steps` steps; return positions (n_windows, steps + 1, nq) and velocities (n_windows, steps + 1, nv).
+
+    Args:
+        model: The model.
+        hook: Called before every step.
+        windows: Where they start.
+        control: Controls (all_steps, nu) of the whole record; its last row is held.
+        steps: Steps a window.
+        rested: Whether actuators had no input before the record; otherwise its first.
+    """
+    own = mujoco.MjModel.__copy__(model)
+    own.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    activations = _activations(own, control, rested=rested)
+    starts, rows = [], []
+    for window in windows:
+        data = mujoco.MjData(own)
+        data.qpos[:], data.qvel[:] = window.position, window.velocity
+        data.act[:] = activations[min(window.first, len(activations) - 1)]
+        _remember(own, data, control, window.first, rested=rested)
+        state = np.empty(mujoco.mj_stateSize(own, mujoco.mjtState.mjSTATE_FULLPHYSICS))
+        mujoco.mj_getState(own, data, state, mujoco.mjtState.mjSTATE_FULLPHYSICS)
+        starts.append(state)
+        rows.append(control[np.minimum(window.first + np.arange(steps), len(control) - 1)])
+    with native.running(own):
+        if hook is None:
+            found, _ = rollout.rollout(own, mujoco.MjData(own), np.array(starts), np.array(rows))
+            states = np.asarray(found, dtype=np.float64)
+        else:
+            states = np.array([_stepped(own, hook, s, c) for s, c in zip(starts, rows, strict=True)])
+    whole = np.concatenate([np.array(starts)[:, None, :], states], axis=1)
+    return whole[:, :, 1 : 1 + own.nq], whole[:, :, 1 + own.nq : 1 + own.nq + own.nv]
+
+
+def _stepped(model: mujoco.MjModel, hook: Hook, start: Array, control: Array) -> Array:
+    data, spec = mujoco.MjData(model), mujoco.mjtState.mjSTATE_FULLPHYSICS
+    mujoco.mj_setState(model, data, start, spec)
+    out = np.empty((len(control), len(start)))
+    for k, row in enumerate(control):
+        data.ctrl[:] = row
+        hook(model, data)
+        mujoco.mj_step(model, data)
+        mujoco.mj_getState(model, data, out[k], spec)
+    return out
+
+
+def _activations(model: mujoco.MjModel, control: Array, *, rested: bool) -> Array:
+    """What first-order filters hold before every step (n, na); other activations begin at zero."""
+    out = np.zeros((len(control), model.na))
+    step = float(model.opt.timestep)
+    for u in range(model.nu):
+        if int(model.actuator_dyntype[u]) not in (
+            int(mujoco.mjtDyn.mjDYN_FILTER), int(mujoco.mjtDyn.mjDYN_FILTEREXACT)
+        ):  # fmt: skip
+            continue
+        at, share = (
+            int(model.actuator_actadr[u]),
+            1.0 - np.exp(-step / max(float(model.actuator_dynprm[u, 0]), 1e-12)),
+        )
+        late = round(float(model.actuator_delay[u]) / step)
+        held = 0.0 if rested else control[0, u]
+        seen = np.concatenate([np.full(late, held), control[:, u]])
+        value = held
+        for k in range(len(control)):
+            out[k, at] = value
+            value += share * (seen[k] - value)
+    return out
+
+
+def _remember(
+    model: mujoco.MjModel, data: mujoco.MjData, control: Array, first: int, *, rested: bool
+) -> None:
+    """Fill the buffers of delayed actuators with the controls before a step."""
+    step = float(model.opt.timestep)
+    for u in range(model.nu):
+        n = int(model.actuator_history[u, 0])
+        if n < 1:
+            continue
+        before = first - n + np.arange(n)
+        values = np.where(before >= 0, control[np.maximum(before, 0), u], 0.0 if rested else control[0, u])
+        times = (np.arange(n) - n) * step
+        mujoco.mj_initCtrlHistory(model, data, u, times.reshape(-1, 1), np.ascontiguousarray(values))
+
+
+def sampled(position: Array, velocity: Array, model: mujoco.MjModel, times: Array) -> Motion:
+    """A run of one window at sample times, of its own steps where these are no whole number of them."""
+    step = float(model.opt.timestep)
+    clock = np.arange(len(position)) * step
+    if not (np.isfinite(position).all() and np.isfinite(velocity).all()):
+        nan = np.full((len(times), velocity.shape[1]), np.nan)
+        return Motion(nan, nan, nan)
+    at = times / step
+    if np.allclose(at, np.round(at), atol=1e-6):
+        index = np.round(at).astype(int)
+        q, v = position[index], velocity[index]
+    else:
+        q, v = CubicSpline(clock, position)(times), CubicSpline(clock, velocity)(times)
+    if int(model.opt.integrator) == int(mujoco.mjtIntegrator.mjINT_RK4):
+        a = np.asarray(CubicSpline(clock, velocity).derivative()(times))
+    else:  # the step's own: constant over it
+        rates = np.diff(velocity, axis=0) / step
+        a = rates[np.minimum(np.floor(at + 1e-6).astype(int), len(rates) - 1)]
+    return Motion(q, v, a)

@@ -1,0 +1,255 @@
+"""What an applied verdict is worth in the user's own simulator, and which setting would do where it falls short."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.discrepancy.application.applying import (
+    INTEGRATORS,
+    Applied,
+    Findings,
+    Options,
+    apply,
+    specification,
+)
+from bench.discrepancy.application.joint_replay import JointReplay
+from bench.discrepancy.application.linear_replay import LinearReplay
+from bench.discrepancy.articulated.diagnosis import applies
+from bench.discrepancy.articulated.effects import CATALOGUE as ARTICULATED
+from bench.discrepancy.case.case import Case
+from bench.discrepancy.checks.initial_motion import with_starts_found
+from bench.discrepancy.effects.catalogue import CATALOGUE as LINEAR
+from bench.discrepancy.model.rigs import structure_of
+from bench.discrepancy.verdict import Gap
+from bench.errors import BenchError, ModelError
+
+
+@dataclass(frozen=True)
+class VerificationSettings:
+    """Settings of the verification.
+
+    Attributes:
+        short: Part of the diagnosis's own figure by which the native form may miss it.
+        refinements: Parts of the user's step that are tried where it does, in turn.
+        converged: Part of the user's step at which a run counts as converged.
+        matters: Part of the discrepancy from which the simulator's own share is named.
+    """
+
+    short: float = 0.05
+    refinements: tuple[int, ...] = (2, 4, 10)
+    converged: int = 10
+    matters: float = 0.1
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One judged coordinate in the user's simulator.
+
+    Attributes:
+        dof: Degree of freedom.
+        before: NRMSE with the model as it came.
+        after: With the corrected one.
+        diagnosis: What the diagnosis says of the latter.
+        floor: What noise alone leaves.
+    """
+
+    dof: str
+    before: float
+    after: float
+    diagnosis: float
+    floor: float
+
+    @property
+    def short(self) -> float:
+        """Part of the diagnosis's figure by which the corrected model misses it."""
+        return self.after / max(self.diagnosis, 1e-12) - 1.0
+
+
+@dataclass(frozen=True)
+class Verification:
+    """Before and after in the user's simulator.
+
+    Attributes:
+        step: Its step [s].
+        integrator: Its integrator.
+        figures: One a judged coordinate.
+        own_share: NRMSE between the model as it came run as the user runs it, and run converged: fine steps, hard friction. What of
+            the figure before is the simulator's own, not missing physics.
+        remedy: What setting would do, in words; empty where nothing is short.
+        better: Figures with that setting.
+    """
+
+    step: float
+    integrator: str
+    figures: tuple[Figure, ...]
+    own_share: float = 0.0
+    remedy: str = ""
+    better: tuple[Figure, ...] = ()
+
+    @property
+    def worst(self) -> Figure:
+        """The coordinate that was widest open before."""
+        return max(self.figures, key=lambda f: f.before / max(f.floor, 1e-12))
+
+    @property
+    def simulator_line(self) -> str:
+        """The simulator's own share in one line; empty where it does not matter."""
+        f = self.worst
+        if self.own_share <= max(VerificationSettings().matters * f.before, f.floor):
+            return ""
+        return (
+            f"your simulator's own share: {self.own_share:.3g} of {f.before:.3g}, by its step of {self.step:.3g} s, its integrator "
+            f"({self.integrator}) and soft friction: the same model, converged, moves otherwise by as much"
+        )
+
+    @property
+    def line(self) -> str:
+        """The outcome in one line."""
+        f = self.worst
+        place = f" ({f.dof})" if f.dof else ""
+        return f"in your simulator{place}: {f.before:.3g} -> {f.after:.3g} (diagnosis: {f.diagnosis:.3g})"
+
+    def to_json(self) -> dict[str, Any]:
+        """As JSON values."""
+        return {
+            "step_s": self.step,
+            "integrator": self.integrator,
+            "figures": [vars(f) | {"short": f.short} for f in self.figures],
+            "line": self.line,
+            "simulator": self.own_share,
+            "remedy": self.remedy,
+            "better": [vars(f) for f in self.better],
+        }
+
+
+Replay = Callable[[Applied, Sequence[Any]], dict[str, NDArray[np.float64]]]
+
+
+def is_articulated(findings: Findings, case: Case | None) -> bool:
+    """Whether a verdict is one of the engine of articulated models: by the effects' parameters, else by the case."""
+    for effect in findings.effects:
+        own = set(effect.parameters)
+        theirs = next((e for e in ARTICULATED if e.name == effect.name), None)
+        others = next((e for e in LINEAR if e.name == effect.name), None)
+        is_theirs = theirs is not None and own <= {p.name for p in theirs.parameters}
+        is_others = others is not None and bool(effect.law or own <= {p.name for p in others.parameters})
+        if is_theirs != is_others:
+            return is_theirs
+    return case is not None and applies(case)
+
+
+def verify(
+    path: str | Path,
+    findings: Findings,
+    gaps: Sequence[Gap],
+    case: Case,
+    *,
+    settings: VerificationSettings | None = None,
+    progress: Callable[[str], None] = lambda text: None,
+) -> Verification:
+    """Run the judging records in plain MuJoCo with the user's own options, before and after.
+
+    Args:
+        path: The user's model.
+        findings: What was found.
+        gaps: The verdict's.
+        case: The case of the verdict.
+        settings: See there.
+        progress: Called with a line of text at every stage.
+
+    Raises:
+        ModelError: The model is none that the judging records can be run with.
+    """
+    settings = settings or VerificationSettings()
+    articulated = is_articulated(findings, case)
+    replay = _replay(path, case, articulated=articulated)
+    nothing = Findings(())
+
+    def errors(what: Findings, options: Options) -> dict[str, NDArray[np.float64]]:
+        return replay(apply(path, what, case=case, linear=not articulated, options=options), what.effects)
+
+    def figures(options: Options) -> tuple[Figure, ...]:
+        before, after = errors(nothing, options), errors(findings, options)
+        return tuple(
+            Figure(g.dof, _rms(before[g.dof]), _rms(after[g.dof]), g.after, g.noise_floor)
+            for g in gaps
+            if g.dof in before
+        )
+
+    option = specification(path).option
+    step, integrator = float(option.timestep), mujoco.mjtIntegrator(option.integrator)
+    progress("the judging records in your simulator")
+    found = figures(Options())
+    if not found:
+        raise ModelError(
+            f"the verdict judges {', '.join(g.dof or 'one coordinate' for g in gaps)}, the case something else; give the verdict's case"
+        )
+    out = Verification(step, INTEGRATORS[integrator], found)
+    fine = errors(nothing, Options(step / settings.converged, mujoco.mjtIntegrator.mjINT_RK4, hard=True))
+    own = _rms(errors(nothing, Options())[out.worst.dof] - fine[out.worst.dof])
+    out = replace(out, own_share=own)
+    if _short(found) <= settings.short:
+        return out
+    return _remedied(out, figures, settings, progress)
+
+
+def _rms(error: NDArray[np.float64]) -> float:
+    return float(np.sqrt(np.mean(error**2)))
+
+
+def _short(found: Sequence[Figure]) -> float:
+    return max(figure.short for figure in found)
+
+
+def _remedied(
+    out: Verification,
+    figures: Callable[[Options], tuple[Figure, ...]],
+    settings: VerificationSettings,
+    progress: Callable[[str], None],
+) -> Verification:
+    """Try other settings until one does; say which, or that none of them does."""
+    trials: list[tuple[str, float, mujoco.mjtIntegrator | None]] = [
+        (f"a step of {out.step / part:.3g} s", out.step / part, None) for part in settings.refinements
+    ]
+    if out.integrator != "RK4":
+        trials.insert(
+            0,
+            (f"the integrator RK4 at the step of {out.step:.3g} s", out.step, mujoco.mjtIntegrator.mjINT_RK4),
+        )
+    best, label = out.figures, ""
+    for name, step, integrator in trials:
+        progress(f"with {name}")
+        try:
+            tried = figures(Options(step, integrator))
+        except BenchError:
+            continue
+        if _short(tried) < _short(best):
+            best, label = tried, name
+        if _short(tried) <= settings.short:
+            break
+    short = 100.0 * _short(out.figures)
+    if not label:
+        words = f"the corrected model misses the diagnosis by {short:.0f} %, and neither a smaller step nor RK4 brings it nearer"
+    else:
+        worst = next(f for f in best if f.dof == out.worst.dof)
+        rest = "" if _short(best) <= settings.short else f", still {100.0 * _short(best):.0f} % off"
+        words = f"the corrected model misses the diagnosis by {short:.0f} % at your step; {label} gives {worst.after:.3g}{rest}"
+    return replace(out, remedy=words, better=best if label else ())
+
+
+def _replay(path: str | Path, case: Case, *, articulated: bool) -> Replay:
+    if articulated:
+        return JointReplay.of(case, specification(path).compile()).errors
+    if not case.rig.endswith(".xml"):
+        raise ModelError(
+            f"the case is one of the rig '{case.rig}' of the bench; its records are run with a model of your own only where that is the rig"
+        )
+    case = with_starts_found(case)
+    return LinearReplay.of(case, structure_of(case)).errors

@@ -1,0 +1,85 @@
+"""What has to hold before anything is fitted: units by the model, limits of the model applied, no factor and no sign that is one of the
+recording, and a nominal simulation that is the user's model."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from bench.discrepancy.case.case import Case
+from bench.discrepancy.case.free_decay import is_free_decay, with_no_load
+from bench.discrepancy.case.rig_units import in_coherent_units
+from bench.discrepancy.case.unit_conversion import converted
+from bench.discrepancy.checks.data_quality import refuse
+from bench.discrepancy.checks.initial_motion import with_starts_found
+from bench.discrepancy.checks.like_mujoco import unlike_mujoco
+from bench.discrepancy.checks.scales import suspicions
+from bench.discrepancy.likelihood.problem import Problem
+from bench.discrepancy.model.mjcf_file import rig_of
+from bench.discrepancy.model.mjcf_loads import within_limits
+from bench.discrepancy.model.mjcf_reference import actuators_of, reference_of
+from bench.discrepancy.model.mjcf_rest import counted_from_rest
+from bench.discrepancy.model.mjcf_units import expected_units
+from bench.discrepancy.model.mjcf_values import value_notes
+from bench.discrepancy.model.rigs import structure_of
+from bench.errors import ModelError, UnitError
+
+
+class Admitted(NamedTuple):
+    """A case that may be diagnosed.
+
+    Attributes:
+        case: In the units of its model, its loads within the model's limits.
+        notes: What was done to it or is doubtful about it, a sentence each.
+    """
+
+    case: Case
+    notes: tuple[str, ...]
+
+
+def admitted(declared: Case, *, anyway: bool = False) -> Admitted:
+    """Admit a case to the diagnosis.
+
+    Args:
+        declared: The case as read.
+        anyway: Whether what is doubtful is noted rather than refused.
+
+    Raises:
+        UnitError: A unit does not fit, or a channel is off by a factor or a sign.
+        ModelError: The model holds what the nominal simulation cannot, and it comes into play.
+        RecordingError: Nothing moves the rig, or nothing is measured.
+        IdentificationError: The nominal model diverges.
+    """
+    own = declared.rig.endswith(".xml")
+    declared = (
+        with_no_load(declared) if is_free_decay(declared) and not _driven_by_name(declared) else declared
+    )
+    case, said = in_coherent_units(declared)
+    reference = None
+    if own:
+        rig = rig_of(declared)
+        case, said = converted(declared, *expected_units(declared, rig))
+        case, limited = within_limits(case, rig, actuators_of(case, rig))
+        reference = reference_of(case, rig)
+        case, shifted = counted_from_rest(case, reference)
+        said = (*said, *limited, *shifted, *value_notes(case, rig))
+    case = with_starts_found(case)
+    problem = Problem(case, structure_of(case), case.identification)
+    refuse(problem)
+    doubts = suspicions(declared, problem)
+    for first in doubts:
+        if not anyway:
+            more = f" (and {len(doubts) - 1} more such)" if len(doubts) > 1 else ""
+            raise UnitError(f"{first}{more}; --anyway diagnoses the records as they are")
+    if reference is not None:
+        apart = unlike_mujoco(problem, reference, (*case.identification, *case.validation))
+        if apart and not anyway:
+            raise ModelError(f"{apart}; --anyway diagnoses with the nominal model all the same")
+        doubts = (*doubts, apart) if apart else doubts
+    return Admitted(case, (*said, *doubts))
+
+
+def _driven_by_name(case: Case) -> bool:
+    """Whether a channel of a user's own model is a load by nothing but the name of an actuator."""
+    return case.rig.endswith(".xml") and any(
+        c.name in rig_of(case).actuators and not c.target for c in case.channels
+    )

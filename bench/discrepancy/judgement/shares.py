@@ -1,0 +1,58 @@
+"""Shares of a discrepancy in words: the same numbers in sentences, tables and pages."""
+
+from __future__ import annotations
+
+import math
+
+from bench.discrepancy.judgement.validation_discrepancy import AT_THE_NOISE, DIVERGED_GAP
+from bench.discrepancy.verdict import Gap
+
+SURE = 0.9995
+"""Share from which one more digit would be a statement about digits that nobody knows."""
+
+
+def percent(share: float) -> str:
+    """A share between zero and one as a percentage that never claims the whole."""
+    return "over 99.9 %" if share >= SURE else f"{100.0 * max(share, 0.0):.1f} %"
+
+
+def closed_words(gap: Gap, value: float | None = None) -> str:
+    """How much of a discrepancy is closed, in words.
+
+    Args:
+        gap: The discrepancy of a coordinate.
+        value: What is left at one of its steps; `gap.after`, with its interval, where None.
+    """
+    left = gap.after if value is None else value
+    if gap.before <= AT_THE_NOISE * gap.noise_floor:
+        return "nothing to close: it is that of the noise"
+    if left >= DIVERGED_GAP:
+        return "none: it diverges"
+    if left > gap.before:
+        return f"none: it grows to {left / gap.before:.3g} times"
+    share = (gap.before - left) / (gap.before - gap.noise_floor)
+    return percent(share) if value is not None else interval(share, gap.closed_ci95)
+
+
+def interval(share: float, ends: tuple[float, float]) -> str:
+    """A share with its 95 % interval, neither beyond the whole.
+
+    Args:
+        share: At most one.
+        ends: Of the interval.
+    """
+    if math.isnan(share):
+        return "not computed"
+    low, high = (min(end, 1.0) for end in ends)
+    value = percent(share) if share >= 0.0 else ("below -100 %" if share < -1.0 else f"{100.0 * share:.1f} %")
+    if low >= SURE or math.isnan(low) or math.isnan(high):
+        return value
+    lower = f"{100.0 * low:.1f}" if low >= -1.0 else "below -100"
+    return f"{value} ({lower} to {'over 99.9' if high >= SURE else f'{100.0 * high:.1f}'})"
+
+
+def probability(value: float | None) -> str:
+    """A probability as text; none where none was computed."""
+    if value is None or math.isnan(value):
+        return "not computed"
+    return f"{value:.3f}"
