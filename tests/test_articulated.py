@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import mujoco
 import numpy as np
 import pytest
 
 from bench.discrepancy import diagnose, read_case
-from bench.discrepancy.articulated.diagnosis import applies
+from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis, applies
 from bench.discrepancy.articulated.judgement import JudgementSettings, complete
 from bench.discrepancy.report.html_page import write_report
 from bench.discrepancy.report.rerun_recording import write_rerun
@@ -85,7 +86,7 @@ def write_case(folder, truth, *, servo, offset=0.0, nominal=None):
         "mass:upper": {"value": 1.0, "std": 0.03, "unit": "kg"},
         "mass:fore": {"value": 0.5, "std": 0.015, "unit": "kg"},
     }
-    channels = {"time": {"unit": "s"}}
+    channels: dict[str, dict[str, object]] = {"time": {"unit": "s"}}
     for j, kp in KP.items():
         parameters[f"damping:{j}"] = {
             "value": 0.2 if j == "shoulder" else 0.1, "std": 0.03, "unit": "N m s/rad",
@@ -136,6 +137,7 @@ def test_a_servo_arm_without_fault_is_clean_and_everything_is_written(tmp_path):
     case = read_case(write_case(tmp_path, mjcf(servo=True), servo=True))
     assert applies(case)
     found = diagnose(case)
+    assert isinstance(found, ArticulatedDiagnosis)
     assert found.verdict.verdict == "none"
     assert found.verdict.complete
     assert not found.verdict.named
@@ -148,9 +150,7 @@ def test_a_servo_arm_without_fault_is_clean_and_everything_is_written(tmp_path):
     strained = found.final.vector.copy()
     strained[0] = JudgementSettings().strained + 1.0
     assert complete(found.problem, found.final, JudgementSettings())
-    moved = type(found.final)(
-        found.final.hypothesis, strained, found.final.covariance, found.final.chi2, found.final.count, 0.0
-    )
+    moved = replace(found.final, vector=strained)
     assert not complete(found.problem, moved, JudgementSettings())
 
 

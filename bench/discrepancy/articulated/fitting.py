@@ -97,7 +97,7 @@ class Others:
             rows[np.arange(len(own)), np.arange(len(own))] = 1.0 / std[own]
             deviation = (base.vector[own] - mean[own]) / std[own]
             stacked = np.column_stack([np.vstack([jacobian, rows]), np.concatenate([residual, deviation])])
-            r = np.linalg.qr(stacked, mode="r")
+            r = np.asarray(np.linalg.qr(stacked, mode="r"))
             k, m = len(own), len(masses)
             factor, left = r[k : k + m, k : k + m], r[k : k + m, -1]
             return factor, factor @ base.vector[masses] - left

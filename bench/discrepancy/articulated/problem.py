@@ -350,7 +350,7 @@ def base_slots(joint: Joint, on_link: bool) -> Array:
     return p
 
 
-def placed_values(placed: Placed, eta: Array) -> Mapping[str, float]:
+def placed_values(placed: Placed, eta: Array) -> dict[str, float]:
     """Physical values of an effect at its place; a stop's position is counted from the zero of the joint."""
     values = placed.effect.values(eta, placed.scales)
     if placed.effect.name == "one_sided_stop":

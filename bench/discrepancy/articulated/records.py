@@ -162,7 +162,12 @@ class JointRecord:
         transition = expm(np.array([[0.0, 1.0], [-stiffness / m, -damping / m]]) * self.sample)
         push = np.array([0.5 * self.sample**2, self.sample]) / m
         process = np.outer(push, push) * self.process**2
-        return transition, process, np.eye(2)[: self.n_measured], np.diag(self.noise**2)
+        return (
+            np.asarray(transition, dtype=np.float64),
+            process,
+            np.eye(2)[: self.n_measured],
+            np.diag(self.noise**2),
+        )
 
     def _covariance(self) -> Array:
         """Stationary covariance (2, 2) of the predicted state."""
@@ -179,7 +184,7 @@ class JointRecord:
         innovation = observed @ covariance @ observed.T + noise
         gain = np.zeros((2, 2))
         gain[:, : self.n_measured] = covariance @ observed.T @ np.linalg.inv(innovation)
-        return gain, np.linalg.inv(np.linalg.cholesky(innovation))
+        return gain, np.asarray(np.linalg.inv(np.linalg.cholesky(innovation)), dtype=np.float64)
 
     def free_run_noise(self) -> float:
         """RMS error of the position that noise alone leaves in a free run in windows."""
@@ -454,7 +459,8 @@ class _Clock(NamedTuple):
 def _clock(record: CaseRecord) -> _Clock:
     n_sub = max(1, int(np.ceil(record.step / LONGEST_STEP - 1e-9)))
     middles = (np.arange((len(record) - 1) * n_sub) + 0.5) * (record.step / n_sub)
-    return _Clock(np.arange(len(record)) * record.step, middles, n_sub)
+    samples = np.arange(len(record)) * record.step
+    return _Clock(np.asarray(samples, dtype=np.float64), np.asarray(middles, dtype=np.float64), n_sub)
 
 
 class _Coefficients(NamedTuple):
