@@ -206,6 +206,7 @@ def diagnosed(args: Args, console: Console) -> list[Outcome]:
 
             args.html.mkdir(parents=True, exist_ok=True)
             write_report(diagnosis, args.html / f"{name}.html")
+        assert isinstance(diagnosis, Diagnosis)  # none of these sets is articulated
         rows += outcomes(diagnosis, wanted)
     return rows
 

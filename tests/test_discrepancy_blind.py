@@ -361,7 +361,8 @@ def test_the_runner_obeys_the_protocol_skips_what_is_there_and_survives_a_failur
     results = tmp_path / "results"
     asked = []
 
-    def told(path, *, exclude=()):
+    def told(path, *, exclude=(), anyway=False):
+        assert anyway  # planted faults of polarity are to be diagnosed, not refused
         asked.append(path.name)
         if path.name == "case-002":
             raise RuntimeError("no luck")

@@ -32,8 +32,9 @@ from bench.laws.evaluate import evaluate
 
 
 def named(case, *rivals, most=1):
-    """Verdict with a part of the catalogue: the rivals that could take an effect's place."""
-    return diagnose(case, catalogue=[effect_named(name) for name in rivals], most=most).verdict
+    """Verdict with a part of the catalogue: the rivals that could take an effect's place; a wrong sign does not stop it."""
+    chosen = [effect_named(name) for name in rivals]
+    return diagnose(case, catalogue=chosen, most=most, anyway=True).verdict
 
 
 def estimate(verdict, parameter):

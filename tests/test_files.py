@@ -201,7 +201,7 @@ def test_a_campaign_that_is_told_to_stop_leaves_whole_parts_only(
     number: int, status: int, tmp_path: Path
 ) -> None:
     plan, folder = tmp_path / "plan.json", tmp_path / "out"
-    plan.write_text(json.dumps(document(records=400, records_per_part=4, duration=1.0)))
+    plan.write_text(json.dumps(document(records=4000, records_per_part=40, duration=1.0)))
     code = "import sys; from bench.cli import main; sys.exit(main())"
     child = subprocess.Popen(
         [sys.executable, "-c", code, "campaign", str(plan), "--out", str(folder), "--threads", "2", "--json"],

@@ -336,7 +336,7 @@ def test_excite_by_a_policy_and_by_planning(tmp_path: Path, capsys: pytest.Captu
         main(["excite", str(EXAMPLE), "--method", "policy", "--policy", str(path), "-o", out, "--json"]) == 0
     )
     assert json.loads(capsys.readouterr().out)["peaks"]["stroke"]["displacement"] < 1.0
-    arguments = ["--method", "planner", "--evaluations", "64", "--draws", "2", "-o", out, "--json"]
+    arguments = ["--method", "planner", "--evaluations", "64", "--draws", "2", "-o", out, "--force", "--json"]
     assert main(["excite", str(EXAMPLE), *arguments]) == 0
     told = json.loads(capsys.readouterr().out)
     assert any("gap.clearance" in note for note in told["notes"])
@@ -356,14 +356,17 @@ def test_excite_between_rivals(tmp_path: Path, capsys: pytest.CaptureFixture[str
     path.write_text(EXAMPLE.read_text().replace("duration = 8.0", "duration = 1.2") + RIVAL)
     merits = {}
     for method in ("sweep", "planner"):
-        assert main(["excite", str(path), "--method", method, "--draws", "4", "-o", out, "--json"]) == 0
+        assert (
+            main(["excite", str(path), "--method", method, "--draws", "4", "-o", out, "--force", "--json"])
+            == 0
+        )
         told = json.loads(capsys.readouterr().out)
         merits[method] = told["merit"]
         assert max(share for entries in told["peaks"].values() for share in entries.values()) <= 1.0 + 1e-9
     assert any("log Bayes factor" in note for note in told["notes"])
     assert merits["planner"] > merits["sweep"]
     path.write_text(path.read_text().replace('uncertain = { "cubic', 'unknown = { "cubic'))
-    assert main(["excite", str(path), "-o", out]) == 2
+    assert main(["excite", str(path), "-o", out, "--force"]) == 2
     assert "entry of a rival" in " ".join(capsys.readouterr().err.split())
 
 

@@ -1,10 +1,10 @@
 """Record files: lossless round trips, foreign formats, and every way a file can be wrong; the shipped records."""
 
 import gzip
-import os
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 
 import h5py
 import numpy as np
@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from bench.errors import FileFormatError, RecordingError, UnitError, UnknownNameError
-from bench.files import OutputError
+from bench.files import SYSTEM, OutputError
 from bench.record_files import ColumnMap, read_recording, write_recording
 from bench.recording import Recording
 
@@ -113,7 +113,7 @@ def test_writing_is_atomic(tmp_path, monkeypatch):
 
     for broken in ("fsync", "replace"):
         with monkeypatch.context() as patch:
-            patch.setattr(os, broken, full)
+            patch.setattr("bench.files.SYSTEM", replace(SYSTEM, **{broken: full}))
             with pytest.raises(OSError, match="No space left"):
                 write_recording(path, record(300))
         assert path.read_bytes() == before

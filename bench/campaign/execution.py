@@ -149,6 +149,9 @@ def run_campaign(
                 store.check_present(entries)
             status = "complete"
         finally:
+            if status == "stopped":  # between the note of a part and its tally, a signal may have come
+                noted = store.journal.read(plan.sha256).entries
+                entries.update({part: entry for part, entry in noted.items() if part not in entries})
             store.write_manifest(plan, channels, entries, status=status)
     made = _result(store, status, tally, seconds=time.perf_counter() - start, means=means)
     return replace(made, found=tuple(found))

@@ -18,6 +18,7 @@ from rich.text import Text
 from bench.cli.console import emit
 
 if TYPE_CHECKING:
+    from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis
     from bench.discrepancy.diagnosis import Diagnosis
     from bench.discrepancy.verdict import Verdict
 
@@ -124,7 +125,7 @@ def _stages(shown: bool) -> Iterator[Callable[[str], None]]:
         yield lambda text: bar.update(task, description=text)
 
 
-def _diagnosed(asked: Diagnose, stage: Callable[[str], None]) -> Diagnosis:
+def _diagnosed(asked: Diagnose, stage: Callable[[str], None]) -> Diagnosis | ArticulatedDiagnosis:
     """The diagnosis of a folder; what numerics cannot cope with is told like any other input that cannot be used."""
     import numpy as np
 

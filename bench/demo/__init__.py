@@ -85,12 +85,13 @@ def compute(progress: Progress = lambda label, share: None) -> DemoResult:
     records = training_records()
     unseen = unseen_record()
     joint = joint_models(records, unseen, progress, (0.32, 0.85))
-    from bench.discrepancy import diagnose  # noqa: PLC0415  (compiled code, for this part only)
+    from bench.discrepancy import Diagnosis, diagnose  # noqa: PLC0415  (compiled code, for this part only)
 
     found = diagnose(
         damper_case(thin=THIN),
         most=1,
         progress=lambda text: progress(f"diagnosis of the damper: {text}", 0.85),
     )
+    assert isinstance(found, Diagnosis)  # a component is no articulated model
     progress("done", 1.0)
     return DemoResult(tuple(damper), tuple(joint), records, unseen, found, time.perf_counter() - start)

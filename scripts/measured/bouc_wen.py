@@ -43,7 +43,7 @@ NOMINAL = (
 def cases(data: Path) -> dict[str, Case]:
     """The benchmark as a case, from the folder of its files."""
     wanted = [f"multisine/{name}" for name in "uy"]
-    train = read_hdf5(data / "train.h5", wanted)
+    train = read_hdf5(data / "train.h5", wanted.__contains__)
     u, y = (train[name].values[:, 0].reshape(-1, PERIOD) for name in wanted)
     mat = {
         name: loadmat(data / f"{name}.mat")[name].ravel()

@@ -19,11 +19,11 @@ from bench.discrepancy.application.applying import Applied
 from bench.discrepancy.application.forces import values_of
 from bench.discrepancy.application.running import Window, controls, hook_of, run, sampled
 from bench.discrepancy.application.target import PREFIX, as_mujoco
-from bench.discrepancy.articulated.channels import bound
 from bench.discrepancy.articulated.effects import CATALOGUE
-from bench.discrepancy.articulated.model import ArticulatedModel, Joint
-from bench.discrepancy.articulated.records import WINDOW, Encoder, Motion, input_of, motion_of
 from bench.discrepancy.case.case import Case, CaseRecord
+from bench.discrepancy.multibody.channels import bound
+from bench.discrepancy.multibody.model import ArticulatedModel, Joint
+from bench.discrepancy.multibody.records import WINDOW, Encoder, Motion, input_of, motion_of
 from bench.discrepancy.verdict import NamedEffect
 
 Array = NDArray[np.float64]

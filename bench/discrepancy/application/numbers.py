@@ -11,7 +11,7 @@ import numpy as np
 from bench.discrepancy.application.drives import set_kp
 from bench.discrepancy.application.forces import damping_error, values_of
 from bench.discrepancy.application.target import Change, Target
-from bench.discrepancy.articulated.model import ArticulatedModel
+from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.verdict import NamedEffect, NominalEstimate
 from bench.errors import UnknownNameError
 

@@ -15,7 +15,6 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.discrepancy.articulated.channels import bound
 from bench.discrepancy.articulated.effects import CATALOGUE
 from bench.discrepancy.articulated.fitting import ArticulatedFit
 from bench.discrepancy.articulated.judgement import (
@@ -27,7 +26,6 @@ from bench.discrepancy.articulated.judgement import (
     ladder,
     predict,
 )
-from bench.discrepancy.articulated.model import DRIVES, ArticulatedModel, compiled_model
 from bench.discrepancy.articulated.problem import (
     ArticulatedProblem,
     Hypothesis,
@@ -36,10 +34,12 @@ from bench.discrepancy.articulated.problem import (
     placed_values,
     placements,
 )
-from bench.discrepancy.articulated.records import encoders_of, input_of
 from bench.discrepancy.articulated.search import SearchSettings, search
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.effects.catalogue import CATALOGUE as LINEAR
+from bench.discrepancy.multibody.channels import bound
+from bench.discrepancy.multibody.model import DRIVES, ArticulatedModel, compiled_model
+from bench.discrepancy.multibody.records import encoders_of, input_of
 from bench.discrepancy.verdict import (
     Estimate,
     Gap,
@@ -428,14 +428,15 @@ def _gathered(residual: Array, step: float, start: float) -> tuple[tuple[float, 
     """Band [Hz] and interval [s] that hold nine tenths of the power of a residual."""
     residual = np.nan_to_num(residual)
     power = np.abs(np.fft.rfft(residual)) ** 2
-    frequency = np.fft.rfftfreq(len(residual), step)
+    frequency = np.asarray(np.fft.rfftfreq(len(residual), step), dtype=np.float64)
+    time = np.asarray(start + step * np.arange(len(residual)), dtype=np.float64)
 
     def between(weights: Array, axis: Array) -> tuple[float, float]:
         total = np.cumsum(weights)
         low, high = np.searchsorted(total, np.array(HOLDS) * total[-1])
         return float(axis[min(low, len(axis) - 1)]), float(axis[min(high, len(axis) - 1)])
 
-    return between(power, frequency), between(residual**2, start + step * np.arange(len(residual)))
+    return between(power, frequency), between(residual**2, time)
 
 
 def _remainder(

@@ -15,9 +15,9 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.discrepancy.articulated.joint_run import Slot
-from bench.discrepancy.articulated.records import Encoder
 from bench.discrepancy.effects.effect import FreeParameter, log_grid
+from bench.discrepancy.multibody.joint_run import Slot
+from bench.discrepancy.multibody.records import Encoder
 from bench.errors import UnknownNameError
 
 Array = NDArray[np.float64]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from bench.discrepancy.articulated.fitting import ArticulatedFit
 from bench.discrepancy.articulated.problem import ArticulatedProblem
-from bench.discrepancy.articulated.records import encoders_of
+from bench.discrepancy.multibody.records import encoders_of
 from bench.discrepancy.numerics.threads import in_threads
 
 Array = NDArray[np.float64]

@@ -19,9 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.discrepancy.articulated.effects import ArticulatedEffect, JointScales
-from bench.discrepancy.articulated.joint_run import SLOTS, Slot, predict
-from bench.discrepancy.articulated.model import ArticulatedModel, Joint
-from bench.discrepancy.articulated.records import (
+from bench.discrepancy.case.case import Case, CaseRecord
+from bench.discrepancy.multibody.joint_run import SLOTS, Slot, predict
+from bench.discrepancy.multibody.model import ArticulatedModel, Joint
+from bench.discrepancy.multibody.records import (
     Encoder,
     JointRecord,
     PreparedRecord,
@@ -29,7 +30,6 @@ from bench.discrepancy.articulated.records import (
     prepare,
     relinked,
 )
-from bench.discrepancy.case.case import Case, CaseRecord
 from bench.errors import UnknownNameError
 
 Array = NDArray[np.float64]

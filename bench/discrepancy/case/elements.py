@@ -64,11 +64,13 @@ def _uncertain(entry: dict[str, Any], what: str) -> tuple[float, float, str]:
         if key not in PARAMETER:
             raise UnknownNameError(f"entry of {what}", str(key), PARAMETER)
     value, std, unit = entry.get("value"), entry.get("std"), entry.get("unit", "")
-    if not (_is_number(value) and _is_number(std) and std >= 0.0 and isinstance(unit, str)):
-        raise FileFormatError(
-            f"{what} is {entry!r}; a value and its one-sigma std (0 to mean certain) are expected"
-        )
-    return float(value), float(std), unit
+    if isinstance(unit, str) and _is_number(value) and _is_number(std):
+        number, spread = float(value or 0.0), float(std or 0.0)
+        if spread >= 0.0:
+            return number, spread, unit
+    raise FileFormatError(
+        f"{what} is {entry!r}; a value and its one-sigma std (0 to mean certain) are expected"
+    )
 
 
 def law_of(element: Any, path: object) -> tuple[ForceLaw, str]:

@@ -35,12 +35,15 @@ class LikenessSettings:
         share: RMS of the difference over that of the response, from which it could: what is below is less than the error that anyone
             expects of a simulation.
         integration: Times the change that halving MuJoCo's step makes which are still its own error of integration.
+        reached: Times the largest measured response up to which the runs are compared: what acts only beyond the motion that was measured
+            (a pendulum without its friction that goes over the top) has nothing to do with the records.
         steps: MuJoCo's steps spent on a case at the coarser of two step sizes: a second, about.
     """
 
     noise: float = 0.3
     share: float = 0.01
     integration: float = 3.0
+    reached: float = 1.5
     steps: int = 24_000
 
 
@@ -157,6 +160,12 @@ def _deviations(
     own = problem.simulate((), np.zeros(len(problem.nominal)), record)[:length]
     coarse = simulated(reference, model, record, length, split)
     fine = simulated(reference, model, record, length, 2 * split)
+    largest = np.array([np.max(np.abs(record.values[name])) for name in reference.responses])
+    beyond = np.any(np.abs(fine) > settings.reached * largest, axis=1)
+    length = int(np.argmax(beyond)) if beyond.any() else length
+    if length < 2:
+        return []
+    own, coarse, fine = own[:length], coarse[:length], fine[:length]
     out = []
     for c, name in enumerate(problem.structure.channels):
         if name not in reference.responses:

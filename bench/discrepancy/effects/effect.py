@@ -14,7 +14,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import product
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,6 +63,12 @@ class Scales(NamedTuple):
     mobility: float = 0.0
 
 
+class Magnitudes(Protocol):
+    """Named magnitudes that make parameters dimensionless: `Scales`, or those of another kind of model."""
+
+    def _asdict(self) -> dict[str, float]: ...
+
+
 def log_grid(*values: float) -> tuple[float, ...]:
     """Grid of eta for a positive parameter, given as multiples of its scale."""
     return tuple(math.log(v) for v in values)
@@ -94,22 +100,22 @@ class FreeParameter:
     fixed: bool = False
     unit: str = ""
 
-    def value(self, eta: float, scales: Scales) -> float:
+    def value(self, eta: float, scales: Magnitudes) -> float:
         """Physical value at `eta`."""
         return scale_of(self.scale, scales) * (eta if self.signed else math.exp(eta))
 
-    def slope(self, eta: float, scales: Scales) -> float:
+    def slope(self, eta: float, scales: Magnitudes) -> float:
         """Derivative of the physical value by `eta`."""
         return scale_of(self.scale, scales) * (1.0 if self.signed else math.exp(eta))
 
-    def eta(self, value: float, scales: Scales) -> float:
+    def eta(self, value: float, scales: Magnitudes) -> float:
         """Inverse of `value`, clipped to the bounds."""
         ratio = value / scale_of(self.scale, scales)
         raw = ratio if self.signed else math.log(max(ratio, 1e-12))
         return float(np.clip(raw, *self.bounds))
 
 
-def scale_of(key: str, scales: Scales) -> float:
+def scale_of(key: str, scales: Magnitudes) -> float:
     """Evaluate a scale such as "force/position/position" or "1/velocity"."""
     head, *divisors = key.split("/")
     total = 1.0 if head == "1" else getattr(scales, head)

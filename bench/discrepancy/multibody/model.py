@@ -16,7 +16,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.discrepancy.articulated.inverse import along
+from bench.discrepancy.multibody.inverse import along
 from bench.errors import ModelError, UnknownNameError
 
 Array = NDArray[np.float64]

@@ -21,9 +21,9 @@ from scipy.interpolate import CubicSpline
 from scipy.linalg import expm, solve_discrete_are
 from scipy.signal import butter, sosfiltfilt, welch
 
-from bench.discrepancy.articulated.model import ArticulatedModel, Dynamics, Joint
 from bench.discrepancy.case.case import Case, CaseChannel, CaseRecord
 from bench.discrepancy.motion.kalman_smoother import Smoother, resting, smoother_of
+from bench.discrepancy.multibody.model import ArticulatedModel, Dynamics, Joint
 from bench.errors import FileFormatError
 
 Array = NDArray[np.float64]

@@ -290,5 +290,9 @@ def predict(
     """
     n = len(measured[0])
     out, states = np.zeros((n, 2)), np.zeros((n, 4))
-    run(p, *arrays, u, step, n_sub, *measured, gain, np.atleast_2d(starts), every or n, out, states)
+    mass, bias, slope, reference, load = arrays
+    position, velocity = measured
+    run(
+        p, mass, bias, slope, reference, load, u, step, n_sub, position, velocity, gain, np.atleast_2d(starts), every or n, out, states
+    )  # fmt: skip
     return out, states
