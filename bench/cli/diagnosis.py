@@ -70,7 +70,10 @@ class Diagnose:
             raise problem
 
     def _written(
-        self, diagnosis: Diagnosis, document: dict[str, Any], stage: Callable[[str], None]
+        self,
+        diagnosis: Diagnosis | ArticulatedDiagnosis,
+        document: dict[str, Any],
+        stage: Callable[[str], None],
     ) -> tuple[list[Path], Exception | None]:
         """The files written, moved into place together; where one fails, the verdict alone, and what failed."""
         from bench.files import OutputError, together, write_text
