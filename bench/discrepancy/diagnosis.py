@@ -118,7 +118,13 @@ def diagnose(
     """
     if applies(case):
         with threadpool_limits(1, user_api="blas"):
-            return diagnose_articulated(case, exclude=exclude, most=most, rng=rng, progress=progress)
+            robot = diagnose_articulated(case, exclude=exclude, most=most, rng=rng, progress=progress)
+        unused = [
+            f"{name} is not heeded on an articulated model"
+            for name, set_ in (("budget", budget < math.inf), ("anyway", anyway))
+            if set_
+        ]
+        return replace(robot, verdict=replace(robot.verdict, warnings=(*robot.verdict.warnings, *unused)))
     rng = np.random.default_rng(SEED) if rng is None else rng
     known = [effect.name for effect in catalogue]
     for name in exclude:
@@ -127,14 +133,21 @@ def diagnose(
     chosen = [effect for effect in catalogue if effect.name not in exclude]
     # fits run in threads of their own; threads of BLAS within them would only get in each other's way
     with threadpool_limits(1, user_api="blas"):
-        found = _diagnose(case, How(chosen, most, progress, Deadline(budget)), rng, anyway)
-        if found.verdict.verdict != "none" and not found.verdict.complete and drives_only(case):
+        deadline = Deadline(budget)
+        found = _diagnose(case, How(chosen, most, progress, deadline), rng, anyway)
+        asked = "effects of drives and encoders"
+        if (
+            found.verdict.verdict != "none"
+            and not found.verdict.complete
+            and drives_only(case)
+            and deadline.allows(asked)
+        ):
             # what no force on the joint explains to the noise may sit in its drive
-            progress("effects of drives and encoders")
+            progress(asked)
             other = diagnose_articulated(case, exclude=exclude, most=most, rng=rng, progress=progress)
             left, theirs = found.verdict.gap, other.verdict.gap
             # free runs of one kind in both: parts of what each began with are compared
-            nearer = theirs.after / theirs.before < SETTINGS.most * left.after / left.before
+            nearer = theirs.after * left.before < SETTINGS.most * left.after * theirs.before
             if other.verdict.verdict == "effect" and (other.verdict.complete or nearer):
                 return other
         return found
