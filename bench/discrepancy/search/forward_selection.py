@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bench.discrepancy.effects.effect import Effect
+from bench.discrepancy.effects.read_off import TIMED
 from bench.discrepancy.fitting.map_fit import Fit, fit
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Hypothesis, Placed
@@ -189,8 +190,10 @@ def _single(
         _extend(search, screen, [nothing], count=6, among={p.key for p in rare})
     stand_in(search)
     if deadline.allows("forces from outside and friction that follows a channel"):
-        with_timed_force(search)
-        with_schedules(search)
+        asked = {p.effect.name for p in candidates if p.effect.site == "read off"}
+        if TIMED in asked:
+            with_timed_force(search)
+        with_schedules(search, asked)
 
 
 def _worth_challenging(best: Fit, problem: Problem) -> bool:
@@ -382,7 +385,7 @@ def _simulated(search: Search, candidates: Sequence[Placed]) -> None:
     tasks: list[Task] = []
     for placed in candidates:
         effect = placed.effect
-        if effect.rare or not _contact(effect):
+        if effect.rare or effect.site != "joint" or not _contact(effect):
             continue
         size = effect.parameters[0]
         starts = [
