@@ -119,11 +119,11 @@ def _runs(column: Array, size: Array, settings: OutlierSettings) -> list[Run]:
             for length in range(1, settings.longest + 1)
             for k in range(low, high + 2 - length)
         ]
-        hold = _hold_within(column, low, high)
+        hold = _hold_within(column, low, high, settings.longest_hold)
         tried += [hold] if hold is not None and hold.last - hold.first < settings.longest_hold else []
         healed = [run for run in tried if _heals(column, run, float(limit[cluster].max()), settings)]
         if healed:
-            out.append(min(healed, key=lambda run: run.last - run.first))
+            out.append(min(healed, key=lambda run: (not _held(column, run), run.last - run.first)))
     return out
 
 
@@ -160,9 +160,9 @@ def _held(column: Array, run: Run) -> bool:
     return bool(np.all(samples == samples[0]) and (len(samples) > 1 or samples[0] == 0.0))
 
 
-def _hold_within(column: Array, low: int, high: int) -> Run | None:
+def _hold_within(column: Array, low: int, high: int, reach: int) -> Run | None:
     """The longest run of equal samples about a cluster."""
-    first, last = max(low - 2, 1), min(high + 3, len(column) - 1)
+    first, last = max(low - reach, 1), min(high + reach + 1, len(column) - 1)
     best = None
     k = first
     while k < last:
