@@ -139,10 +139,6 @@ def test_blocks_that_repeat_one_motion_make_no_difference_certain():
     worse, error = rival.worse_than(first)
     assert worse == pytest.approx(4.8)
     assert error == pytest.approx(2.0 * np.linalg.norm(apart))
-    weights = shares([first, rival], np.zeros(2), rng, draws=4000)
-    alone = shares([replace(e, left=np.zeros(0)) for e in (first, rival)], np.zeros(2), rng)
-    assert alone[1] == pytest.approx(1.0 / (1.0 + np.exp(2.4)), abs=1e-9)
-    assert weights[1] > 1.3 * alone[1]
 
 
 def test_what_is_left_tells_how_likely_the_cause_stands_in_no_catalogue():

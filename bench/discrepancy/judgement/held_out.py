@@ -7,7 +7,7 @@ blocks on the parameters tell how far these are known if the model is wrong (the
 
 Blocks that repeat one motion repeat the error of a model as well, and differ too little. The weighed residuals tell another standard
 error: if they are of unit variance, as they were weighed to be, that of the difference of two sums of squares is twice the norm of
-the difference of the residuals. The larger one counts, and weights are averaged over draws of both.
+the difference of the residuals. The larger one counts.
 
 References:
     R. Giordano, R. Liu, M. I. Jordan, T. Broderick, A Swiss army infinitesimal jackknife, AISTATS 2019.
@@ -15,7 +15,6 @@ References:
     Y. Yao, A. Vehtari, D. Simpson, A. Gelman, Using stacking to average Bayesian predictive distributions, Bayesian Analysis 13 (2018)
         (weights averaged over a bootstrap of what was held out).
     Q. H. Vuong, Likelihood ratio tests for model selection and non-nested hypotheses, Econometrica 57 (1989) 307-333.
-    J. H. Huggins, J. W. Miller, Reproducible model selection using bagged posteriors, Bayesian Analysis 18 (2023) 79-104.
 """
 
 from __future__ import annotations
@@ -172,16 +171,10 @@ def _sandwiched(problem: Problem, fitted: Fit, cost: Array, pulls: Array) -> Fit
     return replace(fitted, precision=precision)
 
 
-def _normal_with(covariance: Array, draws: int, rng: np.random.Generator) -> Array:
-    """Normal numbers (draws, n) of a covariance (n, n) that may be singular."""
-    squares, vectors = np.linalg.eigh(covariance)
-    return np.asarray(rng.standard_normal((draws, len(squares))) @ (vectors * np.sqrt(np.maximum(squares, 0.0))).T)
-
-
 def shares(
     found: Sequence[HeldOut], priors: Array, rng: np.random.Generator, draws: int = SETTINGS.draws
 ) -> Array:
-    """Weights (n,) of explanations by what they predict, averaged over a Bayesian bootstrap of the blocks and draws of the residuals.
+    """Weights (n,) of explanations by what they predict, averaged over a Bayesian bootstrap of the blocks.
 
     Args:
         found: Explanations on the same blocks.
@@ -192,9 +185,5 @@ def shares(
     table = np.array([entry.scores for entry in found])
     times = rng.dirichlet(np.ones(table.shape[1]), size=draws) * table.shape[1]
     logs = -0.5 * times @ table.T + priors
-    if len({entry.left.shape for entry in found}) == 1:
-        apart = np.array([entry.left for entry in found])
-        # draws of other data: (r + e)'(r + e) of each, what all have in common left out
-        logs -= _normal_with(apart @ apart.T, draws, rng)
     weights = np.exp(logs - logs.max(axis=1, keepdims=True))
     return np.asarray((weights / weights.sum(axis=1, keepdims=True)).mean(axis=0), dtype=np.float64)
