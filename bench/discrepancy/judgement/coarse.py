@@ -72,7 +72,7 @@ class Judged:
         found: All finalists on held-out blocks, the chosen one first.
         weights: (n,) probability of each, as if one of them were true.
         within: Those within one standard error of the best.
-        alike: Those that the blocks do not tell from the chosen one: two standard errors.
+        alike: Those that the blocks do not tell from the chosen one: two standard errors; and those that the judging records prefer.
         vetoed: Whether the judging records refused what the others would have named.
         nominal: Largest judged discrepancy of the nominal model, its parameters re-estimated within their uncertainty.
         left: Part of the power of the judged discrepancy, beyond noise, that the chosen one leaves.
@@ -148,10 +148,19 @@ def judge(
         e = entry.explanation
         if not e.hypothesis or known.pays(e, nothing, part):
             found = [entry if other is own else other for other in found]
-            alike = tuple(other for other in found if _as_good(other, base, settings, ALIKE))
+            preferred = [other for other in found if known.prefers(other.explanation, e)]
+            alike = tuple(o for o in found if o in preferred or _as_good(o, base, settings, ALIKE))
+            weights = _undecided(weights, found, [entry, *preferred])
             return Judged(entry, tuple(found), weights, within, alike, vetoed, worst, known.left(e, nothing))
         vetoed = True
     return Judged(found[-1], tuple(found), weights, within, within, True, worst, 1.0)
+
+
+def _undecided(weights: Array, found: Sequence[HeldOut], among: Sequence[HeldOut]) -> Array:
+    """Weights (n,) of which some explanations have equal parts: the records for finding speak for one of them, those for judging for
+    others, and neither is to be believed more."""
+    own = np.array([entry in among for entry in found])
+    return np.where(own, float(weights[own].mean()), weights)
 
 
 def _steady(entry: HeldOut, case: Case, rng: np.random.Generator) -> HeldOut:
@@ -235,6 +244,15 @@ class Discrepancies:
         before, after = (self._beyond(x) for x in self._judged(nothing, explanation))
         widest = int(np.argmax(before))
         return float(min((after[widest] / max(before[widest], 1e-300)) ** 2, 1.0))
+
+    def prefers(self, rival: Explanation, explanation: Explanation) -> bool:
+        """Whether the judging records prefer a rival of other names: it leaves less beyond noise where an explanation leaves most."""
+        names, others = ({(p.effect.name, p.place.name) for p in e.hypothesis} for e in (rival, explanation))
+        if not names or names == others:
+            return False
+        theirs, own = (self._beyond(x) for x in self._judged(rival, explanation))
+        widest = int(np.argmax(own))
+        return bool(np.isfinite(theirs).all() and theirs[widest] * UNCHANGED < own[widest])
 
     def _judged(self, nothing: Explanation, explanation: Explanation) -> tuple[Array, Array]:
         return self.of(nothing, judging=True), self.of(explanation, judging=True)
