@@ -49,7 +49,10 @@ def _table_rows(campaign: Campaign) -> list[Row]:
             ("standard deviation", entry.printed_std, entry.std, of_std),
         ):
             if table == "3.2":
-                put_in = f"C and n of the tests are drawn from this table: no evidence; ours is {ours:.4g}, {(ours - printed) / error:+.1f} limits away"
+                put_in = (
+                    "C and n of the tests are drawn from this table: no evidence; "
+                    f"ours is {ours:.4g}, {(ours - printed) / error:+.1f} limits away"
+                )
                 told = told_row(
                     f"{name}, {what}",
                     unit,

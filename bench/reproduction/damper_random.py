@@ -89,11 +89,11 @@ def rows() -> list[Row]:
     """NMSE of the force on line and the swing of C, for each kind of motion over all seeds."""
     found = []
     for motion in (NARROW, POLYNOMIAL, WIDE):
+        narrow = motion is NARROW
         runs = [track(motion, seed) for seed in SEEDS]
         error, swing = [run.error for run in runs], [run.swing for run in runs]
-        printed = None if motion is NARROW else "incapable of accurately tracking C and n"
-        source = "" if motion is NARROW else f"{fig('3.10')}, sentence on p. 59"
-        limits = {"high": GOOD_FIT} if motion is NARROW else {"low": GOOD_FIT}
+        printed = None if narrow else "incapable of accurately tracking C and n"
+        source = "" if narrow else f"{fig('3.10')}, sentence on p. 59"
         # Where some seeds lie on the other side the sentence is not refuted, and not borne out either.
         split = Verdict.SHAPE if min(error) < GOOD_FIT < max(error) else None
         found.append(
@@ -108,19 +108,21 @@ def rows() -> list[Row]:
                 why="in a band below 1 Hz the synthetic damper still is nearly a curve, and C and n follow it to the limit of "
                 "a good fit: the sentence holds where the motion is fast enough for the damper to lag",
                 verdict=split,
-                **limits,
+                low=-math.inf if narrow else GOOD_FIT,
+                high=GOOD_FIT if narrow else math.inf,
             )
         )
         found.append(
             value_row(
                 f"the same: largest C over least C after three periods, {motion.name}",
                 "1",
-                None if motion is NARROW else "wandering C",
+                None if narrow else "wandering C",
                 swing[0],
-                source="" if motion is NARROW else fig("3.10 a"),
+                source="" if narrow else fig("3.10 a"),
                 reason="an estimate that tracks a constant stays within a half of itself; the damper's C does not change",
                 seeds=swing,
-                **({"high": 1.5} if motion is NARROW else {"low": 1.5}),
+                low=-math.inf if narrow else 1.5,
+                high=1.5 if narrow else math.inf,
             )
         )
         found.append(

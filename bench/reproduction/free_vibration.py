@@ -1,8 +1,9 @@
 """A1: the rig with a linear spring and damper, struck by impulses (Tasbihgoo 2006, Fig 2.6).
 
-Mass, frequency, damping and impulses are not printed. Of the acceleration the labels -250 to -50 in/s^2 can be read; 280 in/s^2
-and 3 Hz are derived, from 15 in/s over 0.8 in as in harmonic motion. The mass only scales the force. Impulses are soft pushes of 0.12 s: short blows that give the printed
-velocity would exceed the printed acceleration while they act.
+Mass, frequency, damping and impulses are not printed. Of the acceleration the labels -250 to -50
+in/s^2 can be read; 280 in/s^2 and 3 Hz are derived, from 15 in/s over 0.8 in as in harmonic motion. The mass only scales the
+force. Impulses are soft pushes of 0.12 s: short blows that give the printed velocity would exceed the printed acceleration
+while they act.
 """
 
 from __future__ import annotations

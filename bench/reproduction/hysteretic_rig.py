@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
 from scipy.integrate import solve_ivp
 
 from bench.figures import loops, style, time_histories
@@ -128,8 +129,8 @@ def _found(seed: int) -> _Found:
     return _Found(test, estimator.theta, history)
 
 
-def _signs(theta: Sequence[float]) -> str:
-    return "".join("+" if value > 0.0 else "-" for value in theta)
+def _signs(theta: ArrayLike) -> str:
+    return "".join("+" if value > 0.0 else "-" for value in np.asarray(theta, dtype=float))
 
 
 def _range_rows(shown: _Found, others: list[_Found]) -> list[Row]:

@@ -104,7 +104,7 @@ def to_markdown(results: Sequence[Result]) -> str:
     for result in results:
         lines += [f"## {result.identifier}: {result.title}", "", f"Searched or chosen: {result.searched}", ""]
         lines += [*table(HEADER, [row.cells() for row in result.rows]), ""]
-    return "\n".join([*lines, _footer(), ""])
+    return "\n".join([*lines, ""])
 
 
 def to_gallery(results: Sequence[Result]) -> str:
