@@ -59,9 +59,7 @@ def write_pages(results: Sequence[Result], folder: Path, docs: Path) -> None:
     write_text(docs / "gallery.md", to_gallery(results))
 
 
-def main(
-    folder: tyro.conf.Positional[Path] = Path("out/reproduce"), docs: Path = Path("docs")
-) -> None:
+def main(folder: tyro.conf.Positional[Path] = Path("out/reproduce"), docs: Path = Path("docs")) -> None:
     """Reproduce what is not there yet, and write the pages.
 
     Args:

@@ -49,21 +49,27 @@ class MonitorSettings:
         run_length: Mean number of periods between false alarms. Twice the thousand that is asked of a monitor, since the
             scatter of neighbouring periods is not quite independent.
         memory: Periods that the running estimate of C and n remembers.
+        confirm: Periods after an alarm that give the changed level, from which further changes are told; five bring its error to
+            half of a single period's.
     """
 
     learning: int = 30
     change: float = 0.2
     run_length: float = 2000.0
     memory: float = 10.0
+    confirm: int = 5
 
     def __post_init__(self) -> None:
         if self.learning < 10:
-            raise ParameterError(f"learning = {self.learning} periods came; at least 10 are expected, to know their scatter")
+            raise ParameterError(
+                f"learning = {self.learning} periods came; at least 10 are expected, to know their scatter"
+            )
         if not 0.0 < self.change < 1.0:
             raise ParameterError(f"change = {self.change:g} came; a share between 0 and 1 is expected")
-        if not self.run_length > 2.0 or not self.memory > 0.0:
+        if not (self.run_length > 2.0 and self.memory > 0.0 and self.confirm >= 1):
             raise ParameterError(
-                f"run_length = {self.run_length:g} and memory = {self.memory:g} came; more than 2 and 0 periods are expected"
+                f"run_length = {self.run_length:g}, memory = {self.memory:g} and confirm = {self.confirm} came; more than 2, more "
+                "than 0 and at least 1 period are expected"
             )
 
 
@@ -132,7 +138,7 @@ class Alarm(NamedTuple):
         time: When it was found [s].
         number: Period in which it was found.
         since: Period from which on it holds, the last at which the sum was zero, plus one.
-        share: Energy since then over that of the damper as learnt [1].
+        share: Energy since then over that of the damper as learnt, from the periods that confirm it once they are over [1].
     """
 
     time: float
@@ -152,11 +158,15 @@ class DamperMonitor:
     Attributes:
         baseline: What was learnt; None while learning.
         judged: Periods after the learning.
-        alarms: Changes found. After one the sums begin anew with the changed level, so that a further change is found too.
+        alarms: Changes found. After one the sums begin anew from the changed level, so that a further change is found too.
     """
 
     def __init__(
-        self, settings: MonitorSettings | None = None, *, centre: float = 0.0, sample_rate: float | None = None
+        self,
+        settings: MonitorSettings | None = None,
+        *,
+        centre: float = 0.0,
+        sample_rate: float | None = None,
     ) -> None:
         self.settings = settings or MonitorSettings()
         self.baseline: Baseline | None = None
@@ -170,6 +180,7 @@ class DamperMonitor:
         self._sums = np.zeros(2)
         self._level = 0.0
         self._since: list[list[float]] = [[], []]
+        self._confirming: list[float] | None = None
         self._number = 0
 
     def take(
@@ -221,7 +232,7 @@ class DamperMonitor:
             initial_covariance=1e4 * frequency,
             window=2.0 / frequency,
             sample_rate=self._rate,
-            gap=math.inf,
+            gap=1e9,
         )
         self._scales = (v_peak, f_peak)
         thetas = np.array([self._estimate(period) for period in periods])
@@ -237,7 +248,9 @@ class DamperMonitor:
         assert estimator is not None
         # the last sample is the first of the next period
         part = slice(None, -1)
-        estimator.run(period.time[part], force=period.force[part] / f_peak, velocity=period.velocity[part] / v_peak)
+        estimator.run(
+            period.time[part], force=period.force[part] / f_peak, velocity=period.velocity[part] / v_peak
+        )
         log_peak, exponent = (float(value) for value in estimator.theta)
         return math.exp(min(log_peak + math.log(f_peak) - exponent * math.log(v_peak), 700.0)), exponent
 
@@ -290,9 +303,7 @@ class DamperMonitor:
         if inside:
             spread = learnt.scatter * math.sqrt(1.0 + float(used @ learnt.inverse @ used))
             z = (y - self._level) / spread
-            self._sums = np.maximum(0.0, self._sums + np.array([-z, z]) - learnt.reference)
-            for side in (0, 1):
-                self._since[side] = [*self._since[side], y] if self._sums[side] > 0.0 else []
+            self._add(y, z, learnt.reference)
         judged = PeriodJudged(
             self._number,
             period.end,
@@ -310,9 +321,24 @@ class DamperMonitor:
         if inside and self._sums[side] > learnt.threshold:
             since = self._since[side]
             self._level = float(np.mean(since))
-            self.alarms.append(Alarm(period.end, self._number, self._number - len(since) + 1, math.exp(self._level)))
+            self.alarms.append(
+                Alarm(period.end, self._number, self._number - len(since) + 1, math.exp(self._level))
+            )
             self._sums[:] = 0.0
-            self._since = [[], []]
+            self._since, self._confirming = [[], []], []
+
+    def _add(self, y: float, z: float, reference: float) -> None:
+        """Add a period to the sums, or to those that confirm the last change."""
+        if self._confirming is None:
+            self._sums = np.maximum(0.0, self._sums + np.array([-z, z]) - reference)
+            for side in (0, 1):
+                self._since[side] = [*self._since[side], y] if self._sums[side] > 0.0 else []
+            return
+        self._confirming.append(y)
+        if len(self._confirming) == self.settings.confirm:
+            self._level = float(np.mean(self._confirming))
+            self.alarms[-1] = self.alarms[-1]._replace(share=math.exp(self._level))
+            self._confirming = None
 
 
 def monitor_record(

@@ -88,7 +88,9 @@ class PeriodSplitter:
         Raises:
             RecordingError: Lengths differ or a value is not finite.
         """
-        rows = [np.atleast_1d(np.asarray(values, dtype=float)) for values in (time, displacement, velocity, force)]
+        rows = [
+            np.atleast_1d(np.asarray(values, dtype=float)) for values in (time, displacement, velocity, force)
+        ]
         if len({row.shape for row in rows}) != 1 or rows[0].ndim != 1:
             raise RecordingError(
                 f"channels of shapes {', '.join(str(row.shape) for row in rows)} came; equal rows are expected"
@@ -100,7 +102,9 @@ class PeriodSplitter:
         if block.shape[1] == 0:
             return []
         if self._kept.size and block[0, 0] <= self._kept[0, -1]:
-            raise RecordingError(f"time {block[0, 0]:g} s came after {self._kept[0, -1]:g} s; time must go on")
+            raise RecordingError(
+                f"time {block[0, 0]:g} s came after {self._kept[0, -1]:g} s; time must go on"
+            )
         return self._cut(block)
 
     def _cut(self, block: NDArray[np.float64]) -> list[Period]:
@@ -118,7 +122,9 @@ class PeriodSplitter:
                 continue
             if self._started:
                 t, displacement, v, f = samples[:, begin : before + k + 1]
-                found.append(Period(float(t[0]), float(t[-1]), t.copy(), displacement.copy(), v.copy(), f.copy()))
+                found.append(
+                    Period(float(t[0]), float(t[-1]), t.copy(), displacement.copy(), v.copy(), f.copy())
+                )
             begin, since = before + k, k
             self._armed, self._started = False, True
         self._armed |= bool(count[-1] > count[since])

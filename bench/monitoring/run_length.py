@@ -35,7 +35,9 @@ def mean_run_length(threshold: float, reference: float, freedom: float) -> float
         ParameterError: A negative threshold or reference.
     """
     if threshold < 0.0 or reference < 0.0:
-        raise ParameterError(f"threshold {threshold:g} and reference {reference:g} came; numbers of at least 0 are expected")
+        raise ParameterError(
+            f"threshold {threshold:g} and reference {reference:g} came; numbers of at least 0 are expected"
+        )
     z = stats.norm() if math.isinf(freedom) else stats.t(freedom)
     if threshold == 0.0:
         return 1.0 / max(float(z.sf(reference)), 1e-300)
@@ -64,7 +66,9 @@ def alarm_threshold(reference: float, freedom: float, run_length: float) -> floa
         ParameterError: A run length of two periods or fewer.
     """
     if not run_length > 2.0:
-        raise ParameterError(f"a mean run of {run_length:g} periods between false alarms came; more than 2 are expected")
+        raise ParameterError(
+            f"a mean run of {run_length:g} periods between false alarms came; more than 2 are expected"
+        )
     one_side = 2.0 * run_length
 
     def short(threshold: float) -> float:
@@ -75,4 +79,5 @@ def alarm_threshold(reference: float, freedom: float, run_length: float) -> floa
     high = 1.0
     while short(high) < 0.0:
         high *= 2.0
-    return float(optimize.brentq(short, 0.0 if high == 1.0 else 0.5 * high, high, xtol=1e-4))
+    low = 0.0 if high == 1.0 else 0.5 * high
+    return float(optimize.root_scalar(short, bracket=(low, high), xtol=1e-4).root)
