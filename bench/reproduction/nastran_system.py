@@ -28,6 +28,7 @@ from bench.nastran import (
 )
 from bench.nastran.bulk import Format
 from bench.recording import Recording
+from bench.reproduction import original_deck
 from bench.reproduction.chain_joint import AXES
 from bench.reproduction.estimates import fine
 from bench.reproduction.item import Item, Picture, Progress
@@ -214,7 +215,7 @@ def run(progress: Progress) -> Item:
         "restoring force lags: this is integrated here from the published algorithm, and explains the "
         "deck's step of 0.01 ms."
     )
-    rows = _rows(systems["deck"].order, worst, deck, cards, study)
+    rows = (*_rows(systems["deck"].order, worst, deck, cards, study), *original_deck.rows())
     return Item(
         text, rows, _pictures(record, found["deck"][1], study), "nothing; the numbers are the printed cards'"
     )

@@ -53,7 +53,12 @@ _ENTRIES = (
     Entry("C4", "Joint identified without the mass (section 4.5)", "unknown_mass", 60.0),
     Entry("D1", "Linear chain of four bodies (Fig 5.3, eqs 5.47-5.53)", "linear_chain"),
     Entry("D3", "Reduced-order joint in the chain (Figs 5.4, 5.8, 5.9)", "chain_joint", 90.0),
-    Entry("D4", "Network as Nastran bulk data (eqs 5.16-5.46, appendix B.3)", "nastran_system", 20.0),
+    Entry(
+        "D4",
+        "Joint and network as Nastran bulk data (eqs 5.16-5.46, 5.55, appendices B.1 to B.3)",
+        "nastran_system",
+        20.0,
+    ),
 )
 
 ENTRIES: Mapping[str, Entry] = MappingProxyType({entry.identifier: entry for entry in _ENTRIES})
