@@ -59,6 +59,12 @@ _ENTRIES = (
         "nastran_system",
         20.0,
     ),
+    Entry(
+        "D5",
+        "Frame on an isolator with dampers, four reduced-order joints at once (chapter 6)",
+        "frame",
+        60.0,
+    ),
 )
 
 ENTRIES: Mapping[str, Entry] = MappingProxyType({entry.identifier: entry for entry in _ENTRIES})
