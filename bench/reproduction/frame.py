@@ -24,7 +24,7 @@ from bench.identification.damper_study import VISCOUS_DAMPER
 from bench.identification.network import fit_network
 from bench.identification.polynomial import fit_polynomial
 from bench.laws import find_law
-from bench.laws.along import force_along
+from bench.laws.evaluate import evaluate
 from bench.recording import Recording, nmse
 from bench.reduction import element_from
 from bench.reproduction.estimates import fine
@@ -113,7 +113,8 @@ def identified(kind: str, true: Element, peak: float, band: tuple[float, float],
         seed: Of the test.
     """
     time, x, v = random_motion(peak, band, np.random.default_rng(seed))
-    force = force_along(true.law, true.theta, time, x[:, None], v[:, None])
+    # a few steps of the branch's relaxation time of some milliseconds to each sample
+    force = evaluate(true.law, true.theta, time, x, v, substeps=4).force
     states, forces = np.column_stack([x, v])[::5], force[::5]
     if kind == "polynomial":
         model = fit_polynomial(states, forces, orders=(5, 5))
