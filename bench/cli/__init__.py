@@ -20,6 +20,7 @@ from bench.cli.console import Terminated, terminable
 from bench.cli.diagnosis import Blind, Diagnose
 from bench.cli.excite import Excite
 from bench.cli.installation import Doctor, Example
+from bench.cli.monitoring import Monitor
 from bench.cli.rigs import Demo, Laws, Simulate, View
 from bench.cli.schema import Schema
 from bench.cli.studies import Campaign, Reproduce
@@ -34,6 +35,7 @@ COMMANDS: dict[str, type] = {
     "diagnose": Diagnose,
     "apply": Apply,
     "blind": Blind,
+    "monitor": Monitor,
     "reproduce": Reproduce,
     "campaign": Campaign,
     "schema": Schema,
