@@ -22,79 +22,23 @@ import time as clock
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property
-from itertools import combinations, pairwise
-from typing import Literal
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bench.errors import FileFormatError, IdentificationError, ParameterError
+from bench.errors import FileFormatError, IdentificationError
 from bench.identification.memory_refinement import refined
+from bench.identification.memory_settings import MemorySettings, dictionary
 from bench.identification.memory_terms import JointRecord, Terms, fold, smoothness, solve
 from bench.identification.polynomial import ValidityRange, checked_data, frozen, nmse_percent
 from bench.laws.base import ForceLaw
 from bench.laws.evaluate import evaluate
 from bench.laws.memory import memory_law
-from bench.laws.memory_layout import Direction, MemoryLayout
+from bench.laws.memory_energy import stored_energy
+from bench.laws.memory_layout import MemoryLayout
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class MemorySettings:
-    """What a joint with memory is made of before the data have chosen.
-
-    Attributes:
-        form: "sliders" (many rounded sliders) or "profiles" (few slip elements with learned slip profiles).
-        directions: "axes", or "pairs": also the sum and the difference of every two coordinates, scaled by their spreads.
-        slips: Slip elements along each direction, 0 for a joint without memory.
-        smallest: Smallest range of a slider over the half-range of the motion; the largest is the half-range itself.
-        parts: Parts of a slip element's range with stiffnesses of their own: 1 for linear springs.
-        unequal: Whether the limits of a slip element may differ, as those of a band brake do.
-        profile: Knots of a slip profile ("profiles" only).
-        reach: Range of slip elements over the half-range of the motion ("profiles" only).
-        transition: Part of a slider's range over which slip sets in ("sliders" only).
-        cells: Cells of a potential.
-        knots: Knots of a damping over a place, and of one over the speed.
-        maxwells: Maxwell elements along each direction, relaxation times spread between a few samples and the record.
-        smoothing: Strengths of smoothing that are tried on segments held out.
-        negligible: Share of the force's spread below which a term is dropped.
-        refine: Most steps of the refinement, 0 for none.
-        max_samples: Most samples fitted; hidden states are integrated over all.
-        substeps: Integration steps of the hidden states a sample: a slider of small range is passed within one sample.
-    """
-
-    form: Literal["sliders", "profiles"] = "sliders"
-    directions: Literal["axes", "pairs"] = "axes"
-    slips: int = 14
-    smallest: float = 0.004
-    parts: int = 1
-    unequal: bool = False
-    profile: int = 6
-    reach: float = 1.25
-    transition: float = 0.1
-    cells: int = 24
-    knots: int = 13
-    maxwells: int = 0
-    smoothing: tuple[float, ...] = (1e-3, 1e-2, 1e-1)
-    negligible: float = 1e-3
-    refine: int = 12
-    max_samples: int = 12_000
-    substeps: int = 4
-
-    def __post_init__(self) -> None:
-        if self.form not in ("sliders", "profiles") or self.directions not in ("axes", "pairs"):
-            raise ParameterError(
-                f"form '{self.form}' and directions '{self.directions}' came; sliders or profiles, and axes or pairs, are expected"
-            )
-        counts = (self.slips, self.parts - 1, self.profile - 1, self.cells - 1, self.knots - 2, self.maxwells)
-        if min(*counts, self.refine, self.max_samples - 100, self.substeps - 1) < 0:
-            raise ParameterError(f"a size among {asdict(self)} is too small")
-        if not (0.0 < self.smallest < 1.0 and self.reach > 0.0 and self.smoothing):
-            raise ParameterError(
-                f"smallest {self.smallest:g}, reach {self.reach:g} and smoothing {self.smoothing} came; "
-                "a share of the motion, a positive number and at least one strength are expected"
-            )
 
 
 @dataclass(frozen=True)
@@ -165,6 +109,10 @@ class MemoryModel:
             evaluate(self.law, self.theta, t[i], s[i, :k], s[i, k:], substeps=substeps).force for i in pieces
         ]
         return np.vstack(parts)
+
+    def stored_energy(self, displacements: ArrayLike, memory: ArrayLike) -> Array:
+        """Energy (n,) [J] held at displacements (n, k) and hidden states (n, n_states); none at rest in the virgin state."""
+        return stored_energy(self.layout, self.parameters, displacements, memory)
 
     def to_json(self) -> str:
         """The model as JSON text; numbers survive to the last bit."""
@@ -260,7 +208,7 @@ def fit_memory(
             f"{len(s)} samples of a motion with the spreads {np.std(s, axis=0)[:k]} came; at least 100 of a joint in motion are expected"
         )
     records = _records(t, s, f, a, settle, chosen.max_samples)
-    terms = _dictionary(chosen, s, t, a.shape[1])
+    terms = dictionary(chosen, s, t, a.shape[1])
     n_weights = terms.n_weights()
     strength, held_out = _strength(terms, records, spreads, chosen)
     terms, weights = _pruned(terms, records, spreads, chosen, strength)
@@ -293,63 +241,6 @@ def _records(t: Array, s: Array, f: Array, a: Array, settle: float, most: int) -
     if not sum(len(record.used) for record in found):
         raise IdentificationError(f"no sample is left after a settling time of {settle:g} s; shorten it")
     return found
-
-
-def _directions(settings: MemorySettings, s: Array) -> tuple[Direction, ...]:
-    k = s.shape[1] // 2
-    spread = np.std(s[:, :k], axis=0)
-    vectors = [row for row, size in zip(np.eye(k), spread, strict=True) if size > 0.0]
-    if settings.directions == "pairs":
-        for i, j in combinations(np.flatnonzero(spread > 0.0).tolist(), 2):
-            for sign in (1.0, -1.0):
-                vector = np.zeros(k)
-                vector[i], vector[j] = 1.0, sign * spread[i] / spread[j]
-                vectors.append(vector)
-    found = []
-    for vector in vectors:
-        along, rates = s[:, :k] @ vector, s[:, k:] @ vector
-        size = float(np.max(np.abs(along)))
-        low, high = min(float(along.min()), -1e-3 * size), max(float(along.max()), 1e-3 * size)
-        found.append(Direction(tuple(vector.tolist()), low, high, float(np.max(np.abs(rates))) or 1.0))
-    return tuple(found)
-
-
-def _dictionary(settings: MemorySettings, s: Array, t: Array, n_masses: int) -> Terms:
-    directions = _directions(settings, s)
-    every = range(len(directions))
-    sliders = settings.form == "sliders"
-    slips = tuple(i for i in every for _ in range(settings.slips))
-    layout = MemoryLayout(
-        s.shape[1] // 2,
-        directions,
-        potentials=tuple(every),
-        gated=tuple((i, g) for i in every for g in every),
-        speeds=tuple(every),
-        slips=slips,
-        maxwells=tuple(i for i in every for _ in range(settings.maxwells)),
-        cells=settings.cells,
-        knots=settings.knots,
-        speed_knots=settings.knots,
-        parts=settings.parts,
-        profile=0 if sliders else settings.profile,
-        transition=settings.transition,
-    )
-    half = [0.5 * (d.high - d.low) for d in directions]
-    spread = (
-        np.geomspace(settings.smallest, 1.0, settings.slips)
-        if sliders
-        else np.full(settings.slips, settings.reach)
-    )
-    ranges = np.concatenate([h * spread for h in half]) if slips else np.zeros(0)
-    knots = np.arange(1, layout.profile) / layout.profile if layout.profile else np.zeros(0)
-    # profiles begin between a straight one (Bouc-Wen, n = 1) and ones that slip late
-    powers = 2.0 ** np.arange(settings.slips)
-    profiles = np.array([knots**power for _ in every for power in powers]).reshape(len(slips), len(knots))
-    times = np.geomspace(
-        8.0 * float(np.median(np.diff(t))), 0.25 * float(np.ptp(t)), max(settings.maxwells, 1)
-    )
-    relaxation = np.concatenate([times[: settings.maxwells] for _ in every])
-    return Terms(layout, ranges, profiles, relaxation, settings.unequal, n_masses, settings.substeps)
 
 
 _SEGMENTS = 10
