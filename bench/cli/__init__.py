@@ -17,6 +17,8 @@ from bench.cli.application import Apply
 from bench.cli.console import Terminated, terminable
 from bench.cli.diagnosis import Blind, Diagnose
 from bench.cli.excite import Excite
+from bench.cli.joints import Compare, Export, Identify, Swap
+from bench.cli.records import Convert, Plot
 from bench.cli.rigs import Demo, Laws, Simulate, View
 from bench.cli.schema import Schema
 from bench.cli.studies import Campaign, Reproduce
@@ -27,6 +29,12 @@ COMMANDS: dict[str, type] = {
     "laws": Laws,
     "simulate": Simulate,
     "view": View,
+    "identify": Identify,
+    "swap": Swap,
+    "compare": Compare,
+    "export": Export,
+    "plot": Plot,
+    "convert": Convert,
     "excite": Excite,
     "diagnose": Diagnose,
     "apply": Apply,
