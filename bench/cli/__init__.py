@@ -15,8 +15,10 @@ from rich.console import Console
 from bench import __version__
 from bench.cli.application import Apply
 from bench.cli.console import Terminated, terminable
-from bench.cli.diagnosis import Blind, Diagnose
+from bench.cli.diagnose import Diagnose
+from bench.cli.diagnosis import Blind
 from bench.cli.excite import Excite
+from bench.cli.init import Init
 from bench.cli.joints import Compare, Export, Identify, Swap
 from bench.cli.records import Convert, Plot
 from bench.cli.rigs import Demo, Laws, Simulate, View
@@ -36,6 +38,7 @@ COMMANDS: dict[str, type] = {
     "plot": Plot,
     "convert": Convert,
     "excite": Excite,
+    "init": Init,
     "diagnose": Diagnose,
     "apply": Apply,
     "blind": Blind,
