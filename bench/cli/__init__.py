@@ -17,10 +17,14 @@ import bench
 from bench import __version__, kernel_cache
 from bench.cli.application import Apply
 from bench.cli.console import Terminated, terminable
-from bench.cli.diagnosis import Blind, Diagnose
+from bench.cli.diagnose import Diagnose
+from bench.cli.diagnosis import Blind
 from bench.cli.excite import Excite
+from bench.cli.init import Init
 from bench.cli.installation import Doctor, Example
+from bench.cli.joints import Compare, Export, Identify, Swap
 from bench.cli.monitoring import Monitor
+from bench.cli.records import Convert, Plot
 from bench.cli.rigs import Demo, Laws, Simulate, View
 from bench.cli.schema import Schema
 from bench.cli.studies import Campaign, Reproduce
@@ -31,7 +35,14 @@ COMMANDS: dict[str, type] = {
     "laws": Laws,
     "simulate": Simulate,
     "view": View,
+    "identify": Identify,
+    "swap": Swap,
+    "compare": Compare,
+    "export": Export,
+    "plot": Plot,
+    "convert": Convert,
     "excite": Excite,
+    "init": Init,
     "diagnose": Diagnose,
     "apply": Apply,
     "blind": Blind,
