@@ -21,7 +21,7 @@ from scipy.io import loadmat
 
 from bench.discrepancy import Case, CaseChannel, NominalParameter, record_from_arrays
 from bench.discrepancy.case.acquisition import Antialias
-from bench.record_files.arrays import read_hdf5
+from bench.record_files.hdf5 import read_hdf5
 from measured.target import Target
 
 FOLDER = "bouc_wen_benchmark"
