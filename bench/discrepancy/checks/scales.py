@@ -187,7 +187,9 @@ def observed(problem: Problem) -> list[Observed]:
     if problem.driven:
         records = problem.records
         return [
-            Observed(name, order, np.ones(1), max(shown_noise(problem.case, name, record) for record in records))
+            Observed(
+                name, order, np.ones(1), max(shown_noise(problem.case, name, record) for record in records)
+            )
             for order, name in motion_channels(problem.case).items()
         ]
     return [
