@@ -126,7 +126,7 @@ def bouc_wen_benchmark(folder: str | Path) -> dict[str, Recording]:
         MissingFileError: A file is not there.
         FileFormatError: It does not hold what it should.
     """
-    from bench.record_files.arrays import read_hdf5  # noqa: PLC0415  (h5py, for this set only)
+    from bench.record_files.hdf5 import read_hdf5  # noqa: PLC0415  (h5py, for this set only)
 
     own = Path(folder)
     if not (own / "train.h5").is_file():
