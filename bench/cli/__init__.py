@@ -14,6 +14,7 @@ from rich.console import Console
 
 from bench import __version__
 from bench.cli.application import Apply
+from bench.cli.check import Check
 from bench.cli.console import Terminated, terminable
 from bench.cli.diagnose import Diagnose
 from bench.cli.diagnosis import Blind
@@ -39,6 +40,7 @@ COMMANDS: dict[str, type] = {
     "convert": Convert,
     "excite": Excite,
     "init": Init,
+    "check": Check,
     "diagnose": Diagnose,
     "apply": Apply,
     "blind": Blind,
