@@ -44,6 +44,9 @@ class BlindMake:
     """Single effects only, each struck from the catalogue that its diagnosis may use."""
     detectability: bool = True
     """Compute how well the records of each case can tell its effect, for the answers."""
+    background: bool = False
+    """A small background that no model has beside each effect or none, its part 5 to 30 % of the main discrepancy; noise that is stated,
+    stated too small, or not."""
     workers: int = 1
     """Processes."""
     force: bool = False
@@ -54,13 +57,18 @@ class BlindMake:
         import numpy as np
 
         from bench.discrepancy import BlindOptions, make_blind
+        from bench.discrepancy.blind.background_settings import BackgroundSettings
         from bench.discrepancy.blind.protocol import SEAL
+        from bench.discrepancy.blind.rigs import BACKGROUND_SHARES
         from bench.targets import check_folder
 
         begun = next(self.folder.glob(f"*/{SEAL}"), None) is not None  # by the same command, which goes on
         for folder in (self.folder, self.answers):
             check_folder(folder, force=self.force or begun)
         chosen = {key: value for key, value in vars(self).items() if key in BlindOptions.__dataclass_fields__}
+        chosen["background"] = BackgroundSettings() if self.background else None
+        if self.background and self.shares == BlindOptions().shares:
+            chosen["shares"] = BACKGROUND_SHARES
         with Console(stderr=True).status("making cases") as status:
             names = make_blind(
                 self.folder,
