@@ -59,6 +59,8 @@ class Diagnose:
     """Go on where a unit, a sign or a part of the model stands against the diagnosis; what it was becomes a note."""
     budget: float = float("inf")
     """Seconds after which no further stage of the search is begun; the verdict is then the best one so far and says what was not tried."""
+    check: bool = True
+    """Look at the records first, as `jointbench check` does, and say at once what is doubtful."""
     force: bool = False
     """Overwrite files that exist."""
     progress: bool = True
@@ -210,8 +212,14 @@ def _diagnosed(asked: Diagnose, case: Case, stage: Callable[[str], None]) -> Dia
     import numpy as np
 
     from bench.discrepancy import diagnose
+    from bench.discrepancy.precheck.checking import check
     from bench.errors import IdentificationError
 
+    if asked.check:
+        stage("looking at the records")
+        told = Console(stderr=True, soft_wrap=True)
+        for doubt in check(case, informed=False).doubts:
+            told.print(f"check: {doubt}", style="yellow", markup=False, highlight=False)
     try:
         return diagnose(
             case,
