@@ -216,7 +216,7 @@ def _diagnose(case: Case, how: How, rng: np.random.Generator, anyway: bool) -> D
         ),
         splits=where.splits,
         seconds=time.perf_counter() - began,
-        complete=kind != "unknown" and complete(found, sharp=not finding.coarse),
+        complete=kind != "unknown" and complete(found, sharp=not finding.coarse, stated=problem.noise_stated),
         remainder=remainder(problem, final, widest),
         nominal=nominal_estimates(final),
         nearest=nearest,
