@@ -55,7 +55,7 @@ def kinds() -> list[tuple[str, Callable[[int], Run]]]:
             (35, 20, None, ""),
             (20, 35, None, ""),
             (80, 70, FINE, ", 10 % sought"),
-            (80, 70, None, ", 9 % less, not sought"),
+            (80, 70, None, ", 9 % less"),
         )
     ]
     return found

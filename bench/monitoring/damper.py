@@ -45,7 +45,8 @@ class MonitorSettings:
 
     Attributes:
         learning: Periods from which the baseline is learnt. With 30 the threshold is within a tenth of that of a known scatter.
-        change: Smallest change of C to be found, as a share of it.
+        change: Smallest change of a period's energy to be found, as a share of it. 0.15 is what the loss of a fifth of C leaves where a
+            quarter of the energy is the seals' friction, which is not lost with it.
         run_length: Mean number of periods between false alarms. Twice the thousand that is asked of a monitor, since the
             scatter of neighbouring periods is not quite independent.
         memory: Periods that the running estimate of C and n remembers.
@@ -54,7 +55,7 @@ class MonitorSettings:
     """
 
     learning: int = 30
-    change: float = 0.2
+    change: float = 0.15
     run_length: float = 2000.0
     memory: float = 10.0
     confirm: int = 5
