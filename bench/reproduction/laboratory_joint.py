@@ -72,6 +72,40 @@ def rig() -> Rig:
     return laboratory_joint_rig(joint)
 
 
+FRICTION_SHARE = 0.1
+"""Friction of the universal joints over the peak of the restoring force; a tenth is what such joints have under load."""
+YIELD = 0.005
+"""Motion over which the friction builds up [in, rad]: ten counts of the linear encoder, a fortieth of the printed range."""
+
+
+def friction() -> tuple[Element, Element]:
+    """Elastic-slip friction of the two universal joints, along the shaft and about it: a tenth of the printed peak force of 60."""
+    limit = FRICTION_SHARE * 60.0
+    return (
+        Element.of(
+            "jenkins", "axial", name="friction_axial", limit=limit * POUND_FORCE, stiffness=limit / YIELD * POUND_FORCE / INCH
+        ),
+        Element.of(
+            "jenkins", "torsional", name="friction_torsional", limit=limit * POUND_FORCE * INCH,
+            stiffness=limit / YIELD * POUND_FORCE * INCH,
+        ),
+    )  # fmt: skip
+
+
+def rig_with_friction() -> Rig:
+    """The laboratory rig with the friction of its universal joints beside the joint; `total_forces` adds them up."""
+    return rig().with_(elements=(*rig().elements, *friction()))
+
+
+def total_forces(record: Recording) -> np.ndarray:
+    """Restoring forces of everything between the two bodies (n, 2) [N, N m]: of the joint, and of friction where there is any."""
+    forces = np.stack([record["joint/force_1"], record["joint/force_2"]], axis=1)
+    for i, name in enumerate(("friction_axial/force", "friction_torsional/force")):
+        if name in record.names:
+            forces[:, i] += record[name]
+    return forces
+
+
 def drive(loaded: tuple[bool, bool]) -> Excitation:
     """Uncorrelated noise on the axes asked for."""
     peaks = (FORCE * POUND_FORCE, TORQUE * POUND_FORCE * INCH)
