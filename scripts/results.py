@@ -444,6 +444,10 @@ def _verdict(what: str, figure: str, limit: str, verdict: str = "") -> str:
         return f"**{verdict}**" if verdict.startswith("does not hold") else verdict
     bound = re.match(r"(≤|≥|at most|at least)\s*([-−\d.]+)", limit)
     whole = re.fullmatch(r"([\d.]+) to ([\d.]+)( %)?", limit)
+    apart = re.fullmatch(r"within ([\d.]+) %", limit)
+    bracket = re.search(r"\(([-+][\d.]+) %\)", figure)
+    if apart and bracket:
+        return "holds" if abs(float(bracket[1])) <= float(apart[1]) else "**misses**"
     if limit == "100 %":
         bound = re.match(r"(≥)\s*(\d+)", "≥ 100")
     values = [number for part in figure.partition("(")[0].split("/") for number in _numbers(part)[:1]]

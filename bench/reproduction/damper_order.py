@@ -154,6 +154,8 @@ def _online_rows(study: OnlineStudy) -> list[Row]:
             source=f"p. 61, sentences (ii), (iii); {fig('3.12 a to e')}",
             tolerance="least range over its median, orders from 3 on",
             reason="an order of the five has no tolerance",
+            shape=moved[0] < 0.1,
+            why="the estimate of x moves as little as that of x''; those of v, x³ and v³ change with the order, as printed",
         ),
         fact_row(
             "identification error ruled by the order of v, not of x (orders 1 to 10, range)",
@@ -234,6 +236,8 @@ def _batch_rows(study: OrderStudy, others: list[OrderStudy]) -> list[Row]:
             spread=f"{min(v for v in blow if v is not None)} … {max(v for v in blow if v is not None)}"
             if any(v is not None for v in blow)
             else "never",
+            shape=any(value is not None for value in blow),
+            why=f"on some seeds the error does not double up to order {SEEDS_HIGHEST}, where the study of further seeds ends",
         ),
         fact_row(
             "unseen data, batch: the mass leaves its plateau within one order of where the error doubles",
