@@ -29,13 +29,15 @@ LARGEST = 40_000
 
 
 def small_png(path: Path) -> bytes:
-    """The picture with 24 colours, as wide as its size allows and at most 800 pixels."""
+    """The picture with 32 colours, rare ones kept, as wide as its size allows and at most 800 pixels."""
     picture = Image.open(path).convert("RGB")
     for width in range(800, 200, -40):
         scale = min(width / picture.width, 1.0)
         size = (round(picture.width * scale), round(picture.height * scale))
         buffer = io.BytesIO()
-        picture.resize(size, Image.Resampling.LANCZOS).quantize(24).save(buffer, "PNG", optimize=True)
+        picture.resize(size, Image.Resampling.LANCZOS).quantize(32, Image.Quantize.MAXCOVERAGE).save(
+            buffer, "PNG", optimize=True
+        )
         if buffer.tell() <= LARGEST:
             break
     return buffer.getvalue()

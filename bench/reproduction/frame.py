@@ -198,6 +198,11 @@ def _rows(twins: dict[str, Twin]) -> tuple[Row, ...]:
     return tuple(rows)
 
 
+def _short(label: str) -> str:
+    """A twin's name as a legend has room for: "all: networks", "dampers: networks"."""
+    return label.replace("isolator and dampers reduced to", "all:").replace("dampers reduced to", "dampers:")
+
+
 def run(progress: Progress) -> Item:
     """Make the item."""
     progress("true frame", 0.02)
@@ -213,11 +218,11 @@ def run(progress: Progress) -> Item:
         twins[f"isolator and dampers reduced to {kind}s"] = compared(reduced, records)
     progress("drawing", 0.95)
     drawn = {"true devices": records[0]} | {
-        label: twin.record for label, twin in twins.items() if twin.record is not None
+        _short(label): twin.record for label, twin in twins.items() if twin.record is not None
     }
     names = ["isolator_drift", "storey_1_drift", "storey_3_drift"]
     scores = {
-        label: {name: float(np.median([errors[name] for errors in twin.errors])) for name in NAMES}
+        _short(label): {name: float(np.median([errors[name] for errors in twin.errors])) for name in NAMES}
         for label, twin in twins.items()
         if all(math.isfinite(value) for errors in twin.errors for value in errors.values())
     }
