@@ -40,8 +40,8 @@ from bench.discrepancy.articulated.search import SearchSettings, search
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.effects.catalogue import CATALOGUE as LINEAR
 from bench.discrepancy.multibody.channels import bound
+from bench.discrepancy.multibody.encoders import encoders_of, input_of
 from bench.discrepancy.multibody.model import DRIVES, ArticulatedModel, compiled_model
-from bench.discrepancy.multibody.records import encoders_of, input_of
 from bench.discrepancy.verdict import (
     Estimate,
     Gap,
@@ -180,7 +180,7 @@ def diagnose_articulated(
     progress("judging records")
     rungs = ladder(fits)
     last, predictions = kept(judging, rungs, judged)
-    untouched = predict(judging, None, judged)
+    untouched = predict(judging, None, predictions[0].floor, judged)
     final = rungs[last]
     verdict = _verdict(problem, fits, rungs, last, untouched, predictions, judged, rng, stated=stated)
     verdict = replace(verdict, warnings=(*verdict.warnings, *notes)).timed(time.perf_counter() - began)

@@ -73,6 +73,15 @@ class Spectra(NamedTuple):
     counts: NDArray[np.bool_]
 
 
+class Observed(NamedTuple):
+    """A channel that measures motion: its name, the derivative that it measures, of which coordinate (n_dof,), and its noise."""
+
+    channel: str
+    order: int
+    row: Array
+    noise: float
+
+
 class Pair(NamedTuple):
     """Two channels of one motion: the second over the first, derivatives taken into account, and how sure that is."""
 
@@ -173,16 +182,18 @@ def compare_channels(
     return Pair(float(factor), float(np.median(np.cos(np.angle(lowest)))))
 
 
-def _observed(problem: Problem) -> list[tuple[str, int, Array, float]]:
-    """Channels that measure motion: name, order, row, noise."""
+def observed(problem: Problem) -> list[Observed]:
+    """Channels that measure motion, a prescribed one included, with their noise as it shows."""
     if problem.driven:
         records = problem.records
         return [
-            (name, order, np.ones(1), max(shown_noise(problem.case, name, record) for record in records))
+            Observed(
+                name, order, np.ones(1), max(shown_noise(problem.case, name, record) for record in records)
+            )
             for order, name in motion_channels(problem.case).items()
         ]
     return [
-        (
+        Observed(
             o.channel,
             o.order,
             o.row,
@@ -200,11 +211,11 @@ def shown_noise(case: Case, name: str, record: CaseRecord) -> float:
 
 def _between(declared: Case, problem: Problem, settings: ScaleSettings) -> Iterator[str]:
     """Pairs of channels that measure derivatives of one coordinate."""
-    observed = _observed(problem)
+    channels = observed(problem)
     odd: dict[str, list[tuple[str, Pair, int, CaseRecord]]] = {}
     agreeing: set[str] = set()
-    for i, (first, low, row, level) in enumerate(observed):
-        for second, high, other, second_level in observed[i + 1 :]:
+    for i, (first, low, row, level) in enumerate(channels):
+        for second, high, other, second_level in channels[i + 1 :]:
             ratio = _parallel(row, other)
             if low == high or ratio == 0.0:
                 continue
