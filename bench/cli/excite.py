@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 from dataclasses import dataclass
 from pathlib import Path
@@ -130,10 +129,6 @@ class Excite:
         if bool(self.policy) != (self.method == "policy"):
             raise ParameterError(
                 "--policy NAME and --method policy go together; trained policies are listed by an unknown name"
-            )
-        if self.method in {"dopt", "planner"} and importlib.util.find_spec("cmaes") is None:
-            raise ParameterError(
-                f"--method {self.method} needs the extra rl (pip install 'jointbench[rl]'); the other methods do without"
             )
 
 

@@ -22,8 +22,10 @@ from bench.discrepancy.application.target import PREFIX, as_mujoco
 from bench.discrepancy.articulated.effects import CATALOGUE
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.multibody.channels import bound
+from bench.discrepancy.multibody.encoders import Encoder, input_of
 from bench.discrepancy.multibody.model import ArticulatedModel, Joint
-from bench.discrepancy.multibody.records import WINDOW, Encoder, Motion, input_of, motion_of
+from bench.discrepancy.multibody.motion import Motion, motion_of
+from bench.discrepancy.multibody.records import WINDOW
 from bench.discrepancy.verdict import NamedEffect
 
 Array = NDArray[np.float64]

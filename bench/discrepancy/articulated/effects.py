@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.discrepancy.effects.effect import FreeParameter, log_grid
+from bench.discrepancy.multibody.encoders import Encoder
 from bench.discrepancy.multibody.joint_run import Slot
-from bench.discrepancy.multibody.records import Encoder
 from bench.errors import UnknownNameError
 
 Array = NDArray[np.float64]

@@ -53,9 +53,8 @@ class ArticulatedFit:
         size = problem.size(hypothesis)
         residuals = [problem.residual(j, hypothesis, vector[:size]) for j in range(len(problem.joints))]
         chi2 = np.array([float(r @ r) for r in residuals])
-        count = np.array([float(len(r)) for r in residuals])
         _, std, _, _ = problem.prior(hypothesis)
-        return cls(hypothesis, vector[:size], np.diag(std**2), chi2, count, -np.inf)
+        return cls(hypothesis, vector[:size], np.diag(std**2), chi2, problem.count, -np.inf)
 
     @property
     def reduced(self) -> Array:
@@ -209,11 +208,11 @@ def _summary(
     others: Others | None,
 ) -> ArticulatedFit:
     n_joints = len(problem.joints)
-    chi2, count = np.zeros(n_joints), np.zeros(n_joints)
+    chi2, count = np.zeros(n_joints), problem.count
     for j in range(n_joints):
         if j in active or others is None:
             residual = problem.residual(j, hypothesis, vector)
-            chi2[j], count[j] = float(residual @ residual), len(residual)
+            chi2[j] = float(residual @ residual)
         else:
             # what the other joints lose by masses that suit this one
             masses = list(problem.masses)
@@ -221,8 +220,7 @@ def _summary(
             now = others.factors[j] @ vector[masses] - others.targets[j]
             then = others.factors[j] @ base.vector[masses] - others.targets[j]
             chi2[j] = base.chi2[j] + scale[j] ** 2 * float(now @ now - then @ then)
-            count[j] = base.count[j]
-    total = sum(misfit_of(c, int(n)) for c, n in zip(chi2, count, strict=True))
+    total = sum(misfit_of(c, n) for c, n in zip(chi2, count, strict=True))
     mean, std, _, _ = problem.prior(hypothesis)
     covariance = np.zeros((len(vector), len(vector)))
     inverse = np.linalg.pinv(curvature)

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from bench.discrepancy.articulated.fitting import ArticulatedFit
 from bench.discrepancy.articulated.problem import ArticulatedProblem
-from bench.discrepancy.multibody.records import encoders_of
 from bench.discrepancy.numerics.threads import in_threads
 
 Array = NDArray[np.float64]
@@ -72,32 +71,52 @@ class Prediction:
         return np.asarray((self.power - self.floor**2).sum(axis=1))
 
 
-def predict(
-    problem: ArticulatedProblem, found: ArticulatedFit | None, settings: JudgementSettings
-) -> Prediction:
-    """Free runs of a problem's records with a fit's model; with the nominal model as it is where None."""
-    hypothesis = found.hypothesis if found else ()
-    vector = found.vector.copy() if found else np.zeros(len(problem.nominal))
-    n = len(problem.nominal)
+def believed(problem: ArticulatedProblem, found: ArticulatedFit, settings: JudgementSettings) -> Array:
+    """The vector of a fit, its nominal parameters no further out than is believed."""
+    vector, n = found.vector.copy(), len(problem.nominal)
     vector[:n] = np.clip(vector[:n], -settings.strained, settings.strained)
+    return vector
+
+
+def noise_floor(problem: ArticulatedProblem, found: ArticulatedFit, settings: JudgementSettings) -> Array:
+    """NRMSE (n_joints,) that noise alone leaves in free runs, were the model of a fit right."""
+    vector = believed(problem, found, settings)
+    elastic = problem.settled(found.hypothesis, vector)
+    jobs = [(j, r) for r in range(len(problem.records)) for j in range(len(problem.joints))]
+    left = in_threads(lambda job: elastic.free_run_noise(job[0], found.hypothesis, vector, job[1]), jobs)
+    sizes = [size_of(problem, r, j) for j, r in jobs]
+    table = np.reshape(np.array(left) / np.array(sizes), (len(problem.records), -1))
+    return np.asarray(np.sqrt(np.mean(table**2, axis=0)), dtype=np.float64)
+
+
+def size_of(problem: ArticulatedProblem, r: int, j: int) -> float:
+    """What errors of joint `j` in record `r` are divided by: its motion, at least its noise."""
+    record = problem.records[r].joints[j]
+    return max(float(np.std(record.position)), float(np.max(record.noise)))
+
+
+def predict(
+    problem: ArticulatedProblem, found: ArticulatedFit | None, floor: Array, settings: JudgementSettings
+) -> Prediction:
+    """Free runs of a problem's records with a fit's model, with the nominal model as it is where None; `floor` as of `noise_floor`."""
+    hypothesis = found.hypothesis if found else ()
+    vector = believed(problem, found, settings) if found else np.zeros(len(problem.nominal))
     elastic = problem.settled(hypothesis, vector)
     jobs = [(j, r) for r in range(len(problem.records)) for j in range(len(problem.joints))]
     motions = elastic.motions(hypothesis, vector)
     errors = in_threads(lambda job: elastic.free_run(job[0], hypothesis, vector, motions[job[1]]), jobs)
-    rows, floors = [], []
-    for r, prepared in enumerate(problem.records):
-        columns, floor = [], []
+    rows = []
+    for r in range(len(problem.records)):
+        columns = []
         for j in range(len(problem.joints)):
-            size = max(float(np.std(prepared.joints[j].position)), float(np.max(prepared.joints[j].noise)))
+            size = size_of(problem, r, j)
             error = np.nan_to_num(errors[jobs.index((j, r))], nan=1e3 * size)
             factor = 1.0 + motions[r].joints[j].encoder.gain
             columns.append(
                 [float(np.mean(b**2)) for b in np.array_split(error * factor / size, settings.blocks)]
             )
-            floor.append(prepared.joints[j].free_run_noise() / size)
         rows.append(np.array(columns).T)
-        floors.append(floor)
-    return Prediction(np.minimum(np.vstack(rows), 1e6), np.sqrt(np.mean(np.square(floors), axis=0)))
+    return Prediction(np.minimum(np.vstack(rows), 1e6), floor)
 
 
 def ladder(fits: Sequence[ArticulatedFit]) -> list[ArticulatedFit]:
@@ -119,7 +138,8 @@ def kept(
     away more than it leaves. Nothing is added to what is complete, and nothing small where even then something is left: it stands in
     for a little of the form of the law that is not right.
     """
-    predictions = [predict(problem, rung, settings) for rung in rungs]
+    floor = noise_floor(problem, rungs[-1], settings)
+    predictions = [predict(problem, rung, floor, settings) for rung in rungs]
     last = 0
     for k in range(1, len(rungs)):
         if complete(problem, rungs[last], settings):
@@ -137,25 +157,9 @@ def kept(
 def complete(problem: ArticulatedProblem, found: ArticulatedFit, settings: JudgementSettings) -> bool:
     """Whether no joint keeps more than the noise, and no nominal parameter is strained for it."""
     # the mean square of n residuals is known to sqrt(2 / n)
-    steps = np.array([_of_steps(problem, j) for j in range(len(problem.joints))])
-    noise = (1.0 + settings.noise_known) ** 2 + settings.sure * np.hypot(steps, np.sqrt(2.0 / found.count))
+    noise = (1.0 + settings.noise_known) ** 2 + settings.sure * np.sqrt(2.0 / found.count)
     far = np.abs(found.vector[: len(problem.nominal)]) > settings.strained
     return bool(np.all(found.reduced <= noise) and not far.any())
-
-
-def _of_steps(problem: ArticulatedProblem, j: int) -> float:
-    """Standard error of the mean square of an encoder's noise that comes of its steps, relative to the stated noise.
-
-    While a reading stays the same its error hardly changes: of a uniform error, whose square has the standard deviation
-    ``step^2 / sqrt(180)``, there are as many draws as the reading changes.
-    """
-    channel = encoders_of(problem.case, problem.joints[j]).channels[0]
-    if channel.resolution <= 0.0:
-        return 0.0
-    readings = [np.diff(prepared.joints[j].position) for prepared in problem.records]
-    changes = sum(int(np.count_nonzero(np.abs(d) > 0.5 * channel.resolution)) for d in readings)
-    noise = float(problem.records[0].joints[j].noise[0])
-    return channel.resolution**2 / np.sqrt(180.0 * max(changes, 1)) / noise**2
 
 
 def closed(

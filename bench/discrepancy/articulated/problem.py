@@ -20,10 +20,12 @@ from numpy.typing import NDArray
 
 from bench.discrepancy.articulated.effects import ArticulatedEffect, JointScales
 from bench.discrepancy.case.case import Case, CaseRecord
+from bench.discrepancy.multibody.encoders import Encoder, input_of
 from bench.discrepancy.multibody.joint_run import SLOTS, Slot, predict
 from bench.discrepancy.multibody.model import ArticulatedModel, Joint
+from bench.discrepancy.multibody.motion import clock_of
+from bench.discrepancy.multibody.noise import NoiseDraw, NoiseSettings, draw
 from bench.discrepancy.multibody.records import (
-    Encoder,
     JointRecord,
     PreparedRecord,
     corrected,
@@ -230,12 +232,55 @@ class ArticulatedProblem:
         return out[:, : record.n_measured], states
 
     def free_run(self, j: int, hypothesis: Hypothesis, vector: Array, prepared: PreparedRecord) -> Array:
-        """Measured less predicted positions (n,) of joint `j`, run without corrections from the measured states of its windows."""
+        """Measured less predicted positions (n,) of joint `j`, run without corrections from the measured states of its windows.
+
+        What no encoder tells at the start of a window, the winding of an elastic drive, is taken from the run that is corrected. The
+        first of several windows is left out: at the end of a record its velocity is told from one side alone, several times worse.
+        """
         record, motion = prepared.joints[j], prepared.motion
         every = record.window or len(record.position)
         starts = np.column_stack([motion.position[::every, j], motion.velocity[::every, j]])
+        if any(placed.effect.train and placed.joint == j for placed in hypothesis):
+            _, states = self.innovations(j, hypothesis, vector, prepared)
+            starts = np.hstack([starts, states[::every, 2:] - states[::every, :2]])
         out, _ = self._run(j, hypothesis, vector, record, np.zeros((2, 2)), starts, every)
-        return out[:, 0]
+        return out[every if len(starts) > 1 else 0 :, 0]
+
+    @cached_property
+    def draws(self) -> tuple[tuple[NoiseDraw, ...], ...]:
+        """Draws of the noise of every record."""
+        settings = NoiseSettings()
+        rng = np.random.default_rng(settings.seed)
+        return tuple(
+            tuple(
+                draw(self.model, prepared.motion, clock_of(prepared.record), rng)
+                for _ in range(settings.draws)
+            )
+            for prepared in self.records
+        )
+
+    def free_run_noise(self, j: int, hypothesis: Hypothesis, vector: Array, r: int) -> float:
+        """RMS error of the position that noise alone leaves in a free run of joint `j` in record `r`, were the hypothesis true."""
+        prepared = self.motions(hypothesis, vector)[r]
+        record, rng = prepared.joints[j], np.random.default_rng(NoiseSettings().seed + 1 + j)
+        drive = record.joint.drive
+        channel = input_of(self.case, record.joint)
+        stated = 0.0 if drive is None or drive.servo else channel.noise_std or 0.0
+        quiet = self.free_run(j, hypothesis, vector, prepared)
+        total = []
+        for one in self.draws[r]:
+            kicks = np.repeat(stated * rng.standard_normal(len(record.position) - 1), record.n_sub)
+            noisy = replace(
+                record, bias=record.bias + one.bias[j], reference=record.reference + one.reference[j], command=record.command + kicks,
+            )  # fmt: skip
+            motion = prepared.motion._replace(
+                position=prepared.motion.position + one.motion[0],
+                velocity=prepared.motion.velocity + one.motion[1],
+            )
+            joints = (*prepared.joints[:j], noisy, *prepared.joints[j + 1 :])
+            loud = self.free_run(j, hypothesis, vector, replace(prepared, joints=joints, motion=motion))
+            total.append(np.mean((loud - quiet) ** 2))
+        return float(np.sqrt(np.mean(total) + record.noise[0] ** 2))
 
     def _run(
         self,
@@ -276,15 +321,23 @@ class ArticulatedProblem:
         return bias, np.maximum(inertia, 1e-3 * record.inertia)
 
     def residual(self, j: int, hypothesis: Hypothesis, vector: Array) -> Array:
-        """Whitened innovations of joint `j` over all records; their mean square is one where nothing is missing."""
+        """Whitened, weighted innovations of joint `j` over all records; their sum of squares is about `count` where nothing is missing."""
         out = []
         for original, prepared in zip(self.records, self.motions(hypothesis, vector), strict=True):
             innovation, _ = self.innovations(j, hypothesis, vector, prepared)
             # a corrected log has another noise; residuals are compared in units of what was logged
             innovation = innovation * (original.joints[j].noise / prepared.joints[j].noise)
-            whitened = innovation @ original.joints[j].whitening.T
+            whitened = innovation @ original.joints[j].whitening.T * original.joints[j].weight
             out.append(np.nan_to_num(whitened, nan=DIVERGED, posinf=DIVERGED, neginf=-DIVERGED).ravel())
         return np.concatenate(out)
+
+    @cached_property
+    def count(self) -> Array:
+        """Number (n_joints,) of independent residuals of every joint: of readings that stay the same in a row, about one."""
+        records = self.records
+        return np.array(
+            [sum(float(np.sum(r.joints[j].weight ** 2)) for r in records) for j in range(len(self.joints))]
+        )
 
     def prior(self, hypothesis: Hypothesis) -> tuple[Array, Array, Array, Array]:
         """Mean, standard deviation, lower and upper bound of a vector."""
@@ -330,7 +383,7 @@ class ArticulatedProblem:
         )
 
 
-def misfit_of(chi2: float, count: int) -> float:
+def misfit_of(chi2: float, count: float) -> float:
     """Minus twice the profiled log-likelihood of `count` residuals of a sum of squares, their scale unknown but at least one."""
     mean = chi2 / count
     return count * (mean if mean <= 1.0 else 1.0 + float(np.log(mean)))

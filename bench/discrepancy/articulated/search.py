@@ -77,6 +77,7 @@ class _Ground:
 
     def __init__(self, problem: ArticulatedProblem, base: ArticulatedFit, joints: Sequence[int]) -> None:
         self.joints = tuple(joints)
+        self.count = problem.count
         self.base = base
         free = set(free_entries(problem, base.hypothesis).tolist())
         columns = [i for i in range(len(base.vector)) if i in free and self._moves(problem, base, i)]
@@ -114,7 +115,7 @@ class _Ground:
         total = float(left[self.slices[-1].stop :] @ left[self.slices[-1].stop :])
         for j, part in zip(self.joints, self.slices, strict=True):
             chi2 = float(left[part] @ left[part]) * float(self.base.scale[j]) ** 2
-            total += misfit_of(chi2, part.stop - part.start)
+            total += misfit_of(chi2, float(self.count[j]))
         return total
 
     def moved(self, change: Array) -> Array:
@@ -224,8 +225,7 @@ def _untouched(problem: ArticulatedProblem, base: ArticulatedFit) -> Articulated
 def nominal_fit(problem: ArticulatedProblem, settings: SearchSettings) -> ArticulatedFit:
     """The nominal model alone, with the scales of the joints that it leaves."""
     vector = np.zeros(len(problem.nominal))
-    left = [float(np.mean(problem.residual(j, (), vector) ** 2)) for j in range(len(problem.joints))]
-    scale = np.sqrt(np.maximum(left, 1.0))
+    scale = ArticulatedFit.at(problem, (), vector).scale
     current = fit(problem, (), vector, scale=scale, iterations=settings.iterations)
     for _ in range(settings.refits - 1):
         before = current.scale
@@ -367,9 +367,9 @@ def _scale_of(problem: ArticulatedProblem, found: ArticulatedFit) -> Array:
     """Scale (n_joints,) of the residuals of a fit's model in a problem, at least one."""
     joints = range(len(problem.joints))
     left = in_threads(
-        lambda j: float(np.mean(problem.residual(j, found.hypothesis, found.vector) ** 2)), joints
+        lambda j: float(np.sum(problem.residual(j, found.hypothesis, found.vector) ** 2)), joints
     )
-    return np.sqrt(np.maximum(left, 1.0))
+    return np.sqrt(np.maximum(np.array(left) / problem.count, 1.0))
 
 
 def _fits(

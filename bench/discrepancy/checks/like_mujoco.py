@@ -18,6 +18,7 @@ import numpy as np
 from mujoco import rollout
 from numpy.typing import NDArray
 
+from bench import native
 from bench.discrepancy.case.case import CaseRecord
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.mjcf_reference import Reference
@@ -193,6 +194,7 @@ def _rms(x: Array) -> float:
     return float(np.sqrt(np.mean(x**2)))
 
 
+@native.quiet()
 def simulated(
     reference: Reference, model: mujoco.MjModel, record: CaseRecord, length: int, split: int
 ) -> Array:

@@ -185,13 +185,17 @@ def _kick_train(p, mass, step, motor_force, link_force, damping, implicit, brist
 
 
 @_inlined
-def _set_anew(p, bias, q, on_link):
-    """Positions of motor and link that rest at an encoder's reading `q`, the train wound up by what the link weighs."""
-    if p[29] <= 0.5:
-        return q, q
-    weight = bias + p[7] * (q - p[8])
-    wound = weight / p[30] + math.copysign(p[32], weight)
-    return (q + wound, q) if on_link else (q, q - wound)
+def _set_anew(p, bias, start, on_link):
+    """Positions and velocities of motor and link at the start of a window, see `run`."""
+    q, v, wound, whirl = start[0], start[1], 0.0, 0.0
+    if p[29] > 0.5:
+        wound, whirl = start[2], start[3]
+        if math.isnan(wound):
+            weight = bias + p[7] * (q - p[8])
+            wound, whirl = -(weight / p[30] + math.copysign(p[32], weight)), 0.0
+    if on_link:
+        return q - wound, v - whirl, q, v
+    return q, v, q + wound, v + whirl
 
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
@@ -202,7 +206,10 @@ def run(
 
     Args:
         p: (SLOTS,) parameters, see `Slot`.
-        mass, bias, slope, reference: (n_steps,) coefficients of the equation at the middle of every step.
+        mass: (n_steps,) inertia about the joint at the middle of every step, as the next three.
+        bias: (n_steps,) torque of gravity and of the other joints at the reference position.
+        slope: (n_steps,) its derivative by the position.
+        reference: (n_steps,) the position at which it was taken.
         load: (n_steps,) torque that the gear carries (magnitude), for friction that grows with it.
         u: (n_steps,) input.
         step: Length of a step [s].
@@ -210,10 +217,11 @@ def run(
         y: (n,) measured positions.
         v_measured: (n,) measured velocities, or (0,).
         gain: (2, 2) of the innovations of position and velocity into position and velocity.
-        starts: (n_windows, 2) position and velocity at the first sample of every window.
+        starts: (n_windows, 4) at the first sample of every window: position and velocity on the encoder's side, then those of the link
+            less those of the motor where there is a train; NaN there: wound up by what the link weighs.
         every: Samples a window; at its end the state is set anew.
         out: (n, 2) innovations; overwritten.
-        states: (n, 4) predicted position and velocity on the encoder's side, then of the link where there is a train; overwritten.
+        states: (n, 4) predicted position and velocity of the motor, then of the link, which are the same without a train; overwritten.
     """
     n = y.shape[0]
     train = p[29] > 0.5
@@ -223,12 +231,10 @@ def run(
     keep = math.exp(-step / p[27]) if p[27] > 0.0 else 0.0
     for i in range(n):
         if i % every == 0:
-            q, ql = _set_anew(p, bias[min(i * n_sub, bias.shape[0] - 1)], starts[i // every, 0], on_link)
-            v = vl = starts[i // every, 1]
-        states[i, 0], states[i, 1] = (ql, vl) if on_link else (q, v)
-        states[i, 2], states[i, 3] = ql, vl
-        out[i, 0] = y[i] - states[i, 0]
-        out[i, 1] = v_measured[i] - states[i, 1] if v_measured.shape[0] > 0 else 0.0
+            q, v, ql, vl = _set_anew(p, bias[min(i * n_sub, bias.shape[0] - 1)], starts[i // every], on_link)
+        states[i, 0], states[i, 1], states[i, 2], states[i, 3] = q, v, ql, vl
+        out[i, 0] = y[i] - (ql if on_link else q)
+        out[i, 1] = v_measured[i] - (vl if on_link else v) if v_measured.shape[0] > 0 else 0.0
         if not (abs(out[i, 0]) < FAR and abs(out[i, 1]) < FAR):
             out[i:] = math.nan
             return
@@ -285,14 +291,16 @@ def predict(
         n_sub: Steps a sample.
         measured: Positions (n,) and velocities (n,) or (0,).
         gain: (2, 2).
-        starts: (n_windows, 2) states at the beginning of every window.
+        starts: (n_windows, 2) states at the beginning of every window, or (n_windows, 4), see `run`.
         every: Samples a window; one window where None.
     """
     n = len(measured[0])
     out, states = np.zeros((n, 2)), np.zeros((n, 4))
     mass, bias, slope, reference, load = arrays
     position, velocity = measured
+    at = np.full((len(np.atleast_2d(starts)), 4), np.nan)
+    at[:, : np.shape(starts)[-1]] = starts
     run(
-        p, mass, bias, slope, reference, load, u, step, n_sub, position, velocity, gain, np.atleast_2d(starts), every or n, out, states
+        p, mass, bias, slope, reference, load, u, step, n_sub, position, velocity, gain, at, every or n, out, states
     )  # fmt: skip
     return out, states

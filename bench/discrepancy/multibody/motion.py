@@ -1,0 +1,114 @@
+"""Measured motion of all joints, smoothed from their encoders, and what the equations of the joints are along it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from bench.discrepancy.case.case import Case, CaseRecord
+from bench.discrepancy.motion.kalman_smoother import Smoother, resting, smoother_of
+from bench.discrepancy.multibody.encoders import TRUE, Encoder, encoders_of
+from bench.discrepancy.multibody.model import ArticulatedModel, Dynamics
+
+Array = NDArray[np.float64]
+LONGEST_STEP = 1e-3
+"""Longest integration step [s]: MuJoCo's own default is two of them, and a servo of 10 Hz is then integrated to 3e-4."""
+
+
+class Motion(NamedTuple):
+    """Measured motion of all joints, smoothed: positions, velocities, accelerations (n, n_joints) and the smoothers behind them."""
+
+    position: Array
+    velocity: Array
+    acceleration: Array
+    samples: tuple[Array, ...]
+    smoothers: tuple[Smoother | None, ...]
+    noise: tuple[Array, ...]
+
+
+def motion_of(
+    case: Case,
+    model: ArticulatedModel,
+    record: CaseRecord,
+    encoders: Mapping[str, Encoder],
+    like: Motion | None = None,
+) -> Motion:
+    """Smooth the motion of a record; `encoders` says what is wrong with which joint, `like` has smoothers to be used again.
+
+    A delay shifts the smoothed motion. The samples keep theirs: interpolated, they would have less noise than was logged.
+    """
+    clock = np.arange(len(record)) * record.step
+    out = np.zeros((3, len(record), len(model.joints)))
+    samples, smoothers, noises = [], [], []
+    for j, joint in enumerate(model.joints):
+        measured = encoders_of(case, joint)
+        wrong = encoders.get(joint.name, TRUE)
+        raw = np.column_stack([record.values[c.name] for c in measured.channels])
+        true = wrong.corrected(raw, measured.orders)
+        noise = wrong.scaled(measured.noise, measured.orders)
+        still = resting(true, measured.orders, noise)
+        smoother = like.smoothers[j] if like else None
+        if still is None and smoother is None:
+            smoother = smoother_of(true, measured.orders, noise, record.step)
+        if like is not None and wrong == TRUE:
+            out[:, :, j] = np.stack([like.position[:, j], like.velocity[:, j], like.acceleration[:, j]])
+        elif still is not None or smoother is None:
+            out[:, :, j] = (still if still is not None else np.zeros((len(record), 3))).T
+        else:
+            smooth = smoother.smooth(true)
+            if wrong.delay:
+                smooth = CubicSpline(clock, smooth, axis=0)(np.minimum(clock + wrong.delay, clock[-1]))
+            out[:, :, j] = smooth.T
+        samples.append(true)
+        smoothers.append(smoother)
+        noises.append(noise)
+    return Motion(out[0], out[1], out[2], tuple(samples), tuple(smoothers), tuple(noises))
+
+
+class Clock(NamedTuple):
+    """Samples of a record, and the middles of the integration steps between them."""
+
+    samples: Array
+    middles: Array
+    n_sub: int
+
+    def later(self, delay: float) -> Clock:
+        """The middles of steps that lie `delay` [s] earlier, from the first sample on."""
+        return self._replace(middles=np.maximum(self.middles - delay, 0.0))
+
+    def between(self, samples: Array) -> Array:
+        """Values (n, n_joints) at the samples, at the middles (n_joints, n_steps)."""
+        return np.ascontiguousarray(CubicSpline(self.samples, samples, axis=0)(self.middles).T)
+
+
+def clock_of(record: CaseRecord) -> Clock:
+    """Samples and integration steps of a record."""
+    n_sub = max(1, int(np.ceil(record.step / LONGEST_STEP - 1e-9)))
+    middles = (np.arange((len(record) - 1) * n_sub) + 0.5) * (record.step / n_sub)
+    samples = np.arange(len(record)) * record.step
+    return Clock(np.asarray(samples, dtype=np.float64), np.asarray(middles, dtype=np.float64), n_sub)
+
+
+class Coefficients(NamedTuple):
+    """Coefficients of the equations of all joints (n_joints, n_steps)."""
+
+    bias: Array
+    inertia: Array
+    reference: Array
+    load: Array
+
+    @classmethod
+    def of(cls, dynamics: Dynamics, motion: Motion, clock: Clock) -> Coefficients:
+        """Coefficients along a motion; the bias is the torque besides that of the joint's own acceleration."""
+        bias = clock.between(dynamics.torque - dynamics.inertia * motion.acceleration)
+        load = np.abs(clock.between(dynamics.torque))
+        return cls(bias, clock.between(dynamics.inertia), clock.between(motion.position), load)
+
+    @property
+    def stacked(self) -> Array:
+        """Bias and inertia (n_joints, 2, n_steps)."""
+        return np.stack([self.bias, self.inertia], axis=1)
