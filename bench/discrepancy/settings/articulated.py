@@ -146,12 +146,6 @@ class ArticulatedSettings:
         "MuJoCo's own default is two of them, and a servo of 10 Hz is then integrated to 3e-4.",
         unit="s",
     )
-    servo_band: tuple[float, ...] = setting(
-        (0.2, 10.0),
-        "Frequencies between which the torque noise that the motion's noise makes is averaged.",
-        "Those that a joint follows.",
-        unit="Hz",
-    )
     followed: float = setting(
         20.0,
         "Frequency up to which links are moved.",

@@ -32,9 +32,7 @@ def _entry(settings: Any, kind: str, base: type[Entry] = Entry) -> type[Entry]:
     for entry in fields(settings):
         value = getattr(settings, entry.name)
         kinds[entry.name] = (
-            _entry(value, f"settings of '{entry.name}'")
-            if is_dataclass(value)
-            else _kind(value)
+            _entry(value, f"settings of '{entry.name}'") if is_dataclass(value) else _kind(value)
         )
     name = "SettingsDocument" if base is Document else f"{type(settings).__name__}Entry"
     return entry_of(type(settings), lambda hint: None, kind=kind, name=name, base=base, replaced=kinds)

@@ -41,7 +41,22 @@ class CoarseSettings:
         "Convention.",
     )
     outside: float = setting(
-        0.05, "Share of effects that no catalogue holds among what is named, at least.", "Convention."
+        0.05,
+        "Share of effects that no catalogue holds among what explains records about as well as one of the catalogue does.",
+        "Convention.",
+    )
+    unlike: float = setting(
+        0.03,
+        "The same among what is named and leaves next to nothing, at least.",
+        (
+            "Of thirty cases of the background's maker in which an effect was named and no other came near, it was the right "
+            "one in all, and one more may not be (Laplace's rule of succession)."
+        ),
+    )
+    background: float = setting(
+        0.1,
+        "Part of the discrepancy's power that small things leave on average.",
+        "Backgrounds of 30 % leave 9 % of it.",
     )
     telling: float = setting(
         4.0,

@@ -2,11 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from bench.discrepancy.settings.describing import setting
+
+
+@dataclass(frozen=True)
+class MemorySettings:
+    """How long a component may remember what was before its record."""
+
+    width: float = setting(
+        0.01,
+        "Way back from a turning point, over the reach of the motion, that makes a reversal.",
+        "Convention.",
+    )
+    reversals: int = setting(
+        2,
+        "Reversals after which a slider has been dragged both ways and where it stood before is forgotten.",
+        "Convention.",
+    )
+    longest: float = setting(0.25, "Part of a record that may be left out for that, at most.", "Convention.")
 
 
 @dataclass(frozen=True)
@@ -47,3 +64,4 @@ class MotionSettings:
     edge_width: int = setting(
         9, "Samples over which it is averaged.", "A window of the smoother.", unit="samples"
     )
+    memory: MemorySettings = field(default_factory=MemorySettings)

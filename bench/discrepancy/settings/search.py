@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from bench.discrepancy.settings.describing import setting
 from bench.discrepancy.settings.search_parts import (
     CoupledSettings,
+    PlainSettings,
     ReadingSettings,
     RestartSettings,
     SoftFrictionSettings,
@@ -174,6 +175,7 @@ class SearchSettings:
         "Part of the nominal model's own friction with which more of it begins.",
         "Small enough not to stick.",
     )
+    plain: PlainSettings = field(default_factory=PlainSettings)
     restarts: RestartSettings = field(default_factory=RestartSettings)
     coupled: CoupledSettings = field(default_factory=CoupledSettings)
     readings: ReadingSettings = field(default_factory=ReadingSettings)

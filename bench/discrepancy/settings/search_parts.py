@@ -8,6 +8,14 @@ from bench.discrepancy.settings.describing import setting
 
 
 @dataclass(frozen=True)
+class PlainSettings:
+    """When two plain effects are tried in place of a large one."""
+
+    parameters: int = setting(2, "Parameters of a plain effect, at most.", "A size and a shape.")
+    bases: int = setting(2, "Plain effects that are extended.", "Convention.")
+
+
+@dataclass(frozen=True)
 class RestartSettings:
     """Restarts of fits in which friction sticks: the cost is rough there."""
 
