@@ -15,7 +15,7 @@ from bench.discrepancy.settings.judgement import CoarseSettings, HeldOutSettings
 from bench.discrepancy.settings.likelihood import ErrorSettings, LikelihoodSettings
 from bench.discrepancy.settings.localisation import LocalisationSettings
 from bench.discrepancy.settings.model import ModelSettings
-from bench.discrepancy.settings.motion import MotionSettings
+from bench.discrepancy.settings.motion import MemorySettings, MotionSettings
 from bench.discrepancy.settings.next_test import NextTestSettings
 from bench.discrepancy.settings.numerics import NumericsSettings
 from bench.discrepancy.settings.response import ResponseSettings
@@ -41,6 +41,7 @@ __all__ = [
     "LikelihoodSettings",
     "LikenessSettings",
     "LocalisationSettings",
+    "MemorySettings",
     "ModelSettings",
     "MotionSettings",
     "NextTestSettings",
