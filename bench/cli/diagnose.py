@@ -59,6 +59,8 @@ class Diagnose:
     """Go on where a unit, a sign or a part of the model stands against the diagnosis; what it was becomes a note."""
     budget: float = float("inf")
     """Seconds after which no further stage of the search is begun; the verdict is then the best one so far and says what was not tried."""
+    settings: Path | None = None
+    """File (JSON or TOML) with thresholds that differ from their defaults, as tables by room (see docs/thresholds.md)."""
     force: bool = False
     """Overwrite files that exist."""
     progress: bool = True
@@ -210,8 +212,10 @@ def _diagnosed(asked: Diagnose, case: Case, stage: Callable[[str], None]) -> Dia
     import numpy as np
 
     from bench.discrepancy import diagnose
+    from bench.discrepancy.settings import DEFAULT, read_settings
     from bench.errors import IdentificationError
 
+    settings = DEFAULT if asked.settings is None else read_settings(asked.settings)
     try:
         return diagnose(
             case,
@@ -220,6 +224,7 @@ def _diagnosed(asked: Diagnose, case: Case, stage: Callable[[str], None]) -> Dia
             anyway=asked.anyway,
             progress=stage,
             budget=asked.budget,
+            settings=settings,
         )
     except (np.linalg.LinAlgError, ArithmeticError) as error:
         raise IdentificationError(
