@@ -223,12 +223,16 @@ def test_frequency_and_damping_of_an_exact_decay():
 
 
 def test_the_chain_comes_to_rest_where_statics_say():
-    from bench.reproduction.linear_chain import SPRINGS, exact, matrix
+    from bench.reproduction.linear_chain import (
+        LINEAR_CHAIN_SETUP,
+        exact,
+        matrix,
+    )
 
-    stiffness = matrix(SPRINGS)
+    stiffness = matrix(LINEAR_CHAIN_SETUP.springs)
     assert np.array_equal(stiffness, stiffness.T)
     assert np.all(np.linalg.eigvalsh(stiffness) > 0.0)
-    assert np.count_nonzero(matrix(SPRINGS, as_printed=True) - stiffness) == 1
+    assert np.count_nonzero(matrix(LINEAR_CHAIN_SETUP.springs, as_printed=True) - stiffness) == 1
     load = np.array([300.0, -200.0])
     end = exact(np.tile(load, (2500, 1)), 0.01)[-1]
     # slowest mode 3.6 Hz, damped by about 5 1/s: 25 s leave e^-60 of the start; 1e-9 is left to rounding
@@ -236,11 +240,14 @@ def test_the_chain_comes_to_rest_where_statics_say():
 
 
 def test_integration_without_hysteresis_is_an_oscillator():
-    from bench.reproduction.simulated_hysteresis import RATE, integrate
+    from bench.reproduction.simulated_hysteresis import (
+        SIMULATED_HYSTERESIS_SETUP,
+        integrate,
+    )
 
     n = 4000
     rows = integrate(np.full(n, 2.0), [np.array([5.0, 0.0, 0.0, 0.0, 0.0])] * n)
-    time = np.arange(n) / RATE
+    time = np.arange(n) / SIMULATED_HYSTERESIS_SETUP.rate
     # RK4 at omega h = 2e-3: (omega h)^4 / 120 of a radian a radian, far below 1e-10
     np.testing.assert_allclose(rows[:, 0], 0.4 * (1.0 - np.cos(math.sqrt(5.0) * time)), atol=1e-10)
     np.testing.assert_allclose(rows[:, 2], 2.0 * np.cos(math.sqrt(5.0) * time), atol=1e-9)

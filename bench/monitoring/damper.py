@@ -32,11 +32,19 @@ from bench.identification.regressors import damper_model
 from bench.monitoring.periods import Period, PeriodSplitter
 from bench.monitoring.run_length import alarm_threshold
 
-VARIED = 0.02
-"""Standard deviation of log speed or log frequency over the learning below which it counts as constant: what two hundredths do to
-a damper of any exponent is a tenth of the change sought."""
-BEYOND = 0.1
-"""How far beyond the learnt range, in the logarithm, a period's speed and frequency may lie: half of the change sought, for n = 1."""
+
+@dataclass(frozen=True)
+class DamperSettings:
+    """Numbers of `bench.monitoring.damper`."""
+
+    varied: float = 0.02
+    """Standard deviation of log speed or log frequency over the learning below which it counts as constant: what two hundredths do to
+    a damper of any exponent is a tenth of the change sought."""
+    beyond: float = 0.1
+    """How far beyond the learnt range, in the logarithm, a period's speed and frequency may lie: half of the change sought, for n = 1."""
+
+
+SETTINGS = DamperSettings()
 
 
 @dataclass(frozen=True)
@@ -267,7 +275,7 @@ class DamperMonitor:
 
     def _regressed(self, y: NDArray[np.float64], coefficient: float, exponent: float) -> Baseline:
         x = np.array([self._motion(period) for period in self._learnt])
-        terms = np.concatenate([[True], x[:, 1:].std(axis=0) > VARIED])
+        terms = np.concatenate([[True], x[:, 1:].std(axis=0) > SETTINGS.varied])
         used = x[:, terms]
         inverse = np.linalg.pinv(used.T @ used)
         b = inverse @ used.T @ y
@@ -296,7 +304,7 @@ class DamperMonitor:
     def _judge(self, period: Period, learnt: Baseline) -> None:
         coefficient, exponent = self._estimate(period)
         motion = self._motion(period)
-        outside = (motion[1:] < learnt.low - BEYOND) | (motion[1:] > learnt.high + BEYOND)
+        outside = (motion[1:] < learnt.low - SETTINGS.beyond) | (motion[1:] > learnt.high + SETTINGS.beyond)
         used = motion[learnt.terms]
         y = self._log_energy(period, learnt.coefficient, learnt.exponent) - float(used @ learnt.regression)
         z = math.nan

@@ -27,6 +27,7 @@ class JumpSettings:
         apart: How much larger a jump must be than what happens at all other places, and a leap than the steps about it: records in
             which all channels jump now and then (pulses, impacts) are none in which samples are missing.
         most: Most places that are told; where more stand out, jumps belong to the record.
+        looked: Samples on either side of a leap in which nothing like it may happen.
     """
 
     order: int = 10
@@ -34,11 +35,10 @@ class JumpSettings:
     clear: float = 5.0
     apart: float = 2.0
     most: int = 3
+    looked: int = 200_000
 
 
 JUMPS = JumpSettings()
-_LOOKED = 200_000
-"""Samples on either side of a leap in which nothing like it may happen."""
 
 
 def hidden_dropouts(values: NDArray[np.float64], settings: JumpSettings = JUMPS) -> list[int]:
@@ -63,9 +63,9 @@ def hidden_dropouts(values: NDArray[np.float64], settings: JumpSettings = JUMPS)
         leaps = _leaps(values, moving, settings)
         if not 0 < len(leaps) <= settings.most:
             return []
-        part = slice(max(0, leaps[0] - _LOOKED), leaps[-1] + _LOOKED)
-        if part.stop - part.start > 4 * _LOOKED:
-            part = slice(max(0, leaps[0] - _LOOKED), leaps[0] + _LOOKED)
+        part = slice(max(0, leaps[0] - settings.looked), leaps[-1] + settings.looked)
+        if part.stop - part.start > 4 * settings.looked:
+            part = slice(max(0, leaps[0] - settings.looked), leaps[0] + settings.looked)
         scaled = (values[part][:, moving] - np.mean(values[part][:, moving], axis=0)) / spread[moving]
         news = _news(scaled, order)
     places = [k - part.start - order for k in leaps if order + 3 <= k - part.start < len(scaled)]
