@@ -17,10 +17,8 @@ from bench.discrepancy.judgement.validation_discrepancy import gaps
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.search.explain import Explanation, nominal_alone
 from bench.discrepancy.search.fits import key_of
+from bench.discrepancy.settings import JudgementSettings
 from bench.discrepancy.verdict import Gap, NamedEffect, NominalEstimate
-
-WITHIN_NOISE = 1.3
-"""Discrepancy over that of noise alone up to which an explanation is complete."""
 
 
 def with_closed(
@@ -75,12 +73,15 @@ def nominal_estimates(explanation: Explanation) -> tuple[NominalEstimate, ...]:
     return tuple(out.values())
 
 
-def complete(found: Sequence[Gap], *, sharp: bool, stated: bool) -> bool:
+def complete(found: Sequence[Gap], *, sharp: bool, stated: bool, settings: JudgementSettings) -> bool:
     """Whether what an explanation leaves is noise.
 
     Args:
         found: Discrepancies of the judging records.
         sharp: Whether the stated noise explains what is left.
         stated: Whether the noise is stated: where it is and does not, more is left, and be it in channels that are not judged.
+        settings: How near to noise counts as noise where none is stated.
     """
-    return sharp or (not stated and all(gap.after <= WITHIN_NOISE * gap.noise_floor for gap in found))
+    return sharp or (
+        not stated and all(gap.after <= settings.within_noise * gap.noise_floor for gap in found)
+    )
