@@ -203,6 +203,14 @@ def test_readings_that_stay_the_same_are_believed_as_far_as_they_tell_something(
     assert np.std(scores["white"]) > 4.0
     fast = weight_of_readings(np.cumsum(np.full(50, 3.0)), step, step / np.sqrt(12.0))
     np.testing.assert_allclose(fast, 1.0)
+    # a joint at rest whose reading is thrown to and fro: its mean square is neither raised nor lowered
+    squares, counts, noise = 0.0, 0.0, np.hypot(step / np.sqrt(12.0), 0.13)
+    for rest in rng.uniform(-0.5, 0.5, 400):
+        readings = np.round((rest + 0.13 * rng.standard_normal(500)) / step) * step
+        weight = weight_of_readings(readings, step, float(noise))
+        squares += float(np.sum((weight * (readings - rest) / noise) ** 2))
+        counts += float(np.sum(weight**2))
+    assert squares / counts == pytest.approx(1.0, abs=0.2)
 
 
 def test_a_free_run_behind_a_late_encoder_starts_on_the_clock_of_its_log(tmp_path):
