@@ -3,7 +3,7 @@ BIN := .venv/bin
 # pyNastran's metadata asks for numpy < 2; the tests use its bulk-data reader, which runs with numpy 2.
 NASTRAN := pyNastran==1.4.1 cpylog docopt-ng
 
-.PHONY: demo test lint types layers wheel results clean
+.PHONY: demo test lint types layers wheel results docs clean
 
 demo: .venv/core
 	$(BIN)/jointbench demo --out out/demo --force
@@ -21,6 +21,12 @@ types: .venv/full
 layers: .venv/full
 	$(BIN)/lint-imports
 
+docs: .venv/docs
+	$(BIN)/python scripts/docs.py --check
+	NO_MKDOCS_2_WARNING=1 DISABLE_MKDOCS_2_WARNING=true $(BIN)/python -m mkdocs build --strict -f scripts/site/mkdocs.yml
+	$(BIN)/python scripts/snippets.py
+	$(BIN)/python scripts/notebooks.py --check
+
 results: .venv/full
 	$(BIN)/python scripts/results.py
 
@@ -37,6 +43,10 @@ results: .venv/full
 	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[rl,scale,io,peers,test]'
 	$(BIN)/python -m pip install --quiet --no-deps $(NASTRAN)
 	touch $@ .venv/core
+
+.venv/docs: .venv/full
+	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[docs]'
+	touch $@ .venv/core .venv/full
 
 clean:
 	rm -rf .venv out build dist

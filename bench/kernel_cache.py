@@ -38,6 +38,24 @@ def provide(package: Path) -> Path | None:
     return folder
 
 
+def place(package: Path) -> str:
+    """Where numba keeps machine code, in words."""
+    if os.environ.get(VARIABLE):
+        return os.environ[VARIABLE]
+    if _beside(package):
+        return f"beside the source ({package})"
+    return "the user's cache" if _users() else "nowhere: every process compiles anew"
+
+
+def is_empty(package: Path) -> bool:
+    """Whether nothing has been compiled yet, so that the next command takes longer than those after it."""
+    chosen = os.environ.get(VARIABLE)
+    places = [Path(chosen)] if chosen else [package]
+    if not chosen and not _beside(package):
+        places = [_users_folder()]
+    return not any(next(folder.rglob("*.nbi"), None) for folder in places)
+
+
 def _beside(package: Path) -> bool:
     """Whether every folder with modules has, or may be given, a `__pycache__` to write to."""
     for folder, names, files in os.walk(package):
@@ -49,8 +67,8 @@ def _beside(package: Path) -> bool:
     return True
 
 
-def _users() -> bool:
-    """Whether the user has a cache folder of his own, or may be given one, where numba looks for it."""
+def _users_folder() -> Path:
+    """The user's cache folder, where numba looks for it."""
     home = Path("~").expanduser()
     if sys.platform == "darwin":
         folder = home / "Library" / "Caches"
@@ -58,7 +76,12 @@ def _users() -> bool:
         folder = Path(os.environ.get("LOCALAPPDATA", home / "AppData" / "Local"))
     else:
         folder = Path(os.environ.get("XDG_CACHE_HOME") or home / ".cache")
-    folder = folder / "numba"
+    return folder / "numba"
+
+
+def _users() -> bool:
+    """Whether the user has a cache folder of his own, or may be given one."""
+    folder = _users_folder()
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):

@@ -13,7 +13,8 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from bench.errors import UnknownNameError
+from bench.errors import IdentificationError, UnknownNameError
+from bench.identification.memory import MemoryModel, fit_memory
 from bench.identification.network import NetworkModel, fit_network
 from bench.identification.polynomial import PolynomialModel, fit_polynomial
 from bench.identification.restoring_force import JointData
@@ -30,7 +31,7 @@ class Comparison(NamedTuple):
 
 
 def element_from(
-    model: PolynomialModel | NetworkModel, joints: Sequence[str], *, name: str = "joint"
+    model: PolynomialModel | NetworkModel | MemoryModel, joints: Sequence[str], *, name: str = "joint"
 ) -> Element:
     """The reduced-order joint of an identified model, ready to be put into a rig."""
     return Element(model.law, tuple(joints), model.theta, name=name, validity=model.range)
@@ -40,7 +41,7 @@ def reduced_joint(
     data: JointData,
     joints: Sequence[str],
     *,
-    model: Literal["polynomial", "network"] = "network",
+    model: Literal["polynomial", "network", "memory"] = "network",
     name: str = "joint",
     rng: np.random.Generator | None = None,
     **settings: object,
@@ -50,13 +51,13 @@ def reduced_joint(
     Args:
         data: States and restoring forces, of all training records together.
         joints: Joints or fixed tendons that the element will act on, in the order of the data's columns.
-        model: "polynomial" (settings as of `fit_polynomial`) or "network" (as of `fit_network`).
+        model: "polynomial" (settings as of `fit_polynomial`), "network" (as of `fit_network`) or "memory" (as of `fit_memory`).
         name: Name of the element; the true one's, so that channels of both rigs compare.
         rng: Source of the network's random starts.
         **settings: Passed on.
 
     Raises:
-        UnknownNameError: `model` is neither.
+        UnknownNameError: `model` is none of these.
         IdentificationError: The data do not determine the model.
     """
     if model == "polynomial":
@@ -65,7 +66,14 @@ def reduced_joint(
         generator = rng if rng is not None else np.random.default_rng(0)
         fitted = fit_network(data.states, data.forces, rng=generator, **settings)  # type: ignore[arg-type]
         return element_from(fitted, joints, name=name)
-    raise UnknownNameError("reduced-order model", model, ("polynomial", "network"))
+    if model == "memory":
+        if data.time is None:
+            raise IdentificationError(
+                "a joint with memory needs the times of its data; `joint_data` gives them"
+            )
+        remembered = fit_memory(data.states, data.forces, time=data.time, **settings)  # type: ignore[arg-type]
+        return element_from(remembered, joints, name=name)
+    raise UnknownNameError("reduced-order model", model, ("polynomial", "network", "memory"))
 
 
 def compare(

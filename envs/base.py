@@ -12,6 +12,9 @@ from bench.errors import ParameterError
 from .benches import FLOATS, Benches, Options, require_count
 from .setups import PAIRS, SDOF_LAWS, Setup, discrimination_setup, joint_setup, sdof_setup
 
+MOST_DRAWS = 10_000
+"""Most prior draws that a reward is averaged over: its standard error is then a hundredth of their spread, and every step runs each."""
+
 RENDER_MODES = ("rgb_array", "human")
 
 _OPTIONS = tuple(Options.__dataclass_fields__)
@@ -29,8 +32,8 @@ def setup_of(kind: str, arguments: dict[str, Any]) -> Setup:
     """
     if kind == "sdof":
         laws = _names("laws", arguments.pop("laws", SDOF_LAWS))
-        return sdof_setup(laws, require_count("n_draws", arguments.pop("n_draws", 2 * len(laws))))
-    n_draws = require_count("n_draws", arguments.pop("n_draws", 4))
+        return sdof_setup(laws, require_count("n_draws", arguments.pop("n_draws", 2 * len(laws)), MOST_DRAWS))
+    n_draws = require_count("n_draws", arguments.pop("n_draws", 4), MOST_DRAWS)
     if kind == "joint":
         return joint_setup(n_draws)
     rig = arguments.pop("rig", "joint")

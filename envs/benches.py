@@ -24,6 +24,7 @@ from bench.excitation.shaping import SHAPINGS
 from bench.excitation.station import Desk
 from bench.excitation.stepping import run_of
 from bench.excitation.windows import Window, advance, advance_prior, advance_rivals
+from bench.limits import READING_LIMITS, size_text
 
 from .laboratory import Laboratories
 from .setups import Setup
@@ -72,15 +73,30 @@ class Options:
         require_count("n_knots", self.n_knots)
 
 
-def require_count(name: str, value: Any) -> int:
+def require_count(name: str, value: Any, most: int | None = None) -> int:
     """The value of an argument that counts something.
 
     Raises:
-        ParameterError: It is no whole number of at least one.
+        ParameterError: It is no whole number of at least one, or more than `most`.
     """
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
         raise ParameterError(f"{name} is {value}; a whole number of at least one is expected")
+    if most is not None and value > most:
+        raise ParameterError(f"{name} is {value}; at most {most} are expected")
     return int(value)
+
+
+def _check_size(numbers: int, what: str) -> None:
+    """Refuse what would take more memory than any file that is read may.
+
+    Raises:
+        ParameterError: It would.
+    """
+    if numbers > READING_LIMITS.numbers:
+        raise ParameterError(
+            f"{what} takes {size_text(8.0 * numbers)}, and at most {size_text(8.0 * READING_LIMITS.numbers)} are taken: ask for shorter "
+            "episodes, or for fewer environments or draws"
+        )
 
 
 def _is_number(value: Any) -> bool:
@@ -154,13 +170,17 @@ class SteppedBenches(ABC):
             raise ParameterError(
                 f"n_knots is {options.n_knots} in a window of {self.n_steps} steps; a number that divides them is expected"
             )
+        _check_size(
+            n * (self.n_windows + 1) * self.n_steps * len(setup.noise),
+            f"an episode of {n} environment{'s' * (n > 1)}",
+        )
+        self._merit = np.zeros(n)
         self.station = setup.station(
             self.n_steps, self.n_windows, shaping=options.shaping, n_knots=options.n_knots
         )
         self.desk = Desk(self.station, n)
         self.truth: list[Draw | None] = [None] * n
         self._rivals = isinstance(setup.questions[0], Rivals)
-        self._merit = np.zeros(n)
         # The sensors' noise of an episode and, last, of the rest before it: drawn at once, which is faster.
         self._disturbance = np.zeros((n, self.n_windows + 1, self.n_steps, len(self.station.channels)))
 
@@ -331,6 +351,9 @@ class Benches(SteppedBenches):
         draws, p = panel.counts.shape[1], int(panel.counts.max())
         self.question = np.zeros(n, dtype=np.int64)
         self._states = np.zeros((n, panel.members.shape[1], panel.ensemble.n_states))
+        _check_size(
+            n * draws * (p * p + p), f"what is known of {draws} draws in {n} environment{'s' * (n > 1)}"
+        )
         self._fisher, self._score = np.zeros((n, draws, p, p)), np.zeros((n, draws, p))
         self._square = np.zeros((n, draws))
         self._contrast = Contrast.zeros(n, draws // 2, parameters=p) if self._rivals else None

@@ -14,6 +14,7 @@ from bench.errors import ParameterError, UnknownNameError
 from bench.excitation.ensemble import available_threads
 
 from .base import action_space, make_benches, observation_space, rest_info
+from .benches import require_count
 from .rendering import Picture
 
 
@@ -48,8 +49,7 @@ class BenchVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray
             render_mode: "rgb_array" for a picture of each, or None.
             **arguments: Those of the single environment.
         """
-        if num_envs < 1:
-            raise ParameterError(f"{num_envs} environments came; at least one is expected")
+        require_count("num_envs", num_envs)
         if render_mode not in {None, "rgb_array"}:
             raise UnknownNameError("render mode of a vector environment", str(render_mode), ("rgb_array",))
         self.num_envs = num_envs

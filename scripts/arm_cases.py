@@ -19,6 +19,7 @@ from bench.discrepancy import read_case
 from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis, diagnose_articulated
 from bench.discrepancy.articulated.judgement import ladder
 from bench.errors import BenchError
+from bench.files import write_text
 
 
 def told(found: ArticulatedDiagnosis) -> str:
@@ -66,7 +67,7 @@ def main() -> None:
             continue
         used = time.process_time() - began
         written = found.verdict.to_json() | {"cpu_seconds": round(used, 1)}
-        answer.write_text(json.dumps(written, indent=1))
+        write_text(answer, json.dumps(written, indent=1))
         line = f"{folder.name}: {told(found)} {used:.0f} s of processor"
         print(line, flush=True)
         with (options.results / "ladders.txt").open("a") as file:

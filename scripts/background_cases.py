@@ -80,7 +80,9 @@ def _tell(console: Console, score: BackgroundScore) -> None:
             markup=False,
             highlight=False,
         )
-    console.print(f"expected calibration error of names: {score.calibration:.3f}")
+    console.print(
+        f"expected calibration error of names: {score.calibration:.3f}; {score.scatter:.3f} if every probability were exact"
+    )
     for stated, right, n in score.reliability:
         console.print(f"  stated {stated:.2f}, right {right:.2f}, of {n}")
 

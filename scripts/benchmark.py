@@ -26,6 +26,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 from benchmarks.timing import Row
 
+from bench.files import write_text
+
 GROUPS = tuple(
     sorted(
         path.stem
@@ -90,7 +92,7 @@ def main() -> int:
     if args.json:
         print(text)
     if args.save is not None:
-        args.save.write_text(text, encoding="utf-8")
+        write_text(args.save, text)
     return 0 if holds else 1
 
 

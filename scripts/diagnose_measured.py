@@ -33,7 +33,9 @@ from bench.errors import BenchError
 
 SOURCES = tuple(
     sorted(
-        path.stem for path in (Path(__file__).parent / "measured").glob("[a-z]*.py") if path.stem != "target"
+        path.stem
+        for path in (Path(__file__).parent / "measured").glob("[a-z]*.py")
+        if path.stem not in {"target", "acceptance"}
     )
 )
 

@@ -48,7 +48,7 @@ from bench.excitation.estimation import Records, estimate
 from bench.excitation.planner import Planner
 from bench.excitation.sequential import SequentialPlanner
 from bench.excitation.stepping import Packed
-from bench.files import write_text
+from bench.files import replacing, write_text
 from envs.setups import Setup, discrimination_setup, joint_setup, rival_experiment, sdof_setup
 
 HELD_OUT = 7_000_000  # seeds of rigs and noise; no training draws from them
@@ -130,8 +130,8 @@ def designed(
             evaluations=args.evaluations,
         )  # fmt: skip
         commands.append(controls_from(plan))
-    path.parent.mkdir(parents=True, exist_ok=True)
-    np.savez_compressed(path, **{f"question_{i}": u for i, u in enumerate(commands)})
+    with replacing(path) as temporary:
+        np.savez_compressed(temporary, **{f"question_{i}": u for i, u in enumerate(commands)})
     return commands
 
 
@@ -332,8 +332,7 @@ def main() -> int:
         print(text)
         return 0
     if args.json is not None:
-        args.json.parent.mkdir(parents=True, exist_ok=True)
-        args.json.write_text(text, encoding="utf-8")
+        write_text(args.json, text)
     console = Console()
     for group in (key for key, value in document.items() if isinstance(value, dict)):
         measure = f"{document['measure']} \\[{document['unit']}]"

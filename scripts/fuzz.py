@@ -34,11 +34,13 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 from fuzzing.documents import TARGETS as DOCUMENTS
 from fuzzing.documents import Target
+from fuzzing.products import PRODUCT_TARGETS
 from fuzzing.records import RECORD_TARGETS
 
 from bench.errors import BenchError
+from bench.files import write_text
 
-TARGETS: dict[str, Target] = {**DOCUMENTS, **RECORD_TARGETS}
+TARGETS: dict[str, Target] = {**DOCUMENTS, **RECORD_TARGETS, **PRODUCT_TARGETS}
 """Targets by name."""
 
 SECONDS = 20
@@ -47,7 +49,7 @@ SPARE = 6 * 2**30
 """Address space beyond what a worker has at its start; what asks for more gets a MemoryError instead of the machine."""
 WARM = 300
 """Seconds that a worker may take to import what it needs and to read sound inputs."""
-MAKES_FILES = ("manifest",)
+MAKES_FILES = ("manifest", "parts")
 """Targets that write beside what they read, as they should."""
 
 
@@ -246,7 +248,7 @@ def main() -> int:
         print(json.dumps(document, indent=1))
         return 1 if broken else 0
     if args.json is not None:
-        args.json.write_text(json.dumps(document, indent=1), encoding="utf-8")
+        write_text(args.json, json.dumps(document, indent=1))
     for row in broken:
         print(f"{row.target} {row.number}: {row.what[:300]}")
     return 1 if broken else 0

@@ -22,6 +22,7 @@ import tyro
 from numpy.typing import NDArray
 
 from bench import model_path
+from bench.files import write_bytes
 
 SIDES = 6
 """Corners of the wire's cross-section."""
@@ -160,7 +161,7 @@ def main(args: Args) -> None:
     for path in sorted(args.models.glob("*.xml")):
         for file, content in springs(path).items():
             target = args.models / "assets" / file
-            target.write_bytes(content)
+            write_bytes(target, content)
             print(f"{target}  {len(content) / 1000:.0f} kB")
 
 

@@ -2,8 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from pathlib import Path
+
 import numpy as np
 import pytest
+
+
+@pytest.fixture(autouse=True)
+def _no_log_of_mujoco() -> Iterator[None]:
+    """MuJoCo writes its warnings into the folder that one works in, unless the bench keeps them to itself."""
+    log = Path.cwd() / "MUJOCO_LOG.TXT"
+    before = log.stat().st_size if log.exists() else 0
+    yield
+    assert (log.stat().st_size if log.exists() else 0) == before, f"MuJoCo wrote a warning into {log}"
 
 
 @pytest.fixture

@@ -23,7 +23,7 @@ from bench.errors import BenchError
 
 RATE, FINE, LENGTH = 100.0, 20, 6.0
 """Samples a second, steps a sample of the simulation that stands for the robot, and seconds."""
-NOISE = 2e-4
+NOISE, SPEED_NOISE = 2e-4, 5e-3
 KP = {"shoulder": 60.0, "elbow": 40.0}
 LIMIT, PAYLOAD = 0.4, 0.25
 LINK = """<body name="{body}" pos="0 0 {z}"><joint name="{joint}" type="hinge" axis="0 1 0" damping="{damping}" armature="0.02"
@@ -55,10 +55,10 @@ def mjcf(*, servo, friction=0.0, payload=0.0):
     )
 
 
-def targets(seed):
+def targets(seed, length=LENGTH):
     """Targets (n, 2) of the joints [rad]: sines that begin at rest."""
     rng = np.random.default_rng(seed)
-    t = np.arange(int(LENGTH * RATE)) / RATE
+    t = np.arange(int(length * RATE)) / RATE
     out = np.zeros((len(t), 2))
     for j in range(2):
         for f in (0.25, 0.6, 1.1):
@@ -66,25 +66,26 @@ def targets(seed):
     return out * np.minimum(t / 0.5, 1.0)[:, None] ** 2
 
 
-def record(truth, seed, *, servo, offset=0.0):
+def record(truth, seed, *, servo, offset=0.0, velocity=False, length=LENGTH):
     """Columns of a log; a torque-driven arm follows the targets by a loop that the log does not mention."""
     model = mujoco.MjModel.from_xml_string(truth)
     data = mujoco.MjData(model)
     rng = np.random.default_rng(100 + seed)
-    wanted = targets(seed)
+    wanted = targets(seed, length)
     rows = []
     for goal in wanted:
         command = goal if servo else 20.0 * (goal - data.qpos) - 1.0 * data.qvel
-        rows.append([*command, *data.qpos])
+        rows.append([*command, *data.qpos, *(data.qvel if velocity else ())])
         data.ctrl[:] = command
         mujoco.mj_step(model, data, FINE)
     table = np.array(rows)
-    table[:, 2:] += NOISE * rng.standard_normal((len(table), 2))
+    table[:, 2:4] += NOISE * rng.standard_normal((len(table), 2))
+    table[:, 4:] += SPEED_NOISE * rng.standard_normal((len(table), table.shape[1] - 4))
     table[:, 3] += offset
     return np.column_stack([np.arange(len(table)) / RATE, table])
 
 
-def write_case(folder, truth, *, servo, offset=0.0, nominal=None):
+def write_case(folder, truth, *, servo, offset=0.0, nominal=None, velocity=False, length=LENGTH):
     """A case folder; the records of a truth beside the model without anything."""
     (folder / "model.xml").write_text(nominal or mjcf(servo=servo))
     parameters = {
@@ -102,14 +103,17 @@ def write_case(folder, truth, *, servo, offset=0.0, nominal=None):
             parameters[f"kp:{j}_drive"] = {"value": kp, "std": 0.05 * kp, "unit": "N m/rad"}
     for j in KP:
         channels[f"{j}_q"] = {"unit": "rad", "joint": j, "quantity": "position", "noise_std": NOISE}
+    for j in KP if velocity else ():
+        channels[f"{j}_v"] = {"unit": "rad/s", "joint": j, "quantity": "velocity", "noise_std": SPEED_NOISE}
     document = {
         "rig": "model.xml", "sample_rate_hz": RATE, "parameters": parameters, "channels": channels,
         "load_interpolation": "zero_order_hold",
     }  # fmt: skip
     (folder / "nominal.json").write_text(json.dumps(document))
     for k, name in enumerate(("identification", "validation")):
-        table = record(truth, k, servo=servo, offset=offset)
-        header = ",".join(["time", *(f"{j}_in" for j in KP), *(f"{j}_q" for j in KP)])
+        table = record(truth, k, servo=servo, offset=offset, velocity=velocity, length=length)
+        names = ["time", *(f"{j}_in" for j in KP), *(f"{j}_q" for j in KP)]
+        header = ",".join(names + [f"{j}_v" for j in KP if velocity])
         np.savetxt(folder / f"{name}.csv", table, delimiter=",", header=header, comments="", fmt="%.9g")
     return folder
 

@@ -33,7 +33,8 @@ from bench.campaign import (
 from bench.campaign.distribution import Distribution
 from bench.campaign.drawing import dimension, draw_at, draws, point_of
 from bench.campaign.generation import Generator
-from bench.campaign.plan import PLAN_LIMITS, leaves
+from bench.campaign.nest import leaves
+from bench.campaign.plan import PLAN_LIMITS
 from bench.campaign.quantities import read_quantity
 from bench.campaign.tables import part_contents
 from bench.errors import BenchError, FileFormatError, ParameterError, UnknownNameError

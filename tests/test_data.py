@@ -6,9 +6,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.io import savemat
 
-from bench.data import FRICTION_DAMPER_FOLDER, friction_damper, friction_damper_names
-from bench.errors import UnknownNameError
+from bench.data import (
+    FRICTION_DAMPER_FOLDER,
+    bouc_wen_benchmark,
+    emps,
+    friction_damper,
+    friction_damper_names,
+    silverbox,
+)
+from bench.errors import FileFormatError, UnknownNameError
+from bench.limits import MissingFileError
 from bench.record_files import read_recording
 
 
@@ -53,6 +62,30 @@ def test_excerpt_ships_with_licence_and_attribution():
     for part in ("ARTS-Laboratory", "Coble", "CC BY-SA 4.0", "What was changed"):
         assert part in attribution
     assert sum(file.stat().st_size for file in FRICTION_DAMPER_FOLDER.iterdir()) < 1.5e6
+
+
+def test_public_records_are_read_from_a_folder(tmp_path):
+    t = np.arange(3000) / 1000.0
+    volts = {"vir": 2.0 * np.sin(t), "gtau": 35.0, "qm": np.cos(t), "qg": np.cos(t), "t": t}
+    savemat(tmp_path / "DATA_EMPS.mat", volts)
+    record = emps(tmp_path)
+    assert record.sample_rate == 1000.0
+    np.testing.assert_allclose(record["force"], 70.0 * np.sin(t))
+    savemat(tmp_path / "SNLS80mV.mat", {"V1": np.sin(t), "V2": np.cos(t)})
+    assert silverbox(tmp_path).channel("output").unit == "V"
+    for name in ("multisine", "sinesweep"):
+        for kind in "uy":
+            savemat(tmp_path / f"{kind}val_{name}.mat", {f"{kind}val_{name}": np.sin(t)})
+    with pytest.raises(MissingFileError, match=r"train\.h5"):
+        bouc_wen_benchmark(tmp_path)
+    with pytest.raises(MissingFileError, match="PULSES"):
+        emps(tmp_path, pulses=True)
+    savemat(tmp_path / "DATA_EMPS.mat", {"qm": t})
+    with pytest.raises(FileFormatError, match="'qg', 'vir', 'gtau', 't'"):
+        emps(tmp_path)
+    (tmp_path / "SNLS80mV.mat").write_bytes(b"nothing")
+    with pytest.raises(FileFormatError, match="cannot be read"):
+        silverbox(tmp_path)
 
 
 def test_excerpt_script(tmp_path):

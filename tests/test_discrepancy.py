@@ -215,6 +215,10 @@ def test_catalogue_names_are_unique_and_found():
     names = [effect.name for effect in CATALOGUE]
     assert len(set(names)) == len(names)
     assert effect_named("gap").name == "gap"
+    # what is read off the records first can be left out and scored like any other
+    assert effect_named("timed_force").family == "external"
+    assert effect_named("scheduled_bouc_wen_hysteresis").family == "hysteresis"
+    assert effect_named("record_dependent_friction").family == "friction"
     with pytest.raises(UnknownNameError, match="Did you mean 'gap'"):
         effect_named("gapp")
 

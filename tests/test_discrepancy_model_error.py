@@ -11,6 +11,7 @@ from planted_cases import MASS, NOISE, STIFFNESS, linear_motion, motion_with, pl
 from bench.discrepancy import diagnose
 from bench.discrepancy.effects.catalogue import effect_named
 from bench.discrepancy.fitting.map_fit import fit
+from bench.discrepancy.judgement.coarse import outside
 from bench.discrepancy.judgement.held_out import HeldOut, held_out, shares
 from bench.discrepancy.likelihood.model_error import (
     band_weights,
@@ -20,8 +21,11 @@ from bench.discrepancy.likelihood.model_error import (
     smoothed,
 )
 from bench.discrepancy.likelihood.problem import Problem
+from bench.discrepancy.localisation.remainder import free_force
+from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.search.explain import Explanation
+from bench.discrepancy.search.fits import complexity
 
 FEW = [
     effect_named(name)
@@ -125,6 +129,49 @@ def test_weights_average_over_what_blocks_say():
     assert shares(lucky, np.zeros(2), rng)[1] > 1e3 * shares(steady, np.zeros(2), rng)[1]
 
 
+def test_what_a_free_force_would_still_take_is_told():
+    cubic = planted_case(lambda f: motion_with(f, lambda x, v, z: (2e5 * x**3, [])), n=1500)
+    for case, kind in ((cubic, "displacement"), (planted_case(n=1500), "")):
+        problem = problem_of(case)
+        found = free_force(Explanation(((problem, fit(problem, (), start=np.zeros(3))),)))
+        if kind:
+            assert kind in found["free_force"]
+            assert found["free_force_gain"] > 0.5
+        else:
+            assert found["free_force_gain"] < 0.05
+
+
+def test_blocks_that_repeat_one_motion_make_no_difference_certain():
+    rng = np.random.default_rng(1)
+    left = rng.standard_normal(144)
+    own = left.reshape(12, 12)
+    apart = 0.15 * rng.standard_normal(144)
+    # the rival is worse by the same amount in every block
+    first = HeldOut(Explanation(()), np.full(12, np.sum(own**2) / 12.0), left)
+    rival = HeldOut(Explanation(()), first.scores + 0.4, left + apart)
+    worse, error = rival.worse_than(first)
+    assert worse == pytest.approx(4.8)
+    assert error == pytest.approx(2.0 * np.linalg.norm(apart))
+
+
+def test_what_is_left_tells_how_likely_the_cause_stands_in_no_catalogue():
+    assert outside(0.0) == outside(0.1) == pytest.approx(0.03)
+    assert outside(0.3) == pytest.approx(0.1, abs=0.02)
+    assert outside(1.0) > 0.95
+    parts = [outside(left) for left in np.linspace(0.0, 1.0, 20)]
+    assert parts == sorted(parts)
+
+
+def test_a_law_of_many_parameters_takes_more_to_be_described_than_two_of_one_each():
+    place = problem_of(planted_case(n=600)).structure.places[0]
+
+    def size(*names: str) -> float:
+        return complexity(tuple(Placed(effect_named(name), place) for name in names))
+
+    assert size("coulomb_friction") < size("stribeck_friction") < size("coulomb_friction", "force_offset")
+    assert size("coulomb_friction", "force_offset") < size("backlash_friction")
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("noise", [NOISE, UNSTATED, UNDERSTATED], ids=["stated", "unstated", "understated"])
 def test_an_effect_is_named_over_a_background_that_no_model_has(noise):
@@ -134,6 +181,7 @@ def test_an_effect_is_named_over_a_background_that_no_model_has(noise):
     first = verdict.named[0]
     assert first.name == "cubic_stiffness"
     assert not verdict.complete
+    assert 0.0 <= verdict.remainder["free_force_gain"] <= 1.0
     assert verdict.gap.after < 0.3 * verdict.gap.parameters_only
     low, high = first.closed_ci95
     assert low <= first.closed <= high

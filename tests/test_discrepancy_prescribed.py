@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 
 from bench.discrepancy.case.case import Case, CaseChannel, NominalParameter, record_from_arrays
+from bench.discrepancy.checks.data_quality import notes
 from bench.discrepancy.diagnosis import diagnose
 from bench.discrepancy.effects.catalogue import effect_named
 from bench.discrepancy.fitting.map_fit import fit
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.model.rigs import structure_of
-from bench.discrepancy.motion.prescribed import decided, held, prescribed_motion
+from bench.discrepancy.motion.prescribed import MEMORY, decided, held, prescribed_motion, remembering
 from bench.discrepancy.search.fits import consistent
 from bench.errors import RecordingError
 
@@ -97,6 +98,43 @@ def test_reversals_smaller_than_the_noise_do_not_count() -> None:
     assert np.array_equal(out[kept], velocity[kept])
 
 
+def test_a_component_remembers_where_it_stood_until_it_was_dragged_both_ways() -> None:
+    t = np.linspace(0.0, 10.0, 5001)
+    # reversals at pi/2 and 3 pi/2 of the phase
+    until = remembering(0.01 * (1.0 + t) * np.sin(2.0 * np.pi * t))
+    assert t[until] == pytest.approx(0.75, abs=0.05)
+    assert remembering(np.sin(2.0 * np.pi * t) + 1e-3 * np.sin(300.0 * t)) == pytest.approx(until, abs=30)
+    # no reversals, or so late that hardly anything would be left
+    assert remembering(t) == 0
+    assert remembering(np.sin(2.0 * np.pi * 0.1 * t)) == 0
+    assert MEMORY.longest < 0.5
+
+
+def test_what_a_loop_was_before_its_record_is_held_against_no_law(rng: np.random.Generator) -> None:
+    known = case(rng)
+    x = known.identification[0].values["displacement"]
+    until = remembering(x)
+    problem = Problem(known, structure_of(known), known.identification)
+    (data,) = problem.data
+    assert data.compared is not None
+    assert not data.compared[:until].any()
+    assert data.compared[until : until + 500].any()
+
+
+def test_channels_of_a_prescribed_motion_are_held_against_one_another(rng: np.random.Generator) -> None:
+    known = case(rng)
+    records = []
+    for record in (*known.identification, *known.validation):
+        v = np.gradient(record.values["displacement"], STEP)
+        smooth = np.convolve(v, np.ones(25) / 25.0, mode="same")
+        late = np.interp(record.time - 0.02, record.time, smooth)
+        records.append(record_from_arrays(record.name, record.time, {**record.values, "velocity": late}))
+    channels = (*known.channels, CaseChannel("velocity", "m/s", "prescribed", 2e-3))
+    both = replace(known, channels=channels, identification=(records[0],), validation=(records[1],))
+    said = notes(both, Problem(both, structure_of(both), both.identification))
+    assert any("'velocity' lags 'displacement' by" in note for note in said)
+
+
 def test_only_reversals_and_dwells_are_in_doubt(rng: np.random.Generator) -> None:
     known = case(rng, friction=FRICTION)
     record = known.identification[0]
@@ -105,6 +143,7 @@ def test_only_reversals_and_dwells_are_in_doubt(rng: np.random.Generator) -> Non
     assert compared is not None
     true = np.gradient(strokes(0.8, 0.3), STEP)
     fast = np.abs(true) > 0.3 * np.abs(true).max()
+    fast[: remembering(prescribed.motion.position[:, 0])] = False
     assert compared[fast].mean() > 0.99
     assert compared[np.abs(true) < 1e-9].mean() < 0.2
     # a smoother knows one side of the first samples only: nothing is compared there

@@ -333,6 +333,12 @@ def test_the_command_lists_and_writes_schemas(tmp_path, capsys):
     assert main(["schema", "plan", "-o", str(out), "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == {"name": "plan", "file": str(out)}
     assert json.loads(out.read_text()) == generated("plan")
+    capsys.readouterr()
+    assert main(["schema", "rig", "-o", str(out)]) == 2
+    assert "--force" in capsys.readouterr().err
+    assert json.loads(out.read_text()) == generated("plan")
+    assert main(["schema", "rig", "-o", str(out), "--force"]) == 0
+    assert json.loads(out.read_text()) == generated("rig")
     assert main(["schema", "rigg"]) == 2
     assert "Did you mean 'rig'" in capsys.readouterr().err
     assert main(["schema"]) == 2

@@ -22,6 +22,8 @@ record = bench.simulate(rig, {"shaker": np.full(500, 10.0)})
 assert record["carriage.gap/force"].max() > 0.0
 from bench.data import friction_damper_names
 assert len(friction_damper_names()) == 8
+from bench.examples import copy_example
+assert pathlib.Path("stage/stage.xml") in copy_example("mismatch", "stage")
 assert "torch" not in sys.modules
 import jointbench
 assert jointbench.Rig is bench.Rig
@@ -60,6 +62,7 @@ def test_wheel_holds_code_models_data_and_licences_and_nothing_else(wheel):
         "bench/_data/published_network.json",
         "jointbench/__init__.py",
         "bench/_data/schemas/nominal.json",
+        "bench/_examples/mismatch/measure.py",
     ):
         assert expected in names
     assert not [name for name in names if "_facade" in name]

@@ -4,10 +4,11 @@
 it with its hashes, `write_minari` stores rollouts of a policy.
 """
 
+from bench.campaign.alternatives import ElementPlan, ExcitationPlan, RigPlan, SensorPlan
 from bench.campaign.distribution import Choice, Distribution, Integers, LogUniform, Normal, Shared, Uniform
 from bench.campaign.execution import CampaignResult, Progress, run_campaign
 from bench.campaign.lock import CampaignError
-from bench.campaign.plan import ElementPlan, ExcitationPlan, Plan, RigPlan, SensorPlan
+from bench.campaign.plan import Plan
 from bench.campaign.reading import plan_from_dict, read_plan
 from bench.campaign.rollouts import Rollout, collect, write_minari
 from bench.campaign.verifying import verify

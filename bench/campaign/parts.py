@@ -99,7 +99,7 @@ def entry_of(layout: Layout, part: int, failed: list[int], contents: Mapping[str
     """What journal and manifest say of a part.
 
     Args:
-        plan: The layout.
+        layout: The layout.
         part: Number of the part.
         failed: Records of it that failed.
         contents: The bytes of its files, by folder.
@@ -142,7 +142,7 @@ def fault(folder: Path, layout: Layout, entry: Mapping[str, Any], *, whole: bool
 
     Args:
         folder: Folder of the campaign.
-        plan: Its layout.
+        layout: Its layout.
         entry: What was noted.
         whole: Hash every file, whatever its times of change.
 

@@ -13,7 +13,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from bench.campaign.distribution import Distribution, Quantity, Shared, Value, check_weights
+from bench.campaign.alternatives import ExcitationPlan, RigPlan, SensorPlan, unique
+from bench.campaign.distribution import Distribution, Quantity, Shared, check_weights
 from bench.errors import ParameterError, UnknownNameError
 from bench.signals.base import MAX_SAMPLES
 
@@ -43,189 +44,6 @@ class PlanLimits:
 
 
 PLAN_LIMITS = PlanLimits()
-
-Node = Any
-"""A signal's or chain's dictionary in which a distribution may stand for a number."""
-
-
-@dataclass(frozen=True)
-class ElementPlan:
-    """An element of a rig, its parameters drawn.
-
-    Attributes:
-        law: Name of the law.
-        joints: Joints or fixed tendons it acts on.
-        name: Name of the element.
-        parameters: Quantity by parameter; the others at the law's defaults.
-        header: Leading entries of theta that fix sizes.
-        inputs: Actuators that the law reads.
-        exact: As `bench.rig.Element.exact`.
-        withheld: Left out of the public part of the manifest; its parameters stand in the answers.
-        probability: Share of the rig's records that have the element.
-    """
-
-    law: str
-    joints: tuple[str, ...]
-    name: str
-    parameters: Mapping[str, Quantity]
-    header: tuple[float, ...] = ()
-    inputs: tuple[str, ...] = ()
-    exact: bool = False
-    withheld: bool = False
-    probability: float = 1.0
-
-    def to_dict(self) -> dict[str, Any]:
-        """As in a plan."""
-        entry: dict[str, Any] = {"law": self.law, "joints": list(self.joints), "name": self.name}
-        entry["parameters"] = {key: as_entry(value) for key, value in self.parameters.items()}
-        optional = {
-            "header": list(self.header),
-            "inputs": list(self.inputs),
-            "exact": self.exact,
-            "withheld": self.withheld,
-        }
-        entry |= {key: value for key, value in optional.items() if value}
-        return entry | ({"probability": self.probability} if self.probability < 1.0 else {})
-
-
-@dataclass(frozen=True)
-class RigPlan:
-    """A rig to choose from.
-
-    Attributes:
-        name: Name in the tables.
-        rig: Rig of the bench, or path of an MJCF file.
-        elements: Its elements.
-        structure: (kind, body or joint, quantity), as `bench.rig.Rig.with_structure`.
-        structure_withheld: The structure's numbers stand in the answers only.
-        weight: Share of the records.
-        timestep: Integration step [s]; the rig's own where None.
-        integrator: The rig's own where None.
-        folder: Folder that an MJCF path is relative to.
-        model_sha256: Hash of the MJCF file, so that a campaign is not resumed on another model.
-    """
-
-    name: str
-    rig: str
-    elements: tuple[ElementPlan, ...] = ()
-    structure: tuple[tuple[str, str, Quantity], ...] = ()
-    structure_withheld: bool = False
-    weight: float = 1.0
-    timestep: float | None = None
-    integrator: str | None = None
-    folder: str = "."
-    model_sha256: str = ""
-
-    def __post_init__(self) -> None:
-        _unique(f"elements of rig '{self.name}'", [element.name for element in self.elements])
-
-    @property
-    def withheld(self) -> bool:
-        """Whether something of the rig is withheld."""
-        return self.structure_withheld or any(element.withheld for element in self.elements)
-
-    def quantities(self) -> Iterator[tuple[str, Quantity, bool]]:
-        """(column, quantity, withheld) of its structure and elements, as far as the plan names them."""
-        for kind, target, quantity in self.structure:
-            yield f"structure/{kind}/{target}", quantity, self.structure_withheld
-        for element in self.elements:
-            for name, quantity in element.parameters.items():
-                yield f"{element.name}/{name}", quantity, element.withheld
-
-    def to_dict(self, *, public: bool = False) -> dict[str, Any]:
-        """As in a plan; without what is withheld if `public`."""
-        entry: dict[str, Any] = {"name": self.name, "rig": self.rig, "weight": self.weight}
-        optional = {
-            "timestep": self.timestep,
-            "integrator": self.integrator,
-            "model_sha256": self.model_sha256,
-        }
-        entry |= {key: value for key, value in optional.items() if value}
-        if not (public and self.structure_withheld):
-            structure: dict[str, dict[str, Any]] = {}
-            for kind, target, quantity in self.structure:
-                structure.setdefault(kind, {})[target] = as_entry(quantity)
-            entry |= {"structure": structure} if structure else {}
-            entry |= {"structure_withheld": True} if self.structure_withheld else {}
-        elements = [element.to_dict() for element in self.elements if not (public and element.withheld)]
-        return entry | ({"elements": elements} if elements else {})
-
-
-@dataclass(frozen=True)
-class ExcitationPlan:
-    """An excitation to choose from.
-
-    Attributes:
-        name: Name in the tables.
-        signals: A signal's dictionary by actuator, with distributions.
-        weight: Share of the records of the rigs it fits.
-        rigs: Names of the rigs it fits; all where empty.
-        prescribe: Joint that follows the one signal, which is its displacement, as `bench.rig.library.prescribe`.
-    """
-
-    name: str
-    signals: Mapping[str, Node]
-    weight: float = 1.0
-    rigs: tuple[str, ...] = ()
-    prescribe: str = ""
-
-    def __post_init__(self) -> None:
-        if self.prescribe and tuple(self.signals) != (self.prescribe,):
-            raise ParameterError(
-                f"excitation '{self.name}' prescribes the motion of '{self.prescribe}' and needs one signal of that name; "
-                f"it has {', '.join(self.signals)}"
-            )
-
-    def quantities(self) -> Iterator[tuple[str, Quantity]]:
-        """(column, quantity) of every number and distribution."""
-        for actuator, node in self.signals.items():
-            yield from leaves(node, f"excitation/{actuator}")
-
-    def to_dict(self) -> dict[str, Any]:
-        """As in a plan."""
-        entry: dict[str, Any] = {"name": self.name, "weight": self.weight}
-        entry |= {"rigs": list(self.rigs)} if self.rigs else {}
-        entry |= {"prescribe": self.prescribe} if self.prescribe else {}
-        return entry | {"signals": {key: as_entry(node) for key, node in self.signals.items()}}
-
-
-@dataclass(frozen=True)
-class SensorPlan:
-    """A set of sensors to choose from.
-
-    Attributes:
-        name: Name in the tables.
-        chains: Stages by channel: a stage's dictionary by its type, with distributions.
-        weight: Share of the records of the rigs it fits.
-        rigs: Names of the rigs it fits; all where empty.
-        withheld: The stages stand in the answers only.
-    """
-
-    name: str
-    chains: Mapping[str, Mapping[str, Node]]
-    weight: float = 1.0
-    rigs: tuple[str, ...] = ()
-    withheld: bool = False
-
-    def quantities(self) -> Iterator[tuple[str, Quantity, bool]]:
-        """(column, quantity, withheld) of every number and distribution."""
-        for channel, stages in self.chains.items():
-            for stage, node in stages.items():
-                for column, quantity in leaves(node, f"sensors/{channel}/{stage}"):
-                    yield column, quantity, self.withheld
-
-    def to_dict(self, *, public: bool = False) -> dict[str, Any]:
-        """As in a plan; without the stages if `public` and withheld."""
-        entry: dict[str, Any] = {"name": self.name, "weight": self.weight}
-        entry |= {"rigs": list(self.rigs)} if self.rigs else {}
-        entry |= {"withheld": True} if self.withheld and not public else {}
-        if public and self.withheld:
-            return entry
-        stages = {
-            channel: [{"type": kind, **as_entry(node)} for kind, node in named.items()]
-            for channel, named in self.chains.items()
-        }
-        return entry | {"chains": stages}
 
 
 @dataclass(frozen=True)
@@ -318,7 +136,7 @@ class Plan:
             ("excitations", self.excitations),
             ("sensors", self.sensors),
         ):
-            _unique(what, [member.name for member in members])
+            unique(what, [member.name for member in members])
             if members:
                 check_weights(what, [member.weight for member in members])
         for member in (*self.excitations, *self.sensors):
@@ -330,7 +148,7 @@ class Plan:
                 raise ParameterError(
                     f"no excitation fits rig '{rig.name}'; leave `rigs` out of one, or name the rig in it"
                 )
-        _unique("channels", list(self.channels))
+        unique("channels", list(self.channels))
         for quantity in self.all_quantities():
             if isinstance(quantity, Shared) and quantity.name not in self.shared:
                 raise UnknownNameError("shared quantity", quantity.name, self.shared)
@@ -392,50 +210,8 @@ class Plan:
         return hashlib.sha256(text.encode()).hexdigest()
 
 
-def as_entry(node: Node) -> Any:
-    """A quantity, or a nest of them, as in a plan."""
-    if isinstance(node, Distribution | Shared):
-        return node.to_dict()
-    if isinstance(node, Mapping):
-        return {key: as_entry(value) for key, value in node.items()}
-    if isinstance(node, list | tuple):
-        return [as_entry(value) for value in node]
-    return node
-
-
-def leaves(node: Node, path: str) -> Iterator[tuple[str, Quantity]]:
-    """(path, quantity) of the numbers and distributions in a nest; fixed names and lists of plain numbers are none."""
-    if isinstance(node, Distribution | Shared) or (
-        isinstance(node, int | float) and not isinstance(node, bool)
-    ):
-        yield path, node
-    elif isinstance(node, Mapping):
-        for key, value in node.items():
-            yield from leaves(value, f"{path}/{key}")
-    elif isinstance(node, list | tuple) and not all(isinstance(value, int | float) for value in node):
-        for index, value in enumerate(node):
-            yield from leaves(value, f"{path}/{index}")
-
-
-def filled(node: Node, path: str, values: Mapping[str, Value]) -> Any:
-    """The nest with the values drawn in the places of its distributions."""
-    if isinstance(node, Distribution | Shared):
-        return values[path]
-    if isinstance(node, Mapping):
-        return {key: filled(value, f"{path}/{key}", values) for key, value in node.items()}
-    if isinstance(node, list | tuple):
-        return [filled(value, f"{path}/{index}", values) for index, value in enumerate(node)]
-    return node
-
-
 def _short(number: float) -> str:
     """A number on a few characters, whatever its size."""
     if isinstance(number, int) and number.bit_length() > 64:
         return f"about 10^{math.floor(number.bit_length() * math.log10(2.0))}"
     return f"{number:,}".replace(",", " ") if isinstance(number, int) else f"{number:g}"
-
-
-def _unique(what: str, names: list[str]) -> None:
-    for name in names:
-        if names.count(name) > 1:
-            raise ParameterError(f"{what}: the name '{name}' comes more than once; give each its own")

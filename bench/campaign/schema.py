@@ -9,18 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, Strict, WrapValidator, model_validator
 
+from bench.campaign.alternatives import ElementPlan, ExcitationPlan, RigPlan, SensorPlan
 from bench.campaign.distribution import Distribution
-from bench.campaign.plan import (
-    Compression,
-    ElementPlan,
-    ExcitationPlan,
-    Node,
-    Plan,
-    Precision,
-    RigPlan,
-    Sampling,
-    SensorPlan,
-)
+from bench.campaign.nest import Node
+from bench.campaign.plan import Compression, Plan, Precision, Sampling
 from bench.campaign.quantities import AnyQuantity, NumberQuantity, is_quantity_table, read_quantity, spread
 from bench.documents import (
     AS_NUMBER,

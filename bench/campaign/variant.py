@@ -13,9 +13,11 @@ from mujoco.batch import Batch
 from numpy.typing import NDArray
 
 from bench import native
+from bench.campaign.alternatives import ElementPlan, RigPlan
 from bench.campaign.distribution import Value
 from bench.campaign.drawing import Draw
-from bench.campaign.plan import ElementPlan, Plan, RigPlan, filled
+from bench.campaign.nest import filled
+from bench.campaign.plan import Plan
 from bench.errors import ParameterError, UnknownNameError
 from bench.laws.along import force_along
 from bench.measurement import Chain, Stage

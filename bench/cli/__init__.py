@@ -7,16 +7,25 @@ import sys
 import warnings
 from collections.abc import Callable
 from io import TextIOWrapper
+from pathlib import Path
 from typing import Any
 
 import tyro
 from rich.console import Console
 
-from bench import __version__
+import bench
+from bench import __version__, kernel_cache
 from bench.cli.application import Apply
+from bench.cli.check import Check
 from bench.cli.console import Terminated, terminable
-from bench.cli.diagnosis import Blind, Diagnose
+from bench.cli.diagnose import Diagnose
+from bench.cli.diagnosis import Blind
 from bench.cli.excite import Excite
+from bench.cli.init import Init
+from bench.cli.installation import Doctor, Example
+from bench.cli.joints import Compare, Export, Identify, Swap
+from bench.cli.monitoring import Monitor
+from bench.cli.records import Convert, Plot
 from bench.cli.rigs import Demo, Laws, Simulate, View
 from bench.cli.schema import Schema
 from bench.cli.studies import Campaign, Reproduce
@@ -27,13 +36,24 @@ COMMANDS: dict[str, type] = {
     "laws": Laws,
     "simulate": Simulate,
     "view": View,
+    "identify": Identify,
+    "swap": Swap,
+    "compare": Compare,
+    "export": Export,
+    "plot": Plot,
+    "convert": Convert,
     "excite": Excite,
+    "init": Init,
+    "check": Check,
     "diagnose": Diagnose,
     "apply": Apply,
     "blind": Blind,
+    "monitor": Monitor,
     "reproduce": Reproduce,
     "campaign": Campaign,
     "schema": Schema,
+    "example": Example,
+    "doctor": Doctor,
 }
 
 
@@ -52,6 +72,13 @@ def _speak_unicode() -> None:
             stream.reconfigure(encoding="utf-8" if ascii_only else None, errors="backslashreplace")
 
 
+def _announce_compilation(command: object) -> None:
+    """Say once why the first command on an installation takes longer than the same one later."""
+    quick = (Laws, Schema, Example, Doctor)
+    if not isinstance(command, quick) and kernel_cache.is_empty(Path(bench.__file__).parent):
+        print("jointbench: first run, force laws and fits are compiled once", file=sys.stderr)
+
+
 def main(argv: list[str] | None = None) -> int:
     """Run the command line; returns the exit status: 0 done, 2 refused with a message, 130 stopped by hand, 143 by the system."""
     warnings.showwarning = _show_warning
@@ -66,6 +93,7 @@ def main(argv: list[str] | None = None) -> int:
             description="A MuJoCo virtual test bench for nonlinear joints. --version prints the version.",
             args=argv,
         )
+        _announce_compilation(command)
         with terminable():
             command()
     except (BenchError, OSError) as error:

@@ -1,203 +1,17 @@
-"""Commands of the diagnosis: one case, and the blind protocol."""
+"""The blind protocol by command."""
 
 from __future__ import annotations
 
-import contextlib
-import json
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import tyro
 from rich.console import Console
-from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 from rich.text import Text
 
 from bench.cli.console import emit
-
-if TYPE_CHECKING:
-    from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis
-    from bench.discrepancy.diagnosis import Diagnosis
-    from bench.discrepancy.verdict import Verdict
-
-
-@dataclass
-class Diagnose:
-    """Say where a simulation misses the measurement, which effect causes it, and how far the gap shrinks once it is added."""
-
-    folder: tyro.conf.Positional[Path]
-    """Case folder: nominal.json and the records (see docs/howto-mismatch.md)."""
-    json: Path | None = None
-    """File for the result as JSON; "-" prints it."""
-    html: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
-    """File for the report, a self-contained HTML page."""
-    rrd: Path | None = None
-    """File for a rerun recording: measured and simulated channels, and where the gap lies."""
-    exclude: tuple[str, ...] = ()
-    """Effects to leave out of the catalogue."""
-    most: int = 3
-    """Largest number of effects named together."""
-    anyway: bool = False
-    """Go on where a unit, a sign or a part of the model stands against the diagnosis; what it was becomes a note."""
-    budget: float = float("inf")
-    """Seconds after which no further stage of the search is begun; the verdict is then the best one so far and says what was not tried."""
-    force: bool = False
-    """Overwrite files that exist."""
-    progress: bool = True
-    """Show what is being done, on standard error."""
-
-    def __call__(self) -> None:
-        """Run the command."""
-        self._check_places()
-        with _stages(self.progress) as stage:
-            diagnosis = _diagnosed(self, stage)
-            document = diagnosis.verdict.to_json()
-            written, problem = self._written(diagnosis, document, stage)
-        if self.json == PRINTED:
-            emit(document)
-        else:
-            for part in summary(diagnosis.verdict):
-                Console().print(part, markup=False, highlight=False)
-            for path in written:
-                print(f"written: {path}")
-        for warning in diagnosis.verdict.warnings:
-            Console(stderr=True, soft_wrap=True).print(
-                f"note: {warning}", style="yellow", markup=False, highlight=False
-            )
-        if problem is not None:
-            raise problem
-
-    def _written(
-        self,
-        diagnosis: Diagnosis | ArticulatedDiagnosis,
-        document: dict[str, Any],
-        stage: Callable[[str], None],
-    ) -> tuple[list[Path], Exception | None]:
-        """The files written, moved into place together; where one fails, the verdict alone, and what failed."""
-        from bench.files import OutputError, together, write_text
-
-        text = json.dumps(document, indent=1, ensure_ascii=False)
-        saved = [self.json] if self.json is not None and self.json != PRINTED else []
-        try:
-            with together():
-                for path in saved:
-                    write_text(path, text)
-                if self.html is not None:
-                    from bench.discrepancy import write_report
-
-                    stage(f"writing {self.html}")
-                    write_report(diagnosis, self.html)
-                if self.rrd is not None:
-                    from bench.discrepancy.report.rerun_recording import write_rerun
-
-                    stage(f"writing {self.rrd}")
-                    write_rerun(diagnosis, self.rrd)
-        except Exception as error:  # whatever a figure ran into: the verdict is told and kept
-            problem = OutputError(f"the report of this verdict cannot be written: {error}")
-            with contextlib.suppress(OutputError):
-                for path in saved:
-                    write_text(path, text)
-                return saved, problem
-            return [], problem
-        return [path for path in (*saved, self.html, self.rrd) if path is not None], None
-
-    def _check_places(self) -> None:
-        """Refuse places that cannot be written to before a minute is spent on the diagnosis."""
-        from bench.errors import ParameterError
-        from bench.targets import check_targets
-
-        if self.most < 1:
-            raise ParameterError(f"--most is {self.most}; at least one effect has to be allowed")
-        if not self.budget > 0.0:
-            raise ParameterError(f"--budget is {self.budget:g} s; give more than zero")
-        check_targets(self.json, self.html, self.rrd, force=self.force)
-
-
-PRINTED = Path("-")
-"""Stands for standard output."""
-
-
-@contextlib.contextmanager
-def _stages(shown: bool) -> Iterator[Callable[[str], None]]:
-    """A line on standard error with what is being done and for how long; call what is given with the text."""
-    columns = (SpinnerColumn(), TimeElapsedColumn(), TextColumn("{task.description}", markup=False))
-    with Progress(*columns, console=Console(stderr=True), disable=not shown, transient=True) as bar:
-        task = bar.add_task("reading", total=None)
-        yield lambda text: bar.update(task, description=text)
-
-
-def _diagnosed(asked: Diagnose, stage: Callable[[str], None]) -> Diagnosis | ArticulatedDiagnosis:
-    """The diagnosis of a folder; what numerics cannot cope with is told like any other input that cannot be used."""
-    import numpy as np
-
-    from bench.discrepancy import diagnose_folder
-    from bench.errors import IdentificationError
-
-    try:
-        return diagnose_folder(
-            asked.folder,
-            exclude=asked.exclude,
-            most=asked.most,
-            anyway=asked.anyway,
-            progress=stage,
-            budget=asked.budget,
-        )
-    except (np.linalg.LinAlgError, ArithmeticError) as error:
-        raise IdentificationError(
-            f"the numbers of '{asked.folder}' cannot be worked with ({error}); check nominal values, units and noise_std: "
-            "one of them is probably off by orders of magnitude"
-        ) from error
-
-
-def summary(verdict: Verdict) -> list[Any]:
-    """A verdict for people: sentences and tables to print.
-
-    Args:
-        verdict: The verdict.
-    """
-    from bench.discrepancy.judgement.shares import closed_words, interval, probability
-
-    parts: list[Any] = [verdict.explanation]
-    for effects, title in (
-        (verdict.named, "Missing from the model"),
-        (verdict.nearest, "What comes nearest"),
-    ):
-        if not effects:
-            continue
-        table = Table("effect", "where", "probability", "closes", "parameters", title=title)
-        for effect in effects:
-            values = "\n".join(
-                f"{name} = {p.value:.5g} ± {p.std:.2g} {p.unit if p.unit != '1' else ''}".rstrip()
-                for name, p in effect.parameters.items()
-            )
-            where = " ".join(text for text in (effect.where, effect.channel) if text)
-            closes = interval(effect.closed, effect.closed_ci95)
-            table.add_row(effect.name, where, probability(effect.probability), closes, Text(values))
-        parts.append(table)
-    for gap in verdict.gaps:
-        label = f"{gap.dof}: {gap.metric}" if gap.dof else gap.metric
-        table = Table("model", "NRMSE", "closed", title=f"How far the gap shrinks ({label})")
-        steps = gap.steps or (("nominal", gap.before), ("after", gap.after))
-        for name, value in steps[:-1]:
-            table.add_row(name, f"{value:.3g}", "" if value == gap.before else closed_words(gap, value))
-        table.add_row(steps[-1][0], f"{steps[-1][1]:.3g}", closed_words(gap))
-        table.add_row("noise alone", f"{gap.noise_floor:.3g}", "")
-        parts.append(table)
-    if verdict.left:
-        parts.append(verdict.left)
-    for names in verdict.indistinguishable:
-        parts.append(f"These records cannot tell {' from '.join(names)}.")
-    proposal = verdict.next_excitation
-    if proposal.get("reason"):
-        parts.append(proposal["reason"])
-    if proposal.get("separates") and proposal.get("excitation"):
-        parts.append(
-            f"To separate {' from '.join(proposal['separates'])}: {proposal['excitation']}, peak load "
-            f"{proposal['peak_load']:.3g}, {proposal['duration_s']:.3g} s; power {100 * proposal['power']:.0f} %."
-        )
-    return parts
 
 
 @dataclass
@@ -230,6 +44,9 @@ class BlindMake:
     """Single effects only, each struck from the catalogue that its diagnosis may use."""
     detectability: bool = True
     """Compute how well the records of each case can tell its effect, for the answers."""
+    background: bool = False
+    """A small background that no model has beside each effect or none, its part 5 to 30 % of the main discrepancy; noise that is stated,
+    stated too small, or not."""
     workers: int = 1
     """Processes."""
     force: bool = False
@@ -240,13 +57,18 @@ class BlindMake:
         import numpy as np
 
         from bench.discrepancy import BlindOptions, make_blind
+        from bench.discrepancy.blind.background_settings import BackgroundSettings
         from bench.discrepancy.blind.protocol import SEAL
+        from bench.discrepancy.blind.rigs import BACKGROUND_SHARES
         from bench.targets import check_folder
 
         begun = next(self.folder.glob(f"*/{SEAL}"), None) is not None  # by the same command, which goes on
         for folder in (self.folder, self.answers):
             check_folder(folder, force=self.force or begun)
         chosen = {key: value for key, value in vars(self).items() if key in BlindOptions.__dataclass_fields__}
+        chosen["background"] = BackgroundSettings() if self.background else None
+        if self.background and self.shares == BlindOptions().shares:
+            chosen["shares"] = BACKGROUND_SHARES
         with Console(stderr=True).status("making cases") as status:
             names = make_blind(
                 self.folder,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 from dataclasses import dataclass
 from pathlib import Path
@@ -48,6 +47,8 @@ class Excite:
     """Trained policy by name or file (.npz), with --method policy."""
     out: Annotated[Path, tyro.conf.arg(aliases=["-o"])] = Path("excitation.csv")
     """File: .csv (time and loads) or .json (an [excitation] for a rig's file)."""
+    rrd: Path | None = None
+    """Rerun recording of the episode to write: the rig in motion, its limits, and what is known by when."""
     draws: int = 8
     """Rigs drawn from what is unknown; the excitation keeps the limits on all of them."""
     evaluations: int = 1600
@@ -99,9 +100,17 @@ class Excite:
                 if self.method == "planner":
                     show("planning", 1.0)
                     made, notes = _from_planner(asked, made, rng)
+            if self.rrd is not None:
+                from bench.excitation.methods import controls_from
+                from bench.rerun_log import log_episode
+
+                show("writing the rerun recording", 1.0)
+                title = f"excitation episode: {self.method}"
+                log_episode(self.rrd, asked.rig, asked.experiment, controls_from(made), title=title)
         _write(self.out, made.excitation, rig)
         result = {
             "file": str(self.out),
+            "rrd": None if self.rrd is None else str(self.rrd),
             "method": self.method,
             "policy": self.policy,
             "merit": made.merit,
@@ -120,7 +129,7 @@ class Excite:
         from bench.errors import ParameterError, UnknownNameError
         from bench.targets import check_targets
 
-        check_targets(self.out, force=self.force)
+        check_targets(self.out, self.rrd, force=self.force)
         if self.method not in METHODS:
             raise UnknownNameError("method", self.method, METHODS)
         if self.out.suffix not in {".csv", ".json"}:
@@ -130,10 +139,6 @@ class Excite:
         if bool(self.policy) != (self.method == "policy"):
             raise ParameterError(
                 "--policy NAME and --method policy go together; trained policies are listed by an unknown name"
-            )
-        if self.method in {"dopt", "planner"} and importlib.util.find_spec("cmaes") is None:
-            raise ParameterError(
-                f"--method {self.method} needs the extra rl (pip install 'jointbench[rl]'); the other methods do without"
             )
 
 

@@ -70,6 +70,8 @@ class Schema:
     """Kind of document; --list tells which there are."""
     out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
     """File for the schema; printed where not given."""
+    force: bool = False
+    """Overwrite a file that exists."""
     list: bool = False
     """List the kinds of documents."""
     json: bool = False
@@ -79,6 +81,7 @@ class Schema:
         """Run the command."""
         from bench.errors import ParameterError, UnknownNameError
         from bench.files import write_text
+        from bench.targets import check_targets
 
         if self.list:
             self._tell_kinds()
@@ -87,8 +90,9 @@ class Schema:
             raise ParameterError(f"name a kind of document: {', '.join(KINDS)} (--list describes them)")
         if self.name not in KINDS:
             raise UnknownNameError("kind of document", self.name, KINDS)
+        check_targets(self.out, force=self.force)
         text = (FOLDER / f"{self.name}.json").read_text(encoding="utf-8")
-        if self.out is None:
+        if self.out is None or str(self.out) == "-":
             print(text, end="")
             return
         write_text(self.out, text)

@@ -30,7 +30,10 @@ class Reproduce:
 
     def __call__(self) -> None:
         """Run the command."""
-        from bench.reproduction import reproduce
+        from rich.markup import escape
+
+        from bench.reproduction import Verdict, reproduce
+        from bench.reproduction.writing import summary
         from bench.targets import check_folder
 
         check_folder(self.out, force=self.force, own=("table.json", "[A-D][0-9]*.json"))
@@ -40,15 +43,18 @@ class Reproduce:
             emit(result.to_dict() | {"files": [str(path) for path in result.files]})
             return
         table = Table(
-            "item", "quantity", "printed", "ours", "must hold", "holds", title="The dissertation, and ours"
+            "item", "quantity", "printed", "ours", "over ten seeds", "verdict", title=summary(result.results)
         )
+        colours = {
+            Verdict.FAILS: "red",
+            Verdict.SHAPE: "yellow",
+            Verdict.HOLDS: "",
+            Verdict.NOT_COMPARABLE: "dim",
+        }
         for made in result.results:
             for row in made.rows:
-                mark = {True: "yes", False: "[red]no[/red]", None: ""}[row.holds]
-                unit = f" [{row.unit}]".replace("[", r"\[") if row.unit else ""
-                table.add_row(
-                    made.identifier, row.quantity + unit, row.printed, row.ours, row.requirement, mark
-                )
+                cells = (made.identifier, *row.cells()[:4], row.verdict.value)
+                table.add_row(*(escape(cell) for cell in cells), style=colours[row.verdict])
         Console().print(table)
         print(f"{result.seconds:.0f} s; open {result.files[0]} in a browser.")
 

@@ -69,8 +69,11 @@ def unseen_record() -> Recording:
     return simulate(joint_rig(), excitation(True, True), rng=np.random.default_rng(UNSEEN_SEED))
 
 
-def laboratory_view(records: Sequence[Recording], rig: Rig) -> JointData:
-    """States and restoring forces of the joint as measured at body 1: its loads less its inertia and mounts."""
+def laboratory_view(records: Sequence[Recording], rig: Rig, *, mass_known: bool = True) -> JointData:
+    """States and restoring forces of the joint as measured at body 1: its loads less its inertia and mounts.
+
+    With `mass_known` false its loads less its mounts, and its accelerations, as section 4.5 has it.
+    """
     model = rig.model
     mounts = [model.joint(name) for name in ("axial_1", "torsional_1")]
     return joint_data(
@@ -81,7 +84,7 @@ def laboratory_view(records: Sequence[Recording], rig: Rig) -> JointData:
         accelerations=("acceleration_1_x", "angular_acceleration_1_x"),
         body_displacements=("displacement_1", "rotation_1"),
         body_velocities=("velocity_1", "rotation_rate_1"),
-        mass=[inertia_of(rig, name) for name in ("axial_1", "torsional_1")],
+        mass=[inertia_of(rig, name) for name in ("axial_1", "torsional_1")] if mass_known else None,
         stiffness=[float(mount.stiffness[0]) for mount in mounts],
         damping=[float(mount.damping[0]) for mount in mounts],
         body="first",

@@ -53,7 +53,7 @@ from bench.discrepancy.search.fits import names
 from bench.discrepancy.search.forward_selection import STALLED
 from bench.discrepancy.search.load_interpolation import reading_notes
 from bench.discrepancy.verdict import Gap, Kind, NamedEffect, Ranked, Verdict
-from bench.errors import UnknownNameError
+from bench.errors import BenchError, UnknownNameError
 
 SEED = 20060501
 """Seed of the bootstrap where no generator is given, so that a diagnosis repeats exactly."""
@@ -118,13 +118,13 @@ def diagnose(
     """
     if applies(case):
         with threadpool_limits(1, user_api="blas"):
-            robot = diagnose_articulated(case, exclude=exclude, most=most, rng=rng, progress=progress)
-        unused = [
-            f"{name} is not heeded on an articulated model"
-            for name, set_ in (("budget", budget < math.inf), ("anyway", anyway))
-            if set_
-        ]
-        return replace(robot, verdict=replace(robot.verdict, warnings=(*robot.verdict.warnings, *unused)))
+            robot = diagnose_articulated(
+                case, exclude=exclude, most=most, anyway=anyway, rng=rng, progress=progress
+            )
+        if budget == math.inf:
+            return robot
+        unused = "budget is not heeded on an articulated model"
+        return replace(robot, verdict=replace(robot.verdict, warnings=(*robot.verdict.warnings, unused)))
     rng = np.random.default_rng(SEED) if rng is None else rng
     known = [effect.name for effect in catalogue]
     for name in exclude:
@@ -144,7 +144,14 @@ def diagnose(
         ):
             # what no force on the joint explains to the noise may sit in its drive
             progress(asked)
-            other = diagnose_articulated(case, exclude=exclude, most=most, rng=rng, progress=progress)
+            try:
+                other = diagnose_articulated(
+                    case, exclude=exclude, most=most, anyway=anyway, rng=rng, progress=progress
+                )
+            except (
+                BenchError
+            ):  # admitted as a linear structure, with parts that the equations of drives leave out
+                return found
             left, theirs = found.verdict.gap, other.verdict.gap
             # free runs of one kind in both: parts of what each began with are compared
             nearer = theirs.after * left.before < SETTINGS.most * left.after * theirs.before

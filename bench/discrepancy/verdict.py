@@ -182,7 +182,8 @@ class Verdict:
         seconds: Wall time.
         complete: Whether what is named leaves nothing but noise.
         remainder: What is left on the judging records: "nrmse", "over_noise" (times what noise leaves), "of_before" (part of the gap
-            before), and the "channel", "band_hz" and "time_s" that hold most of it in the records for identification.
+            before), the "channel", "band_hz" and "time_s" that hold most of it in the records for identification, and the
+            "free_force_gain": the part of what is left there that a free force, of what "free_force" names, would still take.
         nearest: Where nothing is named because something unknown is missing, the effects of the catalogue that come nearest.
         nominal: Nominal parameters as the explanation behind `gap.after` has them.
         applied: What `jointbench apply` made of it in the user's own model: "changes", and "figures" before and after.
@@ -221,7 +222,10 @@ class Verdict:
             place = (
                 f"; most of it in '{own['channel']}', {low:.3g} to {high:.3g} Hz, {first:.3g} to {last:.3g} s"
             )
-        return f"Left on the judging records: NRMSE {own['nrmse']:.3g}{noise}{place}."
+        free = ""
+        if own.get("free_force_gain", 0.0) > 0.0:
+            free = f" A free force of {own['free_force']} would still take {100.0 * own['free_force_gain']:.0f} % of its power."
+        return f"Left on the judging records: NRMSE {own['nrmse']:.3g}{noise}{place}.{free}"
 
     def timed(self, seconds: float) -> Verdict:
         """The verdict with its wall time [s]."""

@@ -112,6 +112,7 @@ def _offset(model: mujoco.MjModel, theta: int) -> int:
     return int(theta - starts[starts <= theta].max())
 
 
+@native.quiet()
 def _respond(model: mujoco.MjModel, data: mujoco.MjData, inputs: NDArray, n_actuators: int) -> NDArray:
     """Accelerations and sensors ``(nv + nsensordata,)`` for positions, velocities, commands and generalised forces."""
     nv = model.nv

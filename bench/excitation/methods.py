@@ -217,7 +217,7 @@ def _d_optimal(
     progress: Callable[[int, float], None] | None,
 ) -> tuple[NDArray[np.float64], int]:
     """Search over the cosine and sine coefficients of the lines of all actuators."""
-    from cmaes import CMA  # noqa: PLC0415  (of the extra `rl`; the other methods do without)
+    from cmaes import CMA  # noqa: PLC0415  (for this method alone)
 
     lines = spectral_lines(band, n * experiment.timestep)
     angle = 2.0 * np.pi * np.outer(np.arange(n) * experiment.timestep, lines)

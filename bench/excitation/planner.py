@@ -113,7 +113,7 @@ class Planner(SequentialPlanner):
         told: Callable[[int, Plan], None] | None,
     ) -> NDArray[np.float64]:
         """The best commands found for the rest of the test ``(n - begin, n_actuators)``."""
-        from cmaes import CMA  # noqa: PLC0415  (of the extra `rl`)
+        from cmaes import CMA  # noqa: PLC0415  (for this method alone)
 
         family, rest = self.families[kind], controls[begin:]
         basis = self.basis[begin:]

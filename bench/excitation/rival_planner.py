@@ -186,7 +186,7 @@ class RivalPlanner(SequentialPlanner):
         generations: int,
     ) -> tuple[NDArray[np.float64], float]:
         """The best commands found for the rest of the test, and their worth; none after the horizon."""
-        from cmaes import CMA  # noqa: PLC0415  (of the extra `rl`)
+        from cmaes import CMA  # noqa: PLC0415  (for this method alone)
 
         station = self.station
         part = self._samples(self.knot)

@@ -1,8 +1,8 @@
 """Identification: from records to models.
 
 One module a method, each usable on arrays: `restoring_force` (a joint's forces from loads, inertia and mounts),
-`polynomial` and `network` (models of a joint's states), `parametric` (a law's parameters, hidden states included),
-`surface` (restoring-force surfaces), `adaptive` (least squares on line), `damper` (design model and order study).
+`polynomial` and `network` (models of a joint's states), `memory` (a joint that remembers), `parametric` (a law's parameters, hidden
+states included), `surface` (restoring-force surfaces), `adaptive` (least squares on line), `damper` (design model and order study).
 `bench.reduction` turns their results into elements.
 """
 
@@ -22,6 +22,8 @@ if TYPE_CHECKING:
         fit_design_model_online,
     )
     from bench.identification.linear_rig import LinearRig
+    from bench.identification.memory import MemoryModel, MemoryReport, fit_memory
+    from bench.identification.memory_settings import MemorySettings
     from bench.identification.network import NetworkModel, NetworkReport, fit_network
     from bench.identification.order_study import ForceRecord, OrderStudy
     from bench.identification.output_error import OutputErrorModel, fit_output_error
@@ -50,6 +52,9 @@ _HOMES = {
     "ForceRecord": "order_study",
     "JointData": "restoring_force",
     "LinearRig": "linear_rig",
+    "MemoryModel": "memory",
+    "MemoryReport": "memory",
+    "MemorySettings": "memory_settings",
     "NetworkModel": "network",
     "NetworkReport": "network",
     "OnlineDesignFit": "damper",
@@ -70,6 +75,7 @@ _HOMES = {
     "fit_design_model": "damper",
     "fit_design_model_online": "damper",
     "fit_law": "parametric",
+    "fit_memory": "memory",
     "fit_network": "network",
     "fit_output_error": "output_error",
     "fit_polynomial": "polynomial",
@@ -89,6 +95,9 @@ __all__ = [
     "ForceRecord",
     "JointData",
     "LinearRig",
+    "MemoryModel",
+    "MemoryReport",
+    "MemorySettings",
     "NetworkModel",
     "NetworkReport",
     "OnlineDesignFit",
@@ -109,6 +118,7 @@ __all__ = [
     "fit_design_model",
     "fit_design_model_online",
     "fit_law",
+    "fit_memory",
     "fit_network",
     "fit_output_error",
     "fit_polynomial",

@@ -395,7 +395,11 @@ def harmonic_campaign(rng: np.random.Generator, *, n_tests: int = 202) -> Campai
 
 
 def polynomial_experiment(
-    rng: np.random.Generator, *, orders: tuple[int, int] = (5, 5), initial_covariance: float = 20.0
+    rng: np.random.Generator,
+    *,
+    orders: tuple[int, int] = (5, 5),
+    initial_covariance: float = 20.0,
+    peak: float = INCH,
 ) -> PolynomialExperiment:
     """Identify the polynomial model on line from random motion, and judge it on two other records.
 
@@ -403,6 +407,7 @@ def polynomial_experiment(
         rng: Draws motions and noise.
         orders: Orders in x and v.
         initial_covariance: Of the scaled parameters.
+        peak: Largest displacement of the record identified [m]; the other record has half of it.
 
     Returns:
         The experiment, ready to be plotted.
@@ -410,9 +415,9 @@ def polynomial_experiment(
     from bench.identification.adaptive import AdaptiveLeastSquares  # noqa: PLC0415
     from bench.identification.regressors import Reference, polynomial_model  # noqa: PLC0415
 
-    whole = random_record(rng, seconds=90.0)
+    whole = random_record(rng, peak=peak, seconds=90.0)
     training, segment = whole.part(slice(0, 30_000)), whole.part(slice(30_000, None))
-    half = random_record(rng, peak=0.5 * INCH)
+    half = random_record(rng, peak=0.5 * peak)
     peaks = [float(np.abs(channel).max()) for channel in training[1:]]
     model = polynomial_model(*orders, reference=Reference(peaks[3], peaks[0], peaks[1], peaks[2]))
     estimator = AdaptiveLeastSquares(model, initial_covariance=initial_covariance)

@@ -249,6 +249,7 @@ class PolynomialModel:
         range: Range of the states it was identified from.
         report: How the fit went.
         mass: Mass matrix (k, k) [kg, kg m²] identified with it, or None.
+        beyond: Stiffness and damping (2, k) [N/m, N m/rad; N s/m, N m s/rad] of a bounded polynomial beyond its range, or None.
     """
 
     orders: tuple[int, ...]
@@ -261,6 +262,7 @@ class PolynomialModel:
     range: ValidityRange
     report: PolynomialReport
     mass: NDArray[np.float64] | None = None
+    beyond: NDArray[np.float64] | None = None
 
     @cached_property
     def exponents(self) -> NDArray[np.int64]:
@@ -271,19 +273,34 @@ class PolynomialModel:
     def law(self) -> ForceLaw:
         """The law whose parameters are the coefficients."""
         return polynomial_law(
-            self.orders, self.kind, degree=self.degree, basis=self.basis, centre=self.centre, scale=self.scale
+            self.orders,
+            self.kind,
+            degree=self.degree,
+            basis=self.basis,
+            centre=self.centre,
+            scale=self.scale,
+            bounded=self.beyond is not None,
         )
 
     @cached_property
     def theta(self) -> NDArray[np.float64]:
         """Header and coefficients, as an element takes them."""
-        return frozen(self.law.theta(self.coefficients.ravel()))
+        beyond = () if self.beyond is None else self.beyond.ravel()
+        return frozen(self.law.theta(np.concatenate([self.coefficients.ravel(), beyond])))
 
     def predict(self, states: ArrayLike) -> NDArray[np.float64]:
         """Restoring forces (n, k) [N, N m] at states (n, 2 k) [m, rad, m/s, rad/s]."""
         data = np.atleast_2d(np.asarray(states, dtype=float))
-        blocks = _regressors(data, self.exponents, self.basis, self.centre, self.scale)
-        return np.vstack([block @ self.coefficients.T for block in blocks])
+        inside = data
+        if self.beyond is not None:
+            inside = np.clip(data, self.centre - self.scale, self.centre + self.scale)
+        blocks = _regressors(inside, self.exponents, self.basis, self.centre, self.scale)
+        force = np.vstack([block @ self.coefficients.T for block in blocks])
+        if self.beyond is None:
+            return force
+        outside = (data - inside) * self.beyond.ravel()
+        k = len(self.coefficients)
+        return force + outside[:, :k] + outside[:, k:]
 
     def to_json(self) -> str:
         """The model as JSON text; numbers survive to the last bit."""
@@ -299,6 +316,7 @@ class PolynomialModel:
             "range": self.range.to_dict(),
             "report": vars(self.report),
             "mass": None if self.mass is None else self.mass.tolist(),
+            "beyond": None if self.beyond is None else self.beyond.tolist(),
         }
         return json.dumps(values)
 
@@ -325,6 +343,7 @@ class PolynomialModel:
                 range=ValidityRange.from_dict(values["range"]),
                 report=report,
                 mass=None if values["mass"] is None else frozen(values["mass"]),
+                beyond=None if values.get("beyond") is None else frozen(values["beyond"]),
             )
         except (KeyError, TypeError, ValueError) as error:
             if isinstance(error, FileFormatError):
@@ -344,6 +363,7 @@ def fit_polynomial(
     ridge: float = 0.0,
     accelerations: ArrayLike | None = None,
     rcond: float = 1e-12,
+    bounded: bool = False,
 ) -> PolynomialModel:
     """Fit a polynomial of the states to forces by linear least squares.
 
@@ -361,6 +381,8 @@ def fit_polynomial(
         accelerations: Absolute accelerations ``(n, k)`` [m/s², rad/s²] of the body the forces act on, where its mass
             is unknown: the mass matrix is fitted along with the coefficients.
         rcond: Singular values below `rcond` times the largest are left out [1].
+        bounded: Whether the polynomial is held at the edge of its range, with the stiffness and damping of a linear fit to the same
+            records beyond it: its force then brings the motion back, where an unbounded one runs away. Needs `normalise`.
 
     Returns:
         The model with condition number, rank and error in its report.
@@ -379,6 +401,10 @@ def fit_polynomial(
     if basis == "chebyshev" and not normalise:
         raise ParameterError(
             "a Chebyshev basis came with normalise=False; it needs states scaled to [-1, 1], use basis='power'"
+        )
+    if bounded and not normalise:
+        raise ParameterError(
+            "a bounded polynomial came with normalise=False; its range is that of the normalised states"
         )
     if ridge < 0.0:
         raise ParameterError(f"ridge is {ridge:g}; 0 or more is expected")
@@ -410,11 +436,22 @@ def fit_polynomial(
         range=ValidityRange.of(s),
         report=pending,
         mass=mass,
+        beyond=_linear(s, f, a) if bounded else None,
     )
     estimated = model.predict(s) + (0.0 if mass is None else a @ mass.T)
     return replace(
         model, report=replace(pending, nmse=nmse_percent(f, estimated), seconds=time.perf_counter() - begun)
     )
+
+
+def _linear(
+    states: NDArray[np.float64], forces: NDArray[np.float64], accelerations: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Stiffness and damping (2, k) of each coordinate by a linear fit, none below zero."""
+    k = forces.shape[1]
+    regressors = np.hstack([states, accelerations, np.ones((len(states), 1))])
+    solution = np.linalg.lstsq(regressors, forces, rcond=None)[0]
+    return frozen(np.maximum([np.diag(solution[:k]), np.diag(solution[k : 2 * k])], 0.0))
 
 
 def _orders_of(orders: int | Sequence[int], n_states: int) -> tuple[int, ...]:

@@ -38,6 +38,8 @@ class JointData(NamedTuple):
     """Restoring forces (n, k), or applied forces less mounts where the mass is unknown [N, N m]."""
     accelerations: NDArray[np.float64] | None = None
     """Accelerations (n, k) of the body where its mass is unknown, with the sign the fits expect [m/s², rad/s²]."""
+    time: NDArray[np.float64] | None = None
+    """Times (n,) [s], starting anew with every record; models with memory need them."""
 
 
 def joint_forces(
@@ -166,9 +168,10 @@ def joint_data(
         "damping": damping,
     }
     force, acceleration = read(applied), read(accelerations)
+    clock = np.concatenate([record.time[_settled(record)] - record.time[0] for record in records])
     if mass is None:
-        return unknown_mass_data(states, force, acceleration, body=body, **mounts)
-    return JointData(states, joint_forces(force, acceleration, mass=mass, body=body, **mounts))
+        return unknown_mass_data(states, force, acceleration, body=body, **mounts)._replace(time=clock)
+    return JointData(states, joint_forces(force, acceleration, mass=mass, body=body, **mounts), time=clock)
 
 
 def _settled(recording: Recording) -> NDArray[np.bool_]:

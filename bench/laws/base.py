@@ -60,7 +60,10 @@ class Kernel:
 
         pointer = types.CPointer(types.float64)
         signature = types.void(types.float64, pointer, pointer, pointer, pointer, pointer)
-        return numba.cfunc(signature, cache=True, error_model="numpy")(self.function)
+        try:
+            return numba.cfunc(signature, cache=True, error_model="numpy")(self.function)
+        except RuntimeError:  # defined at a prompt: there is no file beside which machine code could be kept
+            return numba.cfunc(signature, error_model="numpy")(self.function)
 
     @property
     def address(self) -> int:

@@ -1,4 +1,4 @@
-"""Laws that couple an axial coordinate x = q[0] [m] with a torsional one theta = q[1] [rad] of the same joint.
+"""Laws that couple an axial coordinate ``x = q[0]`` in m with a torsional one ``theta = q[1]`` in rad of the same joint.
 
 - `cross_stiffness`: ``f1 = k theta``, ``f2 = k x``, one constant for both, so that the coupling has the
   potential ``k x theta`` and neither gives nor takes energy (a helix, or shear centre off the axis). Stable

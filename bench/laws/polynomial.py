@@ -3,7 +3,10 @@
 The reduced-order joint of the dissertation's section 4.1.3: each restoring force is a linear combination of products
 of polynomials in the relative states ``s = (q_1 … q_n, v_1 … v_n)``. The states enter scaled,
 ``u = (s - centre) / scale``, so that a Chebyshev basis is used on [-1, 1], where it is bounded by 1; outside it
-continues as the polynomial it is, and grows as fast. `network_law` is the near-namesake that saturates instead.
+continues as the polynomial it is, and grows as fast. `network_law` is the near-namesake that saturates instead, and so does a
+*bounded* polynomial: outside the box of its scaled range it takes the states at the nearest point of the box and adds
+``k (q - q_box) + c (v - v_box)`` with k, c >= 0 along each coordinate. Its force then grows linearly and towards the box, so
+that no closed loop runs away, whatever work the polynomial does within.
 
 Terms are stored as runs: all exponents of the last state from 0 up share one product of the other states, so that a
 tensor of order 3 in four states costs 64 products instead of 256, without a scratch array. (A table of all one-state
@@ -13,6 +16,7 @@ polynomials would save little more and would need memory on the stack; a nested 
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Literal
@@ -33,7 +37,8 @@ MAX_TERMS = 20_000
 @kernel
 def force(t, q, v, z, theta, f):
     """``f_o = sum_t a_ot prod_i P_e(t,i)(u_i)``, with ``P_(k+1) = (1 + c) u P_k - c P_(k-1)``, c = 1 Chebyshev, 0 power."""
-    c = theta[0]
+    bounded = theta[0] >= 2.0
+    c = theta[0] - 2.0 if bounded else theta[0]
     n = int(theta[1])
     n_terms = int(theta[2])
     n_runs = int(theta[3])
@@ -42,6 +47,8 @@ def force(t, q, v, z, theta, f):
     inverse = 5 + 2 * n
     run = 5 + 4 * n
     last = (v[n - 1] - theta[centre + 2 * n - 1]) * theta[inverse + 2 * n - 1]
+    if bounded:
+        last = min(max(last, -1.0), 1.0)
     for _ in range(n_runs):
         n_factors = int(theta[run])
         length = int(theta[run + 1])
@@ -53,6 +60,8 @@ def force(t, q, v, z, theta, f):
             run += 2
             s = q[i] if i < n else v[i - n]
             u = (s - theta[centre + i]) * theta[inverse + i]
+            if bounded:
+                u = min(max(u, -1.0), 1.0)
             previous = 1.0
             current = u
             for _ in range(1, exponent):
@@ -72,6 +81,12 @@ def force(t, q, v, z, theta, f):
                 current = following
             f[o] += product * total
         coefficient += length
+    if bounded:
+        coefficient += (n - 1) * n_terms
+        for i in range(2 * n):
+            s = (q[i] if i < n else v[i - n]) - theta[centre + i]
+            width = 1.0 / theta[inverse + i]
+            f[i if i < n else i - n] += theta[coefficient + i] * (s - min(max(s, -width), width))
 
 
 def polynomial_exponents(
@@ -127,6 +142,7 @@ def polynomial_law(
     basis: Basis = "chebyshev",
     centre: ArrayLike = 0.0,
     scale: ArrayLike = 1.0,
+    bounded: bool = False,
 ) -> ForceLaw:
     """Build the polynomial law of one set of orders; the coefficients are its parameters.
 
@@ -137,6 +153,8 @@ def polynomial_law(
         basis: "chebyshev" (default: bounded by 1 on the scaled range) or "power".
         centre: Centre of each state's range (2 n,) or one number [m, rad, m/s, rad/s].
         scale: Half-width of each state's range, above 0, (2 n,) or one number [m, rad, m/s, rad/s].
+        bounded: Whether the law is held at the edge of its range, with a spring and a damper beyond: two parameters more a
+            coordinate, k_beyond and c_beyond.
 
     Returns:
         A law on n coordinates. A coefficient ``a<o>[e_1,…]`` multiplies scaled, dimensionless states and so has the unit
@@ -164,11 +182,11 @@ def polynomial_law(
     if not (np.all(np.isfinite(middle)) and np.all(np.isfinite(width)) and np.all(width > 0)):
         raise ParameterError(f"centre {middle} and scale {width} must be finite, and the scale above 0")
     runs, n_runs = _runs(exponents)
-    fixed = [float(basis == "chebyshev"), float(n), float(len(exponents)), float(n_runs)]
+    fixed = [float(basis == "chebyshev") + 2.0 * bounded, float(n), float(len(exponents)), float(n_runs)]
     header = [*fixed, float(len(fixed) + 1 + 2 * n_states + len(runs)), *middle, *(1.0 / width), *runs]
     return ForceLaw(
         name="polynomial",
-        parameters=_coefficients(exponents, middle, width),
+        parameters=(*_coefficients(exponents, middle, width), *(_beyond(n) if bounded else ())),
         force=force,
         equation="f_o = sum a_o[e] prod P_e_i(u_i), u = (s - centre) / scale, s = (q, v)",
         reference="Masri and Caughey 1979; Tasbihgoo 2006, eqs. 4.10-4.13",
@@ -202,9 +220,10 @@ def polynomial_law_of(header: Sequence[float]) -> ForceLaw:
             orders,
             "tensor" if tensor else "total",
             degree=None if tensor else degree,
-            basis="chebyshev" if entries[0] else "power",
+            basis="chebyshev" if entries[0] % 2.0 else "power",
             centre=entries[5 : 5 + 2 * n],
             scale=1.0 / np.array(entries[5 + 2 * n : 5 + 4 * n]),
+            bounded=entries[0] >= 2.0,
         )
     except (IndexError, ValueError, ZeroDivisionError) as error:
         raise ParameterError(
@@ -225,6 +244,18 @@ def _runs(exponents: NDArray[np.int64]) -> tuple[list[float], int]:
         encoded += [len(factors), len(list(members)), *itertools.chain.from_iterable(factors)]
         n_runs += 1
     return encoded, n_runs
+
+
+def _beyond(n: int) -> list[Parameter]:
+    """Stiffness, then damping, of every coordinate beyond the range."""
+    kinds = (("k", "N/m", "N m/rad", 1000.0, "stiffness"), ("c", "N s/m", "N m s/rad", 1.0, "damping"))
+    return [
+        Parameter(
+            f"{letter}_beyond{o + 1}", unit, default, (0.0, math.inf), f"{what} beyond the range", rotational
+        )
+        for letter, unit, rotational, default, what in kinds
+        for o in range(n)
+    ]
 
 
 def _coefficients(

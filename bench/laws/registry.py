@@ -34,6 +34,7 @@ from bench.laws.jenkins_backlash import JENKINS_BACKLASH
 from bench.laws.linear import LINEAR
 from bench.laws.lugre import ELASTOPLASTIC_FRICTION, LUGRE
 from bench.laws.maxwell import MAXWELL
+from bench.laws.memory import memory_law_of
 from bench.laws.network import network_law_of
 from bench.laws.normal_force_friction import (
     CONTROLLED_FRICTION,
@@ -97,7 +98,7 @@ _SIZED: Mapping[str, Callable[[int], ForceLaw]] = MappingProxyType(
 )
 
 MODELS: Mapping[str, Callable[[Sequence[float]], ForceLaw]] = MappingProxyType(
-    {"polynomial": polynomial_law_of, "network": network_law_of}
+    {"polynomial": polynomial_law_of, "network": network_law_of, "memory": memory_law_of}
 )
 """Laws of identified models: no default size, so not in `LAWS`; found by name and header."""
 

@@ -20,6 +20,7 @@ from bench.nastran.cards import (
 )
 from bench.nastran.expanded import ExpandedSystem, expanded_system
 from bench.nastran.integration import LagStudy, Response, integrate, lag_study
+from bench.nastran.joint_model import JointAxis, JointModel, joint_model_cards, read_joint_model
 from bench.nastran.network_deck import (
     INCH_POUND,
     SI,
@@ -42,6 +43,8 @@ __all__ = [
     "DmigHeader",
     "ExpandedSystem",
     "Grid",
+    "JointAxis",
+    "JointModel",
     "LagStudy",
     "Lseq",
     "Mpc",
@@ -58,12 +61,14 @@ __all__ = [
     "deck_text",
     "expanded_system",
     "integrate",
+    "joint_model_cards",
     "lag_study",
     "network_cards",
     "network_text",
     "network_weights",
     "parse_deck",
     "read_deck",
+    "read_joint_model",
     "read_network",
     "table_error",
     "tanh_points",

@@ -22,7 +22,8 @@ from typing import Literal, TypeVar, get_args
 from bench.errors import FileFormatError, UnknownNameError
 from bench.files import write_text
 from bench.limits import READING_LIMITS, ReadingLimits, regular_file, size_text
-from bench.nastran.cards import Card, Field, Place, RawCard, interpret
+from bench.nastran.cards import Card, Field, Place, RawCard
+from bench.nastran.interpretation import interpret
 from bench.nastran.numbers import integer_text, real_text
 
 Format = Literal["small", "large", "free"]

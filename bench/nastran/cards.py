@@ -403,32 +403,3 @@ class Tload1(Card):
         if raw.integer(3, "TYPE", 0) != 0:
             raise raw.fail(3, "TYPE", "blank or 0 (a force)")
         return cls(raw.integer(0, "set"), raw.integer(1, "excitation"), raw.integer(4, "table"))
-
-
-def _read_dmig(raw: RawCard) -> Card:
-    column = raw.integer(1, "column point (0: header)")
-    return DmigHeader.read(raw) if column == 0 else DmigColumn.read(raw)
-
-
-_READERS: dict[str, Callable[[RawCard], Card]] = {
-    "SPOINT": ScalarPoints.read,
-    "EPOINT": ScalarPoints.read,
-    "GRID": Grid.read,
-    "MPC": Mpc.read,
-    "SLOAD": Sload.read,
-    "DMIG": _read_dmig,
-    "NOLIN1": Nolin1.read,
-    "TABLED1": Tabled1.read,
-    "LSEQ": Lseq.read,
-    "TLOAD1": Tload1.read,
-}
-
-
-def interpret(raw: RawCard) -> Card:
-    """The typed card of a raw one; `OtherCard` where the name is none of those above.
-
-    Raises:
-        FileFormatError: A field does not hold what it should; names place, card, field and what was expected.
-    """
-    reader = _READERS.get(raw.name)
-    return OtherCard(raw.name, raw.fields) if reader is None else reader(raw)

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from bench.errors import FileFormatError, RecordingError
 from bench.limits import READING_LIMITS, ReadingLimits, regular_file
-from bench.record_files.arrays import read_hdf5, read_mat, read_npz
+from bench.record_files.arrays import read_mat, read_npz
 from bench.record_files.column_map import ColumnMap, Variable, base_name, find, name_and_unit
+from bench.record_files.hdf5 import read_hdf5
 from bench.record_files.parquet import read_parquet
 from bench.record_files.text import read_csv
 from bench.record_files.times import Clock, clock_of, is_time, time_source

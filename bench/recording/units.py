@@ -220,3 +220,18 @@ def si_unit(unit: str, quantity: str = "") -> str:
         if _parsed(known)[1] == root:
             return known
     return f"{_registry().Quantity(1.0, parsed).to_base_units().units:~C}"
+
+
+@cache
+def dimensions(unit: str) -> tuple[float, float, float]:
+    """Powers of mass, length and time of a unit; angles, which have none, count as numbers.
+
+    Args:
+        unit: Unit as a pint expression.
+
+    Raises:
+        UnitError: The unit is unknown.
+    """
+    powers = _parsed(unit)[0].dimensionality
+    mass, length, time = (float(powers.get(name, 0.0)) for name in ("[mass]", "[length]", "[time]"))
+    return mass, length, time

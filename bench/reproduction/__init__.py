@@ -4,9 +4,10 @@
 ``run(progress) -> Item`` that uses the bench as any user would: rigs, signals, identification, figures.
 """
 
-from bench.reproduction.item import Item, Picture, Result, Row
+from bench.reproduction.item import Item, Picture, Result
 from bench.reproduction.registry import ENTRIES, Entry, find_entries
 from bench.reproduction.running import Reproduction, fingerprint, reproduce
+from bench.reproduction.verdict import Row, Verdict
 
 __all__ = [
     "ENTRIES",
@@ -16,6 +17,7 @@ __all__ = [
     "Reproduction",
     "Result",
     "Row",
+    "Verdict",
     "find_entries",
     "fingerprint",
     "reproduce",

@@ -17,7 +17,10 @@ from bench.reduction import channel_nmse, element_from
 from bench.reproduction import joint_models
 from bench.reproduction.estimates import fine
 from bench.reproduction.imperial import imperial
-from bench.reproduction.item import Item, Picture, Progress, Row, value_row
+from bench.reproduction.item import Item, Picture, Progress
+from bench.reproduction.printed_figures import fig, panels
+from bench.reproduction.verdict import GOOD_FIT, Row, told_row, value_row
+from bench.reproduction.verdict import SEEDS as FURTHER_SEEDS
 from bench.rig import Element, Rig, simulate
 from bench.rig.library import chain_rig
 
@@ -36,9 +39,8 @@ CHANNELS = {
 }
 NETWORK, PUBLISHED = "our network (40)", "published network (30)"
 TENSOR, TOTAL = "our polynomial (tensor of order 3)", "our polynomial (total degree 5)"
-LIMITS = {NETWORK: 1.0, PUBLISHED: 1.0, TOTAL: 5.0, TENSOR: math.inf}
-"""Largest NMSE required of the joint's motion and forces [%]: for networks a fifth of what counts as a good fit. The tensor is
-reported as it comes."""
+LAST_SEED = 2100
+"""Further seeds of the unseen excitation begin after it."""
 
 
 class Outcome(NamedTuple):
@@ -81,34 +83,51 @@ def outcome(rig: Rig, element: Element, true: Recording, seed: int) -> Outcome:
     return Outcome(record, channel_nmse(true, record), outside, "")
 
 
-def _rows(outcomes: dict[str, dict[str, Outcome]]) -> tuple[Row, ...]:
+def _why(others: list[Outcome]) -> str:
+    """What became of a joint over the further seeds."""
+    gone = sum(other.record is None for other in others)
+    left = sum(other.record is not None and other.outside > 0.0 for other in others)
+    return (
+        f"under {gone} of {len(others)} further excitations the chain diverges and under {left} it leaves the range of the training "
+        "data, beyond which the model's force means nothing"
+    )
+
+
+def _rows(outcomes: dict[str, dict[str, Outcome]], further: dict[str, list[Outcome]]) -> tuple[Row, ...]:
     rows = []
     for excited, by_label in outcomes.items():
+        number, page = ("5.8", "p. 132") if excited == "training" else ("5.9", "p. 132")
         for label, found in by_label.items():
+            network = label in (NETWORK, PUBLISHED)
+            printed = "accurate representation" if network else ""
+            source = f"{page}, sentence; {fig(number)}" if network else ""
             if found.record is None:
-                rows.append(Row(f"{excited} excitation, {label}", "", "", found.note))
+                reason = "the text puts only a network into the chain"
+                rows.append(told_row(f"{excited} excitation, {label}", "", found.note, reason))
                 continue
+            others = further[label] if excited == "unseen" else []
             for channel, name in list(CHANNELS.items())[:4]:
                 rows.append(
                     value_row(
                         f"{excited} excitation, {label}: NMSE of {name}",
                         "%",
-                        None,
+                        printed or None,
                         found.nmse[channel],
-                        high=LIMITS[label],
+                        high=GOOD_FIT,
+                        source=source,
+                        reason="a good fit (section 3.4.2); the text compares by eye",
+                        seeds=[other.nmse.get(channel, math.inf) for other in others],
+                        why=_why(others),
                     )
                 )
             worst = max(found.nmse[channel] for channel in list(CHANNELS)[4:])
+            name = f"{excited} excitation, {label}"
             rows.append(
-                value_row(f"{excited} excitation, {label}: worst NMSE of the outer bodies", "%", None, worst)
+                value_row(f"{name}: worst NMSE of the outer bodies", "%", None, worst, reason="reported")
             )
+            outside = 100.0 * found.outside
             rows.append(
-                value_row(
-                    f"{excited} excitation, {label}: samples outside the data's range",
-                    "%",
-                    None,
-                    100.0 * found.outside,
-                )
+                value_row(f"{name}: samples outside the data's range", "%", None, outside, reason="reported")
             )
     return tuple(rows)
 
@@ -124,6 +143,13 @@ def run(progress: Progress) -> Item:
         excited: {label: outcome(rig, element, true[excited], seed) for label, element in candidates.items()}
         for excited, seed in SEEDS.items()
     }
+    further: dict[str, list[Outcome]] = {label: [] for label in candidates}
+    for number in FURTHER_SEEDS:
+        progress(f"seed {number}", 0.75 + 0.014 * number)
+        reference = respond(rig, LAST_SEED + number)
+        for label, element in candidates.items():
+            if label != TENSOR:
+                further[label].append(outcome(rig, element, reference, LAST_SEED + number))
     progress("drawing", 0.9)
     pictures = []
     pairs = [("axial_23", "joint/force_1"), ("torsional_23", "joint/force_2")]
@@ -145,11 +171,13 @@ def run(progress: Progress) -> Item:
                 f"{excited}_histories",
                 f"Restoring forces, {excited} excitation ({figure} a, b).",
                 time_histories(records, names, window=window),
+                panels(figure.removeprefix("Fig "), "ab"),
             ),
             Picture(
                 f"{excited}_loops",
                 f"Loops of the joint, {excited} excitation ({figure} c, d).",
                 fine(loops(records, pairs, window=window)),
+                panels(figure.removeprefix("Fig "), "cd"),
             ),
             Picture(
                 f"{excited}_errors",
@@ -168,4 +196,6 @@ def run(progress: Progress) -> Item:
         "data; a polynomial of total degree 5 with half as many coefficients does not. (An answer of no "
         f"force at all would score {both['training']:.0f} %.)"
     )
-    return Item(text, _rows(outcomes), tuple(pictures))
+    searched = "total degree of the second polynomial, because the printed form diverges; seeds and band of the loads, and the "
+    searched += "seed shown, which was fixed before the ten others were tried (their spread stands beside it)"
+    return Item(text, _rows(outcomes, further), tuple(pictures), searched)

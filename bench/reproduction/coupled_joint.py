@@ -10,10 +10,12 @@ from bench.figures import bar_table, loops, time_histories
 from bench.identification.network import NetworkModel
 from bench.identification.polynomial import PolynomialModel, fit_polynomial
 from bench.recording import Recording
-from bench.reproduction import joint_models
+from bench.reproduction import joint_models, joint_one_record
 from bench.reproduction.estimates import fine
 from bench.reproduction.imperial import imperial
-from bench.reproduction.item import Item, Picture, Progress, Row, value_row
+from bench.reproduction.item import Item, Picture, Progress
+from bench.reproduction.printed_figures import fig, panels
+from bench.reproduction.verdict import GOOD_FIT, Row, axis_row, told_row, value_row
 
 PAIRS = [("axial", "axial force"), ("torsional", "torsional force")]
 """Loops: force over relative displacement, torque over relative rotation."""
@@ -47,24 +49,46 @@ def worst(model: Model) -> float:
 
 def _range_rows(records: dict[str, Recording]) -> list[Row]:
     both = imperial(records["both"])
-    channels = {
-        "relative displacement": ("axial", "in", "about ±0.6"),
-        "relative rotation": ("torsional", "rad", "about ±0.6"),
-        "axial restoring force": ("joint/force_1", "lbf", "within ±1000"),
-        "torsional restoring force": ("joint/force_2", "lbf in", "within ±1000"),
-    }
     rows = []
-    for quantity, (name, unit, printed) in channels.items():
+    for quantity, name, unit, part in (
+        ("relative displacement", "axial", "in", "c"),
+        ("relative rotation", "torsional", "rad", "d"),
+    ):
         low, high = float(both[name].min()), float(both[name].max())
-        rows.append(Row(f"{quantity}, both axes loaded", unit, printed, f"{low:.3g} … {high:.3g}"))
+        rows.append(
+            told_row(
+                f"{quantity}, both axes loaded",
+                unit,
+                f"{low:.3g} … {high:.3g}",
+                "the axis reaches beyond its last legible labels; how far cannot be read",
+                printed="labels to ±0.5",
+                source=f"{fig('4.6 c')} ({part}), axis labels",
+            )
+        )
+    for quantity, name, unit in (
+        ("axial restoring force", "joint/force_1", "lbf"),
+        ("torsional restoring force", "joint/force_2", "lbf in"),
+    ):
+        rows.append(
+            axis_row(
+                f"{quantity}, both axes loaded",
+                unit,
+                1000.0,
+                500.0,
+                both[name],
+                source=fig("4.6 c"),
+                chosen="seed and band of the loads; their level is the deck's",
+            )
+        )
     return rows
 
 
 def _single(progress: Progress) -> list[tuple[str, float, float]]:
     """Loading of the only training record, and the worst NMSE of a polynomial and of a network on unseen records [%]."""
     found = []
-    for number, (name, record) in enumerate(joint_models.training().items()):
-        progress(f"training on the {name} record only", 0.45 + 0.15 * number)
+    for number, name in enumerate(("axial", "torsional")):
+        record = joint_models.training()[name]
+        progress(f"training on the {name} record only", 0.4 + 0.1 * number)
         data = joint_models.view(record)
         polynomial = fit_polynomial(data.states, data.forces, orders=3)
         network = joint_models.train_network(data)
@@ -72,29 +96,64 @@ def _single(progress: Progress) -> list[tuple[str, float, float]]:
     return found
 
 
-def _rows(models: joint_models.Models, single: list[tuple[str, float, float]]) -> tuple[Row, ...]:
+def _rows(
+    models: joint_models.Models, single: list[tuple[str, float, float]], one_record: list[Row]
+) -> tuple[Row, ...]:
     rows = _range_rows(joint_models.training())
     ratios = []
+    drawn = {"polynomial": "4.8", "network": "4.10"}
     for name, record in joint_models.unseen().items():
         scores = zip(joint_models.AXES, *(joint_models.errors(m, record) for m in models[:2]), strict=True)
         for axis, polynomial, network in scores:
             if polynomial is None or network is None:
                 continue
             ratios.append(polynomial / network)
-            rows.append(
-                value_row(
-                    f"unseen, {name} loaded: NMSE of the {axis} force, polynomial", "%", None, polynomial
+            for kind, score in (("polynomial", polynomial), ("network", network)):
+                rows.append(
+                    value_row(
+                        f"unseen, {name} loaded: NMSE of the {axis} force, {kind}",
+                        "%",
+                        "clearly indicate the capability" if kind == "network" else "validation, no number",
+                        score,
+                        high=GOOD_FIT if kind == "network" else math.inf,
+                        source=f"p. 82, sentence; {fig(drawn[kind])}",
+                        reason="a good fit (section 3.4.2)"
+                        if kind == "network"
+                        else "reported: the text gives no number and makes no claim of accuracy for it",
+                    )
                 )
-            )
-            rows.append(
-                value_row(f"unseen, {name} loaded: NMSE of the {axis} force, network", "%", None, network)
-            )
-    seconds = models.network_seconds / models.polynomial_seconds
     rows += [
-        value_row("least ratio of the errors, polynomial over network", "1", 16.0, min(ratios), low=16.0),
-        value_row("ratio of the fitting times, network over polynomial", "1", 180.0, seconds, high=20.0),
-        value_row("fitting time, polynomial", "s", None, models.polynomial_seconds),
-        value_row("fitting time, network of 40", "s", None, models.network_seconds),
+        value_row(
+            "error of the polynomial over that of the network, least of the unseen tests",
+            "1",
+            16.0,
+            min(ratios),
+            low=8.0,
+            high=32.0,
+            shape=(1.0, math.inf),
+            source="p. 97, number (about 16 times lower percentage error)",
+            reason="about 16: within a factor of two",
+            why="our network, trained by Levenberg-Marquardt on noise-free records to its end, is better by more than printed",
+        ),
+        value_row(
+            "fitting time, network over polynomial",
+            "1",
+            180.0,
+            models.network_seconds / models.polynomial_seconds,
+            low=90.0,
+            high=360.0,
+            shape=(1.0, math.inf),
+            source="p. 97, number (about 180 times longer)",
+            reason="about 180: within a factor of two; wall time, measured in this run",
+            why="compiled kernels and a choice of 12 000 of the 90 000 samples make the network's training short; the polynomial "
+            "takes all of them",
+        ),
+        value_row(
+            "fitting time, polynomial", "s", None, models.polynomial_seconds, reason="reported as measured"
+        ),
+        value_row(
+            "fitting time, network of 40", "s", None, models.network_seconds, reason="reported as measured"
+        ),
         value_row(
             "coefficients of a force, polynomial",
             "1",
@@ -102,36 +161,33 @@ def _rows(models: joint_models.Models, single: list[tuple[str, float, float]]) -
             float(models.polynomial.report.n_terms),
             low=256.0,
             high=256.0,
+            source="p. 79, number",
+            reason="a count",
         ),
     ]
-    whole = worst(models.network)
-    rows.append(
-        value_row("trained on all three records: worst NMSE on unseen records, network", "%", None, whole)
-    )
     for name, polynomial, network in single:
-        rows.append(
-            value_row(f"trained on the {name} record only: the same, polynomial", "%", None, polynomial)
-        )
-        rows.append(
-            value_row(
-                f"trained on the {name} record only: the same, network",
-                "%",
-                None,
-                network,
-                low=-math.inf if name == "both" else 10.0 * whole,
-                requirement="" if name == "both" else "fails: more than ten times that of all three",
-            )._replace(printed="would have failed (section 4.5)")
-        )
-    return tuple(rows)
+        for kind, score in (("polynomial", polynomial), ("network", network)):
+            rows.append(
+                value_row(
+                    f"trained on the {name} record only: worst unseen NMSE, {kind}",
+                    "%",
+                    "three data sets were required",
+                    score,
+                    low=GOOD_FIT,
+                    source="p. 77, sentence",
+                    reason="not a good fit (section 3.4.2)",
+                )
+            )
+    return (*rows, *one_record)
 
 
 def _pictures(records: dict[str, Recording], models: joint_models.Models) -> tuple[Picture, ...]:
     test = joint_models.unseen()["both"]
-    both: dict[str, Model] = {"polynomial, order 3": models.polynomial, "network, 40 units": models.network}
+    polynomial, network = {"polynomial, order 3": models.polynomial}, {"network, 40 units": models.network}
+    both: dict[str, Model] = {**polynomial, **network}
     views = {
         f"{name} loaded": shown(record, joint_models.view(record).forces) for name, record in records.items()
     }
-    compared = overlaid(test, both)
     scores = {
         label: {
             f"{name}, {axis}": score
@@ -141,34 +197,44 @@ def _pictures(records: dict[str, Recording], models: joint_models.Models) -> tup
         }
         for label, model in both.items()
     }
-    return (
+    named = {"both": "both loaded", "x only": "axial loaded", "θ only": "torsional loaded"}
+    window = (15.0, 18.0)
+    pictures = [
         Picture(
             "training",
             "The three training records: loads on x only, on θ only, on both (Fig 4.6).",
-            fine(
-                loops(
-                    {
-                        "both": views["both loaded"],
-                        "x only": views["axial loaded"],
-                        "θ only": views["torsional loaded"],
-                    },
-                    PAIRS,
-                    window=(10.0, 20.0),
-                )
+            fine(loops({label: views[name] for label, name in named.items()}, PAIRS, window=(10.0, 20.0))),
+            panels("4.6", "abc"),
+        ),
+    ]
+    for kind, model, training, unseen in (
+        ("polynomial", polynomial, "4.7", "4.8"),
+        ("network", network, "4.9", "4.10"),
+    ):
+        fitted, judged = overlaid(records["both"], {**model}), overlaid(test, {**model})
+        pictures += [
+            Picture(
+                f"{kind}_training",
+                f"{kind.capitalize()} on the training record with both axes loaded (Fig {training}).",
+                fine(loops(fitted, PAIRS, window=window)),
+                panels(training, "ab"),
             ),
-        ),
-        Picture(
-            "unseen",
-            "Unseen record, both axes: forces on the true states (Figs 4.8, 4.10 a, b).",
-            time_histories(compared, [name for _, name in PAIRS], window=(15.0, 18.0)),
-        ),
-        Picture(
-            "unseen_loops",
-            "The same as loops: the polynomial rounds the corners of the gap (Figs 4.8, 4.10 c, d).",
-            fine(loops(compared, PAIRS, window=(15.0, 18.0))),
-        ),
-        Picture("errors", "NMSE on unseen records.", bar_table(scores, limit=5.0, limit_label="good fit")),
-    )
+            Picture(
+                f"{kind}_unseen",
+                f"{kind.capitalize()} on an unseen record, both axes, over time (Fig {unseen} a, b).",
+                time_histories(judged, [name for _, name in PAIRS], window=window),
+                panels(unseen, "ab"),
+            ),
+            Picture(
+                f"{kind}_unseen_loops",
+                f"The same as loops (Fig {unseen} c, d)."
+                + (" The polynomial rounds the corners of the gap." if kind == "polynomial" else ""),
+                fine(loops(judged, PAIRS, window=window)),
+                panels(unseen, "cd"),
+            ),
+        ]
+    errors = bar_table(scores, limit=5.0, limit_label="good fit")
+    return (*pictures, Picture("errors", "NMSE on unseen records.", errors))
 
 
 def run(progress: Progress) -> Item:
@@ -178,6 +244,7 @@ def run(progress: Progress) -> Item:
     progress("fitting polynomial and network", 0.08)
     models = joint_models.models()
     single = _single(progress)
+    one_record = joint_one_record.rows(lambda label, share: progress(label, 0.55 + 0.35 * share))
     progress("drawing", 0.9)
     text = (
         "The joint of the deck in appendix B.1 (spring, damper, gap of 0.2 on both axes, coupling by "
@@ -185,9 +252,10 @@ def run(progress: Progress) -> Item:
         "1000 lbf in. Restoring forces are found from what is measured at body 1. Polynomial: full "
         "tensor of order 3 in the four states, 256 coefficients a force. Network: 40 tanh units, "
         "Levenberg-Marquardt with Bayesian regularisation, staged, four starts. Both are fitted to the "
-        "same 90 000 samples and judged on records of other seeds.\n\nSection 4.5 says that one record "
-        "alone would not do. It holds for each record with one axis loaded. It does not hold here for "
-        "the record with both axes loaded: excited as strongly as this, and without sensor noise, it "
-        "visits the states of the other two."
+        "same 90 000 samples and judged on records of other seeds.\n\nSection 4.5 says that models from the record with both "
+        "axes loaded alone would have failed. As strong as here and without sensor noise, that record visits the states of "
+        "the other two. The question is put again with 5 % noise and with weaker loads, to one record and to all three."
     )
-    return Item(text, _rows(models, single), _pictures(records, models))
+    searched = "seeds and band of the loads (the level is the deck's); number of units and order as printed; levels of noise and "
+    searched += "of the weaker loads, one each, not searched"
+    return Item(text, _rows(models, single, one_record), _pictures(records, models), searched)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -109,6 +109,29 @@ def contribution_histories(
             axes.set_title(f"{share:.3g} % of the mean square", fontsize=8)
             axes.margins(x=0.0)
         _finish(grid, len(rows))
+    return figure
+
+
+def courses(
+    time: NDArray[np.float64], drawn: Mapping[str, tuple[NDArray[np.float64], float, tuple[float, float]]]
+) -> Figure:
+    """Estimates over time with the off-line values dashed.
+
+    Args:
+        time: (n,) [s].
+        drawn: By label: the estimates (n,), the value off line, and the ends of the axis, those of the printed figure.
+    """
+    with style():
+        figure, grid = axes_grid(8.0, 3.4, nrows=len(drawn), sharex=True)
+        for axes, (label, (values, final, span)) in zip(grid[:, 0], drawn.items(), strict=True):
+            axes.plot(time, values, color="#1a1a1a", linewidth=1.2, label="on line")
+            axes.axhline(final, label="nonlinear least squares", **REFERENCE)
+            axes.set_ylim(span)
+            axes.set_ylabel(label)
+            axes.margins(x=0.0)
+        grid[-1, 0].set_xlabel("time [s]")
+        handles, labels = grid[0, 0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside upper right", ncols=2)
     return figure
 
 

@@ -28,9 +28,11 @@ from bench.nastran import (
 )
 from bench.nastran.bulk import Format
 from bench.recording import Recording
+from bench.reproduction import original_deck
 from bench.reproduction.chain_joint import AXES
 from bench.reproduction.estimates import fine
-from bench.reproduction.item import Item, Picture, Progress, Row, fact_row, value_row
+from bench.reproduction.item import Item, Picture, Progress
+from bench.reproduction.verdict import Row, fact_row, value_row
 from bench.rig import Element, simulate
 from bench.rig.library import chain_rig
 
@@ -90,6 +92,7 @@ def _deck_rows() -> tuple[list[Row], str]:
                 None,
                 worst,
                 high=tolerance,
+                reason="digits that the fields of the format hold",
             )
         )
     deck = parse_deck(
@@ -115,13 +118,23 @@ def _rows(
     order: int, found: dict[str, float], deck: list[Row], cards: str, study: LagStudy
 ) -> tuple[Row, ...]:
     return (
-        value_row("equations of the expanded system", "1", 72.0, float(order), low=72.0, high=72.0),
+        value_row(
+            "equations of the expanded system",
+            "1",
+            72.0,
+            float(order),
+            low=72.0,
+            high=72.0,
+            source="p. 126, number (s4)",
+            reason="a count",
+        ),
         value_row(
             "expanded system (deck's form) against the direct swap: largest difference over peak",
             "1",
             None,
             found["deck"],
             high=1e-8,
+            reason="the same system by the same Runge-Kutta steps: rounding, amplified by some seconds of motion",
         ),
         value_row(
             "expanded system (printed form, eqs 5.41, 5.63) against the direct swap",
@@ -129,6 +142,7 @@ def _rows(
             None,
             found["printed"],
             high=1e-8,
+            reason="the same",
         ),
         *deck,
         fact_row(
@@ -136,16 +150,25 @@ def _rows(
             cards,
             all(name in cards for name in ("DmigColumn", "Nolin1", "Sload", "ScalarPoints", "Tabled1")),
             printed="DMIG, SPOINT, SLOAD, NOLIN1, TABLED1",
-            requirement="all five kinds",
+            source="appendix B.3, pp. 159 to 172, cards",
+            tolerance="all five kinds",
+            reason="a kind of card is there or not",
         ),
         value_row(
             "Nastran's evaluation (NOLIN1 one step late): error of x at 0.08 ms",
             "%",
             None,
             100.0 * float(study.errors[0, 0]),
+            reason="reported",
         ),
         value_row(
-            "order of that error in the step", "1", None, float(np.mean(study.orders)), low=0.9, high=1.1
+            "order of that error in the step",
+            "1",
+            None,
+            float(np.mean(study.orders)),
+            low=0.9,
+            high=1.1,
+            reason="a load one step late is an error of first order",
         ),
     )
 
@@ -192,5 +215,7 @@ def run(progress: Progress) -> Item:
         "restoring force lags: this is integrated here from the published algorithm, and explains the "
         "deck's step of 0.01 ms."
     )
-    rows = _rows(systems["deck"].order, worst, deck, cards, study)
-    return Item(text, rows, _pictures(record, found["deck"][1], study))
+    rows = (*_rows(systems["deck"].order, worst, deck, cards, study), *original_deck.rows())
+    return Item(
+        text, rows, _pictures(record, found["deck"][1], study), "nothing; the numbers are the printed cards'"
+    )

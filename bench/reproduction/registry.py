@@ -49,10 +49,22 @@ _ENTRIES = (
     Entry("B2", "Damper polynomial model under random excitation (Figs 3.5-3.9)", "damper_polynomial", 10.0),
     Entry("B3", "Order of the damper polynomial model (Figs 3.11, 3.12)", "damper_order", 30.0),
     Entry("C2", "Coupled joint: polynomial and network (Figs 4.6-4.10, section 4.5)", "coupled_joint", 120.0),
-    Entry("C3", "Laboratory joint (Figs 4.14-4.18)", "laboratory_joint", 60.0),
+    Entry("C3", "Laboratory joint (Figs 4.14-4.18, 5.10-5.12)", "laboratory_joint", 60.0),
+    Entry("C4", "Joint identified without the mass (section 4.5)", "unknown_mass", 60.0),
     Entry("D1", "Linear chain of four bodies (Fig 5.3, eqs 5.47-5.53)", "linear_chain"),
     Entry("D3", "Reduced-order joint in the chain (Figs 5.4, 5.8, 5.9)", "chain_joint", 90.0),
-    Entry("D4", "Network as Nastran bulk data (eqs 5.16-5.46, appendix B.3)", "nastran_system", 20.0),
+    Entry(
+        "D4",
+        "Joint and network as Nastran bulk data (eqs 5.16-5.46, 5.55, appendices B.1 to B.3)",
+        "nastran_system",
+        20.0,
+    ),
+    Entry(
+        "D5",
+        "Frame on an isolator with dampers, four reduced-order joints at once (chapter 6)",
+        "frame",
+        60.0,
+    ),
 )
 
 ENTRIES: Mapping[str, Entry] = MappingProxyType({entry.identifier: entry for entry in _ENTRIES})

@@ -14,7 +14,7 @@ from typing import Any
 from bench import model_path
 from bench.files import together, write_text
 from bench.provenance import provenance, software_versions
-from bench.reproduction.item import Item, Progress, Result
+from bench.reproduction.item import Item, Progress, Result, Shown
 from bench.reproduction.registry import Entry, find_entries
 from bench.reproduction.writing import to_markdown, to_page
 
@@ -35,7 +35,7 @@ class Reproduction:
 
     @property
     def holds(self) -> bool:
-        """Whether everything that must hold does."""
+        """Whether everything that can be judged holds, at least in shape."""
         return all(result.holds for result in self.results)
 
     def to_dict(self) -> dict[str, Any]:
@@ -100,7 +100,7 @@ def reproduce(
         write_text(
             files[2], json.dumps(reproduction.to_dict(), indent=1, ensure_ascii=False, allow_nan=False)
         )
-    pictures = [folder / name for result in results for name, _ in result.pictures]
+    pictures = [folder / name for result in results for name in (shown.file for shown in result.pictures)]
     return Reproduction(reproduction.results, (*files, *pictures), reproduction.seconds)
 
 
@@ -122,7 +122,7 @@ def _kept(folder: Path, entry: Entry) -> Result | None:
         result = Result.from_dict(json.loads(_file(folder, entry).read_text(encoding="utf-8")))
     except (OSError, ValueError, KeyError, TypeError):
         return None
-    present = all((folder / name).is_file() for name, _ in result.pictures)
+    present = all((folder / shown.file).is_file() for shown in result.pictures)
     return result if result.version == fingerprint() and present else None
 
 
@@ -135,11 +135,12 @@ def _made(folder: Path, entry: Entry, progress: Progress) -> Result:
     for picture in item.pictures:
         name = f"{entry.identifier}_{picture.name}.png"
         save(picture.figure, folder / name, dpi=110.0)
-        pictures.append((name, picture.caption))
+        pictures.append(Shown(name, picture.caption, picture.shows))
     result = Result(
         entry.identifier,
         entry.title,
         item.text,
+        item.searched,
         item.rows,
         tuple(pictures),
         time.perf_counter() - start,

@@ -93,7 +93,8 @@ def parse(text: str, folder: str, label: str) -> mujoco.MjSpec:
         ModelError: It is no valid MJCF.
     """
     try:
-        spec = mujoco.MjSpec.from_string(text, include=included_files(text, Path(folder)))
+        with native.quiet():
+            spec = mujoco.MjSpec.from_string(text, include=included_files(text, Path(folder)))
     except (ValueError, ElementTree.ParseError) as error:
         raise ModelError(f"the MJCF of {label} cannot be read: {error}") from error
     if folder:

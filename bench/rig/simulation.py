@@ -46,20 +46,7 @@ def controls_of(rig: Rig, drive: Drive, rng: np.random.Generator | None = None) 
         UnknownNameError: The drive names an actuator that the rig lacks.
         ParameterError: Not finite, or of different lengths, or a sample rate that does not divide the step rate.
     """
-    if isinstance(drive, Excitation):
-        samples = drive.sample(rng if rng is not None else np.random.default_rng())
-        columns = dict(zip(drive.names, samples.T, strict=True))
-        rate = drive.sample_rate
-    elif isinstance(drive, Recording):
-        columns = {name: drive[name] for name in rig.actuators if name in drive.names}
-        rate = drive.sample_rate
-        if not columns:
-            raise UnknownNameError(
-                f"channel for the actuators of rig '{rig.name}' in the record", rig.actuators[0], drive.names
-            )
-    else:
-        columns = {name: np.asarray(values, dtype=float) for name, values in drive.items()}
-        rate = 1.0 / rig.timestep
+    columns, rate = _columns(rig, drive, rng)
     for name in columns:
         if name not in rig.actuators:
             raise UnknownNameError(f"actuator of rig '{rig.name}'", name, rig.actuators)
@@ -73,8 +60,12 @@ def controls_of(rig: Rig, drive: Drive, rng: np.random.Generator | None = None) 
     if len(lengths) != 1:
         raise ParameterError(
             f"the drive of rig '{rig.name}' has channels of different lengths: {sorted(lengths)} samples"
+            if lengths
+            else f"the drive of rig '{rig.name}' has no channels; one of {', '.join(rig.actuators)} at least is expected"
         )
     length = lengths.pop()
+    if length < 1:
+        raise ParameterError(f"the drive of rig '{rig.name}' has no samples; at least one is expected")
     if length * hold > MAX_SAMPLES:
         raise ParameterError(
             f"{length} samples, each held for {hold} steps of rig '{rig.name}', are {length * hold} steps; at most {MAX_SAMPLES} "
@@ -89,6 +80,46 @@ def controls_of(rig: Rig, drive: Drive, rng: np.random.Generator | None = None) 
             )
         controls[:, rig.actuators.index(name)] = np.repeat(values, hold)
     return controls
+
+
+def _columns(
+    rig: Rig, drive: Drive, rng: np.random.Generator | None
+) -> tuple[dict[str, NDArray[np.float64]], float]:
+    """Commands by actuator as a drive has them, and their rate [Hz]."""
+    if isinstance(drive, Excitation):
+        samples = drive.sample(rng if rng is not None else np.random.default_rng())
+        columns = dict(zip(drive.names, samples.T, strict=True))
+        rate = drive.sample_rate
+    elif isinstance(drive, Recording):
+        columns = {name: drive[name] for name in rig.actuators if name in drive.names}
+        rate = drive.sample_rate
+        if not columns:
+            raise UnknownNameError(
+                f"channel for the actuators of rig '{rig.name}' in the record", rig.actuators[0], drive.names
+            )
+    elif isinstance(drive, Mapping):
+        columns = {name: _command(name, values) for name, values in drive.items()}
+        rate = 1.0 / rig.timestep
+    else:
+        raise ParameterError(
+            f"the drive of rig '{rig.name}' is a {type(drive).__name__}; an excitation, a record or arrays by actuator name are expected"
+        )
+    return columns, rate
+
+
+def _command(name: str, values: ArrayLike) -> NDArray[np.float64]:
+    """Commands of one actuator (n,)."""
+    try:
+        samples = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ParameterError(
+            f"the command of actuator '{name}' is no array of real numbers; (n,) of them are expected"
+        ) from None
+    if samples.ndim != 1:
+        raise ParameterError(
+            f"the command of actuator '{name}' has the shape {samples.shape}; (n,) is expected, one number a time step"
+        )
+    return samples
 
 
 def simulate(
@@ -229,7 +260,15 @@ def _roll(
 def _set_initial(
     batch: Batch, rigs: Sequence[Rig], initial: Mapping[str, tuple[float, float]] | None
 ) -> None:
-    for joint, (position, velocity) in (initial or {}).items():
+    for joint, state in (initial or {}).items():
+        try:
+            position, velocity = map(float, state)
+        except (TypeError, ValueError):
+            position = velocity = float("nan")
+        if not (np.isfinite(position) and np.isfinite(velocity)):
+            raise ParameterError(
+                f"the initial state of joint '{joint}' is {state!r}; a finite position and velocity are expected, as (0.01, 0.0)"
+            )
         (at_q, at_v, _), *more = native.coordinate(rigs[0].model, joint).terms
         if more:
             raise ModelError(f"'{joint}' is a tendon; give the initial position and velocity of its joints")

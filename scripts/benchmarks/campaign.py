@@ -24,6 +24,7 @@ from bench.campaign.execution import cores, generator_of, payload_of
 from bench.campaign.parts import part_name
 from bench.campaign.store import Store
 from bench.campaign.tables import part_contents
+from bench.files import write_text
 from benchmarks.new_process import in_new_process, memory_row
 from benchmarks.timing import Row, interleave, ratio_row
 
@@ -313,7 +314,7 @@ def main(path: str, *, full: bool) -> None:
     load = f"load average {os.getloadavg()[0]:.1f} before"
     stamp = f"Measured on {time.strftime('%Y-%m-%d')}, {cores()} cores, {load}, by the command above."
     block = f"{before}<!-- measured -->\n{stamp}\n\n{measured(full=full)}\n<!-- end of measured -->{after}"
-    file.write_text(block, encoding="utf-8")
+    write_text(file, block)
 
 
 if __name__ == "__main__":

@@ -410,7 +410,8 @@ def _best(case: Case, catalogue: Sequence[Effect], seconds: float) -> tuple[Plac
     structure = structure_of(case)
     problem = Problem(case, structure, case.identification)
     nothing = Candidate(problem, None)
-    others = [Candidate(problem, placed) for placed in placements(case, structure, catalogue)]
+    asked = [effect for effect in catalogue if effect.site != "read off"]  # which only the diagnosis can read
+    others = [Candidate(problem, placed) for placed in placements(case, structure, asked)]
     if np.isfinite(seconds):
         fitted = _in_heats(nothing, others, began, seconds)
     else:

@@ -183,11 +183,38 @@ def spoil_npz(folder: Path, rng: np.random.Generator) -> None:
                 + head.encode()
                 + table()[:, 0].tobytes()
             )
-            archive.writestr(
-                f"{name}.npy",
-                content[: len(content) if rng.random() < 0.8 else int(rng.integers(len(content)))],
-            )
+            content = content[: len(content) if rng.random() < 0.8 else int(rng.integers(len(content)))]
+            if rng.random() < 0.1:
+                content = _zipped(content)
+            member = f"{name}.npy" if rng.random() < 0.9 else str(rng.choice(ODD_MEMBERS))
+            archive.writestr(member, content)
+            if rng.random() < 0.1:
+                with warnings.catch_warnings():
+                    warnings.simplefilter("ignore")  # of two members of one name
+                    archive.writestr(member, content)
     path.write_bytes(stream.getvalue())
+
+
+ODD_MEMBERS = (
+    "../time.npy",
+    "/etc/passwd.npy",
+    "time.npy/",
+    "time.NPY",
+    ".npy",
+    "a" * 300 + ".npy",
+    "time.npy.npy",
+    "CON.npy",
+)
+
+
+def _zipped(content: bytes) -> bytes:
+    """An archive of an archive of an array."""
+    for _ in range(2):
+        stream = io.BytesIO()
+        with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
+            archive.writestr("time.npy", content)
+        content = stream.getvalue()
+    return content
 
 
 def make_mat(folder: Path) -> None:
@@ -208,8 +235,26 @@ def spoil_mat(folder: Path, rng: np.random.Generator) -> None:
 
     path = folder / "record.mat"
     t, f, x = table().T
-    kind = int(rng.integers(4))
-    if kind == 1:
+    kind = int(rng.integers(6))
+    if kind == 4:
+        from scipy.sparse import random_array
+
+        matrix = random_array((50, 50), density=0.1, rng=rng, format="csc")
+        savemat(
+            path, {"time": t, "force": f, "displacement": x, "sparse": matrix, "words": np.array(["ab", "c"])}
+        )
+    elif kind == 5:
+        nested: Any = x[:3]
+        for _ in range(int(rng.integers(2, 60))):
+            nested = (
+                {"s": nested, "c": np.array([nested, "x"], dtype=object)}
+                if rng.random() < 0.1
+                else {"s": nested}
+            )
+        savemat(
+            path, {"time": t, "force": f, "displacement": x, "deep": nested, "flags": np.array([True, False])}
+        )
+    elif kind == 1:
         savemat(path, {"time": t, "force": f, "displacement": x}, format="4")
     elif kind == 2:
         savemat(path, {"time": t, "force": f, "displacement": x}, do_compression=True)

@@ -17,17 +17,16 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from scipy.io import loadmat
 
+from bench.data import BOUC_WEN_PERIOD as PERIOD
+from bench.data import BOUC_WEN_RATE as RATE
+from bench.data import bouc_wen_benchmark
 from bench.discrepancy import Case, CaseChannel, NominalParameter, record_from_arrays
 from bench.discrepancy.case.acquisition import Antialias
-from bench.record_files.arrays import read_hdf5
 from measured.target import Target
 
 FOLDER = "bouc_wen_benchmark"
 TARGET = Target("displacement", "rms", 5e-7, "m")
-RATE = 750.0
-PERIOD = 8192
 BAND = (5.0, 150.0)
 """Excited frequencies [Hz]."""
 DECIMATION = Antialias("fir", cutoff_hz=375.0, rate_hz=15000.0, taps=31, records=("validation_sweep",))
@@ -42,13 +41,8 @@ NOMINAL = (
 
 def cases(data: Path) -> dict[str, Case]:
     """The benchmark as a case, from the folder of its files."""
-    wanted = [f"multisine/{name}" for name in "uy"]
-    train = read_hdf5(data / "train.h5", wanted.__contains__)
-    u, y = (train[name].values[:, 0].reshape(-1, PERIOD) for name in wanted)
-    mat = {
-        name: loadmat(data / f"{name}.mat")[name].ravel()
-        for name in ("uval_multisine", "yval_multisine", "uval_sinesweep", "yval_sinesweep")
-    }
+    found = bouc_wen_benchmark(data)
+    u, y = (found["train"][name].reshape(-1, PERIOD) for name in ("force", "displacement"))
     channels = (
         CaseChannel("force", "N", "measured", 0.0),
         CaseChannel("displacement", "m", "response", _noise(y), DECIMATION),
@@ -65,8 +59,8 @@ def cases(data: Path) -> dict[str, Case]:
             "bouc_wen", "sdof", NOMINAL, channels,
             (record("identification", u.mean(axis=0), y.mean(axis=0), periodic=True),),
             (
-                record("validation_multisine", mat["uval_multisine"], mat["yval_multisine"], periodic=True),
-                record("validation_sweep", mat["uval_sinesweep"], mat["yval_sinesweep"], periodic=False),
+                record("validation_multisine", found["multisine"]["force"], found["multisine"]["displacement"], periodic=True),
+                record("validation_sweep", found["sweep"]["force"], found["sweep"]["displacement"], periodic=False),
             ),
             options={"load_interpolation": "band_limited"},
         )

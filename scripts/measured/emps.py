@@ -24,9 +24,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from scipy.io import loadmat
 from scipy.signal import decimate
 
+from bench.data import emps
 from bench.discrepancy.case.case import Case, CaseChannel, NominalParameter, record_from_arrays
 
 FACTOR = 5
@@ -43,13 +43,11 @@ def cases(data: Path) -> dict[str, Case]:
     Args:
         data: Folder of the measured data set.
     """
-    table = loadmat(data / "DATA_EMPS.mat")
-    position = table["qm"].ravel()
-    force = float(table["gtau"].item()) * table["vir"].ravel()
-    time = table["t"].ravel()
-    step = FACTOR * (time[-1] - time[0]) / (len(time) - 1)
+    record = emps(data)
+    force, position = record["force"], record["displacement"]
+    step = FACTOR / record.sample_rate
     force, position = (decimate(x, FACTOR, ftype="fir", zero_phase=True) for x in (force, position))
-    clock = time[0] + step * np.arange(len(force))
+    clock = step * np.arange(len(force))
     end = int(SHARE * len(force))
     parts = {"identification": slice(0, end), "validation": slice(end, None)}
     records = {

@@ -14,13 +14,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from scipy.io import loadmat
 
+from bench.data import SILVERBOX_RATE as RATE
+from bench.data import silverbox
 from bench.discrepancy import Case, CaseChannel, CaseRecord, NominalParameter, record_from_arrays
 from measured.target import Target
 
 TARGET = Target("displacement", "rms", 1e-3, "V")
-RATE = 1e7 / 2**14
 ARROW = 40_000
 QUIET = 60
 """Shortest silence, in samples; the last third of each is averaged for the levels at rest."""
@@ -42,8 +42,8 @@ It leaves 0.18 mV of 7 mV there. The circuit is an analogue computer: a volt of 
 
 def cases(data: Path) -> dict[str, Case]:
     """The arrow as a case, from the folder of its file."""
-    table = loadmat(data / "SNLS80mV.mat")
-    u, y = table["V1"].ravel(), table["V2"].ravel()
+    table = silverbox(data)
+    u, y = table["input"], table["output"]
     silences = find_silences(u)
     level_u, level_y = (float(np.mean([x[b - QUIET // 3 : b].mean() for _, b in silences])) for x in (u, y))
 

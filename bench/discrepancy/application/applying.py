@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from bench import native
 from bench.discrepancy.application.drives import DRIVES, LOGGED, logged
 from bench.discrepancy.application.forces import FORCES, element, harden
 from bench.discrepancy.application.numbers import nominal_parameter, wrong_number
@@ -20,6 +21,8 @@ from bench.discrepancy.case.case import Case
 from bench.discrepancy.verdict import NamedEffect, NominalEstimate
 from bench.errors import ModelError
 from bench.rig import Element, Rig
+from bench.rig.building import parse
+from bench.rig.mjcf_files import model_text
 
 Array = NDArray[np.float64]
 WRONG_NUMBERS = ("mass_error", "com_error", "stiffness_error", "damping_error")
@@ -66,6 +69,7 @@ class Applied:
         """Python that runs before every step."""
         return tuple(line for change in self.changes for line in change.lines)
 
+    @native.quiet()
     def compiled(self) -> mujoco.MjModel:
         """The model, with its laws as native callbacks where it has such."""
         model = self.spec.compile()
@@ -91,14 +95,12 @@ def specification(path: str | Path) -> mujoco.MjSpec:
     """Read an MJCF file.
 
     Raises:
-        ModelError: MuJoCo does not read it.
+        ModelError: MuJoCo does not read it, or it is beyond the limits of a model.
     """
-    try:
-        return mujoco.MjSpec.from_file(str(path))
-    except ValueError as error:
-        raise ModelError(f"'{path}' is no MJCF that MuJoCo reads: {told(error)}") from None
+    return parse(model_text(path), str(Path(path).parent), f"'{path}'")
 
 
+@native.quiet()
 def rest_of(model: mujoco.MjModel) -> dict[str, float]:
     """Positions of the joints at which the model stays without controls, from which a linear case counts."""
     start = np.array(model.qpos0)
@@ -157,6 +159,7 @@ class Options(NamedTuple):
     hard: bool = False
 
 
+@native.quiet()
 def apply(
     path: str | Path,
     findings: Findings,

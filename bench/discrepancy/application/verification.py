@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from bench import native
 from bench.discrepancy.application.applying import (
     INTEGRATORS,
     Applied,
@@ -145,6 +146,7 @@ def is_articulated(findings: Findings, case: Case | None) -> bool:
     return case is not None and applies(case)
 
 
+@native.quiet()
 def verify(
     path: str | Path,
     findings: Findings,

@@ -11,6 +11,7 @@ from xml.sax.saxutils import quoteattr
 
 import mujoco
 
+from bench import native
 from bench.discrepancy.application.applying import INTEGRATORS, Applied, Findings
 from bench.discrepancy.application.applying import told as one_line
 from bench.discrepancy.application.target import Change
@@ -34,6 +35,7 @@ def carried(model, data):
 """Part of a snippet for friction that grows with the load."""
 
 
+@native.quiet()
 def model_text(applied: Applied, folder: Path, source: str) -> str:
     """The corrected MJCF, to stand in a folder; what was changed is said in comments."""
     spec = applied.spec.copy()
@@ -78,6 +80,7 @@ def _annotate(lines: list[str], kind: str, name: str, change: Change) -> None:
             return
 
 
+@native.quiet()
 def write_model(applied: Applied, path: Path, source: str) -> None:
     """Write the corrected MJCF, whole or not at all, once MuJoCo has read it again.
 

@@ -8,13 +8,15 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from bench import native
+from bench.discrepancy.articulated.admission import admitted_robot
 from bench.discrepancy.articulated.effects import CATALOGUE
 from bench.discrepancy.articulated.fitting import ArticulatedFit
 from bench.discrepancy.articulated.judgement import (
@@ -92,9 +94,9 @@ def applies(case: Case) -> bool:
     if any(p.name.partition(":")[0] in DRIVES for p in case.parameters):
         return True
     try:
-        model = mujoco.MjModel.from_xml_path(str(path))
-    except ValueError:
-        return False
+        model = compiled_model(path)
+    except BenchError:
+        return False  # refused where the model is read for a diagnosis
     # one joint on its own is a linear structure first: forces on it have a larger catalogue there
     servos = model.nv > 1 and model.nu and np.any(np.asarray(model.actuator_biasprm)[:, 1] != 0.0)
     return bool(servos) or _posture_matters(model)
@@ -117,6 +119,7 @@ def drives_only(case: Case) -> bool:
     return True
 
 
+@native.quiet()
 def _posture_matters(model: mujoco.MjModel) -> bool:
     if model.nv != model.njnt or model.nv < 2:
         return False
@@ -135,6 +138,7 @@ def diagnose_articulated(
     *,
     exclude: Collection[str] = (),
     most: int = 3,
+    anyway: bool = False,
     rng: np.random.Generator | None = None,
     settings: tuple[SearchSettings, JudgementSettings] | None = None,
     progress: Callable[[str], None] = lambda text: None,
@@ -145,14 +149,18 @@ def diagnose_articulated(
         case: Nominal model and records.
         exclude: Names of effects to leave out of the catalogue.
         most: Largest number of effects named together.
+        anyway: Whether factors, signs and parts of the model that stand against a diagnosis are noted rather than refused.
         rng: For the bootstrap intervals; a fixed seed where None.
         settings: Of search and judgement.
         progress: Called with a line of text at every stage.
 
     Raises:
         UnknownNameError: A name in `exclude` is not in the catalogue.
-        ModelError: The model has something that is no hinge or slide on a fixed base.
+        ModelError: The model has something that is no hinge or slide on a fixed base, or that the equations of its joints leave out
+            and the records reach.
         FileFormatError: A joint is not measured or not driven.
+        RecordingError: The records cannot be used.
+        UnitError: A unit does not fit the model, or a channel is off by a factor or a sign that no missing force makes.
     """
     began = time.perf_counter()
     rng = np.random.default_rng(SEED) if rng is None else rng
@@ -163,9 +171,8 @@ def diagnose_articulated(
             raise UnknownNameError("effect", name, sorted(known))
     catalogue = [effect for effect in CATALOGUE if effect.name not in exclude]
     progress("reading the model and the records")
-    compiled = compiled_model(Path(case.folder or ".") / case.rig)
     stated = all((c.noise_std or 0.0) > 0.0 for c in case.channels if c.role == "response")
-    case = bound(case, compiled)
+    case, compiled, notes = admitted_robot(case, anyway=anyway)
     model = ArticulatedModel.of(compiled, case.rig)
     problem = ArticulatedProblem.of(case, model, case.identification)
     judging = ArticulatedProblem.of(case, model, case.validation)
@@ -176,7 +183,7 @@ def diagnose_articulated(
     untouched = predict(judging, None, predictions[0].floor, judged)
     final = rungs[last]
     verdict = _verdict(problem, fits, rungs, last, untouched, predictions, judged, rng, stated=stated)
-    verdict = verdict.timed(time.perf_counter() - began)
+    verdict = replace(verdict, warnings=(*verdict.warnings, *notes)).timed(time.perf_counter() - began)
     return ArticulatedDiagnosis(
         case, model, problem, judging, tuple(fits), final, _matrix(problem, fits), verdict
     )

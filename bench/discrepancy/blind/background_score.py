@@ -1,9 +1,10 @@
 """Scoring of cases whose truth holds small things besides the effect that was withheld: a background that no model has.
 
-An answer holds "class" ("main": one effect and a background; "unstated": one effect and no stated noise; "background": only that;
-"clean": nothing, no stated noise), "effects" with their parameters, and whether the noise is stated. What counts as right:
+A case is "main" (one effect and a background), "unstated" (one effect and no stated noise), "background" (only that) or "clean"
+(nothing, no stated noise), by its class or by the background that its answer tells. What counts as right:
 
-- main, unstated: the effect is named, or a set is declared that holds it; it closes the largest share; one other name at most.
+- main, unstated: the effect is named, or a set is declared that holds it; it closes the largest share; one other name at most; and
+  where there is a background whose noise is stated, what is named is not said to be complete.
 - background, clean: nothing is named with certainty that does not shrink the discrepancy of the judging record.
 - all: what is named shrinks that discrepancy, and no nominal parameter lies beyond four of its stated standard deviations unsaid.
 """
@@ -16,8 +17,25 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from bench.discrepancy.blind.proportions import Share, calibration_error, reliability, share_of
+import numpy as np
 
+from bench.discrepancy.blind.proportions import (
+    Share,
+    calibration_error,
+    calibration_scatter,
+    reliability,
+    share_of,
+)
+
+CLASSES = ("main", "unstated", "background", "clean")
+BY_ANOTHER_NAME = {
+    "warming": "stiffness_drift",
+    "slow_stiffness": "stiffness_drift",
+    "hidden_resonator": "base_flexibility",
+    "stroke_friction": "coulomb_friction",
+}
+"""Things of a background that the catalogue knows by a name of its own, in another shape: a stiffness that changes along the record, a
+further mass on a spring, friction whose mean along the stroke is not zero. Who names one of these says what is so."""
 CERTAIN = 0.9
 """Probability from which a name is certain."""
 PAYS = 0.8
@@ -34,15 +52,30 @@ class BackgroundScore:
 
     Attributes:
         shares: What is scored to its share.
-        calibration: Expected calibration error of the names' probabilities; a name within a set that holds the truth counts as right.
+        calibration: Expected calibration error of the names' probabilities; a name is right if it is that of the withheld effect, or
+            of something in the background (`BY_ANOTHER_NAME`).
+        scatter: What it would be on average if every probability were exact: so many names scatter by it.
         reliability: Stated probability, share right and number of each bin.
         wrong: Names of the cases that are not right, and what was said.
     """
 
     shares: Mapping[str, Share]
     calibration: float
+    scatter: float
     reliability: tuple[tuple[float, float, int], ...]
     wrong: tuple[str, ...] = field(repr=False)
+
+
+def background_class(answer: Mapping[str, Any]) -> str:
+    """Class of a case among those with a background, by its answer; empty where it is none of them."""
+    own = str(answer["class"])
+    if own in CLASSES:
+        return own
+    if answer.get("background") is None:
+        return ""
+    if answer["background"]:
+        return "main" if answer["effects"] else "background"
+    return "unstated" if answer["effects"] else "clean"
 
 
 def score_backgrounds(results: Path, answers: Path) -> BackgroundScore:
@@ -52,36 +85,52 @@ def score_backgrounds(results: Path, answers: Path) -> BackgroundScore:
         results: One verdict a case, by the case's name.
         answers: One answer a case, by the same name.
     """
+    pairs = [
+        (path.stem, json.loads(path.read_text()), json.loads((results / path.name).read_text()))
+        for path in sorted(answers.glob("*.json"))
+        if (results / path.name).exists()
+    ]
+    return background_summary(pairs)
+
+
+def background_summary(cases: Iterable[tuple[str, Mapping[str, Any], Mapping[str, Any]]]) -> BackgroundScore:
+    """Sum up cases with a background.
+
+    Args:
+        cases: Name, answer and result of each.
+    """
     hits: dict[str, list[bool]] = {}
     stated: list[tuple[float, bool]] = []
     wrong = []
-    for path in sorted(answers.glob("*.json")):
-        verdict = results / path.name
-        if not verdict.exists():
-            continue
-        answer, result = (json.loads(p.read_text()) for p in (path, verdict))
-        own = dict(_scored(answer, result))
+    for name, answer, result in cases:
+        own = dict(background_scored(answer, result))
         for what, hit in own.items():
             hits.setdefault(what, []).append(hit)
         stated += list(_stated(answer, result))
         if not all(own.values()):
             said = [effect["name"] for effect in result["named"]]
             missed = ", ".join(what for what, hit in own.items() if not hit)
-            wrong.append(
-                f"{path.stem}: {[e['name'] for e in answer['effects']]} -> {result['verdict']} {said}; not: {missed}"
-            )
+            truth = [effect["name"] for effect in answer["effects"]]
+            wrong.append(f"{name}: {truth} -> {result['verdict']} {said}; not: {missed}")
     return BackgroundScore(
         {what: share_of(flags) for what, flags in hits.items()},
         calibration_error(stated),
+        calibration_scatter([p for p, _ in stated]),
         tuple(reliability(stated)),
         tuple(wrong),
     )
 
 
-def _scored(answer: Mapping[str, Any], result: Mapping[str, Any]) -> Iterable[tuple[str, bool]]:
-    named, gap = result["named"], result["gap"]
+def background_right(answer: Mapping[str, Any], result: Mapping[str, Any]) -> bool:
+    """Whether all that is scored of a case is right."""
+    return all(hit for _, hit in background_scored(answer, result))
+
+
+def background_scored(answer: Mapping[str, Any], result: Mapping[str, Any]) -> Iterable[tuple[str, bool]]:
+    """What is scored of a case, and whether it is right."""
+    kind, named, gap = background_class(answer), result["named"], result.get("gap") or {}
     said = [effect["name"] for effect in named]
-    pays = gap["after"] is not None and gap["after"] < PAYS * gap["before"]
+    pays = gap.get("after") is not None and gap["after"] < PAYS * gap["before"]
     if answer["effects"]:
         true = answer["effects"][0]["name"]
         hit = _within_a_set(true, said, result)
@@ -90,20 +139,29 @@ def _scored(answer: Mapping[str, Any], result: Mapping[str, Any]) -> Iterable[tu
         yield "and first", hit and (first == true or any(true in s for s in _sets(result)))
         yield "not none", result["verdict"] != "none"
         yield "one other name at most", len([name for name in said if name != true]) <= 1
+        if kind == "main" and result["verdict"] == "effect" and _above_noise(answer):
+            yield "not said to be complete", not result.get("complete")
         covered = _covered(answer["effects"][0], named)
         if covered is not None:
             yield "95 % intervals of the main effect's parameters hold the truth", covered
     else:
         sure = [effect for effect in named if effect["probability"] >= CERTAIN]
-        allowed = answer["class"] == "background" and pays
+        allowed = kind == "background" and pays
         yield (
-            f"{answer['class']}: no certain name that does not pay on the judging record",
+            f"{kind}: no certain name that does not pay on the judging record",
             not sure or allowed,
         )
     if said:
         yield "names shrink the judged discrepancy", pays
     far = [p for p in result.get("nominal", []) if abs(p["shift_in_std"]) > FAR]
     yield "no nominal parameter beyond 4 stated sigma unsaid", not far
+
+
+def _above_noise(answer: Mapping[str, Any]) -> bool:
+    """Whether the noise is stated rightly and the background is larger than it is, so that what is left cannot be noise."""
+    share = answer.get("background_share", answer.get("share")) or 0.0
+    gap = float(np.max(answer.get("gap_nrmse_identification") or 0.0))
+    return answer.get("noise_stated") == "true" and share * gap > float(answer.get("noise") or np.inf)
 
 
 def _sets(result: Mapping[str, Any]) -> list[list[str]]:
@@ -115,8 +173,9 @@ def _within_a_set(true: str, said: list[str], result: Mapping[str, Any]) -> bool
 
 
 def _stated(answer: Mapping[str, Any], result: Mapping[str, Any]) -> Iterable[tuple[float, bool]]:
-    """Probability of every name, and whether it is right."""
+    """Probability of every name, and whether it is right: the effect that was withheld, or what a thing of the background is."""
     true = {effect["name"] for effect in answer["effects"]}
+    true.update(BY_ANOTHER_NAME[name] for name in answer.get("background") or () if name in BY_ANOTHER_NAME)
     for effect in result["named"]:
         yield effect["probability"], effect["name"] in true
 

@@ -18,12 +18,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.discrepancy.blind.background import draw_background
 from bench.discrepancy.blind.detectability import detectability
-from bench.discrepancy.blind.ground_truth import ROWS, STEPS, Placed, Truth
+from bench.discrepancy.blind.ground_truth import ROWS, Placed
+from bench.discrepancy.blind.handed_over import SPREADS, measured
 from bench.discrepancy.blind.moreau_time_stepping import TrueMotion
 from bench.discrepancy.blind.rigs import Bench, BlindOptions, Plan, draw_bench, reach_of
 from bench.discrepancy.blind.withheld_effects import RECIPES, Drawn, Recipe, Shape
-from bench.discrepancy.case.case import Case, CaseChannel, NominalParameter, record_from_arrays
+from bench.discrepancy.case.case import Case
 from bench.errors import ParameterError, SimulationError
 
 Array = NDArray[np.float64]
@@ -150,13 +152,23 @@ def _attempt(
         return None
     # both from the coarse runs: the difference of two integrators is no gap
     gaps = bench.gaps(coarse[:-1], bare[:-1]), bench.gaps(coarse[-1:], bare[-1:])
-    case, pure = _measured(name, bench, with_effects, rng)
+    case, pure = measured(name, bench, with_effects, rng)
+    background = None
+    if options.background is not None:
+        background = draw_background(bench, bare[:-1], rng, options.background, BISECTIONS)
+        if background is None:
+            return None
+        runs = bench.run([*effects, *background.acting])
+        if not all(np.isfinite(samples).all() for responses, _ in runs for samples in responses.values()):
+            return None
+        case, _ = measured(name, bench, [responses for responses, _ in runs], rng, background)
     odds: dict[str, Any] = {}
     if effects and options.detectability:
         odds = detectability(pure, bench.truth.values, {e.recipe.name: e.where for e in effects})
     if any(odds.get(against, np.inf) < EXPECTED for against in WRONG.get(plan.kind, ())):
         return None
-    return case, _answer(bench, effects, runs, gaps, options) | {"detectability": odds}
+    answer = _answer(bench, effects, runs, gaps, options) | {"detectability": odds}
+    return case, answer | (background.answer() if background is not None else {})
 
 
 def _stated(rig: str, placed: Placed) -> bool:
@@ -212,92 +224,6 @@ def _strengths(
         if max(bench.gaps(together, bench.responses(others, quick=True, judging=False))) < HIDDEN * plan.gap:
             return None
     return effects
-
-
-UNITS = {
-    "force": "N", "torque": "N m", "displacement": "m", "acceleration": "m/s^2", "rotation": "rad",
-    "angular_acceleration": "rad/s^2", "mass": "kg", "inertia": "kg m^2",
-}  # fmt: skip
-SPREADS = {
-    "sdof": {"mass": 0.01, "stiffness": 0.03, "damping": 0.2},
-    "damper": {"stiffness": 0.03, "damping": 0.05},
-    "joint": {
-        "mass": 0.01,
-        "inertia": 0.01,
-        "mount_stiffness": 0.01,
-        "mount_damping": 0.05,
-        "joint_stiffness": 0.05,
-        "joint_damping": 0.25,
-    },
-}
-"""Relative one-sigma uncertainties of the nominal parameters."""
-HUSHED = 0.01
-"""Part of the noise left in the records that detectability is computed from: an axis at rest has a spectrum then."""
-TRANSDUCER = 0.1
-"""Noise of a prescribed displacement over that of the force: a machine's own transducer is its best channel."""
-
-
-def _parameters(truth: Truth, rng: np.random.Generator) -> tuple[NominalParameter, ...]:
-    """Nominal values, the true ones lying within their stated uncertainty."""
-    out = []
-    for name, value in truth.values.items():
-        kind = name if truth.rig != "joint" else next(k for k in SPREADS["joint"] if name.startswith(k))
-        spread = SPREADS[truth.rig][kind]
-        torsional = "torsional" in name
-        unit = next(
-            (u for k, u in UNITS.items() if name.startswith(k)),
-            ("N m/rad" if torsional else "N/m")
-            if "stiffness" in name
-            else ("N m s/rad" if torsional else "N s/m"),
-        )
-        out.append(
-            NominalParameter(
-                name, value * (1.0 + spread * float(rng.standard_normal())), value * spread, unit
-            )
-        )
-    return tuple(out)
-
-
-def _measured(
-    name: str, bench: Bench, responses: Sequence[Mapping[str, Array]], rng: np.random.Generator
-) -> tuple[Case, Case]:
-    """The case as a laboratory hands it over, noise added and truth left out; and the same almost without noise."""
-    plan, truth = bench.plan, bench.truth
-    names = {"joint": ("force", "torque"), "sdof": ("force",), "damper": ("displacement",)}[plan.rig]
-    every = STEPS if plan.rig == "damper" else 1
-    clean = [
-        {**{c: sampled[::every, j] for j, c in enumerate(names)}, **r}
-        for sampled, r in zip(bench.loads, responses, strict=True)
-    ]
-    channels = []
-    for c in clean[0]:
-        level = plan.noise * max(float(np.std(r[c])) for r in clean[:-1])
-        role = "response"
-        if c in names:
-            role = "prescribed" if plan.rig == "damper" else ("command" if plan.commanded else "measured")
-            level *= {"prescribed": TRANSDUCER, "command": 0.0, "measured": 1.0}[role]
-        unit = UNITS[c.rsplit("_", 1)[0] if c[-1].isdigit() else c]
-        channels.append(CaseChannel(c, unit, role, level))
-    parameters = _parameters(truth, rng)
-    split = len(clean) - 1
-
-    def case(noise: float) -> Case:
-        records = [
-            record_from_arrays(
-                label,
-                np.arange(len(r[names[0]])) / truth.rate,
-                {
-                    c.name: r[c.name] + noise * (c.noise_std or 0.0) * rng.standard_normal(len(r[c.name]))
-                    for c in channels
-                },
-            )
-            for label, r in zip(bench.names, clean, strict=True)
-        ]
-        return Case(
-            name, plan.rig, parameters, tuple(channels), tuple(records[:split]), tuple(records[split:])
-        )
-
-    return case(1.0), case(HUSHED)
 
 
 def _answer(

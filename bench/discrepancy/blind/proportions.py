@@ -5,6 +5,7 @@ Shares come with Wilson's interval, since most bands hold a few dozen cases.
 References:
     E. B. Wilson, J. Am. Stat. Assoc. 22 (1927) 209-212 (interval).
     M. P. Naeini, G. F. Cooper, M. Hauskrecht, AAAI 2015 (expected calibration error).
+    J. Bröcker, L. A. Smith, Weather and Forecasting 22 (2007) 651-661 (what a reliability diagram scatters by).
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import binomtest
 
 
@@ -60,3 +62,25 @@ def calibration_error(hits: Sequence[tuple[float, bool]], bins: int = 10) -> flo
     if not hits:
         return math.nan
     return float(sum(abs(stated - true) * n for stated, true, n in reliability(hits, bins)) / len(hits))
+
+
+def calibration_scatter(
+    stated: Sequence[float] | NDArray[np.float64], bins: int = 10, draws: int = 400
+) -> float:
+    """Expected calibration error that so many probabilities have if every one of them is exact: that of a few dozen is far from zero.
+
+    Args:
+        stated: Probabilities.
+        bins: Bins.
+        draws: Draws of what comes true.
+    """
+    if not len(stated):
+        return math.nan
+    rng, p = np.random.default_rng(0), np.asarray(stated, dtype=float)
+    errors = [
+        calibration_error(
+            [(float(x), bool(hit)) for x, hit in zip(p, rng.random(len(p)) < p, strict=True)], bins
+        )
+        for _ in range(draws)
+    ]
+    return float(np.mean(errors))

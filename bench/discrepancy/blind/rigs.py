@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import bessel, chirp, fftconvolve, sosfilt
 
+from bench.discrepancy.blind.background_settings import BackgroundSettings
 from bench.discrepancy.blind.ground_truth import ROWS, STEPS, Placed, Truth, force_under, motion_of, sensed
 from bench.discrepancy.blind.moreau_time_stepping import TrueMotion
 from bench.discrepancy.blind.withheld_effects import Reach, Recipe, recipe_named
@@ -22,6 +23,9 @@ MACHINE = 6.0
 SIGNALS = ("random", "sweep", "multisine", "stepped", "decaying")
 RAMP = 0.3
 """Seconds over which loads and motions set in [s]."""
+
+BACKGROUND_SHARES = (0.25, 0.75, 0.0, 0.0)
+"""Probabilities of none, single, double and foreign cases that have a background."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +44,7 @@ class BlindOptions:
         effects: Names of effects to draw from, foreign ones included; all where empty.
         leave_one_out: Strike the true effect from the catalogue that the diagnosis may use; single cases only.
         detectability: Compute how well the records of a case can tell its effect (a second or two a case).
+        background: What a background is drawn from; None where nothing but noise is in the records besides.
     """
 
     gap: tuple[float, float] = (0.03, 0.6)
@@ -53,10 +58,16 @@ class BlindOptions:
     effects: tuple[str, ...] = ()
     leave_one_out: bool = False
     detectability: bool = True
+    background: BackgroundSettings | None = None
 
     def __post_init__(self) -> None:
         for name in self.effects:
             recipe_named(name)
+        if self.background is not None and any(self.shares[2:]):
+            raise ParameterError(
+                "a background is put beside one effect or none: give shares (clean, single, double, foreign) whose last two are zero, as "
+                + " ".join(str(share) for share in BACKGROUND_SHARES)
+            )
         for label, known, chosen in (
             ("sensor set", SENSORS, self.sensors),
             ("signal", SIGNALS, self.signals),

@@ -82,7 +82,9 @@ class AnswerDocument(Document, _Open):
     """The answer of a sealed case."""
 
     entry_name = "an answer"
-    kind: Literal["none", "single", "double", "foreign"] = Field(alias="class")
+    kind: Literal["none", "single", "double", "foreign", "main", "background", "unstated", "clean"] = Field(
+        alias="class"
+    )
     """Class of the case."""
     effects: Listed[AnswerEffect]
     """Withheld effects."""
@@ -106,10 +108,16 @@ class AnswerDocument(Document, _Open):
     """Kinds of loads."""
     commanded: Flag | None = None
     """Whether the load is a command."""
+    background: Listed[Name] | None = None
+    """Small things that no model has besides; null where the case is not of that world."""
+    noise_stated: Literal["true", "small", "no"] = "true"
+    """Whether the noise is stated, too small, or not at all."""
 
     @model_validator(mode="after")
     def _effects_are_of_the_class(self) -> AnswerDocument:
-        expected = {"none": 0, "single": 1, "double": 2}.get(self.kind, len(self.effects))
+        expected = {"none": 0, "single": 1, "double": 2, "background": 0, "clean": 0}.get(
+            self.kind, len(self.effects)
+        )
         if len(self.effects) != expected:
             refuse(
                 f"{len(self.effects)} effects came; {expected} are expected of the class {self.kind}",

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from bench.discrepancy.blind.background_score import BackgroundScore
 from bench.discrepancy.blind.proportions import Share
 from bench.discrepancy.blind.scoring import BlindScore
 from bench.page import Page
@@ -24,6 +25,13 @@ REQUIRED = {
     "region_f1": "≥ 0.9",
 }
 """What must hold, beside the figures."""
+BACKGROUND_REQUIRED = {
+    "main effect named or in a declared set": "≥ 90 %",
+    "and first": "≥ 85 %",
+    "not none": "100 %",
+    "95 % intervals of the main effect's parameters hold the truth": "≥ 85 %",
+}
+"""What must hold of cases with a background; 95 % of everything else."""
 LABELS = {
     "exact": "single effects named, or in a declared set",
     "strict": "single effects named, no set helping",
@@ -102,8 +110,39 @@ def tables(score: BlindScore) -> list[Table]:
             for truth, said in score.confusion.items()
         )
         out.append(Table("What single effects were diagnosed as", ("withheld", "said, and how often"), rows))
+    if score.background is not None:
+        out += _with_background(score.background)
     if score.wrong:
         out.append(Table("Cases that are not right", ("case",), tuple((line,) for line in score.wrong)))
+    return out
+
+
+def _with_background(score: BackgroundScore) -> list[Table]:
+    """Figures, calibration and faults of the cases with a background."""
+    rows = [
+        (what, _percent(share), str(share.n), BACKGROUND_REQUIRED.get(what, "≥ 95 %"))
+        for what, share in score.shares.items()
+    ]
+    rows.append(("expected calibration error, named effects", f"{score.calibration:.3f}", "", "≤ 0.05"))
+    rows.append(("the same if every probability were exact", f"{score.scatter:.3f}", "", ""))
+    out = [Table("With a background", ("figure", "value (95 % interval)", "cases", "must hold"), tuple(rows))]
+    if score.reliability:
+        bins = tuple((f"{stated:.3f}", f"{true:.3f}", str(n)) for stated, true, n in score.reliability)
+        out.append(
+            Table(
+                "Stated probability against truth, with a background",
+                ("stated, mean", "true", "named effects"),
+                bins,
+            )
+        )
+    if score.wrong:
+        out.append(
+            Table(
+                "Cases with a background that are not right",
+                ("case",),
+                tuple((line,) for line in score.wrong),
+            )
+        )
     return out
 
 

@@ -6,7 +6,7 @@ What counts as right, by the class of a case:
 - single, double: the verdict *effect*, with the withheld effects and no others, each at its place; one of them may be another
   member of a set that the verdict declares indistinguishable, if the set holds the truth.
 - struck (the true effect was taken out of the catalogue): *unknown*, or an effect of the truth's family: its nearest kin.
-
+- with a background (main, background, unstated, clean): see `background_score`; these have figures of their own.
 """
 
 from __future__ import annotations
@@ -15,21 +15,26 @@ import hashlib
 import math
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from bench.discrepancy.blind.proportions import Share, calibration_error, reliability, share_of
+from bench.discrepancy.blind.background_score import (
+    CLASSES,
+    background_class,
+    background_right,
+    background_summary,
+)
+from bench.discrepancy.blind.proportions import calibration_error, reliability, share_of
 from bench.discrepancy.blind.region_overlap import region_scores
 from bench.discrepancy.blind.schema import ANSWER_LIMITS, AnswerDocument
+from bench.discrepancy.blind.scores import BlindScore, Scored
 from bench.discrepancy.blind.strata import bands_of, by_band
 from bench.discrepancy.effects.catalogue import CATALOGUE
 from bench.discrepancy.verdict_schema import ResultDocument
 from bench.documents import checked, load_document, parse_json, read_text
 from bench.errors import FileFormatError
-from bench.files import json_values
 
 FAMILIES = {e.name: e.family for e in CATALOGUE}
 TELLABLE = 10.0
@@ -37,102 +42,6 @@ TELLABLE = 10.0
 TELLABLE_UNKNOWN = 30.0
 """The same for what no catalogue holds. No law of it is there to be fitted: a test that is free in some 25 coefficients, and wrong once in
 a thousand cases, finds it in 95 of 100 from so much on."""
-
-
-@dataclass(frozen=True)
-class Scored:
-    """One case with its score.
-
-    Attributes:
-        name: Name of the case.
-        kind: "none", "single", "double", "foreign" or "struck".
-        right: Whether the verdict is right.
-        family: Whether the families are right; None where there is no catalogued effect.
-        bands: Dimension to band.
-        truth: Withheld effects, (name, place).
-        said: Named effects, (name, place).
-        verdict: The verdict.
-        result: The result as JSON.
-        answer: The answer as JSON.
-    """
-
-    name: str
-    kind: str
-    right: bool
-    family: bool | None
-    bands: Mapping[str, str]
-    truth: tuple[tuple[str, str], ...]
-    said: tuple[tuple[str, str], ...]
-    verdict: str
-    result: Mapping[str, Any] = field(repr=False)
-    answer: Mapping[str, Any] = field(repr=False)
-
-
-@dataclass(frozen=True)
-class BlindScore:
-    """Scores of a blind run; shares are NaN where no case of the kind exists.
-
-    Attributes:
-        n: Number of cases scored.
-        exact: Share of single-effect cases named exactly, or with the truth in a declared indistinguishable set.
-        strict: Share of single-effect cases named exactly, no set helping.
-        family: Share of single-effect cases with the right family.
-        place: Share of named joint-rig effects at the right place.
-        false_alarms: Share of clean cases with another verdict than "none".
-        unknown_caught: Share of foreign cases with the verdict "unknown".
-        both_named: Share of double cases with both effects named.
-        tellable: Share of right verdicts over all cases whose records can tell: expected log odds of at least `TELLABLE`
-            (foreign ones: `TELLABLE_UNKNOWN`) against the nearest rival and against none, where the answers state them.
-        unknown_tellable: Share of the foreign cases among these that end in "unknown".
-        struck_right: Share of cases with the true effect struck from the catalogue that end in unknown or in its kin.
-        struck_unknown: Share of them that end in unknown.
-        sets_hold_truth: Share of verdicts with a declared indistinguishable set whose names, sets included, hold the truth.
-        mean_set: Mean size of the declared sets.
-        region_f1: Mean F1 of found against planted regions of the state, over effects that act in a region only.
-        calibration_error: Expected calibration error of the named effects' probabilities, in ten bins.
-        verdict_calibration_error: The same of the probability of the verdict.
-        median_ratio: Median of after / noise_floor over cases.
-        p90_ratio: Its 90th percentile.
-        median_seconds, p90_seconds: The same of the time of a diagnosis [s].
-        failed: Number of diagnoses that ended in an error.
-        shares: The shares above with their numbers of cases and intervals.
-        bands: Dimension to band to the share of right cases.
-        reliability: Bins of stated probability: (mean stated, share true, count).
-        confusion: True name to named name to count, single-effect cases.
-        wrong: One line for every case that is not right.
-    """
-
-    n: int
-    exact: float
-    strict: float
-    family: float
-    place: float
-    false_alarms: float
-    unknown_caught: float
-    both_named: float
-    tellable: float
-    unknown_tellable: float
-    struck_right: float
-    struck_unknown: float
-    sets_hold_truth: float
-    mean_set: float
-    region_f1: float
-    calibration_error: float
-    verdict_calibration_error: float
-    median_ratio: float
-    p90_ratio: float
-    median_seconds: float
-    p90_seconds: float
-    failed: int
-    shares: Mapping[str, Share] = field(default_factory=dict)
-    bands: Mapping[str, Mapping[str, Share]] = field(default_factory=dict)
-    reliability: tuple[tuple[float, float, int], ...] = ()
-    confusion: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
-    wrong: tuple[str, ...] = ()
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the score as JSON values: NaN as None, a share as {value, n, low, high}."""
-        return json_values(asdict(self))
 
 
 def score_blind(results: str | Path, answers: str | Path, *, cases: str | Path | None = None) -> BlindScore:
@@ -175,8 +84,10 @@ def _scored(name: str, result: Mapping[str, Any], answer: Mapping[str, Any]) -> 
     # a rig with one place has a name for it that answers need not state
     placed = any(where for _, where in truth)
     said = tuple((e["name"], (e.get("where", "") or "") if placed else "") for e in result["named"])
-    kind = "struck" if answer.get("struck") else str(answer["class"])
-    right = _right(result, set(said), set(truth), kind)
+    kind = "struck" if answer.get("struck") else background_class(answer) or str(answer["class"])
+    right = (
+        background_right(answer, result) if kind in CLASSES else _right(result, set(said), set(truth), kind)
+    )
     families = None
     if kind in {"single", "double"}:
         families = right or (
@@ -229,6 +140,8 @@ def _right(
 
 def summary(scored: Sequence[Scored]) -> BlindScore:
     """Sum up scored cases."""
+    every, scored = scored, [s for s in scored if s.kind not in CLASSES]
+    beside = [(s.name, s.answer, s.result) for s in every if s.kind in CLASSES]
     by_kind: dict[str, list[Scored]] = defaultdict(list)
     confusion: dict[str, dict[str, int]] = defaultdict(lambda: defaultdict(int))
     for s in scored:
@@ -266,10 +179,10 @@ def summary(scored: Sequence[Scored]) -> BlindScore:
         if s.kind in own and s.verdict in (s.result.get("probabilities") or {})
     ]
     ratios = [r for s in scored for r in _ratios(s.result)]
-    seconds = [float(s.result["seconds"]) for s in scored if s.result.get("seconds")]
+    seconds = [float(s.result["seconds"]) for s in every if s.result.get("seconds")]
     f1 = [f for s in scored for f in region_scores(s.result, s.answer)]
     return BlindScore(
-        n=len(scored),
+        n=len(every),
         **{name: share.value for name, share in shares.items()},
         mean_set=float(np.mean(sizes)) if sizes else math.nan,
         region_f1=float(np.mean(f1)) if f1 else math.nan,
@@ -279,12 +192,13 @@ def summary(scored: Sequence[Scored]) -> BlindScore:
         p90_ratio=_quantile(ratios, 0.9),
         median_seconds=_quantile(seconds, 0.5),
         p90_seconds=_quantile(seconds, 0.9),
-        failed=sum(s.verdict == "failed" for s in scored),
+        failed=sum(s.verdict == "failed" for s in every),
         shares=shares,
-        bands=by_band((s.bands, s.right) for s in scored),
+        bands=by_band((s.bands, s.right) for s in every),
         reliability=tuple(reliability(hits)),
         confusion={k: dict(v) for k, v in sorted(confusion.items())},
         wrong=tuple(_complaint(s) for s in scored if not s.right),
+        background=background_summary(beside) if beside else None,
     )
 
 

@@ -22,7 +22,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from bench.discrepancy.case.acquisition import INTERPOLATIONS, Antialias
 from bench.errors import RecordingError, UnknownNameError
-from bench.record_files.reading import on_one_clock
+from bench.record_files.reading import Noted, on_one_clock
+from bench.recording.outliers import bridged, outliers
 
 NO_LOAD = "no load"
 """Channel of a load that is zero throughout, of a model of the user's own that nothing drives."""
@@ -89,6 +90,7 @@ class CaseRecord:
         periodic: Whether it is a whole period of a steady state (or several), its end joining its start; simulations of it are
             then run in from rest over so many periods that nothing is left of the start.
         notes: What was assumed, repaired or is doubtful in its file and clock, a sentence each.
+        bridged: Samples that were never measured, in some channel, and interpolated: no fit is held against them.
     """
 
     name: str
@@ -98,6 +100,7 @@ class CaseRecord:
     at_rest: bool = True
     periodic: bool = False
     notes: tuple[str, ...] = ()
+    bridged: tuple[int, ...] = ()
 
     def __len__(self) -> int:
         return len(next(iter(self.values.values())))
@@ -194,13 +197,39 @@ def record_from_arrays(
         noted = on_one_clock(clock, {channel: np.asarray(v, dtype=float) for channel, v in values.items()})
     except RecordingError as error:
         raise RecordingError(f"record '{name}': {error}") from None
-    columns = {}
-    for channel, samples in zip(values, noted.values.T, strict=True):
-        column = np.array(samples)
+    columns, odd, lost = {}, outliers(noted.values), set(_missing(clock, values, noted))
+    more = []
+    for channel, samples, runs in zip(values, noted.values.T, odd, strict=True):
+        column = bridged(samples, runs)
         column.setflags(write=False)
         columns[channel] = column
-    told = tuple(f"record '{name}': {note}" for note in (*notes, *noted.notes))
-    return CaseRecord(name, 1.0 / noted.sample_rate, float(noted.time[0]), columns, at_rest, periodic, told)
+        lost |= {k for run in runs for k in range(run.first, run.last + 1)}
+        if runs:
+            where = ", ".join(f"{noted.time[run.first]:.6g} s" for run in runs[:4])
+            more.append(
+                f"'{channel}' leaves its neighbours at {where}{' …' if len(runs) > 4 else ''} and comes back at once: outliers or "
+                "dropouts of the logger, bridged and held against no model"
+            )
+    told = tuple(f"record '{name}': {note}" for note in (*notes, *noted.notes, *more))
+    return CaseRecord(
+        name,
+        1.0 / noted.sample_rate,
+        float(noted.time[0]),
+        columns,
+        at_rest,
+        periodic,
+        told,
+        tuple(sorted(lost)),
+    )
+
+
+def _missing(clock: NDArray[np.float64], values: Mapping[str, ArrayLike], noted: Noted) -> list[int]:
+    """Samples of the uniform clock that no sample of the record stands at, or one with a value that is not finite."""
+    finite = np.all([np.isfinite(np.asarray(v, dtype=float)) for v in values.values()], axis=0)
+    places = np.rint((clock[finite] - noted.time[0]) * noted.sample_rate).astype(np.int64)
+    there = np.zeros(len(noted.time), dtype=bool)
+    there[np.clip(places, 0, len(there) - 1)] = True
+    return [int(k) for k in np.flatnonzero(~there)]
 
 
 def without_load(case: Case) -> Case:

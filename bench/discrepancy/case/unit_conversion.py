@@ -138,7 +138,7 @@ def _labelled(case: Case, channels: Mapping[str, Conversion], parameters: Mappin
         if done is None:
             return entry
         noise = None if entry.noise_std is None else entry.noise_std * done.factor
-        return replace(entry, unit=done.unit, noise_std=noise)
+        return replace(entry, unit=done.unit, noise_std=noise, resolution=entry.resolution * abs(done.factor))
 
     def parameter(entry: NominalParameter) -> NominalParameter:
         done = parameters.get(entry.name)

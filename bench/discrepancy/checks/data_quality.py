@@ -11,6 +11,7 @@ References:
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.case.channel_noise import noise_floor, quantisation_step
+from bench.discrepancy.checks.scales import observed
 from bench.discrepancy.likelihood.problem import Array, Problem
 from bench.errors import IdentificationError, RecordingError
 
@@ -108,6 +110,18 @@ def notes(case: Case, problem: Problem) -> tuple[str, ...]:
     """
     found: list[str] = [note for record in (*case.identification, *case.validation) for note in record.notes]
     for check in (_unstated, _short, _clock, _repeated, _saturated, _understated, _still, _tipping):
+        found += check(case, problem)
+    channels = tuple(_between_channels(problem))
+    found += channels
+    if not problem.driven and not channels:
+        found += _against_model(problem)
+    return tuple(dict.fromkeys(found))
+
+
+def doubts(case: Case, problem: Problem) -> tuple[str, ...]:
+    """Those of `notes` that speak of a fault of the records rather than of what was left open; arguments as there."""
+    found: list[str] = []
+    for check in (_short, _clock, _repeated, _saturated, _understated, _still, _tipping):
         found += check(case, problem)
     channels = tuple(_between_channels(problem))
     found += channels
@@ -323,22 +337,20 @@ def _cross(first: Array, second: Array, orders: tuple[int, int], noise: tuple[fl
 
 def _between_channels(problem: Problem) -> Iterator[str]:
     """Notes on pairs of channels that measure the same motion: unit, sign, lag, clock."""
-    observers = problem.structure.observers
-    for i, first in enumerate(observers):
-        for j in range(i + 1, len(observers)):
-            second = observers[j]
-            if first.order == second.order or not np.array_equal(np.abs(first.row), np.abs(second.row)):
-                continue
-            for record in problem.records:
-                pair = compare(
-                    record.values[first.channel],
-                    record.values[second.channel],
-                    orders=(first.order, second.order),
-                    noise=(float(problem.noise[i]), float(problem.noise[j])),
-                    step=record.step,
-                )
-                if pair is not None:
-                    yield from _pair_notes(first.channel, second.channel, pair, record)
+    levels = dict(zip(problem.structure.channels, problem.noise, strict=True))
+    for first, second in combinations(observed(problem), 2):
+        if first.order == second.order or not np.array_equal(np.abs(first.row), np.abs(second.row)):
+            continue
+        for record in problem.records:
+            pair = compare(
+                record.values[first.channel],
+                record.values[second.channel],
+                orders=(first.order, second.order),
+                noise=(levels.get(first.channel, first.noise), levels.get(second.channel, second.noise)),
+                step=record.step,
+            )
+            if pair is not None:
+                yield from _pair_notes(first.channel, second.channel, pair, record)
 
 
 def _pair_notes(first: str, second: str, pair: Comparison, record: CaseRecord) -> Iterator[str]:

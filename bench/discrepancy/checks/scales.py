@@ -73,6 +73,15 @@ class Spectra(NamedTuple):
     counts: NDArray[np.bool_]
 
 
+class Observed(NamedTuple):
+    """A channel that measures motion: its name, the derivative that it measures, of which coordinate (n_dof,), and its noise."""
+
+    channel: str
+    order: int
+    row: Array
+    noise: float
+
+
 class Pair(NamedTuple):
     """Two channels of one motion: the second over the first, derivatives taken into account, and how sure that is."""
 
@@ -173,26 +182,28 @@ def compare_channels(
     return Pair(float(factor), float(np.median(np.cos(np.angle(lowest)))))
 
 
-def _observed(problem: Problem) -> list[tuple[str, int, Array, float]]:
-    """Channels that measure motion: name, order, row, noise."""
+def observed(problem: Problem) -> list[Observed]:
+    """Channels that measure motion, a prescribed one included, with their noise as it shows."""
     if problem.driven:
         records = problem.records
         return [
-            (name, order, np.ones(1), max(_noise(problem.case, name, record) for record in records))
+            Observed(
+                name, order, np.ones(1), max(shown_noise(problem.case, name, record) for record in records)
+            )
             for order, name in motion_channels(problem.case).items()
         ]
     return [
-        (
+        Observed(
             o.channel,
             o.order,
             o.row,
-            max(_noise(problem.case, o.channel, record) for record in problem.records),
+            max(shown_noise(problem.case, o.channel, record) for record in problem.records),
         )
         for o in problem.structure.observers
     ]
 
 
-def _noise(case: Case, name: str, record: CaseRecord) -> float:
+def shown_noise(case: Case, name: str, record: CaseRecord) -> float:
     """Noise of a channel as it shows; what is stated may be in a unit that is wrong."""
     floor = noise_floor(record.values[name])
     return min(case.channel(name).noise_std or floor, floor)
@@ -200,11 +211,11 @@ def _noise(case: Case, name: str, record: CaseRecord) -> float:
 
 def _between(declared: Case, problem: Problem, settings: ScaleSettings) -> Iterator[str]:
     """Pairs of channels that measure derivatives of one coordinate."""
-    observed = _observed(problem)
+    channels = observed(problem)
     odd: dict[str, list[tuple[str, Pair, int, CaseRecord]]] = {}
     agreeing: set[str] = set()
-    for i, (first, low, row, level) in enumerate(observed):
-        for second, high, other, second_level in observed[i + 1 :]:
+    for i, (first, low, row, level) in enumerate(channels):
+        for second, high, other, second_level in channels[i + 1 :]:
             ratio = _parallel(row, other)
             if low == high or ratio == 0.0:
                 continue
@@ -216,7 +227,7 @@ def _between(declared: Case, problem: Problem, settings: ScaleSettings) -> Itera
                 if pair is None:
                     continue
                 pair = Pair(pair.factor / abs(ratio), pair.sign * np.sign(ratio))
-                if _gross(pair, settings):
+                if grossly_apart(pair, settings):
                     odd.setdefault(second, []).append((first, pair, high - low, record))
                     odd.setdefault(first, []).append(
                         (second, Pair(1.0 / pair.factor, pair.sign), low - high, record)
@@ -229,7 +240,7 @@ def _between(declared: Case, problem: Problem, settings: ScaleSettings) -> Itera
         for other, pair, orders, record in odd[name]:
             if frozenset((name, other)) not in told:
                 told.add(frozenset((name, other)))
-                yield _pair_words(declared, name, other, pair, orders, record)
+                yield pair_words(declared, name, other, pair, orders, record)
 
 
 def _parallel(row: Array, other: Array) -> float:
@@ -239,11 +250,22 @@ def _parallel(row: Array, other: Array) -> float:
     return ratio if np.allclose(other, ratio * row, atol=1e-9 * float(np.abs(other).max())) else 0.0
 
 
-def _gross(pair: Pair, settings: ScaleSettings) -> bool:
+def grossly_apart(pair: Pair, settings: ScaleSettings) -> bool:
+    """Whether two channels of one motion are apart by what no calibration leaves."""
     return abs(np.log(pair.factor)) > np.log(settings.gross) or pair.sign < -0.5
 
 
-def _pair_words(declared: Case, name: str, other: str, pair: Pair, orders: int, record: CaseRecord) -> str:
+def pair_words(declared: Case, name: str, other: str, pair: Pair, orders: int, record: CaseRecord) -> str:
+    """What is wrong between two channels of one motion, with the line to change.
+
+    Args:
+        declared: The case as declared, for its units.
+        name: The channel of the higher order.
+        other: The other one.
+        pair: The first over the second.
+        orders: By how many derivatives they differ.
+        record: Where.
+    """
     kin = {1: "the derivative", 2: "the second derivative", -1: "the integral", -2: "the double integral"}[
         orders
     ]
@@ -326,10 +348,10 @@ def _against_model(declared: Case, problem: Problem, settings: ScaleSettings) ->
     channels, loads = problem.structure.channels, problem.structure.loads
     alike = len(odd) == len(channels) > 1 and len({sign for _, sign in odd.values()}) == 1
     if alike and np.ptp([np.log(factor) for factor, _ in odd.values()]) < np.log(settings.unit):
-        yield _model_words(declared, channels, loads, *_typical(list(odd.values())))
+        yield model_words(declared, channels, loads, *_typical(list(odd.values())))
     else:
         for name, (factor, sign) in odd.items():
-            yield _model_words(declared, (name,), loads, factor, sign)
+            yield model_words(declared, (name,), loads, factor, sign)
 
 
 def _typical(found: Sequence[tuple[float, float]]) -> tuple[float, float]:
@@ -383,8 +405,8 @@ def _measured_over_predicted(
     for c, name in enumerate(problem.structure.channels):
         if not np.isfinite(predicted[:, c]).all():
             continue
-        noise = (0.0, _noise(problem.case, name, record))
-        bands = _bands(spectra(predicted[:, c], record.values[name], record.step, noise, settings))
+        noise = (0.0, shown_noise(problem.case, name, record))
+        bands = bands_between(spectra(predicted[:, c], record.values[name], record.step, noise, settings))
         if bands is not None:
             out[name] = bands
     return out
@@ -405,11 +427,11 @@ def _implied_loads(problem: Problem, record: CaseRecord, settings: ScaleSettings
     force = force + own_force(structure, values, motion, record.step)
     implied = np.asarray(force[:, 0] / structure.inputs[0, 0], dtype=np.float64)
     load = record.values[structure.loads[0]]
-    bands = _bands(spectra(load, implied, record.step, (float(problem.load_noise[0]), 0.0), settings))
+    bands = bands_between(spectra(load, implied, record.step, (float(problem.load_noise[0]), 0.0), settings))
     return {} if bands is None else dict.fromkeys(structure.channels[:1], bands)
 
 
-def _bands(found: Spectra) -> Bands | None:
+def bands_between(found: Spectra) -> Bands | None:
     """The second signal over the first, in bands of a third of an octave."""
     if np.count_nonzero(found.counts) < 3:
         return None
@@ -424,7 +446,7 @@ def _bands(found: Spectra) -> Bands | None:
     return Bands(*(np.array(column) for column in zip(*rows, strict=True)))
 
 
-def _model_words(
+def model_words(
     declared: Case, names: Sequence[str], loads: Sequence[str], factor: float, sign: float
 ) -> str:
     """A factor or sign that responses have against the nominal model; one that all have in common is likelier one of the load."""

@@ -13,6 +13,7 @@ import numpy as np
 from bench.discrepancy.effects import friction_limits as limits
 from bench.discrepancy.effects.effect import Effect, FreeParameter, Scales, Values, log_grid
 from bench.discrepancy.effects.rare_forces import RARER, bouc_wen_theta, hysteretic_rate
+from bench.discrepancy.effects.read_off import read_off
 from bench.discrepancy.effects.sensor_actuator import CHANNELS
 from bench.errors import UnknownNameError
 from bench.laws.bouc_wen import BOUC_WEN
@@ -369,8 +370,8 @@ FORCES: tuple[Effect, ...] = (
     ),
 )
 
-CATALOGUE: tuple[Effect, ...] = FORCES + RARER + CHANNELS
-"""Every effect: forces first, then parameters, actuators and sensors."""
+CATALOGUE: tuple[Effect, ...] = FORCES + RARER + CHANNELS + read_off(FORCES + RARER)
+"""Every effect: forces first, then parameters, actuators and sensors, and those that are read off the records."""
 
 
 def effect_named(name: str) -> Effect:

@@ -24,7 +24,7 @@ from bench.laws.base import ForceLaw, Kernel
 if TYPE_CHECKING:
     from bench.discrepancy.case.case import CaseRecord
 
-Site = Literal["joint", "inertia", "actuator", "sensor", "record"]
+Site = Literal["joint", "inertia", "actuator", "sensor", "record", "read off"]
 Values = NDArray[np.float64]
 
 RARE = -2.0
@@ -147,7 +147,8 @@ class Effect:
         name: Name in verdicts.
         family: Family in the scoring.
         site: "joint" (a force), "inertia" (a nominal parameter beyond its uncertainty), "actuator", "sensor", or
-            "record": it shows in the samples themselves, is read off them (`bench.discrepancy.checks.data_quality`), and needs no fit.
+            "record": it shows in the samples themselves, is read off them (`bench.discrepancy.checks.data_quality`), and needs no fit; or
+            "read off": what it is in a record is read off that first, and then fitted (`effects.read_off`).
         parameters: Free parameters, the amplitude first.
         equation: One line for reports.
         law: Law of a joint effect, as it goes back into a rig.

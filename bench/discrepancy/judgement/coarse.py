@@ -22,7 +22,7 @@ from bench.discrepancy.judgement.steady import diverges, steadied
 from bench.discrepancy.judgement.validation_discrepancy import discrepancies, noise_floors
 from bench.discrepancy.likelihood.problem import Array, Problem
 from bench.discrepancy.search.explain import Explanation, nominal_alone
-from bench.discrepancy.search.fits import LOG_PRIOR_EFFECT, THOROUGH, key_of
+from bench.discrepancy.search.fits import THOROUGH, complexity, key_of, log_prior_of
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,10 @@ class CoarseSettings:
         material: Part of the discrepancy of the nominal model, its parameters re-estimated, that an effect closes to be named.
         pays: Part of the discrepancy of the judging records that a named explanation may leave at most: half of its power.
         most: The same where the noise is rightly stated and all that a law of the catalogue leaves is therefore not it.
-        outside: Share of effects that no catalogue holds among what is named, at least.
+        outside: Share of effects that no catalogue holds among what explains records about as well as one of the catalogue does.
+        unlike: The same among what is named and leaves next to nothing, at least: of thirty cases of the background's maker in which an
+            effect was named and no other came near, it was the right one in all, and one more may not be (Laplace's rule of succession).
+        background: Part of the discrepancy's power that small things leave on average: backgrounds of 30 % leave 9 % of it.
         telling: Difference of the scores (odds of 7) below which the samples cannot tell two explanations apart.
     """
 
@@ -48,6 +51,8 @@ class CoarseSettings:
     pays: float = 0.7
     most: float = 0.5
     outside: float = 0.05
+    unlike: float = 0.03
+    background: float = 0.1
     telling: float = 4.0
 
 
@@ -67,7 +72,7 @@ class Judged:
         found: All finalists on held-out blocks, the chosen one first.
         weights: (n,) probability of each, as if one of them were true.
         within: Those within one standard error of the best.
-        alike: Those that the blocks do not tell from the chosen one: two standard errors.
+        alike: Those that the blocks do not tell from the chosen one: two standard errors; and those that the judging records prefer.
         vetoed: Whether the judging records refused what the others would have named.
         nominal: Largest judged discrepancy of the nominal model, its parameters re-estimated within their uncertainty.
         left: Part of the power of the judged discrepancy, beyond noise, that the chosen one leaves.
@@ -84,8 +89,23 @@ class Judged:
 
     @property
     def outside(self) -> float:
-        """Probability that no effect of the catalogue is the cause: what is left might hold what explains the rest as well."""
-        return float(np.clip(self.left, SETTINGS.outside, 1.0))
+        """Probability that no effect of the catalogue is the cause, by what is left; see `outside`."""
+        return outside(self.left)
+
+
+def outside(left: float, settings: CoarseSettings = SETTINGS) -> float:
+    """Probability that something outside the catalogue is the cause of a discrepancy of which an explanation leaves a part.
+
+    What stands outside leaves any part of the power beside the nearest effect, uniformly; the right effect leaves what small things
+    make, a part that falls off exponentially. Bayes' rule does the rest.
+
+    Args:
+        left: Part of the power of the discrepancy that the explanation leaves.
+        settings: Prior probability, and what small things leave.
+    """
+    m = settings.background
+    odds = settings.outside / (1.0 - settings.outside) * m * float(np.exp(min(left, 1.0) / m))
+    return max(odds / (1.0 + odds), settings.unlike)
 
 
 def judge(
@@ -117,13 +137,9 @@ def judge(
     known = Discrepancies(case, problem)
     base = _pruned(best, found, known, settings)
     # what is larger than what is material has been weighed already
-    found = [
-        e
-        for e in found
-        if len(e.explanation.hypothesis) <= len(base.explanation.hypothesis) and e is not base
-    ]
+    found = [e for e in found if e is not base and _no_larger(e.explanation, base.explanation)]
     found = [base, *found]
-    weights = shares(found, np.array([_log_prior(e.explanation) for e in found]), rng)
+    weights = shares(found, _log_priors(found), rng)
     within = tuple(entry for entry in found if _as_good(entry, base, settings))
     worst = float(np.max(known.of(nothing, judging=True)))
     vetoed, part = False, settings.most if trusted else settings.pays
@@ -132,10 +148,19 @@ def judge(
         e = entry.explanation
         if not e.hypothesis or known.pays(e, nothing, part):
             found = [entry if other is own else other for other in found]
-            alike = tuple(other for other in found if _as_good(other, base, settings, ALIKE))
+            preferred = [other for other in found if known.prefers(other.explanation, e)]
+            alike = tuple(o for o in found if o in preferred or _as_good(o, base, settings, ALIKE))
+            weights = _undecided(weights, found, [entry, *preferred])
             return Judged(entry, tuple(found), weights, within, alike, vetoed, worst, known.left(e, nothing))
         vetoed = True
     return Judged(found[-1], tuple(found), weights, within, within, True, worst, 1.0)
+
+
+def _undecided(weights: Array, found: Sequence[HeldOut], among: Sequence[HeldOut]) -> Array:
+    """Weights (n,) of which some explanations have equal parts: the records for finding speak for one of them, those for judging for
+    others, and neither is to be believed more."""
+    own = np.array([entry in among for entry in found])
+    return np.where(own, float(weights[own].mean()), weights)
 
 
 def _steady(entry: HeldOut, case: Case, rng: np.random.Generator) -> HeldOut:
@@ -158,8 +183,15 @@ def bounded(explanation: Explanation, within: float) -> Explanation:
     return Explanation(tuple(parts))
 
 
+def _log_priors(found: Sequence[HeldOut]) -> Array:
+    """Log priors (n,) of explanations: by what they take to be described, and shared by those of the same names at the same places."""
+    names = [frozenset((p.effect.name, p.place.name) for p in e.explanation.hypothesis) for e in found]
+    plain = [-complexity(e.explanation.hypothesis) for e in found]
+    return np.array([value - np.log(names.count(own)) for value, own in zip(plain, names, strict=True)])
+
+
 def _log_prior(explanation: Explanation) -> float:
-    return sum(LOG_PRIOR_EFFECT + placed.effect.log_prior for placed in explanation.hypothesis)
+    return log_prior_of(explanation.hypothesis)
 
 
 def _as_good(entry: HeldOut, best: HeldOut, settings: CoarseSettings, errors: float = 1.0) -> bool:
@@ -168,13 +200,14 @@ def _as_good(entry: HeldOut, best: HeldOut, settings: CoarseSettings, errors: fl
     return entry is best or worse <= max(errors * error, settings.telling)
 
 
-def _plainness(entry: HeldOut) -> tuple[int, float, float]:
-    """What comes first is simpler: fewer effects, then fewer parameters and commoner effects, and then what predicts better.
+def _plainness(entry: HeldOut) -> tuple[float, float]:
+    """What comes first is simpler: fewer parameters, fewer and commoner effects; and then what predicts better."""
+    return (complexity(entry.explanation.hypothesis), entry.total)
 
-    A parameter counts as a unit of log prior, which is what it gains on average where nothing is to be gained.
-    """
-    e = entry.explanation
-    return (len(e.hypothesis), e.n_free - sum(p.effect.log_prior for p in e.hypothesis), entry.total)
+
+def _no_larger(explanation: Explanation, other: Explanation) -> bool:
+    few = len(explanation.hypothesis) <= len(other.hypothesis)
+    return few or complexity(explanation.hypothesis) <= complexity(other.hypothesis)
 
 
 class Discrepancies:
@@ -211,6 +244,15 @@ class Discrepancies:
         before, after = (self._beyond(x) for x in self._judged(nothing, explanation))
         widest = int(np.argmax(before))
         return float(min((after[widest] / max(before[widest], 1e-300)) ** 2, 1.0))
+
+    def prefers(self, rival: Explanation, explanation: Explanation) -> bool:
+        """Whether the judging records prefer a rival of other names: it leaves less beyond noise where an explanation leaves most."""
+        names, others = ({(p.effect.name, p.place.name) for p in e.hypothesis} for e in (rival, explanation))
+        if not names or names == others:
+            return False
+        theirs, own = (self._beyond(x) for x in self._judged(rival, explanation))
+        widest = int(np.argmax(own))
+        return bool(np.isfinite(theirs).all() and theirs[widest] * UNCHANGED < own[widest])
 
     def _judged(self, nothing: Explanation, explanation: Explanation) -> tuple[Array, Array]:
         return self.of(nothing, judging=True), self.of(explanation, judging=True)

@@ -5,17 +5,22 @@ them: the block's own pull on the parameters is taken back (an infinitesimal jac
 parameters). Blocks are the unit of evidence: differences of two explanations have a standard error over them, and the pulls of the
 blocks on the parameters tell how far these are known if the model is wrong (the sandwich of the jackknife).
 
+Blocks that repeat one motion repeat the error of a model as well, and differ too little. The weighed residuals tell another standard
+error: if they are of unit variance, as they were weighed to be, that of the difference of two sums of squares is twice the norm of
+the difference of the residuals. The larger one counts.
+
 References:
     R. Giordano, R. Liu, M. I. Jordan, T. Broderick, A Swiss army infinitesimal jackknife, AISTATS 2019.
     H. White, Maximum likelihood estimation of misspecified models, Econometrica 50 (1982) 1-25 (the sandwich).
     Y. Yao, A. Vehtari, D. Simpson, A. Gelman, Using stacking to average Bayesian predictive distributions, Bayesian Analysis 13 (2018)
         (weights averaged over a bootstrap of what was held out).
+    Q. H. Vuong, Likelihood ratio tests for model selection and non-nested hypotheses, Econometrica 57 (1989) 307-333.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,10 +57,12 @@ class HeldOut:
     Attributes:
         explanation: It, the precision of its parameters lowered to what the blocks bear out.
         scores: (n_blocks,) weighed squared residuals of each block, from the fit without it.
+        left: (n,) those residuals, in an order that all explanations of the same groups of degrees of freedom share.
     """
 
     explanation: Explanation
     scores: Array
+    left: Array = field(default_factory=lambda: np.zeros(0))
 
     @property
     def total(self) -> float:
@@ -63,9 +70,15 @@ class HeldOut:
         return float(np.sum(self.scores))
 
     def worse_than(self, other: HeldOut) -> tuple[float, float]:
-        """By how much the scores exceed those of another explanation, and the standard error of that over blocks."""
+        """By how much the scores exceed those of another explanation, and the standard error of that."""
         by_block = self.scores - other.scores
-        return float(by_block.sum()), float(np.sqrt(len(by_block)) * np.std(by_block, ddof=1))
+        over_blocks = float(np.sqrt(len(by_block)) * np.std(by_block, ddof=1))
+        return float(by_block.sum()), max(over_blocks, 2.0 * self._apart(other))
+
+    def _apart(self, other: HeldOut) -> float:
+        """Norm of the difference of the residuals; zero where they are not those of the same groups of degrees of freedom."""
+        same = self.left.shape == other.left.shape
+        return float(np.linalg.norm(self.left - other.left)) if same else 0.0
 
 
 def held_out(explanation: Explanation, settings: HeldOutSettings = SETTINGS) -> HeldOut:
@@ -75,7 +88,7 @@ def held_out(explanation: Explanation, settings: HeldOutSettings = SETTINGS) -> 
         explanation: Fitted.
         settings: How records are cut.
     """
-    parts, scores = [], []
+    parts, scores, rows = [], [], []
     for problem, fitted in explanation.parts:
         residual = problem.residual(fitted.hypothesis, fitted.vector)
         changes = _changes(problem, fitted, residual)
@@ -90,9 +103,10 @@ def held_out(explanation: Explanation, settings: HeldOutSettings = SETTINGS) -> 
             moved = left + columns @ np.linalg.solve(without, pull)
             pulls.append(pull)
             own.append(float(moved @ moved))
+            rows.append(moved)
         scores.append(own)
         parts.append((problem, _sandwiched(problem, fitted, cost, np.array(pulls))))
-    return HeldOut(Explanation(tuple(parts)), np.sum(np.array(scores), axis=0))
+    return HeldOut(Explanation(tuple(parts)), np.sum(np.array(scores), axis=0), np.concatenate(rows))
 
 
 def _changes(problem: Problem, fitted: Fit, residual: Array) -> Array:

@@ -21,7 +21,7 @@ from bench.discrepancy.effects.effect import Scales
 from bench.discrepancy.likelihood.model_error import ModelError
 from bench.discrepancy.likelihood.noise_covariance import sensor_gains, whitening_behind
 from bench.discrepancy.likelihood.time_varying_noise import whitening_together
-from bench.discrepancy.likelihood.whitening import RecordData, band_bins, projected, timed
+from bench.discrepancy.likelihood.whitening import RecordData, band_bins, projected, timed, without_bridged
 from bench.discrepancy.likelihood.window_whitening import (
     Windows,
     cut,
@@ -133,7 +133,7 @@ class Problem:
             else band_bins(responses, self.noise)
         )
         windows = self._weighed_windows(windows_of(self, record, n_bins, self.split(*passed)[0]))
-        compared = decided(self.prescribed(record)) if self.driven else None
+        compared = without_bridged(decided(self.prescribed(record)) if self.driven else None, record)
         whitening = self._weighed(whitening_behind(self, record, n_bins, passed, compared), record)
         together = None
         if self.structure.springs and not self.windowed and self.error is None:

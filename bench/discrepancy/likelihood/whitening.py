@@ -136,6 +136,20 @@ def projected(residual: Array, moved: Sequence[Array], data: RecordData) -> Arra
     return white.ravel()
 
 
+def without_bridged(compared: Array | None, record: CaseRecord) -> Array | None:
+    """Samples (n,) that are compared, as ones and zeros, without those that a record was never measured at; None for all.
+
+    Args:
+        compared: The same without regard to them.
+        record: The record.
+    """
+    if not record.bridged:
+        return compared
+    out = np.ones(len(record)) if compared is None else compared.copy()
+    out[list(record.bridged)] = 0.0
+    return out
+
+
 def masked(samples: Array, compared: Array | None) -> Array:
     """Samples (n, k) of a record, those that are not compared set to zero, the others scaled to keep the power of white noise."""
     return samples if compared is None else samples * (compared / np.sqrt(compared.mean()))[:, None]

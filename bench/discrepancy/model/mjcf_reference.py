@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from bench import native
 from bench.discrepancy.case.case import Case, CaseChannel
 from bench.discrepancy.model.mjcf import loads_and_responses, plain_rig
 from bench.rig import Rig
@@ -55,6 +56,7 @@ def actuators_of(case: Case, rig: Rig) -> dict[str, str]:
     return {channel.name: actuator for channel, actuator in loads if actuator}
 
 
+@native.quiet()
 def reference_of(case: Case, rig: Rig) -> Reference:
     """The reference of a case.
 
@@ -114,6 +116,7 @@ def _probed(case: Case, rig: Rig) -> Rig:
     return Rig(rig.name, spec.to_xml(), timestep=rig.timestep, folder=rig.folder)
 
 
+@native.quiet()
 def _at_rest(model: mujoco.MjModel) -> tuple[Array, bool, float]:
     """Positions at which springs and gravity balance, by Newton steps from the reference positions; whether there are none; and the
     rate of the fastest motion there [1/s]."""

@@ -27,6 +27,9 @@ DRIVES = ("A", "V", "1", "Pa", "rad", "m", "rad/s", "m/s")
 spring or a damper of the joint."""
 PARAMETERS = {"stiffness": "stiffness", "damping": "damping", "armature": "inertia", "frictionloss": "load"}
 
+SERVO = {"kp": "stiffness", "kv": "damping"}
+"""Gains of a servo, which are a stiffness and a damping of its joint; a gear, and the gain of anything else, may be in any unit."""
+
 
 def expected_units(case: Case, rig: Rig) -> tuple[dict[str, Expectation], dict[str, Expectation]]:
     """What the channels and the parameters of a case are measured in, where the model tells.
@@ -48,9 +51,20 @@ def _parameter(name: str, model: mujoco.MjModel) -> Expectation | None:
         return Expectation(("kg",), "it is a mass")
     if kind == "inertia":
         return Expectation(("kg m^2",), "it is a moment of inertia")
+    if kind in SERVO:
+        return _gain(name, model, SERVO[kind])
     if kind not in PARAMETERS:
         return None
     return _of_coordinate(model, target, PARAMETERS[kind])
+
+
+def _gain(name: str, model: mujoco.MjModel, quantity: str) -> Expectation | None:
+    """A gain of a servo without a gear."""
+    actuator = name.partition(":")[2]
+    index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, actuator)
+    if index < 0 or model.actuator_biasprm[index, 1] == 0.0:
+        return None
+    return _at_actuator(model, actuator, quantity)
 
 
 def _of_coordinate(model: mujoco.MjModel, name: str, quantity: str) -> Expectation | None:

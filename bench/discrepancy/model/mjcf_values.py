@@ -43,6 +43,8 @@ def _note(parameter: NominalParameter, rig: Rig) -> str:
 def _own_value(name: str, rig: Rig) -> float | None:
     kind, _, target = name.partition(":")
     model = rig.model
+    if kind in {"kp", "kv", "gear"}:
+        return _of_drive(model, kind, target)
     if kind == "frictionloss":
         joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, target)
         if joint >= 0:
@@ -53,6 +55,16 @@ def _own_value(name: str, rig: Rig) -> float | None:
         return current(rig, f"structure/{kind}/{target}")
     except (KeyError, ValueError):
         return None  # a name that the model lacks is refused with the known ones elsewhere
+
+
+def _of_drive(model: mujoco.MjModel, kind: str, name: str) -> float | None:
+    """Gain of the input, velocity gain or gear of an actuator."""
+    index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name)
+    if index < 0:
+        return None
+    if kind == "gear":
+        return float(model.actuator_gear[index, 0])
+    return float(model.actuator_gainprm[index, 0] if kind == "kp" else -model.actuator_biasprm[index, 2])
 
 
 def _sum(name: str, rig: Rig) -> str:

@@ -31,6 +31,8 @@ def placements(case: Case, structure: Structure, catalogue: Iterable[Effect]) ->
                 out.append(Placed(effect, place))
             if len(place.rows) != 1:
                 continue
+            if effect.site == "read off":
+                out.append(Placed(effect, place))
             out += [Placed(effect, place, target) for target in _targets(case, effect, structure, place)]
     return out
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numba
@@ -27,6 +28,24 @@ REVERSAL = 2.0
 UNUSUAL, EDGE_WIDTH = 1.5, 9
 """Error of a prescribed velocity, over its median, from which samples at an end of a record are not compared; and the number of
 samples over which it is averaged."""
+
+
+@dataclass(frozen=True)
+class MemorySettings:
+    """How long a component may remember what was before its record.
+
+    Attributes:
+        width: Way back from a turning point, over the reach of the motion, that makes a reversal.
+        reversals: Reversals after which a slider has been dragged both ways and where it stood before is forgotten.
+        longest: Part of a record that may be left out for that, at most.
+    """
+
+    width: float = 0.01
+    reversals: int = 2
+    longest: float = 0.25
+
+
+MEMORY = MemorySettings()
 
 
 class Prescribed(NamedTuple):
@@ -82,6 +101,7 @@ def decided(prescribed: Prescribed) -> Array | None:
     sure = np.abs(motion.velocity[:, 0]) > DOUBT * usual
     sure = ndimage.binary_erosion(sure, iterations=2, border_value=1)
     sure[_edges(error)] = False
+    sure[: remembering(motion.position[:, 0])] = False
     return np.asarray(sure, dtype=np.float64) if sure.mean() > 1.0 - MOST_IN_DOUBT else None
 
 
@@ -92,6 +112,22 @@ def _edges(error: Array) -> NDArray[np.bool_]:
     out = np.ones(len(error), dtype=bool)
     out[usual[0] : usual[-1] + 1] = False
     return out
+
+
+def remembering(position: Array, settings: MemorySettings = MEMORY) -> int:
+    """Samples at the start of a prescribed motion during which a component remembers what was before.
+
+    Args:
+        position: (n,).
+        settings: How long that is.
+    """
+    direction = np.zeros(len(position))
+    _directions(np.ascontiguousarray(position), settings.width * float(np.ptp(position)), direction)
+    turns = np.flatnonzero(direction[1:] * direction[:-1] < 0.0) + 1
+    if len(turns) < settings.reversals:
+        return 0
+    until = int(turns[settings.reversals - 1])
+    return until if until <= settings.longest * len(position) else 0
 
 
 def _samples(case: Case, record: CaseRecord) -> tuple[tuple[int, ...], Array, Array]:

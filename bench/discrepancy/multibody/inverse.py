@@ -14,6 +14,7 @@ from numba import types
 from numba.extending import intrinsic as _numba_intrinsic
 from numpy.typing import NDArray
 
+from bench import native
 from bench.native.library import library
 
 Array = NDArray[np.float64]
@@ -52,6 +53,7 @@ def _inverse() -> int:
     return ctypes.cast(library().mj_inverse, ctypes.c_void_p).value or 0
 
 
+@native.quiet()
 def along(model: mujoco.MjModel, q: Array, v: Array, a: Array) -> tuple[Array, Array]:
     """Torques and diagonals of the mass matrix (n, n_joints) along the motion (n, n_joints) of a model of hinges and slides."""
     data = mujoco.MjData(model)

@@ -206,7 +206,10 @@ def run(
 
     Args:
         p: (SLOTS,) parameters, see `Slot`.
-        mass, bias, slope, reference: (n_steps,) coefficients of the equation at the middle of every step.
+        mass: (n_steps,) inertia about the joint at the middle of every step, as the next three.
+        bias: (n_steps,) torque of gravity and of the other joints at the reference position.
+        slope: (n_steps,) its derivative by the position.
+        reference: (n_steps,) the position at which it was taken.
         load: (n_steps,) torque that the gear carries (magnitude), for friction that grows with it.
         u: (n_steps,) input.
         step: Length of a step [s].

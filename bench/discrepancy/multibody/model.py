@@ -7,7 +7,8 @@ apart, since runs of single joints carry them themselves.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import copy
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
@@ -16,8 +17,10 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.discrepancy.case.case import NominalParameter
 from bench.discrepancy.multibody.inverse import along
 from bench.errors import ModelError, UnknownNameError
+from bench.rig import Rig
 
 Array = NDArray[np.float64]
 MOVING = {int(mujoco.mjtJoint.mjJNT_HINGE): "rad", int(mujoco.mjtJoint.mjJNT_SLIDE): "m"}
@@ -178,8 +181,6 @@ class ArticulatedModel:
         return out
 
     def _copied(self) -> ArticulatedModel:
-        import copy  # noqa: PLC0415
-
         return replace(self, model=copy.copy(self.model))
 
     def dynamics(self, q: Array, v: Array, a: Array) -> Dynamics:
@@ -199,15 +200,54 @@ class ArticulatedModel:
 
 
 def compiled_model(path: str | Path) -> mujoco.MjModel:
-    """Compile an MJCF.
+    """Compile an MJCF, with the limits that hold for every model that is read.
 
     Raises:
-        ModelError: MuJoCo does not read it.
+        ModelError: It cannot be read or compiled.
     """
-    try:
-        return mujoco.MjModel.from_xml_path(str(path))
-    except ValueError as error:
-        raise ModelError(f"'{path}' is no MJCF that MuJoCo reads: {error}") from None
+    return Rig.from_file(path).model
+
+
+def with_nominal_values(rig: Rig, parameters: Iterable[NominalParameter]) -> mujoco.MjModel:
+    """The compiled model of a rig with the values of nominal parameters in the place of its own.
+
+    Args:
+        rig: The user's model.
+        parameters: ``mass:BODY``, ``damping:JOINT``, ``kp:ACTUATOR``, …; in the units of the model.
+
+    Raises:
+        UnknownNameError: A parameter is of no kind that a model has, or names nothing in it.
+    """
+    structure: dict[str, dict[str, float]] = {}
+    drives: list[tuple[str, str, float]] = []
+    for parameter in parameters:
+        kind, _, target = parameter.name.partition(":")
+        if kind in DRIVES:
+            drives.append((kind, target, parameter.value))
+        elif kind in ("mass", *LOCAL):
+            structure.setdefault(kind, {})[target] = parameter.value
+        else:
+            raise UnknownNameError(
+                "parameter", parameter.name, [f"{k}:NAME" for k in ("mass", *LOCAL, *DRIVES)]
+            )
+    model = copy.copy(rig.with_structure(**structure).model)
+    actuators = [model.actuator(u).name for u in range(model.nu)]
+    for kind, name, value in drives:
+        if name not in actuators:
+            raise UnknownNameError(f"target of parameter '{kind}:{name}'", name, actuators)
+        _set_drive(model, actuators.index(name), kind, value)
+    return model
+
+
+def _set_drive(model: mujoco.MjModel, u: int, kind: str, value: float) -> None:
+    if kind == "gear":
+        model.actuator_gear[u, 0] = value
+    elif kind == "kv":
+        model.actuator_biasprm[u, 2] = -value
+    else:
+        if model.actuator_biasprm[u, 1] != 0.0:  # a servo's input and its position have one gain
+            model.actuator_biasprm[u, 1] = -value
+        model.actuator_gainprm[u, 0] = value
 
 
 def _refuse(model: mujoco.MjModel, name: str) -> None:
@@ -285,8 +325,6 @@ def _drive(model: mujoco.MjModel, u: int) -> Drive:
 
 def _bare(model: mujoco.MjModel) -> mujoco.MjModel:
     """The bodies alone: nothing but inertia and gravity."""
-    import copy  # noqa: PLC0415
-
     bare = copy.copy(model)
     bare.dof_damping[:] = 0.0
     bare.dof_frictionloss[:] = 0.0

@@ -114,6 +114,21 @@ def posterior(fitted: Fit) -> float:
     return fitted.log_evidence + (LOG_PRIOR_EFFECT - tolerance) * len(fitted.hypothesis)
 
 
+def log_prior_of(hypothesis: Hypothesis) -> float:
+    """Log prior odds of a hypothesis against the nominal model alone."""
+    return sum(LOG_PRIOR_EFFECT + placed.effect.log_prior for placed in hypothesis)
+
+
+def complexity(hypothesis: Hypothesis) -> float:
+    """How much a hypothesis takes to be described, in units of log prior.
+
+    A parameter counts as one, which is what it gains on average where nothing is to be gained. A law of seven parameters is larger so
+    than two of one each, and what holds a law at the limit of its parameters is better told by the two.
+    """
+    free = sum(not p.fixed for placed in hypothesis for p in placed.effect.parameters)
+    return free - log_prior_of(hypothesis)
+
+
 def consistent(fitted: Fit) -> bool:
     """Whether the residuals of a fit are as small as the stated noise lets them be."""
     spread = np.sqrt(2.0 / fitted.n_residuals)

@@ -11,11 +11,13 @@ starts, so that no flexible law wins because a simpler one was fitted carelessly
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from bench.discrepancy.effects.effect import Effect
+from bench.discrepancy.effects.read_off import TIMED
 from bench.discrepancy.fitting.map_fit import Fit, fit
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Hypothesis, Placed
@@ -36,10 +38,12 @@ from bench.discrepancy.screening.score_test import lack_of_fit
 from bench.discrepancy.screening.screen import Screen
 from bench.discrepancy.search.fits import (
     IMMATERIAL,
+    LOG_PRIOR_EFFECT,
     THOROUGH,
     Search,
     Task,
     carry_on,
+    complexity,
     consistent,
     converge,
     integrate_finer,
@@ -71,6 +75,21 @@ CONSIDERED, PROMISED = 12, 2
 UNPROMISING = 0.25
 """Part of the excess of a base that one more effect must promise to take away, or none is fitted beside it."""
 
+
+@dataclass(frozen=True)
+class PlainSettings:
+    """When two plain effects are tried in place of a large one.
+
+    Attributes:
+        parameters: Parameters of a plain effect, at most: a size and a shape.
+        bases: Plain effects that are extended.
+    """
+
+    parameters: int = 2
+    bases: int = 2
+
+
+PLAIN = PlainSettings()
 Prepared = tuple[Search, Screen, list[Point]]
 """A search before its first step: the nominal model fitted, the catalogue screened, its grid points by decreasing gain."""
 
@@ -121,9 +140,10 @@ def attribute(
             lacks = not (problem.windowed or problem.error) and lack_of_fit(problem, best).significant(
                 nothing.chi2 - best.chi2, effects=SEVERAL
             )
-            if not lacks and not _promising(screen, best):
+            plain = _plain_bases(search, best)
+            if not lacks and not plain and not _promising(screen, best):
                 break
-            bases = worth_extending(search, screen, size, 4 - size) if lacks else [best]
+            bases = worth_extending(search, screen, size, 4 - size) if lacks else plain or [best]
             _extend(search, screen, bases, count=4)
             soften(search, size + 1)
             reduce_best(search)
@@ -170,8 +190,10 @@ def _single(
         _extend(search, screen, [nothing], count=6, among={p.key for p in rare})
     stand_in(search)
     if deadline.allows("forces from outside and friction that follows a channel"):
-        with_timed_force(search)
-        with_schedules(search)
+        asked = {p.effect.name for p in candidates if p.effect.site == "read off"}
+        if TIMED in asked:
+            with_timed_force(search)
+        with_schedules(search, asked)
 
 
 def _worth_challenging(best: Fit, problem: Problem) -> bool:
@@ -207,6 +229,23 @@ def worth_extending(search: Search, screen: Screen, size: int, most: int) -> lis
     far = [f for f in ranked[:CONSIDERED] if np.isfinite(f.cost) and not followed(f, problem)]
     chosen = ranked[:most] + sorted(far, key=promised)[:PROMISED]
     return [f for f in ranked if any(f is own for own in chosen)]
+
+
+def _plain_bases(search: Search, best: Fit) -> list[Fit]:
+    """Plain effects beside which one more is searched because the best single effect is larger than two of them.
+
+    Where the error of the model weighs, a law of many parameters soon explains enough, at values at which it is another one: one of
+    backlash without play, say, whose asymmetry is that of friction beside a constant force.
+    """
+    largest = 2.0 * PLAIN.parameters + 2.0 * abs(LOG_PRIOR_EFFECT)
+    if search.problem.error is None or len(best.hypothesis) != 1 or complexity(best.hypothesis) <= largest:
+        return []
+    plain = [f for f in search.ranked(1) if _free(f) <= PLAIN.parameters and np.isfinite(f.cost)]
+    return plain[: PLAIN.bases]
+
+
+def _free(fitted: Fit) -> int:
+    return sum(not p.fixed for placed in fitted.hypothesis for p in placed.effect.parameters)
 
 
 def _promising(screen: Screen, best: Fit) -> bool:
@@ -346,7 +385,7 @@ def _simulated(search: Search, candidates: Sequence[Placed]) -> None:
     tasks: list[Task] = []
     for placed in candidates:
         effect = placed.effect
-        if effect.rare or not _contact(effect):
+        if effect.rare or effect.site != "joint" or not _contact(effect):
             continue
         size = effect.parameters[0]
         starts = [

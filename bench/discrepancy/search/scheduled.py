@@ -15,6 +15,7 @@ something has changed between the records and not what; on a record of its own i
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
@@ -24,6 +25,7 @@ from bench.discrepancy.case.case import Case, CaseChannel, CaseRecord
 from bench.discrepancy.case.schema import RIGS
 from bench.discrepancy.effects.catalogue import FRICTION, effect_named
 from bench.discrepancy.effects.effect import RARE, Effect, FreeParameter, Scales, Values
+from bench.discrepancy.effects.read_off import DIFFERS, FOLLOWED, SENSITIVITY, schedulable
 from bench.discrepancy.fitting.map_fit import Fit
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Placed
@@ -36,10 +38,8 @@ SCHEDULED = 4
 """Effects that are tried with a schedule: those that come nearest alone."""
 FAINT = 0.1
 """Part of the nominal model's own friction with which more of it begins."""
-SENSITIVITY = FreeParameter("sensitivity", signed=True, mean=1.0, std=0.5, bounds=(-4.0, 6.0))
 LOADS = ("force", "torque")
 """Load channels of the bench's own rigs."""
-DIFFERS = "record_dependent_friction"
 
 
 def scheduling(case: Case) -> list[CaseChannel]:
@@ -51,11 +51,12 @@ def scheduling(case: Case) -> list[CaseChannel]:
     ]  # fmt: skip
 
 
-def with_schedules(search: Search) -> None:
+def with_schedules(search: Search, asked: Collection[str]) -> None:
     """Fit the foremost effects with a schedule, or friction that differs between records where no channel tells.
 
     Args:
         search: Fits so far; the new ones are added.
+        asked: Names of the effects of the catalogue.
     """
     problem = search.problem
     if consistent(search.ranked()[0]):
@@ -63,9 +64,9 @@ def with_schedules(search: Search) -> None:
     channels = scheduling(problem.case)
     tasks: list[Task] = []
     for channel in channels:
-        for placed, start in _seeds(search):
+        for placed, start in (one for one in _seeds(search) if FOLLOWED + one[0].effect.name in asked):
             tasks += _followed(problem, placed, start, channel)
-    if not channels and len(problem.records) > 1:
+    if not channels and len(problem.records) > 1 and DIFFERS in asked:
         tasks = [
             t for place in problem.structure.places if len(place.rows) == 1 for t in _differing(search, place)
         ]
@@ -94,7 +95,7 @@ def _schedulable(fitted: Fit) -> bool:
     (placed,) = fitted.hypothesis
     effect = placed.effect
     plain = effect.schedule is None and effect.of_record is None and not effect.variant
-    return effect.site == "joint" and plain and bool(np.isfinite(fitted.cost)) and not effect.modulated
+    return schedulable(effect) and plain and bool(np.isfinite(fitted.cost))
 
 
 def _followed(problem: Problem, placed: Placed, start: Array, channel: CaseChannel) -> list[Task]:
@@ -143,7 +144,7 @@ def followed(effect: Effect, channel: CaseChannel, problem: Problem) -> Effect:
         return values[:count] if theta is None else theta(values[:count], scales)
 
     return replace(
-        effect, name=f"scheduled_{effect.name}", equation=f"(1 - kappa + kappa s/s0) f, s = {name}; {effect.equation}",
+        effect, name=FOLLOWED + effect.name, equation=f"(1 - kappa + kappa s/s0) f, s = {name}; {effect.equation}",
         parameters=(*effect.parameters, SENSITIVITY, FreeParameter("reference", signed=True, fixed=True, unit=channel.unit or "1")),
         theta=own_theta, schedule=schedule, log_prior=effect.log_prior + 0.5 * RARE,
         rate_bound=None if bound is None else lambda values, scales: bound(values[:count], scales),

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from bench.discrepancy.case.case import CaseRecord
 from bench.discrepancy.effects.effect import RARE, Effect, FreeParameter, Scales, Values
+from bench.discrepancy.effects.read_off import FORCE, TIMED
 from bench.discrepancy.fitting.map_fit import Fit
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.nominal_elements import own_force
@@ -30,7 +31,6 @@ from bench.discrepancy.search.time_windows import ALIKE, BLOCKS, Windows, follow
 from bench.laws.timed_force import MAX_WINDOWS, timed_force_law
 
 Array = NDArray[np.float64]
-NAME = "timed_force"
 REGULAR = 0.1
 """Relative spread of the times between windows up to which they are told as periodic."""
 SHIFT = FreeParameter("shift", "step", signed=True, std=1.0, bounds=(-20.0, 20.0), unit="s")
@@ -209,8 +209,8 @@ def _effect(problem: Problem, found: _Found) -> Effect:
 
     held = [FreeParameter(name, signed=True, fixed=True, unit=unit) for name, unit in TOLD]
     return Effect(
-        NAME, "external", "joint",
-        (FreeParameter("force", "force", signed=True, std=2.0, bounds=(-50.0, 50.0)), SHIFT, *held),
+        TIMED, "external", "joint",
+        (FORCE, SHIFT, *held),
         "f = -F in windows of time", law=timed_force_law(len(first)), theta=theta, of_record=of_record,
         log_prior=RARE - 2.0 * math.log(BLOCKS) * count,
     )  # fmt: skip

@@ -1,0 +1,236 @@
+"""The diagnosis by command: of a case folder, of logs against a model, of a fleet of cases."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import tyro
+from rich.console import Console
+from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+from bench.cli.console import emit
+from bench.cli.records import pairs
+from bench.cli.verdict_text import summary
+
+if TYPE_CHECKING:
+    from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis
+    from bench.discrepancy.case.case import Case
+    from bench.discrepancy.diagnosis import Diagnosis
+
+
+@dataclass
+class Diagnose:
+    """Say where a simulation misses the measurement, which effect causes it, and how far the gap shrinks once it is added.
+
+    Examples:
+      jointbench diagnose my-case --html report.html --json verdict.json
+      jointbench diagnose run_1.csv run_2.csv arm.xml --map q1=shoulder.position u1=shoulder.command --json verdict.json
+      jointbench diagnose robot_1 robot_2 robot_3 --html fleet.html --json fleet.json
+    """
+
+    cases: tyro.conf.Positional[tuple[Path, ...]]
+    """A case folder (nominal.json and records, docs/howto-mismatch.md); several, for a fleet; or logs and an MJCF, the last log judging."""
+    map: tuple[str, ...] = ()
+    """Of logs: what columns stand for: COLUMN=JOINT.position (velocity, acceleration, torque, command), =ACTUATOR, =SENSOR, =- for none."""
+    unit: tuple[str, ...] = ()
+    """Of logs: units that headings do not tell, COLUMN=UNIT."""
+    judge: tuple[Path, ...] = ()
+    """Of logs: those that judge; the last one by default, of a single log its last third."""
+    rate: float = 0.0
+    """Of logs: sample rate [Hz] where they have no time."""
+    scheduler: str = ""
+    """Of a fleet: address of a dask scheduler (extra scale) that its cases run on."""
+    json: Path | None = None
+    """File for the result as JSON; "-" prints it."""
+    html: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
+    """File for the report, a self-contained HTML page."""
+    rrd: Path | None = None
+    """File for a rerun recording: measured and simulated channels, and where the gap lies."""
+    exclude: tuple[str, ...] = ()
+    """Effects to leave out of the catalogue."""
+    most: int = 3
+    """Largest number of effects named together."""
+    anyway: bool = False
+    """Go on where a unit, a sign or a part of the model stands against the diagnosis; what it was becomes a note."""
+    budget: float = float("inf")
+    """Seconds after which no further stage of the search is begun; the verdict is then the best one so far and says what was not tried."""
+    check: bool = True
+    """Look at the records first, as `jointbench check` does, and say at once what is doubtful."""
+    force: bool = False
+    """Overwrite files that exist."""
+    progress: bool = True
+    """Show what is being done, on standard error."""
+
+    def __call__(self) -> None:
+        """Run the command."""
+        self._check_places()
+        from bench.errors import ParameterError
+
+        logs = [path for path in self.cases if not path.is_dir()]
+        model = [path for path in logs if path.suffix == ".xml"]
+        if model and len(logs) == len(self.cases):
+            self._of_logs([path for path in logs if path not in model], model)
+        elif len(self.cases) == 1:
+            from bench.discrepancy import read_case
+
+            with _stages(self.progress) as stage:
+                case = read_case(self.cases[0])
+                found = _diagnosed(self, case, stage)
+                document, written, problem = self._results(found, stage, ())
+            self._told(found, document, written, problem)
+        elif self.cases and not logs:
+            from bench.cli.fleet import diagnose_fleet
+
+            diagnose_fleet(self, _stages)
+        else:
+            raise ParameterError(
+                "give one case folder, several (a fleet), or logs and the MJCF they are held against, as in: "
+                "jointbench diagnose run.csv model.xml"
+            )
+
+    def _of_logs(self, logs: list[Path], models: list[Path]) -> None:
+        from bench.discrepancy.intake.asking import case_from
+        from bench.errors import ParameterError
+
+        if len(models) != 1:
+            raise ParameterError(
+                f"{len(models)} models came ({', '.join(map(str, models))}); one is expected"
+            )
+        with (
+            _stages(self.progress) as stage,
+            case_from(
+                logs,
+                models[0],
+                judging=self.judge,
+                columns=pairs("--map", self.map),
+                units=pairs("--unit", self.unit),
+                rate=self.rate,
+            ) as (case, made),
+        ):
+            told = Console(stderr=True, soft_wrap=True)
+            for line in made.assumed:
+                told.print(f"assumed: {line}", markup=False, highlight=False)
+            found = _diagnosed(self, case, stage)
+            document, written, problem = self._results(found, stage, made.assumed)
+        self._told(found, document, written, problem)
+
+    def _results(
+        self, found: Diagnosis | ArticulatedDiagnosis, stage: Callable[[str], None], assumed: tuple[str, ...]
+    ) -> tuple[dict[str, Any], list[Path], Exception | None]:
+        """The verdict as a document, and its files written."""
+        document = found.verdict.to_json()
+        document["warnings"] = [*document["warnings"], *(f"assumed: {line}" for line in assumed)]
+        return document, *self._written(found, document, stage)
+
+    def _told(
+        self,
+        found: Diagnosis | ArticulatedDiagnosis,
+        document: dict[str, Any],
+        written: list[Path],
+        problem: Exception | None,
+    ) -> None:
+        if self.json == PRINTED:
+            emit(document)
+        else:
+            for part in summary(found.verdict):
+                Console().print(part, markup=False, highlight=False)
+            for path in written:
+                print(f"written: {path}")
+        for warning in found.verdict.warnings:
+            Console(stderr=True, soft_wrap=True).print(
+                f"note: {warning}", style="yellow", markup=False, highlight=False
+            )
+        if problem is not None:
+            raise problem
+
+    def _written(
+        self,
+        diagnosis: Diagnosis | ArticulatedDiagnosis,
+        document: dict[str, Any],
+        stage: Callable[[str], None],
+    ) -> tuple[list[Path], Exception | None]:
+        """The files written, moved into place together; where one fails, the verdict alone, and what failed."""
+        from bench.files import OutputError, together, write_text
+
+        text = json.dumps(document, indent=1, ensure_ascii=False)
+        saved = [self.json] if self.json is not None and self.json != PRINTED else []
+        try:
+            with together():
+                for path in saved:
+                    write_text(path, text)
+                if self.html is not None:
+                    from bench.discrepancy import write_report
+
+                    stage(f"writing {self.html}")
+                    write_report(diagnosis, self.html)
+                if self.rrd is not None:
+                    from bench.discrepancy.report.rerun_recording import write_rerun
+
+                    stage(f"writing {self.rrd}")
+                    write_rerun(diagnosis, self.rrd)
+        except Exception as error:  # whatever a figure ran into: the verdict is told and kept
+            problem = OutputError(f"the report of this verdict cannot be written: {error}")
+            with contextlib.suppress(OutputError):
+                for path in saved:
+                    write_text(path, text)
+                return saved, problem
+            return [], problem
+        return [path for path in (*saved, self.html, self.rrd) if path is not None], None
+
+    def _check_places(self) -> None:
+        """Refuse places that cannot be written to before a minute is spent on the diagnosis."""
+        from bench.errors import ParameterError
+        from bench.targets import check_targets
+
+        if self.most < 1:
+            raise ParameterError(f"--most is {self.most}; at least one effect has to be allowed")
+        if not self.budget > 0.0:
+            raise ParameterError(f"--budget is {self.budget:g} s; give more than zero")
+        check_targets(self.json, self.html, self.rrd, force=self.force)
+
+
+PRINTED = Path("-")
+"""Stands for standard output."""
+
+
+@contextlib.contextmanager
+def _stages(shown: bool) -> Iterator[Callable[[str], None]]:
+    """A line on standard error with what is being done and for how long; call what is given with the text."""
+    columns = (SpinnerColumn(), TimeElapsedColumn(), TextColumn("{task.description}", markup=False))
+    with Progress(*columns, console=Console(stderr=True), disable=not shown, transient=True) as bar:
+        task = bar.add_task("reading", total=None)
+        yield lambda text: bar.update(task, description=text)
+
+
+def _diagnosed(asked: Diagnose, case: Case, stage: Callable[[str], None]) -> Diagnosis | ArticulatedDiagnosis:
+    """The diagnosis of a case; what numerics cannot cope with is told like any other input that cannot be used."""
+    import numpy as np
+
+    from bench.discrepancy import diagnose
+    from bench.discrepancy.precheck.checking import check
+    from bench.errors import IdentificationError
+
+    if asked.check:
+        stage("looking at the records")
+        told = Console(stderr=True, soft_wrap=True)
+        for doubt in check(case, informed=False).doubts:
+            told.print(f"check: {doubt}", style="yellow", markup=False, highlight=False)
+    try:
+        return diagnose(
+            case,
+            exclude=asked.exclude,
+            most=asked.most,
+            anyway=asked.anyway,
+            progress=stage,
+            budget=asked.budget,
+        )
+    except (np.linalg.LinAlgError, ArithmeticError) as error:
+        raise IdentificationError(
+            f"the numbers of '{case.name}' cannot be worked with ({error}); check nominal values, units and noise_std: "
+            "one of them is probably off by orders of magnitude"
+        ) from error

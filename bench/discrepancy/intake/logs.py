@@ -1,0 +1,113 @@
+"""Logs as they come: columns with units and times, from files, recordings, tables or arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.errors import RecordingError
+from bench.record_files.column_map import ColumnMap, name_and_unit
+from bench.record_files.columns import read_columns
+from bench.record_files.times import clock_of, time_source
+from bench.recording import Recording
+
+Array = NDArray[np.float64]
+
+
+class Log(NamedTuple):
+    """A log.
+
+    Attributes:
+        name: Where it comes from.
+        time: Times [s] (n,), as they were recorded.
+        arrays: Column without unit to values (n,).
+        units: Units that are told.
+        notes: What was left out or is doubtful.
+    """
+
+    name: str
+    time: Array
+    arrays: Mapping[str, Array]
+    units: Mapping[str, str]
+    notes: tuple[str, ...] = ()
+
+
+def log_of(source: Any, *, rate: float = 0.0, name: str = "log") -> Log:
+    """A log from a file, a Recording, a pandas or polars table, or a mapping of columns to arrays.
+
+    Args:
+        source: It.
+        rate: Sample rate [Hz] where it has no time.
+        name: Name where it has none itself.
+
+    Raises:
+        MissingFileError: There is no such file.
+        FileFormatError: It cannot be read.
+        RecordingError: It has no time, or columns of different lengths.
+    """
+    if isinstance(source, Recording):
+        return _of_recording(source, name)
+    if isinstance(source, (str, Path)):
+        return _of_file(Path(source), rate)
+    if hasattr(source, "columns") and hasattr(source, "__getitem__"):
+        return _of_table({str(c): source[c] for c in source.columns}, rate, name)
+    if isinstance(source, Mapping):
+        return _of_table({str(c): values for c, values in source.items()}, rate, name)
+    raise RecordingError(
+        f"a {type(source).__name__} came for a log; a path, a Recording, a DataFrame, or a mapping of columns to arrays is expected"
+    )
+
+
+def _of_file(path: Path, rate: float) -> Log:
+    found = read_columns(path, ColumnMap({}, sample_rate=rate), time_optional=rate > 0.0)
+    if isinstance(found, Recording):
+        return _of_recording(found, path.name)
+    n = len(next(iter(found.arrays.values())))
+    time = found.time
+    notes = found.notes
+    if time is None:
+        time = np.arange(n) / rate if found.clock is None else found.clock.seconds
+        if found.clock is not None and found.clock.doubt:
+            raise RecordingError(f"'{path}': {found.clock.doubt}")
+    return Log(path.name, np.asarray(time), found.arrays, found.units, notes)
+
+
+def _of_recording(recording: Recording, name: str) -> Log:
+    arrays = {channel.name: recording[channel.name] for channel in recording.channels}
+    # a pure number is what a recording says where nobody knew better
+    units = {channel.name: channel.unit for channel in recording.channels if channel.unit != "1"}
+    return Log(name, recording.time, arrays, units, tuple(map(str, recording.meta.get("warnings", ()))))
+
+
+def _of_table(columns: Mapping[str, Any], rate: float, name: str) -> Log:
+    heading = time_source(columns)
+    arrays, units = {}, {}
+    for column, values in columns.items():
+        numbers = np.asarray(values)
+        if column == heading or numbers.dtype.kind not in "biuf" or numbers.ndim != 1:
+            continue
+        plain, unit = name_and_unit(column)
+        arrays[plain] = numbers.astype(float)
+        if unit:
+            units[plain] = unit
+    if not arrays:
+        raise RecordingError(
+            f"'{name}' has no column of numbers beside the time (it has {', '.join(columns) or 'nothing'})"
+        )
+    n = {len(values) for values in arrays.values()}
+    if len(n) > 1:
+        raise RecordingError(
+            f"the columns of '{name}' have {sorted(n)} samples; all of one length are expected"
+        )
+    if heading:
+        clock = clock_of(np.asarray(columns[heading]), "", heading, told=name_and_unit(heading)[1])
+        return Log(name, clock.seconds, arrays, units, clock.notes)
+    if not rate > 0.0:
+        raise RecordingError(
+            f"'{name}' has no column 'time'; add one, or give the sample rate (rate=, --rate)"
+        )
+    return Log(name, np.arange(n.pop()) / rate, arrays, units)

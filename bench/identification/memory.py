@@ -1,0 +1,278 @@
+"""Model of a joint with memory: `bench.laws.memory`, learned from records of its motion and force.
+
+Three steps, each through what the law itself does along the measured motion:
+
+1. A dictionary of slip elements of ranges spread logarithmically over the motion, beside potentials and damping along every
+   direction: all weights by non-negative least squares (`bench.identification.memory_terms`), which leaves few of them above zero.
+   How smooth neighbouring weights are is chosen on segments held out.
+2. Terms that add nothing are dropped.
+3. Ranges, profiles and relaxation times are refined by separable least squares: a step changes them, the hidden states are
+   integrated anew, and the weights that belong to them are solved for. Nothing restricts how they enter, since the states do not
+   depend on the weights.
+
+`bench.identification.output_error` goes on from there where only the motion of a whole rig was measured: every parameter of the
+law is a free parameter to it, and none of them within its bounds makes the joint active.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import time as clock
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field, fields, replace
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from bench.errors import FileFormatError, IdentificationError
+from bench.identification.memory_refinement import refined
+from bench.identification.memory_settings import MemorySettings, dictionary
+from bench.identification.memory_terms import JointRecord, Terms, fold, smoothness, solve
+from bench.identification.polynomial import ValidityRange, checked_data, frozen, nmse_percent
+from bench.laws.base import ForceLaw
+from bench.laws.evaluate import evaluate
+from bench.laws.memory import memory_law
+from bench.laws.memory_energy import stored_energy
+from bench.laws.memory_layout import MemoryLayout
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class MemoryReport:
+    """How a fit went.
+
+    Attributes:
+        nmse: Normalised mean-square error of each force along the records, from rest [%].
+        nmse_validation: The same on the segments held out, before they too were fitted [%], mean of the forces.
+        n_weights: Weights that the fit began with.
+        n_parameters: Parameters of the model.
+        n_states: Hidden states of the model.
+        smoothing: Strength of smoothing that was chosen.
+        steps: Evaluations of the refinement.
+        seconds: Time taken [s].
+    """
+
+    nmse: tuple[float, ...]
+    nmse_validation: float
+    n_weights: int
+    n_parameters: int
+    n_states: int
+    smoothing: float
+    steps: int
+    seconds: float
+
+
+@dataclass(frozen=True)
+class MemoryModel:
+    """A joint with memory in physical units, with its range of validity.
+
+    Attributes:
+        layout: What it consists of.
+        parameters: Parameters of its law (n_parameters,).
+        range: Range of the states it was identified from.
+        report: How the fit went.
+        mass: Masses (k,) [kg, kg m²] identified with it, or None.
+    """
+
+    layout: MemoryLayout
+    parameters: Array = field(repr=False)
+    range: ValidityRange
+    report: MemoryReport
+    mass: Array | None = None
+
+    @cached_property
+    def law(self) -> ForceLaw:
+        """The law whose parameters these are."""
+        return memory_law(self.layout)
+
+    @cached_property
+    def theta(self) -> Array:
+        """Header and parameters, as an element takes them."""
+        return frozen(self.law.theta(self.parameters))
+
+    def predict(self, states: ArrayLike, *, time: ArrayLike, substeps: int = 4) -> Array:
+        """Restoring forces (n, k) [N, N m] along a motion that begins at rest in the joint's virgin state.
+
+        Args:
+            states: Relative states (n, 2 k) [m, rad, m/s, rad/s].
+            time: Times (n,) [s]; a new record begins where it does not increase.
+            substeps: Integration steps of the hidden states a sample.
+        """
+        s, t = np.atleast_2d(np.asarray(states, dtype=float)), np.asarray(time, dtype=float)
+        k = self.layout.n_joints
+        pieces = [slice(a, b) for a, b in runs(t)]
+        parts = [
+            evaluate(self.law, self.theta, t[i], s[i, :k], s[i, k:], substeps=substeps).force for i in pieces
+        ]
+        return np.vstack(parts)
+
+    def stored_energy(self, displacements: ArrayLike, memory: ArrayLike) -> Array:
+        """Energy (n,) [J] held at displacements (n, k) and hidden states (n, n_states); none at rest in the virgin state."""
+        return stored_energy(self.layout, self.parameters, displacements, memory)
+
+    def to_json(self) -> str:
+        """The model as JSON text; numbers survive to the last bit."""
+        values = {
+            "type": "memory",
+            "header": list(self.layout.header()),
+            "parameters": self.parameters.tolist(),
+            "range": self.range.to_dict(),
+            "report": asdict(self.report),
+            "mass": None if self.mass is None else self.mass.tolist(),
+        }
+        return json.dumps(values)
+
+    @classmethod
+    def from_json(cls, text: str) -> MemoryModel:
+        """The model from the text of `to_json`.
+
+        Raises:
+            FileFormatError: The text is not that of a joint with memory.
+        """
+        try:
+            values = json.loads(text)
+            if values["type"] != "memory":
+                raise FileFormatError(f"a model of type '{values['type']}' came; 'memory' is expected")
+            layout = MemoryLayout.of_header(values["header"])
+            report = {f.name: values["report"][f.name] for f in fields(MemoryReport)}
+            report["nmse"] = tuple(report["nmse"])
+            parameters = memory_law(layout).theta(values["parameters"])[len(values["header"]) :]
+            mass = None if values["mass"] is None else frozen(values["mass"])
+            return cls(
+                layout,
+                frozen(parameters),
+                ValidityRange.from_dict(values["range"]),
+                MemoryReport(**report),
+                mass,
+            )
+        except (KeyError, TypeError, ValueError) as error:
+            if isinstance(error, FileFormatError):
+                raise
+            raise FileFormatError(f"this is no joint with memory written by `to_json`: {error}") from error
+
+
+def runs(time: Array) -> list[tuple[int, int]]:
+    """First sample and end of each record in a clock (n,) that starts anew where it does not increase."""
+    if time.ndim != 1 or not len(time) or not np.all(np.isfinite(time)):
+        raise IdentificationError(f"a clock of shape {time.shape} came; finite times (n,) are expected")
+    edges = [0, *(np.flatnonzero(np.diff(time) <= 0.0) + 1).tolist(), len(time)]
+    return list(pairwise(edges))
+
+
+def fit_memory(
+    states: ArrayLike,
+    forces: ArrayLike,
+    *,
+    time: ArrayLike,
+    accelerations: ArrayLike | None = None,
+    settle: float = 0.0,
+    settings: MemorySettings | None = None,
+    **changes: object,
+) -> MemoryModel:
+    """Learn a joint with memory from records of its motion and force.
+
+    Args:
+        states: Relative states ``(n, 2 k)``, displacements before velocities [m, rad, m/s, rad/s]; records one after the other,
+            each from rest in the joint's virgin state (or with `settle`).
+        forces: Restoring forces ``(n, k)`` [N, N m]; with `accelerations`, applied forces less mounts.
+        time: Times (n,) [s]; a new record begins where it does not increase.
+        accelerations: Absolute accelerations ``(n, k)`` [m/s², rad/s²] of the body the forces act on, where its mass is unknown.
+        settle: Seconds at the start of each record that are integrated and not fitted: what came before it is forgotten by then.
+        settings: What the joint is made of.
+        **changes: Single settings by name.
+
+    Returns:
+        The model.
+
+    Raises:
+        IdentificationError: Arrays do not fit, are not finite, are constant or too short.
+        ParameterError: A setting is out of range.
+    """
+    begun = clock.monotonic()
+    chosen = replace(settings or MemorySettings(), **changes)  # type: ignore[arg-type]
+    s, f, a = checked_data(states, forces, accelerations)
+    t = np.asarray(time, dtype=float)
+    if t.shape != (len(s),):
+        raise IdentificationError(
+            f"a clock of shape {t.shape} came with {len(s)} samples; one time each is expected"
+        )
+    k = f.shape[1]
+    spreads = np.std(f, axis=0)
+    spreads[spreads == 0.0] = 1.0
+    if not np.any(np.std(s, axis=0)[:k]) or len(s) < 100:
+        raise IdentificationError(
+            f"{len(s)} samples of a motion with the spreads {np.std(s, axis=0)[:k]} came; at least 100 of a joint in motion are expected"
+        )
+    records = _records(t, s, f, a, settle, chosen.max_samples)
+    terms = dictionary(chosen, s, t, a.shape[1])
+    n_weights = terms.n_weights()
+    strength, held_out = _strength(terms, records, spreads, chosen)
+    terms, weights = _pruned(terms, records, spreads, chosen, strength)
+    steps = 0
+    if chosen.refine and terms.layout.slips + terms.layout.maxwells:
+        terms, steps = refined(terms, records, spreads, strength, chosen.refine)
+        terms, weights = _pruned(terms, records, spreads, chosen, strength)
+    parameters = frozen(terms.parameters(weights))
+    mass = frozen(weights[len(weights) - k :]) if a.shape[1] else None
+    report = MemoryReport(
+        (), held_out, n_weights, len(parameters), len(memory_law(terms.layout).states), strength, steps, 0.0
+    )
+    model = MemoryModel(terms.layout, parameters, ValidityRange.of(s), report, mass)
+    predicted = model.predict(s, time=t, substeps=chosen.substeps) + (0.0 if mass is None else a * mass)
+    kept = np.concatenate([t[i:j] - t[i] >= settle for i, j in runs(t)])
+    report = replace(report, nmse=nmse_percent(f[kept], predicted[kept]), seconds=clock.monotonic() - begun)
+    return replace(model, report=report)
+
+
+def _records(t: Array, s: Array, f: Array, a: Array, settle: float, most: int) -> list[JointRecord]:
+    """The records, with evenly spread samples to be fitted."""
+    k = f.shape[1]
+    pieces = runs(t)
+    stride = max(1, math.ceil(len(t) / most))
+    found = []
+    for i, j in pieces:
+        used = np.arange(0, j - i, stride)
+        used = used[t[i:j][used] - t[i] >= settle]
+        found.append(JointRecord(t[i:j], s[i:j, :k], s[i:j, k:], f[i:j], a[i:j], used))
+    if not sum(len(record.used) for record in found):
+        raise IdentificationError(f"no sample is left after a settling time of {settle:g} s; shorten it")
+    return found
+
+
+_SEGMENTS = 10
+"""Segments that the samples are cut into; every other pair of them is held out in turn to choose the smoothing."""
+
+
+def _strength(
+    terms: Terms, records: Sequence[JointRecord], spreads: Array, settings: MemorySettings
+) -> tuple[float, float]:
+    """Strength of smoothing that predicts segments held out best, and the NMSE there [%]."""
+    fitted, held = [], []
+    for record in records:
+        segment = np.minimum(
+            np.arange(len(record.used)) * _SEGMENTS // max(len(record.used), 1), _SEGMENTS - 1
+        )
+        fitted.append(record._replace(used=record.used[segment % 4 != 3]))
+        held.append(record._replace(used=record.used[segment % 4 == 3]))
+    seen, unseen = fold(terms, fitted, spreads), fold(terms, held, spreads)
+    losses = [unseen.loss(solve(seen, smoothness(terms, seen, x))) for x in settings.smoothing]
+    best = int(np.argmin(losses))
+    return settings.smoothing[best], 100.0 * losses[best] / max(unseen.total, 1e-300)
+
+
+def _pruned(
+    terms: Terms, records: Sequence[JointRecord], spreads: Array, settings: MemorySettings, strength: float
+) -> tuple[Terms, Array]:
+    """The terms without those that add nothing, and their weights."""
+    factor = fold(terms, records, spreads)
+    weights = solve(factor, smoothness(terms, factor, strength))
+    share = np.linalg.norm(factor.R, axis=0) * weights / math.sqrt(max(factor.total, 1e-300))
+    smaller = terms.without(share < settings.negligible)
+    if smaller.n_weights() == terms.n_weights():
+        return terms, weights
+    factor = fold(smaller, records, spreads)
+    return smaller, solve(factor, smoothness(smaller, factor, strength))

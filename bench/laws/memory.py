@@ -1,0 +1,250 @@
+"""Joint with memory: elastic-slip elements with learned profiles, a convex potential and non-negative damping.
+
+The reduced-order joint that remembers. It acts along directions ``s_d = c_d . q`` of the joint's coordinates, with the force
+``f = sum_d c_d F_d``, and every term of ``F_d`` is passive by the sign of its parameters alone:
+
+| term | force along s | stored energy | what holds |
+|---|---|---|---|
+| potential | ``int_0^s k(x) dx``, k constant in cells | ``int int k >= 0`` | ``k >= 0``: convex, least at 0 |
+| damping, gated by place | ``c(s_g) s'``, c linear between knots over any direction g | none | ``c >= 0`` |
+| damping by speed | ``c(abs(s')) s'`` | none | ``c >= 0`` |
+| slip element | ``sigma(e) = int_-r^e k(x) dx - phi int_-r^r k(x) dx`` | ``int sigma de`` on ``[-r, r]`` | ``k >= 0, 0 <= phi <= 1`` |
+| Maxwell element | ``k e`` | ``k e^2 / 2`` | ``k >= 0, tau > 0`` |
+
+A slip element's hidden state is the elastic strain e of a spring behind a slider, within its range r::
+
+    e' = s' (1 - h(abs(e) / r)) while e s' > 0 (loading), else s'
+
+Slip needs ``sigma(e) s' h >= 0``, and h(1) = 1 keeps e within the range: no weights, however learned, make the joint give out more
+than it took in, and no motion makes a slip element's force exceed ``sigma(r)``. With n coordinates the same holds along any
+direction, so also for axes that slip together.
+
+Two families of slip profile h, and with them the two forms of the model:
+
+- *sliders* (no profile knots): ``h = u^2, u = (abs(e)/r - 1 + w)/w``, the rounded yield of `jenkins`. Many of them in parallel
+  with a learned distribution of ranges are Iwan's model, a Prandtl-Ishlinskii operator of stops; with k varying in cells over
+  ``[-r, r]`` each is a function of a stop, which is how backlash that travels with the slider and unequal limits come in.
+- *profiles* (G knots): h linear between 0 and learned values at ``abs(e)/r = 1/G, 2/G, …``, 1 at the end: a Duhem operator of which
+  Bouc-Wen (for which ``1 - h`` is the ratio of the slopes of loading and unloading) and Dahl are special cases. A few suffice.
+
+Differs from `iwan` (a given power law for the distribution, one axis, sliders only), from `jenkins_backlash` (one slider of a given
+shape) and from the Bouc-Wen laws, which are passive for some of their parameters only.
+
+References:
+    Iwan 1966, J. Appl. Mech. 33(4), 893-900; Krejci 1996, Hysteresis, Convexity and Dissipation in Hyperbolic Equations (functions
+    of play and stop); van der Schaft & Jeltsema 2014, Port-Hamiltonian Systems Theory, ch. 2; Ikhouane & Rodellar 2007, ch. 2
+    (passivity of Bouc-Wen).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import lru_cache
+
+from bench.laws.base import ForceLaw, Parameter, kernel
+from bench.laws.memory_layout import FIRST, MemoryLayout
+
+
+@kernel
+def force(t, q, v, z, theta, f):  # noqa: PLR0912, PLR0915  (one C function: a kernel calls no other)
+    """Sum of potential, damping, slip and Maxwell forces along all directions."""
+    n = int(theta[0])
+    width = n + 3
+    cells, knots, speeds = int(theta[3]), int(theta[5]), int(theta[7])
+    n_slips, parts = int(theta[8]), int(theta[9])
+    index = FIRST + int(theta[1]) * width
+    n_potentials, n_gated, n_speed, n_maxwell = int(theta[2]), int(theta[4]), int(theta[6]), int(theta[11])
+    at = index + n_potentials + 2 * n_gated + n_speed + n_slips + n_maxwell
+    for _ in range(n_potentials):
+        row = FIRST + int(theta[index]) * width
+        s = 0.0
+        for o in range(n):
+            s += theta[row + o] * q[o]
+        low = theta[row + n]
+        size = (theta[row + n + 1] - low) / cells
+        # cells that hold s and 0; the first and the last reach to infinity
+        there = int(min(max((s - low) / size, 0.0), cells - 1.0))
+        here = int(min(max(-low / size, 0.0), cells - 1.0))
+        if there == here:
+            total = theta[at + here] * s
+        elif there > here:
+            total = theta[at + here] * (low + (here + 1) * size) + theta[at + there] * (
+                s - low - there * size
+            )
+            for b in range(here + 1, there):
+                total += theta[at + b] * size
+        else:
+            total = theta[at + here] * (low + here * size) + theta[at + there] * (
+                s - low - (there + 1) * size
+            )
+            for b in range(there + 1, here):
+                total -= theta[at + b] * size
+        for o in range(n):
+            f[o] += theta[row + o] * total
+        at += cells
+        index += 1
+    for _ in range(n_gated):
+        row = FIRST + int(theta[index]) * width
+        gate = FIRST + int(theta[index + 1]) * width
+        rate = 0.0
+        s = 0.0
+        for o in range(n):
+            rate += theta[row + o] * v[o]
+            s += theta[gate + o] * q[o]
+        low = theta[gate + n]
+        x = min(max((s - low) / (theta[gate + n + 1] - low) * (knots - 1.0), 0.0), knots - 1.0)
+        b = min(int(x), knots - 2)
+        push = (theta[at + b] + (x - b) * (theta[at + b + 1] - theta[at + b])) * rate
+        for o in range(n):
+            f[o] += theta[row + o] * push
+        at += knots
+        index += 2
+    for _ in range(n_speed):
+        row = FIRST + int(theta[index]) * width
+        rate = 0.0
+        for o in range(n):
+            rate += theta[row + o] * v[o]
+        x = min(abs(rate) / theta[row + n + 2] * (speeds - 1.0), speeds - 1.0)
+        b = min(int(x), speeds - 2)
+        push = (theta[at + b] + (x - b) * (theta[at + b + 1] - theta[at + b])) * rate
+        for o in range(n):
+            f[o] += theta[row + o] * push
+        at += speeds
+        index += 1
+    stride = 2 + parts + max(int(theta[10]) - 1, 0)
+    for i in range(n_slips):
+        row = FIRST + int(theta[index]) * width
+        r = theta[at]
+        x = (min(max(z[i], -r), r) / r + 1.0) * 0.5 * parts
+        whole = 0.0
+        below = 0.0
+        for b in range(parts):
+            whole += theta[at + 2 + b]
+            below += theta[at + 2 + b] * min(max(x - b, 0.0), 1.0)
+        push = 2.0 * r / parts * (below - theta[at + 1] * whole)
+        for o in range(n):
+            f[o] += theta[row + o] * push
+        at += stride
+        index += 1
+    for i in range(n_maxwell):
+        row = FIRST + int(theta[index]) * width
+        for o in range(n):
+            f[o] += theta[row + o] * theta[at] * z[n_slips + i]
+        at += 2
+        index += 1
+
+
+@kernel
+def rate(t, q, v, z, theta, zdot):
+    """``e' = s' (1 - h)`` while loading, ``s'`` while unloading; ``e' = s' - e / tau`` of Maxwell elements."""
+    n = int(theta[0])
+    width = n + 3
+    n_gated, n_slips, parts, profile = int(theta[4]), int(theta[8]), int(theta[9]), int(theta[10])
+    n_maxwell = int(theta[11])
+    first = FIRST + int(theta[1]) * width
+    index = first + int(theta[2]) + 2 * n_gated + int(theta[6])
+    at = index + n_slips + n_maxwell
+    at += int(theta[2]) * int(theta[3]) + n_gated * int(theta[5]) + int(theta[6]) * int(theta[7])
+    transition = theta[12]
+    stride = 2 + parts + max(profile - 1, 0)
+    for i in range(n_slips):
+        row = FIRST + int(theta[index + i]) * width
+        rate = 0.0
+        for o in range(n):
+            rate += theta[row + o] * v[o]
+        slip = 0.0
+        if z[i] * rate > 0.0:
+            x = abs(z[i]) / theta[at]
+            if profile == 0:
+                u = (x - 1.0 + transition) / transition
+                if u > 0.0:
+                    slip = min(u * u, 2.0)  # beyond 1 it leads back into the range
+            elif x >= 1.0:
+                slip = 1.0
+            else:
+                g = int(x * profile)
+                left = theta[at + 1 + parts + g] if g > 0 else 0.0
+                right = theta[at + 2 + parts + g] if g < profile - 1 else 1.0
+                slip = left + (x * profile - g) * (right - left)
+        zdot[i] = rate * (1.0 - slip)
+        at += stride
+    index += n_slips
+    for i in range(n_maxwell):
+        row = FIRST + int(theta[index + i]) * width
+        rate = 0.0
+        for o in range(n):
+            rate += theta[row + o] * v[o]
+        zdot[n_slips + i] = rate - z[n_slips + i] / theta[at + 1]
+        at += 2
+
+
+@lru_cache(maxsize=64)
+def memory_law(layout: MemoryLayout) -> ForceLaw:
+    """The law of one layout; all its parameters keep it passive within their bounds.
+
+    The default of the parameters is a weak spring and damper with sliders of a tenth of each direction's range.
+    """
+    slips = [f"e{i + 1} [m]" for i in range(len(layout.slips))]
+    maxwells = [f"u{i + 1} [m]" for i in range(len(layout.maxwells))]
+    return ForceLaw(
+        name="memory",
+        parameters=tuple(_parameters(layout)),
+        force=force,
+        rate=rate if slips or maxwells else None,
+        states=tuple(slips + maxwells),
+        equation="f = sum_d c_d (int k ds + c(s_g) s' + c(|s'|) s' + sum sigma(e) + sum k u), e' = s' (1 - h(|e|/r)) loading, s' else",
+        reference="Iwan 1966; Krejci 1996; van der Schaft & Jeltsema 2014",
+        n_coordinates=layout.n_joints,
+        smoothness="continuous",
+        header=layout.header(),
+    )
+
+
+def memory_law_of(header: Sequence[float]) -> ForceLaw:
+    """The law that has this header.
+
+    Raises:
+        ParameterError: No joint with memory has it.
+    """
+    return memory_law(MemoryLayout.of_header(tuple(float(entry) for entry in header)))
+
+
+def _parameters(layout: MemoryLayout) -> list[Parameter]:
+    positive = (0.0, math.inf)
+    found = [
+        Parameter(f"k{i + 1}[{b + 1}]", "N/m", 100.0, positive, "stiffness of a cell", "N m/rad")
+        for i in range(len(layout.potentials))
+        for b in range(layout.cells)
+    ]
+    for letter, count, knots in (
+        ("c", len(layout.gated), layout.knots),
+        ("d", len(layout.speeds), layout.speed_knots),
+    ):
+        found += [
+            Parameter(f"{letter}{i + 1}[{b + 1}]", "N s/m", 1.0, positive, "damping at a knot", "N m s/rad")
+            for i in range(count)
+            for b in range(knots)
+        ]
+    for i, place in enumerate(layout.slips):
+        span = layout.directions[place].high - layout.directions[place].low
+        found += [
+            Parameter(f"r{i + 1}", "m", 0.1 * span, (1e-12, math.inf), "range of the elastic strain", "rad"),
+            Parameter(f"phi{i + 1}", "1", 0.5, (0.0, 1.0), "place of zero force: 1/2 for equal limits"),
+        ]
+        found += [
+            Parameter(
+                f"s{i + 1}[{b + 1}]", "N/m", 100.0, positive, "stiffness of a part of the range", "N m/rad"
+            )
+            for b in range(layout.parts)
+        ]
+        found += [
+            Parameter(f"h{i + 1}[{g}]", "1", g / layout.profile, (0.0, 1.0), "slip at a knot")
+            for g in range(1, layout.profile)
+        ]
+    for i in range(len(layout.maxwells)):
+        found += [
+            Parameter(f"km{i + 1}", "N/m", 100.0, positive, "stiffness of the branch", "N m/rad"),
+            Parameter(f"tau{i + 1}", "s", 0.1, (1e-6, math.inf), "relaxation time"),
+        ]
+    return found

@@ -1,0 +1,212 @@
+"""A page for every effect that a diagnosis may name: what it is, how it looks in a record, what it is taken for."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from bench.discrepancy.articulated.effects import CATALOGUE as ARTICULATED
+from bench.discrepancy.effects.catalogue import CATALOGUE as LINEAR
+from bench.discrepancy.effects.effect import Effect, FreeParameter
+from bench.figures.look import COLOURS, REFERENCE_COLOUR, save, style
+
+LOOKS = {
+    "coulomb_friction": "The missing force is a step at every reversal of the velocity, the same at every amplitude. Free decays end after finitely many swings, along straight lines. Small motions are damped most.",
+    "soft_coulomb_friction": "As Coulomb friction, but the force turns round before or after the velocity does, and a resting joint creeps.",
+    "stribeck_friction": "A step at every reversal that falls off with the velocity. Slow motion stutters.",
+    "presliding_friction": "The step at a reversal is rounded over a displacement that does not depend on the frequency; below it the joint is a spring.",
+    "bouc_wen_hysteresis": "Loops of force over displacement with round corners; the stiffness falls with the amplitude, the loss a cycle grows with it, the frequency does not matter.",
+    "backlash_friction": "A loop whose flanks are broken by a dead space: after a reversal the friction stays away for the length of the clearance, then builds up over the slip displacement.",
+    "gap": "No force in the middle of the stroke, a spring at both ends. Resonances bend upwards with the amplitude and jump.",
+    "one_sided_stop": "A spring on one side only: the mean of the motion moves away from it, even harmonics appear.",
+    "asymmetric_gap": "As a gap, with two different walls: even harmonics besides the odd ones.",
+    "cubic_stiffness": "Resonance bends upwards (or downwards) smoothly with the amplitude; odd harmonics.",
+    "quadratic_stiffness": "The rest position under a load differs by its sign; even harmonics.",
+    "quadratic_damping": "Large motions are damped more than small ones; nothing at reversals.",
+    "power_law_damping": "Loss a cycle grows with a power of the velocity other than one: below one it resembles friction, above one drag.",
+    "asymmetric_damping": "One direction is damped more than the other: the mean of the motion moves.",
+    "viscoelastic_relaxation": "Stiffer at high than at low frequency, and loss in between; a step of the load creeps.",
+    "load_dependent_friction": "A step at every reversal whose height grows with the force carried: a bow tie of force over displacement.",
+    "time_varying_friction": "A step at every reversal whose height beats with a period of its own.",
+    "record_dependent_friction": "Friction of a different height in each record, steady within each.",
+    "stiffness_drift": "The frequency changes along the record; begun anew it is as before or has stayed.",
+    "force_offset": "A constant force: the rest position is off, the motion about it is right.",
+    "timed_force": "A force that is switched on and off by a clock and not by the motion.",
+    "gap_coupling": "One axis is damped only while the other is far out.",
+    "cross_stiffness": "A load of one axis moves the other, at once and in proportion.",
+    "cogging": "A force that repeats along the stroke or turn, whatever the speed: in slow motion a ripple, in fast motion a tone that rises with it.",
+    "base_flexibility": "Less stiffness, an additional resonance above the joint's own, and no friction.",
+    "degrading_hysteresis": "Loops that lose strength or stiffness from cycle to cycle.",
+    "pinching_hysteresis": "Loops with a waist: soft near the middle, stiff at the ends.",
+    "mass_error": "Inertial forces are off in proportion to the acceleration; on an arm, gravity besides.",
+    "com_error": "Gravity torques are off by a part that turns with the posture; little else.",
+    "stiffness_error": "All resonances are off in proportion, at every amplitude.",
+    "damping_error": "Peaks are too high or too low, at every amplitude alike.",
+    "armature_error": "As a mass, but gravity is right.",
+    "actuator_delay": "The response lags by a constant time: a phase in proportion to the frequency, all responses alike.",
+    "actuator_lag": "The response lags and fades with the frequency.",
+    "force_gain_error": "All responses are off by one factor.",
+    "servo_gain_error": "The servo follows more tightly or more loosely; gravity sags differ in inverse proportion.",
+    "actuator_saturation": "Right while the load is small; a plateau at its peaks.",
+    "actuator_deadband": "Nothing happens around zero load.",
+    "joint_compliance": "The link swings on behind its motor: a resonance that the motor's encoder hardly sees.",
+    "backlash": "After each reversal of the torque the motor runs free for the width of the play, then strikes.",
+}
+"""How an effect looks in records, by name; that of sensors is told by `_sensor_look`."""
+
+SENSOR = {
+    "gain_error": "The channel is off by a factor, at all frequencies; the other channels of the same motion are right.",
+    "delay": "The channel lags all others by a constant time.",
+    "bias": "The channel is off by a constant.",
+    "offset": "The channel is off by a constant. Where a servo acts on it, the joint is.",
+    "drift": "The channel runs away along the record.",
+    "clipping": "The channel has plateaus at its extremes.",
+    "crosstalk": "The channel holds a share of another channel.",
+    "polarity": "The channel has the opposite sign of all others.",
+    "quantisation": "All values lie on multiples of a step.",
+}
+"""How a fault of a sensor looks, by the end of its name."""
+
+
+def look_of(name: str) -> str:
+    """How an effect looks in a record."""
+    if name in LOOKS:
+        return LOOKS[name]
+    if name.startswith("scheduled_"):
+        return LOOKS[name.removeprefix("scheduled_")] + " Its size follows the scheduling channel."
+    return next((text for end, text in SENSOR.items() if name.endswith(end)), "")
+
+
+def _range(parameter: FreeParameter) -> str:
+    """Where the prior expects a parameter, as multiples of its scale."""
+    if parameter.fixed:
+        return "tried: " + (
+            f"{len(parameter.grid)} values"
+            if len(parameter.grid) > 4
+            else ", ".join(f"{g:g}" for g in parameter.grid)
+        )
+    if parameter.signed:
+        return f"{parameter.mean:g} ± {parameter.std:g}"
+    return f"{np.exp(parameter.mean - parameter.std):.2g} … {np.exp(parameter.mean + parameter.std):.2g}"
+
+
+def _table(parameters: tuple[FreeParameter, ...]) -> list[str]:
+    rows = ["| parameter | in units of | expected there (one sigma) |", "|---|---|---|"]
+    rows += [
+        f"| `{p.name}` | {'1' if p.scale == '1' and not p.unit else p.unit or p.scale} | {_range(p)} |"
+        for p in parameters
+    ]
+    return rows
+
+
+def draw(effect: Effect, path: Path) -> None:
+    """Draw what an actuator or a sensor makes of a swept sine."""
+    assert effect.signal is not None
+    time = np.linspace(0.0, 2.0, 2000)
+    signal = (0.3 + 0.35 * time) * np.sin(2 * np.pi * (1.0 + 0.5 * time) * time)
+    size = {
+        "delay": 0.06,
+        "lag": 0.08,
+        "time_constant": 0.08,
+        "level": 0.6,
+        "step": 0.2,
+        "drift": 0.5,
+        "bias": 0.3,
+    }
+    first = effect.parameters[0].name
+    value = np.array([size.get(first, 0.35)])
+    with style():
+        figure = Figure(figsize=(6.6, 2.2), layout="constrained")
+        axes = figure.subplots()
+        axes.plot(time, signal, color=REFERENCE_COLOUR, linewidth=2.0, alpha=0.6, label="true")
+        axes.plot(
+            time,
+            effect.signal(signal, value, float(time[1])),
+            color=COLOURS[0],
+            linewidth=1.2,
+            label=effect.name,
+        )
+        axes.set_xlabel("time [s]")
+        axes.set_ylabel("channel")
+        axes.legend(loc="upper left", ncols=2)
+        save(figure, path, dpi=90)
+
+
+def _drawn(effect: Effect) -> bool:
+    return effect.signal is not None and not effect.pickup
+
+
+def page(name: str) -> str:
+    """The page of the effect of that name, of linear structures and of arms together."""
+    linear = next((e for e in LINEAR if e.name == name), None)
+    arm = next((e for e in ARTICULATED if e.name == name), None)
+    first = linear or arm
+    assert first is not None
+    lines = [f"# {name}", "", "```text", first.equation, "```", "", "## In a record", "", look_of(name), ""]
+    if linear is not None and linear.law is not None:
+        law = linear.law.name
+        lines += [
+            f"![Force of the law {law}](../laws/pictures/{law}.png)",
+            "",
+            f"The law: [`{law}`](../laws/{law}.md).",
+            "",
+        ]
+    elif linear is not None and _drawn(linear):
+        lines += [f"![What {name} makes of a swept sine](pictures/{name}.png)", ""]
+    if linear is not None:
+        when = "only where no common effect explains the records alone" if linear.rare else "always"
+        lines += [
+            "## On a linear structure",
+            "",
+            f"Place: {linear.site}. Family: {linear.family}. Tried: {when}.",
+            "",
+        ]
+        lines += [*_table(linear.parameters), ""]
+    if arm is not None:
+        lines += ["## On an arm, a leg or a servo", "", f"Place: {arm.site}. Family: {arm.family}.", ""]
+        lines += [
+            *(
+                ["```text", arm.equation, "```", ""]
+                if linear is not None and arm.equation != linear.equation
+                else []
+            ),
+            *_table(arm.parameters),
+            "",
+        ]
+    lines += [
+        "`force`, `position`, `velocity` and so on stand for the largest of the records at the place of the effect.",
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def names() -> list[str]:
+    """Names of all effects, those of linear structures first."""
+    return list(dict.fromkeys([*(e.name for e in LINEAR), *(e.name for e in ARTICULATED)]))
+
+
+def pages() -> dict[str, str]:
+    """All pages of effects, by path below docs/."""
+    lines = ["# Effects", "", "What a diagnosis may find missing, and how it shows.", ""]
+    lines += ["| effect | place | structures | arms, servos | in a record |", "|---|---|---|---|---|"]
+    linear, arms = {e.name: e for e in LINEAR}, {e.name: e for e in ARTICULATED}
+    for name in names():
+        site = (linear.get(name) or arms[name]).site
+        lines.append(
+            f"| [`{name}`]({name}.md) | {site} | {'yes' if name in linear else '–'} | {'yes' if name in arms else '–'} | {look_of(name)} |"
+        )
+    lines.append("")
+    return {"reference/effects/index.md": "\n".join(lines)} | {
+        f"reference/effects/{n}.md": page(n) for n in names()
+    }
+
+
+def draw_all(docs: Path) -> None:
+    """Draw the pictures of all effects on channels."""
+    folder = docs / "reference" / "effects" / "pictures"
+    folder.mkdir(parents=True, exist_ok=True)
+    for effect in LINEAR:
+        if _drawn(effect):
+            draw(effect, folder / f"{effect.name}.png")
