@@ -34,6 +34,7 @@ def test_what_acts_on_a_rig_makes_the_wanted_part_of_the_discrepancy(rig):
     plan = draw_plan(rng, made)
     bench = draw_bench(plan, rng, made)
     bare = bench.responses((), quick=True, judging=False)
+    assert made.background is not None
     background = next(
         found
         for _ in range(20)
@@ -184,7 +185,12 @@ def test_exact_probabilities_of_few_names_have_a_calibration_error_all_the_same(
     rng = np.random.default_rng(0)
     stated = rng.uniform(0.3, 1.0, 40)
     expected = calibration_scatter(stated)
-    seen = [calibration_error(list(zip(stated, rng.random(40) < stated, strict=True))) for _ in range(50)]
+    seen = [
+        calibration_error(
+            [(float(p), bool(hit)) for p, hit in zip(stated, rng.random(40) < stated, strict=True)]
+        )
+        for _ in range(50)
+    ]
     assert expected == pytest.approx(np.mean(seen), abs=0.02)
     assert expected > 0.05
     assert calibration_scatter(np.full(4000, 0.9)) < 0.01

@@ -128,7 +128,9 @@ class AdaptiveLeastSquares:
             and clean signals bear; noise e (relative to z) makes estimates unreliable below about e^2 / number of
             samples in the window.
         max_pull: Largest part of a parameter by which the start may still pull its estimate, for it to be trusted: what the
-            estimate would move by, were the start's own information left out (see `bench.identification.stream.judge_prior`).
+            estimate would move by, were the start's own information left out (see `bench.identification.stream.judge_prior`). The
+            pull is exact where data hold no noise, so that this is what a trusted estimate may be off by on account of its start,
+            and not a statistical threshold.
         jump_ratio: Reset the covariance when the mean square of the recent normalised innovation exceeds its long
             average this many times; 0 for never. Tracks a sudden change without the noise that forgetting lets in.
         jump_time: Averaging time of the recent innovation [s].

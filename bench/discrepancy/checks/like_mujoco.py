@@ -35,7 +35,9 @@ class LikenessSettings:
             the power of the residuals by a tenth.
         share: RMS of the difference over that of the response, from which it could: what is below is less than the error that anyone
             expects of a simulation.
-        integration: Times the change that halving MuJoCo's step makes which are still its own error of integration.
+        integration: Times the change that halving MuJoCo's step makes which are still its own error of integration. Of an integrator of
+            the first order, the least there is, the finer run is off by that change once; where it is not yet asymptotic (a stop, a
+            step of several time constants) by some more.
         reached: Times the largest measured response up to which the runs are compared: what acts only beyond the motion that was measured
             (a pendulum without its friction that goes over the top) has nothing to do with the records.
         steps: MuJoCo's steps spent on a case at the coarser of two step sizes: a second, about.
