@@ -115,7 +115,9 @@ def check(case: Case, settings: CheckSettings | None = None, *, informed: bool =
                 "these records tell none of the nominal parameters: excite more strongly, or in another band"
             )
         if effects and not any(one.word == "identifiable" for one in effects):
-            found.append("these records would not show any effect of the catalogue: excite more strongly, or measure with less noise")  # fmt: skip
+            found.append(
+                "these records would not show any effect of the catalogue: excite more strongly, or measure with less noise"
+            )
     return replace(_said(found, notes, began), parameters=tuple(parameters), effects=tuple(effects))
 
 
