@@ -169,7 +169,8 @@ def _bag(folder, plugin):
 
 
 MAKERS = {
-    "json": _json, "folder": _folder, "lerobot": _lerobot, "npz": _npz, "mat": _mat, "mat 7.3": _mat73, "hdf5": _hdf5, "lvm": _lvm, "tdms": _tdms, "uff": _uff,
+    "json": _json, "folder": _folder, "lerobot": _lerobot, "npz": _npz, "mat": _mat, "mat 7.3": _mat73, "hdf5": _hdf5,
+    "lvm": _lvm, "tdms": _tdms, "uff": _uff,
     "rosbag2": lambda folder: _bag(folder, "SQLITE3"), "mcap": lambda folder: _bag(folder, "MCAP"),
 }  # fmt: skip
 
