@@ -49,8 +49,8 @@ def measured(rng: np.random.Generator, peak: float = 30.0) -> tuple[dict[str, Co
         found = simulate(rig, drive, rng=np.random.default_rng(int(rng.integers(2**31))))
         take = slice(None, None, round(1000.0 / RATE))
         columns = {
-            "time": found.time[take],
-            "force": found["shaker"][take],
+            "time": np.array(found.time[take]),
+            "force": np.array(found["shaker"][take]),
             "displacement": found["displacement"][take],
             "acceleration": found["acceleration_x"][take],
         }
