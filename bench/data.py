@@ -11,6 +11,7 @@ files are those of nonlinearbenchmark.org.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -60,10 +61,18 @@ def friction_damper(name: str) -> Recording:
     return read_recording(FRICTION_DAMPER_FOLDER / f"{name}.parquet")
 
 
-SILVERBOX_RATE = 1e7 / 2**14
-"""Sample rate of the Silverbox [Hz]."""
-BOUC_WEN_RATE, BOUC_WEN_PERIOD = 750.0, 8192
-"""Sample rate of the Bouc-Wen benchmark [Hz], and samples of a period of its multisines."""
+@dataclass(frozen=True)
+class DataSettings:
+    """Numbers of `bench.data`."""
+
+    silverbox_rate: float = 1e7 / 2**14
+    """Sample rate of the Silverbox [Hz]."""
+    bouc_wen_rate: float = 750.0
+    bouc_wen_period: int = 8192
+    """Sample rate of the Bouc-Wen benchmark [Hz], and samples of a period of its multisines."""
+
+
+DATA_SETTINGS = DataSettings()
 
 
 def emps(folder: str | Path, *, pulses: bool = False) -> Recording:
@@ -111,7 +120,7 @@ def silverbox(folder: str | Path) -> Recording:
         None,
         arrays,
         units={"input": "V", "output": "V"},
-        sample_rate=SILVERBOX_RATE,
+        sample_rate=DATA_SETTINGS.silverbox_rate,
         meta={"source": path.name},
     )
 
@@ -144,7 +153,7 @@ def bouc_wen_benchmark(folder: str | Path) -> dict[str, Recording]:
             None,
             {"force": u, "displacement": y},
             units={"force": "N", "displacement": "m"},
-            sample_rate=BOUC_WEN_RATE,
+            sample_rate=DATA_SETTINGS.bouc_wen_rate,
         )
         for name, (u, y) in pairs.items()
     }

@@ -10,11 +10,20 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from itertools import islice
 from typing import Any
 
-SHOWN_NAMES = 60
-"""Names that a message lists at most; the nearest one is told in any case."""
+
+@dataclass(frozen=True)
+class ErrorsSettings:
+    """Numbers of `bench.errors`."""
+
+    shown_names: int = 60
+    """Names that a message lists at most; the nearest one is told in any case."""
+
+
+SETTINGS = ErrorsSettings()
 
 
 class BenchError(Exception):
@@ -43,8 +52,8 @@ def unknown_name(kind: str, name: str, known: Iterable[str]) -> str:
     names = sorted(map(str, known))
     near = nearest(str(name), names)
     hint = f" Did you mean '{near}'?" if near else ""
-    more = f", … ({len(names)} in all)" if len(names) > SHOWN_NAMES else ""
-    listed = ", ".join(names[:SHOWN_NAMES]) or "none"
+    more = f", … ({len(names)} in all)" if len(names) > SETTINGS.shown_names else ""
+    listed = ", ".join(names[: SETTINGS.shown_names]) or "none"
     return f"unknown {kind} '{shortened(str(name))[1:-1]}'; known: {listed}{more}.{hint}"
 
 

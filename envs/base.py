@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,8 +13,17 @@ from bench.errors import ParameterError
 from .benches import FLOATS, Benches, Options, require_count
 from .setups import PAIRS, SDOF_LAWS, Setup, discrimination_setup, joint_setup, sdof_setup
 
-MOST_DRAWS = 10_000
-"""Most prior draws that a reward is averaged over: its standard error is then a hundredth of their spread, and every step runs each."""
+
+@dataclass(frozen=True)
+class BaseSettings:
+    """Numbers of `envs.base`."""
+
+    most_draws: int = 10_000
+    """Most prior draws that a reward is averaged over: its standard error is then a hundredth of their spread, and every step runs
+    each."""
+
+
+SETTINGS = BaseSettings()
 
 RENDER_MODES = ("rgb_array", "human")
 
@@ -32,8 +42,10 @@ def setup_of(kind: str, arguments: dict[str, Any]) -> Setup:
     """
     if kind == "sdof":
         laws = _names("laws", arguments.pop("laws", SDOF_LAWS))
-        return sdof_setup(laws, require_count("n_draws", arguments.pop("n_draws", 2 * len(laws)), MOST_DRAWS))
-    n_draws = require_count("n_draws", arguments.pop("n_draws", 4), MOST_DRAWS)
+        return sdof_setup(
+            laws, require_count("n_draws", arguments.pop("n_draws", 2 * len(laws)), SETTINGS.most_draws)
+        )
+    n_draws = require_count("n_draws", arguments.pop("n_draws", 4), SETTINGS.most_draws)
     if kind == "joint":
         return joint_setup(n_draws)
     rig = arguments.pop("rig", "joint")

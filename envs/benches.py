@@ -19,7 +19,11 @@ from numpy.typing import NDArray
 from bench.errors import ParameterError, UnknownNameError
 from bench.excitation import Contrast, Draw, Ensemble, RigPrior, Rivals
 from bench.excitation.experiment import fan
-from bench.excitation.information import STEP, accumulate, misfit
+from bench.excitation.information import (
+    INFORMATION_LIMITS,
+    accumulate,
+    misfit,
+)
 from bench.excitation.shaping import SHAPINGS
 from bench.excitation.station import Desk
 from bench.excitation.stepping import run_of
@@ -31,11 +35,19 @@ from .setups import Setup
 
 ENFORCEMENTS = ("terminate", "cost")
 AVERAGES = ("prior", "posterior")
-CERTAIN = math.log(99.0)
-"""Log Bayes factor of 99 % certainty between two rivals that were equally likely [nat]."""
 
-LOST = 10.0
-"""Fraction of the limits that is reported where a simulation diverged; ends the episode like the limit switch."""
+
+@dataclass(frozen=True)
+class BenchesSettings:
+    """Numbers of `envs.benches`."""
+
+    certain: float = math.log(99.0)
+    """Log Bayes factor of 99 % certainty between two rivals that were equally likely [nat]."""
+    lost: float = 10.0
+    """Fraction of the limits that is reported where a simulation diverged; ends the episode like the limit switch."""
+
+
+SETTINGS = BenchesSettings()
 
 FLOATS = (
     "merit", "gain", "cost", "stroke", "velocity", "force", "energy", "time", "effective_draws", "separated"
@@ -228,7 +240,7 @@ class SteppedBenches(ABC):
         commands, exhausted = self.desk.commands(places, actions)
         measured, lost = self._measured(places, commands)
         reached = self.desk.book(places, measured)
-        reached[lost] = LOST
+        reached[lost] = SETTINGS.lost
         self.desk.window[places] += 1
         observation = self.desk.observe(places, measured, commands, actions, self.question)
         gain, effective = self._told(places, measured)
@@ -276,7 +288,7 @@ class SteppedBenches(ABC):
         """Share of a bench's pairs of rivals that are expected to be told apart with 99 % certainty ``(m,)``."""
         if not self._rivals:
             return np.zeros(len(places))
-        certain = self._values[places].reshape(len(places), -1) >= math.log1p(CERTAIN)
+        certain = self._values[places].reshape(len(places), -1) >= math.log1p(SETTINGS.certain)
         return np.count_nonzero(certain, axis=1) / certain.shape[1]
 
     def _clock(self, places: NDArray[np.int64]) -> NDArray[np.float64]:
@@ -309,7 +321,7 @@ def _panel(setup: Setup, threads: int) -> _Panel:
     rigs: list = []
     parts = []
     for experiment in setup.experiments:
-        own, places, counts = fan(experiment.rigs_drawn, STEP)
+        own, places, counts = fan(experiment.rigs_drawn, INFORMATION_LIMITS.step)
         parts.append((len(rigs), len(own), places, counts))
         rigs += own
     n_draws = max(len(part[2]) for part in parts)
@@ -444,7 +456,17 @@ class Benches(SteppedBenches):
             logarithms = np.zeros(counts.shape)
             panel.ensemble.spread(
                 lambda a, b: accumulate(
-                    a, b, window.outputs, counts, STEP, weights, measured, fisher, score, square, logarithms
+                    a,
+                    b,
+                    window.outputs,
+                    counts,
+                    INFORMATION_LIMITS.step,
+                    weights,
+                    measured,
+                    fisher,
+                    score,
+                    square,
+                    logarithms,
                 ),
                 m,
             )

@@ -19,15 +19,23 @@ from bench.excitation.station import Station
 
 from .setups import Setup
 
-GAIN = 1.6
-"""Of a D-optimal design behind a brake: it is made for rigs that move most, and most rigs move by 0.6 of what is allowed."""
-EVALUATIONS = 480
-"""Signals that its search weighs."""
-FIRST_PUSH = 0.7
-FIRST_WINDOWS = 4  # of a push at the start, to move at all
-BRAKE = 12.0
-LEAD = 0.4
-"""The force comes half a window late and takes a window to get there [rad at resonance]."""
+
+@dataclass(frozen=True)
+class FeedbackSettings:
+    """Numbers of `envs.feedback`."""
+
+    gain: float = 1.6
+    """Of a D-optimal design behind a brake: it is made for rigs that move most, and most rigs move by 0.6 of what is allowed."""
+    evaluations: int = 480
+    """Signals that its search weighs."""
+    first_push: float = 0.7
+    first_windows: int = 4
+    brake: float = 12.0
+    lead: float = 0.4
+    """The force comes half a window late and takes a window to get there [rad at resonance]."""
+
+
+SETTINGS = FeedbackSettings()
 
 
 @dataclass(frozen=True)
@@ -54,9 +62,11 @@ class Feedback:
         for push, stroke, velocity in zip(self.push, limits.stroke, limits.velocity, strict=True):
             x = observation[:, last + names.index(stroke)].astype(float)
             v = observation[:, last + names.index(velocity)].astype(float)
-            ahead = math.cos(LEAD) * v - 0.8 * math.sin(LEAD) * x  # of limits that belong to one resonance
+            ahead = (
+                math.cos(SETTINGS.lead) * v - 0.8 * math.sin(SETTINGS.lead) * x
+            )  # of limits that belong to one resonance
             excess = np.hypot(x, v) - self.hold
-            size = np.where(excess < 0.0, push * np.minimum(1.0, -8.0 * excess), -BRAKE * excess)
+            size = np.where(excess < 0.0, push * np.minimum(1.0, -8.0 * excess), -SETTINGS.brake * excess)
             actions.append(size * np.tanh(16.0 * ahead))
         return np.clip(np.stack(actions, axis=1), -1.0, 1.0)
 
@@ -69,7 +79,7 @@ def pump(station: Station) -> Feedback:
         for name in station.actuators
     ]
     schedule = np.zeros((max(1, len(station.questions)), station.n_windows, station.width), dtype=np.float32)
-    schedule[:, :FIRST_WINDOWS] = FIRST_PUSH
+    schedule[:, : SETTINGS.first_windows] = SETTINGS.first_push
     return Feedback(station, schedule, np.array(push), 0.75)
 
 
@@ -79,8 +89,8 @@ def braked_design(setup: Setup, rng: np.random.Generator) -> Feedback:
     ends = np.arange(1, station.n_windows + 1) * station.n_steps - 1
     force = np.array([setup.limits.force[name] for name in station.actuators])
     plans = [
-        design("d_optimal", experiment, duration=setup.duration, band=setup.band, rng=rng, evaluations=EVALUATIONS)
+        design("d_optimal", experiment, duration=setup.duration, band=setup.band, rng=rng, evaluations=SETTINGS.evaluations)
         for experiment in setup.experiments
     ]  # fmt: skip
-    schedule = np.stack([GAIN * controls_from(plan)[ends] / force for plan in plans])
+    schedule = np.stack([SETTINGS.gain * controls_from(plan)[ends] / force for plan in plans])
     return Feedback(station, np.clip(schedule, -1.0, 1.0).astype(np.float32), np.zeros(station.width), 0.8)

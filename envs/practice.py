@@ -11,6 +11,7 @@ Rigs are compiled `Family` members, equal to MuJoCo to rounding. Bench i hides a
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -20,7 +21,10 @@ from numpy.typing import NDArray
 from bench.errors import UnknownNameError
 from bench.excitation import Contrast, Draw, Family, Hypothesis, Rivals, expected_log_bayes_factor, fans
 from bench.excitation.bayes_factor import accumulate_contrast
-from bench.excitation.information import STEP, accumulate
+from bench.excitation.information import (
+    INFORMATION_LIMITS,
+    accumulate,
+)
 from bench.excitation.station import Desk
 from bench.excitation.stepping import Packed, integrate_cases
 
@@ -29,12 +33,20 @@ from .benches import Options, SteppedBenches, sensed
 from .setups import Setup, made, rival_experiment
 from .vector import BenchVectorEnv
 
-FLOOR = 0.005
-"""Error in prior standard deviations that the value takes for nothing, root mean square over the parameters. Sensitivities grow without
-bound where motion is chaotic (a rig that keeps grazing its gap's edges), and no identification gets that from a record: without the floor
-policies learn to claim errors in the gap a hundred times smaller than what identification leaves."""
-PAIRS_KEPT = 24
-"""Pairs of rivals, each the other's best imitation, that a question's rigs are taken from."""
+
+@dataclass(frozen=True)
+class PracticeSettings:
+    """Numbers of `envs.practice`."""
+
+    floor: float = 0.005
+    """Error in prior standard deviations that the value takes for nothing, root mean square over the parameters. Sensitivities grow
+    without bound where motion is chaotic (a rig that keeps grazing its gap's edges), and no identification gets that from a record:
+    without the floor policies learn to claim errors in the gap a hundred times smaller than what identification leaves."""
+    pairs_kept: int = 24
+    """Pairs of rivals, each the other's best imitation, that a question's rigs are taken from."""
+
+
+PRACTICE_SETTINGS = PracticeSettings()
 
 
 class _Fan:
@@ -44,14 +56,16 @@ class _Fan:
         self.family = Family(hypothesis, channels, actuators)
         self.p = self.family.n_parameters
         self.coordinates = np.zeros((n, self.p))
-        self._packed: Packed = self.family.packed(fans(self.coordinates, STEP).reshape(-1, self.p))
+        self._packed: Packed = self.family.packed(
+            fans(self.coordinates, INFORMATION_LIMITS.step).reshape(-1, self.p)
+        )
         self._states = self._packed.start.reshape(n, 1 + self.p, -1).copy()
         self._members = np.arange(n * (1 + self.p)).reshape(n, 1 + self.p)
 
     def install(self, place: int, coordinates: NDArray[np.float64]) -> None:
         """Put a rig at rest on a bench."""
         self.coordinates[place] = coordinates
-        fresh = self.family.packed(fans(coordinates, STEP))
+        fresh = self.family.packed(fans(coordinates, INFORMATION_LIMITS.step))
         rows = self._members[place]
         for name in ("constants", "coefficients", "theta"):
             getattr(self._packed, name)[rows] = getattr(fresh, name)
@@ -103,14 +117,24 @@ class _Priors:
         fisher, score, square = parts
         measured = outputs[:, 0].copy()
         accumulate(
-            0, len(places), outputs, counts, STEP, self._weights, measured, fisher, score, square, values
+            0,
+            len(places),
+            outputs,
+            counts,
+            INFORMATION_LIMITS.step,
+            self._weights,
+            measured,
+            fisher,
+            score,
+            square,
+            values,
         )
         for array, part in zip(self._sums, parts, strict=True):
             array[places] = part
         p = self.fan.p
         known = np.where(np.isfinite(fisher[:, 0]), fisher[:, 0], 0.0)
         remaining = np.trace(np.linalg.inv(np.eye(p) + known), axis1=1, axis2=2) / p
-        return outputs[:, 0], -p * np.log(remaining + FLOOR**2)
+        return outputs[:, 0], -p * np.log(remaining + PRACTICE_SETTINGS.floor**2)
 
 
 @lru_cache(maxsize=16)
@@ -119,7 +143,7 @@ def _pool(recipe: tuple[str, tuple], question: int) -> tuple[Any, ...]:
     setup = made(*recipe)
     asked = setup.questions[question]
     assert isinstance(asked, Rivals)
-    return rival_experiment(setup.place, asked, PAIRS_KEPT).draws
+    return rival_experiment(setup.place, asked, PRACTICE_SETTINGS.pairs_kept).draws
 
 
 class _Pairs:
@@ -150,7 +174,7 @@ class _Pairs:
         at = np.tile(np.array([0, 1 + self.fans[0].p]), (m, 1, 1))
         counts = np.tile(np.array([fan.p for fan in self.fans]), (m, 1, 1))
         sums = Contrast._make(array[places] for array in self._sums)
-        accumulate_contrast(0, m, outputs, at, counts, STEP, self._weights, sums)
+        accumulate_contrast(0, m, outputs, at, counts, INFORMATION_LIMITS.step, self._weights, sums)
         for array, part in zip(self._sums, sums, strict=True):
             array[places] = part
         factor = expected_log_bayes_factor(sums)[:, 0]

@@ -5,6 +5,7 @@ OpenGL is loaded when the first picture is asked for, and only then.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import mujoco
@@ -13,7 +14,16 @@ from numpy.typing import NDArray
 
 from bench.rig import Rig
 
-WIDTH, HEIGHT = 640, 480
+
+@dataclass(frozen=True)
+class RenderingSettings:
+    """Numbers of `envs.rendering`."""
+
+    width: int = 640
+    height: int = 480
+
+
+SETTINGS = RenderingSettings()
 CAMERA = "overview"
 
 
@@ -37,7 +47,7 @@ class Picture:
     def array(self, positions: NDArray[np.float64]) -> NDArray[np.uint8]:
         """A picture ``(HEIGHT, WIDTH, 3)`` of the rig at joint positions ``(nq,)``."""
         if self._renderer is None:
-            self._renderer = mujoco.Renderer(self.rig.scene, HEIGHT, WIDTH)
+            self._renderer = mujoco.Renderer(self.rig.scene, SETTINGS.height, SETTINGS.width)
         self._place(positions)
         self._renderer.update_scene(self._data, camera=CAMERA)
         return self._renderer.render()

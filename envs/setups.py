@@ -21,10 +21,17 @@ from bench.laws import find_law
 from bench.rig import Element, Rig
 from bench.rig.library import joint_rig, sdof_rig
 
-DRAWS_SEED = 2006
-"""Seed of the fixed prior draws that rewards are averaged over; hidden rigs are drawn anew in every episode."""
 
-REFERENCE_SECONDS = 3.0  # of the test under which rivals imitate each other
+@dataclass(frozen=True)
+class SetupsSettings:
+    """Numbers of `envs.setups`."""
+
+    draws_seed: int = 2006
+    """Seed of the fixed prior draws that rewards are averaged over; hidden rigs are drawn anew in every episode."""
+    reference_seconds: float = 3.0
+
+
+SETTINGS = SetupsSettings()
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,7 +217,7 @@ def joint_setup(n_draws: int = 4) -> Setup:
 
 
 def _identification(place: Place, prior: RigPrior, n_draws: int, recipe: tuple[str, tuple]) -> Setup:
-    draws = prior.draws(n_draws, np.random.default_rng(DRAWS_SEED))
+    draws = prior.draws(n_draws, np.random.default_rng(SETTINGS.draws_seed))
     return _setup(place, (prior,), (Experiment(prior, place.noise, place.limits, draws),), recipe)
 
 
@@ -262,9 +269,9 @@ def rival_experiment(place: Place, rivals: Rivals, n_draws: int) -> Experiment:
         place.noise,
         place.limits,
         pairs=n_draws,
-        duration=REFERENCE_SECONDS,
+        duration=SETTINGS.reference_seconds,
         band=place.band,
-        rng=np.random.default_rng(DRAWS_SEED),
+        rng=np.random.default_rng(SETTINGS.draws_seed),
     )
 
 

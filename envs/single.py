@@ -15,8 +15,6 @@ from bench.excitation import Draw
 from .base import RENDER_MODES, action_space, info_of, make_benches, observation_space, rest_info
 from .rendering import Picture
 
-_HERE = np.zeros(1, dtype=np.int64)
-
 
 class BenchEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     """One bench as a gymnasium environment; see the subclasses.
@@ -56,10 +54,10 @@ class BenchEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             options: None are known.
         """
         super().reset(seed=seed)
-        observation = self.benches.reset(_HERE, [self.np_random])[0]
+        observation = self.benches.reset(np.zeros(1, dtype=np.int64), [self.np_random])[0]
         if self.render_mode == "human":
             self.render()
-        return observation, info_of(rest_info(self.benches, _HERE), 0)
+        return observation, info_of(rest_info(self.benches, np.zeros(1, dtype=np.int64)), 0)
 
     def step(
         self, action: NDArray[np.float32]
@@ -74,7 +72,7 @@ class BenchEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         """
         if self.truth is None:
             raise ResetNeeded("call reset() before step(): there is no rig on the bench yet")
-        outcome = self.benches.step(_HERE, np.asarray(action)[None])
+        outcome = self.benches.step(np.zeros(1, dtype=np.int64), np.asarray(action)[None])
         if self.render_mode == "human":
             self.render()
         return (

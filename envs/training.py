@@ -46,15 +46,24 @@ TASKS: dict[str, tuple[str, dict[str, Any]]] = {
 ALGORITHMS = ("ppo", "sac")
 REWARDS = ("practice", "prior", "posterior")
 STARTS = ("pump", "design", "nothing")
-HELD_OUT = 1_000_000
-"""Seeds from here on are for evaluation only."""
-EPISODES = 3
-NOISE = 0.3  # of the largest force: so that the start has seen what follows its own mistakes
-LOG_STD = -1.2
-"""Logarithm of the exploration's standard deviation at the start."""
-GAE_LAMBDA = 1.0
-"""Advantages of PPO are whole returns less the value, never bootstrapped from it: what a test has told about the hidden rig so far is not
-in the observation, so that the value is a poor guess; with 0.95 some seeds score less the longer they are trained."""
+
+
+@dataclass(frozen=True)
+class TrainingSettings:
+    """Numbers of `envs.training`."""
+
+    held_out: int = 1_000_000
+    """Seeds from here on are for evaluation only."""
+    episodes: int = 3
+    noise: float = 0.3
+    log_std: float = -1.2
+    """Logarithm of the exploration's standard deviation at the start."""
+    gae_lambda: float = 1.0
+    """Advantages of PPO are whole returns less the value, never bootstrapped from it: what a test has told about the hidden rig so far
+    is not in the observation, so that the value is a poor guess; with 0.95 some seeds score less the longer they are trained."""
+
+
+SETTINGS = TrainingSettings()
 
 
 @dataclass(frozen=True)
@@ -115,7 +124,7 @@ class Score(NamedTuple):
     certain: float  # mean time to expected 99 % certainty [s], the duration where not reached (rivals only)
 
 
-def evaluate(policy: Policy, task: str, *, n: int = 96, seed: int = HELD_OUT) -> Score:
+def evaluate(policy: Policy, task: str, *, n: int = 96, seed: int = SETTINGS.held_out) -> Score:
     """Run a policy for one test on each of `n` held-out rigs (practice benches).
 
     Args:
@@ -244,12 +253,12 @@ def _model(plan: Plan, env: VecNormalize) -> PPO | SAC:
         return SAC(
             "MlpPolicy", env, batch_size=512, gradient_steps=16, buffer_size=300_000, policy_kwargs=kwargs, **common
         )  # fmt: skip
-    kwargs = {"net_arch": {"pi": units, "vf": [64, 64]}, "log_std_init": LOG_STD}
+    kwargs = {"net_arch": {"pi": units, "vf": [64, 64]}, "log_std_init": SETTINGS.log_std}
     episode = _scheduled(env).station.n_windows
     n_steps = min(episode, max(1, plan.evaluate_every // plan.n_envs))
     return PPO(
         "MlpPolicy", env, n_steps=n_steps, batch_size=max(64, n_steps * plan.n_envs // 8), n_epochs=8, clip_range=0.2,
-        target_kl=0.04, gae_lambda=GAE_LAMBDA, policy_kwargs=kwargs, **common,
+        target_kl=0.04, gae_lambda=SETTINGS.gae_lambda, policy_kwargs=kwargs, **common,
     )  # fmt: skip
 
 
@@ -280,11 +289,11 @@ def imitate(model: PPO | SAC, env: VecNormalize, feedback: Feedback, *, seed: in
     venv, rng = _scheduled(env), np.random.default_rng(seed)
     seen, told = [], []
     observation = venv.reset()
-    for _ in range(EPISODES * feedback.station.n_windows):
+    for _ in range(SETTINGS.episodes * feedback.station.n_windows):
         wanted = feedback.correction(observation)
         seen.append(observation)
         told.append(wanted)
-        observation = np.asarray(venv.step(wanted + NOISE * rng.standard_normal(wanted.shape))[0])
+        observation = np.asarray(venv.step(wanted + SETTINGS.noise * rng.standard_normal(wanted.shape))[0])
     x, y = np.concatenate(seen), np.concatenate(told)
     env.obs_rms.update(x)  # type: ignore[union-attr]
     y = np.arctanh(np.clip(y, -0.96, 0.96)) if isinstance(model, SAC) else y

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from bench.discrepancy import Case, CaseChannel, NominalParameter, record_from_arrays
 from bench.discrepancy.likelihood.problem import Problem
-from bench.discrepancy.localisation.state_map import CELLS, TIMES, WEAK, cell_index, state_maps
+from bench.discrepancy.localisation.state_map import CELLS, cell_index, state_maps
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.model.structure import Place, Structure
 from bench.discrepancy.motion.observer import Observer
@@ -305,11 +305,12 @@ def _elements(law: Any, theta: tuple[float, ...], structure: Structure, place: s
 def score(case: Planted, over: str) -> dict[str, float]:
     """Precision, recall and F1 of the cells found."""
     right = wrong = missed = 0
+    settings = case.problem.settings.localisation
     for found in state_maps(case.problem, case.problem.records):
         here = found.place.name == case.place
         if over == "time":
-            power = np.array([np.mean(part**2) for part in np.array_split(case.force, TIMES)])
-            truth = (power > WEAK**2 * power.max()) & here
+            power = np.array([np.mean(part**2) for part in np.array_split(case.force, settings.intervals)])
+            truth = (power > settings.weak**2 * power.max()) & here
             marked = found.active[0]
         else:
             cell = cell_index(
@@ -318,7 +319,7 @@ def score(case: Planted, over: str) -> dict[str, float]:
             count = np.bincount(cell, minlength=CELLS * CELLS)
             mean = np.bincount(cell, case.force, CELLS * CELLS) / np.maximum(count, 1)
             mean = np.where(np.isfinite(found.force.ravel()), mean, 0.0)
-            truth = (np.abs(mean) > WEAK * np.abs(mean).max()) & here
+            truth = (np.abs(mean) > settings.weak * np.abs(mean).max()) & here
             marked = found.significant.ravel()
         right += int(np.sum(truth & marked))
         wrong += int(np.sum(~truth & marked))

@@ -2,6 +2,7 @@
 
     python scripts/make_gallery.py          makes what is not there yet of this version in out/reproduce, then the pages
     python scripts/make_gallery.py FOLDER   takes another folder
+    python scripts/results.py reproduce     makes all anew, with the rows of docs/results.md as well
 
 Both pages are written from one set of results, which docs/reproduction.json keeps: a test makes them again from it.
 """
@@ -12,6 +13,7 @@ import io
 import json
 import sys
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import tyro
@@ -27,13 +29,15 @@ LARGEST = 40_000
 
 
 def small_png(path: Path) -> bytes:
-    """The picture with 24 colours, as wide as its size allows and at most 800 pixels."""
+    """The picture with 32 colours, rare ones kept, as wide as its size allows and at most 800 pixels."""
     picture = Image.open(path).convert("RGB")
     for width in range(800, 200, -40):
         scale = min(width / picture.width, 1.0)
         size = (round(picture.width * scale), round(picture.height * scale))
         buffer = io.BytesIO()
-        picture.resize(size, Image.Resampling.LANCZOS).quantize(24).save(buffer, "PNG", optimize=True)
+        picture.resize(size, Image.Resampling.LANCZOS).quantize(32, Image.Quantize.MAXCOVERAGE).save(
+            buffer, "PNG", optimize=True
+        )
         if buffer.tell() <= LARGEST:
             break
     return buffer.getvalue()
@@ -59,18 +63,32 @@ def write_pages(results: Sequence[Result], folder: Path, docs: Path) -> None:
     write_text(docs / "gallery.md", to_gallery(results))
 
 
-def main(folder: tyro.conf.Positional[Path] = Path("out/reproduce"), docs: Path = Path("docs")) -> None:
-    """Reproduce what is not there yet, and write the pages.
+@dataclass
+class Args:
+    """Reproduce what is not there yet, and write gallery, table and pictures."""
 
-    Args:
-        folder: Folder of `jointbench reproduce`.
-        docs: The documentation's folder.
-    """
-    made = reproduce(
-        None, folder, progress=lambda label, share: print(f"{100 * share:3.0f} % {label}", file=sys.stderr)
-    )
-    write_pages(made.results, folder, docs)
+    folder: tyro.conf.Positional[Path] = Path("out/reproduce")
+    """Folder of `jointbench reproduce`."""
+    docs: Path = Path("docs")
+    """The documentation's folder."""
+    fresh: bool = False
+    """Make all items again."""
+    json: bool = False
+    """Print the results as JSON."""
+
+
+def main() -> None:
+    """Reproduce and write the pages."""
+    args = tyro.cli(Args, description=__doc__)
+
+    def show(label: str, share: float) -> None:
+        print(f"{100 * share:3.0f} % {label}", file=sys.stderr)
+
+    made = reproduce(None, args.folder, fresh=args.fresh, progress=show)
+    write_pages(made.results, args.folder, args.docs)
+    if args.json:
+        print(json.dumps(made.to_dict(), ensure_ascii=False))
 
 
 if __name__ == "__main__":
-    tyro.cli(main)
+    main()

@@ -109,7 +109,9 @@ def curves(errors: dict[str, NDArray], time: NDArray, now: float) -> Image.Image
         for colour, (name, error) in zip(COLOURS, errors.items(), strict=False):
             axes.plot(time, 1e3 * error, color=colour, label=name)
         axes.axvline(now, color=REFERENCE_COLOUR, linewidth=1.0)
-        axes.set(xlabel="time [s]", ylabel="error of the\nelbow [mrad]", xlim=(0.0, SECONDS), ylim=(-32.0, 48.0))
+        axes.set(
+            xlabel="time [s]", ylabel="error of the\nelbow [mrad]", xlim=(0.0, SECONDS), ylim=(-32.0, 48.0)
+        )
         axes.legend(loc="upper right", ncols=2)
         buffer = io.BytesIO()
         figure.savefig(buffer, format="png", dpi=100)

@@ -18,9 +18,8 @@ from bench.identification.damper import (
     fit_design_model_online,
 )
 from bench.identification.damper_study import (
-    ACTUATOR_FORCE,
+    DAMPER_STUDY_SETTINGS,
     INCH,
-    RATED_VELOCITY,
     VISCOUS_DAMPER,
     harmonic_campaign,
     harmonic_record,
@@ -175,10 +174,12 @@ def test_campaign_of_202_tests():
     assert campaign.settled < 1.0
     assert 0 < campaign.n_trusted < 202
     for test in campaign.tests:
-        assert 2 * math.pi * test.frequency * test.amplitude <= RATED_VELOCITY * (1 + 1e-9)
+        assert 2 * math.pi * test.frequency * test.amplitude <= DAMPER_STUDY_SETTINGS.rated_velocity * (
+            1 + 1e-9
+        )
         assert 0.1 <= test.frequency <= 30.0
         peak = test.true_coefficient * (2 * math.pi * test.frequency * test.amplitude) ** test.true_exponent
-        assert peak <= ACTUATOR_FORCE
+        assert peak <= DAMPER_STUDY_SETTINGS.actuator_force
     slow = [test.trusted for test in campaign.tests if test.frequency < 0.3]
     fast = [test.trusted for test in campaign.tests if test.frequency > 3.0]
     assert np.mean(slow) > np.mean(fast)

@@ -12,14 +12,27 @@ from bench.discrepancy import score_blind
 from bench.discrepancy.blind.background import ACTING, RECORDED, Background, draw_background
 from bench.discrepancy.blind.background_score import background_scored, background_summary
 from bench.discrepancy.blind.background_settings import STATED, BackgroundSettings
-from bench.discrepancy.blind.drawing import BISECTIONS, draw_case, draw_plan
+from bench.discrepancy.blind.drawing import (
+    DRAWING_SETTINGS,
+    draw_case,
+    draw_plan,
+)
 from bench.discrepancy.blind.proportions import calibration_error, calibration_scatter
-from bench.discrepancy.blind.rigs import BACKGROUND_SHARES, BlindOptions, draw_bench
+from bench.discrepancy.blind.rigs import (
+    RIGS_SETTINGS,
+    BlindOptions,
+    draw_bench,
+)
 from bench.discrepancy.blind.score_report import tables
 from bench.errors import ParameterError
 
 RIGS = {"sdof": (1.0, 0.0, 0.0), "damper": (0.0, 1.0, 0.0), "joint": (0.0, 0.0, 1.0)}
-SHORT = {"duration": 3.0, "sample_rate": 300.0, "detectability": False, "shares": BACKGROUND_SHARES}
+SHORT = {
+    "duration": 3.0,
+    "sample_rate": 300.0,
+    "detectability": False,
+    "shares": RIGS_SETTINGS.background_shares,
+}
 
 
 def options(rig: str, **settings) -> BlindOptions:
@@ -34,10 +47,12 @@ def test_what_acts_on_a_rig_makes_the_wanted_part_of_the_discrepancy(rig):
     plan = draw_plan(rng, made)
     bench = draw_bench(plan, rng, made)
     bare = bench.responses((), quick=True, judging=False)
+    assert made.background is not None
     background = next(
         found
         for _ in range(20)
-        if (found := draw_background(bench, bare, rng, made.background, BISECTIONS)) is not None
+        if (found := draw_background(bench, bare, rng, made.background, DRAWING_SETTINGS.bisections))
+        is not None
     )
     assert {e.recipe.name for e in background.acting} == {recipe.name for recipe in ACTING}
     assert set(background.recorded) == set(RECORDED)
@@ -184,7 +199,12 @@ def test_exact_probabilities_of_few_names_have_a_calibration_error_all_the_same(
     rng = np.random.default_rng(0)
     stated = rng.uniform(0.3, 1.0, 40)
     expected = calibration_scatter(stated)
-    seen = [calibration_error(list(zip(stated, rng.random(40) < stated, strict=True))) for _ in range(50)]
+    seen = [
+        calibration_error(
+            [(float(p), bool(hit)) for p, hit in zip(stated, rng.random(40) < stated, strict=True)]
+        )
+        for _ in range(50)
+    ]
     assert expected == pytest.approx(np.mean(seen), abs=0.02)
     assert expected > 0.05
     assert calibration_scatter(np.full(4000, 0.9)) < 0.01

@@ -13,7 +13,11 @@ from hypothesis import strategies as st
 from bench.cli import main
 from bench.discrepancy import make_blind, read_case, run_blind, score_blind
 from bench.discrepancy.blind import out_of_catalogue as foreign
-from bench.discrepancy.blind.drawing import ALIKE, CLOSE, draw_case, draw_plan
+from bench.discrepancy.blind.drawing import (
+    DRAWING_SETTINGS,
+    draw_case,
+    draw_plan,
+)
 from bench.discrepancy.blind.ground_truth import ROWS, Placed, Truth, motion_of, played, sensed
 from bench.discrepancy.blind.moreau_time_stepping import Acting, Matrices, Stop, march
 from bench.discrepancy.blind.proportions import calibration_error, share_of
@@ -230,7 +234,10 @@ def test_a_drawn_effect_reaches_the_wanted_gap_and_the_noise_is_the_stated_one(n
     values = np.array([answer["true"][n] for n in ("mass", "damping", "stiffness")])
     linear = LinearStructure(*(v * np.ones((1, 1)) for v in values), np.ones((1, 1)))
     (channel,) = (c for c in case.channels if c.name != "force")
-    for record, low, high in ((case.identification[0], *CLOSE), (case.validation[0], *ALIKE)):
+    for record, low, high in (
+        (case.identification[0], *DRAWING_SETTINGS.close),
+        (case.validation[0], *DRAWING_SETTINGS.alike),
+    ):
         motion = free_run(linear, Elements(np.zeros((0, 8), dtype=np.int64), np.zeros((0, 1)), np.zeros(1), np.zeros(0)),
                           loads=record.values["force"][:, None], step=record.step)  # fmt: skip
         real = record.values[channel.name]
@@ -272,7 +279,11 @@ def test_a_double_case_is_made_on_every_rig(rig):
     case, answer = draw_case("double", np.random.default_rng(4), options)
     assert case.rig == rig
     assert len(answer["effects"]) == 2
-    assert ALIKE[0] < max(answer["gap_nrmse_validation"]) / answer["wanted_gap"] < ALIKE[1]
+    assert (
+        DRAWING_SETTINGS.alike[0]
+        < max(answer["gap_nrmse_validation"]) / answer["wanted_gap"]
+        < DRAWING_SETTINGS.alike[1]
+    )
 
 
 def test_no_effect_is_drawn_beside_one_that_holds_it():

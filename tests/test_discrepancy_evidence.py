@@ -5,23 +5,24 @@ from types import SimpleNamespace
 import numpy as np
 
 from bench.discrepancy.effects.catalogue import effect_named
-from bench.discrepancy.judgement.posterior import RIVAL, indistinguishable
+from bench.discrepancy.judgement.posterior import indistinguishable
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.model.structure import Place
+from bench.discrepancy.settings import DEFAULT
 
 AXIAL = Place("axial", np.eye(1), "m", "N")
 
 
 def explanation(log_posterior, *names):
     placed = tuple(Placed(effect_named(name), AXIAL) for name in names)
-    return SimpleNamespace(hypothesis=placed, log_posterior=log_posterior, scaled=True)
+    return SimpleNamespace(hypothesis=placed, log_posterior=log_posterior, scaled=True, settings=DEFAULT)
 
 
 def test_effects_that_do_nearly_as_well_in_the_place_of_one_stand_in_a_set_with_it():
     found = [
         explanation(-10.0, "gap", "coulomb_friction"),
-        explanation(-10.0 - 0.9 * RIVAL, "cubic_stiffness", "coulomb_friction"),
-        explanation(-10.0 - 1.1 * RIVAL, "gap", "stribeck_friction"),
+        explanation(-10.0 - 0.9 * DEFAULT.judgement.rival, "cubic_stiffness", "coulomb_friction"),
+        explanation(-10.0 - 1.1 * DEFAULT.judgement.rival, "gap", "stribeck_friction"),
     ]
     assert indistinguishable(found) == (("cubic_stiffness", "gap"),)
 

@@ -20,11 +20,11 @@ from bench.discrepancy.effects.catalogue import effect_named
 from bench.discrepancy.fitting.initial_state_fit import predict, run_kind, start_warnings
 from bench.discrepancy.fitting.map_fit import fit
 from bench.discrepancy.judgement.validation_discrepancy import nrmse
-from bench.discrepancy.likelihood import window_whitening as starts
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.screening.screen import Screen
+from bench.discrepancy.settings import DEFAULT, with_values
 from bench.discrepancy.simulation.stick_slip import NO_ELEMENTS, Elements, LinearStructure, free_run
 from bench.errors import FileFormatError, ModelError, UnknownNameError
 from bench.laws import LAWS
@@ -354,13 +354,13 @@ def test_a_free_slide_is_judged_on_windows_and_its_friction_found_again():
 
 
 @pytest.mark.slow
-def test_what_a_model_leaves_counts_as_a_force_where_no_noise_is_stated(monkeypatch: pytest.MonkeyPatch):
+def test_what_a_model_leaves_counts_as_a_force_where_no_noise_is_stated():
     case = free_slide(friction=3.0, push=1.5)
     case = replace(case, channels=tuple(replace(c, noise_std=None) for c in case.channels))
     worst = []
-    for weight in (starts.MODEL_ERROR, 0.0):
-        monkeypatch.setattr(starts, "MODEL_ERROR", weight)
-        problem = Problem(case, structure_of(case), case.identification)
+    for weight in (DEFAULT.likelihood.white_force, 0.0):
+        settings = with_values(DEFAULT, {"likelihood": {"white_force": weight}})
+        problem = Problem(case, structure_of(case), case.identification, settings=settings)
         placed = Placed(effect_named("coulomb_friction"), problem.structure.places[0])
         fitted = fit(problem, (placed,), start=np.array([0.0, 0.0, -1.0]), iterations=30)
         values, (eta,) = problem.split(fitted.hypothesis, fitted.vector)

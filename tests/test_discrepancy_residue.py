@@ -20,7 +20,7 @@ from bench.discrepancy.likelihood.whitening import timed
 from bench.discrepancy.model.placements import placements
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.response.driving_loads import driving_loads
-from bench.discrepancy.screening.candidates import WORTH_A_FIT, followed
+from bench.discrepancy.screening.candidates import followed
 from bench.discrepancy.screening.linear_amplitudes import Point
 from bench.discrepancy.screening.score_test import LackOfFit, lack_of_fit
 from bench.discrepancy.screening.screen import Screen
@@ -28,6 +28,7 @@ from bench.discrepancy.search.explain import Explanation, close
 from bench.discrepancy.search.fits import Search, consistent, integrate_finer
 from bench.discrepancy.search.forward_selection import attribute
 from bench.discrepancy.search.rivals import challenge
+from bench.discrepancy.settings import DEFAULT
 
 STEP = 1.0 / SAMPLE_RATE
 
@@ -103,7 +104,11 @@ def test_forces_of_one_parameter_are_fitted_whatever_others_promise():
     gains: dict[str, float] = {}
     for point in screen.ranked():
         gains.setdefault(point.placed.effect.name, point.gain)
-    weak = [name for name, gain in gains.items() if WORTH_A_FIT < gain < 0.05 * max(gains.values())]
+    weak = [
+        name
+        for name, gain in gains.items()
+        if DEFAULT.screening.worth_a_fit < gain < 0.05 * max(gains.values())
+    ]
     simple = [name for name in weak if len(effect_named(name).parameters) == 1]
     assert simple
     fits = attribute(problem, chosen, most=1).fits.values()

@@ -15,7 +15,10 @@ from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.numerics.least_squares import Prior, minimise
 from bench.discrepancy.numerics.spectral_product import whiten
 from bench.discrepancy.screening.candidates import refined
-from bench.discrepancy.screening.linear_amplitudes import ROWS, products
+from bench.discrepancy.screening.linear_amplitudes import (
+    LINEAR_AMPLITUDES_SETTINGS,
+    products,
+)
 from bench.discrepancy.screening.screen import Screen
 from bench.discrepancy.simulation.linear_response import linear_run
 from bench.discrepancy.simulation.stick_slip import NO_ELEMENTS, LinearStructure, free_run
@@ -178,7 +181,7 @@ def test_refinement_along_the_measured_motion_nears_the_truth_without_a_nonlinea
 def test_products_of_rounded_columns_are_summed_in_double_precision():
     rng = np.random.default_rng(5)
     # the last rows do not fill a block
-    rough = (1.0 + rng.standard_normal((2 * ROWS + 17, 3))).astype(np.float32)
+    rough = (1.0 + rng.standard_normal((2 * LINEAR_AMPLITUDES_SETTINGS.rows + 17, 3))).astype(np.float32)
     other = 1.0 + rng.standard_normal((len(rough), 2))
     found = products(rough, other)
     assert found.dtype == np.float64

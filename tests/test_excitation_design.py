@@ -36,7 +36,10 @@ from bench.excitation import (
 )
 from bench.excitation.bayes_factor import accumulate_contrast
 from bench.excitation.experiment import fan
-from bench.excitation.information import STEP, accumulate
+from bench.excitation.information import (
+    INFORMATION_LIMITS,
+    accumulate,
+)
 from bench.excitation.methods import spectral_lines
 from bench.excitation.prior import with_values
 from bench.excitation.rivals import imitate
@@ -267,7 +270,7 @@ def test_what_the_record_cannot_see_adds_nothing() -> None:
 @settings(max_examples=10, deadline=None)
 def test_information_grows_and_windows_add_up(seed: int, n: int) -> None:
     draw = PRIOR.draw(np.random.default_rng(seed))
-    rigs, _, counts = fan((draw,), STEP)
+    rigs, _, counts = fan((draw,), INFORMATION_LIMITS.step)
     outputs = Ensemble(rigs, tuple(NOISE), ("shaker",)).record(wave(60, seed)[None])
     noise = np.array(list(NOISE.values()))
     p = int(counts[0])
@@ -275,10 +278,19 @@ def test_information_grows_and_windows_add_up(seed: int, n: int) -> None:
     sums = [np.zeros((1, 1, p, p)), np.zeros((1, 1, p)), np.zeros((1, 1)), np.zeros((1, 1))]
     last = 0.0
     for part in np.array_split(np.arange(60), n):
-        accumulate(0, 1, outputs[:, :, part], counts[None], STEP, 1.0 / noise, measured[:, part], *sums)
+        accumulate(
+            0,
+            1,
+            outputs[:, :, part],
+            counts[None],
+            INFORMATION_LIMITS.step,
+            1.0 / noise,
+            measured[:, part],
+            *sums,
+        )
         assert sums[3][0, 0] >= last - 1e-9  # information is never lost; rounding of sums of up to 1e9
         last = sums[3][0, 0]
-    rows = ((outputs[0, 1:] - outputs[0, 0]) / STEP / noise).reshape(p, -1)
+    rows = ((outputs[0, 1:] - outputs[0, 0]) / INFORMATION_LIMITS.step / noise).reshape(p, -1)
     residual = ((measured[0] - outputs[0, 0]) / noise).ravel()
     np.testing.assert_allclose(
         sums[0][0, 0], rows @ rows.T, rtol=1e-9, atol=1e-9 * np.abs(rows @ rows.T).max()
@@ -309,12 +321,19 @@ def test_expected_log_bayes_factor_is_the_divergence_of_the_marginal_likelihoods
     assert value == pytest.approx(dense, rel=1e-6)  # two ways round matrices of condition 1e5
     assert float(expected_log_bayes_factor(contrast_of(a, a, noise))) == pytest.approx(0.0, abs=1e-8)
     # The same sums, window by window in compiled code.
-    rigs, places, counts = fan((first, second), STEP)
+    rigs, places, counts = fan((first, second), INFORMATION_LIMITS.step)
     outputs = Ensemble(rigs, tuple(NOISE), ("shaker",)).record(wave(80)[None])
     sums = Contrast.zeros(1, 1, parameters=4)
     for part in (slice(0, 30), slice(30, 80)):
         accumulate_contrast(
-            0, 1, outputs[:, :, part], places[None, None], counts[None, None], STEP, 1.0 / noise, sums
+            0,
+            1,
+            outputs[:, :, part],
+            places[None, None],
+            counts[None, None],
+            INFORMATION_LIMITS.step,
+            1.0 / noise,
+            sums,
         )
     assert float(expected_log_bayes_factor(sums)[0, 0]) == pytest.approx(value, rel=1e-9)
 

@@ -20,8 +20,8 @@ OWED = {
 """Imports for type checkers that close a circle until the problem is cut in two."""
 UPWARDS = {("bench.discrepancy.screening.candidates", "bench.discrepancy.search.fits")}
 """Imports that the contract of rooms lists as owed."""
-LEAVES = {"verdict", "verdict_schema"}
-"""Types of results, which any room may use: no room, and not drawn."""
+LEAVES = {"verdict", "verdict_schema", "settings"}
+"""Types of results and thresholds, which any room may use: not drawn."""
 TOO_LARGE = {"blind": 3500}
 """Rooms that owe a cut, and what they must not grow beyond until then [lines]."""
 LARGEST_ROOM, MOST_LOOSE = 2500, 4

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -20,7 +21,13 @@ from bench.monitoring import (
     monitor_record,
     run_length,
 )
-from bench.monitoring.study import MOTIONS, RATE, motion, service_run, switched_run
+from bench.monitoring.study import (
+    MOTIONS,
+    STUDY_SETTINGS,
+    motion,
+    service_run,
+    switched_run,
+)
 
 
 def record(kind="wandering", seconds=300.0, seed=1, **parameters):
@@ -42,7 +49,7 @@ def test_run_lengths_are_the_published_ones(threshold, two_sided):
 
 def test_run_length_does_not_hang_on_the_cells_and_counts_heavy_tails(monkeypatch):
     coarse = mean_run_length(3.0, 0.7, 28.0)
-    monkeypatch.setattr(run_length, "CELLS", 160)
+    monkeypatch.setattr(run_length, "SETTINGS", replace(run_length.SETTINGS, cells=160))
     assert mean_run_length(3.0, 0.7, 28.0) == pytest.approx(coarse, rel=0.01)
     assert coarse < mean_run_length(3.0, 0.7, math.inf)
     assert alarm_threshold(6.0, 28.0, 2000.0) == 0.0  # one period beyond six deviations is rarer
@@ -71,7 +78,7 @@ def test_a_monitor_fed_in_blocks_says_the_same():
     test = record(seconds=200.0)
     force = np.where(test.time < 150.0, 1.0, 0.7) * test.force
     whole = monitor_record(*channels(test._replace(force=force)))
-    blocks = DamperMonitor(sample_rate=RATE)
+    blocks = DamperMonitor(sample_rate=STUDY_SETTINGS.rate)
     found = []
     for k in range(0, test.time.size, 137):
         part = slice(k, k + 137)

@@ -33,10 +33,15 @@ from bench.excitation import (
 )
 from bench.excitation.closed_loop import disturbances, run_commands, run_policy
 from bench.excitation.estimation import costs, normal_equations
-from bench.excitation.information import STEP
+from bench.excitation.information import (
+    INFORMATION_LIMITS,
+)
 from bench.signals import Excitation
 from envs.benches import Options
-from envs.practice import FLOOR, PracticeBenches
+from envs.practice import (
+    PRACTICE_SETTINGS,
+    PracticeBenches,
+)
 from envs.setups import discrimination_setup, sdof_setup
 
 SETUP = sdof_setup()
@@ -141,10 +146,10 @@ def test_practice_rewards_what_the_record_tells_of_the_rig() -> None:
         assert draw.hypothesis is family.hypothesis
     runs = run_policy(policy, GAP.packed(benches.truth[0].coordinates[None]), benches._disturbance[:1])  # type: ignore[union-attr]
     u = runs.records.controls[0, :200]
-    y = GAP.record(fans(benches.truth[0].coordinates[None], STEP), u[None])[0]  # type: ignore[union-attr]
-    rows = ((y[1:] - y[0]) / STEP / NOISE).reshape(4, -1)
+    y = GAP.record(fans(benches.truth[0].coordinates[None], INFORMATION_LIMITS.step), u[None])[0]  # type: ignore[union-attr]
+    rows = ((y[1:] - y[0]) / INFORMATION_LIMITS.step / NOISE).reshape(4, -1)
     remaining = np.trace(np.linalg.inv(np.eye(4) + rows @ rows.T)) / 4.0
-    assert total[0] == pytest.approx(-4.0 * np.log(remaining + FLOOR**2), rel=1e-6)
+    assert total[0] == pytest.approx(-4.0 * np.log(remaining + PRACTICE_SETTINGS.floor**2), rel=1e-6)
 
 
 def test_policies_travel_and_say_what_they_cannot_take(tmp_path: Path) -> None:

@@ -9,7 +9,10 @@ from hypothesis import strategies as st
 
 from bench.errors import RecordingError
 from bench.recording import Channel, Recording
-from bench.recording.clock import LONGEST_REPAIR, uniform_clock
+from bench.recording.clock import (
+    CLOCK_SETTINGS,
+    uniform_clock,
+)
 
 # The clock
 
@@ -133,7 +136,7 @@ def test_a_sound_record_is_not_touched_by_repair():
 def test_what_cannot_be_bridged_is_refused():
     t = np.arange(100) / 100.0
     units = {"x": "m"}
-    long = np.delete(t, np.arange(20, 21 + LONGEST_REPAIR))
+    long = np.delete(t, np.arange(20, 21 + CLOCK_SETTINGS.longest_repair))
     with pytest.raises(RecordingError, match=r"11 successive samples are lost after t = 0.19 s"):
         Recording.from_arrays(long, {"x": long}, units=units, gaps="interpolate")
     for place in (0, -1):

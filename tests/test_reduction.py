@@ -6,7 +6,10 @@ import pytest
 
 import bench
 from bench import Element, compare, joint_rig, reduced_joint
-from bench.demo.joint import PEAK, PEAK_TORQUE, laboratory_view
+from bench.demo.joint import (
+    JOINT_SETUP,
+    laboratory_view,
+)
 from bench.errors import UnknownNameError
 from bench.rig import simulate
 from bench.signals import BandLimitedNoise, Excitation
@@ -16,8 +19,8 @@ AXES = ("axial", "torsional")
 
 def excitation(duration: float = 4.0, level: float = 0.3) -> Excitation:
     signals = {
-        "force": BandLimitedNoise(cutoff=12.0, peak=level * PEAK),
-        "torque": BandLimitedNoise(cutoff=12.0, peak=level * PEAK_TORQUE),
+        "force": BandLimitedNoise(cutoff=12.0, peak=level * JOINT_SETUP.peak),
+        "torque": BandLimitedNoise(cutoff=12.0, peak=level * JOINT_SETUP.peak_torque),
     }
     return Excitation(signals, duration=duration, sample_rate=1000.0)
 

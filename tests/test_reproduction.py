@@ -5,13 +5,18 @@ from __future__ import annotations
 import json
 import math
 from importlib import import_module
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from bench.errors import UnknownNameError
 from bench.reproduction import ENTRIES, Entry, Item, Result, find_entries, reproduce, running
-from bench.reproduction.item import range_row, value_row
+from bench.reproduction.printed_figures import PANELS
+from bench.reproduction.verdict import OWN, Verdict, axis_row, fact_row, one_of_ours, value_row
+from bench.reproduction.writing import summary, to_gallery, to_markdown
+
+DOCS = Path(__file__).resolve().parent.parent / "docs"
 
 
 def names(*given):
@@ -27,6 +32,7 @@ def test_items_are_found_by_name_chapter_and_alias():
     assert names("b") == ["B1", "B2", "B3"]
     assert names("d4", "A1", "a1") == ["A1", "D4"]
     assert names("C1", "D2") == ["C2", "D3"]
+    assert names("c4", "D5") == ["C4", "D5"]
     with pytest.raises(UnknownNameError, match="E7"):
         find_entries(["A1", "E7"])
 
@@ -37,20 +43,93 @@ def test_every_item_can_be_run(entry):
     assert entry.weight > 0.0
 
 
-def test_a_range_holds_only_if_both_of_its_ends_do():
-    assert range_row("x", "in", 1.0, [-0.9, 0.0, 1.1]).holds is True
-    row = range_row("x", "in", 1.0, [-0.8, 0.0, 1.1])
-    assert row.holds is False
-    assert row.deviation == pytest.approx(-20.0)
-    assert range_row("x", "in", 1.0, [0.2, 1.0]).holds is False
+def range_of(values, seeds=(), **options):
+    return axis_row("x", "in", 1.0, 0.5, values, source="Fig 1", seeds=seeds, **options)
 
 
-def test_a_value_holds_between_its_limits_and_is_only_reported_without():
+def test_a_range_holds_only_if_both_of_its_ends_lie_where_the_axis_says():
+    assert range_of([-0.9, 0.0, 0.6]).verdict is Verdict.HOLDS
+    assert range_of([-0.9, 0.0, 0.4]).verdict is Verdict.FAILS
+    assert range_of([-1.1, 0.0, 0.9]).verdict is Verdict.FAILS
+    assert range_of([-0.3, 0.0, 0.9], below=(0.4, 0.2)).verdict is Verdict.HOLDS
+
+
+def test_the_verdict_is_that_of_the_seeds_and_not_of_the_record_shown():
+    wide, fit = [-1.2, 1.2], [-0.8, 0.8]
+    assert range_of(fit, seeds=[wide, wide, fit]).verdict is Verdict.FAILS
+    assert range_of(wide, seeds=[fit, fit, wide]).verdict is Verdict.HOLDS
+    row = value_row("n", "1", 2.0, 5.0, low=1.0, high=3.0, seeds=[2.0, 2.5, 9.0])
+    assert row.verdict is Verdict.HOLDS
+    assert row.spread == "2.5 (2 … 9)"
+    assert value_row("n", "1", 2.0, 2.0, high=3.0, seeds=[4.0, 5.0, 2.0]).verdict is Verdict.FAILS
+
+
+def test_a_value_holds_between_its_limits_and_cannot_be_judged_without():
     assert value_row("n", "1", 2.0, 2.1, low=1.9, high=2.2).holds is True
     assert value_row("n", "1", 2.0, 2.3, high=2.2).holds is False
+    assert value_row("n", "1", 2.0, 2.3, high=2.2, shape=(0.0, 3.0)).verdict is Verdict.SHAPE
     assert value_row("n", "1", None, math.nan, high=2.2).holds is False
+    assert value_row("n", "1", 2.0, 2.3).verdict is Verdict.NOT_COMPARABLE
     assert value_row("n", "1", 2.0, 2.3).holds is None
     assert value_row("n", "1", 2.0, 2.3).deviation == pytest.approx(15.0)
+
+
+def test_a_printed_value_holds_where_it_could_be_one_of_ours():
+    def row(printed, seeds):
+        return one_of_ours("e", "%", printed, seeds[0], seeds, source="p. 1", shape=(0.0, 5.0)).verdict
+
+    assert row(4.0, [3.0, 3.5, 4.5]) is Verdict.HOLDS
+    assert row(2.0, [3.0, 3.5, 4.5]) is Verdict.SHAPE
+    assert row(2.0, [6.0, 7.0, 8.0]) is Verdict.FAILS
+    assert row(9.0, [3.0, 3.5, 4.5]) is Verdict.FAILS
+
+
+def test_what_was_put_in_is_told_and_not_counted_as_evidence():
+    rows = (
+        fact_row("a", "1", True, printed="1", source="p. 1"),
+        fact_row("b", "1", True, printed="1", source="p. 1", chosen="it"),
+        fact_row("c", "2", False, printed="1", source="p. 1"),
+        fact_row("d", "1", True),
+    )
+    told = summary([Result("A1", "t", "x", "nothing", rows, (), 1.0, "v")])
+    assert "Of 3 things that the text prints, 2 hold, 0 hold in shape only, 1 does not hold" in told
+    assert "1 of those that hold were put in" in told
+    assert "Of 1 checks of our own" in told
+    assert rows[3].source == OWN
+
+
+@pytest.fixture(scope="module")
+def published():
+    """The results that the documentation's pages are made of."""
+    values = json.loads((DOCS / "reproduction.json").read_text(encoding="utf-8"))
+    return [Result.from_dict(item) for item in values["items"]]
+
+
+def test_gallery_and_table_are_made_of_the_same_results(published):
+    assert [result.identifier for result in published] == list(ENTRIES)
+    assert (DOCS / "reproduction.md").read_text(encoding="utf-8") == to_markdown(published)
+    assert (DOCS / "gallery.md").read_text(encoding="utf-8") == to_gallery(published)
+    shown = {picture.file for result in published for picture in result.pictures}
+    assert shown == {path.name for path in (DOCS / "gallery").glob("*.png")}
+
+
+def test_no_figure_of_the_text_is_left_out(published):
+    shown = [panel for result in published for picture in result.pictures for panel in picture.shows]
+    assert sorted(set(shown)) == sorted(PANELS)
+    assert len(shown) == len(set(shown))
+
+
+def test_every_row_says_where_it_is_printed_and_why_it_is_judged_so(published):
+    for result in published:
+        assert result.searched
+        for row in result.rows:
+            name = f"{result.identifier}: {row.quantity}"
+            assert row.source, name
+            assert row.reason, name
+            assert (row.source == OWN) == row.own, name
+            assert row.holds is None or row.tolerance, name
+            if row.verdict in {Verdict.FAILS, Verdict.SHAPE} and not row.own:
+                assert row.why, name
 
 
 class Counting:
@@ -71,10 +150,11 @@ class Counting:
         figure, grid = axes_grid(2.0, 1.0)
         grid[0, 0].plot([0.0, 1.0])
         rows = (
-            value_row("speed | size", "m/s", 2.0, 2.1, high=2.2),
-            value_row("<b>", "", None, 1.0),
+            value_row("speed | size", "m/s", 2.0, 2.1, high=2.2, source="p. 1", reason="so"),
+            value_row("<b>", "", None, 1.0, reason="reported"),
         )
-        return Item("One paragraph.\n\nAnother.", rows, (Picture("line", "A line.", figure),))
+        pictures = (Picture("line", "A line.", figure, ("2.6 a",)),)
+        return Item("One paragraph.\n\nAnother.", rows, pictures, "nothing")
 
 
 @pytest.fixture
@@ -96,7 +176,9 @@ def test_items_are_written_and_kept(tmp_path, counting, monkeypatch):
     assert first.holds
     table = json.loads((out / "table.json").read_text(encoding="utf-8"))
     assert [item["identifier"] for item in table["items"]] == ["A1", "A2"]
-    assert table["items"][0]["rows"][0]["ours"] == "2.1"
+    row = table["items"][0]["rows"][0]
+    told = {name: row[name] for name in ("printed", "source", "ours", "tolerance", "reason", "verdict")}
+    assert list(told.values()) == ["2", "p. 1", "2.1", "at most 2.2", "so", "holds"]
     assert Result.from_dict(table["items"][1]) == first.results[1]
     assert "speed \\| size" in (out / "table.md").read_text(encoding="utf-8")
     page = (out / "index.html").read_text(encoding="utf-8")
@@ -141,12 +223,16 @@ def test_frequency_and_damping_of_an_exact_decay():
 
 
 def test_the_chain_comes_to_rest_where_statics_say():
-    from bench.reproduction.linear_chain import SPRINGS, exact, matrix
+    from bench.reproduction.linear_chain import (
+        LINEAR_CHAIN_SETUP,
+        exact,
+        matrix,
+    )
 
-    stiffness = matrix(SPRINGS)
+    stiffness = matrix(LINEAR_CHAIN_SETUP.springs)
     assert np.array_equal(stiffness, stiffness.T)
     assert np.all(np.linalg.eigvalsh(stiffness) > 0.0)
-    assert np.count_nonzero(matrix(SPRINGS, as_printed=True) - stiffness) == 1
+    assert np.count_nonzero(matrix(LINEAR_CHAIN_SETUP.springs, as_printed=True) - stiffness) == 1
     load = np.array([300.0, -200.0])
     end = exact(np.tile(load, (2500, 1)), 0.01)[-1]
     # slowest mode 3.6 Hz, damped by about 5 1/s: 25 s leave e^-60 of the start; 1e-9 is left to rounding
@@ -154,11 +240,14 @@ def test_the_chain_comes_to_rest_where_statics_say():
 
 
 def test_integration_without_hysteresis_is_an_oscillator():
-    from bench.reproduction.simulated_hysteresis import RATE, integrate
+    from bench.reproduction.simulated_hysteresis import (
+        SIMULATED_HYSTERESIS_SETUP,
+        integrate,
+    )
 
     n = 4000
     rows = integrate(np.full(n, 2.0), [np.array([5.0, 0.0, 0.0, 0.0, 0.0])] * n)
-    time = np.arange(n) / RATE
+    time = np.arange(n) / SIMULATED_HYSTERESIS_SETUP.rate
     # RK4 at omega h = 2e-3: (omega h)^4 / 120 of a radian a radian, far below 1e-10
     np.testing.assert_allclose(rows[:, 0], 0.4 * (1.0 - np.cos(math.sqrt(5.0) * time)), atol=1e-10)
     np.testing.assert_allclose(rows[:, 2], 2.0 * np.cos(math.sqrt(5.0) * time), atol=1e-9)
@@ -186,12 +275,22 @@ def test_the_encoders_lag_as_the_load_cells_do():
 
 
 @pytest.mark.parametrize(
-    "identifier",
-    ["A1", *(pytest.param(name, marks=pytest.mark.slow) for name in ("A3", "A5", "D1", "D4"))],
+    ("identifier", "failing"),
+    [
+        ("A1", 0),
+        # the loops of Fig 2.10 a, which do not coincide: nothing in the rig wears
+        pytest.param("A3", 1, marks=pytest.mark.slow),
+        # the typing slip of eq 5.52
+        pytest.param("D1", 1, marks=pytest.mark.slow),
+        # the spring that the printed deck lacks
+        pytest.param("D4", 1, marks=pytest.mark.slow),
+    ],
 )
-def test_what_must_hold_of_a_quick_item_holds(identifier):
+def test_a_quick_item_comes_out_as_its_rows_say(identifier, failing):
     item = ENTRIES[identifier].run(silent)
-    assert [row for row in item.rows if row.holds is False] == []
+    lost = [row for row in item.rows if row.holds is False]
+    assert len(lost) == failing
+    assert all(row.why for row in lost)
     assert any(row.holds for row in item.rows)
     assert len({picture.name for picture in item.pictures}) == len(item.pictures) >= 1
     for picture in item.pictures:

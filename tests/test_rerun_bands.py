@@ -7,7 +7,11 @@ import pytest
 
 from bench import Element, Recording
 from bench.laws import LAWS
-from bench.rerun_log.bands import SLIP_SHARE, bands_of, changes
+from bench.rerun_log.bands import (
+    BANDS_SETTINGS,
+    bands_of,
+    changes,
+)
 
 
 def sine(amplitude: float, n: int = 100_000) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -59,7 +63,7 @@ def test_a_jenkins_slider_slips_from_the_yield_of_each_half_cycle_to_its_reversa
         r.append(spring)
     states = band.of(record_of("slide", t, x, v, np.array(r)))
     # After a reversal at +A the force falls from +Fy; it reaches -0.9 Fy when the slider has gone back 1.9 Fy/k.
-    elastic = (1.0 + SLIP_SHARE) * yield_at
+    elastic = (1.0 + BANDS_SETTINGS.slip_share) * yield_at
     start = 0.25 + np.arccos((amplitude - elastic) / amplitude) / (2.0 * np.pi)
     half = (t > 0.25) & (t < 0.75)
     np.testing.assert_array_equal(states[half] == 1, t[half] > start)

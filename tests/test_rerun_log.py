@@ -445,3 +445,30 @@ def test_half_a_minute_of_three_joint_rigs_fits_in_thirty_megabytes(tmp_path, rn
     path = log_comparison(tmp_path / "long.rrd", rigs, noisy)
     assert path.stat().st_size < 30e6
     assert len(column(chunks_of(path)["/rig/2-polynomial/body_2"], "time")) == 900
+
+
+def test_an_episode_tells_the_limits_and_what_is_known_by_when(tmp_path):
+    from bench.excitation import design
+    from bench.excitation.methods import controls_from
+    from bench.excitation.request import request
+    from bench.excitation.schema import ExcitationRequest
+    from bench.rerun_log.episode import episode_record, log_episode
+
+    example = Path(__file__).resolve().parents[1] / "examples" / "excite.toml"
+    document = ExcitationRequest.read(example)
+    rng = np.random.default_rng(1)
+    rig = document.build(example.parent)
+    asked = request(rig, document.experiment, draws=2, rng=rng)
+    made = design("log_sweep", asked.experiment, duration=4.0, band=asked.band, rng=rng)
+    controls = controls_from(made)
+    record = episode_record(asked.rig, asked.experiment, controls)
+    assert record["limit/force of shaker"].max() <= 1.0 + 1e-9
+    assert 0.0 < record["limit/displacement"].max() <= 1.0
+    assert np.all(np.diff(record["information"]) >= -1e-9)
+    # the last window's end lies a sample before that of the record
+    assert record["information"].max() == pytest.approx(
+        float(asked.experiment.merit(controls[None])[0]), rel=0.01
+    )
+    path = log_episode(tmp_path / "episode.rrd", asked.rig, asked.experiment, controls)
+    assert path is not None
+    assert path.stat().st_size > 10_000

@@ -10,7 +10,8 @@ import pytest
 from bench import Element, Excitation, Rig, simulate, simulate_batch
 from bench.errors import ModelError, ParameterError, RangeWarning, SimulationError, UnknownNameError
 from bench.laws import LAWS
-from bench.rig.library import INCH, POUND_FORCE, damper_rig, joint_rig, prescribe, sdof_rig, starting
+from bench.laws.coupling import INCH, POUND_FORCE
+from bench.rig.library import damper_rig, joint_rig, prescribe, sdof_rig, starting
 from bench.signals import Harmonic
 
 GAP = Element.of("gap", "carriage", stiffness=3000.0, clearance=0.005)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from functools import lru_cache
 from itertools import repeat
 from typing import NamedTuple
@@ -19,12 +20,20 @@ from bench.campaign.distribution import Distribution, Quantity, Shared, Value, p
 from bench.campaign.plan import Plan
 from bench.errors import ParameterError
 
-CHOICES = 3
-"""Leading coordinates of a point: rig, excitation, sensors."""
-SOBOL_BLOCK = 1 << 14
-"""Points of a Sobol sequence made at a time: it can only be wound forwards, which takes a while far out."""
-LARGEST_HYPERCUBE = 20_000_000
-"""Numbers of a Latin hypercube, which must be held whole: 160 MB."""
+
+@dataclass(frozen=True)
+class DrawingSettings:
+    """Numbers of `bench.campaign.drawing`."""
+
+    choices: int = 3
+    """Leading coordinates of a point: rig, excitation, sensors."""
+    sobol_block: int = 1 << 14
+    """Points of a Sobol sequence made at a time: it can only be wound forwards, which takes a while far out."""
+    largest_hypercube: int = 20_000_000
+    """Numbers of a Latin hypercube, which must be held whole: 160 MB."""
+
+
+SETTINGS = DrawingSettings()
 
 _designing = threading.Lock()
 
@@ -64,7 +73,7 @@ def draws(plan: Plan, records: Iterable[int]) -> list[Draw]:
 
 def dimension(plan: Plan) -> int:
     """Coordinates of a point: the choices, the shared quantities, then the longest of each of rigs, excitations, sensors."""
-    return CHOICES + len(plan.shared) + sum(_blocks(plan))
+    return SETTINGS.choices + len(plan.shared) + sum(_blocks(plan))
 
 
 def point_of(plan: Plan, record: int) -> NDArray[np.float64]:
@@ -74,7 +83,7 @@ def point_of(plan: Plan, record: int) -> NDArray[np.float64]:
     if plan.sampling == "latin_hypercube":
         check_design(plan)
         return _hypercube(plan.records, dimension(plan), plan.seed)[record]
-    block, place = divmod(record, SOBOL_BLOCK)
+    block, place = divmod(record, SETTINGS.sobol_block)
     return _sobol(block, dimension(plan), plan.seed)[place]
 
 
@@ -82,12 +91,12 @@ def draw_at(plan: Plan, record: int, point: NDArray[np.float64]) -> Draw:
     """What a record draws whose point ``(dimension,)`` is given."""
     shared = {
         name: quantity.at(float(u))
-        for (name, quantity), u in zip(plan.shared.items(), point[CHOICES:], strict=False)
+        for (name, quantity), u in zip(plan.shared.items(), point[SETTINGS.choices :], strict=False)
     }
     rig = pick(float(point[0]), [entry.weight for entry in plan.rigs])
     excitation = _fitting(plan, plan.excitations, rig, float(point[1]))
     sensors = _fitting(plan, plan.sensors, rig, float(point[2])) if plan.fitting(plan.sensors, rig) else -1
-    at = CHOICES + len(plan.shared)
+    at = SETTINGS.choices + len(plan.shared)
     rigs, excitations, _ = _blocks(plan)
     slots = iter(point[at:])
     present = tuple(
@@ -151,10 +160,10 @@ def _value(quantity: Quantity, slots: Iterator[float], shared: Mapping[str, Valu
 def check_design(plan: Plan) -> None:
     """Raise `ParameterError` where the points of a plan cannot be held."""
     records, size = plan.records, dimension(plan)
-    if plan.sampling == "latin_hypercube" and records * size > LARGEST_HYPERCUBE:
+    if plan.sampling == "latin_hypercube" and records * size > SETTINGS.largest_hypercube:
         raise ParameterError(
             f"a Latin hypercube of {records} records in {size} quantities must be held whole in memory, and at most "
-            f'{LARGEST_HYPERCUBE // size} records are allowed; use sampling = "sobol", which is made piece by piece'
+            f'{SETTINGS.largest_hypercube // size} records are allowed; use sampling = "sobol", which is made piece by piece'
         )
 
 
@@ -183,7 +192,7 @@ def _sobol_of(block: int, size: int, seed: int) -> NDArray[np.float64]:
 
     engine = qmc.Sobol(size, rng=np.random.default_rng(seed))
     if block:
-        engine.fast_forward(block * SOBOL_BLOCK)
-    points = engine.random(SOBOL_BLOCK)
+        engine.fast_forward(block * SETTINGS.sobol_block)
+    points = engine.random(SETTINGS.sobol_block)
     points.flags.writeable = False
     return points

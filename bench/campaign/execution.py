@@ -25,8 +25,16 @@ from bench.campaign.store import Store, counts
 from bench.campaign.task import generator_of, payload_of
 from bench.errors import ParameterError
 
-CRASHES_ALLOWED = 3
-"""Times that a part may take a worker process down with it before the campaign stops."""
+
+@dataclass(frozen=True)
+class ExecutionSettings:
+    """Numbers of `bench.campaign.execution`."""
+
+    crashes_allowed: int = 3
+    """Times that a part may take a worker process down with it before the campaign stops."""
+
+
+SETTINGS = ExecutionSettings()
 
 
 class Progress(NamedTuple):
@@ -238,7 +246,7 @@ def _run(
                 except BrokenProcessPool as error:
                     # every part in flight breaks together; which one was the cause shows when it comes again
                     crashes[part] += 1
-                    if crashes[part] > CRASHES_ALLOWED:
+                    if crashes[part] > SETTINGS.crashes_allowed:
                         raise CampaignError(
                             f"a worker process died {crashes[part]} times at part {part} "
                             f"(records {tally.plan.part(part)[0]} to {tally.plan.part(part)[-1]}); the other parts are kept. "

@@ -26,8 +26,17 @@ from bench.errors import FileFormatError
 
 FOLDERS = ("samples", "records", "answers")
 """Folders of the files of a part."""
-_TAIL = 8
-"""Bytes at the end of a Parquet file: length of the footer and "PAR1"."""
+
+
+@dataclass(frozen=True)
+class PartsSettings:
+    """Numbers of `bench.campaign.parts`."""
+
+    tail: int = 8
+    """Bytes at the end of a Parquet file: length of the footer and "PAR1"."""
+
+
+SETTINGS = PartsSettings()
 
 
 @dataclass(frozen=True)
@@ -232,14 +241,14 @@ def _footer_hash(footer: bytes) -> str:
 
 
 def _footer_length(tail: bytes) -> int:
-    return int.from_bytes(tail[-_TAIL:-4], "little") + _TAIL
+    return int.from_bytes(tail[-SETTINGS.tail : -4], "little") + SETTINGS.tail
 
 
 def _footer(path: Path) -> bytes:
     with path.open("rb") as file:
         size = file.seek(0, os.SEEK_END)
-        file.seek(max(0, size - _TAIL))
-        length = min(_footer_length(file.read(_TAIL)), size)
+        file.seek(max(0, size - SETTINGS.tail))
+        length = min(_footer_length(file.read(SETTINGS.tail)), size)
         file.seek(size - length)
         return file.read(length)
 

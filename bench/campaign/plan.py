@@ -16,16 +16,26 @@ from typing import Any, Literal
 from bench.campaign.alternatives import ExcitationPlan, RigPlan, SensorPlan, unique
 from bench.campaign.distribution import Distribution, Quantity, Shared, check_weights
 from bench.errors import ParameterError, UnknownNameError
-from bench.signals.base import MAX_SAMPLES
+from bench.signals.base import (
+    BASE_SETTINGS,
+)
 
 Sampling = Literal["random", "latin_hypercube", "sobol"]
 Precision = Literal["float32", "float64"]
 Compression = Literal["none", "lz4", "zstd"]
 
-ROWS_PER_PART = 500_000
-"""Rows that a part aims at where the plan does not say: 14 MB for seven channels of float32."""
-MIN_PARTS = 64
-"""Parts that a campaign is cut into where it has the records, so that many cores have work."""
+
+@dataclass(frozen=True)
+class PlanSettings:
+    """Numbers of `bench.campaign.plan`."""
+
+    rows_per_part: int = 500_000
+    """Rows that a part aims at where the plan does not say: 14 MB for seven channels of float32."""
+    min_parts: int = 64
+    """Parts that a campaign is cut into where it has the records, so that many cores have work."""
+
+
+SETTINGS = PlanSettings()
 
 
 @dataclass(frozen=True)
@@ -39,7 +49,7 @@ class PlanLimits:
     """
 
     records: int = 100_000_000
-    samples: int = MAX_SAMPLES
+    samples: int = BASE_SETTINGS.max_samples
     parts: int = 40_000
 
 
@@ -109,8 +119,10 @@ class Plan:
             )
         self._check_members()
         if not self.records_per_part:
-            whole = max(1, ROWS_PER_PART // self.n_samples)
-            object.__setattr__(self, "records_per_part", max(1, min(whole, -(-self.records // MIN_PARTS))))
+            whole = max(1, SETTINGS.rows_per_part // self.n_samples)
+            object.__setattr__(
+                self, "records_per_part", max(1, min(whole, -(-self.records // SETTINGS.min_parts)))
+            )
             self._check_size(PLAN_LIMITS)
 
     def _check_size(self, limits: PlanLimits) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,13 +18,21 @@ if TYPE_CHECKING:
 
     from bench.campaign.generation import Generator, Part
 
-ROWS_PER_GROUP = 8192
-"""Rows that a row group holds at least: a record, or a few short ones, so that a window can be read by itself."""
+
+@dataclass(frozen=True)
+class TablesSettings:
+    """Numbers of `bench.campaign.tables`."""
+
+    rows_per_group: int = 8192
+    """Rows that a row group holds at least: a record, or a few short ones, so that a window can be read by itself."""
+
+
+SETTINGS = TablesSettings()
 
 
 def records_per_group(n_samples: int) -> int:
     """Records of one row group of the samples."""
-    return max(1, -(-ROWS_PER_GROUP // n_samples))
+    return max(1, -(-SETTINGS.rows_per_group // n_samples))
 
 
 def part_contents(generator: Generator, part: Part) -> dict[str, bytes]:

@@ -61,6 +61,8 @@ class Diagnose:
     """Seconds after which no further stage of the search is begun; the verdict is then the best one so far and says what was not tried."""
     check: bool = True
     """Look at the records first, as `jointbench check` does, and say at once what is doubtful."""
+    settings: Path | None = None
+    """File (JSON or TOML) with thresholds that differ from their defaults, as tables by room (see docs/thresholds.md)."""
     force: bool = False
     """Overwrite files that exist."""
     progress: bool = True
@@ -214,8 +216,10 @@ def _diagnosed(asked: Diagnose, case: Case, stage: Callable[[str], None]) -> Dia
     from bench.discrepancy import diagnose
     from bench.discrepancy.application.own_share import with_simulator
     from bench.discrepancy.precheck.checking import check
+    from bench.discrepancy.settings import DEFAULT, read_settings
     from bench.errors import IdentificationError
 
+    settings = DEFAULT if asked.settings is None else read_settings(asked.settings)
     if asked.check:
         stage("looking at the records")
         told = Console(stderr=True, soft_wrap=True)
@@ -229,6 +233,7 @@ def _diagnosed(asked: Diagnose, case: Case, stage: Callable[[str], None]) -> Dia
             anyway=asked.anyway,
             progress=stage,
             budget=asked.budget,
+            settings=settings,
         )
         stage("the simulator's own share")
         return replace(found, verdict=with_simulator(found.verdict, case))

@@ -59,7 +59,9 @@ class BlindMake:
         from bench.discrepancy import BlindOptions, make_blind
         from bench.discrepancy.blind.background_settings import BackgroundSettings
         from bench.discrepancy.blind.protocol import SEAL
-        from bench.discrepancy.blind.rigs import BACKGROUND_SHARES
+        from bench.discrepancy.blind.rigs import (
+            RIGS_SETTINGS,
+        )
         from bench.targets import check_folder
 
         begun = next(self.folder.glob(f"*/{SEAL}"), None) is not None  # by the same command, which goes on
@@ -68,7 +70,7 @@ class BlindMake:
         chosen = {key: value for key, value in vars(self).items() if key in BlindOptions.__dataclass_fields__}
         chosen["background"] = BackgroundSettings() if self.background else None
         if self.background and self.shares == BlindOptions().shares:
-            chosen["shares"] = BACKGROUND_SHARES
+            chosen["shares"] = RIGS_SETTINGS.background_shares
         with Console(stderr=True).status("making cases") as status:
             names = make_blind(
                 self.folder,

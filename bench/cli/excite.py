@@ -47,6 +47,8 @@ class Excite:
     """Trained policy by name or file (.npz), with --method policy."""
     out: Annotated[Path, tyro.conf.arg(aliases=["-o"])] = Path("excitation.csv")
     """File: .csv (time and loads) or .json (an [excitation] for a rig's file)."""
+    rrd: Path | None = None
+    """Rerun recording of the episode to write: the rig in motion, its limits, and what is known by when."""
     draws: int = 8
     """Rigs drawn from what is unknown; the excitation keeps the limits on all of them."""
     evaluations: int = 1600
@@ -98,9 +100,17 @@ class Excite:
                 if self.method == "planner":
                     show("planning", 1.0)
                     made, notes = _from_planner(asked, made, rng)
+            if self.rrd is not None:
+                from bench.excitation.methods import controls_from
+                from bench.rerun_log import log_episode
+
+                show("writing the rerun recording", 1.0)
+                title = f"excitation episode: {self.method}"
+                log_episode(self.rrd, asked.rig, asked.experiment, controls_from(made), title=title)
         _write(self.out, made.excitation, rig)
         result = {
             "file": str(self.out),
+            "rrd": None if self.rrd is None else str(self.rrd),
             "method": self.method,
             "policy": self.policy,
             "merit": made.merit,
@@ -119,7 +129,7 @@ class Excite:
         from bench.errors import ParameterError, UnknownNameError
         from bench.targets import check_targets
 
-        check_targets(self.out, force=self.force)
+        check_targets(self.out, self.rrd, force=self.force)
         if self.method not in METHODS:
             raise UnknownNameError("method", self.method, METHODS)
         if self.out.suffix not in {".csv", ".json"}:

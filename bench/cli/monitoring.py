@@ -36,8 +36,8 @@ class Monitor:
     """Displacement about which the motion goes [SI]; the middle of the learning by default."""
     learning: int = 30
     """Periods to learn from."""
-    change: float = 0.2
-    """Smallest change of the force to be found, as a share."""
+    change: float = 0.15
+    """Smallest change of a period's energy to be found, as a share; what a fifth of C lost leaves beside some friction."""
     run_length: float = 2000.0
     """Mean number of periods between false alarms."""
     figure: Path | None = None

@@ -40,6 +40,9 @@ KINDS: dict[str, Kind] = {
         "nominal.json of a case for `diagnose`", "bench.discrepancy.case.schema", "NominalDocument"
     ),
     "verdict": Kind("what `diagnose --json` writes", "bench.discrepancy.verdict_schema", "VerdictDocument"),
+    "settings": Kind(
+        "thresholds for `diagnose --settings`", "bench.discrepancy.settings.document", "SettingsDocument"
+    ),
     "protocol": Kind("protocol.json of a sealed case", "bench.discrepancy.blind.schema", "ProtocolDocument"),
     "answer": Kind("the answer of a sealed case", "bench.discrepancy.blind.schema", "AnswerDocument"),
     "manifest": Kind("manifest.json of a campaign", "bench.campaign.schema", "ManifestDocument"),

@@ -12,7 +12,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bench.demo.damper import TENSIONS, DamperTest, damper_test
+from bench.demo.damper import (
+    DAMPER_SETUP,
+    DamperTest,
+    damper_test,
+)
 from bench.demo.joint import JointModel, Progress, joint_models, training_records, unseen_record
 from bench.demo.measured_case import damper_case
 from bench.recording import Recording
@@ -20,8 +24,16 @@ from bench.recording import Recording
 if TYPE_CHECKING:
     from bench.discrepancy.diagnosis import Diagnosis
 
-THIN = 8
-"""Every so manieth sample goes to the diagnosis: 128 a second, 128 a cycle at 1 Hz."""
+
+@dataclass(frozen=True)
+class DemoSetup:
+    """Numbers of `bench.demo`."""
+
+    thin: int = 8
+    """Every so manieth sample goes to the diagnosis: 128 a second, 128 a cycle at 1 Hz."""
+
+
+SETUP = DemoSetup()
 
 
 def _by_axis(pair: tuple[float, float] | None) -> dict[str, float] | None:
@@ -78,8 +90,10 @@ def compute(progress: Progress = lambda label, share: None) -> DemoResult:
     """
     start = time.perf_counter()
     damper = []
-    for number, tension in enumerate(TENSIONS):
-        progress(f"damper: identifying at {tension} lbf band tension", 0.3 * number / len(TENSIONS))
+    for number, tension in enumerate(DAMPER_SETUP.tensions):
+        progress(
+            f"damper: identifying at {tension} lbf band tension", 0.3 * number / len(DAMPER_SETUP.tensions)
+        )
         damper.append(damper_test(tension, np.random.default_rng(tension)))
     progress("joint: simulating the training records", 0.3)
     records = training_records()
@@ -88,7 +102,7 @@ def compute(progress: Progress = lambda label, share: None) -> DemoResult:
     from bench.discrepancy import Diagnosis, diagnose  # noqa: PLC0415  (compiled code, for this part only)
 
     found = diagnose(
-        damper_case(thin=THIN),
+        damper_case(thin=SETUP.thin),
         most=1,
         progress=lambda text: progress(f"diagnosis of the damper: {text}", 0.85),
     )

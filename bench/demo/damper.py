@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -18,8 +19,16 @@ from bench.reduction import element_from
 from bench.rig import Element, simulate
 from bench.rig.library import damper_rig, prescribe, starting
 
-TENSIONS = (20, 35, 70, 80)
-"""Band tensions of the shipped friction-damper tests [lbf]."""
+
+@dataclass(frozen=True)
+class DamperSetup:
+    """Numbers of `bench.demo.damper`."""
+
+    tensions: tuple[int, ...] = (20, 35, 70, 80)
+    """Band tensions of the shipped friction-damper tests [lbf]."""
+
+
+DAMPER_SETUP = DamperSetup()
 
 
 class DamperTest(NamedTuple):

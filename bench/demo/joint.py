@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 import warnings
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,21 +16,30 @@ from bench.identification.network import fit_network
 from bench.identification.polynomial import fit_polynomial
 from bench.identification.restoring_force import JointData, joint_data
 from bench.laws.along import force_along
+from bench.laws.coupling import INCH, POUND_FORCE
 from bench.laws.network import published_network
 from bench.recording import Recording, nmse
 from bench.reduction import Comparison, channel_nmse, element_from
 from bench.rig import Element, Rig, simulate
-from bench.rig.library import INCH, POUND_FORCE, inertia_of, joint_rig
+from bench.rig.library import inertia_of, joint_rig
 from bench.signals import BandLimitedNoise, Constant, Excitation
 
-PEAK = 1000.0 * POUND_FORCE
-"""The deck's load level, 1000 lbf [N]."""
-PEAK_TORQUE = 1000.0 * POUND_FORCE * INCH
-"""1000 lbf in [N m]."""
-DURATION = 30.0
-RATE = 1000.0
-CUTOFF = 12.0
-UNSEEN_SEED = 2006
+
+@dataclass(frozen=True)
+class JointSetup:
+    """Numbers of `bench.demo.joint`."""
+
+    peak: float = 1000.0 * POUND_FORCE
+    """The deck's load level, 1000 lbf [N]."""
+    peak_torque: float = 1000.0 * POUND_FORCE * INCH
+    """1000 lbf in [N m]."""
+    duration: float = 30.0
+    rate: float = 1000.0
+    cutoff: float = 12.0
+    unseen_seed: int = 2006
+
+
+JOINT_SETUP = JointSetup()
 
 Progress = Callable[[str, float], None]
 """Called with what is being done and the share of the whole that is done."""
@@ -50,9 +60,11 @@ class JointModel(NamedTuple):
 def excitation(axial: bool, torsional: bool) -> Excitation:
     """The deck's loading: noise flat to 12 Hz at ±1000 on the axes asked for, ramped in over half a second."""
     quiet = Constant(0.0)
-    force = BandLimitedNoise(cutoff=CUTOFF, peak=PEAK) if axial else quiet
-    torque = BandLimitedNoise(cutoff=CUTOFF, peak=PEAK_TORQUE) if torsional else quiet
-    return Excitation({"force": force, "torque": torque}, duration=DURATION, sample_rate=RATE)
+    force = BandLimitedNoise(cutoff=JOINT_SETUP.cutoff, peak=JOINT_SETUP.peak) if axial else quiet
+    torque = BandLimitedNoise(cutoff=JOINT_SETUP.cutoff, peak=JOINT_SETUP.peak_torque) if torsional else quiet
+    return Excitation(
+        {"force": force, "torque": torque}, duration=JOINT_SETUP.duration, sample_rate=JOINT_SETUP.rate
+    )
 
 
 def training_records() -> tuple[Recording, ...]:
@@ -66,7 +78,7 @@ def training_records() -> tuple[Recording, ...]:
 
 def unseen_record() -> Recording:
     """The true joint's response to an excitation of another seed, both axes loaded."""
-    return simulate(joint_rig(), excitation(True, True), rng=np.random.default_rng(UNSEEN_SEED))
+    return simulate(joint_rig(), excitation(True, True), rng=np.random.default_rng(JOINT_SETUP.unseen_seed))
 
 
 def laboratory_view(records: Sequence[Recording], rig: Rig, *, mass_known: bool = True) -> JointData:
@@ -107,7 +119,9 @@ def _joint_model(label: str, element: Element, unseen: Recording, seconds: float
         warnings.simplefilter("always", RangeWarning)
         try:
             reduced = simulate(
-                rig.with_element(element), excitation(True, True), rng=np.random.default_rng(UNSEEN_SEED)
+                rig.with_element(element),
+                excitation(True, True),
+                rng=np.random.default_rng(JOINT_SETUP.unseen_seed),
             )
         except SimulationError as error:
             return JointModel(label, element, None, None, open_loop, seconds, str(error))

@@ -6,6 +6,7 @@ what a person reads off the 0.5 Hz loop: the median of the force against the dir
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,13 +16,21 @@ from bench.data import friction_damper
 if TYPE_CHECKING:
     from bench.discrepancy import Case, CaseRecord
 
-TENSION = 80
-"""Band tension of the demo's case [lbf]."""
-FROM_QUARTILES = 1.349
-"""Quartile distance of a normal distribution in standard deviations."""
+
+@dataclass(frozen=True)
+class MeasuredCaseSetup:
+    """Numbers of `bench.demo.measured_case`."""
+
+    tension: int = 80
+    """Band tension of the demo's case [lbf]."""
+    from_quartiles: float = 1.349
+    """Quartile distance of a normal distribution in standard deviations."""
 
 
-def damper_case(tension: int = TENSION, *, thin: int = 1) -> Case:
+SETUP = MeasuredCaseSetup()
+
+
+def damper_case(tension: int = SETUP.tension, *, thin: int = 1) -> Case:
     """The tests at one band tension as a case, in SI units.
 
     Args:
@@ -39,7 +48,7 @@ def damper_case(tension: int = TENSION, *, thin: int = 1) -> Case:
     return Case(
         f"friction_damper_{tension}lb",
         "damper",
-        (NominalParameter("coulomb", middle, (high - low) / FROM_QUARTILES, "N"),),
+        (NominalParameter("coulomb", middle, (high - low) / SETUP.from_quartiles, "N"),),
         (CaseChannel("displacement", "m", "prescribed"), CaseChannel("force", "N", "response")),
         (found,),
         (_record("validation", f"1Hz_{tension}lb", thin),),

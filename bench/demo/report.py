@@ -91,17 +91,23 @@ def _converged(result: DemoResult) -> list[JointModel]:
     return [model for model in result.joint if model.comparison is not None]
 
 
+def best_of_each_kind(result: DemoResult) -> list[JointModel]:
+    """The best model of each kind that did not diverge: kinds are the words before the brackets ("network", "polynomial")."""
+    best: dict[str, JointModel] = {}
+    for model in sorted(_converged(result), key=lambda model: sum(model.force_nmse or (0.0, 0.0))):
+        best.setdefault(model.label.partition(" (")[0].split()[-1], model)
+    return list(best.values())
+
+
 def log_joint(result: DemoResult, path: Path) -> None:
-    """The rig moving in 3-D with the true joint and with the best network side by side, and every channel."""
-    model = min(_converged(result), key=lambda m: sum(m.force_nmse or (0.0, 0.0)))
-    assert model.comparison is not None
+    """The rig moving in 3-D with the true joint and with the best model of each kind side by side, and every channel."""
     rig = joint_rig()
-    log_comparison(
-        path,
-        {"true": rig, model.label: rig.with_element(model.element)},
-        {"true": model.comparison.true, model.label: model.comparison.reduced},
-        title="jointbench demo: true and reduced-order joint",
-    )
+    rigs, records = {"true": rig}, {"true": result.unseen}
+    for model in best_of_each_kind(result):
+        assert model.comparison is not None
+        rigs[model.label] = rig.with_element(model.element)
+        records[model.label] = model.comparison.reduced
+    log_comparison(path, rigs, records, title="jointbench demo: true and reduced-order joints")
 
 
 def _write_records(result: DemoResult, folder: Path) -> list[Path]:

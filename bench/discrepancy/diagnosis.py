@@ -37,7 +37,6 @@ from bench.discrepancy.effects.nonparametric import CLOSURES
 from bench.discrepancy.fitting.initial_state_fit import start_warnings
 from bench.discrepancy.judgement import posterior as evidence
 from bench.discrepancy.judgement.closing import complete, nominal_estimates, with_closed
-from bench.discrepancy.judgement.coarse import SETTINGS
 from bench.discrepancy.judgement.nonparametric_rival import Rival
 from bench.discrepancy.judgement.two_regimes import How, Progress, found_of
 from bench.discrepancy.judgement.validation_discrepancy import gaps, nominal_prediction
@@ -50,16 +49,10 @@ from bench.discrepancy.next_test.discriminating_excitation import separate, told
 from bench.discrepancy.numerics.deadline import Deadline
 from bench.discrepancy.search.explain import Explanation, close, nominal_alone
 from bench.discrepancy.search.fits import names
-from bench.discrepancy.search.forward_selection import STALLED
 from bench.discrepancy.search.load_interpolation import reading_notes
+from bench.discrepancy.settings import DEFAULT, DiagnosisSettings, changed
 from bench.discrepancy.verdict import Gap, Kind, NamedEffect, Ranked, Verdict
 from bench.errors import BenchError, UnknownNameError
-
-SEED = 20060501
-"""Seed of the bootstrap where no generator is given, so that a diagnosis repeats exactly."""
-
-WORSE = 1.1
-"""Gap with a closure over that without, on any judged coordinate, from which the closure is withdrawn."""
 
 Placed = TypeVar("Placed", NamedEffect, Ranked)
 
@@ -96,6 +89,7 @@ def diagnose(
     rng: np.random.Generator | None = None,
     progress: Progress = lambda text: None,
     budget: float = math.inf,
+    settings: DiagnosisSettings = DEFAULT,
 ) -> Diagnosis | ArticulatedDiagnosis:
     """Diagnose a case; one of an articulated MJCF by `diagnose_articulated`, with the catalogue of joints, drives and encoders.
 
@@ -109,6 +103,7 @@ def diagnose(
         progress: Called with a line of text at every stage.
         budget: Seconds after which no further stage of the search is begun; the verdict is then the best one so far, and its
             warnings say what was not tried.
+        settings: Thresholds, see docs/thresholds.md.
 
     Raises:
         UnknownNameError: A name in `exclude` is not in the catalogue.
@@ -116,16 +111,16 @@ def diagnose(
         UnitError: A unit does not fit the model, or a channel is off by a factor or a sign that no missing force makes.
         ModelError: The model holds what a nominal simulation cannot, and the records reach it.
     """
-    if applies(case):
+    if applies(case, settings=settings.articulated):
         with threadpool_limits(1, user_api="blas"):
             robot = diagnose_articulated(
-                case, exclude=exclude, most=most, anyway=anyway, rng=rng, progress=progress
+                case, exclude=exclude, most=most, anyway=anyway, rng=rng, settings=settings, progress=progress
             )
         if budget == math.inf:
             return robot
         unused = "budget is not heeded on an articulated model"
         return replace(robot, verdict=replace(robot.verdict, warnings=(*robot.verdict.warnings, unused)))
-    rng = np.random.default_rng(SEED) if rng is None else rng
+    rng = np.random.default_rng(settings.seed) if rng is None else rng
     known = [effect.name for effect in catalogue]
     for name in exclude:
         if name not in known and name not in {effect.name for effect in ARTICULATED}:
@@ -134,7 +129,7 @@ def diagnose(
     # fits run in threads of their own; threads of BLAS within them would only get in each other's way
     with threadpool_limits(1, user_api="blas"):
         deadline = Deadline(budget)
-        found = _diagnose(case, How(chosen, most, progress, deadline), rng, anyway)
+        found = _diagnose(case, How(chosen, most, progress, deadline, settings), rng, anyway)
         asked = "effects of drives and encoders"
         if (
             found.verdict.verdict != "none"
@@ -146,7 +141,13 @@ def diagnose(
             progress(asked)
             try:
                 other = diagnose_articulated(
-                    case, exclude=exclude, most=most, anyway=anyway, rng=rng, progress=progress
+                    case,
+                    exclude=exclude,
+                    most=most,
+                    anyway=anyway,
+                    rng=rng,
+                    settings=settings,
+                    progress=progress,
                 )
             except (
                 BenchError
@@ -154,7 +155,7 @@ def diagnose(
                 return found
             left, theirs = found.verdict.gap, other.verdict.gap
             # free runs of one kind in both: parts of what each began with are compared
-            nearer = theirs.after * left.before < SETTINGS.most * left.after * theirs.before
+            nearer = theirs.after * left.before < settings.judgement.coarse.most * left.after * theirs.before
             if other.verdict.verdict == "effect" and (other.verdict.complete or nearer):
                 return other
         return found
@@ -163,10 +164,12 @@ def diagnose(
 def _diagnose(case: Case, how: How, rng: np.random.Generator, anyway: bool) -> Diagnosis:
     began, progress, catalogue = time.perf_counter(), how.progress, how.catalogue
     progress("looking at the records")
-    told, admission = admitted(case, anyway=anyway)
-    quiet = without_idle_noise(told)
+    told, admission = admitted(case, anyway=anyway, settings=how.settings)
+    quiet = without_idle_noise(told, settings=how.settings.case)
     case, finding = found_of(quiet, how, rng)
-    problem = Problem(case, structure_of(case), case.identification)
+    problem = Problem(
+        case, structure_of(case, settings=how.settings), case.identification, settings=how.settings
+    )
     explanations, kind, rival = finding.explanations, finding.kind, finding.rival
     best, probabilities, words = explanations[0], finding.probabilities, finding.words
     seen, fitted = recorded(problem, catalogue), kind
@@ -178,7 +181,7 @@ def _diagnose(case: Case, how: How, rng: np.random.Generator, anyway: bool) -> D
     final, closure, found = _shrunk(case, problem, explanations, kind, rival, rng, closest)
     widest = max(found, key=lambda gap: gap.before / max(gap.noise_floor, 1e-12))
     if kind == "unknown" and not finding.doubt:
-        words += evidence.closes(names(closest.hypothesis), widest)
+        words += evidence.closes(names(closest.hypothesis), widest, settings=how.settings.judgement)
     where = locate(
         problem,
         nominal_alone(explanations),
@@ -216,10 +219,12 @@ def _diagnose(case: Case, how: How, rng: np.random.Generator, anyway: bool) -> D
         ),
         splits=where.splits,
         seconds=time.perf_counter() - began,
-        complete=kind != "unknown" and complete(found, sharp=not finding.coarse),
+        complete=kind != "unknown"
+        and complete(found, sharp=not finding.coarse, settings=how.settings.judgement),
         remainder=remainder(problem, final, widest),
         nominal=nominal_estimates(final),
         nearest=nearest,
+        settings=changed(how.settings),
     )
     return Diagnosis(case, problem, tuple(explanations), verdict, final, where)
 
@@ -252,7 +257,9 @@ def _shrunk(
         stages += [(label, nearest.predict)] if tells else []
     stages.append((names(final.hypothesis), final.predict))
     found = gaps(case, problem, stages=stages, rng=rng, final=_model(final))
-    if kind == "unknown" and any(gap.after > WORSE * gap.parameters_only for gap in found):
+    if kind == "unknown" and any(
+        gap.after > problem.settings.judgement.closure_worse * gap.parameters_only for gap in found
+    ):
         # what imitates an unknown force on some records can be worse than nothing on others: nobody should build that in
         final, closure = nothing, ""
         stages[-1] = ("no closure helps", nothing.predict)
@@ -271,7 +278,11 @@ def _closed(best: Explanation, nothing: Explanation, rival: Rival | None) -> tup
     closed = close(best, nothing, CLOSURES)
     if rival is None or rival.explanation.log_posterior < closed[0].log_posterior:
         return closed
-    return rival if rival.explanation.reduced - 1.0 < STALLED * (best.reduced - 1.0) else closed
+    return (
+        rival
+        if rival.explanation.reduced - 1.0 < best.settings.search.stalled * (best.reduced - 1.0)
+        else closed
+    )
 
 
 def _model(explanation: Explanation) -> tuple[Hypothesis, np.ndarray] | None:

@@ -187,6 +187,7 @@ class Verdict:
         nearest: Where nothing is named because something unknown is missing, the effects of the catalogue that come nearest.
         nominal: Nominal parameters as the explanation behind `gap.after` has them.
         applied: What `jointbench apply` made of it in the user's own model: "changes", and "figures" before and after.
+        settings: Thresholds that differ from their defaults, as `jointbench diagnose --settings` reads them.
     """
 
     verdict: Kind
@@ -208,6 +209,7 @@ class Verdict:
     nominal: tuple[NominalEstimate, ...] = ()
     nearest: tuple[NamedEffect, ...] = ()
     applied: dict[str, Any] = field(default_factory=dict)
+    settings: dict[str, Any] = field(default_factory=dict)
 
     @property
     def left(self) -> str:

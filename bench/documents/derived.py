@@ -57,7 +57,7 @@ def entry_of(
             default = None
         entries[field.name] = (
             replaced.get(field.name) or kind_of(hints[field.name], own, field.name),
-            Field(default, description=texts.get(field.name)),
+            Field(default, description=texts.get(field.name) or field.metadata.get("meaning")),
         )
     model = create_model(name or described.__name__, __base__=base, __module__=__name__, **entries)
     model.entry_name = kind

@@ -9,6 +9,7 @@ from __future__ import annotations
 import functools
 import operator
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Annotated, Any, TypeVar
 
 from pydantic import BeforeValidator, FailFast, Field, Strict, StringConstraints
@@ -16,8 +17,16 @@ from pydantic_core import PydanticCustomError
 
 T = TypeVar("T")
 
-MOST_ENTRIES = 10_000
-"""Entries of one table at most: each is a name that somebody gave, and each may be wrong and has to be told."""
+
+@dataclass(frozen=True)
+class KindsSettings:
+    """Numbers of `bench.documents.kinds`."""
+
+    most_entries: int = 10_000
+    """Entries of one table at most: each is a name that somebody gave, and each may be wrong and has to be told."""
+
+
+SETTINGS = KindsSettings()
 
 
 def any_of(*kinds: Any) -> Any:
@@ -42,9 +51,11 @@ def _whole(value: Any) -> Any:
 
 
 def _few(value: Any) -> Any:
-    if isinstance(value, Mapping) and len(value) > MOST_ENTRIES:
+    if isinstance(value, Mapping) and len(value) > SETTINGS.most_entries:
         raise PydanticCustomError(
-            "bench", "{text}", {"text": f"{len(value)} entries came; at most {MOST_ENTRIES} are expected"}
+            "bench",
+            "{text}",
+            {"text": f"{len(value)} entries came; at most {SETTINGS.most_entries} are expected"},
         )
     return dict(value) if isinstance(value, Mapping) else value
 

@@ -25,14 +25,25 @@ from numpy.typing import NDArray
 
 from bench.errors import ModelError, ParameterError, UnknownNameError
 from bench.excitation.linear_structure import LinearStructure, linear_structure
-from bench.excitation.stepping import MOTION, UNDRIVEN, Packed, integrate_cases
+from bench.excitation.stepping import (
+    STEPPING_LIMITS,
+    Packed,
+    integrate_cases,
+)
 from bench.native import Coordinate
 from bench.rig import Rig
 
-CASES_A_THREAD = 4
-"""Fewest cases for which another thread is worth its start of some 20 µs."""
 
-KEPT = 256
+@dataclass(frozen=True)
+class EnsembleSettings:
+    """Numbers of `bench.excitation.ensemble`."""
+
+    cases_a_thread: int = 4
+    """Fewest cases for which another thread is worth its start of some 20 µs."""
+    kept: int = 256
+
+
+SETTINGS = EnsembleSettings()
 
 
 def available_threads() -> int:
@@ -136,12 +147,12 @@ class Ensemble:
 
     def begin(self, task: Callable[[], None], n_cases: int) -> list[Future]:
         """Begin a task on half of the threads, where there are enough cases for them; the caller has the other half meanwhile."""
-        others = min(self.threads // 2, n_cases // CASES_A_THREAD)
+        others = min(self.threads // 2, n_cases // SETTINGS.cases_a_thread)
         return [self._pool.submit(task) for _ in range(others)]
 
     def spread(self, task: Callable[[int, int], None], n_cases: int) -> None:
         """Call ``task(first, last)`` for contiguous shares of the cases, over the threads where there are enough cases."""
-        parts = min(self.threads, n_cases // CASES_A_THREAD)
+        parts = min(self.threads, n_cases // SETTINGS.cases_a_thread)
         if parts <= 1:
             task(0, n_cases)
             return
@@ -191,7 +202,7 @@ def _once(key: tuple, read: Callable[[], Any]) -> Any:
     if key not in _kept:
         _kept[key] = read()
     _kept.move_to_end(key)
-    while len(_kept) > KEPT:
+    while len(_kept) > SETTINGS.kept:
         _kept.popitem(last=False)
     return _kept[key]
 
@@ -229,7 +240,7 @@ def _pack(rigs: Sequence[Rig], channels: tuple[str, ...], actuators: tuple[str, 
         np.zeros((*shape, 2), dtype=np.int64),
         np.zeros((*shape, 3), dtype=np.int64),
         np.zeros((*shape, coordinates, nv)),
-        np.full((*shape, coordinates), MOTION, dtype=np.int64),
+        np.full((*shape, coordinates), STEPPING_LIMITS.motion, dtype=np.int64),
         np.zeros((*shape, width)),
         np.zeros((len(rigs), 2 * nv + states)),
     )
@@ -252,8 +263,8 @@ def _pack(rigs: Sequence[Rig], channels: tuple[str, ...], actuators: tuple[str, 
 
 
 def _place(driven: list[int], actuator: int) -> int:
-    """Place of an input among the driven actuators; `UNDRIVEN` where it gets no command."""
-    return driven.index(actuator) if actuator in driven else UNDRIVEN
+    """Place of an input among the driven actuators; `undriven` where it gets no command."""
+    return driven.index(actuator) if actuator in driven else STEPPING_LIMITS.undriven
 
 
 def _reduced(

@@ -14,7 +14,7 @@ References:
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numba
@@ -23,21 +23,31 @@ from numpy.typing import NDArray
 from scipy.stats import qmc
 
 from bench.excitation.family import Family, fans
-from bench.excitation.information import STEP
+from bench.excitation.information import (
+    INFORMATION_LIMITS,
+)
 
-BOUND = math.sqrt(3.0)  # the range of a standardised coordinate
-CANDIDATES = 128
-"""Starting points that are tried on the first part of a record, spread evenly over the prior."""
-KEPT = 3
-"""Of which so many are followed."""
-HORIZONS = (0.3, 0.6, 1.0)
-"""Parts of the record that are fitted in turn."""
-STEPS = 30
-SETTLED = 1e-5
-"""Most steps of a search on a horizon, and the fall of the cost, relative to it and to one, that ends it."""
-DAMPINGS = np.array([0.1, 1.0, 10.0])
-CHUNK = 250_000
-"""Samples of records that are held at once, to bound the memory."""
+
+@dataclass(frozen=True)
+class EstimationSettings:
+    """Numbers of `bench.excitation.estimation`."""
+
+    bound: float = math.sqrt(3.0)
+    candidates: int = 128
+    """Starting points that are tried on the first part of a record, spread evenly over the prior."""
+    kept: int = 3
+    """Of which so many are followed."""
+    horizons: tuple[float, float, float] = (0.3, 0.6, 1.0)
+    """Parts of the record that are fitted in turn."""
+    steps: int = 30
+    settled: float = 1e-5
+    """Most steps of a search on a horizon, and the fall of the cost, relative to it and to one, that ends it."""
+    dampings: NDArray[np.float64] = field(default_factory=lambda: np.array([0.1, 1.0, 10.0]))
+    chunk: int = 250_000
+    """Samples of records that are held at once, to bound the memory."""
+
+
+ESTIMATION_SETTINGS = EstimationSettings()
 
 
 class Estimates(NamedTuple):
@@ -111,7 +121,7 @@ def costs(
     """Cost of each of the points ``(m, k, p)`` of each record ``(m, k)``; infinite where a rig diverged."""
     m, k, _ = coordinates.shape
     result = np.empty((m, k))
-    size = max(1, CHUNK // (k * records.controls.shape[1]))
+    size = max(1, ESTIMATION_SETTINGS.chunk // (k * records.controls.shape[1]))
     for first in range(0, m, size):
         rows = slice(first, first + size)
         outputs = family.record(coordinates[rows], records.controls[rows])
@@ -126,12 +136,12 @@ def normal_equations(
     """Information ``(m, p, p)`` and score ``(m, p)`` of each record at a point ``(m, p)``."""
     m, p = coordinates.shape
     fisher, score = np.zeros((m, p, p)), np.zeros((m, p))
-    size = max(1, CHUNK // ((p + 1) * records.controls.shape[1]))
+    size = max(1, ESTIMATION_SETTINGS.chunk // ((p + 1) * records.controls.shape[1]))
     for first in range(0, m, size):
         rows = slice(first, first + size)
-        outputs = family.record(fans(coordinates[rows], STEP), records.controls[rows])
+        outputs = family.record(fans(coordinates[rows], INFORMATION_LIMITS.step), records.controls[rows])
         _normal(
-            outputs, records.measured[rows], 1.0 / noise, records.lengths[rows], STEP, fisher[rows], score[rows]
+            outputs, records.measured[rows], 1.0 / noise, records.lengths[rows], INFORMATION_LIMITS.step, fisher[rows], score[rows]
         )  # fmt: skip
     return fisher, score
 
@@ -142,7 +152,7 @@ def search(
     start: NDArray[np.float64],
     noise: NDArray[np.float64],
     *,
-    steps: int = STEPS,
+    steps: int = ESTIMATION_SETTINGS.steps,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Levenberg-Marquardt of all records together.
 
@@ -156,7 +166,7 @@ def search(
     Returns:
         Points ``(m, p)`` and costs ``(m,)``.
     """
-    x = np.clip(start, -BOUND, BOUND)
+    x = np.clip(start, -ESTIMATION_SETTINGS.bound, ESTIMATION_SETTINGS.bound)
     cost = costs(family, records, x[:, None], noise)[:, 0]
     damping = np.full(len(x), 1e-2)
     active = np.flatnonzero(np.isfinite(cost))
@@ -169,11 +179,13 @@ def search(
         usable = np.isfinite(fisher).all(axis=(1, 2)) & np.isfinite(score).all(axis=1)
         fisher[~usable], score[~usable] = 0.0, 0.0
         inner = fisher + np.eye(p)
-        tried = damping[active, None] * DAMPINGS  # (a, 3)
+        tried = damping[active, None] * ESTIMATION_SETTINGS.dampings  # (a, 3)
         damped = inner[:, None] + tried[:, :, None, None] * (inner * np.eye(p))[:, None]
         gradient = score - x[active]
         moves = np.linalg.solve(damped, np.broadcast_to(gradient[:, None, :, None], (*tried.shape, p, 1)))
-        trials = np.clip(x[active, None] + moves[..., 0], -BOUND, BOUND)
+        trials = np.clip(
+            x[active, None] + moves[..., 0], -ESTIMATION_SETTINGS.bound, ESTIMATION_SETTINGS.bound
+        )
         found = costs(family, some, trials, noise)
         best = np.argmin(found, axis=1)
         rows = np.arange(len(active))
@@ -182,7 +194,7 @@ def search(
         gained = active[better]
         x[gained], cost[gained] = trials[rows, best][better], found[rows, best][better]
         damping[active] = np.clip(np.where(better, tried[rows, best], 100.0 * damping[active]), 1e-9, None)
-        settled = better & (fall < SETTLED * (1.0 + 1e-2 * cost[active]))
+        settled = better & (fall < ESTIMATION_SETTINGS.settled * (1.0 + 1e-2 * cost[active]))
         active = active[~(settled | (damping[active] > 1e7))]
     return x, cost
 
@@ -190,7 +202,7 @@ def search(
 def spread_points(n: int, p: int) -> NDArray[np.float64]:
     """Points spread evenly over the prior ``(n, p)``, always the same (Sobol's sequence)."""
     points = qmc.Sobol(p, scramble=True, rng=np.random.default_rng(0)).random(n)
-    return BOUND * (2.0 * points - 1.0)
+    return ESTIMATION_SETTINGS.bound * (2.0 * points - 1.0)
 
 
 def estimate(
@@ -199,8 +211,8 @@ def estimate(
     noise: NDArray[np.float64],
     *,
     near: NDArray[np.float64] | None = None,
-    candidates: int = CANDIDATES,
-    kept: int = KEPT,
+    candidates: int = ESTIMATION_SETTINGS.candidates,
+    kept: int = ESTIMATION_SETTINGS.kept,
 ) -> Estimates:
     """Find the most probable rig of a family for each record.
 
@@ -218,12 +230,12 @@ def estimate(
         tries.append(search(family, records, near, noise))
     if candidates:
         points = spread_points(candidates, p)
-        first = records.part(HORIZONS[0])
+        first = records.part(ESTIMATION_SETTINGS.horizons[0])
         found = costs(family, first, np.broadcast_to(points, (m, *points.shape)).copy(), noise)
         order = np.argsort(found, axis=1)[:, :kept]
         for k in range(order.shape[1]):
             x = points[order[:, k]]
-            for horizon in HORIZONS[:-1]:
+            for horizon in ESTIMATION_SETTINGS.horizons[:-1]:
                 x, _ = search(family, records.part(horizon), x, noise, steps=12)
             tries.append(search(family, records, x, noise))
     all_x, all_cost = np.stack([x for x, _ in tries]), np.stack([cost for _, cost in tries])

@@ -13,7 +13,11 @@ from numpy.typing import NDArray
 from bench.errors import ParameterError
 from bench.excitation.bayes_factor import Contrast, accumulate_contrast, expected_log_bayes_factor
 from bench.excitation.ensemble import Ensemble
-from bench.excitation.information import STEP, accumulate, noise_vector
+from bench.excitation.information import (
+    INFORMATION_LIMITS,
+    accumulate,
+    noise_vector,
+)
 from bench.excitation.limits import Instrumented, Limits, motion_ratio
 from bench.excitation.prior import Draw, RigPrior
 from bench.excitation.rivals import RivalDraws, Rivals
@@ -81,7 +85,7 @@ class Experiment(Instrumented):
 
     @cached_property
     def _fan(self) -> tuple[Ensemble, NDArray, NDArray]:
-        rigs, places, counts = fan(self.rigs_drawn, STEP)
+        rigs, places, counts = fan(self.rigs_drawn, INFORMATION_LIMITS.step)
         return Ensemble(rigs, self.channels, self.actuators, self.threads), places, counts
 
     def violation(self, controls: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -109,7 +113,7 @@ class Experiment(Instrumented):
             values = np.zeros((n, len(counts)))
             ensemble.spread(
                 lambda a, b: accumulate(
-                    a, b, outputs, many, STEP, weights, measured, fisher, score, square, values
+                    a, b, outputs, many, INFORMATION_LIMITS.step, weights, measured, fisher, score, square, values
                 ),
                 n,
             )  # fmt: skip
@@ -118,5 +122,10 @@ class Experiment(Instrumented):
         contrast = Contrast.zeros(n, pairs, parameters=p)
         at = np.tile(places.reshape(pairs, 2), (n, 1, 1))
         size = np.tile(counts.reshape(pairs, 2), (n, 1, 1))
-        ensemble.spread(lambda a, b: accumulate_contrast(a, b, outputs, at, size, STEP, weights, contrast), n)
+        ensemble.spread(
+            lambda a, b: accumulate_contrast(
+                a, b, outputs, at, size, INFORMATION_LIMITS.step, weights, contrast
+            ),
+            n,
+        )
         return np.mean(np.log1p(np.maximum(expected_log_bayes_factor(contrast), 0.0)), axis=1)

@@ -18,8 +18,16 @@ from bench.excitation.ensemble import Ensemble
 from bench.excitation.prior import Hypothesis
 from bench.excitation.stepping import Packed, integrate_cases
 
-AGREEMENT = 1e-9
-"""Of the largest coefficient: what is affine agrees to 1e-13."""
+
+@dataclass(frozen=True)
+class FamilySettings:
+    """Numbers of `bench.excitation.family`."""
+
+    agreement: float = 1e-9
+    """Of the largest coefficient: what is affine agrees to 1e-13."""
+
+
+SETTINGS = FamilySettings()
 
 _AFFINE = ("constants", "coefficients", "theta")
 
@@ -62,7 +70,9 @@ class Family:
         found = self.packed(check[None])
         for name in _AFFINE:
             given, ours = getattr(packed, name)[-1], getattr(found, name)[0]
-            if np.max(np.abs(given - ours), initial=0.0) > AGREEMENT * np.max(np.abs(given), initial=1e-300):
+            if np.max(np.abs(given - ours), initial=0.0) > SETTINGS.agreement * np.max(
+                np.abs(given), initial=1e-300
+            ):
                 raise ModelError(
                     f"hypothesis '{self.hypothesis.name}' is not affine in its parameters {', '.join(self.hypothesis.names)}; "
                     "stiffnesses, dampings and parameters of laws are, masses and inertias are not: make those known"

@@ -34,9 +34,16 @@ from bench.excitation.products import difference, dot, tile
 from bench.laws.calling import advance, pointer_at
 from bench.rig import Drive, controls_of, simulate_batch
 
-STEP = 1e-4
-"""Step of the finite differences in prior standard deviations. Rounding is a 1e-13th of the records, hence 1e-9 of a
-derivative; truncation is of the order of the step."""
+
+class InformationLimits(NamedTuple):
+    """Numbers of `bench.excitation.information` that compiled code holds."""
+
+    step: float = 1e-4
+    """Step of the finite differences in prior standard deviations. Rounding is a 1e-13th of the records, hence 1e-9 of a derivative;
+    truncation is of the order of the step."""
+
+
+INFORMATION_LIMITS = InformationLimits()
 
 
 class Sensitivity(NamedTuple):
@@ -71,7 +78,7 @@ def sensitivity(
     *,
     channels: tuple[str, ...],
     rng: np.random.Generator | None = None,
-    step: float = STEP,
+    step: float = INFORMATION_LIMITS.step,
     central: bool = False,
     engine: Literal["compiled", "mujoco"] = "compiled",
     threads: int | None = None,

@@ -18,11 +18,18 @@ from numpy.typing import NDArray
 from bench.errors import ParameterError
 from bench.excitation.ensemble import Ensemble
 
-BISECTIONS = 12
-"""Halvings of the interval in which the largest feasible scale lies; it is then met within 0.02 %."""
 
-SMALLEST = 1e-9
-"""Share of the largest command below which a rig that still leaves its limits is taken for unstable."""
+@dataclass(frozen=True)
+class LimitsSettings:
+    """Numbers of `bench.excitation.limits`."""
+
+    bisections: int = 12
+    """Halvings of the interval in which the largest feasible scale lies; it is then met within 0.02 %."""
+    smallest: float = 1e-9
+    """Share of the largest command below which a rig that still leaves its limits is taken for unstable."""
+
+
+SETTINGS = LimitsSettings()
 
 
 @dataclass(frozen=True)
@@ -156,7 +163,7 @@ def feasible(
     held, missed = np.ones(len(full)), np.ones(len(full))
     ratio = motion_ratio(ensemble, limits, full)
     while (over := ratio > 1.0).any():
-        if held.min() < SMALLEST:
+        if held.min() < SETTINGS.smallest:
             raise ParameterError(
                 "drawn rigs leave the limits of stroke or velocity however small the excitation is; "
                 "check their parameters against the time step"
@@ -165,7 +172,7 @@ def feasible(
         held[over] *= np.clip(0.98 / ratio[over], 0.3, 0.98)  # the response is nearly proportional
         ratio[over] = motion_ratio(ensemble, limits, full[over] * held[over, None, None])
     shrunk = held < missed
-    for _ in range(BISECTIONS if exact and shrunk.any() else 0):
+    for _ in range(SETTINGS.bisections if exact and shrunk.any() else 0):
         middle = 0.5 * (held[shrunk] + missed[shrunk])
         inside = motion_ratio(ensemble, limits, full[shrunk] * middle[:, None, None]) <= 1.0
         held[shrunk] = np.where(inside, middle, held[shrunk])

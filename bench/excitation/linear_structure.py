@@ -10,6 +10,7 @@ own kernels, some fifty times as fast as the model it was read from.
 from __future__ import annotations
 
 import copy
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import mujoco
@@ -21,11 +22,18 @@ from bench.errors import ModelError, UnknownNameError
 from bench.laws.along import force_along
 from bench.rig import Rig
 
-TOLERANCE = 1e-9
-"""Largest error of the affine map at random states, relative to the largest value there; what is linear passes at 1e-13."""
 
-STATES = 6
-AMPLITUDE = 0.3  # [m or rad]: large enough for the products of rotations to show
+@dataclass(frozen=True)
+class LinearStructureSettings:
+    """Numbers of `bench.excitation.linear_structure`."""
+
+    tolerance: float = 1e-9
+    """Largest error of the affine map at random states, relative to the largest value there; what is linear passes at 1e-13."""
+    states: int = 6
+    amplitude: float = 0.3
+
+
+SETTINGS = LinearStructureSettings()
 
 TRACKED = (
     mujoco.mjtState.mjSTATE_TIME
@@ -151,8 +159,8 @@ def _check(rig: Rig, structure: LinearStructure, columns: NDArray) -> None:
     model, n_actuators = rig.model, len(rig.actuators)
     data = mujoco.MjData(model)
     rng = np.random.default_rng(0)  # the states of a check: nothing of a result depends on them
-    for _ in range(STATES):
-        inputs = rng.uniform(-AMPLITUDE, AMPLITUDE, 3 * model.nv + n_actuators)
+    for _ in range(SETTINGS.states):
+        inputs = rng.uniform(-SETTINGS.amplitude, SETTINGS.amplitude, 3 * model.nv + n_actuators)
         inputs[2 * model.nv + n_actuators :] = 0.0
         with native.running(model):
             truth = _respond(model, data, inputs, n_actuators)
@@ -165,7 +173,7 @@ def _check(rig: Rig, structure: LinearStructure, columns: NDArray) -> None:
         ):
             error = np.abs(table[:, 0] + table[:, 1:] @ inputs - expected)
             scale = np.max(np.abs(table[:, 1:]) @ np.abs(inputs), initial=1e-12)
-            if np.any(error > TOLERANCE * scale):
+            if np.any(error > SETTINGS.tolerance * scale):
                 raise ModelError(
                     f"the {what} of rig '{rig.name}' are not linear around its elements (off by {error.max():.3g} at a random "
                     "state); only MuJoCo simulates it (engine='mujoco')"

@@ -35,13 +35,21 @@ from bench.excitation.rivals import Rivals
 from bench.signals import PRBS, Excitation, Multisine, Signal, Sweep
 from bench.signals.record import Record
 
-CANDIDATES = 32
-LINES = 20
-"""Spectral lines a designed multisine has at most, spread evenly over the logarithm of frequency."""
-POPULATION = 16
-START_SPREAD = 0.3  # of coefficients of order one
-ROUNDS = 2
-"""Searches of half the evaluations each, from the best so far; a second one from a random start never came as far."""
+
+@dataclass(frozen=True)
+class MethodsSettings:
+    """Numbers of `bench.excitation.methods`."""
+
+    candidates: int = 32
+    lines: int = 20
+    """Spectral lines a designed multisine has at most, spread evenly over the logarithm of frequency."""
+    population: int = 16
+    start_spread: float = 0.3
+    rounds: int = 2
+    """Searches of half the evaluations each, from the best so far; a second one from a random start never came as far."""
+
+
+SETTINGS = MethodsSettings()
 
 
 @dataclass(frozen=True)
@@ -98,7 +106,7 @@ def design(
     if method == "d_optimal":
         controls, count = _d_optimal(experiment, n, band, rng, evaluations, progress)
     elif method == "random_multisine":
-        controls, count = _best_random(experiment, n, band, rng), CANDIDATES
+        controls, count = _best_random(experiment, n, band, rng), SETTINGS.candidates
     else:
         controls, count = _signals(partial(_SIMPLE[method], band), experiment, n, rng), 1
     controls = feasible(experiment.watched, experiment.limits, controls[None])
@@ -188,13 +196,13 @@ def _best_random(
     experiment: Experiment, n: int, band: tuple[float, float], rng: np.random.Generator
 ) -> NDArray[np.float64]:
     make = partial(_multisine, "random", band)
-    candidates = np.stack([_signals(make, experiment, n, rng) for _ in range(CANDIDATES)])
+    candidates = np.stack([_signals(make, experiment, n, rng) for _ in range(SETTINGS.candidates)])
     candidates = feasible(experiment.watched, experiment.limits, candidates, exact=False)
     return candidates[int(np.argmax(experiment.merit(candidates)))]
 
 
 def spectral_lines(band: tuple[float, float], duration: float) -> NDArray[np.float64]:
-    """Frequencies of a designed multisine [Hz]: harmonics of one over the duration, at most `LINES`, evenly over the octaves.
+    """Frequencies of a designed multisine [Hz]: harmonics of one over the duration, at most `lines`, evenly over the octaves.
 
     Raises:
         ParameterError: The band holds no harmonic.
@@ -204,7 +212,7 @@ def spectral_lines(band: tuple[float, float], duration: float) -> NDArray[np.flo
         raise ParameterError(
             f"no harmonic of {1.0 / duration:g} Hz lies in the band {band} Hz; widen it or test longer"
         )
-    numbers = np.unique(np.round(np.geomspace(max(first, 1), last, LINES)).astype(int))
+    numbers = np.unique(np.round(np.geomspace(max(first, 1), last, SETTINGS.lines)).astype(int))
     return numbers / duration
 
 
@@ -228,23 +236,23 @@ def _d_optimal(
     others = feasible(experiment.watched, experiment.limits, others, exact=False)
     merits = experiment.merit(others)
     best, best_merit = others[int(np.argmax(merits))], float(merits.max())
-    count = CANDIDATES + len(_SIMPLE)
-    for _ in range(ROUNDS):
+    count = SETTINGS.candidates + len(_SIMPLE)
+    for _ in range(SETTINGS.rounds):
         near = np.linalg.lstsq(basis, best, rcond=None)[0]  # the best so far, as far as these lines hold it
         start = near / max(float(np.std(near)), 1e-12)
         search = CMA(
             mean=start.ravel(),
-            sigma=START_SPREAD,
-            population_size=POPULATION,
+            sigma=SETTINGS.start_spread,
+            population_size=SETTINGS.population,
             seed=int(rng.integers(2**31)),
         )
-        for _ in range(max(1, (evaluations // ROUNDS) // POPULATION)):
-            asked = [search.ask() for _ in range(POPULATION)]
+        for _ in range(max(1, (evaluations // SETTINGS.rounds) // SETTINGS.population)):
+            asked = [search.ask() for _ in range(SETTINGS.population)]
             controls = np.stack([basis @ x.reshape(shape) for x in asked])
             controls = feasible(experiment.watched, experiment.limits, controls, exact=False)
             merits = experiment.merit(controls)
             search.tell([(x, -float(merit)) for x, merit in zip(asked, merits, strict=True)])
-            count += POPULATION
+            count += SETTINGS.population
             top = int(np.argmax(merits))
             if merits[top] > best_merit:
                 best, best_merit = controls[top], float(merits[top])

@@ -29,10 +29,18 @@ from bench.excitation.prior import RigPrior
 from bench.excitation.sequential import Decide, SequentialPlanner
 from bench.excitation.station import Desk, Station
 
-POPULATION = 16
-MARGIN = 0.94
-"""Of the limits of stroke and velocity that a plan may use on the rig as found."""
-TRIES = 4  # scalings of a candidate until its motion fits
+
+@dataclass(frozen=True)
+class PlannerSettings:
+    """Numbers of `bench.excitation.planner`."""
+
+    population: int = 16
+    margin: float = 0.94
+    """Of the limits of stroke and velocity that a plan may use on the rig as found."""
+    tries: int = 4
+
+
+SETTINGS = PlannerSettings()
 
 
 class Plan(NamedTuple):
@@ -53,7 +61,7 @@ class Planner(SequentialPlanner):
         station: What is measured and allowed.
         opening: Commands ``(n_samples, n_actuators)`` of an open-loop design, used until the first decision.
         decisions: Times of decisions, as shares of the test.
-        generations: Generations of `POPULATION` candidates that a decision weighs.
+        generations: Generations of `population` candidates that a decision weighs.
     """
 
     prior: RigPrior
@@ -121,9 +129,9 @@ class Planner(SequentialPlanner):
         size = max(float(np.std(start)), 1e-9)
         errors, fitted = self._weigh(family, x, controls, rest[None])
         best, least = fitted[0], float(errors[0])
-        search = CMA(mean=start.ravel() / size, sigma=0.6, population_size=POPULATION, seed=seed)
+        search = CMA(mean=start.ravel() / size, sigma=0.6, population_size=SETTINGS.population, seed=seed)
         for _ in range(self.generations):
-            asked = [search.ask() for _ in range(POPULATION)]
+            asked = [search.ask() for _ in range(SETTINGS.population)]
             rests = np.stack([basis @ (size * z).reshape(start.shape) for z in asked])
             errors, fitted = self._weigh(family, x, controls, rests)
             search.tell([(z, float(np.log(e))) for z, e in zip(asked, errors, strict=True)])
@@ -158,10 +166,10 @@ class Planner(SequentialPlanner):
         whole[:, :begin] = controls[:begin]
         point = np.broadcast_to(x, (k, 1, len(x))).copy()
         over = np.ones(k, dtype=bool)
-        for _ in range(TRIES):
+        for _ in range(SETTINGS.tries):
             whole[:, begin:] = rests
             motion = family.record(point[over], whole[over])[:, 0, begin:]
-            reached = np.max(np.nan_to_num(self.desk.reached(motion), nan=np.inf), axis=1) / MARGIN
+            reached = np.max(np.nan_to_num(self.desk.reached(motion), nan=np.inf), axis=1) / SETTINGS.margin
             wide = np.flatnonzero(over)[reached > 1.0]
             over[:] = False
             over[wide] = True

@@ -26,14 +26,23 @@ from bench.files import write_bytes
 
 FOLDER = Path(__file__).resolve().parent.parent / "_data" / "policies"
 FORMAT = 1
-LARGEST = 64 * 2**20
-"""Bytes of all arrays of a policy at most: networks of some millions of weights, which no laboratory computer runs in a window."""
 _UNREADABLE = (
     ValueError, EOFError, OSError, RuntimeError, NotImplementedError, MemoryError, zipfile.BadZipFile, zlib.error
 )  # fmt: skip
 """What NumPy and zipfile raise for archives that are damaged, encrypted, or packed in a way they do not know."""
-CLIP = 10.0
-"""Normalised observations are cut off there, as stable-baselines3's `VecNormalize` does."""
+
+
+@dataclass(frozen=True)
+class PolicySettings:
+    """Numbers of `bench.excitation.policy`."""
+
+    largest: int = 64 * 2**20
+    """Bytes of all arrays of a policy at most: networks of some millions of weights, which no laboratory computer runs in a window."""
+    clip: float = 10.0
+    """Normalised observations are cut off there, as stable-baselines3's `VecNormalize` does."""
+
+
+SETTINGS = PolicySettings()
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +113,7 @@ class Policy:
             )
         for name, array in named.items():
             # observations are cut off at CLIP, hidden values at 1
-            sums = np.sum(np.abs(array, dtype=np.float64), axis=-1) * CLIP if array.ndim else array
+            sums = np.sum(np.abs(array, dtype=np.float64), axis=-1) * SETTINGS.clip if array.ndim else array
             if not np.all(np.asarray(sums) <= np.finfo(np.float32).max):
                 raise ParameterError(
                     f"{name} of policy '{self.name}' hold NaN, infinity or numbers too large; finite numbers are expected"
@@ -129,7 +138,7 @@ class Policy:
             raise ParameterError(
                 f"policy '{self.name}' was trained on observations of length {len(self.mean)}; {observation.shape} came"
             )
-        value = np.clip((observation - self.mean) / self.deviation, -CLIP, CLIP)
+        value = np.clip((observation - self.mean) / self.deviation, -SETTINGS.clip, SETTINGS.clip)
         last = len(self.weights) - 1
         for i, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
             value = value @ weight.T + bias
@@ -205,11 +214,11 @@ class Policy:
 
 
 def _arrays(path: Path) -> dict[str, NDArray[Any]]:
-    """The arrays of an archive, none of which may claim more than the archive holds, nor all of them more than `LARGEST`."""
+    """The arrays of an archive, none of which may claim more than the archive holds, nor all of them more than `window_largest`."""
     arrays: dict[str, NDArray[Any]] = {}
     with zipfile.ZipFile(path) as archive:
-        if sum(member.file_size for member in archive.infolist()) > LARGEST:
-            raise ValueError(f"its arrays take more than {LARGEST} bytes")
+        if sum(member.file_size for member in archive.infolist()) > SETTINGS.largest:
+            raise ValueError(f"its arrays take more than {SETTINGS.largest} bytes")
         for member in archive.infolist():
             content = archive.read(member)
             stream = io.BytesIO(content)

@@ -41,12 +41,22 @@ from bench.excitation.prior import Hypothesis, RigPrior, Uncertain
 from bench.excitation.rivals import Rivals
 from bench.excitation.schema import ExperimentEntry, RivalEntry
 from bench.rig import Rig
-from bench.signals.base import MAX_SAMPLES
+from bench.signals.base import (
+    BASE_SETTINGS,
+)
 
-REFERENCE_SHARE = 0.375
-"""Of the duration: the test under which rivals imitate each other."""
-FACTOR = 2.0
-"""Range of a parameter about its value in the file, both ways, where no range is given."""
+
+@dataclass(frozen=True)
+class RequestSettings:
+    """Numbers of `bench.excitation.request`."""
+
+    reference_share: float = 0.375
+    """Of the duration: the test under which rivals imitate each other."""
+    factor: float = 2.0
+    """Range of a parameter about its value in the file, both ways, where no range is given."""
+
+
+SETTINGS = RequestSettings()
 
 
 @dataclass(frozen=True)
@@ -83,9 +93,10 @@ def request(
         ParameterError: The rig has nothing that is uncertain, or the test has too many steps.
     """
     asked = table if isinstance(table, ExperimentEntry) else checked(ExperimentEntry, table)
-    if not asked.duration <= MAX_SAMPLES * rig.timestep:
+    if not asked.duration <= BASE_SETTINGS.max_samples * rig.timestep:
         raise ParameterError(
-            f"{asked.duration:g} s are more than {MAX_SAMPLES} steps of rig '{rig.name}'; shorten the test or lengthen the timestep"
+            f"{asked.duration:g} s are more than {BASE_SETTINGS.max_samples} steps of rig '{rig.name}'; "
+            "shorten the test or lengthen the timestep"
         )
     limits = Limits(asked.force, asked.energy, asked.stroke, asked.velocity)
     for name in limits.actuators:
@@ -103,7 +114,7 @@ def request(
             asked.noise,
             limits,
             pairs=max(1, draws // 2),
-            duration=REFERENCE_SHARE * asked.duration,
+            duration=SETTINGS.reference_share * asked.duration,
             band=asked.band,
             rng=rng,
         )
@@ -131,7 +142,7 @@ def _uncertain(rig: Rig, ranges: Mapping[str, tuple[float, float]]) -> tuple[Unc
     for element in rig.elements:
         for parameter in element.law.parameters:
             value = element.parameters[parameter.name]
-            low, high = sorted((value / FACTOR, value * FACTOR))
+            low, high = sorted((value / SETTINGS.factor, value * SETTINGS.factor))
             low, high = max(low, parameter.bounds[0]), min(high, parameter.bounds[1])
             if value != 0.0 and low < high:
                 scale = "logarithmic" if low > 0.0 else "linear"

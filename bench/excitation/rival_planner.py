@@ -27,28 +27,43 @@ from numpy.typing import NDArray
 
 from bench.errors import ParameterError
 from bench.excitation.bayes_factor import Contrast, accumulate_contrast, weigh_contrast
-from bench.excitation.estimation import BOUND, Records, estimate
+from bench.excitation.estimation import (
+    ESTIMATION_SETTINGS,
+    Records,
+    estimate,
+)
 from bench.excitation.family import Family, fans
-from bench.excitation.information import STEP
+from bench.excitation.information import (
+    INFORMATION_LIMITS,
+)
 from bench.excitation.rivals import RivalDraws, Rivals
 from bench.excitation.sequential import Decide, SequentialPlanner
 from bench.excitation.shaping import Shaping
 from bench.excitation.station import Desk, Station
 from bench.excitation.stepping import integrate_cases
 
-POPULATION = 16
-FIRST_GENERATIONS = 60  # of the first plan, which is made once for all rigs
-MARGIN = 0.92
-"""Of the limits of stroke and velocity that a plan may use on the rigs it is made for."""
-PARTS = 4
-"""Ends of equal parts of the horizon at which the expected log Bayes factor counts."""
-SETTLED = 2.0 * math.log(99.0)
-"""Log Bayes factor [nat] from which nothing is planned any more; what was planned before is run to its end."""
-STRETCH = 0.15
-"""Shortest interval between decisions, as a share of the time since the beginning: late ones change little."""
-SPREAD = 0.5  # of the search about its start, in units of the largest force
-EXCESS = 10.0  # nat a plan loses for leaving a limit by all of it
-TONES, PHASES = 12, 6
+
+@dataclass(frozen=True)
+class RivalPlannerSettings:
+    """Numbers of `bench.excitation.rival_planner`."""
+
+    population: int = 16
+    first_generations: int = 60
+    margin: float = 0.92
+    """Of the limits of stroke and velocity that a plan may use on the rigs it is made for."""
+    parts: int = 4
+    """Ends of equal parts of the horizon at which the expected log Bayes factor counts."""
+    settled: float = 2.0 * math.log(99.0)
+    """Log Bayes factor [nat] from which nothing is planned any more; what was planned before is run to its end."""
+    stretch: float = 0.15
+    """Shortest interval between decisions, as a share of the time since the beginning: late ones change little."""
+    spread: float = 0.5
+    excess: float = 10.0
+    tones: int = 12
+    phases: int = 6
+
+
+SETTINGS = RivalPlannerSettings()
 
 
 class RivalPlan(NamedTuple):
@@ -70,7 +85,7 @@ class RivalPlanner(SequentialPlanner):
         interval: Time between decisions at first, in periods of the highest frequency of the station's band.
         horizon: Time that a plan looks ahead, in the same periods.
         knot: Time between knots of the force, in the same periods.
-        generations: Generations of `POPULATION` candidates that a decision weighs.
+        generations: Generations of `population` candidates that a decision weighs.
         samples: Pairs of rigs that a decision is made for besides the two fits.
 
     Raises:
@@ -107,7 +122,7 @@ class RivalPlanner(SequentialPlanner):
     def _edges(self) -> list[int]:
         edges, n = [0], self.station.n_samples
         while edges[-1] < n:
-            pause = max(self._samples(self.interval), STRETCH * edges[-1])
+            pause = max(self._samples(self.interval), SETTINGS.stretch * edges[-1])
             edges.append(min(edges[-1] + math.ceil(pause - 1e-9), n))
         return edges
 
@@ -139,12 +154,12 @@ class RivalPlanner(SequentialPlanner):
             odds = fits[0].log_evidence - fits[1].log_evidence
             for i, log_odds in zip(undecided.tolist(), odds.tolist(), strict=True):
                 predicted = 0.0
-                if abs(log_odds) < SETTLED:
+                if abs(log_odds) < SETTINGS.settled:
                     pairs = self._possible(near[0][i], near[1][i], controls[i, :begin], seed + i)
                     plan = self._plan(pairs, controls[i], begin, seed + i, self.generations)
                     controls[i, begin:], predicted = plan
                 tell(i, RivalPlan(begin * self.station.timestep, log_odds, predicted))
-            undecided = undecided[np.abs(odds) < SETTLED]
+            undecided = undecided[np.abs(odds) < SETTINGS.settled]
 
         return decide
 
@@ -153,7 +168,7 @@ class RivalPlanner(SequentialPlanner):
         """The first plan and its worth, the same for all rigs."""
         first, second = (np.stack([pair[k].coordinates for pair in self.draws]) for k in range(2))
         rest = np.zeros((self.station.n_samples, len(self.station.actuators)))
-        return self._plan((first, second), rest, 0, 0, FIRST_GENERATIONS)
+        return self._plan((first, second), rest, 0, 0, SETTINGS.first_generations)
 
     def _possible(
         self, first: NDArray[np.float64], second: NDArray[np.float64], past: NDArray[np.float64], seed: int
@@ -172,9 +187,15 @@ class RivalPlanner(SequentialPlanner):
         for k in range(self.samples):
             lead, other = k % 2, 1 - k % 2
             away = np.linalg.solve(np.linalg.cholesky(inner[lead]).T, rng.standard_normal(p[lead]))
-            points[lead].append(np.clip(fits[lead] + away, -BOUND, BOUND))
+            points[lead].append(
+                np.clip(fits[lead] + away, -ESTIMATION_SETTINGS.bound, ESTIMATION_SETTINGS.bound)
+            )
             moved = points[lead][-1] - fits[lead]
-            points[other].append(np.clip(fits[other] + across[lead] @ moved, -BOUND, BOUND))
+            points[other].append(
+                np.clip(
+                    fits[other] + across[lead] @ moved, -ESTIMATION_SETTINGS.bound, ESTIMATION_SETTINGS.bound
+                )
+            )
         return np.stack(points[0]), np.stack(points[1])
 
     def _plan(
@@ -206,17 +227,17 @@ class RivalPlanner(SequentialPlanner):
 
         def worth(candidates: NDArray[np.float64]) -> NDArray[np.float64]:
             told, reached = look.weigh(commands(candidates))
-            over = np.minimum(np.maximum(reached / MARGIN - 1.0, 0.0), 1.0).sum(axis=1)
-            return told - EXCESS * over
+            over = np.minimum(np.maximum(reached / SETTINGS.margin - 1.0, 0.0), 1.0).sum(axis=1)
+            return told - SETTINGS.excess * over
 
         before = controls[begin + part - 1 :: part][:knots] / self.desk.force
         before = np.pad(before, ((0, knots - len(before)), (0, 0)))
         starts = np.concatenate([before.reshape(1, -1), self._tones(knots, part)])
         values = worth(starts)
         best, most = starts[int(np.argmax(values))], float(values.max())
-        search = CMA(mean=best.copy(), sigma=SPREAD, population_size=POPULATION, seed=seed)
+        search = CMA(mean=best.copy(), sigma=SETTINGS.spread, population_size=SETTINGS.population, seed=seed)
         for _ in range(generations):
-            asked = [search.ask() for _ in range(POPULATION)]
+            asked = [search.ask() for _ in range(SETTINGS.population)]
             values = worth(np.stack(asked))
             search.tell([(z, -float(value)) for z, value in zip(asked, values, strict=True)])
             if values.max() > most:
@@ -236,8 +257,8 @@ class RivalPlanner(SequentialPlanner):
         """Sines over the band at two levels as starts of a search, the same on all actuators, and nothing at all."""
         station = self.station
         clock = (1.0 + np.arange(knots)) * (part * station.timestep)
-        angle = 2.0 * np.pi * np.outer(np.geomspace(*station.band, TONES), clock)
-        phase = 2.0 * np.pi * np.arange(PHASES) / PHASES
+        angle = 2.0 * np.pi * np.outer(np.geomspace(*station.band, SETTINGS.tones), clock)
+        phase = 2.0 * np.pi * np.arange(SETTINGS.phases) / SETTINGS.phases
         sines = np.sin(angle[:, None] + phase[:, None]).reshape(-1, knots)
         levels = np.concatenate([1.6 * sines, 0.5 * sines, np.zeros((1, knots))])
         return np.clip(np.repeat(levels, len(self.desk.force), axis=1), -1.0, 1.0)
@@ -261,7 +282,7 @@ class _Outlook:
         self._clock = 0.0
         n, sizes = len(pairs[0]), [1 + family.n_parameters for family in families]
         self._packed = [
-            family.packed(fans(x, STEP).reshape(-1, family.n_parameters))
+            family.packed(fans(x, INFORMATION_LIMITS.step).reshape(-1, family.n_parameters))
             for family, x in zip(families, pairs, strict=True)
         ]
         self._states = [packed.start[None] for packed in self._packed]
@@ -281,7 +302,7 @@ class _Outlook:
             controls: Commands ``(n_cases, n, n_actuators)``.
 
         Returns:
-            Mean of ``log(1 + K)`` over the pairs and the ends of `PARTS` parts, K the expected log Bayes factor [nat] of the
+            Mean of ``log(1 + K)`` over the pairs and the ends of `clipped_parts` parts, K the expected log Bayes factor [nat] of the
             record up to there ``(n_cases,)``; largest stroke and velocity of any rig, as fractions of the limits ``(n_cases, 2)``.
         """
         cases, n, _ = controls.shape
@@ -290,11 +311,11 @@ class _Outlook:
         reached = self._desk.reached(drawn.reshape(-1, *drawn.shape[2:])).reshape(cases, -1, 2)
         sums = Contrast(*(np.repeat(array, cases, axis=0) for array in self.sums))
         values, told = np.zeros(sums.square.shape), np.zeros(cases)
-        for a, b in pairwise(np.linspace(0, n, PARTS + 1).astype(int)):
+        for a, b in pairwise(np.linspace(0, n, SETTINGS.parts + 1).astype(int)):
             self._book(np.ascontiguousarray(outputs[:, :, a:b]), sums)
             weigh_contrast(0, cases, sums, values)
             told += np.mean(np.log1p(np.maximum(np.nan_to_num(values), 0.0)), axis=1)
-        return told / PARTS, np.nan_to_num(reached, nan=np.inf).max(axis=1)
+        return told / SETTINGS.parts, np.nan_to_num(reached, nan=np.inf).max(axis=1)
 
     def _records(
         self, controls: NDArray[np.float64]
@@ -317,4 +338,6 @@ class _Outlook:
         """Add records to the sums of their cases."""
         cases = len(outputs)
         places, counts = (np.repeat(array, cases, axis=0) for array in (self._places, self._counts))
-        accumulate_contrast(0, cases, outputs, places, counts, STEP, 1.0 / self._desk.noise, sums)
+        accumulate_contrast(
+            0, cases, outputs, places, counts, INFORMATION_LIMITS.step, 1.0 / self._desk.noise, sums
+        )

@@ -10,14 +10,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.excitation.ensemble import Ensemble
-from bench.excitation.information import STEP
+from bench.excitation.information import (
+    INFORMATION_LIMITS,
+)
 from bench.excitation.prior import Draw, Hypothesis, RigPrior
 
-ROUNDS = 20
-SETTLED = 1e-6
-"""Steps of a fit, rejected ones included, and the relative change of the misfit at which it ends before."""
 
-BOUND = math.sqrt(3.0)  # the range of a standardised coordinate
+@dataclass(frozen=True)
+class RivalsSettings:
+    """Numbers of `bench.excitation.rivals`."""
+
+    rounds: int = 20
+    settled: float = 1e-6
+    """Steps of a fit, rejected ones included, and the relative change of the misfit at which it ends before."""
+    bound: float = math.sqrt(3.0)
+
+
+SETTINGS = RivalsSettings()
 
 
 class RivalDraws(NamedTuple):
@@ -108,22 +117,22 @@ def imitate(
 
     def misfit(coordinates: NDArray, *, derive: bool) -> tuple[NDArray, NDArray]:
         draw = hypothesis.at(coordinates)
-        rigs = (draw.rig, *draw.perturbed(STEP)) if derive else (draw.rig,)
+        rigs = (draw.rig, *draw.perturbed(INFORMATION_LIMITS.step)) if derive else (draw.rig,)
         outputs = Ensemble(rigs, channels, actuators).record(reference[None])[0]
         whitened = (outputs / noise).reshape(len(rigs), -1)
         residual = (record / noise).ravel() - whitened[0]
-        return residual, ((whitened[1:] - whitened[0]) / STEP).T
+        return residual, ((whitened[1:] - whitened[0]) / INFORMATION_LIMITS.step).T
 
     residual, jacobian = misfit(x, derive=True)
     cost = residual @ residual + x @ x
     damping = 1.0
-    for _ in range(ROUNDS):
+    for _ in range(SETTINGS.rounds):
         normal = jacobian.T @ jacobian + np.eye(x.size)
         step = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), jacobian.T @ residual - x)
-        trial = np.clip(x + step, -BOUND, BOUND)
+        trial = np.clip(x + step, -SETTINGS.bound, SETTINGS.bound)
         new, _ = misfit(trial, derive=False)
         new_cost = new @ new + trial @ trial
-        settled = abs(cost - new_cost) < SETTLED * cost
+        settled = abs(cost - new_cost) < SETTINGS.settled * cost
         if new_cost < cost:
             x, cost, damping = trial, new_cost, damping / 5.0
             residual, jacobian = misfit(x, derive=True)

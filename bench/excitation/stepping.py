@@ -16,11 +16,19 @@ from numpy.typing import NDArray
 from bench.laws.base import MAX_COORDINATES
 from bench.laws.calling import advance, call_kernel, load_int, pointer_at, stack_array
 
-MOTION, UNDRIVEN = -1, -2
-"""Marks of a law's coordinate that is a motion, or an input that gets no command."""
 
-MAX_STATES, MAX_VALUES = 16, 32
-"""Hidden states; states, force and commands together: the most that the loop of a single element has room for."""
+class SteppingLimits(NamedTuple):
+    """Numbers of `bench.excitation.stepping` that compiled code holds."""
+
+    motion: int = -1
+    undriven: int = -2
+    """Marks of a law's coordinate that is a motion, or an input that gets no command."""
+    max_states: int = 16
+    max_values: int = 32
+    """Hidden states; states, force and commands together: the most that the loop of a single element has room for."""
+
+
+STEPPING_LIMITS = SteppingLimits()
 
 
 class Packed(NamedTuple):
@@ -75,7 +83,7 @@ def _derivative(t, x, nv, nx, n_elements, n_coordinates, n_theta, table, rows, c
             velocity = 0.0
             if source >= 0:
                 position = u[source]
-            elif source == MOTION:
+            elif source == STEPPING_LIMITS.motion:
                 for i in range(nv):
                     position += row[i] * x[i]
                     velocity += row[i] * x[nv + i]
@@ -86,7 +94,7 @@ def _derivative(t, x, nv, nx, n_elements, n_coordinates, n_theta, table, rows, c
         states = advance(x, first)
         call_kernel(force, t, scratch, lv, states, parameters, lf)
         for j in range(count):
-            if load_int(inputs + 8 * (n_coordinates * k + j)) == MOTION:
+            if load_int(inputs + 8 * (n_coordinates * k + j)) == STEPPING_LIMITS.motion:
                 row = advance(motion, nv * (n_coordinates * k + j))
                 for i in range(nv):
                     tau[i] -= row[i] * lf[j]
@@ -186,8 +194,12 @@ def _advance_single(case, m, d, run):  # noqa: PLR0912  (one compiled loop)
     coefficients = pointer_at(p.coefficients.ctypes.data + 8 * p.coefficients.shape[1] * d)
     rows, columns = p.rows.ctypes.data, p.columns.ctypes.data
     q, v, f = stack_array(1), stack_array(1), stack_array(1)
-    z, rate, total = stack_array(MAX_STATES), stack_array(MAX_STATES), stack_array(MAX_STATES)
-    values = stack_array(MAX_VALUES)
+    z, rate, total = (
+        stack_array(STEPPING_LIMITS.max_states),
+        stack_array(STEPPING_LIMITS.max_states),
+        stack_array(STEPPING_LIMITS.max_states),
+    )
+    values = stack_array(STEPPING_LIMITS.max_values)
     u = advance(values, nx + 1)
     hidden = pointer_at(states.ctypes.data + 8 * (nx * (m + states.shape[1] * case) + 2))
     y = pointer_at(outputs.ctypes.data + 8 * nc * n_steps * (m + outputs.shape[1] * case))
@@ -248,11 +260,15 @@ def advance_cases(first, last, run):
     commands = advance(state, nx + nv)
     rates = advance(commands, nu)
     work = _Work(state, commands, rates, advance(rates, 4 * nx))
-    single = p.motion.shape[1:] == (1, 1, 1) and nx <= 2 + MAX_STATES and nx + 1 + nu <= MAX_VALUES
+    single = (
+        p.motion.shape[1:] == (1, 1, 1)
+        and nx <= 2 + STEPPING_LIMITS.max_states
+        and nx + 1 + nu <= STEPPING_LIMITS.max_values
+    )
     for case in range(first, last):
         for m in range(run.counts[case]):
             d = run.members[case, m]
-            if single and p.inputs[d, 0, 0] == MOTION:
+            if single and p.inputs[d, 0, 0] == STEPPING_LIMITS.motion:
                 _advance_single(case, m, d, run)
             elif nv == 4:  # known to the compiler: its loops are unrolled
                 _advance_any(case, m, d, run, work, 4)

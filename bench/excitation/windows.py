@@ -17,7 +17,10 @@ from numpy.typing import NDArray
 
 from bench.excitation.bayes_factor import Contrast, accumulate_contrast, weigh_contrast
 from bench.excitation.ensemble import Ensemble
-from bench.excitation.information import STEP, accumulate
+from bench.excitation.information import (
+    INFORMATION_LIMITS,
+    accumulate,
+)
 from bench.excitation.stepping import Run, advance_cases
 from bench.laws.calling import claim
 
@@ -37,7 +40,19 @@ def _advance_prior(counter, run, counts, weights, fisher, score, square, values)
     case = claim(counter)
     while case < run.controls.shape[0]:
         advance_cases(case, case + 1, run)
-        accumulate(case, case + 1, run.outputs, counts, STEP, weights, None, fisher, score, square, values)
+        accumulate(
+            case,
+            case + 1,
+            run.outputs,
+            counts,
+            INFORMATION_LIMITS.step,
+            weights,
+            None,
+            fisher,
+            score,
+            square,
+            values,
+        )
         case = claim(counter)
 
 
@@ -47,7 +62,9 @@ def _advance_rivals(counter, run, places, counts, weights, contrast, values):
     case = claim(counter)
     while case < run.controls.shape[0]:
         advance_cases(case, case + 1, run)
-        accumulate_contrast(case, case + 1, run.outputs, places, counts, STEP, weights, contrast)
+        accumulate_contrast(
+            case, case + 1, run.outputs, places, counts, INFORMATION_LIMITS.step, weights, contrast
+        )
         weigh_contrast(case, case + 1, contrast, values)
         case = claim(counter)
 

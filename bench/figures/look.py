@@ -5,8 +5,9 @@ from __future__ import annotations
 import base64
 import io
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -23,37 +24,53 @@ REFERENCE_COLOUR = "#1a1a1a"
 COLOURS = ("#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 """Colours of the variants beside the reference (Okabe & Ito 2008, "Color Universal Design")."""
 
-DASHES = ("-", (0, (5, 1.2)), (0, (3, 1, 1, 1)), (0, (1, 1)), (0, (7, 2)), (0, (4, 1, 1, 1, 1, 1)))
-MAX_POINTS = 20_000
-"""Most points of a drawn line; a longer record is thinned to extremes of short windows, which no eye can tell."""
 
-_STYLE: dict[Any, Any] = {
-    "font.size": 9.0,
-    "axes.titlesize": 10.0,
-    "axes.titlelocation": "left",
-    "axes.labelsize": 9.0,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "axes.formatter.limits": (-3, 4),
-    "axes.formatter.use_mathtext": True,
-    "grid.color": "#dddddd",
-    "grid.linewidth": 0.6,
-    "lines.linewidth": 1.2,
-    "legend.frameon": False,
-    "legend.fontsize": 8.5,
-    "figure.dpi": 110.0,
-    "savefig.dpi": 150.0,
-    "svg.fonttype": "path",
-    "svg.hashsalt": "jointbench",  # the same figure gives the same file
-}
+@dataclass(frozen=True)
+class LookSettings:
+    """Numbers of `bench.figures.look`."""
+
+    dashes: tuple[Any, ...] = (
+        "-",
+        (0, (5, 1.2)),
+        (0, (3, 1, 1, 1)),
+        (0, (1, 1)),
+        (0, (7, 2)),
+        (0, (4, 1, 1, 1, 1, 1)),
+    )
+    max_points: int = 20_000
+    """Most points of a drawn line; a longer record is thinned to extremes of short windows, which no eye can tell."""
+    style: Mapping[str, Any] = field(
+        default_factory=lambda: {
+            "font.size": 9.0,
+            "axes.titlesize": 10.0,
+            "axes.titlelocation": "left",
+            "axes.labelsize": 9.0,
+            "axes.spines.top": False,
+            "axes.spines.right": False,
+            "axes.grid": True,
+            "axes.axisbelow": True,
+            "axes.formatter.limits": (-3, 4),
+            "axes.formatter.use_mathtext": True,
+            "grid.color": "#dddddd",
+            "grid.linewidth": 0.6,
+            "lines.linewidth": 1.2,
+            "legend.frameon": False,
+            "legend.fontsize": 8.5,
+            "figure.dpi": 110.0,
+            "savefig.dpi": 150.0,
+            "svg.fonttype": "path",
+            "svg.hashsalt": "jointbench",  # the same figure gives the same file
+        }
+    )
+
+
+SETTINGS = LookSettings()
 
 
 @contextmanager
 def style() -> Iterator[None]:
     """The bench's look, for code that draws its own axes: matplotlib's settings are restored afterwards."""
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(SETTINGS.style):
         yield
 
 
@@ -68,14 +85,14 @@ def look(number: int) -> dict[str, Any]:
     if number == 0:
         return {"color": REFERENCE_COLOUR, "linewidth": 2.2, "alpha": 0.75}
     index = (number - 1) % len(COLOURS)
-    return {"color": COLOURS[index], "linewidth": 1.1, "linestyle": DASHES[index]}
+    return {"color": COLOURS[index], "linewidth": 1.1, "linestyle": SETTINGS.dashes[index]}
 
 
 def thin(x: NDArray, y: NDArray) -> tuple[NDArray, NDArray]:
-    """At most about `MAX_POINTS` points, among them the extremes of y in each short window."""
-    if len(x) <= MAX_POINTS:
+    """At most about `max_points` points, among them the extremes of y in each short window."""
+    if len(x) <= SETTINGS.max_points:
         return x, y
-    width = math.ceil(2.0 * len(x) / MAX_POINTS)
+    width = math.ceil(2.0 * len(x) / SETTINGS.max_points)
     whole = len(y) // width * width
     first, windows = np.arange(0, whole, width), y[:whole].reshape(-1, width)
     kept = np.unique(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import matplotlib
 import numpy as np
 from matplotlib.colors import TwoSlopeNorm
@@ -11,8 +13,16 @@ from numpy.typing import ArrayLike
 from bench.errors import ParameterError
 from bench.figures.look import axes_grid, style
 
-COVERAGE_SAMPLES = 3
-"""Fewest samples in a cell of a surface for it to be drawn: with fewer, the colour would show one stray sample."""
+
+@dataclass(frozen=True)
+class SurfacesSettings:
+    """Numbers of `bench.figures.surfaces`."""
+
+    coverage_samples: int = 3
+    """Fewest samples in a cell of a surface for it to be drawn: with fewer, the colour would show one stray sample."""
+
+
+SETTINGS = SurfacesSettings()
 
 
 def surface(
@@ -55,7 +65,7 @@ def surface(
         )
     count, x_edges, v_edges = np.histogram2d(samples[0], samples[1], bins=bins)
     total, _, _ = np.histogram2d(samples[0], samples[1], bins=(x_edges, v_edges), weights=samples[2])
-    enough = count >= min(COVERAGE_SAMPLES, count.max())
+    enough = count >= min(SETTINGS.coverage_samples, count.max())
     mean = np.where(enough, total / np.maximum(count, 1.0), np.nan)
     with style(), matplotlib.rc_context({"axes.grid": False}):
         figure, grid = axes_grid(8.6, 3.6, ncols=2, sharex=True, sharey=True)

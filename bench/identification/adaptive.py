@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -21,10 +22,17 @@ from bench.identification import layout, stream
 from bench.identification.persistence import EVENT_KINDS, Event, PersistenceHistory, PersistenceReport
 from bench.identification.regressors import CHANNELS, KINDS, RegressorModel
 
-MAX_EVENTS = 1000
-"""Most events kept; the oldest go first."""
 
-_EVENT_BITS = (1 << len(EVENT_KINDS)) - 1
+@dataclass(frozen=True)
+class AdaptiveSettings:
+    """Numbers of `bench.identification.adaptive`."""
+
+    max_events: int = 1000
+    """Most events kept; the oldest go first."""
+    event_bits: int = (1 << len(EVENT_KINDS)) - 1
+
+
+SETTINGS = AdaptiveSettings()
 _TROUBLE = ~(layout.REPORTED | layout.EXCITATION_BACK | layout.MOVING)
 _KINDS = tuple(EVENT_KINDS)
 
@@ -128,7 +136,9 @@ class AdaptiveLeastSquares:
             and clean signals bear; noise e (relative to z) makes estimates unreliable below about e^2 / number of
             samples in the window.
         max_pull: Largest part of a parameter by which the start may still pull its estimate, for it to be trusted: what the
-            estimate would move by, were the start's own information left out (see `bench.identification.stream.judge_prior`).
+            estimate would move by, were the start's own information left out (see `bench.identification.stream.judge_prior`). The
+            pull is exact where data hold no noise, so that this is what a trusted estimate may be off by on account of its start,
+            and not a statistical threshold.
         jump_ratio: Reset the covariance when the mean square of the recent normalised innovation exceeds its long
             average this many times; 0 for never. Tracks a sudden change without the noise that forgetting lets in.
         jump_time: Averaging time of the recent innovation [s].
@@ -137,7 +147,7 @@ class AdaptiveLeastSquares:
 
     Attributes:
         model: The model.
-        events: The last `MAX_EVENTS` events.
+        events: The last `max_events` events.
 
     Raises:
         ParameterError: A setting lies outside its range.
@@ -167,7 +177,7 @@ class AdaptiveLeastSquares:
     ) -> None:
         n = model.n_parameters
         self.model = model
-        self.events: deque[Event] = deque(maxlen=MAX_EVENTS)
+        self.events: deque[Event] = deque(maxlen=SETTINGS.max_events)
         self._state = state = np.zeros(layout.size(n, model.n_filters))
         p0 = _setting("initial_covariance", initial_covariance, 0.0, "a positive number", strict=True)
         limit = 10.0 * p0 * n if bound is None else bound
@@ -349,7 +359,7 @@ class AdaptiveLeastSquares:
         reports = np.empty((halves, 5 + n))
         seen, made = int(self._header[layout.SEEN]), self._events_made
         loop(self._state, stamps, *channels, every, theta, phi, z, flags, reports)
-        for k in np.flatnonzero(flags & _EVENT_BITS):
+        for k in np.flatnonzero(flags & SETTINGS.event_bits):
             self._note(int(flags[k]), float(stamps[k]), seen + int(k) + 1)
         reports = reports[: int(self._header[layout.REPORTS])]
         if reports.shape[0]:

@@ -16,6 +16,7 @@ References:
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -25,17 +26,22 @@ from scipy import optimize, stats
 from bench.errors import IdentificationError, ParameterError, RecordingError
 from bench.recording import nmse
 
-GOOD_FIT = 5.0
-"""NMSE [%] below which a fit counts as good (Worden and Tomlinson 2001)."""
 
-MEMORY_LIMIT = 2.0
-"""Share of the force variance [%] that displacement and acceleration may explain beyond velocity."""
+@dataclass(frozen=True)
+class DamperSettings:
+    """Numbers of `bench.identification.damper`."""
 
-LOOP_LIMIT = 0.15
-"""Half width of the force-velocity loop over the rms force that is still a curve."""
+    good_fit: float = 5.0
+    """NMSE [%] below which a fit counts as good (Worden and Tomlinson 2001)."""
+    memory_limit: float = 2.0
+    """Share of the force variance [%] that displacement and acceleration may explain beyond velocity."""
+    loop_limit: float = 0.15
+    """Half width of the force-velocity loop over the rms force that is still a curve."""
+    opposed_limit: float = 0.05
+    """Share of moving samples in which the damper may push along its velocity."""
 
-OPPOSED_LIMIT = 0.05
-"""Share of moving samples in which the damper may push along its velocity."""
+
+SETTINGS = DamperSettings()
 
 
 class DesignFit(NamedTuple):
@@ -339,18 +345,18 @@ def _objections(
 ) -> tuple[str, ...]:
     """What speaks against the design model, one sentence each; the arguments are those of `TrustReport`."""
     reasons = []
-    if fit.nmse > GOOD_FIT:
+    if fit.nmse > SETTINGS.good_fit:
         reasons.append(
-            f"the best design model misses the force by {fit.nmse:.1f} % NMSE ({GOOD_FIT:g} % is a good fit)"
+            f"the best design model misses the force by {fit.nmse:.1f} % NMSE ({SETTINGS.good_fit:g} % is a good fit)"
         )
-    if opposed > OPPOSED_LIMIT:
+    if opposed > SETTINGS.opposed_limit:
         reasons.append(f"in {100 * opposed:.1f} % of the moving samples the damper pushes along its velocity")
-    if loop_width > LOOP_LIMIT:
+    if loop_width > SETTINGS.loop_limit:
         reasons.append(
             f"force against velocity is a loop, {100 * loop_width:.0f} % of the rms force in half width: "
             "the force depends on more than the velocity"
         )
-    if memory_share > MEMORY_LIMIT and p_value < 1e-3:
+    if memory_share > SETTINGS.memory_limit and p_value < 1e-3:
         reasons.append(
             f"displacement and acceleration explain {memory_share:.1f} % of the force beyond velocity (F = {f_statistic:.1f}): "
             "stiffness, inertia or memory"

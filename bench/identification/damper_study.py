@@ -26,6 +26,8 @@ References:
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -41,22 +43,34 @@ from bench.identification.damper import (
 from bench.identification.order_study import OrderStudy as OrderStudy  # noqa: PLC0414  (part of the study)
 from bench.identification.order_study import order_study as order_study  # noqa: PLC0414
 from bench.laws.base import ForceLaw, Parameter, kernel
+from bench.laws.coupling import INCH
 from bench.recording import nmse
 
-INCH = 0.0254
-ACTUATOR_FORCE = 48.93e3
-RATED_VELOCITY = 1.78
-SERIES_STIFFNESS = 70.0
-"""Series spring over C: a relaxation time of some 10 to 30 ms at the velocities of the tests."""
-TABLES = {
-    ("on line", "C"): (48.27, 27.52),
-    ("on line", "n"): (0.64, 0.20),
-    ("least squares", "C"): (59.00, 31.61),
-    ("least squares", "n"): (0.71, 0.20),
-}
-"""Printed mean and standard deviation, Tables 3.1 and 3.2; C in kN (s/m)^n."""
-PRINTED_NMSE = {"on line": 4.65, "half amplitude": 11.40, "other segment": 1.40}
-"""Printed NMSE of the polynomial model [%], section 3.3."""
+
+@dataclass(frozen=True)
+class DamperStudySettings:
+    """Numbers of `bench.identification.damper_study`."""
+
+    actuator_force: float = 48.93e3
+    rated_velocity: float = 1.78
+    series_stiffness: float = 70.0
+    """Series spring over C: a relaxation time of some 10 to 30 ms at the velocities of the tests."""
+    tables: Mapping[tuple[str, str], tuple[float, float]] = field(
+        default_factory=lambda: {
+            ("on line", "C"): (48.27, 27.52),
+            ("on line", "n"): (0.64, 0.20),
+            ("least squares", "C"): (59.00, 31.61),
+            ("least squares", "n"): (0.71, 0.20),
+        }
+    )
+    """Printed mean and standard deviation, Tables 3.1 and 3.2; C in kN (s/m)^n."""
+    printed_nmse: Mapping[str, float] = field(
+        default_factory=lambda: {"on line": 4.65, "half amplitude": 11.40, "other segment": 1.40}
+    )
+    """Printed NMSE of the polynomial model [%], section 3.3."""
+
+
+DAMPER_STUDY_SETTINGS = DamperStudySettings()
 
 
 @kernel
@@ -320,9 +334,12 @@ def _draw(rng: np.random.Generator, mean: float, std: float, low: float, high: f
 def _draw_test(rng: np.random.Generator) -> tuple[float, float, float, float]:
     """C, n, frequency and amplitude of one test."""
     while True:
-        coefficient = 1e3 * _draw(rng, *TABLES["least squares", "C"], 5.0, 150.0)
-        exponent = _draw(rng, *TABLES["least squares", "n"], 0.15, 1.5)
-        fastest = min(RATED_VELOCITY, (0.9 * ACTUATOR_FORCE / coefficient) ** (1.0 / exponent))
+        coefficient = 1e3 * _draw(rng, *DAMPER_STUDY_SETTINGS.tables["least squares", "C"], 5.0, 150.0)
+        exponent = _draw(rng, *DAMPER_STUDY_SETTINGS.tables["least squares", "n"], 0.15, 1.5)
+        fastest = min(
+            DAMPER_STUDY_SETTINGS.rated_velocity,
+            (0.9 * DAMPER_STUDY_SETTINGS.actuator_force / coefficient) ** (1.0 / exponent),
+        )
         if fastest >= 0.2:
             break
     amplitude = 0.5 * INCH * int(rng.integers(1, 13))
@@ -357,7 +374,7 @@ def harmonic_campaign(rng: np.random.Generator, *, n_tests: int = 202) -> Campai
             rng=rng,
             C=coefficient,
             n=exponent,
-            series_stiffness=SERIES_STIFFNESS * coefficient,
+            series_stiffness=DAMPER_STUDY_SETTINGS.series_stiffness * coefficient,
         )
         fit = fit_design_model(record.velocity, record.force)
         online = fit_design_model_online(record.time, record.velocity, record.force, frequency=frequency)
@@ -383,7 +400,9 @@ def harmonic_campaign(rng: np.random.Generator, *, n_tests: int = 202) -> Campai
         ("least squares", "n"): [test.fitted_exponent for test in tests],
     }
     table = tuple(
-        TableRow(*key, float(np.mean(values)), float(np.std(values, ddof=1)), *TABLES[key])
+        TableRow(
+            *key, float(np.mean(values)), float(np.std(values, ddof=1)), *DAMPER_STUDY_SETTINGS.tables[key]
+        )
         for key, values in columns.items()
     )
     return Campaign(

@@ -35,17 +35,23 @@ from scipy.linalg.lapack import dpotrf, dpotri
 
 from bench.errors import IdentificationError
 
-_SMALLEST_DAMPING = 1e-14
-_LARGEST_DAMPING = 1e10
-_MOST_BENDING = 0.75  # Transtrum and Sethna's bound on |acceleration| / |velocity|
-_EVIDENCE_INTERVAL = (
-    5  # iterations between two estimates of alpha; every single one was no better and costs an inverse
-)
-_PARTS = 8  # of the samples of a network, summed in a fixed order
-_BLOCK = 512  # samples of the wide matrix in the cache at a time
-_STALL_INTERVAL = 25
-_SETTLED = 0.01  # relative change of alpha / beta between two estimates that counts as none
-_STALL = 1e-3  # less relative decrease of the cost over `_STALL_INTERVAL` iterations ends the search
+
+@dataclass(frozen=True)
+class LevenbergMarquardtSettings:
+    """Numbers of `bench.identification.levenberg_marquardt`."""
+
+    smallest_damping: float = 1e-14
+    largest_damping: float = 1e10
+    most_bending: float = 0.75
+    evidence_interval: int = 5
+    parts: int = 8
+    block: int = 512
+    stall_interval: int = 25
+    settled: float = 0.01
+    stall: float = 1e-3
+
+
+SETTINGS = LevenbergMarquardtSettings()
 
 
 class NormalEquations(NamedTuple):
@@ -165,7 +171,7 @@ def minimise(
         model = problem.normal_equations(weights)
         if on_iteration is not None:
             on_iteration(iteration, model.sum_of_squares)
-        if iteration % _EVIDENCE_INTERVAL == 0:
+        if iteration % SETTINGS.evidence_interval == 0:
             settled = prior.settles(weights, model)
         costs.append(model.sum_of_squares)
         if settled and _stalled(costs):  # while the prior still tightens the sum of squares may rise
@@ -200,7 +206,7 @@ class _Prior:
             return True
         before = self.ratio
         self.ratio, self.effective = _evidence(self.n_residuals, weights, model, self.ratio, self.effective)
-        return abs(self.ratio - before) <= _SETTLED * before
+        return abs(self.ratio - before) <= SETTINGS.settled * before
 
     def residual_precision(self, model: NormalEquations) -> float:
         """beta."""
@@ -210,7 +216,10 @@ class _Prior:
 
 def _stalled(costs: list[float]) -> bool:
     """Whether the last iterations made hardly any progress."""
-    return len(costs) > _STALL_INTERVAL and costs[-1] > (1.0 - _STALL) * costs[-1 - _STALL_INTERVAL]
+    return (
+        len(costs) > SETTINGS.stall_interval
+        and costs[-1] > (1.0 - SETTINGS.stall) * costs[-1 - SETTINGS.stall_interval]
+    )
 
 
 def _step(
@@ -229,7 +238,7 @@ def _step(
     )
     cost = model.sum_of_squares + ratio * float(weights @ weights)
     gradient = model.gradient + ratio * weights
-    while damping < _LARGEST_DAMPING:
+    while damping < SETTINGS.largest_damping:
         matrix = model.matrix.copy()
         matrix[diagonal] += ratio + damping * scale
         try:
@@ -242,13 +251,17 @@ def _step(
         acceleration = -0.5 * cho_solve(
             factor, problem.curvature_gradient(weights, velocity), check_finite=False
         )
-        if 4.0 * float((acceleration * scale) @ acceleration) <= _MOST_BENDING**2 * length:
+        if 4.0 * float((acceleration * scale) @ acceleration) <= SETTINGS.most_bending**2 * length:
             trial = weights + velocity + acceleration
             trial_cost = problem.sum_of_squares(trial) + ratio * float(trial @ trial)
             if trial_cost < cost:
                 predicted = -float(velocity @ gradient) + damping * length
                 gain = (cost - trial_cost) / predicted
-                return trial, max(damping * max(1 / 3, 1 - (2 * gain - 1) ** 3), _SMALLEST_DAMPING), 2.0
+                return (
+                    trial,
+                    max(damping * max(1 / 3, 1 - (2 * gain - 1) ** 3), SETTINGS.smallest_damping),
+                    2.0,
+                )
         damping, growth = damping * growth, 2.0 * growth
     return None
 
@@ -293,7 +306,7 @@ class HiddenLayerProblem:
         self.inputs = np.ascontiguousarray(np.column_stack([inputs, np.ones(len(inputs))]).T)
         self.outputs = np.ascontiguousarray(outputs.T)
         self.n_hidden = n_hidden
-        edges = np.linspace(0, len(inputs), _PARTS + 1).astype(int)
+        edges = np.linspace(0, len(inputs), SETTINGS.parts + 1).astype(int)
         self._parts = [slice(int(a), int(b)) for a, b in itertools.pairwise(edges) if b > a]
         self._run = run
 
@@ -355,12 +368,12 @@ class HiddenLayerProblem:
         A, B = self.unpack(weights)
         count = A.size
         inputs, outputs = self.inputs[:, part], self.outputs[:, part]
-        wide = np.ones((count + self.n_hidden + 1, _BLOCK))
+        wide = np.ones((count + self.n_hidden + 1, SETTINGS.block))
         gram = np.zeros((len(wide), len(wide)))
         correlation = np.zeros((len(wide), len(outputs)))
         squares = 0.0
-        for first in range(0, inputs.shape[1], _BLOCK):
-            x, y = inputs[:, first : first + _BLOCK], outputs[:, first : first + _BLOCK]
+        for first in range(0, inputs.shape[1], SETTINGS.block):
+            x, y = inputs[:, first : first + SETTINGS.block], outputs[:, first : first + SETTINGS.block]
             k = wide[:, : x.shape[1]]
             hidden = np.tanh(A.T @ x)
             k[:count] = ((1.0 - hidden * hidden)[None] * x[:, None]).reshape(count, -1)

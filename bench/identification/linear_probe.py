@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import mujoco
@@ -20,9 +21,15 @@ from bench.rig import Rig
 
 Array = NDArray[np.float64]
 
-_AGREEMENT = (
-    1e-9  # of the largest term: unit probing is exact to some 1e-15, a nonlinearity worth the name far above
-)
+
+@dataclass(frozen=True)
+class LinearProbeSettings:
+    """Numbers of `bench.identification.linear_probe`."""
+
+    agreement: float = 1e-9
+
+
+SETTINGS = LinearProbeSettings()
 
 
 class Matrices(NamedTuple):
@@ -104,14 +111,14 @@ class Probe:
             one = np.append(u, 1.0)
             terms = (at.inputs @ one, -at.stiffness @ q, -at.damping @ v)
             size = max(float(np.max(np.abs(term), initial=1e-12)) for term in terms)
-            if np.max(np.abs(mass - at.mass)) > _AGREEMENT * np.max(np.abs(at.mass)):
+            if np.max(np.abs(mass - at.mass)) > SETTINGS.agreement * np.max(np.abs(at.mass)):
                 return "its mass matrix depends on the position"
-            if np.max(np.abs(sum(terms) - force)) > _AGREEMENT * size:
+            if np.max(np.abs(sum(terms) - force)) > SETTINGS.agreement * size:
                 return "its forces are not linear in position, velocity and command"
             acceleration = np.linalg.solve(mass, force)
             parts = sensors * np.concatenate([q, v, acceleration, one])
             sizes = np.max(np.abs(parts), axis=1, initial=1e-12)
-            if np.any(np.abs(parts.sum(axis=1) - measured[columns]) > _AGREEMENT * sizes):
+            if np.any(np.abs(parts.sum(axis=1) - measured[columns]) > SETTINGS.agreement * sizes):
                 return "a channel is not linear in the motion"
         return ""
 

@@ -243,8 +243,15 @@ def _records(t: Array, s: Array, f: Array, a: Array, settle: float, most: int) -
     return found
 
 
-_SEGMENTS = 10
-"""Segments that the samples are cut into; every other pair of them is held out in turn to choose the smoothing."""
+@dataclass(frozen=True)
+class MemoryModuleSettings:
+    """Numbers of `bench.identification.memory`."""
+
+    segments: int = 10
+    """Segments that the samples are cut into; every other pair of them is held out in turn to choose the smoothing."""
+
+
+SETTINGS = MemoryModuleSettings()
 
 
 def _strength(
@@ -254,7 +261,7 @@ def _strength(
     fitted, held = [], []
     for record in records:
         segment = np.minimum(
-            np.arange(len(record.used)) * _SEGMENTS // max(len(record.used), 1), _SEGMENTS - 1
+            np.arange(len(record.used)) * SETTINGS.segments // max(len(record.used), 1), SETTINGS.segments - 1
         )
         fitted.append(record._replace(used=record.used[segment % 4 != 3]))
         held.append(record._replace(used=record.used[segment % 4 == 3]))

@@ -11,7 +11,7 @@ References:
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -23,10 +23,18 @@ from bench.identification.memory_terms import JointRecord, Terms, fold, rows_of,
 
 Array = NDArray[np.float64]
 
-_STEP = 1e-3  # of a logarithm or of a profile's knot: kinks of the force at yield blur derivatives over less than this
-_SAMPLES = 6_000  # most samples of the refinement
-_DAMPINGS = (1.0, 0.1, 10.0, 100.0)  # tried in turn, times the last one that served
-_ENOUGH = 1e-4  # relative fall of the loss below which it ends
+
+@dataclass(frozen=True)
+class MemoryRefinementSettings:
+    """Numbers of `bench.identification.memory_refinement`."""
+
+    step: float = 1e-3
+    samples: int = 6_000
+    dampings: tuple[float, ...] = (1.0, 0.1, 10.0, 100.0)
+    enough: float = 1e-4
+
+
+SETTINGS = MemoryRefinementSettings()
 
 
 class _Point(NamedTuple):
@@ -40,7 +48,7 @@ def refined(
     terms: Terms, records: Sequence[JointRecord], spreads: Array, strength: float, steps: int
 ) -> tuple[Terms, int]:
     """The terms with better shapes, and the number of trials."""
-    stride = max(1, sum(len(record.used) for record in records) // _SAMPLES)
+    stride = max(1, sum(len(record.used) for record in records) // SETTINGS.samples)
     thinned = [record._replace(used=record.used[::stride]) for record in records]
     penalty = smoothness(terms, fold(terms, thinned, spreads), strength)
     with threadpool_limits(1, "blas"):
@@ -51,7 +59,7 @@ def refined(
             residual = at.matrix[:, -1] - at.matrix[:, :-1] @ at.weights
             curvature, slope = jacobian.T @ jacobian, jacobian.T @ residual
             before = at
-            for factor in _DAMPINGS:
+            for factor in SETTINGS.dampings:
                 scaled = np.maximum(
                     np.diag(curvature), 1e-12 * max(float(np.max(np.diag(curvature))), 1e-300)
                 )
@@ -63,7 +71,7 @@ def refined(
                     break
             if at is before:
                 break
-            if before.loss - at.loss < _ENOUGH * before.loss:
+            if before.loss - at.loss < SETTINGS.enough * before.loss:
                 break
     return at.terms, trials
 
@@ -106,15 +114,17 @@ def _jacobian(at: _Point, records: Sequence[JointRecord], spreads: Array) -> Arr
     ] = []  # a change of all shapes of a kind, and whose columns tell each
     slips = [slice(first + i * width, first + (i + 1) * width) for i in range(n)]
     moves = np.zeros((1 + knots + (m > 0), n + g + m))
-    moves[0, :n] = _STEP
+    moves[0, :n] = SETTINGS.step
     kinds.append((moves[0], list(enumerate(slips))))
     for knot in range(knots):
         places = n + knot + knots * np.arange(n)
         # inwards, where a knot is at its upper bound
-        moves[1 + knot, places] = np.where(terms.profiles[:, knot] > 1.0 - _STEP, -_STEP, _STEP)
+        moves[1 + knot, places] = np.where(
+            terms.profiles[:, knot] > 1.0 - SETTINGS.step, -SETTINGS.step, SETTINGS.step
+        )
         kinds.append((moves[1 + knot], list(zip(places.tolist(), slips, strict=True))))
     if m:
-        moves[-1, n + g :] = _STEP
+        moves[-1, n + g :] = SETTINGS.step
         start = first + n * width
         kinds.append((moves[-1], [(n + g + i, slice(start + i, start + i + 1)) for i in range(m)]))
     for move, owners in kinds:

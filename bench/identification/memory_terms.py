@@ -27,7 +27,15 @@ from bench.laws.memory_layout import Direction, MemoryLayout
 
 Array = NDArray[np.float64]
 
-_BLOCK = 4096  # rows in memory at a time
+
+@dataclass(frozen=True)
+class MemoryTermsSettings:
+    """Numbers of `bench.identification.memory_terms`."""
+
+    block: int = 4096
+
+
+SETTINGS = MemoryTermsSettings()
 
 
 class JointRecord(NamedTuple):
@@ -199,8 +207,8 @@ def fold(terms: Terms, records: Sequence[JointRecord], spreads: Array) -> Factor
     with threadpool_limits(1, "blas"):  # small products, which threads only slow down
         for record in records:
             states = terms.states(record)
-            for start in range(0, len(record.used), _BLOCK):
-                block = rows_of(terms, record, states, record.used[start : start + _BLOCK], spreads)
+            for start in range(0, len(record.used), SETTINGS.block):
+                block = rows_of(terms, record, states, record.used[start : start + SETTINGS.block], spreads)
                 total += float(np.sum(block[:, -1] ** 2))
                 factor = _triangle(np.vstack([factor, block]))
     return _factor(factor, total)

@@ -46,7 +46,15 @@ __all__ = ["NetworkModel", "NetworkReport", "Progress", "fit_network", "publishe
 Progress = Callable[[str, int, float], None]
 """Called with the stage ("stage 1/3, start 2/4"), the iteration and the normalised mean-square error [%]."""
 
-_CELLS = 12  # cells a state when samples are drawn evenly over the states visited
+
+@dataclass(frozen=True)
+class NetworkSettings:
+    """Numbers of `bench.identification.network`."""
+
+    cells: int = 12
+
+
+SETTINGS = NetworkSettings()
 
 
 @dataclass(frozen=True)
@@ -416,7 +424,7 @@ def _spread(
     """
     points = inputs[samples]
     n_inputs = points.shape[1]
-    cells = max(min(_CELLS, int(2.0 ** (62.0 / n_inputs))), 1)
+    cells = max(min(SETTINGS.cells, int(2.0 ** (62.0 / n_inputs))), 1)
     index = np.clip(((points + 1.0) * 0.5 * cells).astype(np.int64), 0, cells - 1)
     _, member, count = np.unique(
         index @ (cells ** np.arange(n_inputs)), return_inverse=True, return_counts=True

@@ -44,11 +44,17 @@ from bench.rig import Rig
 
 Array = NDArray[np.float64]
 
-_DIFFERENCE = (
-    1e-6  # of a parameter's scale: truncation and the simulations' rounding of 1e-13 both stay below 1e-6
-)
-_AHEAD = 0.1  # of a move: where the second derivative along it is taken, after Transtrum and Sethna
-_DAMPINGS = (10.0, 1.0, 0.1)  # tried at once, times the last one chosen
+
+@dataclass(frozen=True)
+class OutputErrorSettings:
+    """Numbers of `bench.identification.output_error`."""
+
+    difference: float = 1e-6
+    ahead: float = 0.1
+    dampings: tuple[float, float, float] = (10.0, 1.0, 0.1)
+
+
+SETTINGS = OutputErrorSettings()
 _POSITIVE = ("mass", "inertia")
 
 
@@ -122,7 +128,7 @@ class _Problem:
 
     def linearise(self, point: Array, high: Array) -> _Linearisation:
         """Residuals and Jacobians by forward differences, backwards at an upper bound."""
-        steps = np.where(point + _DIFFERENCE > high, -_DIFFERENCE, _DIFFERENCE)
+        steps = np.where(point + SETTINGS.difference > high, -SETTINGS.difference, SETTINGS.difference)
         points = np.vstack([point, point + np.diag(steps)])
         curvature = np.diag(self.prior_precision)
         gradient = self.prior_precision * (point - self.prior_mean)
@@ -142,9 +148,9 @@ class _Problem:
         """``J' r''`` along each move ``(n_moves, n_parameters)``, r'' the second directional derivative of the residuals."""
         total = np.zeros_like(moves)
         for record, residual, jacobian in zip(self.records, at.residuals, at.jacobians, strict=True):
-            ahead = self.residuals(record, at.point + _AHEAD * moves)
+            ahead = self.residuals(record, at.point + SETTINGS.ahead * moves)
             with np.errstate(invalid="ignore", over="ignore"):
-                second = 2.0 / _AHEAD * ((ahead - residual) / _AHEAD - moves @ jacobian)
+                second = 2.0 / SETTINGS.ahead * ((ahead - residual) / SETTINGS.ahead - moves @ jacobian)
             total += second @ jacobian.T
         return total
 
@@ -308,10 +314,12 @@ def _spread(best: _Minimum) -> tuple[Array, Array]:
     if not free.size:
         return std, correlation
     values, vectors = np.linalg.eigh(best.curvature[np.ix_(free, free)] / np.outer(size, size))
-    open_ends = values <= _DIFFERENCE**2 * values[-1]  # below what finite differences can tell from nothing
+    open_ends = (
+        values <= SETTINGS.difference**2 * values[-1]
+    )  # below what finite differences can tell from nothing
     inverse = (vectors[:, ~open_ends] / values[~open_ends]) @ vectors[:, ~open_ends].T
     spread = np.sqrt(np.diag(inverse))
-    lost = np.sum(vectors[:, open_ends] ** 2, axis=1) > _DIFFERENCE
+    lost = np.sum(vectors[:, open_ends] ** 2, axis=1) > SETTINGS.difference
     with np.errstate(divide="ignore", invalid="ignore"):
         correlation[np.ix_(free, free)] = np.where(
             np.logical_or.outer(lost, lost), np.eye(free.size), inverse / np.outer(spread, spread)
@@ -345,7 +353,7 @@ def _minimise(
             break
         fall = -1.0
         while damping < 1e12 and fall <= 0.0:
-            dampings = damping * np.array(_DAMPINGS)
+            dampings = damping * np.array(SETTINGS.dampings)
             trials = np.clip(point + _moves(problem, at, held, dampings), low, high)
             costs = problem.costs(trials)
             chosen = int(np.argmin(costs))

@@ -30,7 +30,15 @@ from bench.errors import FileFormatError, IdentificationError, ParameterError, R
 from bench.laws.base import ForceLaw
 from bench.laws.polynomial import Basis, Kind, polynomial_exponents, polynomial_law
 
-_BLOCK = 4096  # samples in memory at a time: 8 MB of regressors for 256 terms
+
+@dataclass(frozen=True)
+class PolynomialSettings:
+    """Numbers of `bench.identification.polynomial`."""
+
+    block: int = 4096
+
+
+SETTINGS = PolynomialSettings()
 
 
 def frozen(values: ArrayLike) -> NDArray[np.float64]:
@@ -465,8 +473,8 @@ def _orders_of(orders: int | Sequence[int], n_states: int) -> tuple[int, ...]:
 
 
 def _blocks(array: NDArray[np.float64]) -> Iterator[NDArray[np.float64]]:
-    for first in range(0, len(array), _BLOCK):
-        yield array[first : first + _BLOCK]
+    for first in range(0, len(array), SETTINGS.block):
+        yield array[first : first + SETTINGS.block]
 
 
 def _regressors(
@@ -476,7 +484,7 @@ def _regressors(
     centre: NDArray[np.float64],
     scale: NDArray[np.float64],
 ) -> Iterator[NDArray[np.float64]]:
-    """The terms at all states, in blocks (up to `_BLOCK`, n_terms)."""
+    """The terms at all states, in blocks (up to `block`, n_terms)."""
     c = 1.0 if basis == "chebyshev" else 0.0
     orders = exponents.max(axis=0)
     for block in _blocks(states):

@@ -42,10 +42,7 @@ _A = np.array(
 )
 _C = np.array([0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0, 1.0])
 _E = np.array([71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40])
-_STAGES = 7
-_SMALLEST = (
-    1e-9  # of a step: where the error does not fall with the step (a jump), go on rather than for ever
-)
+_STAGES = len(_C)
 
 _A8 = np.zeros((16, 16))
 """Stages of the 8(5,3) pair: twelve, the result, and three more for the interpolant."""
@@ -55,10 +52,20 @@ _E8 = np.zeros((6, 16))
 """Its two estimates of the error, and the four powers of the interpolant that need all stages."""
 _E8[0, :13], _E8[1, :13], _E8[2:] = DOP853.E3, DOP853.E5, DOP853.D
 _RESULT, _STAGES8, _POWERS = 12, 16, 7
-_GROWTH = 6.0
-_KINK, _OVER = 10.0, -0.4
-"""A step whose error is so many times too large has a kink in it, which is closed in on by halves until a step over it should
-pass: the error of a step over a kink falls with the power 2 (velocities) to 3 (positions) of what lies beyond it."""
+
+
+class RecordLoopLimits(NamedTuple):
+    """Numbers of `bench.identification.record_loop` that compiled code holds."""
+
+    smallest: float = 1e-9
+    growth: float = 6.0
+    kink: float = 10.0
+    over: float = -0.4
+    """A step whose error is so many times too large has a kink in it, which is closed in on by halves until a step over it should
+    pass: the error of a step over a kink falls with the power 2 (velocities) to 3 (positions) of what lies beyond it."""
+
+
+RECORD_LOOP_LIMITS = RecordLoopLimits()
 
 
 def _sparse(table: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
@@ -219,7 +226,7 @@ def _controlled(p, t, length, h, tolerance, y, u, stage, slope, peak):
             scale = max(peak[i], abs(stage[i]), 1e-300)
             if not error <= worst * tolerance * scale:
                 worst = error / (tolerance * scale)
-        if worst <= 1.0 or step <= _SMALLEST * length or not worst < np.inf:
+        if worst <= 1.0 or step <= RECORD_LOOP_LIMITS.smallest * length or not worst < np.inf:
             done = length if count == 1 else done + step
             for i in range(n):
                 y[i] = stage[i]  # the last stage is the step's result
@@ -341,7 +348,10 @@ def _accelerated(p, observe):
 @_inline
 def _wanted(h, worst):
     """The step whose error should be what is allowed, after one whose error is `worst` times that."""
-    return h * min(_GROWTH, max(0.2, 0.9 * worst ** (-0.125) if worst > 0.0 else _GROWTH))
+    return h * min(
+        RECORD_LOOP_LIMITS.growth,
+        max(0.2, 0.9 * worst ** (-0.125) if worst > 0.0 else RECORD_LOOP_LIMITS.growth),
+    )
 
 
 @_jit
@@ -373,10 +383,10 @@ def _across(p, t, step, h, tolerance, place, y, u, work, peak, observe, out):
         worst = _error(n, h, new, slope, peak) / tolerance
         taken = h
         h = _wanted(h, worst)
-        if not (worst <= 1.0 or taken <= _SMALLEST * step or not worst < np.inf):
-            if worst > _KINK:
+        if not (worst <= 1.0 or taken <= RECORD_LOOP_LIMITS.smallest * step or not worst < np.inf):
+            if worst > RECORD_LOOP_LIMITS.kink:
                 before = before if wall > done else taken
-                wall, reach, h = done + taken, taken * worst**_OVER, 0.5 * taken
+                wall, reach, h = done + taken, taken * worst**RECORD_LOOP_LIMITS.over, 0.5 * taken
             continue
         if k < last and (k - first) * step <= done + taken:
             for s in range(_RESULT + 1, _STAGES8):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,8 +13,16 @@ from bench.joint_export.polynomial_terms import terms_of
 from bench.joint_models.document import JointFile
 from bench.nastran import network_weights
 
-OPSET = 17
-"""Version of the operators; all that are used here are older."""
+
+@dataclass(frozen=True)
+class OnnxGraphSettings:
+    """Numbers of `bench.joint_export.onnx_graph`."""
+
+    opset: int = 17
+    """Version of the operators; all that are used here are older."""
+
+
+SETTINGS = OnnxGraphSettings()
 
 
 def onnx_bytes(joint: JointFile) -> bytes:
@@ -46,7 +55,10 @@ def onnx_bytes(joint: JointFile) -> bytes:
         [numpy_helper.from_array(value, name) for name, value in graph.constants.items()],
     )
     model = helper.make_model(
-        made, opset_imports=[helper.make_opsetid("", OPSET)], producer_name="jointbench", ir_version=8
+        made,
+        opset_imports=[helper.make_opsetid("", SETTINGS.opset)],
+        producer_name="jointbench",
+        ir_version=8,
     )
     onnx.checker.check_model(model)
     return model.SerializeToString()

@@ -19,9 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from bench.errors import ParameterError
 from bench.laws.base import MAX_COORDINATES, ForceLaw, Parameter, kernel
-
-INCH = 0.0254  # m, exact
-POUND_FORCE = 4.4482216152605  # N, exact: 0.45359237 kg times 9.80665 m/s²
+from bench.laws.coupling import INCH, POUND_FORCE
 
 
 @kernel

@@ -1,6 +1,6 @@
 """Measurement and actuation chains: what lies between a physical quantity and the numbers in a file.
 
-One order (`ORDER`), one file a stage:
+One order (`order`), one file a stage:
 
 ====  ============  =======================================================
  1    AntiAlias     Butterworth low-pass

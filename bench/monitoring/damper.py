@@ -32,11 +32,19 @@ from bench.identification.regressors import damper_model
 from bench.monitoring.periods import Period, PeriodSplitter
 from bench.monitoring.run_length import alarm_threshold
 
-VARIED = 0.02
-"""Standard deviation of log speed or log frequency over the learning below which it counts as constant: what two hundredths do to
-a damper of any exponent is a tenth of the change sought."""
-BEYOND = 0.1
-"""How far beyond the learnt range, in the logarithm, a period's speed and frequency may lie: half of the change sought, for n = 1."""
+
+@dataclass(frozen=True)
+class DamperSettings:
+    """Numbers of `bench.monitoring.damper`."""
+
+    varied: float = 0.02
+    """Standard deviation of log speed or log frequency over the learning below which it counts as constant: what two hundredths do to
+    a damper of any exponent is a tenth of the change sought."""
+    beyond: float = 0.1
+    """How far beyond the learnt range, in the logarithm, a period's speed and frequency may lie: half of the change sought, for n = 1."""
+
+
+SETTINGS = DamperSettings()
 
 
 @dataclass(frozen=True)
@@ -45,7 +53,8 @@ class MonitorSettings:
 
     Attributes:
         learning: Periods from which the baseline is learnt. With 30 the threshold is within a tenth of that of a known scatter.
-        change: Smallest change of C to be found, as a share of it.
+        change: Smallest change of a period's energy to be found, as a share of it. 0.15 is what the loss of a fifth of C leaves where a
+            quarter of the energy is the seals' friction, which is not lost with it.
         run_length: Mean number of periods between false alarms. Twice the thousand that is asked of a monitor, since the
             scatter of neighbouring periods is not quite independent.
         memory: Periods that the running estimate of C and n remembers.
@@ -54,7 +63,7 @@ class MonitorSettings:
     """
 
     learning: int = 30
-    change: float = 0.2
+    change: float = 0.15
     run_length: float = 2000.0
     memory: float = 10.0
     confirm: int = 5
@@ -266,7 +275,7 @@ class DamperMonitor:
 
     def _regressed(self, y: NDArray[np.float64], coefficient: float, exponent: float) -> Baseline:
         x = np.array([self._motion(period) for period in self._learnt])
-        terms = np.concatenate([[True], x[:, 1:].std(axis=0) > VARIED])
+        terms = np.concatenate([[True], x[:, 1:].std(axis=0) > SETTINGS.varied])
         used = x[:, terms]
         inverse = np.linalg.pinv(used.T @ used)
         b = inverse @ used.T @ y
@@ -295,7 +304,7 @@ class DamperMonitor:
     def _judge(self, period: Period, learnt: Baseline) -> None:
         coefficient, exponent = self._estimate(period)
         motion = self._motion(period)
-        outside = (motion[1:] < learnt.low - BEYOND) | (motion[1:] > learnt.high + BEYOND)
+        outside = (motion[1:] < learnt.low - SETTINGS.beyond) | (motion[1:] > learnt.high + SETTINGS.beyond)
         used = motion[learnt.terms]
         y = self._log_energy(period, learnt.coefficient, learnt.exponent) - float(used @ learnt.regression)
         z = math.nan

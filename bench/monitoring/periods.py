@@ -6,6 +6,7 @@ has been below the centre by a tenth of the largest excursion so far, so that no
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -13,8 +14,16 @@ from numpy.typing import NDArray
 
 from bench.errors import RecordingError
 
-EXCURSION = 0.1
-"""Part of the largest excursion so far that a period must reach below the centre: ten times noise of a hundredth."""
+
+@dataclass(frozen=True)
+class PeriodsSettings:
+    """Numbers of `bench.monitoring.periods`."""
+
+    excursion: float = 0.1
+    """Part of the largest excursion so far that a period must reach below the centre: ten times noise of a hundredth."""
+
+
+SETTINGS = PeriodsSettings()
 
 
 class Period(NamedTuple):
@@ -111,7 +120,7 @@ class PeriodSplitter:
         before = self._kept.shape[1]
         x = block[1]
         largest = np.maximum(np.maximum.accumulate(np.abs(x)), self._largest)
-        below = x < -EXCURSION * largest
+        below = x < -SETTINGS.excursion * largest
         last = self._kept[1, -1] if before else np.inf
         upward = np.flatnonzero((x >= 0.0) & (np.concatenate([[last], x[:-1]]) < 0.0))
         count = np.concatenate([[0], np.cumsum(below)])

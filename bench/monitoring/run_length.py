@@ -13,14 +13,23 @@ References:
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from scipy import optimize, stats
 
 from bench.errors import ParameterError
 
-CELLS = 80
-"""Cells of the sum; the run length changes by less than a hundredth when they are doubled (see the test)."""
+
+@dataclass(frozen=True)
+class RunLengthSettings:
+    """Numbers of `bench.monitoring.run_length`."""
+
+    cells: int = 80
+    """Cells of the sum; the run length changes by less than a hundredth when they are doubled (see the test)."""
+
+
+SETTINGS = RunLengthSettings()
 
 
 def mean_run_length(threshold: float, reference: float, freedom: float) -> float:
@@ -42,12 +51,12 @@ def mean_run_length(threshold: float, reference: float, freedom: float) -> float
     if threshold == 0.0:
         return 1.0 / max(float(z.sf(reference)), 1e-300)
     # Cells centred at 0, w, 2w, …; the first holds all sums that were cut at zero.
-    width = 2.0 * threshold / (2.0 * CELLS - 1.0)
-    centre = width * np.arange(CELLS)
+    width = 2.0 * threshold / (2.0 * SETTINGS.cells - 1.0)
+    centre = width * np.arange(SETTINGS.cells)
     edge = centre[None, :] - centre[:, None] + reference
     step = np.asarray(z.cdf(edge + 0.5 * width)) - np.asarray(z.cdf(edge - 0.5 * width))
     step[:, 0] = z.cdf(edge[:, 0] + 0.5 * width)
-    lengths = np.linalg.solve(np.eye(CELLS) - step, np.ones(CELLS))
+    lengths = np.linalg.solve(np.eye(SETTINGS.cells) - step, np.ones(SETTINGS.cells))
     return float(lengths[0])
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -17,15 +18,27 @@ from numpy.typing import NDArray
 
 from bench.data import friction_damper
 from bench.errors import UnknownNameError
-from bench.identification.damper_study import SERIES_STIFFNESS, damper_record
+from bench.identification.damper_study import (
+    DAMPER_STUDY_SETTINGS,
+    damper_record,
+)
 from bench.monitoring.damper import DamperMonitor, MonitorSettings, monitor_record
 from bench.monitoring.periods import PeriodSplitter
 
-RATE = 100.0
-DRIFT = 0.02
-"""Amplitude of the slow drift of the force: damper fluids lose about 1 % of their force in some 10 K."""
-HEALTHY, AFTER = 200, 40
-"""Periods watched before and after the change, on average."""
+
+@dataclass(frozen=True)
+class StudySettings:
+    """Numbers of `bench.monitoring.study`."""
+
+    rate: float = 100.0
+    drift: float = 0.02
+    """Amplitude of the slow drift of the force: damper fluids lose about 1 % of their force in some 10 K."""
+    healthy: int = 200
+    after: int = 40
+    """Periods watched before and after the change, on average."""
+
+
+STUDY_SETTINGS = StudySettings()
 MOTIONS = ("harmonic", "wandering", "random")
 
 
@@ -90,12 +103,12 @@ def motion(
     Raises:
         UnknownNameError: There is no such motion.
     """
-    time = np.arange(round(seconds * RATE)) / RATE
+    time = np.arange(round(seconds * STUDY_SETTINGS.rate)) / STUDY_SETTINGS.rate
     if kind == "harmonic":
         omega = 2.0 * math.pi * 0.3
         return time, [0.025 * omega**k * np.sin(omega * time + 0.5 * math.pi * k) for k in range(3)]
     if kind == "random":
-        frequency = np.fft.rfftfreq(time.size, 1.0 / RATE)
+        frequency = np.fft.rfftfreq(time.size, 1.0 / STUDY_SETTINGS.rate)
         inside = (frequency >= 0.2) & (frequency <= 0.4)
         spectrum = np.where(
             inside, rng.standard_normal(frequency.size) + 1j * rng.standard_normal(frequency.size), 0.0
@@ -105,10 +118,10 @@ def motion(
         return time, [scale * channel for channel in channels]
     if kind == "wandering":
         amplitude = 0.025 * np.exp(0.4 * _slow(time, rng))
-        phase = 2.0 * math.pi * np.cumsum(0.3 * np.exp(0.2 * _slow(time, rng))) / RATE
+        phase = 2.0 * math.pi * np.cumsum(0.3 * np.exp(0.2 * _slow(time, rng))) / STUDY_SETTINGS.rate
         x = amplitude * np.sin(phase)
-        v = np.gradient(x, 1.0 / RATE)
-        return time, [x, v, np.gradient(v, 1.0 / RATE)]
+        v = np.gradient(x, 1.0 / STUDY_SETTINGS.rate)
+        return time, [x, v, np.gradient(v, 1.0 / STUDY_SETTINGS.rate)]
     raise UnknownNameError("motion of the monitoring study", kind, MOTIONS)
 
 
@@ -141,19 +154,21 @@ def service_run(
     rng = np.random.default_rng([seed, 33])
     chosen = settings or MonitorSettings()
     coefficient, exponent = 1e3 * rng.uniform(30.0, 90.0), rng.uniform(0.4, 1.0)
-    seconds = (chosen.learning + HEALTHY + AFTER) / 0.3
+    seconds = (chosen.learning + STUDY_SETTINGS.healthy + STUDY_SETTINGS.after) / 0.3
     time, (x, v, a) = motion(kind, seconds, rng)
-    change = (chosen.learning + HEALTHY) / 0.3
+    change = (chosen.learning + STUDY_SETTINGS.healthy) / 0.3
     draws = rng.integers(2**32)
     records = [
         damper_record(
             time, x, v, a, rng=np.random.default_rng(draws), noise=noise,
-            C=share * coefficient, n=exponent, series_stiffness=SERIES_STIFFNESS * coefficient,
+            C=share * coefficient, n=exponent, series_stiffness=DAMPER_STUDY_SETTINGS.series_stiffness * coefficient,
         )
         for share in (1.0, 1.0 - loss)
     ]  # fmt: skip
     weight = np.clip((time - change) / gradual, 0.0, 1.0) if gradual > 0.0 else (time >= change).astype(float)
-    drift = 1.0 + DRIFT * np.sin(2.0 * math.pi * time / 300.0 + rng.uniform(0.0, 2.0 * math.pi))
+    drift = 1.0 + STUDY_SETTINGS.drift * np.sin(
+        2.0 * math.pi * time / 300.0 + rng.uniform(0.0, 2.0 * math.pi)
+    )
     force = drift * ((1.0 - weight) * records[0].force + weight * records[1].force)
     late = time > change + gradual
     energies = [float(np.sum(record.force[late] * v[late])) for record in records]
@@ -238,7 +253,7 @@ def switched_run(before: int, after: int, seed: int, settings: MonitorSettings |
     rng = np.random.default_rng([seed, 34])
     chosen = settings or MonitorSettings()
     parts, ends, energies = [], 0, []
-    for tension, count in ((before, chosen.learning + HEALTHY), (after, AFTER)):
+    for tension, count in ((before, chosen.learning + STUDY_SETTINGS.healthy), (after, STUDY_SETTINGS.after)):
         cycles = measured_cycles(tension)
         energies.append(np.mean([np.sum(v * force) for _, v, force in cycles]))
         parts += [cycles[i] for i in rng.integers(len(cycles), size=count)]

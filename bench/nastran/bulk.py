@@ -30,7 +30,15 @@ Format = Literal["small", "large", "free"]
 
 C = TypeVar("C", bound=Card)
 
-_DEEPEST = 10
+
+@dataclass(frozen=True)
+class BulkSettings:
+    """Numbers of `bench.nastran.bulk`."""
+
+    deepest: int = 10
+
+
+SETTINGS = BulkSettings()
 _QUOTES = "'\"‘’`"
 
 
@@ -120,7 +128,7 @@ class _Reader:
             FileFormatError: It has no name, lies outside the deck's folder, includes itself or is nested too deeply.
         """
         why = "has no file name" if not name else ""
-        if name and (self.home is None or len(chain) > _DEEPEST):
+        if name and (self.home is None or len(chain) > SETTINGS.deepest):
             why = "cannot be followed: write the deck to files, nested at most ten deep"
         if why or self.home is None:
             raise FileFormatError(f"{place}: INCLUDE {name[:100]!r} {why}")

@@ -29,8 +29,16 @@ from bench.nastran.network_deck import SI, Units, unit_scales
 from bench.nastran.structure_cards import Cbar, Conm2, Mat1, Nolin2, Pbar, ScalarElement, Spc
 from bench.rig import Element
 
-AXES = (1, 4)
-"""Components of the joint: translation along and rotation about x."""
+
+@dataclass(frozen=True)
+class JointModelSettings:
+    """Numbers of `bench.nastran.joint_model`."""
+
+    axes: tuple[int, int] = (1, 4)
+    """Components of the joint: translation along and rotation about x."""
+
+
+SETTINGS = JointModelSettings()
 
 
 class JointAxis(NamedTuple):
@@ -73,7 +81,7 @@ class JointModel:
             joints: Names of the coordinates.
             name: Name of the element.
         """
-        motion, force = unit_scales(AXES, self.units)
+        motion, force = unit_scales(SETTINGS.axes, self.units)
         values: dict[str, float] = {}
         for i, (axis, label) in enumerate(zip(self.axes, ("axial", "torsional"), strict=True)):
             linear = force[i] / motion[i]
@@ -100,12 +108,14 @@ def read_joint_model(deck: Deck, *, units: Units = SI) -> JointModel:
     relative, bodies = _relative(deck)
     notes: list[str] = []
     auxiliary = _auxiliary(deck, relative, notes)
-    axes = [_axis(deck, relative, bodies, component, auxiliary) for component in AXES]
+    axes = [_axis(deck, relative, bodies, component, auxiliary) for component in SETTINGS.axes]
     held = {card.grid for card in deck.of(Spc)}
     mounts = {}
     for grid in {card.grid for card in deck.of(Conm2)}:
         found = [
-            _between(deck, kind, grid, component, held) for component in AXES for kind in ("CELAS2", "CDAMP2")
+            _between(deck, kind, grid, component, held)
+            for component in SETTINGS.axes
+            for kind in ("CELAS2", "CDAMP2")
         ]
         if any(found):
             mounts[grid] = (found[0], found[1], found[2], found[3])
@@ -283,16 +293,16 @@ def joint_model_cards(
         raise ParameterError(
             f"an element of the law '{joint.law.name}' came; one of '{law.name}' is expected"
         )
-    motion, force = unit_scales(AXES, units)
+    motion, force = unit_scales(SETTINGS.axes, units)
     theta = dict(zip(law.parameter_names, (float(value) for value in joint.theta), strict=True))
     cards: list[Card | str] = [
         "Joint with dead-spaces and coupling (form of Tasbihgoo 2006, appendix B.1), written by jointbench.",
         "Case control: MPC = 1, NONLINEAR = 5. Springs 4 and 5 turn the loads on the auxiliary grid into displacements.",
     ]
     cards += [Grid(number, constrained="2356") for number in (relative, auxiliary)]
-    for i, (component, label) in enumerate(zip(AXES, ("axial", "torsional"), strict=True)):
+    for i, (component, label) in enumerate(zip(SETTINGS.axes, ("axial", "torsional"), strict=True)):
         linear = force[i] / motion[i]
-        other = AXES[1 - i]
+        other = SETTINGS.axes[1 - i]
         clearance = theta[f"clearance_{label}"] / motion[i]
         far = clearance + 1.0
         table, absolute = 102 + 10 * i, 104 + i

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,8 +11,16 @@ from numpy.typing import NDArray
 from bench.errors import ParameterError
 from bench.nastran.numbers import parse_real, real_text
 
-_END = 10.0
-"""Beyond it tanh is 1 to 4e-9, and the table is constant."""
+
+@dataclass(frozen=True)
+class TanhTableSettings:
+    """Numbers of `bench.nastran.tanh_table`."""
+
+    end: float = 10.0
+    """Beyond it tanh is 1 to 4e-9, and the table is constant."""
+
+
+SETTINGS = TanhTableSettings()
 
 
 def tanh_points(n: int = 2001, width: int = 16) -> tuple[tuple[float, float], ...]:
@@ -34,15 +43,18 @@ def tanh_points(n: int = 2001, width: int = 16) -> tuple[tuple[float, float], ..
         raise ParameterError(
             f"a tanh table of {n} points was asked for; an odd number of at least 11 is expected"
         )
-    x = np.linspace(0.0, _END, 200_001)
+    x = np.linspace(0.0, SETTINGS.end, 200_001)
     bend = np.sqrt(2.0 * np.tanh(x)) / np.cosh(x)
     length = np.concatenate([[0.0], np.cumsum(0.5 * (bend[1:] + bend[:-1]) * np.diff(x))])
     inner = np.interp(np.linspace(0.0, length[-1], (n - 1) // 2 - 1), length, x)
     # the negative abscissa has one digit less: round to what both signs can hold
-    rounded = [-parse_real(real_text(-value, width)) for value in [*inner, 2.0 * _END, 2.0 * _END + 1.0]]
+    rounded = [
+        -parse_real(real_text(-value, width))
+        for value in [*inner, 2.0 * SETTINGS.end, 2.0 * SETTINGS.end + 1.0]
+    ]
     if not np.all(np.diff(rounded) > 0.0):
         raise ParameterError(f"{n} points of tanh cannot be told apart in {width} characters; ask for fewer")
-    positive = [(value, 1.0 if value > _END else float(np.tanh(value))) for value in rounded[1:]]
+    positive = [(value, 1.0 if value > SETTINGS.end else float(np.tanh(value))) for value in rounded[1:]]
     return (*((-value, -y) for value, y in reversed(positive)), (0.0, 0.0), *positive)
 
 

@@ -11,6 +11,7 @@ import csv
 import re
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from bench.errors import FileFormatError, UnitError
@@ -21,7 +22,16 @@ WHITE = " "
 """Stands for any run of blanks as the delimiter."""
 
 _DELIMITERS = ("\t", ";", ",", "|", WHITE)  # in the order in which ties are settled
-_SHOWN = 60  # lines at the end of the head by which the delimiter is found
+
+
+@dataclass(frozen=True)
+class DialectSettings:
+    """Numbers of `bench.record_files.dialect`."""
+
+    shown: int = 60
+
+
+SETTINGS = DialectSettings()
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf|infinity)", re.IGNORECASE)
 _MISSING = frozenset(("NA", "N/A", "null", "NULL", "#N/A", "n/a", "-nan", "1.#QNAN", "-1.#IND"))
 _DATE = re.compile(
@@ -100,9 +110,9 @@ def dialect_of(lines: Sequence[str], file: str) -> Dialect:
         raise FileFormatError(
             f"'{file}' holds no table: it is empty{' but for comments' if comments else ''}"
         )
-    delimiter, decimal, width = _best([lines[i] for i in places[-_SHOWN:]])
+    delimiter, decimal, width = _best([lines[i] for i in places[-SETTINGS.shown :]])
     rows = {i: _trimmed(cells_of(lines[i], delimiter), width) for i in places}
-    numeric = _numeric_columns([rows[i] for i in places[-_SHOWN:]], width, decimal)
+    numeric = _numeric_columns([rows[i] for i in places[-SETTINGS.shown :]], width, decimal)
     kinds = {i: _row_kind(rows[i], width, numeric, decimal) for i in places}
     first = _first_of_numbers(places, kinds, rows, width, file)
     _refuse_ragged(places, kinds, rows, first, width, decimal, file)

@@ -12,7 +12,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from threading import Timer
 from typing import Any, BinaryIO
@@ -28,9 +28,19 @@ CHILD = (
     "import sys, json; sys.path[:] = json.loads(sys.argv[1]); "
     "from bench.record_files.hdf5 import serve; serve(sys.argv[2], sys.argv[3])"
 )
-SECONDS, BYTES_A_SECOND = 15.0, 20e6
-"""Time that a file may take, and the rate at which the slowest disks and networks in use give more of it: some damaged files have no
-end."""
+
+
+@dataclass(frozen=True)
+class Hdf5Settings:
+    """Numbers of `bench.record_files.hdf5`."""
+
+    seconds: float = 15.0
+    bytes_a_second: float = 20e6
+    """Time that a file may take, and the rate at which the slowest disks and networks in use give more of it: some damaged files have
+    no end."""
+
+
+SETTINGS = Hdf5Settings()
 
 
 def read_hdf5(
@@ -64,7 +74,7 @@ def read_hdf5(
         )
     except (OSError, ValueError):  # no processes here, or a zero byte in the path
         return _read(path, path, wanted, limits)
-    timer = Timer(SECONDS + path.stat().st_size / BYTES_A_SECOND, child.kill)
+    timer = Timer(SETTINGS.seconds + path.stat().st_size / SETTINGS.bytes_a_second, child.kill)
     timer.start()
     try:
         assert child.stdin is not None

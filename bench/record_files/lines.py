@@ -6,14 +6,23 @@ import codecs
 import gzip
 import zlib
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 from bench.errors import FileFormatError
 from bench.limits import ReadingLimits, size_text
 from bench.record_files.dialect import Dialect, cells_of, is_number
 
-BLOCK = 4 * 2**20
-"""Bytes that are read at a time."""
+
+@dataclass(frozen=True)
+class LinesSettings:
+    """Numbers of `bench.record_files.lines`."""
+
+    block: int = 4 * 2**20
+    """Bytes that are read at a time."""
+
+
+LINES_SETTINGS = LinesSettings()
 _MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
 
 
@@ -58,7 +67,7 @@ def _raw(path: Path) -> Iterator[bytes]:
     packed = path.suffix.lower() == ".gz"
     try:
         with gzip.open(path, "rb") if packed else path.open("rb") as stream:
-            while chunk := stream.read(BLOCK):
+            while chunk := stream.read(LINES_SETTINGS.block):
                 yield chunk
     except (gzip.BadGzipFile, EOFError, zlib.error) as error:
         raise FileFormatError(

@@ -14,19 +14,34 @@ import contextlib
 import math
 import struct
 import zlib
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
 from bench.errors import FileFormatError
 from bench.limits import ReadingLimits, size_text
 
-_MATRIX, _COMPRESSED = 14, 15
-_CELL, _STRUCT, _OBJECT, _CHAR, _SPARSE, _LAST = 1, 2, 3, 4, 5, 15
-_COMPLEX = 0x0800
-_NUMERIC = frozenset((1, 2, 3, 4, 5, 6, 7, 9, 12, 13))
-_TEXTS = _NUMERIC | {16, 17, 18}
-"""Types of data; scipy takes others for pointers."""
-_STEP = 2**20
+
+@dataclass(frozen=True)
+class MatClaimsSettings:
+    """Numbers of `bench.record_files.mat_claims`."""
+
+    matrix: int = 14
+    compressed: int = 15
+    cell: int = 1
+    struct: int = 2
+    object: int = 3
+    char: int = 4
+    sparse: int = 5
+    last: int = 15
+    complex: int = 0x0800
+    numeric: frozenset[int] = frozenset((1, 2, 3, 4, 5, 6, 7, 9, 12, 13))
+    texts: frozenset[int] = numeric | {16, 17, 18}
+    """Types of data; scipy takes others for pointers."""
+    step: int = 2**20
+
+
+SETTINGS = MatClaimsSettings()
 
 
 class _Budget:
@@ -103,12 +118,12 @@ def check_claims(path: Path, limits: ReadingLimits) -> list[str] | None:
         kind, size = struct.unpack_from(order + "II", content, at)
         at += 8
         data = content[at : at + size]
-        if kind == _COMPRESSED:
+        if kind == SETTINGS.compressed:
             data = _unpacked(data, budget)
             if len(data) >= 8:
                 kind, length = struct.unpack_from(order + "II", data, 0)
                 data = data[8 : 8 + length]
-        if kind == _MATRIX:
+        if kind == SETTINGS.matrix:
             with contextlib.suppress(_Unread):
                 names.append(_check_matrix(data, order, budget, 1))
         at += size
@@ -121,7 +136,7 @@ def _unpacked(data: memoryview, budget: _Budget) -> memoryview:
     parts = []
     rest: bytes | memoryview = data
     while rest and not decoder.eof:
-        part = decoder.decompress(rest, _STEP)
+        part = decoder.decompress(rest, SETTINGS.step)
         rest = decoder.unconsumed_tail
         budget.unpacked(len(part))
         parts.append(part)
@@ -139,29 +154,36 @@ def _check_matrix(data: memoryview, order: str, budget: _Budget, depth: int) -> 
     if flags.size < 4 or flags.data + 4 > len(data):
         raise ValueError("an array has no flags")
     word = struct.unpack_from(order + "I", data, flags.data)[0]
-    kind, parts = word & 0xFF, 2 if word & _COMPLEX else 1
+    kind, parts = word & 0xFF, 2 if word & SETTINGS.complex else 1
     shape_tag = _tag(data, flags.following, order)
-    if not 0 < kind <= _LAST:  # function handles and opaque objects, which have no shape
+    if not 0 < kind <= SETTINGS.last:  # function handles and opaque objects, which have no shape
         raise _Unread
     count = min(shape_tag.size // 4, 64)
     shape = struct.unpack_from(f"{order}{count}i", data, shape_tag.data)
     if any(n < 0 for n in shape):
         raise ValueError(f"an array has shape {shape}")
     n = math.prod(shape)
-    if kind != _SPARSE and n > max(len(data), 1):  # a sparse array's shape says nothing about its size
+    if kind != SETTINGS.sparse and n > max(
+        len(data), 1
+    ):  # a sparse array's shape says nothing about its size
         raise ValueError(f"an array claims {n} values in {len(data)} bytes")
     name = _tag(data, shape_tag.following, order)
     at = name.following
-    if kind in (_STRUCT, _OBJECT):
-        at, fields = _fields(data, at, order, named=kind == _OBJECT)
+    if kind in (SETTINGS.struct, SETTINGS.object):
+        at, fields = _fields(data, at, order, named=kind == SETTINGS.object)
         n *= fields
         if n > len(data):
             raise ValueError(f"a structure claims {n} fields in {len(data)} bytes")
-    if kind in (_CELL, _STRUCT, _OBJECT):
+    if kind in (SETTINGS.cell, SETTINGS.struct, SETTINGS.object):
         _check_arrays(data, at, order, n, budget, depth)
     else:
         _check_values(
-            data, at, order, [_TEXTS] if kind == _CHAR else [_NUMERIC] * (parts + 2 * (kind == _SPARSE))
+            data,
+            at,
+            order,
+            [SETTINGS.texts]
+            if kind == SETTINGS.char
+            else [SETTINGS.numeric] * (parts + 2 * (kind == SETTINGS.sparse)),
         )
     return bytes(data[name.data : name.data + name.size]).decode("latin-1").rstrip("\0")
 
@@ -184,7 +206,7 @@ def _check_arrays(data: memoryview, at: int, order: str, n: int, budget: _Budget
         if at + 8 > len(data):
             break
         inner = _tag(data, at, order)
-        if inner.kind != _MATRIX:
+        if inner.kind != SETTINGS.matrix:
             raise ValueError(f"an element of type {inner.kind} stands where an array is expected")
         _check_matrix(data[inner.data : inner.data + inner.size], order, budget, depth + 1)
         at = inner.following

@@ -19,7 +19,10 @@ from bench.record_files.column_map import ColumnMap
 from bench.record_files.columns import READABLE, read_columns
 from bench.recording import Recording
 from bench.recording.channel import channels_from
-from bench.recording.clock import JITTER, grid
+from bench.recording.clock import (
+    CLOCK_SETTINGS,
+    grid,
+)
 from bench.recording.jumps import hidden_dropouts
 from bench.recording.mending import mended
 
@@ -47,7 +50,7 @@ def on_one_clock(
     *,
     sample_rate: float = 0.0,
     bridge: bool = True,
-    jitter: float = JITTER,
+    jitter: float = CLOCK_SETTINGS.jitter,
 ) -> Noted:
     """Channels brought to a uniform clock, as every command does it: see `bench.recording.mending.mended`.
 
@@ -96,7 +99,7 @@ def read_recording(
     settle: float | None = None,
     meta: Mapping[str, Any] | None = None,
     gaps: Literal["raise", "interpolate"] = "raise",
-    jitter: float = JITTER,
+    jitter: float = CLOCK_SETTINGS.jitter,
     limits: ReadingLimits = READING_LIMITS,
 ) -> Recording:
     """Read a record: the bench's own Parquet, or a text table, MAT, npz, HDF5 or plain Parquet file.

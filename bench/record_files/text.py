@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections import deque
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,12 +16,25 @@ from bench.errors import FileFormatError
 from bench.limits import READING_LIMITS, ReadingLimits
 from bench.record_files.column_map import Variable, name_and_unit
 from bench.record_files.dialect import WHITE, Column, Dialect, cells_of, dialect_of, is_number
-from bench.record_files.lines import BLOCK, blocks_of, cut_off, decoded
+from bench.record_files.lines import (
+    LINES_SETTINGS,
+    blocks_of,
+    cut_off,
+    decoded,
+)
 
-_HEAD = 5000
-"""Lines in which a table has to begin."""
-_ABOVE = 1000
-"""Rows above the last one that it is compared with, to see whether it was cut."""
+
+@dataclass(frozen=True)
+class TextSettings:
+    """Numbers of `bench.record_files.text`."""
+
+    head: int = 5000
+    """Lines in which a table has to begin."""
+    above: int = 1000
+    """Rows above the last one that it is compared with, to see whether it was cut."""
+
+
+SETTINGS = TextSettings()
 
 
 class TextTable(NamedTuple):
@@ -61,7 +75,7 @@ def read_csv(
     """
     blocks = blocks_of(path, limits)
     first = next(blocks, b"")
-    lines = decoded(first).split("\n", _HEAD)[:_HEAD]
+    lines = decoded(first).split("\n", SETTINGS.head)[: SETTINGS.head]
     dialect = dialect_of([line.rstrip("\r") for line in lines], path.name)
     if len(dialect.columns) > limits.columns:
         raise FileFormatError(
@@ -118,14 +132,14 @@ class _Reader:
         self._comments = 0
         self._rows = 0
         self._parts: dict[str, list[NDArray[Any]]] = {column.heading: [] for column in chosen}
-        self._above: deque[bytes] = deque(maxlen=_ABOVE)
+        self._above: deque[bytes] = deque(maxlen=SETTINGS.above)
         kinds = {"number": pa.float64(), "long": pa.int64()}
         names = [str(k) for k in range(len(dialect.columns))]
         numbered = {column.heading: name for column, name in zip(dialect.columns, names, strict=True)}
         self._places = {column.heading: numbered[column.heading] for column in chosen}
         self._options: dict[str, Any] = {
             "read_options": pc.ReadOptions(
-                column_names=names, use_threads=False, block_size=2 * BLOCK + limits.line_bytes
+                column_names=names, use_threads=False, block_size=2 * LINES_SETTINGS.block + limits.line_bytes
             ),
             "parse_options": pc.ParseOptions(
                 delimiter="\t" if dialect.delimiter == WHITE else dialect.delimiter
@@ -193,10 +207,10 @@ class _Reader:
             text = b"\n".join(kept)
         if not text.endswith((b"\n", b"\r")):
             head, _, last = text.rpartition(b"\n")
-            above = [*self._above, *head.split(b"\n")[-_ABOVE:]]
+            above = [*self._above, *head.split(b"\n")[-SETTINGS.above :]]
             cut = cut_off(last, above, self.dialect)
             text = head + b"\n" if cut else text
-        self._above.extend(text.rsplit(b"\n", _ABOVE)[1:])
+        self._above.extend(text.rsplit(b"\n", SETTINGS.above)[1:])
         if self.dialect.delimiter == WHITE:
             text = re.sub(rb"[ \t]+", b"\t", re.sub(rb"(?m)^[ \t]+|[ \t\r]+$", b"", text))
         return text, cut

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -16,8 +17,17 @@ from bench.recording.units import conversion
 _NAMES = ("time", "t", "timestamp", "zeit", "datetime", "date")  # in the order in which they are preferred
 _NAMED = re.compile(rf"(?P<name>{'|'.join(_NAMES)})(?:[ _](?P<unit>s|sec|ms|us|µs|ns))?")
 _WORDS = {"ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
-_LATE = 1e8
-"""Times from here on [s] count from 1970 and leave a double too few digits for a step; they are counted from their first."""
+
+
+@dataclass(frozen=True)
+class TimesSettings:
+    """Numbers of `bench.record_files.times`."""
+
+    late: float = 1e8
+    """Times from here on [s] count from 1970 and leave a double too few digits for a step; they are counted from their first."""
+
+
+SETTINGS = TimesSettings()
 
 
 class Clock(NamedTuple):
@@ -90,7 +100,7 @@ def clock_of(values: NDArray, stated: str, heading: str, *, told: str = "") -> C
                 f"'time [{likely}]' if so, 'time [s]' if not"
             )
     scale, _ = conversion(unit or "s", "s")
-    late = len(numbers) > 0 and abs(scale * float(numbers[0])) >= _LATE
+    late = len(numbers) > 0 and abs(scale * float(numbers[0])) >= SETTINGS.late
     start = str(values[0]) + (f" {unit}" if unit else "") if late else ""
     if late:
         numbers = (values - values[0]).astype(float)  # integers are subtracted before a double rounds them

@@ -7,22 +7,27 @@ put on an exactly uniform clock ``start + k / sample_rate``, which is what filte
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bench.errors import RecordingError
 
-JITTER = 0.01
-"""Largest deviation of a sample from the uniform clock, as a fraction of the step, that is taken for uniform.
 
-A sample that is late by a hundredth of a step errs, on a sine of ten samples a period, by 2π/10 * 0.01 = 0.6 % of the
-amplitude: below the noise of the sensors of this field. Times printed with a resolution finer than a fiftieth of the
-step pass.
-"""
+@dataclass(frozen=True)
+class ClockSettings:
+    """Numbers of `bench.recording.clock`."""
 
-LONGEST_REPAIR = 10
-"""Most successive samples that are interpolated: beyond, a repair would invent data rather than bridge a dropout."""
+    jitter: float = 0.01
+    """Largest deviation of a sample from the uniform clock, as a fraction of the step, that is taken for uniform. A sample that is
+    late by a hundredth of a step errs, on a sine of ten samples a period, by 2π/10 * 0.01 = 0.6 % of the amplitude: below the noise
+    of the sensors of this field. Times printed with a resolution finer than a fiftieth of the step pass."""
+    longest_repair: int = 10
+    """Most successive samples that are interpolated: beyond, a repair would invent data rather than bridge a dropout."""
+
+
+CLOCK_SETTINGS = ClockSettings()
 
 
 def grid(start: float, sample_rate: float, n: int) -> NDArray[np.float64]:
@@ -33,7 +38,7 @@ def grid(start: float, sample_rate: float, n: int) -> NDArray[np.float64]:
 
 
 def uniform_clock(
-    time: ArrayLike, *, sample_rate: float = 0.0, jitter: float = JITTER
+    time: ArrayLike, *, sample_rate: float = 0.0, jitter: float = CLOCK_SETTINGS.jitter
 ) -> tuple[float, float]:
     """Start [s] and sample rate [Hz] of a uniform clock, or an error that says where it is not uniform.
 

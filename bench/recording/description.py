@@ -16,7 +16,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from bench.errors import RecordingError, UnitError, UnknownNameError
 from bench.recording.channel import Channel, channels_from
-from bench.recording.clock import JITTER, grid, uniform_clock
+from bench.recording.clock import (
+    CLOCK_SETTINGS,
+    grid,
+    uniform_clock,
+)
 from bench.recording.frozen import frozen
 from bench.recording.mending import mended
 from bench.recording.units import conversion, si_unit
@@ -96,7 +100,7 @@ class Recording:
         meta: Mapping[str, Any] | None = None,
         sample_rate: float = 0.0,
         gaps: Literal["raise", "interpolate"] = "raise",
-        jitter: float = JITTER,
+        jitter: float = CLOCK_SETTINGS.jitter,
     ) -> Recording:
         """A recording from arrays by channel name.
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,8 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from bench.errors import RecordingError
 from bench.recording.clock import (
-    JITTER,
-    LONGEST_REPAIR,
+    CLOCK_SETTINGS,
     gap_text,
     grid,
     increasing,
@@ -26,12 +26,18 @@ from bench.recording.clock import (
     roundest,
 )
 
-MOST_JITTER = 0.3
-"""Largest deviation of a sample from the uniform clock, as a fraction of the step, at which the record is still interpolated.
 
-Samples of a signal without content above half the sample rate determine it as long as none is off by a quarter of a step (Kadec
-1964); records of the field are sampled several times faster than that, which stretches the bound a little.
-"""
+@dataclass(frozen=True)
+class MendingSettings:
+    """Numbers of `bench.recording.mending`."""
+
+    most_jitter: float = 0.3
+    """Largest deviation of a sample from the uniform clock, as a fraction of the step, at which the record is still interpolated.
+    Samples of a signal without content above half the sample rate determine it as long as none is off by a quarter of a step (Kadec
+    1964); records of the field are sampled several times faster than that, which stretches the bound a little."""
+
+
+SETTINGS = MendingSettings()
 
 
 class Mended(NamedTuple):
@@ -55,13 +61,13 @@ def mended(
     names: Sequence[str],
     *,
     sample_rate: float = 0.0,
-    jitter: float = JITTER,
+    jitter: float = CLOCK_SETTINGS.jitter,
     bridge: bool = True,
 ) -> Mended:
     """A record on an exactly uniform clock: jitter interpolated away, dropped samples and values that are not finite bridged.
 
     Jitter of more than a hundredth of a step is taken for real: the record is interpolated from the times that were measured by a
-    cubic spline, up to `MOST_JITTER`. Times that are only rounded (all of them multiples of a decimal, none off by more than half
+    cubic spline, up to `most_jitter`. Times that are only rounded (all of them multiples of a decimal, none off by more than half
     of it) stay where they are. Dropouts are bridged by piecewise cubic Hermite interpolation (PCHIP), which passes through the
     neighbours and never overshoots them, so that a repaired dropout cannot become the peak of a record.
 
@@ -74,7 +80,7 @@ def mended(
         bridge: Whether missing samples and lost values are bridged, or refused.
 
     Raises:
-        RecordingError: More than `LONGEST_REPAIR` successive samples are lost, or some at either end; samples missing where they
+        RecordingError: More than `longest_repair` successive samples are lost, or some at either end; samples missing where they
             are not to be bridged; times not increasing, or further off a uniform clock.
 
     References:
@@ -87,7 +93,9 @@ def mended(
         refuse_gaps(t, places)
     rate, moved, notes = _settled(t, places, sample_rate, jitter)
     n = int(places[-1]) + 1
-    if n - len(t) > LONGEST_REPAIR * (len(t) - 1):  # before memory is taken for a clock that is all gaps
+    if n - len(t) > CLOCK_SETTINGS.longest_repair * (
+        len(t) - 1
+    ):  # before memory is taken for a clock that is all gaps
         raise RecordingError(f"the record is mostly gaps: {gap_text(t, places)}. Cut it into its parts")
     clock = grid(float(t[0]), rate, n)
     if moved is not None or n > len(t) or (bridge and not np.isfinite(values).all()):
@@ -118,8 +126,8 @@ def _settled(
             f"the times are rounded to {digit:.6g} s, up to {100.0 * abs(late[worst]):.3g} % of a step off: taken for a uniform "
             f"clock of {rate:.9g} Hz"
         ]  # fmt: skip
-    if abs(late[worst]) > MOST_JITTER:
-        raise not_uniform(t, late, rate, worst, MOST_JITTER)
+    if abs(late[worst]) > SETTINGS.most_jitter:
+        raise not_uniform(t, late, rate, worst, SETTINGS.most_jitter)
     return rate, float(np.max(np.abs(late))), [
         f"the clock jitters by up to {100.0 * abs(late[worst]):.3g} % of a step (at t = {t[worst]:.6g} s; rms "
         f"{100.0 * float(np.std(late)):.2g} %): the record is interpolated onto a uniform clock of {rate:.9g} Hz"
@@ -228,8 +236,8 @@ def refuse_long(clock: NDArray[np.float64], good: NDArray[np.bool_]) -> None:
     known = np.flatnonzero(good)
     lost = np.diff(known) - 1
     k = int(np.argmax(lost))
-    if lost[k] > LONGEST_REPAIR:
+    if lost[k] > CLOCK_SETTINGS.longest_repair:
         raise RecordingError(
-            f"{lost[k]} successive samples are lost after t = {clock[known[k]]:.9g} s; at most {LONGEST_REPAIR} are "
+            f"{lost[k]} successive samples are lost after t = {clock[known[k]]:.9g} s; at most {CLOCK_SETTINGS.longest_repair} are "
             "interpolated. Cut the record there and use the parts"
         )

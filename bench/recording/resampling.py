@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import firwin, resample_poly
 
-CROSSINGS = 32
-"""Zero crossings of the filter on either side; sets its length."""
 
-BETA = 8.6
-"""Kaiser shape: 86 dB stop band, 5e-5 pass-band ripple."""
+@dataclass(frozen=True)
+class ResamplingSettings:
+    """Numbers of `bench.recording.resampling`."""
+
+    crossings: int = 32
+    """Zero crossings of the filter on either side; sets its length."""
+    beta: float = 8.6
+    """Kaiser shape: 86 dB stop band, 5e-5 pass-band ripple."""
+
+
+SETTINGS = ResamplingSettings()
 
 
 def resampled(values: NDArray[np.float64], up: int, down: int) -> NDArray[np.float64]:
@@ -27,10 +36,10 @@ def resampled(values: NDArray[np.float64], up: int, down: int) -> NDArray[np.flo
     if up == down or values.shape[1] == 0:
         return values[:: max(down // up, 1)]
     slower = max(up, down)
-    half = CROSSINGS * slower
+    half = SETTINGS.crossings * slower
     # transition band of a Kaiser window, (A - 8) / (2.285 (taps - 1)) rad a sample, laid below the Nyquist frequency
     width = (86.0 - 8.0) / (2.285 * 2.0 * half) / np.pi
     cutoff = 1.0 / slower - width / 2.0
-    taps = firwin(2 * half + 1, cutoff, window=("kaiser", BETA))  # pyright: ignore[reportArgumentType]  (stub: names only)
+    taps = firwin(2 * half + 1, cutoff, window=("kaiser", SETTINGS.beta))  # pyright: ignore[reportArgumentType]  (stub: names only)
     kept = (len(values) - 1) * up // down + 1
     return resample_poly(values, up, down, axis=0, window=taps, padtype="line")[:kept]

@@ -10,6 +10,7 @@ The SI units of the bench itself are recognised without loading pint, so that a 
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -40,8 +41,16 @@ SI_UNITS: dict[str, str] = {
 }
 """Quantities a channel may declare, and the SI unit of each."""
 
-LONGEST = 64
-"""Most characters of a unit; the longest of pint's own names has 40."""
+
+@dataclass(frozen=True)
+class UnitsSettings:
+    """Numbers of `bench.recording.units`."""
+
+    longest: int = 64
+    """Most characters of a unit; the longest of pint's own names has 40."""
+
+
+SETTINGS = UnitsSettings()
 
 _PLAIN = {"1", *SI_UNITS.values()}
 _ALPHABET = re.compile(r"[\w\s*/^().·%°+-]*")
@@ -91,9 +100,9 @@ def _registry() -> Any:
 @cache
 def _parsed(unit: str) -> tuple[Any, str]:
     """The pint unit and its root units as text."""
-    if len(unit) > LONGEST:  # pint's time grows with the square of a name's length
+    if len(unit) > SETTINGS.longest:  # pint's time grows with the square of a name's length
         raise UnitError(
-            f"'{unit[:20]}…' has {len(unit)} characters; a unit has at most {LONGEST}, such as 'N m' or 'm/s^2'"
+            f"'{unit[:20]}…' has {len(unit)} characters; a unit has at most {SETTINGS.longest}, such as 'N m' or 'm/s^2'"
         )
     registry = _registry()
     try:

@@ -15,7 +15,13 @@ from bench.reproduction.estimates import fine
 from bench.reproduction.imperial import imperial
 from bench.reproduction.item import Item, Picture, Progress
 from bench.reproduction.printed_figures import fig, panels
-from bench.reproduction.verdict import GOOD_FIT, Row, axis_row, told_row, value_row
+from bench.reproduction.verdict import (
+    VERDICT_SETUP,
+    Row,
+    axis_row,
+    told_row,
+    value_row,
+)
 
 PAIRS = [("axial", "axial force"), ("torsional", "torsional force")]
 """Loops: force over relative displacement, torque over relative rotation."""
@@ -115,7 +121,7 @@ def _rows(
                         "%",
                         "clearly indicate the capability" if kind == "network" else "validation, no number",
                         score,
-                        high=GOOD_FIT if kind == "network" else math.inf,
+                        high=VERDICT_SETUP.good_fit if kind == "network" else math.inf,
                         source=f"p. 82, sentence; {fig(drawn[kind])}",
                         reason="a good fit (section 3.4.2)"
                         if kind == "network"
@@ -173,7 +179,7 @@ def _rows(
                     "%",
                     "three data sets were required",
                     score,
-                    low=GOOD_FIT,
+                    low=VERDICT_SETUP.good_fit,
                     source="p. 77, sentence",
                     reason="not a good fit (section 3.4.2)",
                 )

@@ -8,20 +8,40 @@ not go to the batch values. A larger one reverses each of these.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from bench.identification.damper_study import INCH, PRINTED_NMSE, PolynomialExperiment, polynomial_experiment
+from bench.identification.damper_study import (
+    DAMPER_STUDY_SETTINGS,
+    INCH,
+    PolynomialExperiment,
+    polynomial_experiment,
+)
 from bench.reproduction.item import Progress
 from bench.reproduction.printed_figures import fig
-from bench.reproduction.verdict import GOOD_FIT, SEEDS, Row, fact_row, one_of_ours, value_row
+from bench.reproduction.verdict import (
+    VERDICT_SETUP,
+    Row,
+    fact_row,
+    one_of_ours,
+    value_row,
+)
 
-COVARIANCES = (20.0, 1e3, 1e7)
-"""Start covariances: that of the pictures, that printed for chapter 2, and one that hardly holds back."""
-NEAR = 0.1
-FEW_CYCLES = 10.0
-"""[s]; about six cycles of motion whose mean frequency is 0.6 Hz."""
+
+@dataclass(frozen=True)
+class DamperConvergenceSetup:
+    """Numbers of `bench.reproduction.damper_convergence`."""
+
+    covariances: tuple[float, float, float] = (20.0, 1e3, 1e7)
+    """Start covariances: that of the pictures, that printed for chapter 2, and one that hardly holds back."""
+    near: float = 0.1
+    few_cycles: float = 10.0
+    """[s]; about six cycles of motion whose mean frequency is 0.6 Hz."""
+
+
+SETUP = DamperConvergenceSetup()
 CHOSEN = "P(0) = 20, for the printed errors and their order"
 
 
@@ -39,8 +59,8 @@ class Outcome(NamedTuple):
 
 def outcome(experiment: PolynomialExperiment) -> Outcome:
     """What is judged of a run."""
-    away = np.abs(experiment.theta / experiment.theta_batch - 1.0) > NEAR
-    late = experiment.time >= FEW_CYCLES
+    away = np.abs(experiment.theta / experiment.theta_batch - 1.0) > SETUP.near
+    late = experiment.time >= SETUP.few_cycles
     peak = float(np.abs(experiment.measured).max())
     largest = np.abs(experiment.contributions).max(axis=0) / peak
     names = list(experiment.names)
@@ -67,13 +87,13 @@ def study(progress: Progress) -> Study:
     """Run the experiment for each start covariance and seed."""
     found: dict[float, list[Outcome]] = {}
     within = []
-    for number, covariance in enumerate(COVARIANCES):
-        progress(f"P(0) = {covariance:g}", number / len(COVARIANCES))
+    for number, covariance in enumerate(SETUP.covariances):
+        progress(f"P(0) = {covariance:g}", number / len(SETUP.covariances))
         found[covariance] = [
             outcome(polynomial_experiment(np.random.default_rng(seed), initial_covariance=covariance))
-            for seed in SEEDS
+            for seed in VERDICT_SETUP.seeds
         ]
-    for seed in SEEDS:
+    for seed in VERDICT_SETUP.seeds:
         small = polynomial_experiment(np.random.default_rng(seed), peak=0.5 * INCH)
         within.append(small.other_segment)
     return Study(found, within)
@@ -81,7 +101,7 @@ def study(progress: Progress) -> Study:
 
 def rows(shown: PolynomialExperiment, found: Study) -> list[Row]:
     """The errors beside the printed ones, what P(0) does to them, and the sentences on Figs 3.6 and 3.7."""
-    first = found.by_covariance[COVARIANCES[0]]
+    first = found.by_covariance[SETUP.covariances[0]]
     ours = outcome(shown)
     return [
         *_error_rows(ours, found),
@@ -92,7 +112,7 @@ def rows(shown: PolynomialExperiment, found: Study) -> list[Row]:
 
 
 def _error_rows(ours: Outcome, found: Study) -> list[Row]:
-    first = found.by_covariance[COVARIANCES[0]]
+    first = found.by_covariance[SETUP.covariances[0]]
     drawn = {
         "on line": ("3.5", "p. 51", ours.online, [run.online for run in first]),
         "half amplitude": ("3.8", "p. 55", ours.half, [run.half for run in first]),
@@ -100,8 +120,8 @@ def _error_rows(ours: Outcome, found: Study) -> list[Row]:
     }
     made = []
     for name, (number, page, value, seeds) in drawn.items():
-        printed = PRINTED_NMSE[name]
-        good = printed < GOOD_FIT
+        printed = DAMPER_STUDY_SETTINGS.printed_nmse[name]
+        good = printed < VERDICT_SETUP.good_fit
         made.append(
             one_of_ours(
                 f"{name}: NMSE",
@@ -110,7 +130,7 @@ def _error_rows(ours: Outcome, found: Study) -> list[Row]:
                 value,
                 seeds,
                 source=f"{page}, number; {fig(number)}",
-                shape=(0.0, GOOD_FIT) if good else (GOOD_FIT, 100.0),
+                shape=(0.0, VERDICT_SETUP.good_fit) if good else (VERDICT_SETUP.good_fit, 100.0),
                 shape_text=f"both are {'below' if good else 'above'} 5 %, a good fit",
                 chosen=CHOSEN,
                 why="damper, band and P(0) are ours; the synthetic damper's memory leaves 1.2 to 1.4 % to the best polynomial "
@@ -121,11 +141,11 @@ def _error_rows(ours: Outcome, found: Study) -> list[Row]:
         one_of_ours(
             "other segment, both of the record of half the amplitude: NMSE",
             "%",
-            PRINTED_NMSE["other segment"],
+            DAMPER_STUDY_SETTINGS.printed_nmse["other segment"],
             found.within_half[0],
             found.within_half,
             source=f"p. 56, number; the axes of {fig('3.9')} are those of the record of ±0.013 m",
-            shape=(0.0, GOOD_FIT),
+            shape=(0.0, VERDICT_SETUP.good_fit),
             shape_text="both are below 5 %, a good fit",
             chosen=CHOSEN,
             why="as before: P(0) = 20 holds the estimates back, and more so on half the motion",
@@ -160,18 +180,20 @@ def _covariance_rows(found: Study) -> list[Row]:
         "half amplitude": ("3.8", lambda run: run.half),
         "other segment": ("3.9", lambda run: run.segment),
     }
-    for covariance in COVARIANCES[1:]:
+    for covariance in SETUP.covariances[1:]:
         for name, (number, of) in measures.items():
             seeds = [of(run) for run in found.by_covariance[covariance]]
             made.append(
                 one_of_ours(
                     f"{name}, P(0) = {covariance:g}: NMSE",
                     "%",
-                    PRINTED_NMSE[name],
+                    DAMPER_STUDY_SETTINGS.printed_nmse[name],
                     seeds[0],
                     seeds,
                     source=f"number; {fig(number)}",
-                    shape=(0.0, GOOD_FIT) if PRINTED_NMSE[name] < GOOD_FIT else (GOOD_FIT, 100.0),
+                    shape=(0.0, VERDICT_SETUP.good_fit)
+                    if DAMPER_STUDY_SETTINGS.printed_nmse[name] < VERDICT_SETUP.good_fit
+                    else (VERDICT_SETUP.good_fit, 100.0),
                     shape_text="on the same side of 5 %, a good fit",
                     why="with a larger P(0) the estimator follows the record from its first seconds on, as batch least squares "
                     "would, and its estimates bear half the amplitude better: the printed errors are those of an "
@@ -183,11 +205,11 @@ def _covariance_rows(found: Study) -> list[Row]:
 
 def _convergence_rows(ours: Outcome, found: Study) -> list[Row]:
     made = []
-    for covariance in COVARIANCES:
+    for covariance in SETUP.covariances:
         runs = found.by_covariance[covariance]
-        shown = ours if covariance == COVARIANCES[0] else runs[0]
+        shown = ours if covariance == SETUP.covariances[0] else runs[0]
         for when, value, of in (
-            (f"from {FEW_CYCLES:g} s on", shown.soon, lambda run: run.soon),
+            (f"from {SETUP.few_cycles:g} s on", shown.soon, lambda run: run.soon),
             ("at 60 s", shown.end, lambda run: run.end),
         ):
             made.append(
@@ -204,7 +226,7 @@ def _convergence_rows(ours: Outcome, found: Study) -> list[Row]:
                     "and 60 s of noise decide between them only for P(0) of 1e7, at the end, on some records",
                 )
             )
-    first = found.by_covariance[COVARIANCES[0]]
+    first = found.by_covariance[SETUP.covariances[0]]
     made += [
         value_row(
             "largest contribution of a parameter that has not converged at 60 s, over the largest force",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -27,12 +28,30 @@ from bench.identification.damper_study import (
 )
 from bench.reproduction import damper_random
 from bench.reproduction.damper_records import LOOPS, beside
-from bench.reproduction.estimates import REFERENCE, courses, fine
+from bench.reproduction.estimates import (
+    ESTIMATES_SETUP,
+    courses,
+    fine,
+)
 from bench.reproduction.item import Item, Picture, Progress
 from bench.reproduction.printed_figures import fig, panels
-from bench.reproduction.verdict import GOOD_FIT, Row, fact_row, told_row, value_row
+from bench.reproduction.verdict import (
+    VERDICT_SETUP,
+    Row,
+    fact_row,
+    told_row,
+    value_row,
+)
 
-SEED = 31
+
+@dataclass(frozen=True)
+class DamperDesignSetup:
+    """Numbers of `bench.reproduction.damper_design`."""
+
+    seed: int = 31
+
+
+SETUP = DamperDesignSetup()
 
 
 def _table_rows(campaign: Campaign) -> list[Row]:
@@ -115,7 +134,7 @@ def histograms(campaign: Campaign) -> Figure:
             x = np.linspace(0.0, end, 200)
             for label, mean, std, look in (
                 ("normal, ours", entry.mean, entry.std, {"color": COLOURS[1]}),
-                ("normal, printed", entry.printed_mean, entry.printed_std, REFERENCE),
+                ("normal, printed", entry.printed_mean, entry.printed_std, ESTIMATES_SETUP.reference),
             ):
                 density = np.exp(-0.5 * ((x - mean) / std) ** 2) / (std * np.sqrt(2.0 * np.pi))
                 axes.plot(x, density, label=label, **look)
@@ -204,7 +223,7 @@ def _rows(campaign: Campaign, slow: _SlowTest) -> tuple[Row, ...]:
             "%",
             "curves of Fig 3.3 c to e nearly coincide",
             slow.online.nmse,
-            high=GOOD_FIT,
+            high=VERDICT_SETUP.good_fit,
             source=fig("3.3 c"),
             reason="a good fit (section 3.4.2); no number is printed",
         ),
@@ -265,7 +284,7 @@ def _pictures(campaign: Campaign, slow: _SlowTest) -> tuple[Picture, ...]:
 
 def run(progress: Progress) -> Item:
     """Make the item."""
-    rng = np.random.default_rng(SEED)
+    rng = np.random.default_rng(SETUP.seed)
     progress("202 harmonic tests", 0.05)
     campaign = harmonic_campaign(rng)
     progress("one slow test", 0.8)

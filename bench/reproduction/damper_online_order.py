@@ -7,6 +7,7 @@ x, x^3; its caption has x'', x, x', x^3, x'^3, and those are drawn here.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -20,13 +21,21 @@ from bench.identification.damper_study import DamperRecord
 from bench.identification.regressors import Reference, polynomial_model
 from bench.recording import nmse
 
-COVARIANCES = (20.0, 1e3, 1e7)
-ORDERS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 15, 20, 27, 35)
-"""Common orders: all of the low ones; beyond, a run costs the fourth power of the order."""
-MAP_ORDERS = (0, 1, 2, 3, 5, 8, 12, 20, 27, 35)
-FIXED = 5
-EVERY = 10
-"""Samples of the record taken: one in ten, 50 Hz for motion below 1 Hz."""
+
+@dataclass(frozen=True)
+class DamperOnlineOrderSetup:
+    """Numbers of `bench.reproduction.damper_online_order`."""
+
+    covariances: tuple[float, float, float] = (20.0, 1e3, 1e7)
+    orders: tuple[int, ...] = (1, 2, 3, 4, 5, 6, 8, 10, 12, 15, 20, 27, 35)
+    """Common orders: all of the low ones; beyond, a run costs the fourth power of the order."""
+    map_orders: tuple[int, ...] = (0, 1, 2, 3, 5, 8, 12, 20, 27, 35)
+    fixed: int = 5
+    every: int = 10
+    """Samples of the record taken: one in ten, 50 Hz for motion below 1 Hz."""
+
+
+DAMPER_ONLINE_ORDER_SETUP = DamperOnlineOrderSetup()
 FOLLOWED = {"m": "x''", "a10": "x", "a01": "x'", "a30": "x³", "a03": "x'³"}
 """Estimates drawn in Fig 3.12 a to e, and their terms."""
 
@@ -42,10 +51,10 @@ class OnlineStudy(NamedTuple):
     """The errors and estimates over the orders.
 
     Attributes:
-        diagonal: Runs of `ORDERS` in both, by start covariance.
-        over_x: Error over orders 0 to 35 in x, v at `FIXED` (36,) [%].
+        diagonal: Runs of `orders` in both, by start covariance.
+        over_x: Error over orders 0 to 35 in x, v at `fixed` (36,) [%].
         over_v: The same over the order in v (36,) [%].
-        surface: Error over `MAP_ORDERS` in x (rows) and v [%].
+        surface: Error over `map_orders` in x (rows) and v [%].
     """
 
     diagonal: dict[float, list[Point]]
@@ -56,7 +65,7 @@ class OnlineStudy(NamedTuple):
 
 def identify(record: DamperRecord, order_x: int, order_v: int, covariance: float) -> Point:
     """Run the estimator over a record."""
-    part = record.part(slice(None, None, EVERY))
+    part = record.part(slice(None, None, DAMPER_ONLINE_ORDER_SETUP.every))
     peaks = [float(np.abs(channel).max()) for channel in part[1:]]
     model = polynomial_model(order_x, order_v, reference=Reference(peaks[3], peaks[0], peaks[1], peaks[2]))
     # A window longer than the record: the monitor of excitation costs the cube of the number of terms.
@@ -78,16 +87,27 @@ def identify(record: DamperRecord, order_x: int, order_v: int, covariance: float
 
 def online_study(record: DamperRecord, highest: int) -> OnlineStudy:
     """Make the study on one record; the lines and the surface with the printed P(0) of chapter 2, 1000."""
-    printed = COVARIANCES[1]
+    printed = DAMPER_ONLINE_ORDER_SETUP.covariances[1]
     orders = range(highest + 1)
     return OnlineStudy(
         {
-            covariance: [identify(record, order, order, covariance) for order in ORDERS]
-            for covariance in COVARIANCES
+            covariance: [
+                identify(record, order, order, covariance) for order in DAMPER_ONLINE_ORDER_SETUP.orders
+            ]
+            for covariance in DAMPER_ONLINE_ORDER_SETUP.covariances
         },
-        np.array([identify(record, order, FIXED, printed).error for order in orders]),
-        np.array([identify(record, FIXED, order, printed).error for order in orders]),
-        np.array([[identify(record, p, q, printed).error for q in MAP_ORDERS] for p in MAP_ORDERS]),
+        np.array(
+            [identify(record, order, DAMPER_ONLINE_ORDER_SETUP.fixed, printed).error for order in orders]
+        ),
+        np.array(
+            [identify(record, DAMPER_ONLINE_ORDER_SETUP.fixed, order, printed).error for order in orders]
+        ),
+        np.array(
+            [
+                [identify(record, p, q, printed).error for q in DAMPER_ONLINE_ORDER_SETUP.map_orders]
+                for p in DAMPER_ONLINE_ORDER_SETUP.map_orders
+            ]
+        ),
     )
 
 
@@ -97,11 +117,11 @@ def surface_figure(study: OnlineStudy) -> Figure:
         figure, grid = axes_grid(11.0, 3.4, ncols=3)
         axes = grid[0, 0]
         axes.grid(visible=False)
-        place = np.arange(len(MAP_ORDERS))
+        place = np.arange(len(DAMPER_ONLINE_ORDER_SETUP.map_orders))
         drawn = axes.pcolormesh(place, place, study.surface.T, cmap="viridis", rasterized=True)
         figure.colorbar(drawn, ax=axes, label="identification error, NMSE [%]")
-        axes.set_xticks(place, [str(order) for order in MAP_ORDERS])
-        axes.set_yticks(place, [str(order) for order in MAP_ORDERS])
+        axes.set_xticks(place, [str(order) for order in DAMPER_ONLINE_ORDER_SETUP.map_orders])
+        axes.set_yticks(place, [str(order) for order in DAMPER_ONLINE_ORDER_SETUP.map_orders])
         axes.set_xlabel("order of x")
         axes.set_ylabel("order of v")
         for axes, error, name in (
@@ -124,13 +144,24 @@ def asymptotes_figure(study: OnlineStudy) -> Figure:
             for k, (axes, term) in enumerate(zip(grid.flat, FOLLOWED.values(), strict=False)):
                 column = values[:, k] / np.nanmax(np.abs(values[:, k]))
                 axes.plot(
-                    ORDERS, column, "o-", markersize=3, color=COLOURS[number], label=f"P(0) = {covariance:g}"
+                    DAMPER_ONLINE_ORDER_SETUP.orders,
+                    column,
+                    "o-",
+                    markersize=3,
+                    color=COLOURS[number],
+                    label=f"P(0) = {covariance:g}",
                 )
                 axes.set_ylim(-1.1, 1.1)
                 axes.set_title(f"estimate of {term}, over its largest", fontsize=8)
                 axes.set_ylabel("[1]")
             axes = grid[1, 2]
-            axes.plot(ORDERS, [point.error for point in points], "o-", markersize=3, color=COLOURS[number])
+            axes.plot(
+                DAMPER_ONLINE_ORDER_SETUP.orders,
+                [point.error for point in points],
+                "o-",
+                markersize=3,
+                color=COLOURS[number],
+            )
             axes.set_ylim(0.0, 20.0)
             axes.set_title("identification error", fontsize=8)
             axes.set_ylabel("NMSE [%]")

@@ -6,6 +6,8 @@ least squares of all orders judged on a record that they have not seen.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from matplotlib.figure import Figure
 
@@ -13,23 +15,38 @@ from bench.figures import COLOURS, style
 from bench.figures.look import axes_grid
 from bench.identification.damper_study import OrderStudy, order_study, random_record
 from bench.reproduction.damper_online_order import (
+    DAMPER_ONLINE_ORDER_SETUP,
     FOLLOWED,
-    ORDERS,
     OnlineStudy,
     asymptotes_figure,
     online_study,
     surface_figure,
 )
-from bench.reproduction.estimates import REFERENCE
+from bench.reproduction.estimates import (
+    ESTIMATES_SETUP,
+)
 from bench.reproduction.item import Item, Picture, Progress
 from bench.reproduction.printed_figures import fig, panels
-from bench.reproduction.verdict import GOOD_FIT, SEEDS, Row, fact_row, value_row
+from bench.reproduction.verdict import (
+    VERDICT_SETUP,
+    Row,
+    fact_row,
+    value_row,
+)
 
-SEED = 33
-HIGHEST = 35
-FIXED = 5
-SEEDS_HIGHEST = 14
-"""Highest order of the study on further seeds; all of them are over-parameterised before it."""
+
+@dataclass(frozen=True)
+class DamperOrderSetup:
+    """Numbers of `bench.reproduction.damper_order`."""
+
+    seed: int = 33
+    highest: int = 35
+    fixed: int = 5
+    seeds_highest: int = 14
+    """Highest order of the study on further seeds; all of them are over-parameterised before it."""
+
+
+SETUP = DamperOrderSetup()
 
 
 def error_map(study: OrderStudy) -> Figure:
@@ -49,10 +66,16 @@ def error_map(study: OrderStudy) -> Figure:
         axes.legend(loc="upper right", frameon=True, framealpha=1.0)
         axes = grid[0, 1]
         axes.semilogy(
-            study.orders, error[:, FIXED], color=COLOURS[1], label=f"order of x varied, v at {FIXED}"
+            study.orders,
+            error[:, SETUP.fixed],
+            color=COLOURS[1],
+            label=f"order of x varied, v at {SETUP.fixed}",
         )
         axes.semilogy(
-            study.orders, error[FIXED, :], color=COLOURS[0], label=f"order of v varied, x at {FIXED}"
+            study.orders,
+            error[SETUP.fixed, :],
+            color=COLOURS[0],
+            label=f"order of v varied, x at {SETUP.fixed}",
         )
         axes.set_xlabel("order")
         axes.set_ylabel("NMSE on unseen data [%]")
@@ -89,7 +112,7 @@ def indicators(study: OrderStudy) -> Figure:
             color=COLOURS[1],
             label="data fitted",
         )
-        axes.axvline(study.optimum, label=f"optimum {study.optimum}", **REFERENCE)
+        axes.axvline(study.optimum, label=f"optimum {study.optimum}", **ESTIMATES_SETUP.reference)
         if study.blow_up is not None:
             axes.axvline(study.blow_up, color="#777777", linestyle=":", label=f"blow-up {study.blow_up}")
         axes.set_ylabel("NMSE [%]")
@@ -108,7 +131,8 @@ def _online_rows(study: OnlineStudy) -> list[Row]:
         made += [
             fact_row(
                 f"identification error falls with the order, P(0) = {covariance:g}",
-                f"{error[0]:.2f} % at order {ORDERS[0]}, {error.min():.2f} % at order {ORDERS[int(error.argmin())]}",
+                f"{error[0]:.2f} % at order {DAMPER_ONLINE_ORDER_SETUP.orders[0]}, "
+                f"{error.min():.2f} % at order {DAMPER_ONLINE_ORDER_SETUP.orders[int(error.argmin())]}",
                 error.min() < error[0],
                 printed="decreases with the model order until over-parameterisation",
                 source=f"p. 61, sentence (i); {fig('3.12 f')}",
@@ -116,7 +140,7 @@ def _online_rows(study: OnlineStudy) -> list[Row]:
                 reason="no number is printed",
             ),
             value_row(
-                f"identification error at order {ORDERS[-1]} over its least, P(0) = {covariance:g}",
+                f"identification error at order {DAMPER_ONLINE_ORDER_SETUP.orders[-1]} over its least, P(0) = {covariance:g}",
                 "1",
                 "will not always decrease with increasing order; over-parameterisation",
                 rises,
@@ -154,6 +178,8 @@ def _online_rows(study: OnlineStudy) -> list[Row]:
             source=f"p. 61, sentences (ii), (iii); {fig('3.12 a to e')}",
             tolerance="least range over its median, orders from 3 on",
             reason="an order of the five has no tolerance",
+            shape=moved[0] < 0.1,
+            why="the estimate of x moves as little as that of x''; those of v, x³ and v³ change with the order, as printed",
         ),
         fact_row(
             "identification error ruled by the order of v, not of x (orders 1 to 10, range)",
@@ -179,8 +205,8 @@ def _indicator_row(study: OnlineStudy) -> Row:
         rises = np.flatnonzero((np.arange(len(error)) > error.argmin()) & (error > 1.1 * error.min()))
         leaves = np.flatnonzero(np.abs(mass[2:] / np.median(mass[2:]) - 1.0) > 0.1) + 2
         told.append(
-            f"P(0) = {covariance:g}: error rises at {ORDERS[rises[0]] if rises.size else 'no order'}, "
-            f"mass leaves at {ORDERS[leaves[0]] if leaves.size else 'no order'}"
+            f"P(0) = {covariance:g}: error rises at {DAMPER_ONLINE_ORDER_SETUP.orders[rises[0]] if rises.size else 'no order'}, "
+            f"mass leaves at {DAMPER_ONLINE_ORDER_SETUP.orders[leaves[0]] if leaves.size else 'no order'}"
         )
         found |= bool(rises.size and leaves.size and abs(int(rises[0]) - int(leaves[0])) <= 1)
     return fact_row(
@@ -211,7 +237,7 @@ def _batch_rows(study: OrderStudy, others: list[OrderStudy]) -> list[Row]:
             "%",
             None,
             float(error[study.optimum]),
-            high=GOOD_FIT,
+            high=VERDICT_SETUP.good_fit,
             reason="a good fit (section 3.4.2)",
             seeds=best,
         ),
@@ -234,6 +260,8 @@ def _batch_rows(study: OrderStudy, others: list[OrderStudy]) -> list[Row]:
             spread=f"{min(v for v in blow if v is not None)} … {max(v for v in blow if v is not None)}"
             if any(v is not None for v in blow)
             else "never",
+            shape=any(value is not None for value in blow),
+            why=f"on some seeds the error does not double up to order {SETUP.seeds_highest}, where the study of further seeds ends",
         ),
         fact_row(
             "unseen data, batch: the mass leaves its plateau within one order of where the error doubles",
@@ -282,18 +310,18 @@ def _pictures(study: OrderStudy, online: OnlineStudy) -> tuple[Picture, ...]:
 def run(progress: Progress) -> Item:
     """Make the item."""
     progress("random tests", 0.02)
-    rng = np.random.default_rng(SEED)
+    rng = np.random.default_rng(SETUP.seed)
     training, validation = random_record(rng), random_record(rng)
     progress("on-line estimator over the orders", 0.05)
-    online = online_study(training, HIGHEST)
-    progress(f"fitting all {(HIGHEST + 1) ** 2} pairs of orders", 0.5)
-    study = order_study(training, validation, highest=HIGHEST)
+    online = online_study(training, SETUP.highest)
+    progress(f"fitting all {(SETUP.highest + 1) ** 2} pairs of orders", 0.5)
+    study = order_study(training, validation, highest=SETUP.highest)
     others = []
-    for number, seed in enumerate(SEEDS):
+    for number, seed in enumerate(VERDICT_SETUP.seeds):
         progress(f"seed {seed}", 0.8 + 0.015 * number)
         draws = np.random.default_rng(seed)
         pair = random_record(draws), random_record(draws)
-        others.append(order_study(*pair, highest=SEEDS_HIGHEST))
+        others.append(order_study(*pair, highest=SETUP.seeds_highest))
     text = (
         "First the text's own quantity: the on-line estimator with polynomials of orders up to 35, its error on the record "
         "it learns from, and the values its estimates tend to. Beside it batch least squares of all pairs of orders "

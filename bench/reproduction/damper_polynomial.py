@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from matplotlib.figure import Figure
 from scipy.interpolate import make_interp_spline
@@ -9,7 +11,7 @@ from scipy.interpolate import make_interp_spline
 from bench.figures import bar_table, loops, style, time_histories
 from bench.figures.look import axes_grid, thin
 from bench.identification.damper_study import (
-    PRINTED_NMSE,
+    DAMPER_STUDY_SETTINGS,
     VISCOUS_DAMPER,
     PolynomialExperiment,
     damper_record,
@@ -18,14 +20,25 @@ from bench.identification.damper_study import (
 from bench.recording import nmse
 from bench.reproduction import damper_convergence
 from bench.reproduction.damper_records import LOOPS, beside
-from bench.reproduction.estimates import REFERENCE, fine
+from bench.reproduction.estimates import (
+    ESTIMATES_SETUP,
+    fine,
+)
 from bench.reproduction.item import Item, Picture, Progress
 from bench.reproduction.printed_figures import panels
 from bench.reproduction.verdict import Row, value_row
 from bench.rig import Element, simulate
 from bench.rig.library import damper_rig, prescribe, starting
 
-SEED = 32
+
+@dataclass(frozen=True)
+class DamperPolynomialSetup:
+    """Numbers of `bench.reproduction.damper_polynomial`."""
+
+    seed: int = 32
+
+
+SETUP = DamperPolynomialSetup()
 COLUMNS = 6
 
 
@@ -60,7 +73,7 @@ def _courses(experiment: PolynomialExperiment) -> Figure:
                 linewidth=1.0,
                 label="on line",
             )
-            axes.axhline(experiment.theta_batch[i], label="batch least squares", **REFERENCE)
+            axes.axhline(experiment.theta_batch[i], label="batch least squares", **ESTIMATES_SETUP.reference)
             axes.set_title(f"{name} [{_unit(name)}]", fontsize=7)
             axes.tick_params(labelsize=6)
             axes.margins(x=0.0)
@@ -160,7 +173,7 @@ def _pictures(experiment: PolynomialExperiment, found: damper_convergence.Study)
                 panels(number, "bc"),
             ),
         ]
-    errors = {"printed": PRINTED_NMSE} | {
+    errors = {"printed": DAMPER_STUDY_SETTINGS.printed_nmse} | {
         f"ours, P(0) = {covariance:g}": {
             "on line": float(np.median([run.online for run in runs])),
             "half amplitude": float(np.median([run.half for run in runs])),
@@ -193,7 +206,7 @@ def _pictures(experiment: PolynomialExperiment, found: damper_convergence.Study)
 def run(progress: Progress) -> Item:
     """Make the item."""
     progress("random tests and on-line identification", 0.1)
-    experiment = polynomial_experiment(np.random.default_rng(SEED))
+    experiment = polynomial_experiment(np.random.default_rng(SETUP.seed))
     progress("the same motion on the MuJoCo rig", 0.6)
     difference = rig_difference(experiment)
     found = damper_convergence.study(lambda label, share: progress(label, 0.3 + 0.6 * share))

@@ -21,7 +21,12 @@ from bench.reproduction.damper_records import LOOPS, beside
 from bench.reproduction.estimates import courses, fine
 from bench.reproduction.item import Picture
 from bench.reproduction.printed_figures import fig, panels
-from bench.reproduction.verdict import GOOD_FIT, SEEDS, Row, Verdict, value_row
+from bench.reproduction.verdict import (
+    VERDICT_SETUP,
+    Row,
+    Verdict,
+    value_row,
+)
 
 
 class Motion(NamedTuple):
@@ -90,12 +95,12 @@ def rows() -> list[Row]:
     found = []
     for motion in (NARROW, POLYNOMIAL, WIDE):
         narrow = motion is NARROW
-        runs = [track(motion, seed) for seed in SEEDS]
+        runs = [track(motion, seed) for seed in VERDICT_SETUP.seeds]
         error, swing = [run.error for run in runs], [run.swing for run in runs]
         printed = None if narrow else "incapable of accurately tracking C and n"
         source = "" if narrow else f"{fig('3.10')}, sentence on p. 59"
         # Where some seeds lie on the other side the sentence is not refuted, and not borne out either.
-        split = Verdict.SHAPE if min(error) < GOOD_FIT < max(error) else None
+        split = Verdict.SHAPE if min(error) < VERDICT_SETUP.good_fit < max(error) else None
         found.append(
             value_row(
                 f"design model on line on random motion, {motion.name}: NMSE of the force",
@@ -108,8 +113,8 @@ def rows() -> list[Row]:
                 why="in a band below 1 Hz the synthetic damper still is nearly a curve, and C and n follow it to the limit of "
                 "a good fit: the sentence holds where the motion is fast enough for the damper to lag",
                 verdict=split,
-                low=-math.inf if narrow else GOOD_FIT,
-                high=GOOD_FIT if narrow else math.inf,
+                low=-math.inf if narrow else VERDICT_SETUP.good_fit,
+                high=VERDICT_SETUP.good_fit if narrow else math.inf,
             )
         )
         found.append(
@@ -140,7 +145,7 @@ def rows() -> list[Row]:
 
 def pictures() -> list[Picture]:
     """Course, force and loops of the widest band (Fig 3.10), and the course in the narrow one."""
-    wide, narrow = track(WIDE, SEEDS[0]), track(NARROW, SEEDS[0])
+    wide, narrow = track(WIDE, VERDICT_SETUP.seeds[0]), track(NARROW, VERDICT_SETUP.seeds[0])
     records = beside(wide.record, {"design model on line": wide.predicted})
     window = (15.0, 25.0)
     return [

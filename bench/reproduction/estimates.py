@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -13,7 +15,17 @@ from bench.figures import style
 from bench.figures.look import axes_grid, thin
 from bench.identification.adaptive import AdaptiveHistory
 
-REFERENCE = {"color": "#D55E00", "linestyle": (0, (5, 2)), "linewidth": 1.0}
+
+@dataclass(frozen=True)
+class EstimatesSetup:
+    """Numbers of `bench.reproduction.estimates`."""
+
+    reference: Mapping[str, Any] = field(
+        default_factory=lambda: {"color": "#D55E00", "linestyle": (0, (5, 2)), "linewidth": 1.0}
+    )
+
+
+ESTIMATES_SETUP = EstimatesSetup()
 
 
 def estimate_histories(
@@ -47,7 +59,7 @@ def estimate_histories(
             theta = history.theta[shown, i]
             axes.plot(*thin(time, theta), color="#1a1a1a", linewidth=1.2, label="estimate")
             if reference:
-                axes.axhline(reference[i], label=label, **REFERENCE)
+                axes.axhline(reference[i], label=label, **ESTIMATES_SETUP.reference)
             # The first instants overshoot by decades; the axis belongs to what follows.
             settled = theta[time > time[0] + 0.02 * np.ptp(time)]
             span = [settled.min(), settled.max(), *reference[i : i + 1]]
@@ -125,7 +137,7 @@ def courses(
         figure, grid = axes_grid(8.0, 3.4, nrows=len(drawn), sharex=True)
         for axes, (label, (values, final, span)) in zip(grid[:, 0], drawn.items(), strict=True):
             axes.plot(time, values, color="#1a1a1a", linewidth=1.2, label="on line")
-            axes.axhline(final, label="nonlinear least squares", **REFERENCE)
+            axes.axhline(final, label="nonlinear least squares", **ESTIMATES_SETUP.reference)
             axes.set_ylim(span)
             axes.set_ylabel(label)
             axes.margins(x=0.0)

@@ -9,42 +9,52 @@ while they act.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from bench.figures import phase_plot, time_histories
+from bench.laws.coupling import POUND_FORCE
 from bench.recording import Recording
 from bench.reproduction.imperial import STIFFNESS, sdof_view
 from bench.reproduction.item import Item, Picture, Progress
 from bench.reproduction.printed_figures import fig, panels
 from bench.reproduction.verdict import Row, axis_row, told_row, value_row
 from bench.rig import Element, simulate
-from bench.rig.library import POUND_FORCE, sdof_rig
+from bench.rig.library import sdof_rig
 from bench.signals import Excitation, ImpulseTrain
 
-MASS = 0.04  # [lbf s^2/in]
-FREQUENCY = 3.0  # undamped [Hz]
-DAMPING_RATIO = 0.05
-PUSH = 10.5  # peak of an impulse [lbf]
-WINDOW = (12.0, 16.0)  # time axis of the printed figure [s]
+
+@dataclass(frozen=True)
+class FreeVibrationSetup:
+    """Numbers of `bench.reproduction.free_vibration`."""
+
+    mass: float = 0.04
+    frequency: float = 3.0
+    damping_ratio: float = 0.05
+    push: float = 10.5
+    window: tuple[float, float] = (12.0, 16.0)
+
+
+SETUP = FreeVibrationSetup()
 CHOSEN = "mass, stiffness, damping and impulses"
 
 
 def record() -> Recording:
     """The test: a push each way every two seconds."""
-    omega = 2.0 * math.pi * FREQUENCY
+    omega = 2.0 * math.pi * SETUP.frequency
     spring = Element.of(
         "linear",
         "carriage",
         name="spring",
-        stiffness=MASS * omega**2 * STIFFNESS,
-        damping=2.0 * DAMPING_RATIO * omega * MASS * STIFFNESS,
+        stiffness=SETUP.mass * omega**2 * STIFFNESS,
+        damping=2.0 * SETUP.damping_ratio * omega * SETUP.mass * STIFFNESS,
     )
-    push = ImpulseTrain(amplitude=PUSH * POUND_FORCE, width=0.12, interval=2.0, alternate=True)
-    rig = sdof_rig(spring, mass=MASS * STIFFNESS)
+    push = ImpulseTrain(amplitude=SETUP.push * POUND_FORCE, width=0.12, interval=2.0, alternate=True)
+    rig = sdof_rig(spring, mass=SETUP.mass * STIFFNESS)
     return sdof_view(
-        simulate(rig, Excitation({"shaker": push}, duration=WINDOW[1], sample_rate=1000.0)), MASS
+        simulate(rig, Excitation({"shaker": push}, duration=SETUP.window[1], sample_rate=1000.0)), SETUP.mass
     )
 
 
@@ -103,8 +113,8 @@ def _rows(shown: Recording, frequency: float, ratio: float) -> tuple[Row, ...]:
             "1",
             None,
             ratio,
-            low=0.99 * DAMPING_RATIO,
-            high=1.01 * DAMPING_RATIO,
+            low=0.99 * SETUP.damping_ratio,
+            high=1.01 * SETUP.damping_ratio,
             reason="peaks read off 1 ms samples are low by up to (ωh/2)²/2 = 4e-5, over decrements of 0.3: far below 1 %",
         ),
     )
@@ -114,8 +124,8 @@ def run(progress: Progress) -> Item:
     """Make the item."""
     progress("simulating", 0.1)
     test = record()
-    shown = test.slice_time(*WINDOW)
-    decay = test.slice_time(WINDOW[0] + 0.2, WINDOW[0] + 2.0)
+    shown = test.slice_time(*SETUP.window)
+    decay = test.slice_time(SETUP.window[0] + 0.2, SETUP.window[0] + 2.0)
     frequency, ratio = frequency_and_damping(decay["displacement"], decay.time)
     rows = _rows(shown, frequency, ratio)
     records = {"rig": test}
@@ -123,19 +133,19 @@ def run(progress: Progress) -> Item:
         Picture(
             "histories",
             "Displacement, velocity and acceleration after successive impulses (Fig 2.6 a to c).",
-            time_histories(records, ["displacement", "velocity", "acceleration"], window=WINDOW),
+            time_histories(records, ["displacement", "velocity", "acceleration"], window=SETUP.window),
             panels("2.6", "abc"),
         ),
         Picture(
             "phase",
             "Velocity over displacement: spirals of the linear decay (Fig 2.6 d).",
-            phase_plot(records, "displacement", "velocity", window=WINDOW),
+            phase_plot(records, "displacement", "velocity", window=SETUP.window),
             panels("2.6", "d"),
         ),
     )
     text = (
-        f"Carriage of {MASS:g} lbf s²/in on a linear spring and damper, {FREQUENCY:g} Hz, "
-        f"{100 * DAMPING_RATIO:g} % of critical, pushed alternately both ways for 0.12 s every two "
+        f"Carriage of {SETUP.mass:g} lbf s²/in on a linear spring and damper, {SETUP.frequency:g} Hz, "
+        f"{100 * SETUP.damping_ratio:g} % of critical, pushed alternately both ways for 0.12 s every two "
         "seconds. The dissertation prints neither mass nor stiffness nor the impulses: these are chosen "
         "so that the ranges come out."
     )

@@ -7,42 +7,65 @@ inside 0.8 in.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from bench.figures import loops, surface, time_histories
 from bench.identification.surface import fit_surface
+from bench.laws.coupling import INCH, POUND_FORCE
 from bench.recording import Recording, nmse
 from bench.reproduction.estimates import fine
 from bench.reproduction.imperial import STIFFNESS, sdof_view
 from bench.reproduction.item import Item, Picture, Progress
 from bench.reproduction.printed_figures import fig, panels
-from bench.reproduction.verdict import SEEDS, Row, axis_row, fact_row, value_row
+from bench.reproduction.verdict import (
+    VERDICT_SETUP,
+    Row,
+    axis_row,
+    fact_row,
+    value_row,
+)
 from bench.rig import Element, simulate
-from bench.rig.library import INCH, POUND_FORCE, sdof_rig
+from bench.rig.library import sdof_rig
 from bench.signals import BandLimitedNoise, Excitation
 
-MASS = 0.036  # [lbf s^2/in]
-CONTACT = 36.0  # [lbf/in]
-CLEARANCE = 0.2  # to each side [in]
-BEARING = 0.2  # viscous [lbf s/in]
-FORCE_RMS = 4.0  # [lbf]
-BAND = (0.5, 20.0)  # [Hz]
-DURATION = 60.0
-WINDOW = (20.0, 50.0)  # time axis of the printed figure [s]
-SEED = 1
+
+@dataclass(frozen=True)
+class GapSetup:
+    """Numbers of `bench.reproduction.gap`."""
+
+    mass: float = 0.036
+    contact: float = 36.0
+    clearance: float = 0.2
+    bearing: float = 0.2
+    force_rms: float = 4.0
+    band: tuple[float, float] = (0.5, 20.0)
+    duration: float = 60.0
+    window: tuple[float, float] = (20.0, 50.0)
+    seed: int = 1
+
+
+SETUP = GapSetup()
 CHOSEN = "mass, springs, gap, bearings, level and band of the force"
 
 
-def record(seed: int = SEED) -> Recording:
+def record(seed: int = SETUP.seed) -> Recording:
     """The test."""
     rig = sdof_rig(
-        Element.of("gap", "carriage", name="gap", stiffness=CONTACT * STIFFNESS, clearance=CLEARANCE * INCH),
-        Element.of("linear_damping", "carriage", name="bearings", damping=BEARING * STIFFNESS),
-        mass=MASS * STIFFNESS,
+        Element.of(
+            "gap",
+            "carriage",
+            name="gap",
+            stiffness=SETUP.contact * STIFFNESS,
+            clearance=SETUP.clearance * INCH,
+        ),
+        Element.of("linear_damping", "carriage", name="bearings", damping=SETUP.bearing * STIFFNESS),
+        mass=SETUP.mass * STIFFNESS,
     )
-    force = BandLimitedNoise(low=BAND[0], cutoff=BAND[1], rms=FORCE_RMS * POUND_FORCE)
-    drive = Excitation({"shaker": force}, duration=DURATION, sample_rate=1000.0)
-    return sdof_view(simulate(rig, drive, rng=np.random.default_rng(seed)), MASS)
+    force = BandLimitedNoise(low=SETUP.band[0], cutoff=SETUP.band[1], rms=SETUP.force_rms * POUND_FORCE)
+    drive = Excitation({"shaker": force}, duration=SETUP.duration, sample_rate=1000.0)
+    return sdof_view(simulate(rig, drive, rng=np.random.default_rng(seed)), SETUP.mass)
 
 
 def dead_space(test: Recording) -> tuple[float, float, float]:
@@ -61,8 +84,8 @@ def dead_space(test: Recording) -> tuple[float, float, float]:
 
 
 def _rows(test: Recording, others: list[Recording]) -> tuple[Row, ...]:
-    shown = test.slice_time(*WINDOW)
-    cut = [other.slice_time(*WINDOW) for other in others]
+    shown = test.slice_time(*SETUP.window)
+    cut = [other.slice_time(*SETUP.window) for other in others]
     axes = {"displacement": ("in", 0.8, 0.4, "a"), "velocity": ("in/s", 20.0, 10.0, "b")}
     axes["restoring_force"] = ("lbf", 20.0, 10.0, "c")
     ranges = [
@@ -97,8 +120,8 @@ def _rows(test: Recording, others: list[Recording]) -> tuple[Row, ...]:
         ),
         fact_row(
             "extent of the gap easily discerned from r over x",
-            f"{left[0]:.4f} and {right[0]:.4f} in to the left and right (the rig's is {CLEARANCE:g})",
-            max(abs(edge / CLEARANCE - 1.0) for edge in (*left[1:], *right[1:])) < 0.02,
+            f"{left[0]:.4f} and {right[0]:.4f} in to the left and right (the rig's is {SETUP.clearance:g})",
+            max(abs(edge / SETUP.clearance - 1.0) for edge in (*left[1:], *right[1:])) < 0.02,
             printed="easily discerned",
             source=f"{fig('2.8 a')}, sentence on p. 19",
             tolerance="both within 2 % of the rig's, every seed",
@@ -106,12 +129,12 @@ def _rows(test: Recording, others: list[Recording]) -> tuple[Row, ...]:
             spread=f"{min(*left[1:], *right[1:]):.4f} … {max(*left[1:], *right[1:]):.4f}",
         ),
         value_row(
-            f"slope beyond the gap (the rig's is {CONTACT:g})",
+            f"slope beyond the gap (the rig's is {SETUP.contact:g})",
             "lbf/in",
             None,
             slope[0],
-            low=0.98 * CONTACT,
-            high=1.02 * CONTACT,
+            low=0.98 * SETUP.contact,
+            high=1.02 * SETUP.contact,
             reason=near,
             seeds=slope[1:],
         ),
@@ -149,13 +172,15 @@ def _pictures(test: Recording) -> tuple[Picture, ...]:
         Picture(
             "histories",
             "Displacement, velocity and restoring force: nothing betrays the gap (Fig 2.7).",
-            fine(time_histories(records, ["displacement", "velocity", "restoring_force"], window=WINDOW)),
+            fine(
+                time_histories(records, ["displacement", "velocity", "restoring_force"], window=SETUP.window)
+            ),
             panels("2.7", "abc"),
         ),
         Picture(
             "phase",
             "Restoring force over displacement shows the gap; over velocity it shows nothing (Fig 2.8 a to c).",
-            fine(loops(records, pairs, window=WINDOW)),
+            fine(loops(records, pairs, window=SETUP.window)),
             panels("2.8", "abc"),
         ),
         Picture(
@@ -172,10 +197,10 @@ def run(progress: Progress) -> Item:
     progress("simulating", 0.1)
     test = record()
     progress("surface", 0.4)
-    rows = _rows(test, [record(seed) for seed in SEEDS])
+    rows = _rows(test, [record(seed) for seed in VERDICT_SETUP.seeds])
     text = (
-        f"Carriage of {MASS:g} lbf s²/in between two springs of {CONTACT:g} lbf/in with {CLEARANCE:g} in "
-        f"of free travel to each side, under noise from {BAND[0]:g} to {BAND[1]:g} Hz of {FORCE_RMS:g} "
+        f"Carriage of {SETUP.mass:g} lbf s²/in between two springs of {SETUP.contact:g} lbf/in with {SETUP.clearance:g} in "
+        f"of free travel to each side, under noise from {SETUP.band[0]:g} to {SETUP.band[1]:g} Hz of {SETUP.force_rms:g} "
         "lbf rms. The extremes of such a record scatter, so that the verdicts are those of ten seeds. The restoring "
         "force is what a laboratory computes, r = F - m a."
     )

@@ -9,6 +9,7 @@ printed estimates; the seven-parameter model is then identified from its record 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -20,61 +21,93 @@ from bench.figures import loops, style, time_histories
 from bench.figures.look import axes_grid, thin
 from bench.identification.adaptive import AdaptiveHistory, AdaptiveLeastSquares
 from bench.identification.regressors import Reference, sdof_model
+from bench.laws.coupling import INCH, POUND_FORCE
 from bench.recording import Recording, nmse
-from bench.reproduction.estimates import REFERENCE, contribution_histories, estimate_histories, fine, learnt
+from bench.reproduction.estimates import (
+    ESTIMATES_SETUP,
+    contribution_histories,
+    estimate_histories,
+    fine,
+    learnt,
+)
 from bench.reproduction.imperial import STIFFNESS, sdof_view
 from bench.reproduction.item import Item, Picture, Progress
 from bench.reproduction.printed_figures import fig, panels
-from bench.reproduction.verdict import GOOD_FIT, SEEDS, Row, axis_row, fact_row, told_row, value_row
+from bench.reproduction.verdict import (
+    VERDICT_SETUP,
+    Row,
+    axis_row,
+    fact_row,
+    told_row,
+    value_row,
+)
 from bench.rig import Element, simulate
-from bench.rig.library import INCH, POUND_FORCE, sdof_rig
+from bench.rig.library import sdof_rig
 from bench.signals import BandLimitedNoise, Excitation
 
-MASS = 0.082  # [lbf s^2/in]
-SPRING, DAMPER = 11.4, 0.27  # [lbf/in], [lbf s/in]
-SLOPE, STRENGTH, SKEW = 41.0, 19.0, 0.77  # of the Bouc-Wen element [lbf/in], [lbf], gamma / (beta + gamma)
-BAND = (0.5, 13.0)  # [Hz]
-PEAK = 15.0  # [lbf]
-DURATION = 120.0
-RATE = 1000.0
-SEED = 7
 CHOSEN = "mass, springs, damper, strength, skew and band"
-PRINTED = (48.48, 0.18, -48.61, -0.12, -1.76, -0.00, 0.12)
 UNITS = ("lbf/in", "lbf s/in", "lbf/in^3", "1/in", "1/in", "1/(lbf in)", "1/(lbf in)")
-FILTER_RATE = 5.0  # about a fifth of the natural frequency [rad/s]
+
+
+@dataclass(frozen=True)
+class HystereticRigSetup:
+    """Numbers of `bench.reproduction.hysteretic_rig`."""
+
+    mass: float = 0.082
+    spring: float = 11.4
+    damper: float = 0.27
+    slope: float = 41.0
+    strength: float = 19.0
+    skew: float = 0.77
+    band: tuple[float, float] = (0.5, 13.0)
+    peak: float = 15.0
+    duration: float = 120.0
+    rate: float = 1000.0
+    seed: int = 7
+    printed: tuple[float, ...] = (48.48, 0.18, -48.61, -0.12, -1.76, -0.00, 0.12)
+    filter_rate: float = 5.0
+
+
+SETUP = HystereticRigSetup()
 
 
 def drive() -> Excitation:
     """The excitation."""
-    noise = BandLimitedNoise(low=BAND[0], cutoff=BAND[1], peak=PEAK * POUND_FORCE)
-    return Excitation({"shaker": noise}, duration=DURATION, sample_rate=RATE)
+    noise = BandLimitedNoise(low=SETUP.band[0], cutoff=SETUP.band[1], peak=SETUP.peak * POUND_FORCE)
+    return Excitation({"shaker": noise}, duration=SETUP.duration, sample_rate=SETUP.rate)
 
 
-def record(seed: int = SEED) -> Recording:
+def record(seed: int = SETUP.seed) -> Recording:
     """The test."""
-    softening = SLOPE / STRENGTH / INCH
+    softening = SETUP.slope / SETUP.strength / INCH
     rig = sdof_rig(
         Element.of(
-            "linear", "carriage", name="spring", stiffness=SPRING * STIFFNESS, damping=DAMPER * STIFFNESS
+            "linear",
+            "carriage",
+            name="spring",
+            stiffness=SETUP.spring * STIFFNESS,
+            damping=SETUP.damper * STIFFNESS,
         ),
         Element.of(
             "bouc_wen",
             "carriage",
             name="slide",
-            A=SLOPE * STIFFNESS,
-            beta=(1.0 - SKEW) * softening,
-            gamma=SKEW * softening,
+            A=SETUP.slope * STIFFNESS,
+            beta=(1.0 - SETUP.skew) * softening,
+            gamma=SETUP.skew * softening,
             n=1.0,
         ),
-        mass=MASS * STIFFNESS,
+        mass=SETUP.mass * STIFFNESS,
     )
-    return sdof_view(simulate(rig, drive(), rng=np.random.default_rng(seed)), MASS)
+    return sdof_view(simulate(rig, drive(), rng=np.random.default_rng(seed)), SETUP.mass)
 
 
 def identify(test: Recording) -> tuple[AdaptiveLeastSquares, AdaptiveHistory]:
     """The seven parameters on line, P(0) = 1000 on parameters scaled to the rig's ranges."""
-    model = sdof_model(2, mass=MASS, filter_rate=FILTER_RATE, reference=Reference(10.0, 0.3, 6.0, 200.0))
-    estimator = AdaptiveLeastSquares(model, initial_covariance=1000.0, sample_rate=RATE)
+    model = sdof_model(
+        2, mass=SETUP.mass, filter_rate=SETUP.filter_rate, reference=Reference(10.0, 0.3, 6.0, 200.0)
+    )
+    estimator = AdaptiveLeastSquares(model, initial_covariance=1000.0, sample_rate=SETUP.rate)
     history = estimator.run(
         test.time,
         force=test["force"],
@@ -88,7 +121,7 @@ def identify(test: Recording) -> tuple[AdaptiveLeastSquares, AdaptiveHistory]:
 
 def printed_model_fate(test: Recording) -> str:
     """What becomes of the printed estimates when they are simulated as a rig, integrated by themselves."""
-    k, c, d, *powers = PRINTED
+    k, c, d, *powers = SETUP.printed
     time, force = test.time, test["force"]
 
     def slope(t: float, y: Sequence[float]) -> tuple[float, float, float]:
@@ -97,7 +130,7 @@ def printed_model_fate(test: Recording) -> str:
         size, speed = abs(r), abs(v)
         terms = (speed * r, v * size, speed * size * r, v * size * size)
         hysteretic = sum(theta * term for theta, term in zip(powers, terms, strict=True))
-        return v, (float(np.interp(t, time, force)) - r) / MASS, hysteretic
+        return v, (float(np.interp(t, time, force)) - r) / SETUP.mass, hysteretic
 
     def gone(t: float, y: Sequence[float]) -> float:
         return abs(y[0]) - 10.0 * 0.5  # ten times the printed range
@@ -167,14 +200,14 @@ def _rows(shown: _Found, others: list[_Found], fate: str) -> tuple[Row, ...]:
             value_row(
                 f"θ{i + 1} = {name}",
                 unit,
-                PRINTED[i],
+                SETUP.printed[i],
                 float(shown.theta[i]),
                 source=f"p. 34, number, and {fig('2.15')}",
                 reason="another system: the laboratory's rig is known by these seven numbers alone",
                 seeds=[found.theta[i] for found in others],
             )
         )
-    printed = _signs(PRINTED[:5]) + "-+"  # -0.00 is printed with its sign
+    printed = _signs(SETUP.printed[:5]) + "-+"  # -0.00 is printed with its sign
     all_signs = [_signs(found.theta) for found in others]
     agree = [sum(a == b for a, b in zip(signs, printed, strict=True)) for signs in all_signs]
     rows += [
@@ -194,11 +227,11 @@ def _rows(shown: _Found, others: list[_Found], fate: str) -> tuple[Row, ...]:
             "z of our rig predicted with the printed parameters: NMSE, 55 to 120 s",
             "%",
             "θ as printed",
-            shown.error(np.array(PRINTED)),
-            high=GOOD_FIT,
+            shown.error(np.array(SETUP.printed)),
+            high=VERDICT_SETUP.good_fit,
             source="p. 34, numbers",
             reason="a good fit (section 3.4.2): the two rigs then have one restoring force along this motion",
-            seeds=[found.error(np.array(PRINTED)) for found in others],
+            seeds=[found.error(np.array(SETUP.printed)) for found in others],
             chosen=CHOSEN,
         ),
         value_row(
@@ -206,7 +239,7 @@ def _rows(shown: _Found, others: list[_Found], fate: str) -> tuple[Row, ...]:
             "%",
             "accurate identification",
             shown.error(),
-            high=GOOD_FIT,
+            high=VERDICT_SETUP.good_fit,
             source=f"p. 34, sentence, and {fig('2.16')}",
             reason="a good fit (section 3.4.2); no number is printed",
             seeds=[found.error() for found in others],
@@ -233,7 +266,7 @@ def _restoring(found: _Found) -> tuple[Figure, Figure]:
             part = (history.time >= start) & (history.time <= stop)
             for values, label, look in (
                 (z, "measured", {"color": "#1a1a1a", "linewidth": 1.0}),
-                (predicted, "estimated", REFERENCE),
+                (predicted, "estimated", ESTIMATES_SETUP.reference),
             ):
                 axes.plot(*thin(history.time[part], values[part]), label=label, **look)
             axes.set_ylabel("z [lbf]")
@@ -245,7 +278,7 @@ def _restoring(found: _Found) -> tuple[Figure, Figure]:
         part = (history.time >= 55.0) & (history.time <= 65.0)
         x = np.interp(history.time[part], record.time, record["displacement"])
         axes.plot(x, z[part], label="measured", color="#1a1a1a", linewidth=0.8)
-        axes.plot(x, predicted[part], label="estimated", **REFERENCE)
+        axes.plot(x, predicted[part], label="estimated", **ESTIMATES_SETUP.reference)
         axes.set_xlabel("displacement [in]")
         axes.set_ylabel("z [lbf]")
         axes.legend()
@@ -255,11 +288,11 @@ def _restoring(found: _Found) -> tuple[Figure, Figure]:
 def run(progress: Progress) -> Item:
     """Make the item."""
     progress("simulating", 0.1)
-    shown = _found(SEED)
+    shown = _found(SETUP.seed)
     test, history = shown.record, shown.history
     fate = printed_model_fate(test)
     others = []
-    for number, seed in enumerate(SEEDS):
+    for number, seed in enumerate(VERDICT_SETUP.seeds):
         progress(f"seed {seed}", 0.2 + 0.06 * number)
         others.append(_found(seed))
     progress("drawing", 0.85)
@@ -286,7 +319,7 @@ def run(progress: Progress) -> Item:
         Picture(
             "estimates",
             "Evolution of the seven estimates, the printed asymptotic values dashed (Fig 2.15).",
-            estimate_histories(history, names, reference=PRINTED, units=UNITS),
+            estimate_histories(history, names, reference=SETUP.printed, units=UNITS),
             panels("2.15"),
         ),
         Picture(
@@ -304,9 +337,9 @@ def run(progress: Progress) -> Item:
         ),
     )
     text = (
-        f"The virtual rig: {MASS:g} lbf s²/in on a spring of {SPRING:g} lbf/in, a damper of {DAMPER:g} "
-        f"lbf s/in and a Bouc-Wen element of slope {SLOPE:g} lbf/in and strength {STRENGTH:g} lbf, under "
-        f"noise to {BAND[1]:g} Hz. The seven parameters of the general model (section 2.4.1) are then "
+        f"The virtual rig: {SETUP.mass:g} lbf s²/in on a spring of {SETUP.spring:g} lbf/in, a damper of {SETUP.damper:g} "
+        f"lbf s/in and a Bouc-Wen element of slope {SETUP.slope:g} lbf/in and strength {SETUP.strength:g} lbf, under "
+        f"noise to {SETUP.band[1]:g} Hz. The seven parameters of the general model (section 2.4.1) are then "
         "identified on line. The printed parameters are those of another law: they agree in "
         "stiffness and most signs; the terms that describe softening together (x³, |v| r, v |r|) trade against one "
         "another, so that their single values mean little. Simulated as a rig of its own, the printed "

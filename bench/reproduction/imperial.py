@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from bench.laws.coupling import INCH, POUND_FORCE
 from bench.recording import Recording
-from bench.rig.library import INCH, POUND_FORCE
 
 STIFFNESS = POUND_FORCE / INCH
 """lbf/in in N/m; also lbf s/in in N s/m and lbf s^2/in in kg."""

@@ -6,6 +6,8 @@ Records, excitations and what a laboratory sees of them are those of `bench.demo
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cache
 from typing import NamedTuple
 
@@ -20,10 +22,21 @@ from bench.rig import simulate
 from bench.rig.library import joint_rig
 
 AXES = ("axial", "torsional")
-HIDDEN = 40
 LOADINGS = {"axial": (True, False), "torsional": (False, True), "both": (True, True)}
 """Which axes an excitation loads, by the name of the record."""
-UNSEEN_SEEDS = {"axial": 101, "torsional": 102, "both": 2006}
+
+
+@dataclass(frozen=True)
+class JointModelsSetup:
+    """Numbers of `bench.reproduction.joint_models`."""
+
+    hidden: int = 40
+    unseen_seeds: Mapping[str, int] = field(
+        default_factory=lambda: {"axial": 101, "torsional": 102, "both": 2006}
+    )
+
+
+SETUP = JointModelsSetup()
 
 
 class Models(NamedTuple):
@@ -45,7 +58,7 @@ def training() -> dict[str, Recording]:
 def unseen() -> dict[str, Recording]:
     """Records of the same loadings under excitations of other seeds."""
     return {
-        name: simulate(joint_rig(), excitation(*loaded), rng=np.random.default_rng(UNSEEN_SEEDS[name]))
+        name: simulate(joint_rig(), excitation(*loaded), rng=np.random.default_rng(SETUP.unseen_seeds[name]))
         for name, loaded in LOADINGS.items()
     }
 
@@ -55,9 +68,9 @@ def view(*records: Recording) -> JointData:
     return laboratory_view(records, joint_rig())
 
 
-def train_network(data: JointData, seed: int = HIDDEN) -> NetworkModel:
+def train_network(data: JointData, seed: int = SETUP.hidden) -> NetworkModel:
     """A network of 40 units."""
-    return fit_network(data.states, data.forces, n_hidden=HIDDEN, rng=np.random.default_rng(seed))
+    return fit_network(data.states, data.forces, n_hidden=SETUP.hidden, rng=np.random.default_rng(seed))
 
 
 @cache

@@ -7,27 +7,43 @@ closes the gaps seldom, and each time to all three records as well: a failure sh
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from bench.demo.joint import PEAK, PEAK_TORQUE, excitation
+from bench.demo.joint import (
+    JOINT_SETUP,
+    excitation,
+)
 from bench.identification.network import NetworkModel, fit_network
 from bench.identification.polynomial import PolynomialModel, fit_polynomial
 from bench.identification.restoring_force import JointData
 from bench.reproduction import joint_models
 from bench.reproduction.item import Progress
-from bench.reproduction.verdict import GOOD_FIT, Row, fact_row
+from bench.reproduction.verdict import (
+    VERDICT_SETUP,
+    Row,
+    fact_row,
+)
 from bench.rig import simulate
 from bench.rig.library import joint_rig
 from bench.signals import BandLimitedNoise, Constant, Excitation
 
-NOISE = 0.05
-"""Of each state's and each force's rms, white: poor sensors."""
-WEAK = 0.4
-"""Of the peak of the loads."""
-EVERY = 4
-"""Samples taken: 250 Hz of motion below 12 Hz."""
+
+@dataclass(frozen=True)
+class JointOneRecordSetup:
+    """Numbers of `bench.reproduction.joint_one_record`."""
+
+    noise: float = 0.05
+    """Of each state's and each force's rms, white: poor sensors."""
+    weak: float = 0.4
+    """Of the peak of the loads."""
+    every: int = 4
+    """Samples taken: 250 Hz of motion below 12 Hz."""
+
+
+SETUP = JointOneRecordSetup()
 
 
 class Condition(NamedTuple):
@@ -49,8 +65,10 @@ CONDITIONS = (
 def _weaker(loaded: tuple[bool, bool]) -> Excitation:
     strong = excitation(*loaded)
     signals = {
-        name: BandLimitedNoise(cutoff=12.0, peak=WEAK * peak) if on else Constant(0.0)
-        for name, on, peak in zip(("force", "torque"), loaded, (PEAK, PEAK_TORQUE), strict=True)
+        name: BandLimitedNoise(cutoff=12.0, peak=SETUP.weak * peak) if on else Constant(0.0)
+        for name, on, peak in zip(
+            ("force", "torque"), loaded, (JOINT_SETUP.peak, JOINT_SETUP.peak_torque), strict=True
+        )
     }
     return Excitation(signals, duration=strong.duration, sample_rate=strong.sample_rate)
 
@@ -64,10 +82,10 @@ def _records(condition: Condition) -> dict[str, JointData]:
         if condition.weak:
             record = simulate(joint_rig(), _weaker(loaded), rng=np.random.default_rng(seed))
         data = joint_models.view(record)
-        states, forces = (array[::EVERY].copy() for array in (data.states, data.forces))
+        states, forces = (array[:: SETUP.every].copy() for array in (data.states, data.forces))
         if condition.noisy:
             states, forces = (
-                array + NOISE * array.std(axis=0) * rng.standard_normal(array.shape)
+                array + SETUP.noise * array.std(axis=0) * rng.standard_normal(array.shape)
                 for array in (states, forces)
             )
         found[name] = JointData(states, forces)
@@ -85,7 +103,7 @@ def _fit(data: JointData) -> dict[str, PolynomialModel | NetworkModel]:
     network = fit_network(
         data.states,
         data.forces,
-        n_hidden=joint_models.HIDDEN,
+        n_hidden=joint_models.SETUP.hidden,
         n_restarts=2,
         max_samples=4_000,
         max_iterations=100,
@@ -112,7 +130,7 @@ def rows(progress: Progress) -> list[Row]:
     for number, condition in enumerate(CONDITIONS):
         progress(f"one record or three: {condition.name}", number / len(CONDITIONS))
         data = _records(condition)
-        excited = WEAK if condition.weak else 1.0
+        excited = SETUP.weak if condition.weak else 1.0
         one = {kind: _worst(model, excited) for kind, model in _fit(data["both"]).items()}
         three = {kind: _worst(model, excited) for kind, model in _fit(_joined([*data.values()])).items()}
         for kind in ("polynomial", "network"):
@@ -120,7 +138,7 @@ def rows(progress: Progress) -> list[Row]:
                 fact_row(
                     f"{kind} from the record with both axes loaded, {condition.name}",
                     f"worst unseen NMSE {one[kind]:.3g} %, from all three {three[kind]:.3g} %",
-                    one[kind] > GOOD_FIT > three[kind],
+                    one[kind] > VERDICT_SETUP.good_fit > three[kind],
                     printed="if only the record with both excited were used, the models would have failed in the generalisation",
                     source="p. 96, sentence (Fig 4.6 c)",
                     tolerance="above 5 % where all three records stay below",
@@ -133,7 +151,7 @@ def rows(progress: Progress) -> list[Row]:
 
 
 def _why(kind: str, one: float, three: float) -> str:
-    if three > GOOD_FIT:
+    if three > VERDICT_SETUP.good_fit:
         return (
             "three records do not give a good fit either: the model, not the lack of records, is what fails"
         )

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cache
 from typing import NamedTuple
 
@@ -19,6 +21,7 @@ from bench.errors import RangeWarning, SimulationError
 from bench.figures import loops, time_histories
 from bench.identification.polynomial import fit_polynomial
 from bench.identification.restoring_force import JointData
+from bench.laws.coupling import INCH, POUND_FORCE
 from bench.measurement import AntiAlias, Chain, Noise, Quantisation, measure
 from bench.recording import Recording, nmse
 from bench.reduction import element_from
@@ -27,26 +30,47 @@ from bench.reproduction.estimates import fine
 from bench.reproduction.item import Item, Picture, Progress
 from bench.reproduction.joint_models import AXES, LOADINGS, train_network
 from bench.reproduction.printed_figures import fig, panels
-from bench.reproduction.verdict import GOOD_FIT, Row, axis_row, told_row, value_row
-from bench.reproduction.verdict import SEEDS as FURTHER_SEEDS
+from bench.reproduction.verdict import (
+    VERDICT_SETUP,
+    Row,
+    axis_row,
+    told_row,
+    value_row,
+)
 from bench.rig import Element, Rig, simulate
-from bench.rig.library import INCH, POUND_FORCE, laboratory_joint_rig
+from bench.rig.library import laboratory_joint_rig
 from bench.signals import BandLimitedNoise, Constant, Excitation
 
-FORCE, TORQUE = 40.0, 15.5  # peaks of the drives [lbf], [lbf in]
-BAND = (0.3, 10.0)  # [Hz]
-DURATION = 30.0
-RATE = 1000.0
 FILTER = AntiAlias(100.0)
-LINEAR_COUNT = INCH / 2000.0  # 500 lines an inch, four edges each [m]
-ROTARY_COUNT = 2.0 * np.pi / 10_000.0  # 2500 lines a turn, four edges each [rad]
-SEEDS = {"axial": 71, "torsional": 72, "both": 73}
-UNSEEN_SEEDS = {"axial": 81, "torsional": 82, "both": 83}
+
+
+@dataclass(frozen=True)
+class LaboratoryJointSetup:
+    """Numbers of `bench.reproduction.laboratory_joint`."""
+
+    force: float = 40.0
+    torque: float = 15.5
+    band: tuple[float, float] = (0.3, 10.0)
+    duration: float = 30.0
+    rate: float = 1000.0
+    linear_count: float = INCH / 2000.0
+    rotary_count: float = 2.0 * np.pi / 10_000.0
+    seeds: Mapping[str, int] = field(default_factory=lambda: {"axial": 71, "torsional": 72, "both": 73})
+    unseen_seeds: Mapping[str, int] = field(
+        default_factory=lambda: {"axial": 81, "torsional": 82, "both": 83}
+    )
+    friction_share: float = 0.1
+    """Friction of the universal joints over the peak of the restoring force; a tenth is what such joints have under load."""
+    yield_: float = 0.005
+    """Motion over which the friction builds up [in, rad]: ten counts of the linear encoder, a fortieth of the printed range."""
+
+
+SETUP = LaboratoryJointSetup()
 POSITIONS = {
-    "axial": ("axial_velocity", LINEAR_COUNT),
-    "torsional": ("torsional_velocity", ROTARY_COUNT),
-    "displacement_1": ("velocity_1", LINEAR_COUNT),
-    "rotation_1": ("rotation_rate_1", ROTARY_COUNT),
+    "axial": ("axial_velocity", SETUP.linear_count),
+    "torsional": ("torsional_velocity", SETUP.rotary_count),
+    "displacement_1": ("velocity_1", SETUP.linear_count),
+    "rotation_1": ("rotation_rate_1", SETUP.rotary_count),
 }
 """Encoders: the velocity channel found from each, and the size of a count."""
 
@@ -72,22 +96,16 @@ def rig() -> Rig:
     return laboratory_joint_rig(joint)
 
 
-FRICTION_SHARE = 0.1
-"""Friction of the universal joints over the peak of the restoring force; a tenth is what such joints have under load."""
-YIELD = 0.005
-"""Motion over which the friction builds up [in, rad]: ten counts of the linear encoder, a fortieth of the printed range."""
-
-
 def friction() -> tuple[Element, Element]:
     """Elastic-slip friction of the two universal joints, along the shaft and about it: a tenth of the printed peak force of 60."""
-    limit = FRICTION_SHARE * 60.0
+    limit = SETUP.friction_share * 60.0
     return (
         Element.of(
-            "jenkins", "axial", name="friction_axial", limit=limit * POUND_FORCE, stiffness=limit / YIELD * POUND_FORCE / INCH
+            "jenkins", "axial", name="friction_axial", limit=limit * POUND_FORCE, stiffness=limit / SETUP.yield_ * POUND_FORCE / INCH
         ),
         Element.of(
             "jenkins", "torsional", name="friction_torsional", limit=limit * POUND_FORCE * INCH,
-            stiffness=limit / YIELD * POUND_FORCE * INCH,
+            stiffness=limit / SETUP.yield_ * POUND_FORCE * INCH,
         ),
     )  # fmt: skip
 
@@ -108,13 +126,13 @@ def total_forces(record: Recording) -> np.ndarray:
 
 def drive(loaded: tuple[bool, bool]) -> Excitation:
     """Uncorrelated noise on the axes asked for."""
-    peaks = (FORCE * POUND_FORCE, TORQUE * POUND_FORCE * INCH)
+    peaks = (SETUP.force * POUND_FORCE, SETUP.torque * POUND_FORCE * INCH)
     signals = [
-        BandLimitedNoise(low=BAND[0], cutoff=BAND[1], peak=peak) if on else Constant(0.0)
+        BandLimitedNoise(low=SETUP.band[0], cutoff=SETUP.band[1], peak=peak) if on else Constant(0.0)
         for peak, on in zip(peaks, loaded, strict=True)
     ]
     return Excitation(
-        dict(zip(("force", "torque"), signals, strict=True)), duration=DURATION, sample_rate=RATE
+        dict(zip(("force", "torque"), signals, strict=True)), duration=SETUP.duration, sample_rate=SETUP.rate
     )
 
 
@@ -134,7 +152,7 @@ def measured(record: Recording, rng: np.random.Generator) -> Recording:
     encoders = {name: Chain(Quantisation(count)) for name, (_, count) in POSITIONS.items()}
     sensed = measure(record, analogue | encoders, rng)
     sensed = measure(sensed, dict.fromkeys(POSITIONS, Chain(FILTER)))
-    rates = {rate: np.gradient(sensed[name], 1.0 / RATE) for name, (rate, _) in POSITIONS.items()}
+    rates = {rate: np.gradient(sensed[name], 1.0 / SETUP.rate) for name, (rate, _) in POSITIONS.items()}
     return sensed.with_channels(rates)
 
 
@@ -155,7 +173,7 @@ def view(*records: Recording) -> JointData:
 def models() -> tuple[dict[str, Recording], dict[str, Model]]:
     """The measured training records, and the models identified from them."""
     rng = np.random.default_rng(70)
-    records = {name: measured(record, rng) for name, record in tests(SEEDS).items()}
+    records = {name: measured(record, rng) for name, record in tests(SETUP.seeds).items()}
     data = view(*records.values())
     polynomial = fit_polynomial(data.states, data.forces, orders=3)
     return records, {"polynomial, order 3": polynomial, "network, 40 units": train_network(data)}
@@ -178,7 +196,7 @@ def in_place(model: Model, true: dict[str, Recording]) -> InPlace:
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", RangeWarning)  # the score tells what extrapolation does
-                record = simulate(reduced, drive(loaded), rng=np.random.default_rng(UNSEEN_SEEDS[name]))
+                record = simulate(reduced, drive(loaded), rng=np.random.default_rng(SETUP.unseen_seeds[name]))
         except SimulationError as error:
             notes.append(f"{name} loaded: diverged after {error.time:.1f} s")
             continue
@@ -236,7 +254,7 @@ def _model_rows(label: str, model: Model, unseen: list[JointData], swapped: InPl
                 "%",
                 "generalisation capability" if network else "validation, no number",
                 scores[0],
-                high=GOOD_FIT if network else math.inf,
+                high=VERDICT_SETUP.good_fit if network else math.inf,
                 source=f"p. {93 if network else 89}, sentence; {fig(number)}",
                 reason="a good fit (section 3.4.2)"
                 if network
@@ -252,7 +270,7 @@ def _model_rows(label: str, model: Model, unseen: list[JointData], swapped: InPl
                 "%",
                 "has captured the dominant behavior",
                 swapped.worst,
-                high=GOOD_FIT,
+                high=VERDICT_SETUP.good_fit,
                 source="p. 136, sentence; Figs 5.10 to 5.12, pp. 134 to 137",
                 reason="a good fit (section 3.4.2); the text compares by eye, and not under the same loads",
                 why=f"{why}; {swapped.note}" if swapped.note else why,
@@ -337,12 +355,12 @@ def run(progress: Progress) -> Item:
     progress("measuring and identifying", 0.05)
     records, fitted = models()
     progress("unseen tests", 0.6)
-    true = tests(UNSEEN_SEEDS)
+    true = tests(SETUP.unseen_seeds)
     rng = np.random.default_rng(80)
     unseen = measured(true["both"], rng)
     swapped = {label: in_place(model, true) for label, model in fitted.items()}
     judged = [view(unseen)]
-    for seed in FURTHER_SEEDS[1:]:
+    for seed in VERDICT_SETUP.seeds[1:]:
         progress(f"seed {seed}", 0.7 + 0.02 * seed)
         record = simulate(rig(), drive((True, True)), rng=np.random.default_rng(100 + seed))
         judged.append(view(measured(record, rng)))

@@ -6,12 +6,15 @@ over each step, by the matrix exponential: nothing in that solution comes from M
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh, expm
 
 from bench.demo.joint import excitation
 from bench.figures import time_histories
+from bench.laws.coupling import INCH, POUND_FORCE
 from bench.recording import Recording, nmse
 from bench.reproduction.estimates import fine
 from bench.reproduction.imperial import STIFFNESS, imperial
@@ -19,21 +22,29 @@ from bench.reproduction.item import Item, Picture, Progress
 from bench.reproduction.printed_figures import fig, panels
 from bench.reproduction.verdict import Row, fact_row, value_row
 from bench.rig import Element, Rig, simulate
-from bench.rig.library import INCH, POUND_FORCE, chain_rig
+from bench.rig.library import chain_rig
 from bench.signals import Excitation
 
-SPRINGS = (1000.0, 1e5, 200.0, 1e5, 1000.0)
-"""k1 … k5, axial [lbf/in] and torsional [lbf in/rad] alike: mounts and joint of the deck, 1-2 and 3-4 as in the model."""
-DAMPERS = (10.0, 10.0, 6.32, 10.0, 10.0)
-"""c1 … c5 [lbf s/in], [lbf in s/rad]."""
-DURATION = 10.0
-DURATION_OF_LOADS = 30.0
-SEED = 51
+
+@dataclass(frozen=True)
+class LinearChainSetup:
+    """Numbers of `bench.reproduction.linear_chain`."""
+
+    springs: tuple[float, ...] = (1000.0, 1e5, 200.0, 1e5, 1000.0)
+    """k1 … k5, axial [lbf/in] and torsional [lbf in/rad] alike: mounts and joint of the deck, 1-2 and 3-4 as in the model."""
+    dampers: tuple[float, ...] = (10.0, 10.0, 6.32, 10.0, 10.0)
+    """c1 … c5 [lbf s/in], [lbf in s/rad]."""
+    duration: float = 10.0
+    duration_of_loads: float = 30.0
+    seed: int = 51
+
+
+LINEAR_CHAIN_SETUP = LinearChainSetup()
 
 
 def rig(timestep: float = 1e-3) -> Rig:
     """The chain with a linear joint between bodies 2 and 3."""
-    k, c = SPRINGS[2], DAMPERS[2]
+    k, c = LINEAR_CHAIN_SETUP.springs[2], LINEAR_CHAIN_SETUP.dampers[2]
     axial = Element.of(
         "linear", "axial_23", name="axial_joint", stiffness=k * STIFFNESS, damping=c * STIFFNESS
     )
@@ -64,7 +75,10 @@ def matrix(values: tuple[float, ...], *, as_printed: bool = False) -> NDArray[np
 
 def exact(loads: NDArray[np.float64], step: float, *, as_printed: bool = False) -> NDArray[np.float64]:
     """Displacements (n, 8) under loads on body 1 held over each step (n, 2), masses and inertias of one."""
-    stiffness, damping = (matrix(values, as_printed=as_printed) for values in (SPRINGS, DAMPERS))
+    stiffness, damping = (
+        matrix(values, as_printed=as_printed)
+        for values in (LINEAR_CHAIN_SETUP.springs, LINEAR_CHAIN_SETUP.dampers)
+    )
     system = np.zeros((18, 18))
     system[:8, 8:16] = np.eye(8)
     system[8:16, :8], system[8:16, 8:16] = -stiffness, -damping
@@ -92,7 +106,7 @@ def _deviation(record: Recording, solution: NDArray[np.float64]) -> float:
 
 def _loads(whole: Excitation) -> Recording:
     """The loads of the whole excitation in pounds-force."""
-    loads = whole.sample(np.random.default_rng(SEED)) / [POUND_FORCE, POUND_FORCE * INCH]
+    loads = whole.sample(np.random.default_rng(LINEAR_CHAIN_SETUP.seed)) / [POUND_FORCE, POUND_FORCE * INCH]
     names = {"axial load": "lbf", "torque": "lbf in"}
     arrays = dict(zip(names, loads.T, strict=True))
     return Recording.from_arrays(np.arange(len(loads)) / whole.sample_rate, arrays, units=names)
@@ -103,7 +117,7 @@ def _load_row(whole: Excitation) -> Row:
     loads = _loads(whole)
     correlation = float(np.corrcoef(loads["axial load"], loads["torque"])[0, 1])
     # 720 independent samples (twice 12 Hz times 30 s): two standard deviations of a correlation of nothing
-    limit = 2.0 / np.sqrt(2.0 * 12.0 * DURATION_OF_LOADS)
+    limit = 2.0 / np.sqrt(2.0 * 12.0 * LINEAR_CHAIN_SETUP.duration_of_loads)
     return fact_row(
         "the two loads are uncorrelated",
         f"correlation {correlation:+.3f}; peaks {np.abs(loads['axial load']).max():.0f} lbf, {np.abs(loads['torque']).max():.0f} lbf in",
@@ -119,7 +133,9 @@ def _load_row(whole: Excitation) -> Row:
 def run(progress: Progress) -> Item:
     """Make the item."""
     whole = excitation(True, True)
-    loads = whole.sample(np.random.default_rng(SEED))[: int(DURATION * whole.sample_rate)]
+    loads = whole.sample(np.random.default_rng(LINEAR_CHAIN_SETUP.seed))[
+        : int(LINEAR_CHAIN_SETUP.duration * whole.sample_rate)
+    ]
     inch_pound = loads / [POUND_FORCE, POUND_FORCE * INCH]
     deviations: list[float] = []
     records: list[Recording] = []
@@ -131,7 +147,7 @@ def run(progress: Progress) -> Item:
         records.append(record)
         deviations.append(_deviation(record, solution))
     typed = exact(inch_pound, 1e-3, as_printed=True)
-    frequencies = np.sqrt(eigh(matrix(SPRINGS), eigvals_only=True)[::2]) / (2.0 * np.pi)
+    frequencies = np.sqrt(eigh(matrix(LINEAR_CHAIN_SETUP.springs), eigvals_only=True)[::2]) / (2.0 * np.pi)
     order = float(np.log2(deviations[1] / deviations[2]))
     rows: list[Row] = [
         value_row(
@@ -157,7 +173,11 @@ def run(progress: Progress) -> Item:
         fact_row(
             "stiffness matrix as printed is that of the figure",
             f"k1 + k2 stands on the second body; as typed, NMSE of body 3 {nmse(solution[:, 4], typed[:, 4]):.3g} %",
-            bool(np.array_equal(matrix(SPRINGS, as_printed=True), matrix(SPRINGS))),
+            bool(
+                np.array_equal(
+                    matrix(LINEAR_CHAIN_SETUP.springs, as_printed=True), matrix(LINEAR_CHAIN_SETUP.springs)
+                )
+            ),
             printed="eqs 5.52, 5.53 and Fig 5.3",
             source="pp. 118 to 120, equations",
             tolerance="equal",
@@ -184,7 +204,7 @@ def run(progress: Progress) -> Item:
                 time_histories(
                     {"matrix exponential": reference, "MuJoCo, 1 ms": records[0]},
                     ["displacement_1", "displacement_4", "rotation_1", "rotation_4"],
-                    window=(4.0, DURATION),
+                    window=(4.0, LINEAR_CHAIN_SETUP.duration),
                 )
             ),
         ),

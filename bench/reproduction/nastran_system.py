@@ -7,10 +7,14 @@ References:
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import dataclass
 
 import numpy as np
 
-from bench.demo.joint import UNSEEN_SEED, excitation
+from bench.demo.joint import (
+    JOINT_SETUP,
+    excitation,
+)
 from bench.figures import style, time_histories
 from bench.figures.look import axes_grid
 from bench.laws.network import published_network
@@ -36,9 +40,17 @@ from bench.reproduction.verdict import Row, fact_row, value_row
 from bench.rig import Element, simulate
 from bench.rig.library import chain_rig
 
-DURATION = 10.0
-COMPONENTS = (1, 4)
-"""Translation along and rotation about x of the deck's virtual grid."""
+
+@dataclass(frozen=True)
+class NastranSystemSetup:
+    """Numbers of `bench.reproduction.nastran_system`."""
+
+    duration: float = 10.0
+    components: tuple[int, int] = (1, 4)
+    """Translation along and rotation about x of the deck's virtual grid."""
+
+
+SETUP = NastranSystemSetup()
 
 
 def element() -> Element:
@@ -49,7 +61,9 @@ def element() -> Element:
 
 def swapped() -> tuple[Recording, np.ndarray]:
     """The chain with the network as an element in MuJoCo, and the commands (n, 2)."""
-    commands = excitation(True, True).sample(np.random.default_rng(UNSEEN_SEED))[: int(1000 * DURATION)]
+    commands = excitation(True, True).sample(np.random.default_rng(JOINT_SETUP.unseen_seed))[
+        : int(1000 * SETUP.duration)
+    ]
     record = simulate(chain_rig(element()), {"force": commands[:, 0], "torque": commands[:, 1]})
     return record, commands
 
@@ -79,7 +93,9 @@ def _deck_rows() -> tuple[list[Row], str]:
     # Digits that the fields of each format hold: large fields nine after the point, small fields three.
     formats: tuple[tuple[Format, float], ...] = (("large", 1e-8), ("free", 1e-8), ("small", 5e-3))
     for form, tolerance in formats:
-        text = network_text(element(), form=form, components=COMPONENTS, bodies=(3, 4), units=INCH_POUND)
+        text = network_text(
+            element(), form=form, components=SETUP.components, bodies=(3, 4), units=INCH_POUND
+        )
         back = read_network(parse_deck(text), units=INCH_POUND).weights
         worst = max(
             float(np.max(np.abs(ours - true)) / np.max(np.abs(true)))
@@ -96,7 +112,7 @@ def _deck_rows() -> tuple[list[Row], str]:
             )
         )
     deck = parse_deck(
-        network_text(element(), form="large", components=COMPONENTS, bodies=(3, 4), units=INCH_POUND)
+        network_text(element(), form="large", components=SETUP.components, bodies=(3, 4), units=INCH_POUND)
     )
     counts = Counter(type(card).__name__ for card in deck.cards)
     return rows, ", ".join(f"{count} {name}" for name, count in counts.most_common())
@@ -182,7 +198,9 @@ def _pictures(record: Recording, relative: np.ndarray, study: LagStudy) -> tuple
             "Relative motion of the joint: MuJoCo with the network as an element, and the 72 equations of the deck.",
             fine(
                 time_histories(
-                    {"direct swap": record, "72 equations": expanded}, list(names), window=(4.0, DURATION)
+                    {"direct swap": record, "72 equations": expanded},
+                    list(names),
+                    window=(4.0, SETUP.duration),
                 )
             ),
         ),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from bench.nastran import INCH_POUND, deck_text, joint_model_cards, parse_deck, read_joint_model
@@ -11,8 +13,16 @@ from bench.reproduction.chain_joint import AXES
 from bench.reproduction.verdict import Row, fact_row, told_row, value_row
 from bench.rig import Element
 
-SPRING = (200, 4)
-"""Grid and component that the printed deck leaves without its spring."""
+
+@dataclass(frozen=True)
+class OriginalDeckSetup:
+    """Numbers of `bench.reproduction.original_deck`."""
+
+    spring: tuple[int, int] = (200, 4)
+    """Grid and component that the printed deck leaves without its spring."""
+
+
+SETUP = OriginalDeckSetup()
 
 
 def _cards() -> list[Card | str]:
@@ -26,7 +36,7 @@ def rows() -> list[Row]:
     true = Element.of("axial_torsional_joint", *AXES, name="joint")
     whole = read_joint_model(parse_deck(deck_text(_cards())), units=INCH_POUND)
     printed_cards = [
-        card for card in _cards() if not (isinstance(card, ScalarElement) and card.first == SPRING)
+        card for card in _cards() if not (isinstance(card, ScalarElement) and card.first == SETUP.spring)
     ]
     printed = read_joint_model(parse_deck(deck_text(printed_cards)), units=INCH_POUND)
     worst = float(np.max(np.abs(whole.element(AXES).theta / true.theta - 1.0)))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -16,49 +17,74 @@ from numpy.typing import NDArray
 from bench.figures import loops, time_histories
 from bench.identification.adaptive import AdaptiveHistory, AdaptiveLeastSquares
 from bench.identification.regressors import bouc_wen_model
+from bench.laws.coupling import INCH, POUND_FORCE
 from bench.recording import Recording
 from bench.reproduction.estimates import contribution_histories, estimate_histories, fine
 from bench.reproduction.imperial import STIFFNESS, sdof_view
 from bench.reproduction.item import Item, Picture, Progress
 from bench.reproduction.printed_figures import fig, panels
-from bench.reproduction.verdict import SEEDS, Row, axis_row, fact_row, value_row
+from bench.reproduction.verdict import (
+    VERDICT_SETUP,
+    Row,
+    axis_row,
+    fact_row,
+    value_row,
+)
 from bench.rig import Element, simulate
-from bench.rig.library import INCH, POUND_FORCE, sdof_rig
+from bench.rig.library import sdof_rig
 from bench.signals import BandLimitedNoise, Excitation
 
-TRUE = np.array([5.0, 0.0, 0.0, -0.1, -1.0])
-"""A/eta, -nu beta a1/eta, nu gamma a1/eta, and the latter two for a2, in lbf, in, s."""
-CHANGED = np.array([4.0, 0.0, 0.0, -0.2, -1.2])
-PRINTED = (5.000, 0.002, 0.002, -0.100, -1.001)
 NAMES = ("θ1", "θ2", "θ3", "θ4", "θ5")
 UNITS = ("lbf/in", "1/in", "1/in", "1/(lbf in)", "1/(lbf in)")
-PERIOD = 2.0 * math.pi / math.sqrt(5.0)  # of small motion, mass 1 [s]
-PEAK = 10.0  # [lbf]
-CUTOFF = 9.0  # [Hz]
-DURATION = 120.0
-RATE = 1000.0
-TIMESTEP = 2e-4
-"""A command is held over a step and thus lags by half of one [s]; at 1 ms the estimates would feel it."""
-SEED = 6
+
+
+@dataclass(frozen=True)
+class SimulatedHysteresisSetup:
+    """Numbers of `bench.reproduction.simulated_hysteresis`."""
+
+    true: NDArray[np.float64] = field(default_factory=lambda: np.array([5.0, 0.0, 0.0, -0.1, -1.0]))
+    """A/eta, -nu beta a1/eta, nu gamma a1/eta, and the latter two for a2, in lbf, in, s."""
+    changed: NDArray[np.float64] = field(default_factory=lambda: np.array([4.0, 0.0, 0.0, -0.2, -1.2]))
+    printed: tuple[float, ...] = (5.000, 0.002, 0.002, -0.100, -1.001)
+    period: float = 2.0 * math.pi / math.sqrt(5.0)
+    peak: float = 10.0
+    cutoff: float = 9.0
+    duration: float = 120.0
+    rate: float = 1000.0
+    timestep: float = 2e-4
+    """A command is held over a step and thus lags by half of one [s]; at 1 ms the estimates would feel it."""
+    seed: int = 6
+
+
+SIMULATED_HYSTERESIS_SETUP = SimulatedHysteresisSetup()
 CHOSEN = "band of the excitation"
 
 
-def record(seed: int = SEED, *, timestep: float = TIMESTEP) -> Recording:
+def record(
+    seed: int = SIMULATED_HYSTERESIS_SETUP.seed, *, timestep: float = SIMULATED_HYSTERESIS_SETUP.timestep
+) -> Recording:
     """The test on the rig, in inches and pounds-force, with a mass of 1 lbf s^2/in."""
     # The dissertation's gamma of -1 is +1 in the sign of the law (see `bench.laws.bouc_wen`).
     unit = 1.0 / (INCH * POUND_FORCE)
     element = Element.of(
         "bouc_wen", "carriage", name="hysteresis", A=5.0 * STIFFNESS, beta=0.1 * unit, gamma=1.0 * unit, n=2.0
     )
-    noise = BandLimitedNoise(cutoff=CUTOFF, peak=PEAK * POUND_FORCE)
-    drive = Excitation({"shaker": noise}, duration=DURATION, sample_rate=1.0 / timestep)
+    noise = BandLimitedNoise(
+        cutoff=SIMULATED_HYSTERESIS_SETUP.cutoff, peak=SIMULATED_HYSTERESIS_SETUP.peak * POUND_FORCE
+    )
+    drive = Excitation(
+        {"shaker": noise}, duration=SIMULATED_HYSTERESIS_SETUP.duration, sample_rate=1.0 / timestep
+    )
     rig = sdof_rig(element, mass=STIFFNESS, timestep=timestep)
-    return sdof_view(simulate(rig, drive, rng=np.random.default_rng(seed), sample_rate=RATE), 1.0)
+    return sdof_view(
+        simulate(rig, drive, rng=np.random.default_rng(seed), sample_rate=SIMULATED_HYSTERESIS_SETUP.rate),
+        1.0,
+    )
 
 
 def integrate(force: NDArray[np.float64], thetas: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
     """Displacement, velocity, acceleration (n, 3) under a force held over each step; theta may change with the sample."""
-    step = 1.0 / RATE
+    step = 1.0 / SIMULATED_HYSTERESIS_SETUP.rate
     x = v = r = 0.0
     rows = np.empty((len(force), 3))
     for k, (load, theta) in enumerate(zip(force.tolist(), thetas, strict=True)):
@@ -84,14 +110,18 @@ def plain_estimator(*, jump_ratio: float = 0.0) -> AdaptiveLeastSquares:
     """The estimator in the dissertation's own form; lambda is a third of the natural frequency."""
     model = bouc_wen_model(2, mass=1.0, filter_rate=0.7)
     return AdaptiveLeastSquares(
-        model, forgetting=0.02, initial_covariance=1e6, sample_rate=RATE, jump_ratio=jump_ratio
+        model,
+        forgetting=0.02,
+        initial_covariance=1e6,
+        sample_rate=SIMULATED_HYSTERESIS_SETUP.rate,
+        jump_ratio=jump_ratio,
     )
 
 
 def noise_estimator() -> AdaptiveLeastSquares:
     """The estimator with its measures against noise; it forgets nothing, since the parameters stay."""
     model = bouc_wen_model(2, mass=1.0, filter_rate=1.2, denoise_after=3.0, crossover=50.0)
-    return AdaptiveLeastSquares(model, initial_covariance=1e6, sample_rate=RATE)
+    return AdaptiveLeastSquares(model, initial_covariance=1e6, sample_rate=SIMULATED_HYSTERESIS_SETUP.rate)
 
 
 def estimate(
@@ -121,19 +151,25 @@ def _noisy_error(test: Recording, seeds: Sequence[int]) -> float:
         )
         model = noise_estimator()
         estimate(model, test.time, force, test["velocity"], a)
-        error = np.abs(model.theta - TRUE)[[0, 3, 4]] / np.abs(TRUE[[0, 3, 4]])
+        error = np.abs(model.theta - SIMULATED_HYSTERESIS_SETUP.true)[[0, 3, 4]] / np.abs(
+            SIMULATED_HYSTERESIS_SETUP.true[[0, 3, 4]]
+        )
         worst = max(worst, 100.0 * float(error.max()))
     return worst
 
 
 def _tracking(force: NDArray[np.float64]) -> tuple[AdaptiveHistory, float]:
     """Estimates through a change of parameters at 30 s, and how many periods it takes to follow it."""
-    n, change = int(45.0 * RATE), 30.0
-    time = np.arange(n) / RATE
-    thetas = [CHANGED if t >= change else TRUE for t in time]
+    n, change = int(45.0 * SIMULATED_HYSTERESIS_SETUP.rate), 30.0
+    time = np.arange(n) / SIMULATED_HYSTERESIS_SETUP.rate
+    thetas = [
+        SIMULATED_HYSTERESIS_SETUP.changed if t >= change else SIMULATED_HYSTERESIS_SETUP.true for t in time
+    ]
     motion = integrate(force[:n], thetas)
     history = estimate(plain_estimator(jump_ratio=4.0), time, force[:n], motion[:, 1], motion[:, 2])
-    return history, (settled_after(history, CHANGED) - change) / PERIOD
+    return history, (
+        settled_after(history, SIMULATED_HYSTERESIS_SETUP.changed) - change
+    ) / SIMULATED_HYSTERESIS_SETUP.period
 
 
 class _Other(NamedTuple):
@@ -152,8 +188,13 @@ def _other(seed: int) -> _Other:
 
 
 def _judged(test: Recording, history: AdaptiveHistory) -> _Other:
-    late = float(np.abs(history.theta[history.time >= 30.0] - TRUE).max())
-    return _Other(test, history.theta[-1].copy(), late, settled_after(history, TRUE) / PERIOD)
+    late = float(np.abs(history.theta[history.time >= 30.0] - SIMULATED_HYSTERESIS_SETUP.true).max())
+    return _Other(
+        test,
+        history.theta[-1].copy(),
+        late,
+        settled_after(history, SIMULATED_HYSTERESIS_SETUP.true) / SIMULATED_HYSTERESIS_SETUP.period,
+    )
 
 
 def _range_rows(test: Recording, others: list[_Other]) -> list[Row]:
@@ -194,12 +235,12 @@ def _rows(
     for i, name in enumerate(NAMES):
         rows.append(
             value_row(
-                f"{name} at 120 s (true {TRUE[i]:g})",
+                f"{name} at 120 s (true {SIMULATED_HYSTERESIS_SETUP.true[i]:g})",
                 UNITS[i],
-                f"{PRINTED[i]:.3f}",
+                f"{SIMULATED_HYSTERESIS_SETUP.printed[i]:.3f}",
                 float(shown.theta[i]),
-                low=TRUE[i] - reach,
-                high=TRUE[i] + reach,
+                low=SIMULATED_HYSTERESIS_SETUP.true[i] - reach,
+                high=SIMULATED_HYSTERESIS_SETUP.true[i] + reach,
                 source=f"p. 29, number, and {fig('2.12')}",
                 tolerance=f"within {reach:g} of the true value, median of the seeds",
                 reason="as near as the printed estimates are: .002 and half of their last digit",
@@ -288,12 +329,12 @@ def run(progress: Progress) -> Item:
     noisy = _noisy_error(test, range(1, 11))
     progress("changing a parameter mid-record", 0.5)
     changed, tracked = _tracking(np.array(test["force"]))
-    coarse = record(timestep=1.0 / RATE).slice_time(0.0, 30.0)
+    coarse = record(timestep=1.0 / SIMULATED_HYSTERESIS_SETUP.rate).slice_time(0.0, 30.0)
     x = coarse["displacement"]
-    alone = integrate(coarse["force"], [TRUE] * len(coarse))[:, 0]
+    alone = integrate(coarse["force"], [SIMULATED_HYSTERESIS_SETUP.true] * len(coarse))[:, 0]
     apart = float(np.max(np.abs(alone - x)) / np.max(np.abs(x)))
     others = []
-    for number, seed in enumerate(SEEDS):
+    for number, seed in enumerate(VERDICT_SETUP.seeds):
         progress(f"seed {seed}", 0.6 + 0.03 * number)
         others.append(_other(seed))
     progress("drawing", 0.9)
@@ -314,7 +355,14 @@ def run(progress: Progress) -> Item:
         Picture(
             "estimates",
             "Evolution of the estimates, true values dashed (Fig 2.12).",
-            estimate_histories(history, NAMES, reference=tuple(TRUE), units=UNITS, label="true", until=30.0),
+            estimate_histories(
+                history,
+                NAMES,
+                reference=tuple(SIMULATED_HYSTERESIS_SETUP.true),
+                units=UNITS,
+                label="true",
+                until=30.0,
+            ),
             panels("2.12"),
         ),
         Picture(
@@ -327,16 +375,21 @@ def run(progress: Progress) -> Item:
             "change",
             "Estimates through a change of the parameters at 30 s; the dashed lines are the new values.",
             estimate_histories(
-                changed, NAMES, reference=tuple(CHANGED), units=UNITS, label="after the change"
+                changed,
+                NAMES,
+                reference=tuple(SIMULATED_HYSTERESIS_SETUP.changed),
+                units=UNITS,
+                label="after the change",
             ),
         ),
     )
     text = (
         "Mass 1 lbf s²/in, A = 5, β = 0.1, γ = -1 in the dissertation's sign, n = 2 (2.17), simulated in "
-        f"MuJoCo at 5 kHz under noise flat to {CUTOFF:g} Hz with a peak of {PEAK:g} lbf. The band of the "
+        f"MuJoCo at 5 kHz under noise flat to {SIMULATED_HYSTERESIS_SETUP.cutoff:g} Hz with a peak of "
+        f"{SIMULATED_HYSTERESIS_SETUP.peak:g} lbf. The band of the "
         "printed excitation is not given, and the displacement wanders with it: the rig has no elastic "
         "spring. The restoring force cannot "
-        f"exceed its strength of √(5/1.1) = 2.13 lbf. One system period is {PERIOD:.2f} s."
+        f"exceed its strength of √(5/1.1) = 2.13 lbf. One system period is {SIMULATED_HYSTERESIS_SETUP.period:.2f} s."
     )
     searched = (
         f"{CHOSEN}, which is not printed; settings of the estimator; the seed shown, for its displacement"

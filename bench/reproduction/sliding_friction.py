@@ -9,10 +9,12 @@ an element on the carriage, and the gauge is computed from both.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from bench.figures import loops, time_histories
+from bench.laws.coupling import INCH, POUND_FORCE
 from bench.recording import Recording
 from bench.reproduction.estimates import fine
 from bench.reproduction.imperial import STIFFNESS, imperial
@@ -20,20 +22,28 @@ from bench.reproduction.item import Item, Picture, Progress
 from bench.reproduction.printed_figures import fig, panels
 from bench.reproduction.verdict import Row, axis_row, fact_row, told_row, value_row
 from bench.rig import Element, simulate
-from bench.rig.library import INCH, POUND_FORCE, sdof_rig
+from bench.rig.library import sdof_rig
 from bench.signals import Constant, Excitation, Harmonic, Signal, Tapered
 
-MASS = 0.04  # [lbf s^2/in]
-SPRING = 16.0  # [lbf/in]
-BACK_EMF = 0.8  # [lbf s/in]
-COIL = 15.8  # amplitude of the coil's force [lbf]
-FREQUENCY = 3.2  # [Hz]
-FRICTION_COEFFICIENT = 0.2
-GRIP = (7.5, 70.0)  # smallest and largest normal force [lbf]
-STEADY_GRIP = 25.0  # normal force of the test without modulation [lbf]
-MODULATION = 2.0 / 30.0  # two periods in 30 s [Hz]
-CREEP = 0.3  # velocity that rounds the friction law [in/s]
-DURATION = 30.0
+
+@dataclass(frozen=True)
+class SlidingFrictionSetup:
+    """Numbers of `bench.reproduction.sliding_friction`."""
+
+    mass: float = 0.04
+    spring: float = 16.0
+    back_emf: float = 0.8
+    coil: float = 15.8
+    frequency: float = 3.2
+    friction_coefficient: float = 0.2
+    grip: tuple[float, float] = (7.5, 70.0)
+    steady_grip: float = 25.0
+    modulation: float = 2.0 / 30.0
+    creep: float = 0.3
+    duration: float = 30.0
+
+
+SETUP = SlidingFrictionSetup()
 CHOSEN = "mass, spring, friction, grip, force and frequency of the coil, back-EMF"
 
 
@@ -41,25 +51,27 @@ def record(normal_force: Signal) -> Recording:
     """The test under a course of the normal force [N]."""
     rig = sdof_rig(
         Element.of(
-            "linear", "carriage", name="spring", stiffness=SPRING * STIFFNESS, damping=0.02 * STIFFNESS
+            "linear", "carriage", name="spring", stiffness=SETUP.spring * STIFFNESS, damping=0.02 * STIFFNESS
         ),
         Element.of(
             "controlled_friction",
             "carriage",
             name="slide",
             inputs=("normal_force",),
-            mu=FRICTION_COEFFICIENT,
-            regularisation_velocity=CREEP * INCH,
+            mu=SETUP.friction_coefficient,
+            regularisation_velocity=SETUP.creep * INCH,
         ),
-        Element.of("linear_damping", "carriage", name="back_emf", damping=BACK_EMF * STIFFNESS),
-        mass=MASS * STIFFNESS,
+        Element.of("linear_damping", "carriage", name="back_emf", damping=SETUP.back_emf * STIFFNESS),
+        mass=SETUP.mass * STIFFNESS,
     )
     # Faded in over a second: the start of a sine would leave a transient above the steady motion.
-    coil = Tapered(Harmonic(FREQUENCY, COIL * POUND_FORCE), fade_in=1.0)
-    drive = Excitation({"shaker": coil, "normal_force": normal_force}, duration=DURATION, sample_rate=1000.0)
+    coil = Tapered(Harmonic(SETUP.frequency, SETUP.coil * POUND_FORCE), fade_in=1.0)
+    drive = Excitation(
+        {"shaker": coil, "normal_force": normal_force}, duration=SETUP.duration, sample_rate=1000.0
+    )
     test = imperial(simulate(rig, drive)).renamed({"acceleration_x": "acceleration"})
     gauge = test["load_cell"] - test["back_emf/force"]
-    arrays = {"force_gauge": gauge, "restoring_force": gauge - MASS * test["acceleration"]}
+    arrays = {"force_gauge": gauge, "restoring_force": gauge - SETUP.mass * test["acceleration"]}
     return test.with_channels(
         arrays, units=dict.fromkeys(arrays, "lbf"), quantities=dict.fromkeys(arrays, "force")
     )
@@ -67,13 +79,15 @@ def record(normal_force: Signal) -> Recording:
 
 def modulated() -> Signal:
     """The grip over two periods, from its smallest value to its largest [N]."""
-    mean, swing = 0.5 * (GRIP[1] + GRIP[0]), 0.5 * (GRIP[1] - GRIP[0])
-    return Constant(mean * POUND_FORCE) + Harmonic(MODULATION, swing * POUND_FORCE, phase=-0.5 * math.pi)
+    mean, swing = 0.5 * (SETUP.grip[1] + SETUP.grip[0]), 0.5 * (SETUP.grip[1] - SETUP.grip[0])
+    return Constant(mean * POUND_FORCE) + Harmonic(
+        SETUP.modulation, swing * POUND_FORCE, phase=-0.5 * math.pi
+    )
 
 
 def envelope(values: np.ndarray, time: np.ndarray, at: float) -> float:
     """Largest magnitude over one period of the excitation about a time."""
-    return float(np.max(np.abs(values[np.abs(time - at) <= 0.5 / FREQUENCY])))
+    return float(np.max(np.abs(values[np.abs(time - at) <= 0.5 / SETUP.frequency])))
 
 
 def _loops_apart(constant: Recording) -> float:
@@ -85,15 +99,15 @@ def _loops_apart(constant: Recording) -> float:
 
 
 def _rows(test: Recording, constant: Recording) -> tuple[Row, ...]:
-    loose, tight = 1.0 / MODULATION, 1.5 / MODULATION
+    loose, tight = 1.0 / SETUP.modulation, 1.5 / SETUP.modulation
     swing = {
         name: (envelope(test[name], test.time, loose), envelope(test[name], test.time, tight))
         for name in ("displacement", "velocity", "force_gauge")
     }
-    last = constant.slice_time(20.0, 20.0 + 1.0 / FREQUENCY)
+    last = constant.slice_time(20.0, 20.0 + 1.0 / SETUP.frequency)
     area = float(np.sum(last["slide/force"] * last["velocity"]) / constant.sample_rate)
     stroke = 2.0 * float(np.ptp(last["displacement"]))
-    omega = 2.0 * math.pi * FREQUENCY
+    omega = 2.0 * math.pi * SETUP.frequency
     loops_apart = _loops_apart(constant)
     axes = {
         "displacement": ("in", 1.0, 0.5, "a"),
@@ -118,7 +132,7 @@ def _rows(test: Recording, constant: Recording) -> tuple[Row, ...]:
         told_row(
             "periods of the normal force in 30 s",
             "1",
-            f"{MODULATION * DURATION:g}",
+            f"{SETUP.modulation * SETUP.duration:g}",
             "put in; the axis of Fig 2.9 e is the stepper motor's relative position, not a force",
             printed="about two",
             source=f"{fig('2.9 e')}, sentence on p. 21",
@@ -156,8 +170,8 @@ def _rows(test: Recording, constant: Recording) -> tuple[Row, ...]:
             "constant grip: area of the slide's loop over friction limit times path",
             "1",
             None,
-            area / (FRICTION_COEFFICIENT * STEADY_GRIP * stroke),
-            low=1.0 - CREEP / (omega * 0.25 * stroke),
+            area / (SETUP.friction_coefficient * SETUP.steady_grip * stroke),
+            low=1.0 - SETUP.creep / (omega * 0.25 * stroke),
             high=1.0,
             reason="the loop of dry friction is a rectangle; the creep velocity over the peak velocity is cut from its corners",
         ),
@@ -179,7 +193,9 @@ def _pictures(test: Recording, constant: Recording) -> tuple[Picture, ...]:
         Picture(
             "loop_constant",
             "Restoring force over displacement under a constant grip, steady state: one parallelogram (Fig 2.10 a).",
-            fine(loops({"rig": constant}, [("displacement", "restoring_force")], window=(10.0, DURATION))),
+            fine(
+                loops({"rig": constant}, [("displacement", "restoring_force")], window=(10.0, SETUP.duration))
+            ),
             panels("2.10", "a"),
         ),
         Picture(
@@ -195,11 +211,11 @@ def run(progress: Progress) -> Item:
     """Make the item."""
     progress("simulating", 0.1)
     test = record(modulated())
-    constant = record(Constant(STEADY_GRIP * POUND_FORCE))
+    constant = record(Constant(SETUP.steady_grip * POUND_FORCE))
     text = (
-        f"Carriage of {MASS:g} lbf s²/in, spring of {SPRING:g} lbf/in, friction coefficient "
-        f"{FRICTION_COEFFICIENT:g}, normal force between {GRIP[0]:g} and {GRIP[1]:g} lbf, coil force of "
-        f"{COIL:g} lbf at {FREQUENCY:g} Hz, chosen to give the printed ranges. An ideal source of force "
+        f"Carriage of {SETUP.mass:g} lbf s²/in, spring of {SETUP.spring:g} lbf/in, friction coefficient "
+        f"{SETUP.friction_coefficient:g}, normal force between {SETUP.grip[0]:g} and {SETUP.grip[1]:g} lbf, coil force of "
+        f"{SETUP.coil:g} lbf at {SETUP.frequency:g} Hz, chosen to give the printed ranges. An ideal source of force "
         "would make the gauge read the same throughout; the printed gauge reads more when the grip is "
         "strong, which the back-EMF of a shaker on a voltage amplifier explains."
     )

@@ -74,9 +74,9 @@ def run(progress: Progress) -> Item:
     network = fit_network(
         data.states,
         data.forces,
-        n_hidden=joint_models.HIDDEN,
+        n_hidden=joint_models.SETUP.hidden,
         accelerations=data.accelerations,
-        rng=np.random.default_rng(joint_models.HIDDEN),
+        rng=np.random.default_rng(joint_models.SETUP.hidden),
     )
     known = {"polynomial": _both(given.polynomial), "network": _both(given.network)}
     unknown = {"polynomial": _both(polynomial), "network": _both(network)}

@@ -3,7 +3,7 @@
 A row states what is printed and where, ours, the tolerance with its reason, and one of four verdicts. Four rules:
 
 * Every row that is judged is judged by a rule fixed by the source or by a statistic, never by what came out.
-* Where a seed was chosen, the verdict is that of the median over `SEEDS`, not of the record shown.
+* Where a seed was chosen, the verdict is that of the median over `seeds`, not of the record shown.
 * A row whose quantity was put in, directly or by choosing parameters, says so in `chosen`; it is no evidence.
 * A row of which the text prints nothing is a check of our own; it says nothing of the dissertation.
 """
@@ -12,17 +12,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-SEEDS = range(1, 11)
-"""Seeds of the excitations over which a spread is told."""
 
-GOOD_FIT = 5.0
-"""NMSE below which a fit counts as good [%] (Worden and Tomlinson 2001; section 3.4.2 of the text)."""
+@dataclass(frozen=True)
+class VerdictSetup:
+    """Numbers of `bench.reproduction.verdict`."""
+
+    seeds: range = range(1, 11)
+    """Seeds of the excitations over which a spread is told."""
+    good_fit: float = 5.0
+    """NMSE below which a fit counts as good [%] (Worden and Tomlinson 2001; section 3.4.2 of the text)."""
+
+
+VERDICT_SETUP = VerdictSetup()
 
 AXIS_REASON = (
     "the text prints an axis, not extremes: data lie inside an axis's ends and beyond its last label but one, "
@@ -50,7 +58,7 @@ class Row(NamedTuple):
         printed: What is printed, as text; empty where the text prints nothing.
         source: Figure, page and kind of what is printed: axis label, number, sentence; `OWN` where nothing is printed.
         ours: Ours, as text: that of the record shown.
-        spread: The same over `SEEDS`; empty where no seed was chosen.
+        spread: The same over `seeds`; empty where no seed was chosen.
         tolerance: When it holds, as text; empty where it cannot be judged.
         reason: Why this tolerance; where it cannot be judged, why not.
         verdict: The verdict.

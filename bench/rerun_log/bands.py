@@ -15,9 +15,17 @@ from numpy.typing import NDArray
 from bench.recording import Recording
 from bench.rig import Element
 
-SLIP_SHARE = 0.9
-"""Share of the slip force at which a slider that yields gradually counts as slipping. The exact value is a convention:
-Bouc-Wen and Iwan joints have no sharp transition."""
+
+@dataclass(frozen=True)
+class BandsSettings:
+    """Numbers of `bench.rerun_log.bands`."""
+
+    slip_share: float = 0.9
+    """Share of the slip force at which a slider that yields gradually counts as slipping. The exact value is a convention: Bouc-Wen
+    and Iwan joints have no sharp transition."""
+
+
+BANDS_SETTINGS = BandsSettings()
 
 CONTACT = ("contact −", "free", "contact +")
 SLIDER = ("stick", "slip")
@@ -68,7 +76,10 @@ def _stick(velocity: float) -> Callable[..., NDArray[np.int64]]:
 def _yield(low: float, high: float) -> Callable[..., NDArray[np.int64]]:
     """Slip where the force has reached its limit on the side it is moving to."""
     return lambda r, v: np.where(
-        ((r > SLIP_SHARE * high) & (v > 0.0)) | ((r < SLIP_SHARE * low) & (v < 0.0)), 1, 0
+        ((r > BANDS_SETTINGS.slip_share * high) & (v > 0.0))
+        | ((r < BANDS_SETTINGS.slip_share * low) & (v < 0.0)),
+        1,
+        0,
     )
 
 
@@ -115,7 +126,7 @@ def bands_of(element: Element) -> tuple[Band, ...]:
     """The gaps and sliders of an element; empty for laws that have neither.
 
     A friction law without presliding sticks below its regularisation velocity. One with presliding (Dahl, LuGre,
-    Jenkins, Iwan, Bouc-Wen) slips from `SLIP_SHARE` of its limit on, in the direction of motion.
+    Jenkins, Iwan, Bouc-Wen) slips from `slip_share` of its limit on, in the direction of motion.
     """
     name = element.name
     found = [

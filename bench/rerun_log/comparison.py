@@ -6,6 +6,7 @@ import os
 import sysconfig
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
@@ -26,19 +27,29 @@ from bench.rig import Rig
 
 APPLICATION = "jointbench"
 
-# Other colours than the variants'; told apart with any colour vision (after IBM's design library palette).
-_BAND_COLOURS = {
-    "contact −": (120, 94, 240, 255),
-    "free": (60, 60, 60, 255),
-    "contact +": (220, 38, 127, 255),
-    "stick": (64, 176, 166, 255),
-    "slip": (60, 60, 60, 255),
-    "within noise": (60, 60, 60, 255),
-    "gap": (255, 176, 0, 255),
-    "outside": (60, 60, 60, 255),
-    "region −": (120, 94, 240, 255),
-    "region +": (220, 38, 127, 255),
-}
+
+@dataclass(frozen=True)
+class ComparisonSettings:
+    """Numbers of `bench.rerun_log.comparison`."""
+
+    # Other colours than the variants'; told apart with any colour vision (after IBM's design library palette).
+    band_colours: Mapping[str, tuple[int, ...]] = field(
+        default_factory=lambda: {
+            "contact −": (120, 94, 240, 255),
+            "free": (60, 60, 60, 255),
+            "contact +": (220, 38, 127, 255),
+            "stick": (64, 176, 166, 255),
+            "slip": (60, 60, 60, 255),
+            "within noise": (60, 60, 60, 255),
+            "gap": (255, 176, 0, 255),
+            "outside": (60, 60, 60, 255),
+            "region −": (120, 94, 240, 255),
+            "region +": (220, 38, 127, 255),
+        }
+    )
+
+
+SETTINGS = ComparisonSettings()
 
 
 class _Clock(NamedTuple):
@@ -281,7 +292,7 @@ def _log_bands(
             rr.StateConfiguration(
                 values=list(band.states),
                 labels=list(band.states),
-                colors=[_BAND_COLOURS[s] for s in band.states],
+                colors=[SETTINGS.band_colours[s] for s in band.states],
             ),
             static=True,
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -13,18 +14,25 @@ from bench.errors import UnknownNameError
 from bench.recording import Recording
 from bench.rerun_log.scene import Eye
 
-GROUND = (196, 204, 214)
-"""Background of the 3-D views: light enough that dark apparatus stands out."""
 
-CYCLES_SHOWN = 15
-"""Cycles of the motion in the window of the time views; more run together on a screen."""
+@dataclass(frozen=True)
+class LayoutSettings:
+    """Numbers of `bench.rerun_log.layout`."""
 
-PLOTS_A_TAB = 4
-LOOPS_A_SHEET = 4
-SCENES_A_COLUMN = 3
+    ground: tuple[int, int, int] = (196, 204, 214)
+    """Background of the 3-D views: light enough that dark apparatus stands out."""
+    cycles_shown: int = 15
+    """Cycles of the motion in the window of the time views; more run together on a screen."""
+    plots_a_tab: int = 4
+    loops_a_sheet: int = 4
+    scenes_a_column: int = 3
+    height: float = 760.0
+    title: float = 60.0
+    lane: float = 42.0
+    """Heights of a page, a view's title with its time axis, and a lane of the state view [points]; only their ratios count."""
 
-HEIGHT, TITLE, LANE = 760.0, 60.0, 42.0
-"""Heights of a page, a view's title with its time axis, and a lane of the state view [points]; only their ratios count."""
+
+SETTINGS = LayoutSettings()
 
 
 class Loop(NamedTuple):
@@ -120,11 +128,15 @@ def _tab(channel: str, role: str) -> str:
 
 
 def _window(reference: Recording, channel: str) -> float:
-    """Seconds in which the channel goes through about `CYCLES_SHOWN` cycles, by its crossings of the mean."""
+    """Seconds in which the channel goes through about `cycles_shown` cycles, by its crossings of the mean."""
     y = reference[channel] - np.mean(reference[channel])
     crossings = int(np.count_nonzero(np.diff(np.signbit(y))))
     duration = float(reference.time[-1] - reference.time[0])
-    return duration if crossings < 2 * CYCLES_SHOWN else duration * 2.0 * CYCLES_SHOWN / crossings
+    return (
+        duration
+        if crossings < 2 * SETTINGS.cycles_shown
+        else duration * 2.0 * SETTINGS.cycles_shown / crossings
+    )
 
 
 def _around(window: float) -> rrb.archetypes.TimeAxis:
@@ -153,12 +165,14 @@ def _plots(folder: str, labels: Sequence[str], page: Page, *, prefix: str = "") 
 def _series(page: Page) -> rrb.Tabs:
     tabs: list[rrb.Container | rrb.View] = []
     for tab, labels in page.groups.items():
-        for start in range(0, len(labels), PLOTS_A_TAB):
-            part = labels[start : start + PLOTS_A_TAB]
-            name = tab if len(labels) <= PLOTS_A_TAB else f"{tab} {start // PLOTS_A_TAB + 1}"
+        for start in range(0, len(labels), SETTINGS.plots_a_tab):
+            part = labels[start : start + SETTINGS.plots_a_tab]
+            name = (
+                tab if len(labels) <= SETTINGS.plots_a_tab else f"{tab} {start // SETTINGS.plots_a_tab + 1}"
+            )
             tabs.append(rrb.Vertical(*_plots("channels", part, page), name=name))
-    for start in range(0, len(page.errors), PLOTS_A_TAB):
-        part = page.errors[start : start + PLOTS_A_TAB]
+    for start in range(0, len(page.errors), SETTINGS.plots_a_tab):
+        part = page.errors[start : start + SETTINGS.plots_a_tab]
         tabs.append(rrb.Vertical(*_plots("errors", part, page, prefix="error of "), name="Errors"))
     return rrb.Tabs(*tabs, active_tab=0)
 
@@ -188,7 +202,7 @@ def _scenes(page: Page) -> list[rrb.Container | rrb.View]:
         rrb.Spatial3DView(
             origin=rr.new_entity_path(["rig", entity]),
             name=name,
-            background=GROUND,
+            background=SETTINGS.ground,
             line_grid=False,
             eye_controls=controls,
         )
@@ -198,9 +212,9 @@ def _scenes(page: Page) -> list[rrb.Container | rrb.View]:
 
 def _loop_sheets(page: Page) -> rrb.Container | rrb.View:
     views = [_loop_view(loop, page.window) for loop in page.loops]
-    if len(views) <= LOOPS_A_SHEET:
+    if len(views) <= SETTINGS.loops_a_sheet:
         return rrb.Grid(*views, grid_columns=1 if len(views) <= 2 else 2)
-    sheets = [views[i : i + LOOPS_A_SHEET] for i in range(0, len(views), LOOPS_A_SHEET)]
+    sheets = [views[i : i + SETTINGS.loops_a_sheet] for i in range(0, len(views), SETTINGS.loops_a_sheet)]
     return rrb.Tabs(
         *(rrb.Grid(*sheet, grid_columns=2, name=f"Loops {i + 1}") for i, sheet in enumerate(sheets)),
         active_tab=0,
@@ -216,9 +230,9 @@ def blueprint(page: Page) -> rrb.Blueprint:
     scenes = _scenes(page)
     left, right = list(scenes), [_loop_sheets(page)] if page.loops else []
     left_shares, right_shares = [1.0] * len(scenes), [2.0] * len(right)
-    if 0 < len(scenes) < SCENES_A_COLUMN or not right:
+    if 0 < len(scenes) < SETTINGS.scenes_a_column or not right:
         left.append(scores)
-        left_shares.append(float(max(SCENES_A_COLUMN - len(scenes), 1)))
+        left_shares.append(float(max(SETTINGS.scenes_a_column - len(scenes), 1)))
     else:
         right.append(scores)
         right_shares.append(1.0)
@@ -228,7 +242,7 @@ def blueprint(page: Page) -> rrb.Blueprint:
             origin="/bands", name="contact and slip", time_view=_around(page.window)
         )
         middle.append(bands)
-    bands_share = min((TITLE + LANE * page.lanes) / HEIGHT, 0.5)
+    bands_share = min((SETTINGS.title + SETTINGS.lane * page.lanes) / SETTINGS.height, 0.5)
     columns = [
         rrb.Vertical(*views, row_shares=shares)
         for views, shares in (

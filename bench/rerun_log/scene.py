@@ -8,6 +8,7 @@ frame instead of thousands of vertices.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import mujoco
@@ -19,17 +20,22 @@ from numpy.typing import NDArray
 from bench.errors import UnknownNameError
 from bench.rerun_log.kinematics import BodyPoses
 
-VISIBLE_GROUPS = 3
-"""Geometry groups shown: those below it, as in MuJoCo's own viewer."""
 
-SKIN_SLICES = 12
-"""Slices of a skin whose ends turn against each other: an arc of 1/12 of the angle becomes a chord."""
+@dataclass(frozen=True)
+class SceneSettings:
+    """Numbers of `bench.rerun_log.scene`."""
 
-VIEWER_FIELD_OF_VIEW = np.deg2rad(55.0)
-"""Vertical field of view of rerun's 3-D views; MuJoCo's cameras are moved along their axis to match it."""
+    visible_groups: int = 3
+    """Geometry groups shown: those below it, as in MuJoCo's own viewer."""
+    skin_slices: int = 12
+    """Slices of a skin whose ends turn against each other: an arc of 1/12 of the angle becomes a chord."""
+    viewer_field_of_view: float = np.deg2rad(55.0)
+    """Vertical field of view of rerun's 3-D views; MuJoCo's cameras are moved along their axis to match it."""
+    margin: float = 1.15
+    """Distance of the eye over the one at which the picture's height agrees: the nearer view sees near parts larger."""
 
-MARGIN = 1.15
-"""Distance of the eye over the one at which the picture's height agrees: the nearer view sees near parts larger."""
+
+SETTINGS = SceneSettings()
 
 
 class Eye(NamedTuple):
@@ -176,7 +182,7 @@ def skin_slices(model: mujoco.MjModel, skin: int, poses: BodyPoses) -> list[Skin
     weights /= weights.sum(axis=0)
     turning = np.abs(motions[:, :, :, :3] - motions[:1, :, :, :3]).max() > 1e-6
     place = np.argsort(np.argsort(weights[0], kind="stable"), kind="stable") / len(rest)
-    label = np.floor(place * (SKIN_SLICES if turning else 1)).astype(int)
+    label = np.floor(place * (SETTINGS.skin_slices if turning else 1)).astype(int)
     slices = []
     for number in np.unique(label):
         faces = triangles[label[triangles].min(axis=1) == number]
@@ -202,7 +208,7 @@ def _matrices(matrices: NDArray) -> pa.Array:
 
 def _shown(model: mujoco.MjModel, body: int) -> list[int]:
     geoms = range(*_span(model.body_geomadr, model.body_geomnum, body))
-    return [g for g in geoms if model.geom_group[g] < VISIBLE_GROUPS]
+    return [g for g in geoms if model.geom_group[g] < SETTINGS.visible_groups]
 
 
 def log_scene(
@@ -240,7 +246,7 @@ def log_scene(
             columns = rr.Transform3D.columns(translation=poses.position[:, body], quaternion=quaternion)
             rr.send_columns(entity, clock, columns, recording=stream)
     for skin in range(model.nskin):
-        if model.skin_group[skin] < VISIBLE_GROUPS:
+        if model.skin_group[skin] < SETTINGS.visible_groups:
             _log_skin(stream, path, model, skin, clock, poses)
 
 
@@ -311,5 +317,5 @@ def eye_of(model: mujoco.MjModel, camera: str = "") -> Eye:
     distance = float(np.dot(centre - position, forward))
     distance = distance if distance > 0.0 else float(extent)
     target = position + distance * forward
-    zoom = np.tan(0.5 * np.deg2rad(model.cam_fovy[found])) / np.tan(0.5 * VIEWER_FIELD_OF_VIEW)
-    return Eye(target - MARGIN * zoom * distance * forward, target)
+    zoom = np.tan(0.5 * np.deg2rad(model.cam_fovy[found])) / np.tan(0.5 * SETTINGS.viewer_field_of_view)
+    return Eye(target - SETTINGS.margin * zoom * distance * forward, target)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -11,18 +12,31 @@ import rerun as rr
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike, NDArray
 
-REFERENCE_COLOUR = (225, 225, 225)
-COLOURS = ((240, 150, 30), (86, 180, 233), (0, 190, 130), (225, 130, 190), (240, 228, 66), (213, 94, 0))
-"""Colours of the variants beside the reference, told apart with any colour vision, on rerun's dark ground
-(after Okabe & Ito 2008, lightened)."""
 
-AXES_COLOUR = (130, 130, 130)
-GRID_COLOUR = (60, 60, 60)
-LABEL_COLOUR = (200, 200, 200)
+@dataclass(frozen=True)
+class TracesSettings:
+    """Numbers of `bench.rerun_log.traces`."""
 
-# Rerun writes a label below its point and centred on it.
-LABEL_BELOW = (0.0, 0.01)
-LABEL_BESIDE = (-0.12, -0.06)
+    reference_colour: tuple[int, int, int] = (225, 225, 225)
+    colours: tuple[tuple[int, int, int], ...] = (
+        (240, 150, 30),
+        (86, 180, 233),
+        (0, 190, 130),
+        (225, 130, 190),
+        (240, 228, 66),
+        (213, 94, 0),
+    )
+    """Colours of the variants beside the reference, told apart with any colour vision, on rerun's dark ground (after Okabe & Ito 2008,
+    lightened)."""
+    axes_colour: tuple[int, int, int] = (130, 130, 130)
+    grid_colour: tuple[int, int, int] = (60, 60, 60)
+    label_colour: tuple[int, int, int] = (200, 200, 200)
+    # Rerun writes a label below its point and centred on it.
+    label_below: tuple[float, float] = (0.0, 0.01)
+    label_beside: tuple[float, float] = (-0.12, -0.06)
+
+
+SETTINGS = TracesSettings()
 
 
 class Style(NamedTuple):
@@ -35,8 +49,8 @@ class Style(NamedTuple):
 def style(number: int) -> Style:
     """The reference (number 0) broad and pale, the others thin and coloured on top of it."""
     if number == 0:
-        return Style(REFERENCE_COLOUR, 2.6)
-    return Style(COLOURS[(number - 1) % len(COLOURS)], 1.3)
+        return Style(SETTINGS.reference_colour, 2.6)
+    return Style(SETTINGS.colours[(number - 1) % len(SETTINGS.colours)], 1.3)
 
 
 def extremes(
@@ -140,19 +154,30 @@ def log_frame(
     stream.log(
         rr.new_entity_path([*path, "axes"]),
         rr.LineStrips2D(
-            lines, colors=[AXES_COLOUR] + [GRID_COLOUR] * (len(lines) - 1), radii=rr.Radius.ui_points(0.5)
+            lines,
+            colors=[SETTINGS.axes_colour] + [SETTINGS.grid_colour] * (len(lines) - 1),
+            radii=rr.Radius.ui_points(0.5),
         ),
         static=True,
     )
     x_texts, x_label = _scaled(frame.x_ticks, x_label)
     y_texts, y_label = _scaled(frame.y_ticks, y_label)
     shown_x, shown_y = ([0, len(t) // 2, len(t) - 1] for t in (x_texts, y_texts))
-    places = [*(x[shown_x] + LABEL_BELOW), *(y[shown_y] + LABEL_BESIDE), (0.5, 1.15), (0.25, -0.17)]
+    places = [
+        *(x[shown_x] + SETTINGS.label_below),
+        *(y[shown_y] + SETTINGS.label_beside),
+        (0.5, 1.15),
+        (0.25, -0.17),
+    ]
     texts = [x_texts[i] for i in shown_x] + [y_texts[i] for i in shown_y] + [x_label, y_label]
     stream.log(
         rr.new_entity_path([*path, "labels"]),
         rr.Points2D(
-            places, labels=texts, show_labels=True, radii=rr.Radius.ui_points(0.01), colors=LABEL_COLOUR
+            places,
+            labels=texts,
+            show_labels=True,
+            radii=rr.Radius.ui_points(0.01),
+            colors=SETTINGS.label_colour,
         ),
         static=True,
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple, Protocol, get_args
 from xml.etree import ElementTree
@@ -27,7 +28,15 @@ INTEGRATORS = {
 STRUCTURE: tuple[str, ...] = get_args(StructureName)
 """Structural quantities that `Rig.with_structure` changes."""
 
-EXACT_SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)
+
+@dataclass(frozen=True)
+class BuildingSettings:
+    """Numbers of `bench.rig.building`."""
+
+    exact_solimp: tuple[float, ...] = (0.9999, 0.9999, 0.001, 0.5, 2.0)
+
+
+SETTINGS = BuildingSettings()
 
 
 class Buildable(Protocol):
@@ -165,7 +174,7 @@ def _set_exact_friction(spec: mujoco.MjSpec, element: Element) -> None:
         raise UnknownNameError("joint or tendon", element.joints[0], [joint.name for joint in spec.joints])
     target.frictionloss = element.theta[0]
     target.solref_friction = (2.0 * spec.option.timestep, 1.0)  # the stiffest that MuJoCo takes at this step
-    target.solimp_friction = EXACT_SOLIMP
+    target.solimp_friction = SETTINGS.exact_solimp
 
 
 def _add_state_actuator(spec: mujoco.MjSpec, element: Element, index: int) -> None:

@@ -18,11 +18,6 @@ from bench.mjcf import model_path
 from bench.rig.description import Rig
 from bench.rig.element import Element
 
-INCH = 0.0254
-"""Metres an inch."""
-POUND_FORCE = 4.4482216152605
-"""Newtons a pound-force."""
-
 PRESCRIBED_ACTUATORS = ("drive_position", "drive_velocity", "drive_feedforward")
 
 

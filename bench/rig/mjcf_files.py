@@ -7,6 +7,8 @@ field of a million million points; all of that is refused before MuJoCo sees it.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -20,7 +22,26 @@ _GENERATED = {
 """Elements of MJCF that make many things of one, and the attributes that say how many."""
 _SIZES = ("nuserdata", "nkey", "nuser_body", "nuser_jnt", "nuser_geom", "nuser_site", "nuser_cam", "nuser_tendon",
           "nuser_actuator", "nuser_sensor", "nconmax", "njmax", "nstack")  # fmt: skip
-_PREFIXES = {"": 1.0, "k": 2.0**10, "m": 2.0**20, "g": 2.0**30, "t": 2.0**40, "p": 2.0**50, "e": 2.0**60}
+
+
+@dataclass(frozen=True)
+class MjcfFilesSettings:
+    """Numbers of `bench.rig.mjcf_files`."""
+
+    prefixes: Mapping[str, float] = field(
+        default_factory=lambda: {
+            "": 1.0,
+            "k": 2.0**10,
+            "m": 2.0**20,
+            "g": 2.0**30,
+            "t": 2.0**40,
+            "p": 2.0**50,
+            "e": 2.0**60,
+        }
+    )
+
+
+SETTINGS = MjcfFilesSettings()
 
 
 def model_text(path: str | Path, *, limits: ReadingLimits = READING_LIMITS) -> str:
@@ -138,7 +159,7 @@ def _refuse_multitudes(root: ElementTree.Element, limits: ReadingLimits) -> None
         if node.tag == "size":
             made = max([_number(node.get(key, "")) for key in _SIZES], default=1.0)
             memory = node.get("memory", "").lower()
-            if memory and _number(memory.rstrip("kmgtpe")) * _PREFIXES.get(memory[-1:], 1.0) > 1e9:
+            if memory and _number(memory.rstrip("kmgtpe")) * SETTINGS.prefixes.get(memory[-1:], 1.0) > 1e9:
                 raise ModelError(
                     f"the MJCF asks for memory of {node.get('memory', '')[:40]!r}; at most 1 GB is given"
                 )

@@ -21,7 +21,9 @@ from bench.rig.building import Placed
 from bench.rig.description import Rig
 from bench.rig.element import Element
 from bench.signals import Excitation
-from bench.signals.base import MAX_SAMPLES
+from bench.signals.base import (
+    BASE_SETTINGS,
+)
 
 STATE = (
     mujoco.mjtState.mjSTATE_TIME
@@ -66,9 +68,10 @@ def controls_of(rig: Rig, drive: Drive, rng: np.random.Generator | None = None) 
     length = lengths.pop()
     if length < 1:
         raise ParameterError(f"the drive of rig '{rig.name}' has no samples; at least one is expected")
-    if length * hold > MAX_SAMPLES:
+    if length * hold > BASE_SETTINGS.max_samples:
         raise ParameterError(
-            f"{length} samples, each held for {hold} steps of rig '{rig.name}', are {length * hold} steps; at most {MAX_SAMPLES} "
+            f"{length} samples, each held for {hold} steps of rig '{rig.name}', are {length * hold} steps; "
+            f"at most {BASE_SETTINGS.max_samples} "
             "are expected: lengthen the timestep, or make several records"
         )
     controls = np.zeros((length * hold, len(rig.actuators)))
@@ -199,7 +202,7 @@ def simulate_batch(
 def _whole_steps(rate: float, rig: Rig) -> int:
     """Steps of a rig in one sample; 0 where they are no whole number, or more than any record has."""
     share = rate * rig.timestep
-    if not share * MAX_SAMPLES >= 1.0:
+    if not share * BASE_SETTINGS.max_samples >= 1.0:
         return 0
     steps = round(1.0 / share)
     return steps if abs(steps * share - 1.0) <= 1e-6 else 0

@@ -22,8 +22,16 @@ from bench.signals.description import Described
 from bench.signals.measures import energy, rms
 from bench.signals.streams import named_streams
 
-MAX_SAMPLES = 10_000_000
-"""Samples of one record at most: with the states, sensors and commands of a small rig they take 2 GB while they are simulated."""
+
+@dataclass(frozen=True)
+class BaseSettings:
+    """Numbers of `bench.signals.base`."""
+
+    max_samples: int = 10_000_000
+    """Samples of one record at most: with the states, sensors and commands of a small rig they take 2 GB while they are simulated."""
+
+
+BASE_SETTINGS = BaseSettings()
 
 
 @dataclass(frozen=True)
@@ -157,9 +165,9 @@ def check_sampling(n: int, sample_rate: float) -> None:
     """Raise `ParameterError` unless `n` is a whole number above 0 and `sample_rate` [Hz] above 0."""
     if isinstance(n, bool) or not isinstance(n, int | np.integer) or n < 1:
         raise ParameterError(f"the number of samples is {n!r}; a whole number of at least 1 is expected")
-    if n > MAX_SAMPLES:
+    if n > BASE_SETTINGS.max_samples:
         raise ParameterError(
-            f"{n} samples were asked for; at most {MAX_SAMPLES} are expected: make several records"
+            f"{n} samples were asked for; at most {BASE_SETTINGS.max_samples} are expected: make several records"
         )
     if not (np.isfinite(sample_rate) and sample_rate > 0.0):
         raise ParameterError(f"the sample rate is {sample_rate!r} Hz; a positive number is expected")

@@ -21,15 +21,24 @@ References:
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
-OVERSAMPLING = 16
-"""Samples a cycle of the highest harmonic while optimising. Between them the waveform can be higher by up to
-1 / cos(pi / 16) - 1 = 2 %; with 8 samples a cycle it was by 5 %, with 32 the crest factor fell by 0.01."""
 
-EXPONENTS = (4, 8, 16, 32, 64, 128, 256)
-ITERATIONS = 120  # steps an exponent; 300 changed the crest factors by less than 0.002
+@dataclass(frozen=True)
+class CrestSettings:
+    """Numbers of `bench.signals.crest`."""
+
+    oversampling: int = 16
+    """Samples a cycle of the highest harmonic while optimising. Between them the waveform can be higher by up to 1 / cos(pi / 16) - 1
+    = 2 %; with 8 samples a cycle it was by 5 %, with 32 the crest factor fell by 0.01."""
+    exponents: tuple[int, ...] = (4, 8, 16, 32, 64, 128, 256)
+    iterations: int = 120
+
+
+SETTINGS = CrestSettings()
 
 
 def schroeder_phases(amplitudes: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -74,26 +83,26 @@ def optimised_phases(
         phases: Phases to start from ``(n_harmonics,)`` [rad]; random ones give another waveform each time.
 
     Returns:
-        Phases ``(n_harmonics,)`` [rad], never worse than the start on the grid of `OVERSAMPLING`.
+        Phases ``(n_harmonics,)`` [rad], never worse than the start on the grid of `oversampling`.
     """
     from scipy.fft import next_fast_len  # noqa: PLC0415  (scipy is slow to import, and few signals need it)
     from scipy.optimize import minimize  # noqa: PLC0415
 
-    n: int = next_fast_len(OVERSAMPLING * int(harmonics[-1]), real=True)  # pyright: ignore[reportAssignmentType]
+    n: int = next_fast_len(SETTINGS.oversampling * int(harmonics[-1]), real=True)  # pyright: ignore[reportAssignmentType]
 
     def peak(candidate: NDArray[np.float64]) -> float:
         return float(np.max(np.abs(waveform(harmonics, amplitudes, candidate, n))))
 
     best, smallest = phases, peak(phases)
     current = phases
-    for exponent in EXPONENTS:
+    for exponent in SETTINGS.exponents:
         solution = minimize(
             _log_norm,
             current,
             args=(harmonics, amplitudes, n, exponent),
             jac=True,
             method="CG",
-            options={"maxiter": ITERATIONS},
+            options={"maxiter": SETTINGS.iterations},
         )
         current = solution.x
         if (reached := peak(current)) < smallest:

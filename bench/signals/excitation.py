@@ -11,7 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.errors import ParameterError
-from bench.signals.base import MAX_SAMPLES, Signal
+from bench.signals.base import (
+    BASE_SETTINGS,
+    Signal,
+)
 from bench.signals.streams import named_streams
 
 
@@ -48,10 +51,10 @@ class Excitation:
                 )
             object.__setattr__(self, field, float(value))
         object.__setattr__(self, "signals", MappingProxyType(dict(self.signals)))
-        if not self.duration * self.sample_rate <= MAX_SAMPLES:
+        if not self.duration * self.sample_rate <= BASE_SETTINGS.max_samples:
             raise ParameterError(
                 f"{self.duration:g} s at {self.sample_rate:g} Hz are {self.duration * self.sample_rate:g} samples; at most "
-                f"{MAX_SAMPLES} are expected: shorten the excitation, or make several records"
+                f"{BASE_SETTINGS.max_samples} are expected: shorten the excitation, or make several records"
             )
         if self.n_samples < 1:
             raise ParameterError(

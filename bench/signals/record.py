@@ -15,8 +15,16 @@ from bench.signals.base import Signal
 if TYPE_CHECKING:
     from bench.recording import Recording
 
-LARGEST_RATIO = 10_000
-"""Largest number in the ratio of sample rates for band-limited resampling; the filter has 20 times as many taps."""
+
+@dataclass(frozen=True)
+class RecordSettings:
+    """Numbers of `bench.signals.record`."""
+
+    largest_ratio: int = 10_000
+    """Largest number in the ratio of sample rates for band-limited resampling; the filter has 20 times as many taps."""
+
+
+SETTINGS = RecordSettings()
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,12 +122,15 @@ class Record(Signal, name="record"):
     def _polyphase(self, source: NDArray[np.float64], sample_rate: float) -> NDArray[np.float64]:
         from scipy.signal import resample_poly  # noqa: PLC0415  (scipy.signal is slow to import)
 
-        ratio = Fraction(sample_rate / self.rate).limit_denominator(LARGEST_RATIO)
+        ratio = Fraction(sample_rate / self.rate).limit_denominator(SETTINGS.largest_ratio)
         # 1e-9 of a ratio shifts the last of a million samples by a thousandth of one.
-        if ratio.numerator > LARGEST_RATIO or abs(float(ratio) * self.rate / sample_rate - 1.0) > 1e-9:
+        if (
+            ratio.numerator > SETTINGS.largest_ratio
+            or abs(float(ratio) * self.rate / sample_rate - 1.0) > 1e-9
+        ):
             raise ParameterError(
                 f"a record at {self.rate:.9g} Hz cannot be resampled to {sample_rate:.9g} Hz by a ratio of "
-                f"numbers up to {LARGEST_RATIO}; choose another sample rate, or resampling='linear'"
+                f"numbers up to {SETTINGS.largest_ratio}; choose another sample rate, or resampling='linear'"
             )
         # "line" continues the record along its end points' line: zeros outside would ring at both ends.
         return resample_poly(source, ratio.numerator, ratio.denominator, padtype="line")

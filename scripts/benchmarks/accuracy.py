@@ -25,8 +25,7 @@ from scipy.integrate import solve_ivp
 
 from bench import Element, Rig, joint_rig, sdof_rig
 from bench.identification.linear_rig import LinearRig
-from bench.laws.coupling import AXIAL_TORSIONAL_JOINT
-from bench.rig.library import INCH, POUND_FORCE
+from bench.laws.coupling import AXIAL_TORSIONAL_JOINT, INCH, POUND_FORCE
 from benchmarks.timing import Row, interleave, ratio_row
 
 ERROR = 1e-6

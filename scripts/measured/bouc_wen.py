@@ -18,9 +18,10 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.data import BOUC_WEN_PERIOD as PERIOD
-from bench.data import BOUC_WEN_RATE as RATE
-from bench.data import bouc_wen_benchmark
+from bench.data import (
+    DATA_SETTINGS,
+    bouc_wen_benchmark,
+)
 from bench.discrepancy import Case, CaseChannel, NominalParameter, record_from_arrays
 from bench.discrepancy.case.acquisition import Antialias
 from measured.target import Target
@@ -42,14 +43,16 @@ NOMINAL = (
 def cases(data: Path) -> dict[str, Case]:
     """The benchmark as a case, from the folder of its files."""
     found = bouc_wen_benchmark(data)
-    u, y = (found["train"][name].reshape(-1, PERIOD) for name in ("force", "displacement"))
+    u, y = (
+        found["train"][name].reshape(-1, DATA_SETTINGS.bouc_wen_period) for name in ("force", "displacement")
+    )
     channels = (
         CaseChannel("force", "N", "measured", 0.0),
         CaseChannel("displacement", "m", "response", _noise(y), DECIMATION),
     )
 
     def record(name: str, force: np.ndarray, displacement: np.ndarray, *, periodic: bool):
-        clock = np.arange(len(force)) / RATE
+        clock = np.arange(len(force)) / DATA_SETTINGS.bouc_wen_rate
         return record_from_arrays(
             name, clock, {"force": force, "displacement": displacement}, periodic=periodic
         )
@@ -73,6 +76,6 @@ def _noise(periods: np.ndarray) -> float:
     It falls towards half the sample rate, to half of that level; a mean over all frequencies would state it a tenth too small.
     """
     spectra = np.fft.rfft(periods, axis=1) / np.sqrt(periods.shape[1])
-    frequency = np.fft.rfftfreq(periods.shape[1], 1.0 / RATE)
+    frequency = np.fft.rfftfreq(periods.shape[1], 1.0 / DATA_SETTINGS.bouc_wen_rate)
     excited = (frequency >= BAND[0]) & (frequency <= BAND[1])
     return float(np.sqrt(np.mean(np.var(spectra, axis=0, ddof=1)[excited]) / len(periods)))

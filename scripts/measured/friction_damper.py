@@ -19,7 +19,9 @@ from pathlib import Path
 import numpy as np
 
 from bench.data import friction_damper
-from bench.demo.damper import TENSIONS
+from bench.demo.damper import (
+    DAMPER_SETUP,
+)
 from bench.discrepancy import Case, CaseChannel, CaseRecord, NominalParameter, record_from_arrays
 from measured.target import Target
 
@@ -29,7 +31,7 @@ TARGET = Target("force", "nrmse", 0.2, "1")
 
 def cases(data: Path | None = None) -> dict[str, Case]:
     """Two cases for every band tension, named after the test that judges; `data` is not needed."""
-    found = [damper_case(tension, judged) for tension in TENSIONS for judged in ("1Hz", "0.5Hz")]
+    found = [damper_case(tension, judged) for tension in DAMPER_SETUP.tensions for judged in ("1Hz", "0.5Hz")]
     return {case.name: case for case in found}
 
 

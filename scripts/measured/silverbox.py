@@ -15,8 +15,10 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.data import SILVERBOX_RATE as RATE
-from bench.data import silverbox
+from bench.data import (
+    DATA_SETTINGS,
+    silverbox,
+)
 from bench.discrepancy import Case, CaseChannel, CaseRecord, NominalParameter, record_from_arrays
 from measured.target import Target
 
@@ -49,7 +51,7 @@ def cases(data: Path) -> dict[str, Case]:
 
     def record(name: str, first: int, last: int) -> CaseRecord:
         part = slice(first, last)
-        clock = np.arange(last - first) / RATE
+        clock = np.arange(last - first) / DATA_SETTINGS.silverbox_rate
         return record_from_arrays(
             name, clock, {"force": u[part] - level_u, "displacement": y[part] - level_y}, at_rest=False
         )

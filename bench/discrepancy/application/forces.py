@@ -4,17 +4,33 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import mujoco
 import numpy as np
 
-from bench.discrepancy.application.target import FAR, PREFIX, Change, Target, as_mujoco, mobility
+from bench.discrepancy.application.target import (
+    PREFIX,
+    TARGET_SETTINGS,
+    Change,
+    Target,
+    as_mujoco,
+    mobility,
+)
 from bench.discrepancy.model.mjcf_friction import frictionloss_of
 from bench.discrepancy.verdict import NamedEffect
 
-LEVER = 1e6
-"""Length over the force of a spring that stands for a constant force: a motion of one unit changes it by a millionth."""
+
+@dataclass(frozen=True)
+class ForcesSettings:
+    """Numbers of `bench.discrepancy.application.forces`."""
+
+    lever: float = 1e6
+    """Length over the force of a spring that stands for a constant force: a motion of one unit changes it by a millionth."""
+
+
+SETTINGS = ForcesSettings()
 
 
 def values_of(effect: NamedEffect) -> dict[str, float]:
@@ -160,10 +176,10 @@ def force_offset(target: Target, effect: NamedEffect) -> Change:
     name = target.named(effect.where)
     tendon = target.tendon_on(effect.where, effect.name)
     stiffness = np.zeros_like(np.asarray(tendon.stiffness, dtype=float))
-    stiffness[0] = abs(force) / LEVER
+    stiffness[0] = abs(force) / SETTINGS.lever
     tendon.stiffness = stiffness
-    tendon.springlength = (math.copysign(LEVER, force),) * 2
-    text = f"a constant force of {force:.6g} on '{name}', of a spring whose end is {LEVER:.0e} away"
+    tendon.springlength = (math.copysign(SETTINGS.lever, force),) * 2
+    text = f"a constant force of {force:.6g} on '{name}', of a spring whose end is {SETTINGS.lever:.0e} away"
     return Change(effect.name, name, "native", text, (("fixed", tendon.name),))
 
 
@@ -181,8 +197,12 @@ def gap(target: Target, effect: NamedEffect) -> Change:
     else:
         up, down = v["clearance_positive"], v["clearance_negative"]
         anchors = (
-            target.stop(effect.where, (-FAR, middle + up), v["stiffness_positive"], 0.0, own=True),
-            target.stop(effect.where, (middle - down, FAR), v["stiffness_negative"], 0.0, own=False),
+            target.stop(
+                effect.where, (-TARGET_SETTINGS.far, middle + up), v["stiffness_positive"], 0.0, own=True
+            ),
+            target.stop(
+                effect.where, (middle - down, TARGET_SETTINGS.far), v["stiffness_negative"], 0.0, own=False
+            ),
         )
         text = f"limits that are springs: {v['stiffness_positive']:.6g} beyond {up:.6g}, {v['stiffness_negative']:.6g} below {-down:.6g}"
     return Change(effect.name, name, "native", text, tuple(_anchor(a) for a in anchors))
@@ -192,7 +212,7 @@ def one_sided_stop(target: Target, effect: NamedEffect) -> Change:
     """A stop on one side."""
     v, name = values_of(effect), target.named(effect.where)
     at = v["position"] + target.at_rest(name)
-    limits = (-FAR, at) if v["side"] > 0.0 else (at, FAR)
+    limits = (-TARGET_SETTINGS.far, at) if v["side"] > 0.0 else (at, TARGET_SETTINGS.far)
     anchor = target.stop(effect.where, limits, v["stiffness"], v.get("damping", 0.0), own=True)
     text = f"range with a limit at {at:.6g} that is a spring of {v['stiffness']:.6g} and a damper of {v.get('damping', 0.0):.6g}"
     return Change(effect.name, name, "native", text, (_anchor(anchor),))

@@ -25,16 +25,27 @@ from bench.discrepancy.multibody.channels import bound
 from bench.discrepancy.multibody.encoders import Encoder, input_of
 from bench.discrepancy.multibody.model import ArticulatedModel, Joint
 from bench.discrepancy.multibody.motion import Motion, motion_of
-from bench.discrepancy.multibody.records import WINDOW
+from bench.discrepancy.multibody.records import (
+    RECORDS_SETTINGS,
+)
 from bench.discrepancy.verdict import NamedEffect
 
 Array = NDArray[np.float64]
-HEAVY = 1e6
-"""Armature of a joint that follows the measured motion, over its inertia: what it still feels of the others."""
-FAR_OFF = 1e3
-"""Error that stands for a run that diverged."""
-SERVO_RATE = 0.2
-"""Its servo's frequency [rad] a step: far below the limit of two of an explicit step."""
+
+
+@dataclass(frozen=True)
+class JointReplaySettings:
+    """Numbers of `bench.discrepancy.application.joint_replay`."""
+
+    heavy: float = 1e6
+    """Armature of a joint that follows the measured motion, over its inertia: what it still feels of the others."""
+    far_off: float = 1e3
+    """Error that stands for a run that diverged."""
+    servo_rate: float = 0.2
+    """Its servo's frequency [rad] a step: far below the limit of two of an explicit step."""
+
+
+SETTINGS = JointReplaySettings()
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,9 +87,17 @@ class JointReplay:
                 error = self._error(applied, held, j, record, motion, wrong)
                 size = max(float(np.std(logged.samples[j][:, 0])), float(np.max(logged.noise[j])))
                 found[joint.name].append(
-                    np.nan_to_num(error * factor / size, nan=FAR_OFF, posinf=FAR_OFF, neginf=-FAR_OFF)
+                    np.nan_to_num(
+                        error * factor / size,
+                        nan=SETTINGS.far_off,
+                        posinf=SETTINGS.far_off,
+                        neginf=-SETTINGS.far_off,
+                    )
                 )
-        return {name: np.clip(np.concatenate(parts), -FAR_OFF, FAR_OFF) for name, parts in found.items()}
+        return {
+            name: np.clip(np.concatenate(parts), -SETTINGS.far_off, SETTINGS.far_off)
+            for name, parts in found.items()
+        }
 
     def _error(
         self,
@@ -92,7 +111,7 @@ class JointReplay:
         """Measured less simulated positions (n,) of joint `j`."""
         joint, step = self.model.joints[j], float(model.opt.timestep)
         servo = joint.drive is not None and joint.drive.servo
-        every = len(record) if servo else max(2, round(WINDOW / record.step))
+        every = len(record) if servo else max(2, round(RECORDS_SETTINGS.window / record.step))
         steps = int(np.ceil((len(record) - 1) * record.step / step - 1e-9)) + 1
         late = wrong.get(joint.name, Encoder()).delay
         columns = self._columns(record, joint.name, late)
@@ -202,13 +221,13 @@ def _held(applied: Applied, free: str, reference: mujoco.MjModel) -> mujoco.MjMo
     mujoco.mj_forward(reference, data)
     full = np.zeros((reference.nv, reference.nv))
     mujoco.mj_fullM(reference, data, full)
-    rate = SERVO_RATE / step
+    rate = SETTINGS.servo_rate / step
     followed = {j.name for j in spec.joints if not j.name.startswith(PREFIX) and j.name != free}
     followed |= {
         f"{PREFIX}{name}_train" for name in applied.outputs if name != free
     }  # its link is what was measured
     for joint in [j for j in spec.joints if j.name in followed]:
-        inertia = HEAVY * float(
+        inertia = SETTINGS.heavy * float(
             full[reference.joint(joint.name).dofadr[0], reference.joint(joint.name).dofadr[0]]
         )
         joint.armature = inertia
@@ -258,5 +277,5 @@ def _followed(
     q, v, a = (
         CubicSpline(clock, part)(times) for part in (motion.position, motion.velocity, motion.acceleration)
     )
-    rate = SERVO_RATE / step
+    rate = SETTINGS.servo_rate / step
     return _Followed(q, v, q + 2.0 * v / rate + a / rate**2)

@@ -22,8 +22,17 @@ from bench.discrepancy.model.structure import Structure
 from bench.discrepancy.verdict import NamedEffect
 
 Array = NDArray[np.float64]
-PERIODS = 8
-"""Periods over which a steady state runs in from rest."""
+
+
+@dataclass(frozen=True)
+class LinearReplaySettings:
+    """Numbers of `bench.discrepancy.application.linear_replay`."""
+
+    periods: int = 8
+    """Periods over which a steady state runs in from rest."""
+
+
+SETTINGS = LinearReplaySettings()
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,9 +207,10 @@ class _Player:
         n, step = len(record), float(self.model.opt.timestep)
         steps = int(np.ceil(n * record.step / step - 1e-9))
         control = np.tile(
-            controls(record, columns, self.model, steps, self.replay.case.load_interpolation), (PERIODS, 1)
+            controls(record, columns, self.model, steps, self.replay.case.load_interpolation),
+            (SETTINGS.periods, 1),
         )
         start = [Window(0, self.rest, np.zeros(self.model.nv))]
         position, velocity = run(self.model, self.hook, start, control, len(control), rested=True)
-        times = np.asarray(((PERIODS - 1) * n + np.arange(n)) * record.step, dtype=np.float64)
+        times = np.asarray(((SETTINGS.periods - 1) * n + np.arange(n)) * record.step, dtype=np.float64)
         return self._observed(position[0], velocity[0], times)

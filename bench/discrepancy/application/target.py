@@ -16,10 +16,19 @@ Array = NDArray[np.float64]
 Form = Literal["native", "callback", "step", "log", "number", "none"]
 PREFIX = "added_"
 """Beginning of the names of joints and tendons that an effect adds."""
-SPRING_IMPEDANCE = 1e-4
-"""Impedance (mjMINIMP) at which a limit is the spring and damper that its negative solref says, and moves nothing but its force."""
-FAR = 1e6
-"""Limit that no motion reaches, of a stop that has one side only."""
+
+
+@dataclass(frozen=True)
+class TargetSettings:
+    """Numbers of `bench.discrepancy.application.target`."""
+
+    spring_impedance: float = 1e-4
+    """Impedance (mjMINIMP) at which a limit is the spring and damper that its negative solref says, and moves nothing but its force."""
+    far: float = 1e6
+    """Limit that no motion reaches, of a stop that has one side only."""
+
+
+TARGET_SETTINGS = TargetSettings()
 
 
 @dataclass(frozen=True)
@@ -155,7 +164,13 @@ class Target:
         name = item.name
         item.range = (limits[0] * angle, limits[1] * angle)
         item.limited = mujoco.mjtLimited.mjLIMITED_TRUE
-        item.solimp_limit = (SPRING_IMPEDANCE, SPRING_IMPEDANCE, 0.001, 0.5, 2.0)
+        item.solimp_limit = (
+            TARGET_SETTINGS.spring_impedance,
+            TARGET_SETTINGS.spring_impedance,
+            0.001,
+            0.5,
+            2.0,
+        )
         item.margin = 0.0
 
         def reference(model: mujoco.MjModel) -> None:

@@ -20,7 +20,6 @@ from bench.discrepancy.articulated.admission import admitted_robot
 from bench.discrepancy.articulated.effects import CATALOGUE
 from bench.discrepancy.articulated.fitting import ArticulatedFit
 from bench.discrepancy.articulated.judgement import (
-    JudgementSettings,
     Prediction,
     closed,
     complete,
@@ -36,12 +35,14 @@ from bench.discrepancy.articulated.problem import (
     placed_values,
     placements,
 )
-from bench.discrepancy.articulated.search import SearchSettings, search
+from bench.discrepancy.articulated.search import search
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.effects.catalogue import CATALOGUE as LINEAR
 from bench.discrepancy.multibody.channels import bound
 from bench.discrepancy.multibody.encoders import encoders_of, input_of
 from bench.discrepancy.multibody.model import DRIVES, ArticulatedModel, compiled_model
+from bench.discrepancy.settings import DEFAULT, ArticulatedSettings, DiagnosisSettings, changed
+from bench.discrepancy.settings import ArticulatedJudgementSettings as JudgementSettings
 from bench.discrepancy.verdict import (
     Estimate,
     Gap,
@@ -55,10 +56,6 @@ from bench.discrepancy.verdict import (
 from bench.errors import BenchError, UnknownNameError
 
 Array = NDArray[np.float64]
-SEED = 20060501
-"""Seed of the bootstrap where no generator is given."""
-POSTURES = 8
-"""Random postures at which the mass matrix is compared."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +83,7 @@ class ArticulatedDiagnosis:
     verdict: Verdict
 
 
-def applies(case: Case) -> bool:
+def applies(case: Case, *, settings: ArticulatedSettings = DEFAULT.articulated) -> bool:
     """Whether the rig of a case is an MJCF of several joints with servos, parameters of drives, or inertia that changes with posture."""
     path = Path(case.folder or ".") / case.rig
     if case.rig in ("sdof", "joint", "damper") or not path.is_file():
@@ -99,7 +96,7 @@ def applies(case: Case) -> bool:
         return False  # refused where the model is read for a diagnosis
     # one joint on its own is a linear structure first: forces on it have a larger catalogue there
     servos = model.nv > 1 and model.nu and np.any(np.asarray(model.actuator_biasprm)[:, 1] != 0.0)
-    return bool(servos) or _posture_matters(model)
+    return bool(servos) or _posture_matters(model, settings=settings)
 
 
 def drives_only(case: Case) -> bool:
@@ -120,12 +117,12 @@ def drives_only(case: Case) -> bool:
 
 
 @native.quiet()
-def _posture_matters(model: mujoco.MjModel) -> bool:
+def _posture_matters(model: mujoco.MjModel, *, settings: ArticulatedSettings) -> bool:
     if model.nv != model.njnt or model.nv < 2:
         return False
     rng = np.random.default_rng(0)
     data, matrices = mujoco.MjData(model), []
-    for _ in range(POSTURES):
+    for _ in range(settings.postures):
         data.qpos[:] = model.qpos0 + rng.uniform(-1.0, 1.0, model.nq)
         mujoco.mj_forward(model, data)
         matrices.append(np.array(data.M))
@@ -140,7 +137,7 @@ def diagnose_articulated(
     most: int = 3,
     anyway: bool = False,
     rng: np.random.Generator | None = None,
-    settings: tuple[SearchSettings, JudgementSettings] | None = None,
+    settings: DiagnosisSettings = DEFAULT,
     progress: Callable[[str], None] = lambda text: None,
 ) -> ArticulatedDiagnosis:
     """Diagnose a case whose rig is an articulated MJCF.
@@ -151,7 +148,7 @@ def diagnose_articulated(
         most: Largest number of effects named together.
         anyway: Whether factors, signs and parts of the model that stand against a diagnosis are noted rather than refused.
         rng: For the bootstrap intervals; a fixed seed where None.
-        settings: Of search and judgement.
+        settings: Thresholds, see docs/thresholds.md.
         progress: Called with a line of text at every stage.
 
     Raises:
@@ -163,8 +160,8 @@ def diagnose_articulated(
         UnitError: A unit does not fit the model, or a channel is off by a factor or a sign that no missing force makes.
     """
     began = time.perf_counter()
-    rng = np.random.default_rng(SEED) if rng is None else rng
-    how, judged = settings or (SearchSettings(most=most), JudgementSettings())
+    rng = np.random.default_rng(settings.seed) if rng is None else rng
+    how, judged = replace(settings.articulated.search, most=most), settings.articulated.judgement
     known = {effect.name for effect in (*CATALOGUE, *LINEAR)}
     for name in exclude:
         if name not in known:
@@ -174,8 +171,8 @@ def diagnose_articulated(
     stated = all((c.noise_std or 0.0) > 0.0 for c in case.channels if c.role == "response")
     case, compiled, notes = admitted_robot(case, anyway=anyway)
     model = ArticulatedModel.of(compiled, case.rig)
-    problem = ArticulatedProblem.of(case, model, case.identification)
-    judging = ArticulatedProblem.of(case, model, case.validation)
+    problem = ArticulatedProblem.of(case, model, case.identification, settings)
+    judging = ArticulatedProblem.of(case, model, case.validation, settings)
     fits = search(problem, placements(problem, catalogue), settings=how, progress=progress)
     progress("judging records")
     rungs = ladder(fits)
@@ -183,7 +180,8 @@ def diagnose_articulated(
     untouched = predict(judging, None, predictions[0].floor, judged)
     final = rungs[last]
     verdict = _verdict(problem, fits, rungs, last, untouched, predictions, judged, rng, stated=stated)
-    verdict = replace(verdict, warnings=(*verdict.warnings, *notes)).timed(time.perf_counter() - began)
+    verdict = replace(verdict, warnings=(*verdict.warnings, *notes), settings=changed(settings))
+    verdict = verdict.timed(time.perf_counter() - began)
     return ArticulatedDiagnosis(
         case, model, problem, judging, tuple(fits), final, _matrix(problem, fits), verdict
     )
@@ -405,7 +403,7 @@ def _locations(problem: ArticulatedProblem, base: ArticulatedFit) -> tuple[Locat
     out = []
     for j in np.argsort(-excess):
         share = float(excess[j] / total) if total > 0.0 else 0.0
-        if share < SHOWN:
+        if share < problem.settings.articulated.shown:
             continue
         joint = problem.joints[int(j)]
         prepared = problem.records[0]
@@ -415,7 +413,12 @@ def _locations(problem: ArticulatedProblem, base: ArticulatedFit) -> tuple[Locat
             if c.target == f"joint:{joint.name}" and c.quantity == "position"
         )
         innovation, _ = problem.innovations(int(j), (), base.vector, prepared)
-        band, span = _gathered(innovation[:, 0], prepared.record.step, prepared.record.start)
+        band, span = _gathered(
+            innovation[:, 0],
+            prepared.record.step,
+            prepared.record.start,
+            settings=problem.settings.articulated,
+        )
         q, v = prepared.motion.position[:, j], prepared.motion.velocity[:, j]
         region = {
             "displacement": (float(q.min()), float(q.max())),
@@ -425,13 +428,9 @@ def _locations(problem: ArticulatedProblem, base: ArticulatedFit) -> tuple[Locat
     return tuple(out)
 
 
-SHOWN = 0.01
-"""Share of the excess below which a joint counts as clean."""
-HOLDS = (0.05, 0.95)
-"""Cumulated parts of a power between which a band or an interval is said to hold it."""
-
-
-def _gathered(residual: Array, step: float, start: float) -> tuple[tuple[float, float], tuple[float, float]]:
+def _gathered(
+    residual: Array, step: float, start: float, *, settings: ArticulatedSettings
+) -> tuple[tuple[float, float], tuple[float, float]]:
     """Band [Hz] and interval [s] that hold nine tenths of the power of a residual."""
     residual = np.nan_to_num(residual)
     power = np.abs(np.fft.rfft(residual)) ** 2
@@ -440,7 +439,7 @@ def _gathered(residual: Array, step: float, start: float) -> tuple[tuple[float, 
 
     def between(weights: Array, axis: Array) -> tuple[float, float]:
         total = np.cumsum(weights)
-        low, high = np.searchsorted(total, np.array(HOLDS) * total[-1])
+        low, high = np.searchsorted(total, np.array(settings.holds) * total[-1])
         return float(axis[min(low, len(axis) - 1)]), float(axis[min(high, len(axis) - 1)])
 
     return between(power, frequency), between(residual**2, time)
@@ -453,7 +452,12 @@ def _remainder(
     innovation, _ = problem.innovations(
         j, final.hypothesis, final.vector, problem.motions(final.hypothesis, final.vector)[0]
     )
-    band, span = _gathered(innovation[:, 0], problem.records[0].record.step, problem.records[0].record.start)
+    band, span = _gathered(
+        innovation[:, 0],
+        problem.records[0].record.step,
+        problem.records[0].record.start,
+        settings=problem.settings.articulated,
+    )
     return {
         "nrmse": float(left.discrepancy[j]),
         "over_noise": float(np.sqrt(final.reduced[j])),

@@ -8,9 +8,9 @@ linear structures (`bench.discrepancy.effects.effect`), with the scales of the j
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,10 +29,23 @@ NUMBERS = frozenset({
     "force_offset", "position_offset",
 })  # fmt: skip
 """Effects that are a wrong number."""
-POSITIVE = {"mean": math.log(0.2), "std": 1.5, "bounds": (-9.0, 4.0)}
-"""Prior of a positive amplitude: a fifth of its scale, within a factor of twenty with 95 %."""
-SIGNED = {"signed": True, "mean": 0.0, "std": 0.5, "bounds": (-30.0, 30.0)}
-"""Prior of an amplitude of either sign."""
+
+
+@dataclass(frozen=True)
+class EffectsSettings:
+    """Numbers of `bench.discrepancy.articulated.effects`."""
+
+    positive: Mapping[str, Any] = field(
+        default_factory=lambda: {"mean": math.log(0.2), "std": 1.5, "bounds": (-9.0, 4.0)}
+    )
+    """Prior of a positive amplitude: a fifth of its scale, within a factor of twenty with 95 %."""
+    signed: Mapping[str, Any] = field(
+        default_factory=lambda: {"signed": True, "mean": 0.0, "std": 0.5, "bounds": (-30.0, 30.0)}
+    )
+    """Prior of an amplitude of either sign."""
+
+
+SETTINGS = EffectsSettings()
 TEETH = tuple(float(n) for n in range(2, 121))
 """Periods of cogging in a turn that are tried: slots, poles and teeth are whole numbers."""
 
@@ -174,7 +187,7 @@ MOTOR_SHARE = FreeParameter(
 """Part of the armature that sits on the motor's side of an elastic train; what is left of it moves with the link."""
 ON_LINK = FreeParameter("encoder_on_link", fixed=True, signed=True, grid=(0.0, 1.0), unit="1")
 """Side of the encoder; tried where the channel does not state its ``"side"``."""
-LIMIT = FreeParameter("limit", "force", **POSITIVE)
+LIMIT = FreeParameter("limit", "force", **SETTINGS.positive)
 IN_LOOP = FreeParameter("in_loop", fixed=True, signed=True, grid=(0.0, 1.0), unit="1")
 RELATIVE = FreeParameter("relative_error", signed=True, mean=0.0, std=0.3, bounds=(-0.95, 20.0), unit="1")
 
@@ -254,7 +267,7 @@ CATALOGUE: tuple[ArticulatedEffect, ...] = (
         "force_offset",
         "offset",
         "joint",
-        (FreeParameter("force", "force", **SIGNED),),
+        (FreeParameter("force", "force", **SETTINGS.signed),),
         "a constant torque on the joint",
         _add(OFFSET="force"),
     ),
@@ -270,7 +283,7 @@ CATALOGUE: tuple[ArticulatedEffect, ...] = (
         "quadratic_damping",
         "damping",
         "joint",
-        (FreeParameter("c2", "force/velocity/velocity", **POSITIVE),),
+        (FreeParameter("c2", "force/velocity/velocity", **SETTINGS.positive),),
         "f = c2 |v| v",
         _set(QUADRATIC="c2"),
     ),

@@ -19,12 +19,6 @@ from bench.discrepancy.numerics.least_squares import Prior, minimise
 from bench.discrepancy.numerics.threads import in_threads
 
 Array = NDArray[np.float64]
-REACH = 4.0
-"""Longest step of a fit in the parameters of effects, in prior standard deviations."""
-NOMINAL_REACH = 40.0
-"""The same in nominal parameters, whose priors are narrow and in which the equations are linear."""
-DIFFERENCE = 1e-4
-"""Difference of a parameter, in prior standard deviations, for what the joints know of the masses."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,12 +114,15 @@ def linearised(
     problem: ArticulatedProblem, base: ArticulatedFit, j: int, columns: Sequence[int]
 ) -> tuple[Array, Array]:
     """Jacobian (n, n_columns) and residual (n,) of joint `j` at a fit, in units of the scale that it leaves there."""
+    settings = problem.settings.articulated
     _, std, _, high = problem.prior(base.hypothesis)
     residual = problem.residual(j, base.hypothesis, base.vector) / base.scale[j]
 
     def column(i: int) -> Array:
         step = (
-            DIFFERENCE * std[i] if base.vector[i] + DIFFERENCE * std[i] <= high[i] else -DIFFERENCE * std[i]
+            settings.difference * std[i]
+            if base.vector[i] + settings.difference * std[i] <= high[i]
+            else -settings.difference * std[i]
         )
         moved = base.vector.copy()
         moved[i] += step
@@ -157,6 +154,7 @@ def fit(
         others: What is known of the joints that the hypothesis does not change beyond its base's; they are all run where None.
         limit: Cost that has to be within sight.
     """
+    settings = problem.settings.articulated
     starts = np.atleast_2d(start)
     n_joints = len(problem.joints)
     new = hypothesis[len(others.base.hypothesis) :] if others else hypothesis
@@ -173,10 +171,10 @@ def fit(
 
     mean, std, low, high = problem.prior(hypothesis)
     free = free_entries(problem, hypothesis, active if passive else None)
-    reach = np.where(free < len(problem.nominal), NOMINAL_REACH, REACH)
+    reach = np.where(free < len(problem.nominal), settings.nominal_reach, settings.effect_reach)
     found = minimise(
         residual_at, starts, prior=Prior(mean, std, low, high), free=free, reach=reach, iterations=iterations, limit=limit,
-    )  # fmt: skip
+    settings=problem.settings.numerics)  # fmt: skip
     return _summary(problem, hypothesis, found.vector, found.curvature, free, scale, active, others)
 
 

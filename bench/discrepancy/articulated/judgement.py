@@ -16,36 +16,9 @@ from numpy.typing import NDArray
 from bench.discrepancy.articulated.fitting import ArticulatedFit
 from bench.discrepancy.articulated.problem import ArticulatedProblem
 from bench.discrepancy.numerics.threads import in_threads
+from bench.discrepancy.settings import ArticulatedJudgementSettings as JudgementSettings
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class JudgementSettings:
-    """Settings of the judgement.
-
-    Attributes:
-        blocks: Blocks of a judging record, over which an improvement has to be sure; some periods of the motion each.
-        sure: Standard errors by which a further effect has to improve on the judging records.
-        noise_known: Relative accuracy to which the stated noise is taken to be known: what leaves no more than this beyond it is complete.
-        material: Part of the discrepancy that the effects together have to close for them to be called its cause.
-        rival: Difference in log posterior (odds of 100) within which explanations stand for one another.
-        outside: Probability kept for what no catalogue holds, also where a catalogued effect explains the records; that of the linear
-            structures (`judgement.posterior`).
-        strained: Deviation of a nominal parameter, in its stated standard uncertainties, beyond which it is not believed (one normal
-            number in 16000 is as far out): predictions are made with it there, and what needs more is not complete.
-        small: Part of the discrepancy that a further effect has to close where it does not complete the explanation, the accuracy to which
-            laws of friction hold on real joints.
-    """
-
-    blocks: int = 24
-    sure: float = 2.0
-    noise_known: float = 0.05
-    material: float = 0.5
-    rival: float = 4.6
-    outside: float = 0.01
-    strained: float = 4.0
-    small: float = 0.05
 
 
 @dataclass(frozen=True, eq=False)

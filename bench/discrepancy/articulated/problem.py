@@ -32,6 +32,7 @@ from bench.discrepancy.multibody.records import (
     prepare,
     relinked,
 )
+from bench.discrepancy.settings import DEFAULT, DiagnosisSettings
 from bench.errors import UnknownNameError
 
 Array = NDArray[np.float64]
@@ -45,10 +46,6 @@ LOCAL_SLOTS = {
     "gear": Slot.GEAR,
 }
 """Entries of a joint's parameter vector that nominal parameters set."""
-KEPT_MOTIONS = 24
-"""Corrected records kept: one sensor effect's derivatives over all identification records."""
-DIVERGED = 1e6
-"""Residual, in units of its noise, that stands for a run that is not finite."""
 
 
 @dataclass(frozen=True)
@@ -96,12 +93,14 @@ class ArticulatedProblem:
         case: The case.
         model: The model at its nominal parameters.
         records: Prepared records.
+        settings: Thresholds of the diagnosis.
         nominal: Uncertain nominal parameters: masses first, then joint by joint.
     """
 
     case: Case
     model: ArticulatedModel
     records: tuple[PreparedRecord, ...]
+    settings: DiagnosisSettings = DEFAULT
     nominal: tuple[Nominal, ...] = field(init=False)
     _corrected: dict[tuple, tuple[PreparedRecord, ...]] = field(init=False, default_factory=dict)
     _correcting: Lock = field(init=False, default_factory=Lock)
@@ -110,9 +109,20 @@ class ArticulatedProblem:
         self.nominal = nominal_parameters(self.case, self.model)
 
     @classmethod
-    def of(cls, case: Case, model: ArticulatedModel, records: Sequence[CaseRecord]) -> ArticulatedProblem:
+    def of(
+        cls,
+        case: Case,
+        model: ArticulatedModel,
+        records: Sequence[CaseRecord],
+        settings: DiagnosisSettings = DEFAULT,
+    ) -> ArticulatedProblem:
         """Prepare records."""
-        return cls(case, model, tuple(prepare(case, model, record) for record in records))
+        return cls(
+            case,
+            model,
+            tuple(prepare(case, model, record, settings=settings) for record in records),
+            settings,
+        )
 
     @property
     def joints(self) -> tuple[Joint, ...]:
@@ -164,10 +174,11 @@ class ArticulatedProblem:
         key = tuple(sorted((name, encoder._replace(in_loop=0.0)) for name, encoder in wrong.items()))
         with self._correcting:
             if key not in self._corrected:
-                while len(self._corrected) >= KEPT_MOTIONS:
+                while len(self._corrected) >= self.settings.articulated.kept_motions:
                     self._corrected.pop(next(iter(self._corrected)))
                 self._corrected[key] = tuple(
-                    corrected(self.case, self.model, r, dict(key)) for r in self.records
+                    corrected(self.case, self.model, r, dict(key), settings=self.settings)
+                    for r in self.records
                 )
             found = self._corrected[key]
         if not any(encoder.in_loop for encoder in wrong.values()):
@@ -194,7 +205,7 @@ class ArticulatedProblem:
                 )
                 joints.append(replace(record, process=torque) if torque > record.process else record)
             records.append(replace(prepared, joints=tuple(joints)))
-        return ArticulatedProblem(self.case, self.model, tuple(records))
+        return ArticulatedProblem(self.case, self.model, tuple(records), self.settings)
 
     def settled(self, hypothesis: Hypothesis, vector: Array) -> ArticulatedProblem:
         """The same problem with the links of elastic joints where a fit has them; itself where there are none behind their motors."""
@@ -208,8 +219,8 @@ class ArticulatedProblem:
         records = []
         for raw, prepared in zip(self.records, self.motions(hypothesis, vector), strict=True):
             links = {j: self.innovations(j, hypothesis, vector, prepared)[1][:, 2:] for j in elastic}
-            records.append(relinked(self.case, self.model, raw, links))
-        return ArticulatedProblem(self.case, self.model, tuple(records))
+            records.append(relinked(self.case, self.model, raw, links, settings=self.settings.articulated))
+        return ArticulatedProblem(self.case, self.model, tuple(records), self.settings)
 
     def slots(self, j: int, hypothesis: Hypothesis, vector: Array, *, on_link: bool) -> Array:
         """Parameter vector (SLOTS,) of the runs of joint `j`."""
@@ -253,7 +264,12 @@ class ArticulatedProblem:
         rng = np.random.default_rng(settings.seed)
         return tuple(
             tuple(
-                draw(self.model, prepared.motion, clock_of(prepared.record), rng)
+                draw(
+                    self.model,
+                    prepared.motion,
+                    clock_of(prepared.record, settings=self.settings.articulated),
+                    rng,
+                )
                 for _ in range(settings.draws)
             )
             for prepared in self.records
@@ -322,13 +338,18 @@ class ArticulatedProblem:
 
     def residual(self, j: int, hypothesis: Hypothesis, vector: Array) -> Array:
         """Whitened, weighted innovations of joint `j` over all records; their sum of squares is about `count` where nothing is missing."""
+        settings = self.settings.articulated
         out = []
         for original, prepared in zip(self.records, self.motions(hypothesis, vector), strict=True):
             innovation, _ = self.innovations(j, hypothesis, vector, prepared)
             # a corrected log has another noise; residuals are compared in units of what was logged
             innovation = innovation * (original.joints[j].noise / prepared.joints[j].noise)
             whitened = innovation @ original.joints[j].whitening.T * original.joints[j].weight
-            out.append(np.nan_to_num(whitened, nan=DIVERGED, posinf=DIVERGED, neginf=-DIVERGED).ravel())
+            out.append(
+                np.nan_to_num(
+                    whitened, nan=settings.diverged, posinf=settings.diverged, neginf=-settings.diverged
+                ).ravel()
+            )
         return np.concatenate(out)
 
     @cached_property

@@ -16,43 +16,11 @@ from numpy.typing import NDArray
 from bench.discrepancy.articulated.fitting import ArticulatedFit, Others, fit, free_entries, linearised
 from bench.discrepancy.articulated.problem import ArticulatedProblem, Hypothesis, Placed, misfit_of
 from bench.discrepancy.numerics.threads import in_threads
+from bench.discrepancy.settings import ArticulatedSearchSettings as SearchSettings
 
 Array = NDArray[np.float64]
 UNSCALED = ("actuator_saturation", "backlash", "joint_compliance", "one_sided_stop")
 """Effects whose first parameter is no amplitude of the force."""
-
-
-@dataclass(frozen=True)
-class SearchSettings:
-    """Settings of the search.
-
-    Attributes:
-        most: Largest number of effects named together.
-        fitted: Screened effects that are fitted in a round, at most.
-        least: Of those, the ones that are fitted whatever they promise.
-        hope: The others are fitted while they promise more than this part of what the best fit so far has gained: a screening is a
-            linearisation, and errs by less than that where it matters.
-        starts: Grid points from which one effect is fitted.
-        iterations: Steps of a fit.
-        refits: Fits of the nominal model alone, each with the scales that the last one left.
-        softening: Noise of the torque, as parts of its RMS, with which effects are screened and fitted one after the other before the
-            stated noise holds (`ArticulatedProblem.softened`): from what a crude model errs by to what motor currents tell.
-        strained: Deviation of a nominal parameter, in its stated standard uncertainties, from which it counts as a finding.
-        finalists: Effects that are fitted again without it.
-        worth: Log posterior that a further effect has to add, ten to one being 2.3 and a hundred to one 4.6.
-    """
-
-    most: int = 3
-    fitted: int = 10
-    least: int = 3
-    hope: float = 0.5
-    starts: int = 2
-    iterations: int = 20
-    refits: int = 3
-    worth: float = 4.6
-    softening: tuple[float, ...] = (0.2, 0.02)
-    strained: float = 3.0
-    finalists: int = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -243,7 +211,7 @@ def search(
     progress: Callable[[str], None] = lambda text: None,
 ) -> list[ArticulatedFit]:
     """All fitted hypotheses, the likeliest first."""
-    settings = settings or SearchSettings()
+    settings = settings or problem.settings.articulated.search
     progress("nominal model")
     current = nominal_fit(problem, settings)
     found = [current]
@@ -344,21 +312,20 @@ def _again(problem: ArticulatedProblem, found: ArticulatedFit, settings: SearchS
 
 def sound(problem: ArticulatedProblem, found: ArticulatedFit) -> bool:
     """Whether a fit is finite and no parameter of its effects sits at a bound."""
+    settings = problem.settings.articulated
     if not (np.isfinite(found.log_posterior) and np.isfinite(found.vector).all()):
         return False
     at = len(problem.nominal)
     for placed in found.hypothesis:
         for p in placed.effect.parameters:
             low, high = p.bounds
-            inside = low + AT_BOUND < found.vector[at] < high - AT_BOUND
+            inside = low + settings.at_bound < found.vector[at] < high - settings.at_bound
             if not (inside or p.fixed or p.name in BOUNDED):
                 return False
             at += 1
     return True
 
 
-AT_BOUND = 1e-6
-"""Distance from a bound at which a parameter sits on it: rounding."""
 BOUNDED = ("motor_share", "position")
 """Parameters whose bounds are physical: a share is at most one, a stop lies where the joint goes."""
 

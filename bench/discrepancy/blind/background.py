@@ -43,7 +43,7 @@ class Background:
     """
 
     acting: tuple[Placed, ...] = ()
-    recorded: Mapping[str, float] | None = None
+    recorded: Mapping[str, float] = field(default_factory=dict)
     share: float = 0.0
     stated: str = "true"
     settings: BackgroundSettings = field(default_factory=BackgroundSettings)
@@ -54,7 +54,7 @@ class Background:
 
     def answer(self) -> dict[str, Any]:
         """Its entries of an answer."""
-        names = [placed.recipe.name for placed in self.acting] + list(self.recorded or {})
+        names = [placed.recipe.name for placed in self.acting] + list(self.recorded)
         return {"background": names, "background_share": self.share, "noise_stated": self.stated}
 
     def recorded_in(
@@ -69,7 +69,7 @@ class Background:
             step: Time between samples [s].
             rng: Source of randomness.
         """
-        parts = self.recorded or {}
+        parts = self.recorded
         out = [dict(record) for record in clean]
         scale = {name: float(np.std(np.concatenate([r[name] for r in clean]))) for name in timed}
         if "jitter" in parts:

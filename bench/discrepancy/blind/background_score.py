@@ -36,14 +36,23 @@ BY_ANOTHER_NAME = {
 }
 """Things of a background that the catalogue knows by a name of its own, in another shape: a stiffness that changes along the record, a
 further mass on a spring, friction whose mean along the stroke is not zero. Who names one of these says what is so."""
-CERTAIN = 0.9
-"""Probability from which a name is certain."""
-PAYS = 0.8
-"""Part of the judged discrepancy before that a name may leave."""
-FAR = 4.0
-"""Stated standard deviations beyond which a nominal parameter has to be named."""
-INTERVAL = 1.96
-"""Standard deviations of a 95 % interval."""
+
+
+@dataclass(frozen=True)
+class BackgroundScoreSettings:
+    """Numbers of `bench.discrepancy.blind.background_score`."""
+
+    certain: float = 0.9
+    """Probability from which a name is certain."""
+    pays: float = 0.8
+    """Part of the judged discrepancy before that a name may leave."""
+    far: float = 4.0
+    """Stated standard deviations beyond which a nominal parameter has to be named."""
+    interval: float = 1.96
+    """Standard deviations of a 95 % interval."""
+
+
+SETTINGS = BackgroundScoreSettings()
 
 
 @dataclass(frozen=True)
@@ -130,7 +139,7 @@ def background_scored(answer: Mapping[str, Any], result: Mapping[str, Any]) -> I
     """What is scored of a case, and whether it is right."""
     kind, named, gap = background_class(answer), result["named"], result.get("gap") or {}
     said = [effect["name"] for effect in named]
-    pays = gap.get("after") is not None and gap["after"] < PAYS * gap["before"]
+    pays = gap.get("after") is not None and gap["after"] < SETTINGS.pays * gap["before"]
     if answer["effects"]:
         true = answer["effects"][0]["name"]
         hit = _within_a_set(true, said, result)
@@ -145,7 +154,7 @@ def background_scored(answer: Mapping[str, Any], result: Mapping[str, Any]) -> I
         if covered is not None:
             yield "95 % intervals of the main effect's parameters hold the truth", covered
     else:
-        sure = [effect for effect in named if effect["probability"] >= CERTAIN]
+        sure = [effect for effect in named if effect["probability"] >= SETTINGS.certain]
         allowed = kind == "background" and pays
         yield (
             f"{kind}: no certain name that does not pay on the judging record",
@@ -153,7 +162,7 @@ def background_scored(answer: Mapping[str, Any], result: Mapping[str, Any]) -> I
         )
     if said:
         yield "names shrink the judged discrepancy", pays
-    far = [p for p in result.get("nominal", []) if abs(p["shift_in_std"]) > FAR]
+    far = [p for p in result.get("nominal", []) if abs(p["shift_in_std"]) > SETTINGS.far]
     yield "no nominal parameter beyond 4 stated sigma unsaid", not far
 
 
@@ -186,4 +195,4 @@ def _covered(truth: Mapping[str, Any], named: list[Mapping[str, Any]]) -> bool |
     if own is None or not own["parameters"] or not truth["parameters"]:
         return None
     estimate = next(iter(own["parameters"].values()))
-    return abs(estimate["value"] - truth["parameters"][0]) <= INTERVAL * estimate["std"]
+    return abs(estimate["value"] - truth["parameters"][0]) <= SETTINGS.interval * estimate["std"]

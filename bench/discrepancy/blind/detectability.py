@@ -13,6 +13,7 @@ rival are an upper bound, and a small value is certain while a large one is not.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from itertools import islice
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -26,12 +27,22 @@ if TYPE_CHECKING:
     from bench.discrepancy.model.structure import Structure
     from bench.discrepancy.screening.linear_amplitudes import Point
 
-RIVALS, RIVALS_COUPLED = 6, 3
-"""Effects that the screening likes best and that are fitted; fewer where an effect couples the degrees of freedom."""
-MOST = 1e9
-"""Log odds beyond which nobody counts."""
-ITERATIONS, LAST = 8, 25
-"""Iterations of each, and of the best of them and of the nominal model."""
+
+@dataclass(frozen=True)
+class DetectabilitySettings:
+    """Numbers of `bench.discrepancy.blind.detectability`."""
+
+    rivals: int = 6
+    rivals_coupled: int = 3
+    """Effects that the screening likes best and that are fitted; fewer where an effect couples the degrees of freedom."""
+    most: float = 1e9
+    """Log odds beyond which nobody counts."""
+    iterations: int = 8
+    last: int = 25
+    """Iterations of each, and of the best of them and of the nominal model."""
+
+
+SETTINGS = DetectabilitySettings()
 
 
 def detectability(pure: Case, true: Mapping[str, float], truth: Mapping[str, str]) -> dict[str, Any]:
@@ -83,12 +94,12 @@ def _odds_of(pure: Case, true: Mapping[str, float], truth: Mapping[str, str]) ->
     # a single other effect explains one group, and leaves the others as they are
     nearest = min(groups, key=lambda group: group.rival - group.none)
     odds = {
-        "log_odds_none": min(none, MOST),
-        "log_odds_rival": min(none - nearest.none + nearest.rival, MOST),
+        "log_odds_none": min(none, SETTINGS.most),
+        "log_odds_rival": min(none - nearest.none + nearest.rival, SETTINGS.most),
         "rival": nearest.name,
     }
     if len(truth) > 1:
-        odds["log_odds_one"] = min([MOST, *(group.alone for group in groups)])
+        odds["log_odds_one"] = min([SETTINGS.most, *(group.alone for group in groups)])
     return odds
 
 
@@ -104,7 +115,7 @@ def _group(pure: Case, structure: Structure, true: Mapping[str, float], truth: M
         (true[name] - problem.nominal[i]) / problem.spread[i] for i, name in enumerate(structure.parameters)
     ]
     cost = float(np.sum(np.square(away)))
-    nothing = fit(problem, (), start=np.zeros(len(problem.nominal)), iterations=LAST)
+    nothing = fit(problem, (), start=np.zeros(len(problem.nominal)), iterations=SETTINGS.last)
     own = {name for name, where in truth.items() if where in {p.name for p in structure.places}}
     coupling = len(structure.groups()) > 1
     screen = Screen(problem, placements(pure, structure, CATALOGUE))
@@ -119,15 +130,15 @@ def _group(pure: Case, structure: Structure, true: Mapping[str, float], truth: M
                 problem,
                 (p.placed,),
                 start=screen.starts(p, ground),
-                iterations=ITERATIONS,
+                iterations=SETTINGS.iterations,
             )
             for p in points
         ]
         best = min(fits, key=lambda f: f.cost, default=nothing)
-        return fit(problem, best.hypothesis, start=best.vector, iterations=LAST)
+        return fit(problem, best.hypothesis, start=best.vector, iterations=SETTINGS.last)
 
     others = (p for p in starts.values() if p.placed.effect.name not in own)
-    rival = best_of(islice(others, RIVALS_COUPLED if coupling else RIVALS))
+    rival = best_of(islice(others, SETTINGS.rivals_coupled if coupling else SETTINGS.rivals))
     none = 0.5 * (nothing.cost - cost)
     alone = none
     if len(own) > 1:

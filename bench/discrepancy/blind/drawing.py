@@ -13,6 +13,7 @@ case instead (`bench.discrepancy.blind.detectability`) and stands in the answer.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,10 @@ from numpy.typing import NDArray
 from bench.discrepancy.blind.background import draw_background
 from bench.discrepancy.blind.detectability import detectability
 from bench.discrepancy.blind.ground_truth import ROWS, Placed
-from bench.discrepancy.blind.handed_over import SPREADS, measured
+from bench.discrepancy.blind.handed_over import (
+    HANDED_OVER_SETTINGS,
+    measured,
+)
 from bench.discrepancy.blind.moreau_time_stepping import TrueMotion
 from bench.discrepancy.blind.rigs import Bench, BlindOptions, Plan, draw_bench, reach_of
 from bench.discrepancy.blind.withheld_effects import RECIPES, Drawn, Recipe, Shape
@@ -31,25 +35,34 @@ from bench.errors import ParameterError, SimulationError
 Array = NDArray[np.float64]
 
 KINDS = ("none", "single", "double", "foreign")
-BISECTIONS = 14
-"""Halvings of the logarithm of a strength between e^-7 and e^3: to a tenth of a percent."""
-ATTEMPTS = 200
-"""Draws before the maker gives up; a handful is usual."""
-PLANS = 10_000
-"""Draws of a plan before the maker says that there is none: the rarest kind of case is drawn every few hundred times."""
-PERSISTENCE = 40
-"""Draws of one plan: some ask for what cannot be, a stop that makes a gap of 4 % only, say."""
-CLOSE = (0.85, 1.18)
-"""Gap of the identification records over the wanted one; the search is made with coarse steps."""
-ALIKE = (0.5, 2.0)
-"""Gap of the judging record over the wanted one."""
-HIDDEN = 0.3
-"""Least part of the wanted gap that each of two effects has to add to the other."""
-BEYOND = 4.0
-"""An error of a nominal parameter is an effect from so many of its stated standard deviations on."""
-EXPECTED = 10.0
-"""Expected log odds against the nominal model, re-estimated within its uncertainty, from which there is a gap; and those
-against the nearest single effect of the catalogue from which a foreign one is foreign to the records, and two effects are two."""
+
+
+@dataclass(frozen=True)
+class DrawingSettings:
+    """Numbers of `bench.discrepancy.blind.drawing`."""
+
+    bisections: int = 14
+    """Halvings of the logarithm of a strength between e^-7 and e^3: to a tenth of a percent."""
+    attempts: int = 200
+    """Draws before the maker gives up; a handful is usual."""
+    plans: int = 10_000
+    """Draws of a plan before the maker says that there is none: the rarest kind of case is drawn every few hundred times."""
+    persistence: int = 40
+    """Draws of one plan: some ask for what cannot be, a stop that makes a gap of 4 % only, say."""
+    close: tuple[float, float] = (0.85, 1.18)
+    """Gap of the identification records over the wanted one; the search is made with coarse steps."""
+    alike: tuple[float, float] = (0.5, 2.0)
+    """Gap of the judging record over the wanted one."""
+    hidden: float = 0.3
+    """Least part of the wanted gap that each of two effects has to add to the other."""
+    beyond: float = 4.0
+    """An error of a nominal parameter is an effect from so many of its stated standard deviations on."""
+    expected: float = 10.0
+    """Expected log odds against the nominal model, re-estimated within its uncertainty, from which there is a gap; and those against
+    the nearest single effect of the catalogue from which a foreign one is foreign to the records, and two effects are two."""
+
+
+DRAWING_SETTINGS = DrawingSettings()
 WRONG = {
     "single": ("log_odds_none",),
     "foreign": ("log_odds_rival",),
@@ -64,8 +77,8 @@ def draw_case(name: str, rng: np.random.Generator, options: BlindOptions) -> tup
     Raises:
         ParameterError: None of many draws reached the wanted gap.
     """
-    for attempt in range(ATTEMPTS):
-        if attempt % PERSISTENCE == 0:
+    for attempt in range(DRAWING_SETTINGS.attempts):
+        if attempt % DRAWING_SETTINGS.persistence == 0:
             plan = draw_plan(rng, options)
         try:
             made = _attempt(name, plan, rng, options)
@@ -75,7 +88,9 @@ def draw_case(name: str, rng: np.random.Generator, options: BlindOptions) -> tup
             case, answer = made
             answer["attempts"] = attempt + 1
             return case, answer
-    raise ParameterError(f"case '{name}': none of {ATTEMPTS} draws reached its gap; widen the range of gaps")
+    raise ParameterError(
+        f"case '{name}': none of {DRAWING_SETTINGS.attempts} draws reached its gap; widen the range of gaps"
+    )
 
 
 def draw_plan(rng: np.random.Generator, options: BlindOptions) -> Plan:
@@ -84,7 +99,7 @@ def draw_plan(rng: np.random.Generator, options: BlindOptions) -> Plan:
     Raises:
         ParameterError: The options allow none.
     """
-    for _ in range(PLANS):
+    for _ in range(DRAWING_SETTINGS.plans):
         kind = "single" if options.leave_one_out else str(rng.choice(KINDS, p=options.shares))
         rig = str(rng.choice(["sdof", "damper", "joint"], p=options.rigs))
         pool = [
@@ -155,7 +170,7 @@ def _attempt(
     case, pure = measured(name, bench, with_effects, rng)
     background = None
     if options.background is not None:
-        background = draw_background(bench, bare[:-1], rng, options.background, BISECTIONS)
+        background = draw_background(bench, bare[:-1], rng, options.background, DRAWING_SETTINGS.bisections)
         if background is None:
             return None
         runs = bench.run([*effects, *background.acting])
@@ -165,7 +180,7 @@ def _attempt(
     odds: dict[str, Any] = {}
     if effects and options.detectability:
         odds = detectability(pure, bench.truth.values, {e.recipe.name: e.where for e in effects})
-    if any(odds.get(against, np.inf) < EXPECTED for against in WRONG.get(plan.kind, ())):
+    if any(odds.get(against, np.inf) < DRAWING_SETTINGS.expected for against in WRONG.get(plan.kind, ())):
         return None
     answer = _answer(bench, effects, runs, gaps, options) | {"detectability": odds}
     return case, answer | (background.answer() if background is not None else {})
@@ -175,8 +190,10 @@ def _stated(rig: str, placed: Placed) -> bool:
     """Whether an effect is an error of a nominal parameter that its stated uncertainty already allows for."""
     if placed.recipe.site != "inertia":
         return False
-    spread = SPREADS[rig]["mass" if rig == "sdof" or placed.where == "axial" else "inertia"]
-    return abs(placed.drawn.values["relative_error"]) < BEYOND * spread
+    spread = HANDED_OVER_SETTINGS.spreads[rig][
+        "mass" if rig == "sdof" or placed.where == "axial" else "inertia"
+    ]
+    return abs(placed.drawn.values["relative_error"]) < DRAWING_SETTINGS.beyond * spread
 
 
 def _acts(bench: Bench, real: Sequence[Mapping[str, Array]], bare: Sequence[Mapping[str, Array]]) -> bool:
@@ -187,7 +204,10 @@ def _acts(bench: Bench, real: Sequence[Mapping[str, Array]], bare: Sequence[Mapp
         return True
     found = max(bench.gaps(real[:-1], bare[:-1])) / bench.plan.gap
     judged = max(bench.gaps(real[-1:], bare[-1:])) / bench.plan.gap
-    return CLOSE[0] < found < CLOSE[1] and ALIKE[0] < judged < ALIKE[1]
+    return (
+        DRAWING_SETTINGS.close[0] < found < DRAWING_SETTINGS.close[1]
+        and DRAWING_SETTINGS.alike[0] < judged < DRAWING_SETTINGS.alike[1]
+    )
 
 
 def _strengths(
@@ -204,7 +224,7 @@ def _strengths(
 
     def search(make: Callable[[float], Sequence[Placed]], wanted: float) -> float:
         low, high = -7.0, 3.0
-        for _ in range(BISECTIONS):
+        for _ in range(DRAWING_SETTINGS.bisections):
             middle = 0.5 * (low + high)
             low, high = (middle, high) if gap(make(np.exp(middle))) < wanted else (low, middle)
         return float(np.exp(0.5 * (low + high)))
@@ -221,7 +241,10 @@ def _strengths(
     together = bench.responses(effects, quick=True, judging=False)
     for i in range(len(effects)):
         others = effects[:i] + effects[i + 1 :]
-        if max(bench.gaps(together, bench.responses(others, quick=True, judging=False))) < HIDDEN * plan.gap:
+        if (
+            max(bench.gaps(together, bench.responses(others, quick=True, judging=False)))
+            < DRAWING_SETTINGS.hidden * plan.gap
+        ):
             return None
     return effects
 

@@ -1,7 +1,7 @@
 """What a rig with its withheld effects really does: the records of sealed cases before noise.
 
 Smooth and continuous laws on the sdof and the joint rig are integrated by MuJoCo through the bench's native callback,
-Runge-Kutta with `STEPS` steps a sample: the engine that users run. Set-valued friction and rigid stops, which MuJoCo's
+Runge-Kutta with `steps` steps a sample: the engine that users run. Set-valued friction and rigid stops, which MuJoCo's
 callback can only round, go through Moreau's time stepping (`bench.discrepancy.blind.moreau_time_stepping`). A component under prescribed
 motion needs no dynamics; its hidden states are integrated along the finely sampled motion. None of these is the integrator of
 the fits. What they share with the fits are the kernels of the laws, which is the point of having them written once.
@@ -13,7 +13,7 @@ of the actuator unless it is the withheld effect.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,10 +24,18 @@ from bench.discrepancy.blind.withheld_effects import Drawn, Recipe
 
 Array = NDArray[np.float64]
 
-STEPS = 20
-"""Integration steps of MuJoCo a sample, and samples of a prescribed motion a sample of the record."""
-QUICK = {"smooth": 4, "friction": 20}
-"""Steps a sample of the time stepping while a strength is searched for: that needs a percent, not a record."""
+
+@dataclass(frozen=True)
+class GroundTruthSettings:
+    """Numbers of `bench.discrepancy.blind.ground_truth`."""
+
+    steps: int = 20
+    """Integration steps of MuJoCo a sample, and samples of a prescribed motion a sample of the record."""
+    quick: Mapping[str, int] = field(default_factory=lambda: {"smooth": 4, "friction": 20})
+    """Steps a sample of the time stepping while a strength is searched for: that needs a percent, not a record."""
+
+
+GROUND_TRUTH_SETTINGS = GroundTruthSettings()
 ROWS = {
     "sdof": {"": np.ones((1, 1))},
     "damper": {"": np.ones((1, 1))},
@@ -129,7 +137,11 @@ def motion_of(truth: Truth, effects: Sequence[Placed], loads: Array, *, quick: b
     if stop is not None:
         v = stop.drawn.values
         barrier = Stop(ROWS[truth.rig][stop.where][0], v["position"], v["side"], v["restitution"])
-    substeps = QUICK["friction" if rough else "smooth"] if quick else 10 * STEPS
+    substeps = (
+        GROUND_TRUTH_SETTINGS.quick["friction" if rough else "smooth"]
+        if quick
+        else 10 * GROUND_TRUTH_SETTINGS.steps
+    )
     substeps = max(substeps // each, 2)
     motion = march(
         truth.matrices(effects), laws, loads=fine, step=step / each, substeps=substeps, stop=barrier
@@ -158,8 +170,12 @@ def played(effects: Sequence[Placed], loads: Array, step: float) -> tuple[Array,
     if not delays:
         return out, 1
     clock = step * np.arange(len(out))
-    late = step / STEPS * np.arange(len(out) * STEPS) - sum(delays)
-    return np.column_stack([np.interp(late, clock, column, left=0.0) for column in out.T]), STEPS
+    late = step / GROUND_TRUTH_SETTINGS.steps * np.arange(len(out) * GROUND_TRUTH_SETTINGS.steps) - sum(
+        delays
+    )
+    return np.column_stack(
+        [np.interp(late, clock, column, left=0.0) for column in out.T]
+    ), GROUND_TRUTH_SETTINGS.steps
 
 
 def _in_mujoco(truth: Truth, effects: Sequence[Placed], loads: Array) -> TrueMotion:
@@ -174,8 +190,8 @@ def _in_mujoco(truth: Truth, effects: Sequence[Placed], loads: Array) -> TrueMot
     ]
     matrices = truth.matrices(effects)
     fine, each = played(effects, loads, step)
-    timestep = step / STEPS
-    middle = timestep * (np.arange(len(loads) * STEPS) + 0.5)
+    timestep = step / GROUND_TRUTH_SETTINGS.steps
+    middle = timestep * (np.arange(len(loads) * GROUND_TRUTH_SETTINGS.steps) + 0.5)
     controls = [np.interp(middle, step / each * np.arange(len(fine)), column) for column in fine.T]
     if truth.rig == "sdof":
         rig = sdof_rig(
@@ -222,8 +238,10 @@ def force_under(truth: Truth, effects: Sequence[Placed], position: Array, veloci
     ]
     force = truth.values["stiffness"] * position + truth.values["damping"] * velocity
     if laws:
-        force = force + follow(laws, position=position, velocity=velocity, step=1.0 / (truth.rate * STEPS))
-    return force[::STEPS]
+        force = force + follow(
+            laws, position=position, velocity=velocity, step=1.0 / (truth.rate * GROUND_TRUTH_SETTINGS.steps)
+        )
+    return force[:: GROUND_TRUTH_SETTINGS.steps]
 
 
 def sensed(effects: Sequence[Placed], name: str, samples: Array, step: float) -> Array:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bench.discrepancy.blind.background import Background
-from bench.discrepancy.blind.ground_truth import STEPS, Truth
+from bench.discrepancy.blind.ground_truth import (
+    GROUND_TRUTH_SETTINGS,
+    Truth,
+)
 from bench.discrepancy.blind.rigs import Bench
 from bench.discrepancy.case.case import Case, CaseChannel, NominalParameter, record_from_arrays
 
@@ -18,31 +22,46 @@ UNITS = {
     "force": "N", "torque": "N m", "displacement": "m", "acceleration": "m/s^2", "rotation": "rad",
     "angular_acceleration": "rad/s^2", "mass": "kg", "inertia": "kg m^2",
 }  # fmt: skip
-SPREADS = {
-    "sdof": {"mass": 0.01, "stiffness": 0.03, "damping": 0.2},
-    "damper": {"stiffness": 0.03, "damping": 0.05},
-    "joint": {
-        "mass": 0.01,
-        "inertia": 0.01,
-        "mount_stiffness": 0.01,
-        "mount_damping": 0.05,
-        "joint_stiffness": 0.05,
-        "joint_damping": 0.25,
-    },
-}
-"""Relative one-sigma uncertainties of the nominal parameters."""
-HUSHED = 0.01
-"""Part of the noise left in the records that detectability is computed from: an axis at rest has a spectrum then."""
-TRANSDUCER = 0.1
-"""Noise of a prescribed displacement over that of the force: a machine's own transducer is its best channel."""
+
+
+@dataclass(frozen=True)
+class HandedOverSettings:
+    """Numbers of `bench.discrepancy.blind.handed_over`."""
+
+    spreads: Mapping[str, Mapping[str, float]] = field(
+        default_factory=lambda: {
+            "sdof": {"mass": 0.01, "stiffness": 0.03, "damping": 0.2},
+            "damper": {"stiffness": 0.03, "damping": 0.05},
+            "joint": {
+                "mass": 0.01,
+                "inertia": 0.01,
+                "mount_stiffness": 0.01,
+                "mount_damping": 0.05,
+                "joint_stiffness": 0.05,
+                "joint_damping": 0.25,
+            },
+        }
+    )
+    """Relative one-sigma uncertainties of the nominal parameters."""
+    hushed: float = 0.01
+    """Part of the noise left in the records that detectability is computed from: an axis at rest has a spectrum then."""
+    transducer: float = 0.1
+    """Noise of a prescribed displacement over that of the force: a machine's own transducer is its best channel."""
+
+
+HANDED_OVER_SETTINGS = HandedOverSettings()
 
 
 def _parameters(truth: Truth, rng: np.random.Generator) -> tuple[NominalParameter, ...]:
     """Nominal values, the true ones lying within their stated uncertainty."""
     out = []
     for name, value in truth.values.items():
-        kind = name if truth.rig != "joint" else next(k for k in SPREADS["joint"] if name.startswith(k))
-        spread = SPREADS[truth.rig][kind]
+        kind = (
+            name
+            if truth.rig != "joint"
+            else next(k for k in HANDED_OVER_SETTINGS.spreads["joint"] if name.startswith(k))
+        )
+        spread = HANDED_OVER_SETTINGS.spreads[truth.rig][kind]
         torsional = "torsional" in name
         unit = next(
             (u for k, u in UNITS.items() if name.startswith(k)),
@@ -68,7 +87,7 @@ def measured(
     """The case as a laboratory hands it over, noise added and truth left out; and the same almost without noise."""
     plan, truth = bench.plan, bench.truth
     names = {"joint": ("force", "torque"), "sdof": ("force",), "damper": ("displacement",)}[plan.rig]
-    every = STEPS if plan.rig == "damper" else 1
+    every = GROUND_TRUTH_SETTINGS.steps if plan.rig == "damper" else 1
     clean = [
         {**{c: sampled[::every, j] for j, c in enumerate(names)}, **r}
         for sampled, r in zip(bench.loads, responses, strict=True)
@@ -85,7 +104,7 @@ def measured(
         role = "response"
         if c in names:
             role = "prescribed" if plan.rig == "damper" else ("command" if plan.commanded else "measured")
-            level *= {"prescribed": TRANSDUCER, "command": 0.0, "measured": 1.0}[role]
+            level *= {"prescribed": HANDED_OVER_SETTINGS.transducer, "command": 0.0, "measured": 1.0}[role]
         unit = UNITS[c.rsplit("_", 1)[0] if c[-1].isdigit() else c]
         levels[c] = level
         stated = level if background is None or level == 0.0 else background.noise_stated(level)
@@ -109,4 +128,4 @@ def measured(
             name, plan.rig, parameters, tuple(channels), tuple(records[:split]), tuple(records[split:])
         )
 
-    return case(1.0), case(HUSHED)
+    return case(1.0), case(HANDED_OVER_SETTINGS.hushed)

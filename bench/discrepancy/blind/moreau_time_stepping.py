@@ -3,7 +3,7 @@
 Moreau's scheme: the midpoint rule for what is smooth, and impulses for friction and stops, chosen at the end of each
 step so that the law of dry friction (Coulomb's set-valued sign, with a limit that may depend on state and time) or of
 impact (Newton's restitution) holds exactly there. No event is looked for; an event costs one step of accuracy, which
-is why steps are short (`SUBSTEPS` a sample).
+is why steps are short (`substeps` a sample).
 
 This is a second integrator on purpose. The fits have one of their own (`bench.discrepancy.simulation.stick_slip`: Runge-Kutta between
 events that are located); a case made with that would forgive its mistakes. Smooth laws go through MuJoCo instead, see
@@ -29,12 +29,29 @@ from bench.laws.calling import advance, call_kernel, pointer_at
 
 Array = NDArray[np.float64]
 
-SUBSTEPS = 200
-"""Steps a sample: at 500 Hz 10 µs, which leaves errors of 1e-4 of the motion after hundreds of reversals (tested)."""
 
 FORCE, RATE, LIMIT, N_ROWS, ROW, THETA, STATE, N_STATES = range(8)
-MAX_ROWS = 16
-DIVERGED = 1e12
+
+
+@dataclass(frozen=True)
+class MoreauTimeSteppingSettings:
+    """Numbers of `bench.discrepancy.blind.moreau_time_stepping`."""
+
+    substeps: int = 200
+    """Steps a sample: at 500 Hz 10 µs, which leaves errors of 1e-4 of the motion after hundreds of reversals (tested)."""
+    max_rows: int = 16
+
+
+SETTINGS = MoreauTimeSteppingSettings()
+
+
+class MoreauTimeSteppingLimits(NamedTuple):
+    """Numbers of `bench.discrepancy.blind.moreau_time_stepping` that compiled code holds."""
+
+    diverged: float = 1e12
+
+
+MOREAU_TIME_STEPPING_LIMITS = MoreauTimeSteppingLimits()
 _jit = numba.njit(cache=True, error_model="numpy", nogil=True)
 
 
@@ -218,7 +235,7 @@ def _march(clock, loads, system, elements, hidden, stop, work, out):  # noqa: PL
             (force, zdot),
             reaction,
         )
-        if k == loads.shape[0] - 1 or not abs(q[0]) < DIVERGED:
+        if k == loads.shape[0] - 1 or not abs(q[0]) < MOREAU_TIME_STEPPING_LIMITS.diverged:
             position[k + 1 :] = np.nan
             return
         for s in range(substeps):
@@ -261,7 +278,7 @@ def march(
     *,
     loads: Array,
     step: float,
-    substeps: int = SUBSTEPS,
+    substeps: int = SETTINGS.substeps,
     stop: Stop | None = None,
 ) -> TrueMotion:
     """Simulate a structure from rest under sampled loads, straight lines between the samples.
@@ -297,7 +314,7 @@ def march(
     _march(
         (0.0, step, substeps), np.ascontiguousarray(loads, dtype=float), system,
         (table, np.ascontiguousarray(rows), theta), (z, z.copy(), np.zeros(len(z))), (row_stop, values),
-        (np.zeros((3, MAX_ROWS)), np.zeros(max(len(table), 1))), tuple(out),
+        (np.zeros((3, SETTINGS.max_rows)), np.zeros(max(len(table), 1))), tuple(out),
     )  # fmt: skip
     return out
 
@@ -348,7 +365,7 @@ def follow(acting: Sequence[Acting], *, position: Array, velocity: Array, step: 
     table, theta, z = tabulate(acting)
     rows = np.vstack([a.rows for a in acting]) if acting else np.zeros((0, 1))
     force = np.zeros(len(position))
-    work = (np.zeros((3, MAX_ROWS)), np.zeros(max(len(table), 1)))
+    work = (np.zeros((3, SETTINGS.max_rows)), np.zeros(max(len(table), 1)))
     _follow(
         0.0, step, np.ascontiguousarray(position.reshape(-1, 1)), np.ascontiguousarray(velocity.reshape(-1, 1)),
         (table, np.ascontiguousarray(rows), theta), (z, z.copy(), np.zeros(len(z))), work, force,

@@ -24,11 +24,20 @@ they are laws all the same, so that MuJoCo's callback integrates them like any o
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 from bench.laws.base import ForceLaw, Parameter, kernel
 
-BRANCHES = 8
-"""Relaxations that stand for a fractional derivative: two a decade keep its storage and loss to 2 % over the middle ones."""
+
+@dataclass(frozen=True)
+class OutOfCatalogueSettings:
+    """Numbers of `bench.discrepancy.blind.out_of_catalogue`."""
+
+    branches: int = 8
+    """Relaxations that stand for a fractional derivative: two a decade keep its storage and loss to 2 % over the middle ones."""
+
+
+SETTINGS = OutOfCatalogueSettings()
 
 
 @kernel
@@ -76,7 +85,7 @@ FRACTIONAL_DAMPING = ForceLaw(
     ),
     fractional_force,
     fractional_rate,
-    tuple(f"z{i} [N]" for i in range(BRANCHES)),
+    tuple(f"z{i} [N]" for i in range(SETTINGS.branches)),
     equation="f = C d^alpha q / dt^alpha",
     reference="Bagley & Torvik 1983, J. Rheology 27(3); Papoulia et al. 2010, Rheol. Acta 49 (sums of exponentials)",
 )

@@ -15,6 +15,7 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import binomtest
 
 
@@ -63,7 +64,9 @@ def calibration_error(hits: Sequence[tuple[float, bool]], bins: int = 10) -> flo
     return float(sum(abs(stated - true) * n for stated, true, n in reliability(hits, bins)) / len(hits))
 
 
-def calibration_scatter(stated: Sequence[float], bins: int = 10, draws: int = 400) -> float:
+def calibration_scatter(
+    stated: Sequence[float] | NDArray[np.float64], bins: int = 10, draws: int = 400
+) -> float:
     """Expected calibration error that so many probabilities have if every one of them is exact: that of a few dozen is far from zero.
 
     Args:

@@ -3,12 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-CELLS = 32
-"""Cells of the reach of a coordinate in which planted and found regions are compared."""
+
+@dataclass(frozen=True)
+class RegionOverlapSettings:
+    """Numbers of `bench.discrepancy.blind.region_overlap`."""
+
+    cells: int = 32
+    """Cells of the reach of a coordinate in which planted and found regions are compared."""
+
+
+SETTINGS = RegionOverlapSettings()
 
 
 def region_scores(result: Mapping[str, Any], answer: Mapping[str, Any]) -> list[float]:
@@ -24,10 +33,10 @@ def region_scores(result: Mapping[str, Any], answer: Mapping[str, Any]) -> list[
         planted.setdefault(key, []).extend(region["intervals"])
     out = []
     for (place, coordinate, reach), intervals in planted.items():
-        edges = np.linspace(-reach, reach, CELLS + 1)
+        edges = np.linspace(-reach, reach, SETTINGS.cells + 1)
         middle = 0.5 * (edges[1:] + edges[:-1])
-        truth = _inside(middle, [_widened(interval, 2.0 * reach / CELLS) for interval in intervals])
-        found = np.zeros(CELLS, dtype=bool)
+        truth = _inside(middle, [_widened(interval, 2.0 * reach / SETTINGS.cells) for interval in intervals])
+        found = np.zeros(SETTINGS.cells, dtype=bool)
         for location in result.get("locations") or ():
             dof = str(location.get("dof", ""))
             if place and not dof.startswith({"axial": ("x", "axial"), "torsional": ("th", "tor")}[place]):
@@ -36,7 +45,7 @@ def region_scores(result: Mapping[str, Any], answer: Mapping[str, Any]) -> list[
                 if region:  # a region that does not depend on the coordinate lies everywhere along it
                     low, high = region.get(coordinate, (None, None))  # null: without a limit
                     limits = (-reach if low is None else low, reach if high is None else high)
-                    found |= _inside(middle, [_widened(limits, 2.0 * reach / CELLS)])
+                    found |= _inside(middle, [_widened(limits, 2.0 * reach / SETTINGS.cells)])
         both = np.sum(truth & found)
         out.append(float(2.0 * both / max(np.sum(truth) + np.sum(found), 1)))
     return out

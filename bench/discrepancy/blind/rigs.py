@@ -10,7 +10,15 @@ from numpy.typing import NDArray
 from scipy.signal import bessel, chirp, fftconvolve, sosfilt
 
 from bench.discrepancy.blind.background_settings import BackgroundSettings
-from bench.discrepancy.blind.ground_truth import ROWS, STEPS, Placed, Truth, force_under, motion_of, sensed
+from bench.discrepancy.blind.ground_truth import (
+    GROUND_TRUTH_SETTINGS,
+    ROWS,
+    Placed,
+    Truth,
+    force_under,
+    motion_of,
+    sensed,
+)
 from bench.discrepancy.blind.moreau_time_stepping import TrueMotion
 from bench.discrepancy.blind.withheld_effects import Reach, Recipe, recipe_named
 from bench.errors import ParameterError
@@ -18,14 +26,22 @@ from bench.errors import ParameterError
 Array = NDArray[np.float64]
 
 SENSORS = ("both", "position", "acceleration")
-MACHINE = 6.0
-"""Bandwidth of the machine that prescribes a motion, as a multiple of the signal's central frequency."""
 SIGNALS = ("random", "sweep", "multisine", "stepped", "decaying")
-RAMP = 0.3
-"""Seconds over which loads and motions set in [s]."""
 
-BACKGROUND_SHARES = (0.25, 0.75, 0.0, 0.0)
-"""Probabilities of none, single, double and foreign cases that have a background."""
+
+@dataclass(frozen=True)
+class RigsSettings:
+    """Numbers of `bench.discrepancy.blind.rigs`."""
+
+    machine: float = 6.0
+    """Bandwidth of the machine that prescribes a motion, as a multiple of the signal's central frequency."""
+    ramp: float = 0.3
+    """Seconds over which loads and motions set in [s]."""
+    background_shares: tuple[float, ...] = (0.25, 0.75, 0.0, 0.0)
+    """Probabilities of none, single, double and foreign cases that have a background."""
+
+
+RIGS_SETTINGS = RigsSettings()
 
 
 @dataclass(frozen=True)
@@ -66,7 +82,7 @@ class BlindOptions:
         if self.background is not None and any(self.shares[2:]):
             raise ParameterError(
                 "a background is put beside one effect or none: give shares (clean, single, double, foreign) whose last two are zero, as "
-                + " ".join(str(share) for share in BACKGROUND_SHARES)
+                + " ".join(str(share) for share in RIGS_SETTINGS.background_shares)
             )
         for label, known, chosen in (
             ("sensor set", SENSORS, self.sensors),
@@ -134,9 +150,13 @@ class Bench:
                 continue
             if self.plan.rig == "damper":
                 x = loads[:, 0]
-                v = np.gradient(x, step / STEPS)
+                v = np.gradient(x, step / GROUND_TRUTH_SETTINGS.steps)
                 force = force_under(self.truth, effects, x, v)
-                motion = TrueMotion(x[::STEPS, None], v[::STEPS, None], np.zeros((len(force), 1)))
+                motion = TrueMotion(
+                    x[:: GROUND_TRUTH_SETTINGS.steps, None],
+                    v[:: GROUND_TRUTH_SETTINGS.steps, None],
+                    np.zeros((len(force), 1)),
+                )
                 out.append(({"force": force}, motion))
                 continue
             motion = motion_of(self.truth, effects, loads, quick=quick)
@@ -222,7 +242,9 @@ def reach_of(bench: Bench, where: str) -> Reach:
             else [float(np.sqrt(np.mean(bench.loads[0] ** 2)))]
         )
     rate = float(velocity[0] / position[0])
-    duration = float(len(bench.loads[0]) / truth.rate) / (STEPS if plan.rig == "damper" else 1)
+    duration = float(len(bench.loads[0]) / truth.rate) / (
+        GROUND_TRUTH_SETTINGS.steps if plan.rig == "damper" else 1
+    )
     return Reach(
         force[0], float(position[0]), float(velocity[0]), stiffness[0], rate, duration,
         force[-1], float(position[-1]), float(velocity[-1]), stiffness[-1],
@@ -256,9 +278,12 @@ def draw_bench(plan: Plan, rng: np.random.Generator, options: BlindOptions) -> B
         stroke = float(rng.uniform(0.004, 0.03))
         stiffness = float(np.exp(rng.uniform(np.log(1e3), np.log(1e5))))
         damping = stiffness / (2.0 * np.pi * frequency) * float(rng.uniform(0.2, 1.0))
-        fine = rate * STEPS
+        fine = rate * GROUND_TRUTH_SETTINGS.steps
         loads = tuple(
-            stroke * followed(load(s, frequency, n * STEPS, fine, rng), frequency, fine)[:, None]
+            stroke
+            * followed(load(s, frequency, n * GROUND_TRUTH_SETTINGS.steps, fine, rng), frequency, fine)[
+                :, None
+            ]
             for s in signals
         )
         return Bench(
@@ -276,7 +301,7 @@ def draw_bench(plan: Plan, rng: np.random.Generator, options: BlindOptions) -> B
 def followed(signal: Array, frequency: float, rate: float) -> Array:
     """Motion (n,) of a machine that is asked for a signal: no actuator jumps, nor does it turn a corner."""
     return np.asarray(
-        sosfilt(bessel(4, MACHINE * frequency, fs=rate, output="sos"), signal), dtype=np.float64
+        sosfilt(bessel(4, RIGS_SETTINGS.machine * frequency, fs=rate, output="sos"), signal), dtype=np.float64
     )
 
 
@@ -331,5 +356,5 @@ def load(kind: str, frequency: float, n: int, rate: float, rng: np.random.Genera
         out = np.fft.irfft(np.where(inside, amplitude * np.exp(1j * phase), 0.0), n)
         if kind == "decaying":
             out = out * np.exp(-3.0 * (t % (duration / 3.0)) / (duration / 3.0))
-    out = out * np.sin(0.5 * np.pi * np.minimum(t / RAMP, 1.0)) ** 2
+    out = out * np.sin(0.5 * np.pi * np.minimum(t / RIGS_SETTINGS.ramp, 1.0)) ** 2
     return np.asarray(out / np.sqrt(np.mean(out**2)), dtype=np.float64)

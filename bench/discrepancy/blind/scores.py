@@ -53,8 +53,8 @@ class BlindScore:
         false_alarms: Share of clean cases with another verdict than "none".
         unknown_caught: Share of foreign cases with the verdict "unknown".
         both_named: Share of double cases with both effects named.
-        tellable: Share of right verdicts over all cases whose records can tell: expected log odds of at least `TELLABLE`
-            (foreign ones: `TELLABLE_UNKNOWN`) against the nearest rival and against none, where the answers state them.
+        tellable: Share of right verdicts over all cases whose records can tell: expected log odds of at least `tellable`
+            (foreign ones: `tellable_unknown`) against the nearest rival and against none, where the answers state them.
         unknown_tellable: Share of the foreign cases among these that end in "unknown".
         struck_right: Share of cases with the true effect struck from the catalogue that end in unknown or in its kin.
         struck_unknown: Share of them that end in unknown.

@@ -15,6 +15,7 @@ import hashlib
 import math
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -37,11 +38,20 @@ from bench.documents import checked, load_document, parse_json, read_text
 from bench.errors import FileFormatError
 
 FAMILIES = {e.name: e.family for e in CATALOGUE}
-TELLABLE = 10.0
-"""Expected log odds from which a record is said to be able to tell: noise then misleads in a few cases of ten thousand."""
-TELLABLE_UNKNOWN = 30.0
-"""The same for what no catalogue holds. No law of it is there to be fitted: a test that is free in some 25 coefficients, and wrong once in
-a thousand cases, finds it in 95 of 100 from so much on."""
+
+
+@dataclass(frozen=True)
+class ScoringSettings:
+    """Numbers of `bench.discrepancy.blind.scoring`."""
+
+    tellable: float = 10.0
+    """Expected log odds from which a record is said to be able to tell: noise then misleads in a few cases of ten thousand."""
+    tellable_unknown: float = 30.0
+    """The same for what no catalogue holds. No law of it is there to be fitted: a test that is free in some 25 coefficients, and wrong
+    once in a thousand cases, finds it in 95 of 100 from so much on."""
+
+
+SETTINGS = ScoringSettings()
 
 
 def score_blind(results: str | Path, answers: str | Path, *, cases: str | Path | None = None) -> BlindScore:
@@ -211,7 +221,7 @@ def _least_odds(answer: Mapping[str, Any]) -> float:
 
 def _tellable(s: Scored) -> bool:
     """Whether the records can tell the truth of a case."""
-    return _least_odds(s.answer) >= (TELLABLE_UNKNOWN if s.kind == "foreign" else TELLABLE)
+    return _least_odds(s.answer) >= (SETTINGS.tellable_unknown if s.kind == "foreign" else SETTINGS.tellable)
 
 
 def _complaint(s: Scored) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
 
@@ -12,13 +13,23 @@ import numpy as np
 
 from bench.discrepancy.blind.proportions import Share, share_of
 
-BANDS: Mapping[str, tuple[float, ...]] = {
-    "gap": (0.0, 0.06, 0.12, 0.25, math.inf),
-    "noise": (0.0, 0.006, 0.012, math.inf),
-    "log odds against the nearest rival": (-math.inf, 3.0, 10.0, 50.0, math.inf),
-    "log odds against none": (-math.inf, 10.0, 100.0, math.inf),
-}
-"""Edges of the bands that accuracy is reported by."""
+
+@dataclass(frozen=True)
+class StrataSettings:
+    """Numbers of `bench.discrepancy.blind.strata`."""
+
+    bands: Mapping[str, tuple[float, ...]] = field(
+        default_factory=lambda: {
+            "gap": (0.0, 0.06, 0.12, 0.25, math.inf),
+            "noise": (0.0, 0.006, 0.012, math.inf),
+            "log odds against the nearest rival": (-math.inf, 3.0, 10.0, 50.0, math.inf),
+            "log odds against none": (-math.inf, 10.0, 100.0, math.inf),
+        }
+    )
+    """Edges of the bands that accuracy is reported by."""
+
+
+SETTINGS = StrataSettings()
 
 
 def bands_of(name: str, answer: Mapping[str, Any], kind: str) -> dict[str, str]:
@@ -32,7 +43,7 @@ def bands_of(name: str, answer: Mapping[str, Any], kind: str) -> dict[str, str]:
         "log odds against none": odds.get("log_odds_none"),
     }
     bands = {
-        key: _band(value, BANDS[key], percent=key in {"gap", "noise"})
+        key: _band(value, SETTINGS.bands[key], percent=key in {"gap", "noise"})
         for key, value in numbers.items()
         if value is not None
     }
@@ -67,7 +78,7 @@ def by_band(scored: Iterable[tuple[Mapping[str, str], bool]]) -> dict[str, dict[
     for bands, right in scored:
         for dimension, band in bands.items():
             flags[dimension][band].append(right)
-    ordered = ("class", "rig", *BANDS, "sensors", "identification signal", "effect")
+    ordered = ("class", "rig", *SETTINGS.bands, "sensors", "identification signal", "effect")
     return {
         d: {band: share_of(flags[d][band]) for band in sorted(flags[d], key=_order(d))}
         for d in ordered
@@ -76,9 +87,9 @@ def by_band(scored: Iterable[tuple[Mapping[str, str], bool]]) -> dict[str, dict[
 
 
 def _order(dimension: str) -> Callable[[str], Any]:
-    if dimension not in BANDS:
+    if dimension not in SETTINGS.bands:
         return lambda band: band
-    edges = BANDS[dimension]
+    edges = SETTINGS.bands[dimension]
     names = [
         _band(low + 1e-9 if math.isfinite(low) else high - 1e-9, edges, percent=dimension in {"gap", "noise"})
         for low, high in pairwise(edges)

@@ -32,8 +32,16 @@ from bench.laws.normal_force_friction import LOAD_DEPENDENT_FRICTION, TIME_VARYI
 from bench.laws.stiffness import CUBIC_STIFFNESS, QUADRATIC_STIFFNESS, STIFFNESS_DRIFT
 from bench.laws.stribeck import STRIBECK
 
-SLOW = 1e-4
-"""Velocity that rounds a law at rest, as a part of V; friction proper is set-valued in sealed cases."""
+
+@dataclass(frozen=True)
+class WithheldEffectsSettings:
+    """Numbers of `bench.discrepancy.blind.withheld_effects`."""
+
+    slow: float = 1e-4
+    """Velocity that rounds a law at rest, as a part of V; friction proper is set-valued in sealed cases."""
+
+
+SETTINGS = WithheldEffectsSettings()
 
 
 class Reach(NamedTuple):
@@ -151,7 +159,7 @@ def _stribeck(rng: np.random.Generator, r: Reach) -> Shape:
 
     def shape(a: float) -> Drawn:
         values = {"friction_force": a * r.force, "static_excess": excess, "stribeck_velocity": velocity}
-        return Drawn(values, (*values.values(), SLOW * r.velocity))
+        return Drawn(values, (*values.values(), SETTINGS.slow * r.velocity))
 
     return shape
 
@@ -221,7 +229,7 @@ def _power_law(rng: np.random.Generator, r: Reach) -> Shape:
 
     def shape(a: float) -> Drawn:
         values = {"C": a * r.force * r.velocity**-n, "n": n}
-        return Drawn(values, (*values.values(), SLOW * r.velocity))
+        return Drawn(values, (*values.values(), SETTINGS.slow * r.velocity))
 
     return shape
 
@@ -242,7 +250,7 @@ def _time_varying(rng: np.random.Generator, r: Reach) -> Shape:
 
     def shape(a: float) -> Drawn:
         values = {"friction_force": a * r.force, "depth": depth, "frequency": frequency, "phase": phase}
-        return Drawn(values, (*values.values(), SLOW * r.velocity))
+        return Drawn(values, (*values.values(), SETTINGS.slow * r.velocity))
 
     return shape
 
@@ -414,7 +422,7 @@ def _force(r: Reach) -> float:
 
 
 def _slow(r: Reach) -> float:
-    return SLOW * r.velocity
+    return SETTINGS.slow * r.velocity
 
 
 FREE = ("sdof", "joint")

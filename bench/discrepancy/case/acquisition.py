@@ -29,9 +29,17 @@ Interpolation = Literal["linear", "band_limited", "zero_order_hold"]
 INTERPOLATIONS = get_args(Interpolation)
 """Readings of a load between its samples."""
 
-REACH = 48
-"""Samples on either side that a band-limited value is made of; with `KAISER` exact to 1e-5 up to 0.46 of the sample rate."""
-KAISER = 9.0
+
+@dataclass(frozen=True)
+class AcquisitionSettings:
+    """Numbers of `bench.discrepancy.case.acquisition`."""
+
+    reach: int = 48
+    """Samples on either side that a band-limited value is made of; with `kaiser` exact to 1e-5 up to 0.46 of the sample rate."""
+    kaiser: float = 9.0
+
+
+SETTINGS = AcquisitionSettings()
 
 
 def upsampled(samples: Array, factor: int, *, interpolation: str = "linear", periodic: bool = False) -> Array:
@@ -61,12 +69,12 @@ def upsampled(samples: Array, factor: int, *, interpolation: str = "linear", per
         whole = np.asarray(signal.resample(samples, n * factor, axis=0), dtype=np.float64)
         whole[::factor] = samples
         return whole[: len(fine)]
-    pad = min(2 * REACH, n - 1)
+    pad = min(2 * SETTINGS.reach, n - 1)
     extended = np.pad(samples, ((pad, pad), (0, 0)), mode="reflect", reflect_type="odd")
-    t = np.arange(-REACH * factor, REACH * factor + 1) / factor
-    kernel = np.sinc(t) * np.kaiser(len(t), KAISER)
+    t = np.arange(-SETTINGS.reach * factor, SETTINGS.reach * factor + 1) / factor
+    kernel = np.sinc(t) * np.kaiser(len(t), SETTINGS.kaiser)
     dense = signal.upfirdn(kernel, extended, up=factor, axis=0)
-    first = (pad + REACH) * factor
+    first = (pad + SETTINGS.reach) * factor
     return np.ascontiguousarray(dense[first : first + len(fine)])
 
 

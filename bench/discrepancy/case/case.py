@@ -27,8 +27,17 @@ from bench.recording.outliers import bridged, outliers
 
 NO_LOAD = "no load"
 """Channel of a load that is zero throughout, of a model of the user's own that nothing drives."""
-MIN_SAMPLES = 200
-"""Shortest record that is accepted; below it no spectrum, and so no statement about noise, is possible."""
+
+
+@dataclass(frozen=True)
+class CaseSettings:
+    """Numbers of `bench.discrepancy.case.case`."""
+
+    min_samples: int = 200
+    """Shortest record that is accepted; below it no spectrum, and so no statement about noise, is possible."""
+
+
+SETTINGS = CaseSettings()
 
 
 @dataclass(frozen=True)
@@ -189,9 +198,9 @@ def record_from_arrays(
         RecordingError: Too short, not uniform in time, longer dropouts, or channels of another length.
     """
     clock = np.asarray(time, dtype=float)
-    if clock.ndim != 1 or len(clock) < MIN_SAMPLES:
+    if clock.ndim != 1 or len(clock) < SETTINGS.min_samples:
         raise RecordingError(
-            f"record '{name}' has {clock.size} samples; at least {MIN_SAMPLES} are needed: give a longer record"
+            f"record '{name}' has {clock.size} samples; at least {SETTINGS.min_samples} are needed: give a longer record"
         )
     try:
         noted = on_one_clock(clock, {channel: np.asarray(v, dtype=float) for channel, v in values.items()})

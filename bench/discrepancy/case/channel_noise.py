@@ -12,12 +12,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from bench.discrepancy.settings import DEFAULT, CaseSettings
 
-LATTICE = 0.02
-"""Distance from a lattice point, in steps, that the rounding of a text file may leave."""
-REPEATED = 0.5
-"""Part of the samples that must repeat an earlier value, before a lattice is looked for."""
+Array = NDArray[np.float64]
 
 
 def noise_floor(x: Array) -> float:
@@ -39,14 +36,15 @@ def quiet_noise(x: Array) -> float:
     return float(np.median(np.abs(np.diff(x, 3))) / (0.6745 * np.sqrt(20.0)))
 
 
-def quantisation_step(samples: NDArray[np.float64]) -> float:
+def quantisation_step(samples: NDArray[np.float64], *, settings: CaseSettings = DEFAULT.case) -> float:
     """Step of the lattice on which all samples lie; zero where there is none.
 
     Args:
         samples: (n,).
+        settings: `CaseSettings` of the diagnosis.
     """
     values = np.unique(samples)
-    if len(values) < 3 or len(values) > (1.0 - REPEATED) * len(samples):
+    if len(values) < 3 or len(values) > (1.0 - settings.repeated) * len(samples):
         return 0.0
     gaps = np.diff(values)
     # a text file may print the same lattice point in two ways that differ in the last digit
@@ -54,19 +52,22 @@ def quantisation_step(samples: NDArray[np.float64]) -> float:
     step = float(gaps.min())
     multiples = np.round(gaps / step)
     step = float(gaps.sum() / multiples.sum())
-    if np.max(np.abs(gaps / step - np.round(gaps / step))) > LATTICE:
+    if np.max(np.abs(gaps / step - np.round(gaps / step))) > settings.lattice:
         return 0.0
     return step
 
 
-def raised_noise(noise: float, samples: NDArray[np.float64]) -> float:
+def raised_noise(
+    noise: float, samples: NDArray[np.float64], *, settings: CaseSettings = DEFAULT.case
+) -> float:
     """Noise of a channel with that of its quantisation, where the latter is the coarser one.
 
     Args:
         noise: One-sigma noise as stated.
         samples: (n,).
+        settings: `CaseSettings` of the diagnosis.
     """
-    step = quantisation_step(samples)
+    step = quantisation_step(samples, settings=settings)
     if step <= noise:
         return noise
     return float(np.hypot(noise, step / np.sqrt(12.0)))

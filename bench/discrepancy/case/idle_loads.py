@@ -13,14 +13,10 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from bench.discrepancy.case.case import Case, CaseRecord
-
-BINS = 16
-"""Frequency bins whose power is compared with the noise at a time."""
-SURPRISE = 1e-3
-"""Probability with which noise alone may be taken for a load."""
+from bench.discrepancy.settings import DEFAULT, CaseSettings
 
 
-def without_idle_noise(case: Case) -> Case:
+def without_idle_noise(case: Case, *, settings: CaseSettings = DEFAULT.case) -> Case:
     """Return a case whose measured loads are zero in those records where they read nothing but their stated noise."""
     noise = {c.name: c.noise_std or 0.0 for c in case.channels if c.role == "measured"}
 
@@ -28,7 +24,7 @@ def without_idle_noise(case: Case) -> Case:
         silent = {
             name: np.zeros_like(record.values[name])
             for name, level in noise.items()
-            if level > 0.0 and name in record.values and idle(record.values[name], level)
+            if level > 0.0 and name in record.values and idle(record.values[name], level, settings=settings)
         }
         return replace(record, values={**record.values, **silent}) if silent else record
 
@@ -53,10 +49,14 @@ def idle_notes(case: Case, quiet: Case) -> tuple[str, ...]:
     )
 
 
-def idle(samples: NDArray[np.float64], noise: float) -> bool:
+def idle(samples: NDArray[np.float64], noise: float, *, settings: CaseSettings = DEFAULT.case) -> bool:
     """Whether samples (n,) are white noise of a standard deviation at most that stated, in every band of frequencies."""
     power = np.abs(np.fft.rfft(samples)[1:-1]) ** 2 / (0.5 * len(samples) * noise**2)
-    if len(power) < BINS or abs(np.mean(samples)) > noise:
+    if len(power) < settings.idle_bins or abs(np.mean(samples)) > noise:
         return False
-    bands = power[: len(power) // BINS * BINS].reshape(-1, BINS).sum(axis=1)
-    return bool(bands.max() < chi2.isf(SURPRISE / len(bands), 2 * BINS))
+    bands = (
+        power[: len(power) // settings.idle_bins * settings.idle_bins]
+        .reshape(-1, settings.idle_bins)
+        .sum(axis=1)
+    )
+    return bool(bands.max() < chi2.isf(settings.idle_surprise / len(bands), 2 * settings.idle_bins))

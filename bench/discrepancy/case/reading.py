@@ -7,7 +7,7 @@ change every result (times that can hardly be seconds) stop here; what was repai
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -33,8 +33,16 @@ from bench.recording.units import conversion
 GROUPS = ("identification", "validation")
 """What the names of records begin with: those that serve to find the effect, and those that judge."""
 
-MOST_LISTED = 8
-"""Unused columns that a note lists by name."""
+
+@dataclass(frozen=True)
+class ReadingSettings:
+    """Numbers of `bench.discrepancy.case.reading`."""
+
+    most_listed: int = 8
+    """Unused columns that a note lists by name."""
+
+
+SETTINGS = ReadingSettings()
 
 _THOUSANDS = {1: "ms", 2: "us", 3: "ns"}
 
@@ -162,8 +170,12 @@ def _read_record(file: Path, name: str, known: _Channels, units: dict[str, str],
     except (RecordingError, UnitError, UnknownNameError) as error:
         raise _at(file, error) from None
     if contents.unused:
-        listed = ", ".join(f"'{heading[:60]}'" for heading in contents.unused[:MOST_LISTED])
-        more = f" and {len(contents.unused) - MOST_LISTED} more" if len(contents.unused) > MOST_LISTED else ""
+        listed = ", ".join(f"'{heading[:60]}'" for heading in contents.unused[: SETTINGS.most_listed])
+        more = (
+            f" and {len(contents.unused) - SETTINGS.most_listed} more"
+            if len(contents.unused) > SETTINGS.most_listed
+            else ""
+        )
         notes = (*notes, f"columns that nominal.json does not name are not used: {listed}{more}")
     return record_from_arrays(name, time, arrays, at_rest=at_rest, notes=(*contents.notes, *notes))
 

@@ -7,6 +7,7 @@ one another, with the remedy, before one that does not can become a diagnosis th
 from __future__ import annotations
 
 import contextlib
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
@@ -263,8 +264,17 @@ CONSTANTS = {
     ("damping", "axial"): ("N s/m",), ("damping", "torsional"): ("N m s/rad", "N m s"),
 }  # fmt: skip
 """Kind of a nominal parameter and its axis, to the SI units it may have."""
-MISMATCH = 1e-3
-"""Relative difference of two conversion factors beyond which units do not belong together."""
+
+
+@dataclass(frozen=True)
+class SchemaSettings:
+    """Numbers of `bench.discrepancy.case.schema`."""
+
+    mismatch: float = 1e-3
+    """Relative difference of two conversion factors beyond which units do not belong together."""
+
+
+SETTINGS = SchemaSettings()
 
 
 def check_units(case: Case) -> None:
@@ -291,7 +301,7 @@ def check_units(case: Case) -> None:
             axis, expected = table[base]
             factor = _factor(f"channel '{channel.name}'", channel.unit, (expected,))
             first = seen.setdefault(axis, (channel.name, channel.unit, factor))
-            if abs(factor / first[2] - 1.0) > MISMATCH:
+            if abs(factor / first[2] - 1.0) > SETTINGS.mismatch:
                 raise UnitError(
                     f"'{channel.name}' is in {channel.unit} and '{first[0]}' in {first[1]}, which do not belong together "
                     f"(a factor of {factor / first[2]:.6g}); convert one of the columns"
@@ -308,7 +318,7 @@ def check_units(case: Case) -> None:
         if axis not in motion or axis not in loads:
             continue
         wanted = loads[axis][2] / motion[axis][2]
-        if abs(factor / wanted - 1.0) > MISMATCH:
+        if abs(factor / wanted - 1.0) > SETTINGS.mismatch:
             raise UnitError(
                 f"'{parameter.name}' is in {parameter.unit}, but '{loads[axis][0]}' in {loads[axis][1]} and "
                 f"'{motion[axis][0]}' in {motion[axis][1]} ask for {wanted:.6g} times {CONSTANTS[kind, axis][0]}: "

@@ -21,6 +21,7 @@ from bench.discrepancy.model.mjcf_rest import counted_from_rest
 from bench.discrepancy.model.mjcf_units import expected_units
 from bench.discrepancy.model.mjcf_values import value_notes
 from bench.discrepancy.model.rigs import structure_of
+from bench.discrepancy.settings import DEFAULT, DiagnosisSettings
 from bench.errors import ModelError, UnitError
 
 
@@ -36,12 +37,13 @@ class Admitted(NamedTuple):
     notes: tuple[str, ...]
 
 
-def admitted(declared: Case, *, anyway: bool = False) -> Admitted:
+def admitted(declared: Case, *, anyway: bool = False, settings: DiagnosisSettings = DEFAULT) -> Admitted:
     """Admit a case to the diagnosis.
 
     Args:
         declared: The case as read.
         anyway: Whether what is doubtful is noted rather than refused.
+        settings: Thresholds of the diagnosis.
 
     Raises:
         UnitError: A unit does not fit, or a channel is off by a factor or a sign.
@@ -58,12 +60,14 @@ def admitted(declared: Case, *, anyway: bool = False) -> Admitted:
     if own:
         rig = rig_of(declared)
         case, said = converted(declared, *expected_units(declared, rig))
-        case, limited = within_limits(case, rig, actuators_of(case, rig))
-        reference = reference_of(case, rig)
+        case, limited = within_limits(
+            case, rig, actuators_of(case, rig, settings=settings.model), settings=settings.model
+        )
+        reference = reference_of(case, rig, settings=settings.model)
         case, shifted = counted_from_rest(case, reference)
-        said = (*said, *limited, *shifted, *value_notes(case, rig))
-    case = with_starts_found(case)
-    problem = Problem(case, structure_of(case), case.identification)
+        said = (*said, *limited, *shifted, *value_notes(case, rig, settings=settings.model))
+    case = with_starts_found(case, settings=settings)
+    problem = Problem(case, structure_of(case, settings=settings), case.identification, settings=settings)
     refuse(problem)
     doubts = suspicions(declared, problem)
     for first in doubts:

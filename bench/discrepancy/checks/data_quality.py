@@ -21,6 +21,7 @@ from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.case.channel_noise import noise_floor, quantisation_step, quiet_noise
 from bench.discrepancy.checks.scales import observed
 from bench.discrepancy.likelihood.problem import Array, Problem
+from bench.discrepancy.settings import DEFAULT, ChecksSettings, DiagnosisSettings
 from bench.errors import IdentificationError, RecordingError
 
 UNITS = {
@@ -29,33 +30,6 @@ UNITS = {
     4.44822: "N against lbf",
 }  # fmt: skip
 """Factors that a mistaken unit leaves."""
-SHAPE = 0.9
-"""Correlation from which two signals count as the same but for a factor."""
-BETWEEN_CHANNELS = 0.04
-"""Relative tolerance of a factor between two channels of one motion: a sensor's calibration is no better."""
-TO_MODEL = 0.2
-"""Relative tolerance of a factor between a response and its nominal prediction, whose parameters are wrong by some percent."""
-PERIODS = 10
-"""Periods of the slowest resonance below which a record is called short."""
-SAMPLES_A_PERIOD = 6
-"""Samples a period of the fastest resonance below which a record is called coarse."""
-LEVELLED, NEIGHBOURS = 0.01, 5.0
-"""A channel saturates where more than this part of its samples, and this many times as many as in the next cell, lie at its
-extreme. A pure sine has 2.4 times as many."""
-SQUARE = 0.5
-"""Part of the samples at the extremes from which a signal is a square wave or a hold, not a clipped one."""
-UNDERSTATED = 3.0
-"""Times that the high-frequency floor of a channel exceeds its stated noise."""
-RATE = 1e-3
-"""Relative difference of two sample rates that is no rounding."""
-STRONG = 100.0
-"""Power over that of the noise from which a frequency counts in a comparison of two channels."""
-SHIFTS = 50
-"""Largest shift between load and responses that is looked for, in samples."""
-PIECES = 8
-"""Pieces of a record over which a lag is followed."""
-ANGLES = 1001
-"""Displacements at which the stiffness of a bending spring is looked at."""
 
 
 def refuse(problem: Problem) -> None:
@@ -141,7 +115,7 @@ def _tipping(case: Case, problem: Problem) -> Iterator[str]:
     structure, values = problem.structure, problem.nominal
     tangent = structure.at(values).stiffness
     for spring in structure.springs:
-        angle = np.linspace(-spring.reach, spring.reach, ANGLES)
+        angle = np.linspace(-spring.reach, spring.reach, problem.settings.checks.angles)
         bent = spring.slope_along(spring.coefficients(values), np.outer(angle, spring.row))
         stiffness = bent + float(spring.row @ tangent @ spring.row)
         limit = float(np.min(np.abs(angle[stiffness < 0.0]), initial=np.inf))
@@ -156,20 +130,21 @@ def _tipping(case: Case, problem: Problem) -> Iterator[str]:
 
 
 def _short(case: Case, problem: Problem) -> Iterator[str]:
+    settings = problem.settings.checks
     slow, fast = _resonances(problem)
     if problem.driven or slow <= 0.0:
         return
     for record in (*case.identification, *case.validation):
         periods = slow * len(record) * record.step
-        if periods < PERIODS:
+        if periods < settings.periods:
             yield (
                 f"'{record.name}' lasts {periods:.2g} periods of the {slow:.3g} Hz resonance; "
-                f"at least {PERIODS} are wanted to tell effects apart"
+                f"at least {settings.periods} are wanted to tell effects apart"
             )
-        if fast * record.step * SAMPLES_A_PERIOD > 1.0:
+        if fast * record.step * settings.samples_a_period > 1.0:
             yield (
                 f"'{record.name}' has {1.0 / (fast * record.step):.2g} samples a period of the {fast:.3g} Hz resonance; "
-                f"sample at {SAMPLES_A_PERIOD * fast:.3g} Hz or more"
+                f"sample at {settings.samples_a_period * fast:.3g} Hz or more"
             )
 
 
@@ -178,7 +153,7 @@ def _clock(case: Case, problem: Problem) -> Iterator[str]:
     if not isinstance(stated, int | float):
         return
     for record in (*case.identification, *case.validation):
-        if abs(stated * record.step - 1.0) > RATE:
+        if abs(stated * record.step - 1.0) > problem.settings.checks.rate:
             yield (
                 f"nominal.json says {stated:.6g} Hz, the time column of '{record.name}' {1.0 / record.step:.6g} Hz; "
                 "the time column was taken: check which clock is right"
@@ -206,22 +181,25 @@ def _saturated(case: Case, problem: Problem) -> Iterator[str]:
     for record in (*case.identification, *case.validation):
         for name in (*problem.structure.loads, *problem.structure.channels):
             noise = case.channel(name).noise_std or 0.0
-            if _levelled(record.values[name], noise):
+            if _levelled(record.values[name], noise, settings=problem.settings):
                 yield (
                     f"'{name}' in '{record.name}' dwells at its extreme: "
                     "it may be saturated; a wider range or a smaller load would show"
                 )
 
 
-def _levelled(samples: Array, noise: float) -> bool:
+def _levelled(samples: Array, noise: float, *, settings: DiagnosisSettings) -> bool:
     """Whether a channel dwells at its upper or lower extreme as a clipped one does."""
-    step = quantisation_step(samples)
+    step = quantisation_step(samples, settings=settings.case)
     width = max(4.0 * noise, 0.005 * float(np.ptp(samples)), 1.01 * step)
     for signed in (samples, -samples):
         depth = float(signed.max()) - signed
         top = np.mean(depth <= width)
         below = np.mean((depth > width) & (depth <= 2.0 * width))
-        if LEVELLED < top < SQUARE and top > NEIGHBOURS * below:
+        if (
+            settings.checks.levelled < top < settings.checks.square
+            and top > settings.checks.neighbours * below
+        ):
             return True
     return False
 
@@ -234,7 +212,7 @@ def _understated(case: Case, problem: Problem) -> Iterator[str]:
             for record in problem.records
         )
         unit = case.channel(name).unit
-        if stated and floor > UNDERSTATED * max(stated, problem.noise[c]):
+        if stated and floor > problem.settings.checks.understated * max(stated, problem.noise[c]):
             yield (
                 f"the noise stated for '{name}' is {stated:.3g} {unit}, but nowhere in its spectrum is there less than "
                 f"{floor:.3g} {unit}; measure it at rest, or everything will look like an effect"
@@ -279,7 +257,13 @@ class Comparison(NamedTuple):
 
 
 def compare(
-    first: Array, second: Array, *, orders: tuple[int, int], noise: tuple[float, float], step: float
+    first: Array,
+    second: Array,
+    *,
+    orders: tuple[int, int],
+    noise: tuple[float, float],
+    step: float,
+    settings: ChecksSettings = DEFAULT.checks,
 ) -> Comparison | None:
     """Compare two channels that measure derivatives of one motion.
 
@@ -289,21 +273,22 @@ def compare(
         orders: Derivative that each measures.
         noise: Their noise.
         step: Time between samples [s].
+        settings: `ChecksSettings` of the diagnosis.
 
     Returns:
         The comparison; None where there is no frequency at which both are strong.
     """
-    whole = _cross(first, second, orders, noise, step)
+    whole = _cross(first, second, orders, noise, step, settings=settings)
     if whole is None:
         return None
     factor, correlation, lag = whole
     pieces = []
-    for part in np.array_split(np.arange(len(first)), PIECES):
-        local = _cross(first[part], second[part], orders, noise, step)
+    for part in np.array_split(np.arange(len(first)), settings.pieces):
+        local = _cross(first[part], second[part], orders, noise, step, settings=settings)
         if local is not None:
             pieces.append((float(np.mean(part)), local[2]))
     drift = steady = 0.0
-    if len(pieces) >= PIECES // 2:
+    if len(pieces) >= settings.pieces // 2:
         x, y = np.array(pieces).T
         slope, offset = np.polyfit(x, y, 1)
         drift = float(slope * len(first))
@@ -311,15 +296,23 @@ def compare(
     return Comparison(factor, correlation, lag, drift, steady)
 
 
-def _cross(first: Array, second: Array, orders: tuple[int, int], noise: tuple[float, float], step: float):
+def _cross(
+    first: Array,
+    second: Array,
+    orders: tuple[int, int],
+    noise: tuple[float, float],
+    step: float,
+    *,
+    settings: ChecksSettings,
+):
     """Factor, correlation and lag from the cross-spectrum of two windowed channels."""
     n = len(first)
     window = np.hanning(n)
     omega = 2.0 * np.pi * np.fft.rfftfreq(n, step)
     x, y = (np.fft.rfft((c - c.mean()) * window) for c in (first, second))
     floor = 0.375 * n
-    strong = (np.abs(x) ** 2 > STRONG * noise[0] ** 2 * floor) & (
-        np.abs(y) ** 2 > STRONG * noise[1] ** 2 * floor
+    strong = (np.abs(x) ** 2 > settings.strong * noise[0] ** 2 * floor) & (
+        np.abs(y) ** 2 > settings.strong * noise[1] ** 2 * floor
     )
     # the window leaks a strong resonance into the lowest and highest frequencies, where a derivative magnifies it
     strong &= (np.abs(x) > 0.01 * np.abs(x).max()) | (np.abs(y) > 0.01 * np.abs(y).max())
@@ -351,23 +344,28 @@ def _between_channels(problem: Problem) -> Iterator[str]:
                 orders=(first.order, second.order),
                 noise=(levels.get(first.channel, first.noise), levels.get(second.channel, second.noise)),
                 step=record.step,
+                settings=problem.settings.checks,
             )
             if pair is not None:
-                yield from _pair_notes(first.channel, second.channel, pair, record)
+                yield from _pair_notes(
+                    first.channel, second.channel, pair, record, settings=problem.settings.checks
+                )
 
 
-def _pair_notes(first: str, second: str, pair: Comparison, record: CaseRecord) -> Iterator[str]:
-    if abs(pair.correlation) < SHAPE:
+def _pair_notes(
+    first: str, second: str, pair: Comparison, record: CaseRecord, *, settings: ChecksSettings
+) -> Iterator[str]:
+    if abs(pair.correlation) < settings.shape:
         return
     if pair.correlation < 0.0:
         yield f"'{first}' and '{second}' have opposite signs; turn one of them round"
-    unit = unit_factor(pair.factor, BETWEEN_CHANNELS)
+    unit = unit_factor(pair.factor, settings.factor_between_channels)
     if unit:
         yield f"'{first}' is {pair.factor:.4g} times what '{second}' says: {unit}? Check the units of the two"
     if abs(pair.lag) > record.step:
         late, early = (first, second) if pair.lag > 0.0 else (second, first)
         yield f"'{late}' lags '{early}' by {1e3 * abs(pair.lag):.3g} ms in '{record.name}'; align the channels if that is known"
-    if abs(pair.drift) > 2.0 * record.step and pair.steady > SHAPE:
+    if abs(pair.drift) > 2.0 * record.step and pair.steady > settings.shape:
         yield (
             f"the lag between '{first}' and '{second}' changes by {1e3 * pair.drift:.3g} ms along '{record.name}': "
             "their clocks drift apart; resample one of them"
@@ -376,6 +374,7 @@ def _pair_notes(first: str, second: str, pair: Comparison, record: CaseRecord) -
 
 def _against_model(problem: Problem) -> Iterator[str]:
     """Notes on responses that are the nominal prediction but for a unit, a sign or a shift of all channels."""
+    settings = problem.settings.checks
     for i, record in enumerate(problem.records):
         predicted = problem.simulate((), np.zeros(len(problem.nominal)), record)
         scaled: dict[str, list[str]] = {}
@@ -389,12 +388,12 @@ def _against_model(problem: Problem) -> Iterator[str]:
             name = problem.structure.channels[c]
             correlation = float(np.corrcoef(predicted[:, c], record.values[name])[0, 1])
             factor = float(np.std(record.values[name]) / np.std(predicted[:, c]))
-            unit = unit_factor(factor, TO_MODEL)
-            if unit and (abs(correlation) > SHAPE or not 0.02 < factor < 50.0):
+            unit = unit_factor(factor, settings.factor_to_model)
+            if unit and (abs(correlation) > settings.shape or not 0.02 < factor < 50.0):
                 scaled.setdefault(f"{factor:.3g} times what the nominal model predicts: {unit}?", []).append(
                     name
                 )
-            if correlation < -SHAPE:
+            if correlation < -settings.shape:
                 turned.append(name)
         for text, names in scaled.items():
             yield f"{_quoted(names)} is {text} Check its unit, and that of the load"
@@ -407,6 +406,7 @@ def _against_model(problem: Problem) -> Iterator[str]:
 
 def _shifted(problem: Problem, index: int, predicted: Array) -> Iterator[str]:
     """A shift of all channels against a measured load, that the nominal parameters cannot imitate."""
+    settings = problem.settings.checks
     record = problem.records[index]
     orders = {o.order for o in problem.structure.observers}
     measured = any(problem.case.channel(name).role == "measured" for name in problem.structure.loads)
@@ -419,7 +419,7 @@ def _shifted(problem: Problem, index: int, predicted: Array) -> Iterator[str]:
         moved[p] = 0.1
         columns.append(10.0 * (problem.simulate((), moved, record) - predicted) / scale)
     responses = np.column_stack([record.values[name] for name in problem.structure.channels]) / scale
-    shifts = np.arange(-SHIFTS, SHIFTS + 1)
+    shifts = np.arange(-settings.shifts, settings.shifts + 1)
     model = predicted / scale
     powers = np.sum(responses**2) + np.sum(model**2) - 2.0 * _correlated(responses, model, shifts)
     if columns:
@@ -428,7 +428,7 @@ def _shifted(problem: Problem, index: int, predicted: Array) -> Iterator[str]:
             imitated = direction.reshape(responses.shape)
             powers -= (_correlated(responses, imitated, shifts) - np.sum(imitated * model)) ** 2
     best = int(shifts[int(np.argmin(powers))])
-    still = powers[SHIFTS]
+    still = powers[settings.shifts]
     if abs(best) > 1 and min(powers) < 0.1 * still and still > 1e-3 * responses.size:
         verb = "lag" if best > 0 else "lead"
         yield (

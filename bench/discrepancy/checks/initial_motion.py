@@ -24,6 +24,7 @@ from bench.discrepancy.case.channel_noise import noise_floor
 from bench.discrepancy.likelihood.window_whitening import channels_of, drifts
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.model.structure import Structure
+from bench.discrepancy.settings import DEFAULT, ChecksSettings, DiagnosisSettings
 from bench.discrepancy.simulation.linear_response import linear_run
 from bench.discrepancy.simulation.stick_slip import LinearStructure
 
@@ -31,35 +32,24 @@ Array = NDArray[np.float64]
 
 STATED = "starts_in_motion"
 """Option of a case that says which records start in motion; where it is given, nothing is looked for."""
-SHARE_OF_A_PERIOD = 0.25
-"""Part of the slowest period over which a start is looked for: what is missing has hardly grown in it."""
-FEWEST = 24
-"""Fewest samples of that."""
-MATERIAL = 0.05
-"""Least part of a channel's standard deviation that the free response to a start has to make."""
-CERTAIN = 6.0
-"""Standard deviations by which it has to differ from rest."""
-FORGOTTEN = 0.1
-"""Power of the error beyond noise in the second half of a record, over that in the first, from which it has died away."""
-INDEPENDENT = 4
-"""Pieces of what no start, force, gain or delay explains that say anything of their own: it runs through the samples."""
-GAIN, SHIFT = 0.3, 5.0
-"""Prior standard deviations of a channel's gain error and of its delay, in samples."""
 
 Prediction = Callable[[CaseRecord], Mapping[str, Array]]
 
 
-def with_starts_found(case: Case, predict: Prediction | None = None) -> Case:
+def with_starts_found(
+    case: Case, predict: Prediction | None = None, *, settings: DiagnosisSettings = DEFAULT
+) -> Case:
     """Return a case whose records that evidently begin in motion are said to, so that their initial states are estimated.
 
     Args:
         case: A case; one that states which records start in motion, or whose motion is prescribed or drifts, is returned as it is.
         predict: Free run from rest of a record, response channel to samples (n,), that shows more than that of the nominal
             model does once something is known of what is missing; that of the nominal structure where None.
+        settings: Thresholds of the diagnosis.
     """
     if STATED in case.options or case.rig == "damper":
         return case
-    structure = structure_of(case)
+    structure = structure_of(case, settings=settings)
     table = {p.name: p.value for p in case.parameters}
     linear = structure.at(np.array([table[name] for name in structure.parameters]))
     duration = max(len(r) * r.step for r in (*case.identification, *case.validation))
@@ -69,8 +59,10 @@ def with_starts_found(case: Case, predict: Prediction | None = None) -> Case:
     def looked_at(record: CaseRecord) -> CaseRecord:
         if not record.at_rest or record.periodic:
             return record
-        moves = _begins_off_rest(case, structure, linear, record, predict)
-        moves = moves or (predict is not None and _dies_away(case, structure, record, predict))
+        moves = _begins_off_rest(case, structure, linear, record, predict, settings=settings.checks)
+        moves = moves or (
+            predict is not None and _dies_away(case, structure, record, predict, settings=settings.checks)
+        )
         return replace(record, at_rest=False) if moves else record
 
     return replace(
@@ -86,9 +78,11 @@ def _begins_off_rest(
     linear: LinearStructure,
     record: CaseRecord,
     predict: Prediction | None,
+    *,
+    settings: ChecksSettings,
 ) -> bool:
     """Whether the first positions of a record cannot be those of a start from rest, whatever force is missing."""
-    n, n_dof = _samples(linear, record), len(structure.dofs)
+    n, n_dof = _samples(linear, record, settings=settings), len(structure.dofs)
     structure = replace(structure, observers=tuple(o for o in structure.observers if o.order == 0))
     rows = np.array([o.row for o in structure.observers]).reshape(-1, n_dof)
     measured, noise = _measured(case, structure, record)
@@ -113,27 +107,35 @@ def _begins_off_rest(
     sizes = [float(np.min(spread / np.maximum(np.abs(c).max(axis=0), 1e-300))) for c in columns]
     for own in np.eye(len(noise)):
         columns += [predicted * own, np.gradient(predicted * own, axis=0)]
-        sizes += [GAIN, SHIFT]
+        sizes += [settings.start_gain, settings.start_shift]
     found, deviation = _estimated(
-        np.stack(columns, axis=-1) * sizes / noise[:, None], (measured[:n] - predicted) / noise
+        np.stack(columns, axis=-1) * sizes / noise[:, None],
+        (measured[:n] - predicted) / noise,
+        settings=settings,
     )
     position, velocity, force = found[: 3 * n_dof].reshape(3, n_dof)
     forces = force * sizes[2 * n_dof : 3 * n_dof]
     balance = np.linalg.lstsq(linear.stiffness, forces, rcond=None)[0] / sizes[:n_dof]
     off_balance = np.minimum(np.abs(position), np.abs(position - balance))
     off = np.append(off_balance, np.abs(velocity))
-    return bool(np.any((off > MATERIAL) & (off > CERTAIN * deviation[: 2 * n_dof])))
+    return bool(
+        np.any((off > settings.start_material) & (off > settings.start_certain * deviation[: 2 * n_dof]))
+    )
 
 
-def _dies_away(case: Case, structure: Structure, record: CaseRecord, predict: Prediction) -> bool:
+def _dies_away(
+    case: Case, structure: Structure, record: CaseRecord, predict: Prediction, *, settings: ChecksSettings
+) -> bool:
     """Whether the error of a free run from rest is there with the first sample and gone in the second half."""
     measured, noise = _measured(case, structure, record)
     error = measured - _predicted(structure, record, predict)
     first = np.abs(error[0])
-    begins = (first > CERTAIN * noise) & (first > MATERIAL * np.std(measured, axis=0))
+    begins = (first > settings.start_certain * noise) & (
+        first > settings.start_material * np.std(measured, axis=0)
+    )
     half = len(error) // 2
     early, late = (np.mean(part**2, axis=0) - noise**2 for part in (error[:half], error[half:]))
-    return bool(np.any(begins & (late < FORGOTTEN * early)))
+    return bool(np.any(begins & (late < settings.start_forgotten * early)))
 
 
 def _measured(case: Case, structure: Structure, record: CaseRecord) -> tuple[Array, Array]:
@@ -152,16 +154,16 @@ def _predicted(structure: Structure, record: CaseRecord, predict: Prediction) ->
     return np.column_stack([free_run[o.channel] for o in structure.observers])
 
 
-def _samples(linear: LinearStructure, record: CaseRecord) -> int:
+def _samples(linear: LinearStructure, record: CaseRecord, *, settings: ChecksSettings) -> int:
     """Samples at the beginning that are looked at."""
     squares = np.linalg.eigvals(np.linalg.solve(linear.mass, linear.stiffness)).real
     duration = len(record) * record.step
     slowest = max(float(squares.min()), (2.0 * np.pi / duration) ** 2)
-    samples = SHARE_OF_A_PERIOD * 2.0 * np.pi / np.sqrt(slowest) / record.step
-    return int(np.clip(samples, FEWEST, len(record)))
+    samples = settings.start_share * 2.0 * np.pi / np.sqrt(slowest) / record.step
+    return int(np.clip(samples, settings.start_samples, len(record)))
 
 
-def _estimated(columns: Array, gap: Array) -> tuple[Array, Array]:
+def _estimated(columns: Array, gap: Array, *, settings: ChecksSettings) -> tuple[Array, Array]:
     """Coefficients (k,) of unit prior by which columns (n, n_channels, k) make a gap (n, n_channels), and their deviations.
 
     What no column explains is laid to the model: deviations grow with it.
@@ -170,5 +172,5 @@ def _estimated(columns: Array, gap: Array) -> tuple[Array, Array]:
     covariance = np.linalg.inv(matrix.T @ matrix + np.eye(matrix.shape[1]))
     found = covariance @ (matrix.T @ right)
     left = right - matrix @ found
-    excess = 1.0 + max(float(left @ left) - len(right), 0.0) / INDEPENDENT
+    excess = 1.0 + max(float(left @ left) - len(right), 0.0) / settings.start_independent
     return found, np.sqrt(excess * np.diag(covariance))

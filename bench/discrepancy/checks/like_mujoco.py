@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import mujoco
@@ -22,30 +21,9 @@ from bench import native
 from bench.discrepancy.case.case import CaseRecord
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.mjcf_reference import Reference
+from bench.discrepancy.settings import LikenessSettings
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class LikenessSettings:
-    """When the two simulations count as one.
-
-    Attributes:
-        noise: RMS of the difference over the noise of a channel from which it could be taken for an effect. A third of the noise raises
-            the power of the residuals by a tenth.
-        share: RMS of the difference over that of the response, from which it could: what is below is less than the error that anyone
-            expects of a simulation.
-        integration: Times the change that halving MuJoCo's step makes which are still its own error of integration.
-        reached: Times the largest measured response up to which the runs are compared: what acts only beyond the motion that was measured
-            (a pendulum without its friction that goes over the top) has nothing to do with the records.
-        steps: MuJoCo's steps spent on a case at the coarser of two step sizes: a second, about.
-    """
-
-    noise: float = 0.3
-    share: float = 0.01
-    integration: float = 3.0
-    reached: float = 1.5
-    steps: int = 24_000
 
 
 class Deviation(NamedTuple):
@@ -130,7 +108,7 @@ def unlike_mujoco(
         records: Records whose loads are tried.
         settings: When they count as one.
     """
-    chosen = settings or LikenessSettings()
+    chosen = settings or problem.settings.checks.likeness
     if problem.driven or reference.unsteady:
         return ""
     plain = copy.copy(problem)

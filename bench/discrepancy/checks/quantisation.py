@@ -24,9 +24,6 @@ if TYPE_CHECKING:
     from bench.discrepancy.likelihood.problem import Problem
     from bench.discrepancy.motion.observer import Observer
 
-COARSE = 4.0
-"""Step over noise from which the quantisation outweighs the noise."""
-
 
 def recorded(problem: Problem, catalogue: Sequence[Effect]) -> tuple[NamedEffect, ...]:
     """Effects of a catalogue that show in the samples themselves: channels whose lattice is coarser than their noise.
@@ -42,8 +39,13 @@ def recorded(problem: Problem, catalogue: Sequence[Effect]) -> tuple[NamedEffect
     for effect in (e for e in catalogue if e.site == "record"):
         for observer in problem.structure.observers:
             channel = problem.case.channel(observer.channel)
-            step = max(quantisation_step(record.values[channel.name]) for record in problem.records)
-            if observer.order != orders[effect.quantity] or step <= COARSE * _apart(problem, channel, step):
+            step = max(
+                quantisation_step(record.values[channel.name], settings=problem.settings.case)
+                for record in problem.records
+            )
+            if observer.order != orders[
+                effect.quantity
+            ] or step <= problem.settings.checks.coarse_step * _apart(problem, channel, step):
                 continue
             out.append(
                 NamedEffect(

@@ -12,7 +12,6 @@ References:
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -24,43 +23,11 @@ from bench.discrepancy.case.channel_noise import noise_floor
 from bench.discrepancy.case.single_axis import motion_channels
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.nominal_elements import own_force
+from bench.discrepancy.settings import DEFAULT, ChecksSettings, ScaleSettings
 from bench.errors import UnitError
 from bench.recording.units import conversion, read_as, si_unit
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class ScaleSettings:
-    """When a factor or a sign counts as one of the recording.
-
-    Attributes:
-        gross: Factor between two channels of one motion from which it is no error of calibration: the gain errors that the catalogue
-            itself allows for have a standard deviation of 0.3, so that this is beyond six of them.
-        coherence: Squared coherence from which two channels tell the same motion at a frequency.
-        strong: Power over that of the noise from which a frequency counts.
-        leak: Part of the largest power below which a frequency holds what the window leaks into it.
-        better: How many times better one factor has to describe the log ratios of all bands than no factor does.
-        unit: Ratio up to which a factor against the nominal model is that of a unit; nominal parameters are wrong by so much.
-        any_factor: Factor against the nominal model that is reported whether or not it is one of a unit: no parameter that anyone
-            states with an uncertainty is wrong by it in all bands.
-        octaves: Width of the band in which a sign has to be turned, against the nominal model: a resonance that is misplaced by
-            less turns the sign only within it.
-        segments: Segments that a record is cut into for its spectra, half of each in the next one.
-        cycles: Cycles of the strongest frequency that a segment holds at least, as far as the record allows: the window spreads a line
-            over two frequencies either way.
-    """
-
-    gross: float = 3.0
-    coherence: float = 0.9
-    strong: float = 100.0
-    leak: float = 1e-4
-    better: float = 10.0
-    unit: float = 1.25
-    any_factor: float = 10.0
-    octaves: float = 2.0
-    segments: int = 8
-    cycles: int = 6
 
 
 class Spectra(NamedTuple):
@@ -97,8 +64,6 @@ class Bands(NamedTuple):
     frequencies: Array
 
 
-CALIBRATION = 1.1
-"""Ratio between the factor of two channels and that of a unit which the errors of calibration and estimation leave."""
 SUSPECTS = {
     "m": ("mm", "cm", "um", "in", "ft"), "rad": ("deg", "rev", "mrad"), "m/s": ("mm/s", "cm/s", "in/s", "km/h"),
     "rad/s": ("deg/s", "rpm"), "m/s^2": ("g", "mm/s^2", "cm/s^2", "in/s^2", "mg"), "rad/s^2": ("deg/s^2",),
@@ -115,7 +80,7 @@ def suspicions(declared: Case, problem: Problem, settings: ScaleSettings | None 
         problem: Its identification records and nominal model, in the units of the model.
         settings: When a factor counts.
     """
-    chosen = settings or ScaleSettings()
+    chosen = settings or problem.settings.checks.scales
     between = tuple(dict.fromkeys(_between(declared, problem, chosen)))
     if between or problem.driven:
         return between
@@ -155,7 +120,7 @@ def spectra(
 
 def compare_channels(
     first: Array, second: Array, *, orders: tuple[int, int], noise: tuple[float, float], step: float,
-    settings: ScaleSettings | None = None,
+    settings: ScaleSettings = DEFAULT.checks.scales,
 ) -> Pair | None:  # fmt: skip
     """The factor and sign between two channels of one motion; None where they have no frequency in common.
 
@@ -167,11 +132,10 @@ def compare_channels(
         step: Time between samples [s].
         settings: When a factor counts.
     """
-    chosen = settings or ScaleSettings()
-    found = spectra(first, second, step, noise, chosen)
+    found = spectra(first, second, step, noise, settings)
     with np.errstate(divide="ignore", invalid="ignore"):
         coherence = np.abs(found.cross) ** 2 / (found.first * found.second)
-    use = found.counts & (coherence > chosen.coherence)
+    use = found.counts & (coherence > settings.coherence)
     if np.count_nonzero(use) < 3:
         return None
     derivative = (2j * np.pi * found.frequency[use]) ** (orders[1] - orders[0])
@@ -240,7 +204,9 @@ def _between(declared: Case, problem: Problem, settings: ScaleSettings) -> Itera
         for other, pair, orders, record in odd[name]:
             if frozenset((name, other)) not in told:
                 told.add(frozenset((name, other)))
-                yield pair_words(declared, name, other, pair, orders, record)
+                yield pair_words(
+                    declared, name, other, pair, orders, record, settings=problem.settings.checks
+                )
 
 
 def _parallel(row: Array, other: Array) -> float:
@@ -255,7 +221,16 @@ def grossly_apart(pair: Pair, settings: ScaleSettings) -> bool:
     return abs(np.log(pair.factor)) > np.log(settings.gross) or pair.sign < -0.5
 
 
-def pair_words(declared: Case, name: str, other: str, pair: Pair, orders: int, record: CaseRecord) -> str:
+def pair_words(
+    declared: Case,
+    name: str,
+    other: str,
+    pair: Pair,
+    orders: int,
+    record: CaseRecord,
+    *,
+    settings: ChecksSettings,
+) -> str:
     """What is wrong between two channels of one motion, with the line to change.
 
     Args:
@@ -265,6 +240,7 @@ def pair_words(declared: Case, name: str, other: str, pair: Pair, orders: int, r
         pair: The first over the second.
         orders: By how many derivatives they differ.
         record: Where.
+        settings: `ChecksSettings` of the diagnosis.
     """
     kin = {1: "the derivative", 2: "the second derivative", -1: "the integral", -2: "the double integral"}[
         orders
@@ -285,7 +261,7 @@ def pair_words(declared: Case, name: str, other: str, pair: Pair, orders: int, r
     hints = [
         hint
         for who, factor in ((name, pair.factor), (other, 1.0 / pair.factor))
-        if (hint := suggestion(declared, who, factor, CALIBRATION))
+        if (hint := suggestion(declared, who, factor, settings.calibration))
     ]
     remedy = " or ".join(hints) or (
         f"multiply the column '{name}' by {1.0 / pair.factor:.4g} or '{other}' by {pair.factor:.4g}, whichever is wrong"
@@ -361,24 +337,23 @@ def _typical(found: Sequence[tuple[float, float]]) -> tuple[float, float]:
     ) else 1.0
 
 
-def common_factor(bands: Bands, settings: ScaleSettings | None = None) -> tuple[float, float]:
+def common_factor(bands: Bands, settings: ScaleSettings = DEFAULT.checks.scales) -> tuple[float, float]:
     """The factor and the sign that all bands have in common; (1, 1) where they have none.
 
     Args:
         bands: Measured over predicted.
         settings: When a factor counts.
     """
-    chosen = settings or ScaleSettings()
     ratios = bands.ratios
     if len(ratios) < 3:
         return 1.0, 1.0
     middle = float(np.median(ratios))
-    describes = chosen.better * float(np.sum((ratios - middle) ** 2)) < float(np.sum(ratios**2))
-    wide = bands.frequencies[-1] >= 2.0**chosen.octaves * bands.frequencies[0]
+    describes = settings.better * float(np.sum((ratios - middle) ** 2)) < float(np.sum(ratios**2))
+    wide = bands.frequencies[-1] >= 2.0**settings.octaves * bands.frequencies[0]
     turned = wide and bool(np.all(bands.correlations < 0.0)) and float(np.median(bands.correlations)) < -0.5
-    agrees = float(np.median(np.abs(bands.correlations))) > chosen.coherence
-    gross = abs(middle) > np.log(chosen.any_factor) or (
-        agrees and abs(middle) > np.log(chosen.gross) and _is_of_a_unit(middle, chosen)
+    agrees = float(np.median(np.abs(bands.correlations))) > settings.coherence
+    gross = abs(middle) > np.log(settings.any_factor) or (
+        agrees and abs(middle) > np.log(settings.gross) and _is_of_a_unit(middle, settings)
     )
     return (float(np.exp(middle)) if describes and gross else 1.0), (-1.0 if turned else 1.0)
 

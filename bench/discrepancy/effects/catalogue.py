@@ -7,6 +7,9 @@ laboratory. Priors are broad and the same for all rigs; `log_prior` makes the la
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -29,12 +32,22 @@ from bench.laws.normal_force_friction import LOAD_DEPENDENT_FRICTION, TIME_VARYI
 from bench.laws.stiffness import CUBIC_STIFFNESS, QUADRATIC_STIFFNESS, STIFFNESS_DRIFT
 from bench.laws.stribeck import STRIBECK
 
-AMPLITUDE = {"mean": math.log(0.2), "std": 1.5, "bounds": (-9.0, 5.0)}
-SIGNED = {"signed": True, "mean": 0.0, "std": 0.6, "bounds": (-30.0, 30.0)}
+
+@dataclass(frozen=True)
+class CatalogueSettings:
+    """Numbers of `bench.discrepancy.effects.catalogue`."""
+
+    amplitude: Mapping[str, Any] = field(
+        default_factory=lambda: {"mean": math.log(0.2), "std": 1.5, "bounds": (-9.0, 5.0)}
+    )
+    signed: Mapping[str, Any] = field(
+        default_factory=lambda: {"signed": True, "mean": 0.0, "std": 0.6, "bounds": (-30.0, 30.0)}
+    )
+    slow: float = 1e-3
+    """Regularising velocity of friction that goes back into a rig, as a part of the largest velocity of the records."""
 
 
-SLOW = 1e-3
-"""Regularising velocity of friction that goes back into a rig, as a part of the largest velocity of the records."""
+SETTINGS = CatalogueSettings()
 
 
 def _lugre_theta(values: Values, scales: Scales) -> Values:
@@ -50,7 +63,7 @@ def _backlash_theta(values: Values, scales: Scales) -> Values:
     )
 
 
-FRICTION = FreeParameter("friction_force", "force", **AMPLITUDE)
+FRICTION = FreeParameter("friction_force", "force", **SETTINGS.amplitude)
 
 FORCES: tuple[Effect, ...] = (
     Effect(
@@ -61,7 +74,7 @@ FORCES: tuple[Effect, ...] = (
         "f = Fc sgn(v), set-valued at rest",
         law=COULOMB,
         limit=limits.coulomb_limit,
-        theta=lambda values, scales: np.array([values[0], SLOW * scales.velocity]),
+        theta=lambda values, scales: np.array([values[0], SETTINGS.slow * scales.velocity]),
     ),
     Effect(
         "stribeck_friction",
@@ -85,7 +98,7 @@ FORCES: tuple[Effect, ...] = (
         law=STRIBECK,
         affine=True,
         limit=limits.stribeck_limit,
-        theta=lambda values, scales: np.append(values, SLOW * scales.velocity),
+        theta=lambda values, scales: np.append(values, SETTINGS.slow * scales.velocity),
     ),
     Effect(
         "presliding_friction",
@@ -144,7 +157,7 @@ FORCES: tuple[Effect, ...] = (
         "hysteresis",
         "joint",
         (
-            FreeParameter("friction_force", "force", **AMPLITUDE),
+            FreeParameter("friction_force", "force", **SETTINGS.amplitude),
             FreeParameter(
                 "slip_displacement",
                 "position",
@@ -216,7 +229,7 @@ FORCES: tuple[Effect, ...] = (
         "cubic_stiffness",
         "stiffness",
         "joint",
-        (FreeParameter("k3", "stiffness/position/position", **SIGNED),),
+        (FreeParameter("k3", "stiffness/position/position", **SETTINGS.signed),),
         "f = k3 q^3",
         law=CUBIC_STIFFNESS,
     ),
@@ -224,7 +237,7 @@ FORCES: tuple[Effect, ...] = (
         "quadratic_stiffness",
         "stiffness",
         "joint",
-        (FreeParameter("k2", "stiffness/position", **SIGNED),),
+        (FreeParameter("k2", "stiffness/position", **SETTINGS.signed),),
         "f = k2 q^2",
         law=QUADRATIC_STIFFNESS,
     ),
@@ -232,7 +245,7 @@ FORCES: tuple[Effect, ...] = (
         "quadratic_damping",
         "damping",
         "joint",
-        (FreeParameter("c2", "force/velocity/velocity", **AMPLITUDE),),
+        (FreeParameter("c2", "force/velocity/velocity", **SETTINGS.amplitude),),
         "f = c2 v |v|",
         law=QUADRATIC_DAMPING,
     ),
@@ -241,7 +254,7 @@ FORCES: tuple[Effect, ...] = (
         "damping",
         "joint",
         (
-            FreeParameter("C", "force", **AMPLITUDE),
+            FreeParameter("C", "force", **SETTINGS.amplitude),
             FreeParameter(
                 "n",
                 mean=math.log(0.45),
@@ -253,7 +266,7 @@ FORCES: tuple[Effect, ...] = (
         "f = C sgn(v) |v|^n",
         law=POWER_LAW_DAMPING,
         theta=lambda values, scales: np.array(
-            [values[0] * scales.velocity ** -values[1], values[1], 1e-3 * SLOW * scales.velocity]
+            [values[0] * scales.velocity ** -values[1], values[1], 1e-3 * SETTINGS.slow * scales.velocity]
         ),
     ),
     Effect(
@@ -278,11 +291,11 @@ FORCES: tuple[Effect, ...] = (
         "load_dependent_friction",
         "friction",
         "joint",
-        (FreeParameter("friction_per_displacement", "force/position", **AMPLITUDE),),
+        (FreeParameter("friction_per_displacement", "force/position", **SETTINGS.amplitude),),
         "f = mu |q| sgn(v), set-valued at rest",
         law=LOAD_DEPENDENT_FRICTION,
         limit=limits.load_dependent_limit,
-        theta=lambda values, scales: np.array([values[0], 0.0, SLOW * scales.velocity]),
+        theta=lambda values, scales: np.array([values[0], 0.0, SETTINGS.slow * scales.velocity]),
     ),
     Effect(
         "time_varying_friction",
@@ -311,13 +324,13 @@ FORCES: tuple[Effect, ...] = (
         law=TIME_VARYING_FRICTION,
         limit=limits.time_varying_limit,
         modulated=True,
-        theta=lambda values, scales: np.append(values, SLOW * scales.velocity),
+        theta=lambda values, scales: np.append(values, SETTINGS.slow * scales.velocity),
     ),
     Effect(
         "stiffness_drift",
         "stiffness",
         "joint",
-        (FreeParameter("stiffness_change", "stiffness", **SIGNED),),
+        (FreeParameter("stiffness_change", "stiffness", **SETTINGS.signed),),
         "f = dk (t / T) q",
         law=STIFFNESS_DRIFT,
         theta=lambda values, scales: np.array([values[0] / scales.duration, 0.0]),
@@ -336,8 +349,8 @@ FORCES: tuple[Effect, ...] = (
         "coupling",
         "joint",
         (
-            FreeParameter("axial_damping", "force/velocity/position2", **AMPLITUDE),
-            FreeParameter("torsional_damping", "force2/velocity2/position", **AMPLITUDE),
+            FreeParameter("axial_damping", "force/velocity/position2", **SETTINGS.amplitude),
+            FreeParameter("torsional_damping", "force2/velocity2/position", **SETTINGS.amplitude),
             FreeParameter(
                 "torsional_clearance",
                 "position2",
@@ -363,7 +376,7 @@ FORCES: tuple[Effect, ...] = (
         "cross_stiffness",
         "coupling",
         "joint",
-        (FreeParameter("k_cross", "force/position2", **SIGNED),),
+        (FreeParameter("k_cross", "force/position2", **SETTINGS.signed),),
         "f1 = k th, f2 = k x",
         law=CROSS_STIFFNESS,
         n_coordinates=2,

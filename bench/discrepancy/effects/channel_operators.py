@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 Samples = NDArray[np.float64]
-TAPS = 24
-"""Half-width in samples of the interpolation of a sensor's delay: flat within 0.1 % up to nine tenths of the Nyquist frequency."""
-KAISER = 6.0
-"""Shape of its window."""
+
+
+@dataclass(frozen=True)
+class ChannelOperatorsSettings:
+    """Numbers of `bench.discrepancy.effects.channel_operators`."""
+
+    taps: int = 24
+    """Half-width in samples of the interpolation of a sensor's delay: flat within 0.1 % up to nine tenths of the Nyquist frequency."""
+    kaiser: float = 6.0
+    """Shape of its window."""
+
+
+SETTINGS = ChannelOperatorsSettings()
 
 
 def sensor_delay(x: Samples, values: Samples, step: float) -> Samples:
@@ -20,12 +31,12 @@ def sensor_delay(x: Samples, values: Samples, step: float) -> Samples:
     smooth that noise away, and a fraction of a sample of delay would seem to explain records that have none.
     """
     whole, fraction = divmod(values[0] / step, 1.0)
-    lags = np.arange(1 - TAPS, TAPS + 1)
+    lags = np.arange(1 - SETTINGS.taps, SETTINGS.taps + 1)
     taps = np.sinc(lags - fraction) * np.i0(
-        KAISER * np.sqrt(np.clip(1.0 - ((lags - fraction) / TAPS) ** 2, 0.0, None))
+        SETTINGS.kaiser * np.sqrt(np.clip(1.0 - ((lags - fraction) / SETTINGS.taps) ** 2, 0.0, None))
     )
-    before = min(int(whole), len(x)) + TAPS
-    held = np.pad(x, (before, TAPS - 1), mode="edge")[: len(x) + 2 * TAPS - 1]
+    before = min(int(whole), len(x)) + SETTINGS.taps
+    held = np.pad(x, (before, SETTINGS.taps - 1), mode="edge")[: len(x) + 2 * SETTINGS.taps - 1]
     return np.asarray(np.convolve(held, taps / taps.sum(), mode="valid"), dtype=np.float64)
 
 

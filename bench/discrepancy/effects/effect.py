@@ -27,8 +27,16 @@ if TYPE_CHECKING:
 Site = Literal["joint", "inertia", "actuator", "sensor", "record", "read off"]
 Values = NDArray[np.float64]
 
-RARE = -2.0
-"""Log prior odds of a rare effect against a common one."""
+
+@dataclass(frozen=True)
+class EffectSettings:
+    """Numbers of `bench.discrepancy.effects.effect`."""
+
+    rare: float = -2.0
+    """Log prior odds of a rare effect against a common one."""
+
+
+EFFECT_SETTINGS = EffectSettings()
 
 
 class Scales(NamedTuple):
@@ -206,7 +214,7 @@ class Effect:
     @property
     def rare(self) -> bool:
         """Whether it is tried only where no commoner effect alone explains the records."""
-        return self.log_prior <= RARE and self.site != "inertia"
+        return self.log_prior <= EFFECT_SETTINGS.rare and self.site != "inertia"
 
     @property
     def addresses(self) -> tuple[int, int, int]:

@@ -12,8 +12,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
@@ -26,17 +26,34 @@ _inline: Any = numba.njit(error_model="numpy", nogil=True, forceinline=True)
 
 POWERS = ((0, 0), (2, 0), (1, 1), (0, 2), (3, 0), (2, 1), (1, 2), (0, 3), (5, 0), (4, 1), (0, 5))
 """Powers of displacement and velocity of the surface; (1, 0) and (0, 1) are the nominal stiffness and damping."""
-SPANS = 30
-"""Pieces of a force of one variable."""
-WARP = 2.0
-WARPED = math.sinh(WARP)
+
+
+class NonparametricLimits(NamedTuple):
+    """Numbers of `bench.discrepancy.effects.nonparametric` that compiled code holds."""
+
+    spans: int = 30
+    """Pieces of a force of one variable."""
+    warp: float = 2.0
+
+
+NONPARAMETRIC_LIMITS = NonparametricLimits()
+WARPED = math.sinh(NONPARAMETRIC_LIMITS.warp)
 """How much shorter they are about rest, where gaps, friction and snaps happen: equal steps of asinh(WARPED x) / WARP."""
 PATCHES = (10, 14)
 """Pieces of a force of displacement and velocity along either."""
-MODES = 48
-"""Independent shapes, at most, that a smooth surface is made of: the likeliest ones of its prior."""
-JITTER = 1e-6
-"""Part of a smooth curve's variance that is independent from value to value, so that rounding leaves it a covariance."""
+
+
+@dataclass(frozen=True)
+class NonparametricSettings:
+    """Numbers of `bench.discrepancy.effects.nonparametric`."""
+
+    modes: int = 48
+    """Independent shapes, at most, that a smooth surface is made of: the likeliest ones of its prior."""
+    jitter: float = 1e-6
+    """Part of a smooth curve's variance that is independent from value to value, so that rounding leaves it a covariance."""
+
+
+SETTINGS = NonparametricSettings()
 MEMORY = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)
 """Relaxation times of a free linear memory, by the time of one radian of the motion."""
 
@@ -80,14 +97,18 @@ def _warped(x, pieces):
     """Place on a spline whose pieces are shorter about rest, counted from 0 to `pieces`."""
     a = abs(x) * WARPED
     # asinh, which the C library takes twice as long over
-    return 0.5 * pieces * (1.0 + math.copysign(math.log(a + math.sqrt(1.0 + a * a)), x) / WARP)
+    return (
+        0.5
+        * pieces
+        * (1.0 + math.copysign(math.log(a + math.sqrt(1.0 + a * a)), x) / NONPARAMETRIC_LIMITS.warp)
+    )
 
 
 @kernel
 def curve_force(t, q, v, z, theta, f):
-    """A force of one variable from -1 to 1: a cubic spline of `SPANS` pieces, shorter about rest, by its B-spline coefficients."""
+    """A force of one variable from -1 to 1: a cubic spline of `spans` pieces, shorter about rest, by its B-spline coefficients."""
     x = min(max(q[0] * theta[0] + v[0] * theta[1], -1.0), 1.0)
-    f[0] += cubic(theta, 2, SPANS, _warped(x, SPANS))
+    f[0] += cubic(theta, 2, NONPARAMETRIC_LIMITS.spans, _warped(x, NONPARAMETRIC_LIMITS.spans))
 
 
 _CURVE = ForceLaw(
@@ -95,7 +116,7 @@ _CURVE = ForceLaw(
     (
         Parameter("per_position", "1/m", 1.0, rotational="1/rad"),
         Parameter("per_velocity", "s/m", 0.0, rotational="s/rad"),
-        *(Parameter(f"f{k}", "N", 0.0, rotational="N m") for k in range(SPANS + 3)),
+        *(Parameter(f"f{k}", "N", 0.0, rotational="N m") for k in range(NONPARAMETRIC_LIMITS.spans + 3)),
     ),
     curve_force,
     equation="f = cubic spline of coefficients f_k over q/Q, or over v/V",
@@ -193,7 +214,7 @@ def _closure(
     )  # fmt: skip
 
 
-_KNOTS = [f"f{k}" for k in range(SPANS + 3)]
+_KNOTS = [f"f{k}" for k in range(NONPARAMETRIC_LIMITS.spans + 3)]
 FREE_DISPLACEMENT = _closure("free_displacement", _CURVE, _KNOTS, _over_position)
 FREE_VELOCITY = _closure("free_velocity", _CURVE, _KNOTS, _over_velocity)
 FREE_SURFACE = _closure("free_surface", _PATCH, [p.name for p in _PATCH.parameters[2:]], _over_both)
@@ -206,13 +227,15 @@ def smoothing(length: float) -> Values:
     Args:
         length: Distance within which the curve keeps its course, over its reach.
     """
-    middles = np.sinh(WARP * _middles(SPANS)) / WARPED
+    middles = np.sinh(NONPARAMETRIC_LIMITS.warp * _middles(NONPARAMETRIC_LIMITS.spans)) / WARPED
     covariance = _covariance(middles, length)
-    return np.asarray(np.linalg.cholesky(covariance + JITTER * np.eye(len(middles))), dtype=np.float64)
+    return np.asarray(
+        np.linalg.cholesky(covariance + SETTINGS.jitter * np.eye(len(middles))), dtype=np.float64
+    )
 
 
 def smoothing_both(along: float, across: float) -> Values:
-    """What makes the coefficients of a smooth surface (n, k) out of `MODES` independent ones of unit deviation, or fewer.
+    """What makes the coefficients of a smooth surface (n, k) out of `modes` independent ones of unit deviation, or fewer.
 
     Args:
         along: Distance of displacements within which the surface keeps its course, over its reach.
@@ -224,8 +247,8 @@ def smoothing_both(along: float, across: float) -> Values:
     ]
     powers = np.maximum(np.outer(parts[0][0], parts[1][0]), 0.0).ravel()
     shapes = np.kron(parts[0][1], parts[1][1])
-    kept = np.argsort(-powers)[:MODES]
-    kept = kept[powers[kept] > JITTER * powers.max()]
+    kept = np.argsort(-powers)[: SETTINGS.modes]
+    kept = kept[powers[kept] > SETTINGS.jitter * powers.max()]
     return np.asarray(shapes[:, kept] * np.sqrt(powers[kept]), dtype=np.float64)
 
 

@@ -7,18 +7,25 @@ way from the neighbourhood that a common relative points at.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
-from bench.discrepancy.effects.effect import RARE, Effect, FreeParameter, Scales, Values, log_grid
+from bench.discrepancy.effects.effect import (
+    EFFECT_SETTINGS,
+    Effect,
+    FreeParameter,
+    Scales,
+    Values,
+    log_grid,
+)
 from bench.laws.base_flexibility import BASE_FLEXIBILITY
 from bench.laws.bouc_wen_variants import BOUC_WEN_DEGRADING, BOUC_WEN_PINCHING
 from bench.laws.damping import ASYMMETRIC_DAMPING
 from bench.laws.gap import ASYMMETRIC_GAP
 from bench.laws.stiffness import COGGING
-
-PINCH_SPREAD = 0.25
-"""psi_0: spread of the pinched part of a loop as a share of the ultimate strength; a record hardly tells it from the severity."""
 
 
 def bouc_wen_theta(values: Values, scales: Scales) -> tuple[float, float, float, float]:
@@ -35,7 +42,7 @@ def _degrading_theta(values: Values, scales: Scales) -> Values:
 def _pinching_theta(values: Values, scales: Scales) -> Values:
     # p is large: the slack is there from the first motion, however small, as in a joint that has been used
     onset = 1e9 / (scales.force * scales.position)
-    spread = [onset, PINCH_SPREAD, 0.0, 0.5]
+    spread = [onset, SETTINGS.pinch_spread, 0.0, 0.5]
     return np.array([*bouc_wen_theta(values, scales), 0.0, 0.0, values[5], values[4], *spread])
 
 
@@ -66,7 +73,25 @@ HYSTERESIS = (
     FreeParameter("gamma_over_beta", signed=True, mean=0.0, std=1.0, bounds=(-3.0, 5.0), grid=(0.5,)),
     FreeParameter("n", std=0.5, mean=0.35, bounds=(0.0, 1.6), grid=log_grid(1.1)),
 )
-CLEARANCE = {"mean": math.log(0.4), "std": 0.8, "bounds": (-5.0, 0.1), "grid": log_grid(0.25, 0.6)}
+
+
+@dataclass(frozen=True)
+class RareForcesSettings:
+    """Numbers of `bench.discrepancy.effects.rare_forces`."""
+
+    pinch_spread: float = 0.25
+    """psi_0: spread of the pinched part of a loop as a share of the ultimate strength; a record hardly tells it from the severity."""
+    clearance: Mapping[str, Any] = field(
+        default_factory=lambda: {
+            "mean": math.log(0.4),
+            "std": 0.8,
+            "bounds": (-5.0, 0.1),
+            "grid": log_grid(0.25, 0.6),
+        }
+    )
+
+
+SETTINGS = RareForcesSettings()
 
 RARER: tuple[Effect, ...] = (
     Effect(
@@ -76,14 +101,14 @@ RARER: tuple[Effect, ...] = (
         (
             FreeParameter("stiffness_positive", "stiffness", mean=math.log(0.3), std=1.5, bounds=(-6.0, 6.0)),
             FreeParameter("stiffness_negative", "stiffness", mean=math.log(0.3), std=1.5, bounds=(-6.0, 6.0)),
-            FreeParameter("clearance_positive", "position", **CLEARANCE),
-            FreeParameter("clearance_negative", "position", **CLEARANCE),
+            FreeParameter("clearance_positive", "position", **SETTINGS.clearance),
+            FreeParameter("clearance_negative", "position", **SETTINGS.clearance),
         ),
         "f = k+ (q - d+) beyond d+, k- (q + d-) below -d-",
         law=ASYMMETRIC_GAP,
         n_linear=2,
         theta=lambda values, scales: np.append(values, 0.0),
-        log_prior=RARE,
+        log_prior=EFFECT_SETTINGS.rare,
     ),
     Effect(
         "asymmetric_damping",
@@ -93,7 +118,7 @@ RARER: tuple[Effect, ...] = (
         "f = dc |v|, half the difference of the damping in the two directions",
         law=ASYMMETRIC_DAMPING,
         theta=lambda values, scales: np.array([values[0], -values[0]]),
-        log_prior=RARE,
+        log_prior=EFFECT_SETTINGS.rare,
     ),
     Effect(
         "cogging",
@@ -115,7 +140,7 @@ RARER: tuple[Effect, ...] = (
         law=COGGING,
         n_linear=2,
         theta=_cogging_theta,
-        log_prior=RARE,
+        log_prior=EFFECT_SETTINGS.rare,
     ),
     Effect(
         "base_flexibility",
@@ -140,7 +165,7 @@ RARER: tuple[Effect, ...] = (
         law=BASE_FLEXIBILITY,
         theta=_base_theta,
         rate_bound=lambda values, scales: 2.0 * math.pi * values[1],
-        log_prior=RARE,
+        log_prior=EFFECT_SETTINGS.rare,
     ),
     Effect(
         "degrading_hysteresis",
@@ -159,7 +184,7 @@ RARER: tuple[Effect, ...] = (
         law=BOUC_WEN_DEGRADING,
         theta=_degrading_theta,
         rate_bound=hysteretic_rate,
-        log_prior=RARE,
+        log_prior=EFFECT_SETTINGS.rare,
     ),
     Effect(
         "pinching_hysteresis",
@@ -174,7 +199,7 @@ RARER: tuple[Effect, ...] = (
         law=BOUC_WEN_PINCHING,
         theta=_pinching_theta,
         rate_bound=hysteretic_rate,
-        log_prior=RARE,
+        log_prior=EFFECT_SETTINGS.rare,
     ),
 )
 """Rarer forces."""

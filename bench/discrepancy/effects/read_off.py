@@ -10,7 +10,11 @@ import math
 from collections.abc import Iterable
 from dataclasses import replace
 
-from bench.discrepancy.effects.effect import RARE, Effect, FreeParameter
+from bench.discrepancy.effects.effect import (
+    EFFECT_SETTINGS,
+    Effect,
+    FreeParameter,
+)
 
 TIMED = "timed_force"
 DIFFERS = "record_dependent_friction"
@@ -35,13 +39,27 @@ def read_off(forces: Iterable[Effect]) -> tuple[Effect, ...]:
     scheduled = (
         replace(
             effect, name=FOLLOWED + effect.name, site="read off", parameters=(*effect.parameters, SENSITIVITY),
-            equation=f"(1 - kappa + kappa s/s0) f, s a channel; {effect.equation}", log_prior=effect.log_prior + 0.5 * RARE,
+            equation=f"(1 - kappa + kappa s/s0) f, s a channel; {effect.equation}", log_prior=effect.log_prior + 0.5 * EFFECT_SETTINGS.rare,
             law=None, limit=None, theta=None, rate_bound=None,
         )
         for effect in forces if schedulable(effect)
     )  # fmt: skip
     return (
-        Effect(TIMED, "external", "read off", (FORCE,), "f = -F in windows of time", log_prior=RARE),
-        Effect(DIFFERS, "friction", "read off", (LIMIT,), "f = Fc_i sgn(v) in record i", log_prior=RARE),
+        Effect(
+            TIMED,
+            "external",
+            "read off",
+            (FORCE,),
+            "f = -F in windows of time",
+            log_prior=EFFECT_SETTINGS.rare,
+        ),
+        Effect(
+            DIFFERS,
+            "friction",
+            "read off",
+            (LIMIT,),
+            "f = Fc_i sgn(v) in record i",
+            log_prior=EFFECT_SETTINGS.rare,
+        ),
         *scheduled,
     )

@@ -3,15 +3,30 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 from bench.discrepancy.effects import channel_operators as signals
-from bench.discrepancy.effects.effect import RARE, Effect, FreeParameter, log_grid
+from bench.discrepancy.effects.effect import (
+    EFFECT_SETTINGS,
+    Effect,
+    FreeParameter,
+    log_grid,
+)
 
 POSITION_AND_ACCELERATION = (("displacement", "position", "x"), ("acceleration", "acceleration", "a"))
 """Name of the channel in effects, its quantity, its symbol."""
 REVERSAL = FreeParameter("reversal", grid=(0.0,), fixed=True)
-REVERSED = -1.5
-"""Log prior odds of a reversed channel; not so rare that a gain of minus one would be tried first."""
+
+
+@dataclass(frozen=True)
+class SensorActuatorSettings:
+    """Numbers of `bench.discrepancy.effects.sensor_actuator`."""
+
+    reversed: float = -1.5
+    """Log prior odds of a reversed channel; not so rare that a gain of minus one would be tried first."""
+
+
+SETTINGS = SensorActuatorSettings()
 
 CHANNELS: tuple[Effect, ...] = (
     Effect(
@@ -222,7 +237,7 @@ CHANNELS: tuple[Effect, ...] = (
         "a clipped at a level",
         signal=signals.clip,
         quantity="acceleration",
-        log_prior=RARE,
+        log_prior=EFFECT_SETTINGS.rare,
     ),
     Effect(
         "velocity_gain_error",
@@ -274,7 +289,7 @@ CHANNELS: tuple[Effect, ...] = (
             quantity=quantity,
             pickup=True,
             exact=True,
-            log_prior=RARE,
+            log_prior=EFFECT_SETTINGS.rare,
         )
         for channel, quantity, symbol in POSITION_AND_ACCELERATION
     ),
@@ -288,7 +303,7 @@ CHANNELS: tuple[Effect, ...] = (
             signal=signals.reverse,
             exact=True,
             quantity=quantity,
-            log_prior=REVERSED,
+            log_prior=SETTINGS.reversed,
         )
         for channel, quantity, symbol in POSITION_AND_ACCELERATION
     ),
@@ -300,7 +315,7 @@ CHANNELS: tuple[Effect, ...] = (
         "F = -command",
         signal=signals.reverse,
         exact=True,
-        log_prior=REVERSED,
+        log_prior=SETTINGS.reversed,
     ),
     *(
         Effect(
@@ -311,7 +326,7 @@ CHANNELS: tuple[Effect, ...] = (
             f"{symbol} rounded to a multiple of q",
             signal=signals.quantise,
             quantity=quantity,
-            log_prior=RARE,
+            log_prior=EFFECT_SETTINGS.rare,
         )
         for channel, quantity, symbol in POSITION_AND_ACCELERATION
     ),

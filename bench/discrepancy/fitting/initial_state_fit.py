@@ -9,15 +9,13 @@ from numpy.typing import NDArray
 
 from bench.discrepancy.case.case import CaseRecord
 from bench.discrepancy.likelihood.problem import Problem
-from bench.discrepancy.likelihood.window_whitening import DIFFERENCE, cut, in_motion
+from bench.discrepancy.likelihood.window_whitening import (
+    cut,
+    in_motion,
+)
 from bench.discrepancy.model.placement import Hypothesis
 
 Array = NDArray[np.float64]
-
-ROUNDS = 20
-"""Most Gauss-Newton steps towards the initial states. Three settle a window; a long record of a hardening spring takes ten."""
-SINGULAR = 1e-8
-"""Relative size below which a combination of initial states counts as invisible to the channels and is left alone."""
 
 
 def predict(problem: Problem, hypothesis: Hypothesis, vector: Array, record: CaseRecord) -> Array:
@@ -33,6 +31,7 @@ def predict(problem: Problem, hypothesis: Hypothesis, vector: Array, record: Cas
         vector: See `Problem.simulate`.
         record: Any record of the case.
     """
+    settings = problem.settings
     fitted = record.name in {r.name for r in problem.records}
     if problem.driven or (not problem.windowed and (fitted or not in_motion(record))):
         return problem.simulate(hypothesis, vector, record)
@@ -40,13 +39,13 @@ def predict(problem: Problem, hypothesis: Hypothesis, vector: Array, record: Cas
     responses = np.column_stack([record.values[name] for name in problem.structure.channels])
     motion = problem.motion_of(record)
     spread = np.concatenate([np.std(motion.position, axis=0), np.std(motion.velocity, axis=0)])
-    steps = DIFFERENCE * np.where(spread > 0.0, spread, 1.0)
+    steps = settings.likelihood.start_difference * np.where(spread > 0.0, spread, 1.0)
     starts = problem.starts_of(record, problem.nominal)
     damping = np.ones(len(firsts))
     channels = problem.simulate(hypothesis, vector, record, starts=starts)
     residual = (responses - channels) / problem.noise
     costs = _costs(residual, firsts)
-    for _ in range(ROUNDS):
+    for _ in range(settings.fitting.state_rounds):
         columns = [
             (problem.simulate(hypothesis, vector, record, starts=starts + step) - channels) / problem.noise
             for step in np.diag(steps)
@@ -55,7 +54,9 @@ def predict(problem: Problem, hypothesis: Hypothesis, vector: Array, record: Cas
         for w, (first, end) in enumerate(zip(firsts, np.append(firsts[1:], len(responses)), strict=True)):
             matrix = np.column_stack([column[first:end].ravel() for column in columns])
             if np.isfinite(matrix).all() and np.isfinite(costs[w]):
-                move = np.linalg.lstsq(matrix, residual[first:end].ravel(), rcond=SINGULAR)[0]
+                move = np.linalg.lstsq(
+                    matrix, residual[first:end].ravel(), rcond=settings.fitting.state_singular
+                )[0]
                 trial[w] += damping[w] * move * steps
         tried = problem.simulate(hypothesis, vector, record, starts=trial)
         tried_residual = (responses - tried) / problem.noise
@@ -83,7 +84,10 @@ def run_kind(problem: Problem, records: Sequence[CaseRecord]) -> str:
     if problem.driven:
         return "prescribed motion"
     if problem.windowed:
-        length = cut(problem.case, records[0], len(problem.noise))[1] * records[0].step
+        length = (
+            cut(problem.case, records[0], len(problem.noise), settings=problem.settings.likelihood)[1]
+            * records[0].step
+        )
         return f"windows of {length:.3g} s restarted from the estimated state"
     if any(in_motion(record) for record in records):
         return "free run from the estimated initial state"
@@ -95,7 +99,10 @@ def start_warnings(problem: Problem, records: Sequence[CaseRecord]) -> list[str]
     if problem.driven:
         return []
     if problem.windowed:
-        lengths = [cut(problem.case, r, len(problem.noise))[1] * r.step for r in records]
+        lengths = [
+            cut(problem.case, r, len(problem.noise), settings=problem.settings.likelihood)[1] * r.step
+            for r in records
+        ]
         return [
             "no stiffness holds the motion, so a free run drifts: fits and gap use windows of "
             f"{min(lengths):.3g} s, each restarted from the estimated state"

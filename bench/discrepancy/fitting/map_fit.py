@@ -19,11 +19,9 @@ from numpy.typing import NDArray
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Hypothesis
 from bench.discrepancy.numerics.least_squares import Prior, minimise
+from bench.discrepancy.settings import DEFAULT, DiagnosisSettings
 
 Array = NDArray[np.float64]
-
-NOMINAL_REACH, EFFECT_REACH = 20.0, 2.0
-"""Longest step in prior standard deviations: responses are nearly linear in nominal parameters, but not in shapes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +37,7 @@ class Fit:
         precision: Posterior precision of the vector (n, n).
         log_evidence: Laplace approximation of the log evidence (constants common to all hypotheses left out).
         settled: Whether the iteration ended because nothing more was to be gained.
+        settings: Thresholds of the problem it is a fit of.
     """
 
     hypothesis: Hypothesis
@@ -49,6 +48,7 @@ class Fit:
     precision: Array
     log_evidence: float
     settled: bool = False
+    settings: DiagnosisSettings = DEFAULT
 
     @property
     def reduced(self) -> float:
@@ -100,6 +100,7 @@ def fit(
     Returns:
         The fit; its cost is infinite where no simulation stayed finite.
     """
+    settings = problem.settings.fitting
     prior = Prior(*problem.prior(hypothesis))
     n = len(problem.nominal)
     free = free_entries(problem, hypothesis, fixed)
@@ -108,17 +109,26 @@ def fit(
         np.clip(start, prior.low, prior.high),
         prior=prior,
         free=free,
-        reach=np.where(free < n, NOMINAL_REACH, EFFECT_REACH),
+        reach=np.where(free < n, settings.nominal_reach, settings.effect_reach),
         iterations=iterations,
         tolerance=tolerance,
         limit=limit,
         exact=exact,
+        settings=problem.settings.numerics,
     )
     precision, evidence = laplace(problem, hypothesis, found.cost, found.curvature, free)
     with np.errstate(over="ignore"):  # a run on its way to divergence
         chi2 = float(found.residual @ found.residual)
     return Fit(
-        hypothesis, found.vector, chi2, found.cost, problem.n_residuals, precision, evidence, found.settled
+        hypothesis,
+        found.vector,
+        chi2,
+        found.cost,
+        problem.n_residuals,
+        precision,
+        evidence,
+        found.settled,
+        problem.settings,
     )
 
 

@@ -25,10 +25,19 @@ from bench.recording.units import conversion, read_as
 
 Array = NDArray[np.float64]
 _TURNING = int(mujoco.mjtJoint.mjJNT_HINGE)
-FAR = 100.0
-"""Angle [rad] beyond which a hinge without limits is taken to be logged in degrees: sixteen turns, 100 degrees are less than two."""
-SHORTEST = 200
-"""Samples that a record needs, as `case.MIN_SAMPLES`."""
+
+
+@dataclass(frozen=True)
+class DraftingSettings:
+    """Numbers of `bench.discrepancy.intake.drafting`."""
+
+    far: float = 100.0
+    """Angle [rad] beyond which a hinge without limits is taken to be logged in degrees: sixteen turns, 100 degrees are less than two."""
+    shortest: int = 200
+    """Samples that a record needs, as `case.MIN_SAMPLES`."""
+
+
+SETTINGS = DraftingSettings()
 
 
 @dataclass(frozen=True)
@@ -217,7 +226,9 @@ def _doubt(log: Log, match: Match, values: Array, model: mujoco.MjModel) -> None
     if int(model.jnt_type[joint.id]) != _TURNING:
         return
     reach = float(np.max(np.abs(values[np.isfinite(values)]), initial=0.0))
-    limit = float(np.abs(model.jnt_range[joint.id]).max()) if model.jnt_limited[joint.id] else FAR / 4.0
+    limit = (
+        float(np.abs(model.jnt_range[joint.id]).max()) if model.jnt_limited[joint.id] else SETTINGS.far / 4.0
+    )
     if reach > 4.0 * limit:
         raise UnitError(
             f"'{log.name}': column '{match.column}' reaches {reach:.4g}, joint '{match.name}' of the model {limit:.3g} rad: degrees? "
@@ -249,9 +260,9 @@ def _divided(
         **{_numbered("validation", k): columns for k, columns in enumerate(judge)},
     }
     for name, columns in records.items():
-        if len(columns["time"]) < SHORTEST:
+        if len(columns["time"]) < SETTINGS.shortest:
             raise RecordingError(
-                f"{name} would have {len(columns['time'])} samples; at least {SHORTEST} are needed: give a longer log"
+                f"{name} would have {len(columns['time'])} samples; at least {SETTINGS.shortest} are needed: give a longer log"
             )
     return records, moving, words
 

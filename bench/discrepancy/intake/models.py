@@ -12,6 +12,7 @@ from typing import Any
 
 import mujoco
 
+from bench import native
 from bench.discrepancy.application.applying import Applied, specification, told
 from bench.discrepancy.application.writing import model_text
 from bench.errors import ModelError
@@ -78,6 +79,7 @@ def model_file(source: Any) -> Iterator[ModelFile]:
         yield ModelFile(path, path.name)
 
 
+@native.quiet()
 def _text_of(source: Any, path: Path) -> str:
     if isinstance(source, str):
         return source

@@ -17,10 +17,8 @@ from bench.discrepancy.judgement.validation_discrepancy import gaps
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.search.explain import Explanation, nominal_alone
 from bench.discrepancy.search.fits import key_of
+from bench.discrepancy.settings import JudgementSettings
 from bench.discrepancy.verdict import Gap, NamedEffect, NominalEstimate
-
-WITHIN_NOISE = 1.3
-"""Discrepancy over that of noise alone up to which an explanation is complete."""
 
 
 def with_closed(
@@ -75,6 +73,6 @@ def nominal_estimates(explanation: Explanation) -> tuple[NominalEstimate, ...]:
     return tuple(out.values())
 
 
-def complete(found: Sequence[Gap], *, sharp: bool) -> bool:
+def complete(found: Sequence[Gap], *, sharp: bool, settings: JudgementSettings) -> bool:
     """Whether what an explanation leaves is noise: by the stated one, or by what is left on the judging records."""
-    return sharp or all(gap.after <= WITHIN_NOISE * gap.noise_floor for gap in found)
+    return sharp or all(gap.after <= settings.within_noise * gap.noise_floor for gap in found)

@@ -22,45 +22,12 @@ from bench.discrepancy.judgement.steady import diverges, steadied
 from bench.discrepancy.judgement.validation_discrepancy import discrepancies, noise_floors
 from bench.discrepancy.likelihood.problem import Array, Problem
 from bench.discrepancy.search.explain import Explanation, nominal_alone
-from bench.discrepancy.search.fits import THOROUGH, complexity, key_of, log_prior_of
-
-
-@dataclass(frozen=True)
-class CoarseSettings:
-    """When an effect is named.
-
-    Attributes:
-        finalists: Explanations that are compared by blocks.
-        reach: Difference in log posterior, of the coarsened likelihood, within which one is a finalist.
-        within: Stated standard deviations that a nominal parameter may move. Gaussian tails are an assumption about small deviations; what
-            lies farther off is a finding, and has to be named as an error of that parameter.
-        material: Part of the discrepancy of the nominal model, its parameters re-estimated, that an effect closes to be named.
-        pays: Part of the discrepancy of the judging records that a named explanation may leave at most: half of its power.
-        most: The same where the noise is rightly stated and all that a law of the catalogue leaves is therefore not it.
-        outside: Share of effects that no catalogue holds among what explains records about as well as one of the catalogue does.
-        unlike: The same among what is named and leaves next to nothing, at least: of thirty cases of the background's maker in which an
-            effect was named and no other came near, it was the right one in all, and one more may not be (Laplace's rule of succession).
-        background: Part of the discrepancy's power that small things leave on average: backgrounds of 30 % leave 9 % of it.
-        telling: Difference of the scores (odds of 7) below which the samples cannot tell two explanations apart.
-    """
-
-    finalists: int = 10
-    reach: float = 12.0
-    within: float = 4.0
-    material: float = 0.1
-    pays: float = 0.7
-    most: float = 0.5
-    outside: float = 0.05
-    unlike: float = 0.03
-    background: float = 0.1
-    telling: float = 4.0
-
-
-SETTINGS = CoarseSettings()
-ALIKE = 2.0
-"""Standard errors of a difference within which two explanations are declared a set."""
-ABOUT_NOISE, UNCHANGED = 1.1, 1.02
-"""Times the noise below which a judged discrepancy is nothing but that, and change of it that is none."""
+from bench.discrepancy.search.fits import (
+    complexity,
+    key_of,
+    log_prior_of,
+)
+from bench.discrepancy.settings import DEFAULT, CoarseSettings
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,14 +53,15 @@ class Judged:
     vetoed: bool
     nominal: float
     left: float
+    settings: CoarseSettings
 
     @property
     def outside(self) -> float:
         """Probability that no effect of the catalogue is the cause, by what is left; see `outside`."""
-        return outside(self.left)
+        return outside(self.left, self.settings)
 
 
-def outside(left: float, settings: CoarseSettings = SETTINGS) -> float:
+def outside(left: float, settings: CoarseSettings = DEFAULT.judgement.coarse) -> float:
     """Probability that something outside the catalogue is the cause of a discrepancy of which an explanation leaves a part.
 
     What stands outside leaves any part of the power beside the nearest effect, uniformly; the right effect leaves what small things
@@ -115,7 +83,6 @@ def judge(
     rng: np.random.Generator,
     *,
     trusted: bool = False,
-    settings: CoarseSettings = SETTINGS,
 ) -> Judged:
     """Weigh explanations by prediction.
 
@@ -125,8 +92,8 @@ def judge(
         explanations: By decreasing posterior, the nominal model alone among them.
         rng: For the bootstrap over blocks.
         trusted: Whether the noise is stated, and nothing contradicts it: what is named has to close most of the discrepancy then.
-        settings: When an effect is named.
     """
+    settings = problem.settings.judgement.coarse
     nothing = bounded(nominal_alone(explanations), settings.within)
     with_effects = [e for e in explanations if e.hypothesis][: 2 * settings.finalists]
     ranked = sorted((bounded(e, settings.within) for e in with_effects), key=lambda e: -e.log_posterior)
@@ -139,7 +106,7 @@ def judge(
     # what is larger than what is material has been weighed already
     found = [e for e in found if e is not base and _no_larger(e.explanation, base.explanation)]
     found = [base, *found]
-    weights = shares(found, _log_priors(found), rng)
+    weights = shares(found, _log_priors(found), rng, problem.settings.judgement.held_out.draws)
     within = tuple(entry for entry in found if _as_good(entry, base, settings))
     worst = float(np.max(known.of(nothing, judging=True)))
     vetoed, part = False, settings.most if trusted else settings.pays
@@ -149,11 +116,17 @@ def judge(
         if not e.hypothesis or known.pays(e, nothing, part):
             found = [entry if other is own else other for other in found]
             preferred = [other for other in found if known.prefers(other.explanation, e)]
-            alike = tuple(o for o in found if o in preferred or _as_good(o, base, settings, ALIKE))
+            alike = tuple(
+                o
+                for o in found
+                if o in preferred or _as_good(o, base, settings, problem.settings.judgement.coarse_alike)
+            )
             weights = _undecided(weights, found, [entry, *preferred])
-            return Judged(entry, tuple(found), weights, within, alike, vetoed, worst, known.left(e, nothing))
+            return Judged(
+                entry, tuple(found), weights, within, alike, vetoed, worst, known.left(e, nothing), settings
+            )
         vetoed = True
-    return Judged(found[-1], tuple(found), weights, within, within, True, worst, 1.0)
+    return Judged(found[-1], tuple(found), weights, within, within, True, worst, 1.0, settings)
 
 
 def _undecided(weights: Array, found: Sequence[HeldOut], among: Sequence[HeldOut]) -> Array:
@@ -177,7 +150,17 @@ def bounded(explanation: Explanation, within: float) -> Explanation:
     for problem, fitted in explanation.parts:
         if np.any(np.abs(fitted.vector[: problem.n_physical]) > within):
             narrow = problem.bounded(within)
-            parts.append((narrow, fit(narrow, fitted.hypothesis, start=fitted.vector, iterations=THOROUGH)))
+            parts.append(
+                (
+                    narrow,
+                    fit(
+                        narrow,
+                        fitted.hypothesis,
+                        start=fitted.vector,
+                        iterations=explanation.settings.search.thorough,
+                    ),
+                )
+            )
         else:
             parts.append((problem, fitted))
     return Explanation(tuple(parts))
@@ -186,12 +169,14 @@ def bounded(explanation: Explanation, within: float) -> Explanation:
 def _log_priors(found: Sequence[HeldOut]) -> Array:
     """Log priors (n,) of explanations: by what they take to be described, and shared by those of the same names at the same places."""
     names = [frozenset((p.effect.name, p.place.name) for p in e.explanation.hypothesis) for e in found]
-    plain = [-complexity(e.explanation.hypothesis) for e in found]
+    plain = [
+        -complexity(e.explanation.hypothesis, settings=found[0].explanation.settings.search) for e in found
+    ]
     return np.array([value - np.log(names.count(own)) for value, own in zip(plain, names, strict=True)])
 
 
 def _log_prior(explanation: Explanation) -> float:
-    return log_prior_of(explanation.hypothesis)
+    return log_prior_of(explanation.hypothesis, settings=explanation.settings.search)
 
 
 def _as_good(entry: HeldOut, best: HeldOut, settings: CoarseSettings, errors: float = 1.0) -> bool:
@@ -202,12 +187,14 @@ def _as_good(entry: HeldOut, best: HeldOut, settings: CoarseSettings, errors: fl
 
 def _plainness(entry: HeldOut) -> tuple[float, float]:
     """What comes first is simpler: fewer parameters, fewer and commoner effects; and then what predicts better."""
-    return (complexity(entry.explanation.hypothesis), entry.total)
+    return (complexity(entry.explanation.hypothesis, settings=entry.explanation.settings.search), entry.total)
 
 
 def _no_larger(explanation: Explanation, other: Explanation) -> bool:
     few = len(explanation.hypothesis) <= len(other.hypothesis)
-    return few or complexity(explanation.hypothesis) <= complexity(other.hypothesis)
+    return few or complexity(explanation.hypothesis, settings=explanation.settings.search) <= complexity(
+        other.hypothesis, settings=explanation.settings.search
+    )
 
 
 class Discrepancies:
@@ -234,9 +221,10 @@ class Discrepancies:
     def pays(self, explanation: Explanation, nothing: Explanation, part: float) -> bool:
         """Whether an explanation leaves at most a part of the judging records' discrepancy, beyond noise, on some coordinate and no
         more than all of it on any."""
+        settings = explanation.settings.judgement
         before, after = self._judged(nothing, explanation)
         shrinks = self._beyond(after) <= part * self._beyond(before)
-        worse = after > np.maximum(before, ABOUT_NOISE * self._floor) * UNCHANGED
+        worse = after > np.maximum(before, settings.about_noise * self._floor) * settings.unchanged
         return bool(np.isfinite(after).all() and np.any(shrinks) and not np.any(worse))
 
     def left(self, explanation: Explanation, nothing: Explanation) -> float:
@@ -252,7 +240,9 @@ class Discrepancies:
             return False
         theirs, own = (self._beyond(x) for x in self._judged(rival, explanation))
         widest = int(np.argmax(own))
-        return bool(np.isfinite(theirs).all() and theirs[widest] * UNCHANGED < own[widest])
+        return bool(
+            np.isfinite(theirs).all() and theirs[widest] * rival.settings.judgement.unchanged < own[widest]
+        )
 
     def _judged(self, nothing: Explanation, explanation: Explanation) -> tuple[Array, Array]:
         return self.of(nothing, judging=True), self.of(explanation, judging=True)
@@ -299,6 +289,8 @@ def without(explanation: Explanation, index: int) -> Explanation:
         starts = np.array(
             [kept, np.concatenate([np.zeros(len(problem.nominal)), *etas[:index], *etas[index + 1 :]])]
         )
-        parts.append((problem, fit(problem, rest, start=starts, iterations=THOROUGH)))
+        parts.append(
+            (problem, fit(problem, rest, start=starts, iterations=explanation.settings.search.thorough))
+        )
         index = -1
     return Explanation(tuple(parts))

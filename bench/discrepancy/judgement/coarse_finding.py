@@ -8,35 +8,28 @@ import numpy as np
 
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.judgement import posterior as evidence
-from bench.discrepancy.judgement.coarse import SETTINGS, Judged, judge
+from bench.discrepancy.judgement.coarse import Judged, judge
 from bench.discrepancy.judgement.finding import Finding
-from bench.discrepancy.likelihood.model_error import SETTINGS as ERROR
 from bench.discrepancy.likelihood.model_error import ModelError, crude_error, error_left, own_noise
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.numerics.deadline import NEVER, Deadline
 from bench.discrepancy.search.explain import Explanation
 from bench.discrepancy.search.fits import names
+from bench.discrepancy.settings import DiagnosisSettings
 from bench.discrepancy.verdict import Kind, Ranked
 
 Search = Callable[[Case, ModelError, Sequence[Explanation]], tuple[Case, list[Explanation]]]
 """Searches the explanations of a case, weighed by an error, beside those that are known; the case comes back with what they tell of it."""
-REFERENCE = 2
-"""Effects, at most, of the explanation that tells the error of the model: more of them take its error for effects."""
-ROUNDS = 3
-"""Estimates of the error, at most."""
-UNDERSTATED, QUIETEST = 1.5, 0.1
-"""Noise over the stated one from which that is said, and part of a spectrum that may be quieter: of spectra smoothed over half an octave
-the quietest bins scatter by some tenths."""
-WITHIN_ERROR = 2.0 * ERROR.least
-"""Discrepancy of the judging records, relative, up to which a nominal model of unstated noise is as right as a model can be: two standard
-deviations of what sensors are calibrated to."""
-SETTLED = 0.5
-"""Part of the power of an estimated error above which what an explanation leaves is as estimated."""
 
 
 def coarse_explanations(
-    case: Case, search: Search, known: Sequence[Explanation], deadline: Deadline = NEVER
+    case: Case,
+    search: Search,
+    known: Sequence[Explanation],
+    deadline: Deadline = NEVER,
+    *,
+    settings: DiagnosisSettings,
 ) -> tuple[Case, list[Explanation]]:
     """Explanations of a case, weighed by the error of the model.
 
@@ -45,11 +38,16 @@ def coarse_explanations(
         search: How explanations are searched.
         known: Explanations by the stated noise; empty where none is stated.
         deadline: When no further estimate of the error is begun.
+        settings: Thresholds of the diagnosis.
     """
-    error = _left(case, known) if known else crude_error(case, structure_of(case))
+    error = (
+        _left(case, known)
+        if known
+        else crude_error(case, structure_of(case, settings=settings), settings.likelihood.error)
+    )
     case, explanations = search(case, error, known)
-    for _ in range(1, ROUNDS):
-        settled = bool(known) and reference(explanations).reduced > SETTLED
+    for _ in range(1, settings.judgement.error_rounds):
+        settled = bool(known) and reference(explanations).reduced > settings.judgement.error_settled
         if settled or not deadline.allows("a further estimate of the error of the model"):
             break
         known = explanations
@@ -59,17 +57,24 @@ def coarse_explanations(
 
 def reference(explanations: Sequence[Explanation]) -> Explanation:
     """The explanation of few effects that leaves least."""
-    return min((e for e in explanations if len(e.hypothesis) <= REFERENCE), key=lambda e: e.chi2)
+    return min(
+        (
+            e
+            for e in explanations
+            if len(e.hypothesis) <= explanations[0].settings.judgement.reference_effects
+        ),
+        key=lambda e: e.chi2,
+    )
 
 
 def _left(case: Case, explanations: Sequence[Explanation]) -> ModelError:
     """The error that the best of some explanations leaves."""
-    structure, best = structure_of(case), reference(explanations)
-    problem = Problem(case, structure, case.identification)
+    structure, best = structure_of(case, settings=explanations[0].settings), reference(explanations)
+    problem = Problem(case, structure, case.identification, settings=explanations[0].settings)
     if problem.windowed:
         before = best.parts[0][0].error
         return ModelError({}, max(best.reduced * (1.0 if before is None else before.scale), 1.0))
-    return error_left(problem.data, structure, best.predict)
+    return error_left(problem.data, structure, best.predict, problem.settings.likelihood.error)
 
 
 def coarse_finding(
@@ -87,8 +92,11 @@ def coarse_finding(
     judged = judge(case, problem, explanations, rng, trusted=problem.noise_stated and not understated)
     chosen, nearest = judged.chosen.explanation, _nearest(judged)
     probabilities = _marginal(judged)
-    # noise that is stated and is not all that is left is something that is missing, whatever it be
-    unexplained = problem.noise_stated or (judged.vetoed and judged.nominal > WITHIN_ERROR)
+    # without stated noise a nominal model is as right as a model can be within two standard deviations of what sensors are
+    # calibrated to; noise that is stated and is not all that is left is something that is missing, whatever it be
+    unexplained = problem.noise_stated or (
+        judged.vetoed and judged.nominal > 2.0 * problem.settings.likelihood.error.least
+    )
     kind: Kind = "effect" if chosen.hypothesis else ("unknown" if unexplained else "none")
     others = [entry.explanation for entry in judged.found if entry is not judged.chosen]
     order = np.argsort(
@@ -112,10 +120,10 @@ def coarse_finding(
 def _probabilities(kind: Kind, judged: Judged) -> dict[str, float]:
     """Probabilities of the verdicts."""
     if kind == "unknown":
-        return {"effect": SETTINGS.outside, "none": 0.0, "unknown": 1.0 - SETTINGS.outside}
+        return {"effect": judged.settings.outside, "none": 0.0, "unknown": 1.0 - judged.settings.outside}
     pairs = zip(judged.weights, judged.found, strict=True)
     nothing = float(sum(weight for weight, entry in pairs if not entry.explanation.hypothesis))
-    outside = judged.outside if kind == "effect" else SETTINGS.outside
+    outside = judged.outside if kind == "effect" else judged.settings.outside
     known = 1.0 - outside
     return {"effect": known * (1.0 - nothing), "none": known * nothing, "unknown": outside}
 
@@ -128,6 +136,7 @@ def _nearest(judged: Judged) -> Explanation:
 
 def _understated(problem: Problem, best: Explanation) -> Iterator[str]:
     """Channels whose noise is larger than stated, wherever one looks in their spectra."""
+    settings = problem.settings.judgement
     error = best.parts[0][0].error
     for name in problem.structure.channels:
         stated = problem.case.channel(name).noise_std
@@ -135,11 +144,11 @@ def _understated(problem: Problem, best: Explanation) -> Iterator[str]:
             continue
         c = problem.structure.channels.index(name)
         least = [
-            np.quantile(error.power[data.record.name, name] / own_noise(data)[:, c], QUIETEST)
+            np.quantile(error.power[data.record.name, name] / own_noise(data)[:, c], settings.quietest)
             for data in problem.data
         ]
         factor = float(np.sqrt(1.0 + min(least)))
-        if factor > UNDERSTATED:
+        if factor > settings.noise_understated:
             yield (
                 f"the noise of '{name}' is larger than stated, by a factor of {factor:.2g}: hardly anywhere in its spectrum does an "
                 "explanation leave less; measure it at rest"
@@ -149,7 +158,7 @@ def _understated(problem: Problem, best: Explanation) -> Iterator[str]:
 def _marginal(judged: Judged) -> dict[tuple[str, str], float]:
     """Probability that each (name, place) belongs to the truth."""
     total: dict[tuple[str, str], float] = {}
-    outside = SETTINGS.outside if judged.vetoed else judged.outside
+    outside = judged.settings.outside if judged.vetoed else judged.outside
     for weight, entry in zip(judged.weights, judged.found, strict=True):
         for key in {(p.effect.name, p.place.name) for p in entry.explanation.hypothesis}:
             total[key] = total.get(key, 0.0) + (1.0 - outside) * float(weight)

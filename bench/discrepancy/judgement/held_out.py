@@ -28,26 +28,13 @@ from numpy.typing import NDArray
 from bench.discrepancy.fitting.map_fit import Fit, free_entries
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.likelihood.whitening import fast_length
-from bench.discrepancy.numerics.least_squares import DIFFERENCES, differences
+from bench.discrepancy.numerics.least_squares import (
+    differences,
+)
 from bench.discrepancy.search.explain import Explanation
+from bench.discrepancy.settings import DEFAULT
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class HeldOutSettings:
-    """How records are cut and compared.
-
-    Attributes:
-        blocks: Blocks of each record.
-        draws: Draws of the bootstrap over blocks.
-    """
-
-    blocks: int = 12
-    draws: int = 500
-
-
-SETTINGS = HeldOutSettings()
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,18 +68,21 @@ class HeldOut:
         return float(np.linalg.norm(self.left - other.left)) if same else 0.0
 
 
-def held_out(explanation: Explanation, settings: HeldOutSettings = SETTINGS) -> HeldOut:
+def held_out(explanation: Explanation) -> HeldOut:
     """Predict blocks of the records from fits without them.
 
     Args:
         explanation: Fitted.
-        settings: How records are cut.
     """
     parts, scores, rows = [], [], []
     for problem, fitted in explanation.parts:
         residual = problem.residual(fitted.hypothesis, fitted.vector)
         changes = _changes(problem, fitted, residual)
-        blocks = list(_blocks(problem, np.column_stack([residual, changes]), settings.blocks))
+        blocks = list(
+            _blocks(
+                problem, np.column_stack([residual, changes]), explanation.settings.judgement.held_out.blocks
+            )
+        )
         cost = np.eye(changes.shape[1]) + changes.T @ changes
         pulls, own = [], []
         for block in blocks:
@@ -113,7 +103,7 @@ def _changes(problem: Problem, fitted: Fit, residual: Array) -> Array:
     """Changes (n, n_free) of the residuals by one prior standard deviation of each free entry; none where a run diverges."""
     _, std, _, high = problem.prior(fitted.hypothesis)
     free = free_entries(problem, fitted.hypothesis)
-    for step in DIFFERENCES:
+    for step in problem.settings.numerics.differences:
         found = differences(
             lambda vector: problem.residual(fitted.hypothesis, vector),
             fitted.vector,
@@ -172,7 +162,10 @@ def _sandwiched(problem: Problem, fitted: Fit, cost: Array, pulls: Array) -> Fit
 
 
 def shares(
-    found: Sequence[HeldOut], priors: Array, rng: np.random.Generator, draws: int = SETTINGS.draws
+    found: Sequence[HeldOut],
+    priors: Array,
+    rng: np.random.Generator,
+    draws: int = DEFAULT.judgement.held_out.draws,
 ) -> Array:
     """Weights (n,) of explanations by what they predict, averaged over a Bayesian bootstrap of the blocks.
 

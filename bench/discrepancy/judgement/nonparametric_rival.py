@@ -41,26 +41,14 @@ from bench.discrepancy.screening.linear_amplitudes import Node, products
 from bench.discrepancy.screening.screen import Ground, Screen
 from bench.discrepancy.search.explain import Explanation
 from bench.discrepancy.search.fits import (
-    IMMATERIAL,
-    LOG_PRIOR_EFFECT,
-    SIGHT,
-    THOROUGH,
-    WITHIN_REACH,
     consistent,
     posterior,
 )
+from bench.discrepancy.settings import JudgementSettings
 
 CONTACTS = ("one_sided_stop", "gap")
 """Effects whose law has a damper in the contact, its third parameter, which the catalogue leaves at zero."""
 DAMPING = FreeParameter("damping", "force/velocity", std=1.5)
-LENGTHS = (0.15, 0.25, 0.4, 0.7, 1.2)
-"""Distances within which a smooth curve keeps its course, over the largest displacement or velocity."""
-LENGTHS_ALONG, LENGTHS_ACROSS = (0.2, 0.5, 1.2), (0.15, 0.4, 1.2)
-"""The same of smooth surfaces, along the displacement and across it."""
-TRIED = 2
-"""Free forces that are fitted, at most."""
-SIZES = (0.03, 0.1, 0.3, 1.0)
-"""Sizes of a smooth curve, over the RMS load."""
 
 
 class Rival(NamedTuple):
@@ -120,9 +108,12 @@ def _contacts(problem: Problem, explanations: Sequence[Explanation]) -> list[Fit
 
 def _rival(problem: Problem, fitted: Fit, contacts: Sequence[Fit]) -> Fit | None:
     """The fit of a single force alone, where it is likelier than a hypothesis; the likeliest one."""
+    settings = problem.settings.search
     best, most = None, posterior(fitted)
     for placed, start, toll in [*_damped(problem, contacts), *_free(problem, fitted)]:
-        rival = fit(problem, (placed,), start=start, iterations=THOROUGH, limit=fitted.cost + SIGHT)
+        rival = fit(
+            problem, (placed,), start=start, iterations=settings.thorough, limit=fitted.cost + settings.sight
+        )
         if posterior(rival) + toll > most:
             best, most = rival, posterior(rival) + toll
     return best
@@ -141,6 +132,7 @@ def _damped(problem: Problem, fits: Sequence[Fit]) -> Iterator[tuple[Placed, Arr
 
 def _free(problem: Problem, fitted: Fit) -> Iterator[tuple[Placed, Array, float]]:
     """Free forces that promise to be likelier than a hypothesis, the likeliest first, and where to begin with them."""
+    settings = problem.settings
     families = (FREE_DISPLACEMENT, FREE_VELOCITY, FREE_SURFACE, FREE_MEMORY)
     screen = along(Screen(problem, ()), fitted)
     screen.add(placements(problem.case, problem.structure, families))
@@ -148,9 +140,9 @@ def _free(problem: Problem, fitted: Fit) -> Iterator[tuple[Placed, Array, float]
     promises = sorted(
         (_promised(screen, ground, node) for node in screen.nodes), key=lambda p: -p.log_posterior
     )
-    for promise in promises[:TRIED]:
+    for promise in promises[: settings.judgement.free_forces]:
         # along a motion that no free run told, evidence is less than there is
-        if not consistent(fitted) or promise.log_posterior > posterior(fitted) - WITHIN_REACH:
+        if not consistent(fitted) or promise.log_posterior > posterior(fitted) - settings.search.within_reach:
             yield promise.placed, promise.start, promise.toll
 
 
@@ -171,13 +163,14 @@ def damped(contact: Effect) -> Effect:
 
 def _promised(screen: Screen, ground: Ground, node: Node) -> _Promise:
     """The evidence of a free force, linear in its coefficients along a motion that is known."""
+    settings = screen.problem.settings.search
     left = ground.left
     inner = products(ground.head, node.columns)
     gram = node.gram - inner.T @ inner
     right = products(node.columns, left[: len(ground.residual), None])[:, 0]
     alone = -0.5 * float(left @ left) - float(np.sum(np.log(np.abs(np.diag(ground.triangle)))))
     found: list[tuple[float, Array, Array]] = []
-    for mixing in _mixings(node.placed.effect):
+    for mixing in _mixings(node.placed.effect, settings=screen.problem.settings.judgement):
         curvature = np.eye(mixing.shape[1]) + mixing.T @ gram @ mixing
         factor = cho_factor(curvature)
         eta = cho_solve(factor, mixing.T @ right)
@@ -185,20 +178,23 @@ def _promised(screen: Screen, ground: Ground, node: Node) -> _Promise:
         found.append((0.5 * float(right @ mixing @ eta) - occam, mixing, eta))
     gain, mixing, eta = max(found, key=lambda entry: entry[0])
     toll = float(np.logaddexp.reduce([entry[0] for entry in found])) - float(np.log(len(found))) - gain
-    prior = LOG_PRIOR_EFFECT - 0.5 * IMMATERIAL * screen.problem.n_residuals
+    prior = settings.log_prior_effect - 0.5 * settings.immaterial * screen.problem.n_residuals
     moved = screen.deviations + ground.moves(node.columns @ (mixing @ eta).astype(np.float32))
     placed = replace(node.placed, effect=mixed(node.placed.effect, mixing))
     return _Promise(placed, np.concatenate([moved, eta]), alone + gain + toll + prior, toll)
 
 
-def _mixings(effect: Effect) -> Iterator[Array]:
+def _mixings(effect: Effect, *, settings: JudgementSettings) -> Iterator[Array]:
     """Prior covariances of a free force's coefficients, by what makes them of independent ones of unit deviation."""
     if effect is FREE_MEMORY:
         yield np.eye(effect.n_linear)
         return
     if effect is FREE_SURFACE:
-        shapes = [smoothing_both(*lengths) for lengths in product(LENGTHS_ALONG, LENGTHS_ACROSS)]
+        shapes = [
+            smoothing_both(*lengths)
+            for lengths in product(settings.surface_lengths_along, settings.surface_lengths_across)
+        ]
     else:
-        shapes = [smoothing(length) for length in LENGTHS]
-    for shape, size in product(shapes, SIZES):
+        shapes = [smoothing(length) for length in settings.curve_lengths]
+    for shape, size in product(shapes, settings.curve_sizes):
         yield size * shape

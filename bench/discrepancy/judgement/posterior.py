@@ -9,26 +9,15 @@ import numpy as np
 
 from bench.discrepancy.effects.effect import unit_of
 from bench.discrepancy.judgement.shares import percent
-from bench.discrepancy.judgement.validation_discrepancy import AT_THE_NOISE, closed_share
+from bench.discrepancy.judgement.validation_discrepancy import (
+    closed_share,
+)
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.search.explain import Explanation, nominal_alone, plainest
 from bench.discrepancy.search.fits import names
+from bench.discrepancy.settings import DEFAULT, JudgementSettings
 from bench.discrepancy.verdict import Estimate, Gap, Kind, NamedEffect, Ranked
 
-RIVAL = 4.6
-"""Difference in log posterior (odds of 100) within which two explanations count as indistinguishable."""
-INDEPENDENT = 50.0
-"""Independent pieces of evidence in a record whose residuals are model error rather than noise."""
-MOSTLY = 0.5
-"""Part of the residual power an effect has to explain to be named where the noise is not stated, and part of the gap on the judging
-records that the nearest explanation of something unknown has to close to be worth telling."""
-OUTSIDE = 0.01
-"""Share of effects that no catalogue holds, kept even when a catalogued effect reaches the noise and no free force does better: of the
-417 effects that were named with certainty on the sealed cases of seeds 20261204 and 20261205, two were wrong."""
-WITHIN = 0.05
-"""Share of catalogued effects among what is called unknown: of 104 such verdicts there, six were."""
-OUTSIDE_THE_CATALOGUE = {"effect": WITHIN, "none": 0.0, "unknown": 1.0 - WITHIN}
-"""Probabilities of the verdicts where there is a doubt about an explanation that leaves nothing but noise."""
 FAILS = "explains the records for identification and fails on those for judging"
 """Doubt about an explanation."""
 SINGLE = {
@@ -63,16 +52,17 @@ def nearest(explanations: Sequence[Explanation]) -> Explanation:
     return plain if plain.hypothesis else best
 
 
-def closes(label: str, gap: Gap) -> str:
+def closes(label: str, gap: Gap, *, settings: JudgementSettings = DEFAULT.judgement) -> str:
     """How far the nearest explanation goes on the judging records; empty where that is not far.
 
     Args:
         label: Its effects as they stand among the gap's steps.
         gap: A gap of the case.
+        settings: `JudgementSettings` of the diagnosis.
     """
     left = dict(gap.steps).get(label, math.inf)
-    share = closed_share(gap.before, left, gap.noise_floor)
-    if share < MOSTLY or gap.before <= AT_THE_NOISE * gap.noise_floor:
+    share = closed_share(gap.before, left, gap.noise_floor, settings=settings)
+    if share < settings.mostly or gap.before <= settings.at_the_noise * gap.noise_floor:
         return ""
     return (
         f" On the judging records {label} closes {percent(share)} of the gap all the same: it is much of what is "
@@ -93,12 +83,19 @@ def weights(explanations: Sequence[Explanation]) -> np.ndarray:
         best = explanations[0]
         logs = np.array(
             [
-                -0.5 * INDEPENDENT * e.reduced / best.reduced if e.n_free <= best.n_free else -np.inf
+                -0.5 * explanations[0].settings.judgement.independent * e.reduced / best.reduced
+                if e.n_free <= best.n_free
+                else -np.inf
                 for e in explanations
             ]
         )
     shares = np.exp(logs - logs.max())
     return shares / shares.sum()
+
+
+def outside_the_catalogue(settings: JudgementSettings) -> dict[str, float]:
+    """Probabilities of the verdicts where there is a doubt about an explanation that leaves nothing but noise."""
+    return {"effect": settings.within, "none": 0.0, "unknown": 1.0 - settings.within}
 
 
 def judge(explanations: Sequence[Explanation]) -> tuple[Kind, dict[str, float]]:
@@ -109,7 +106,11 @@ def judge(explanations: Sequence[Explanation]) -> tuple[Kind, dict[str, float]]:
     shares = weights(explanations)
     none = float(sum(w for w, e in zip(shares, explanations, strict=True) if not e.hypothesis))
     complete = best.consistent and not any(best.lacking(nominal_alone(explanations)))
-    known = 1.0 - OUTSIDE if complete else WITHIN
+    known = (
+        1.0 - explanations[0].settings.judgement.outside
+        if complete
+        else explanations[0].settings.judgement.within
+    )
     probabilities = {"effect": known * (1.0 - none), "none": known * none, "unknown": 1.0 - known}
     if not complete:
         return "unknown", probabilities
@@ -124,13 +125,13 @@ def _judge_unscaled(explanations: Sequence[Explanation]) -> tuple[Kind, dict[str
     if not best.hypothesis:
         return "none", {"effect": 0.0, "none": 1.0, "unknown": 0.0}
     probabilities = {"effect": explained, "none": 0.0, "unknown": 1.0 - explained}
-    return ("effect" if explained > MOSTLY else "unknown"), probabilities
+    return ("effect" if explained > explanations[0].settings.judgement.mostly else "unknown"), probabilities
 
 
 def marginal(explanations: Sequence[Explanation]) -> dict[tuple[str, str], float]:
     """Probability that each (name, place) belongs to the truth."""
     total: dict[tuple[str, str], float] = {}
-    known = 1.0 - OUTSIDE if explanations[0].scaled else 1.0
+    known = 1.0 - explanations[0].settings.judgement.outside if explanations[0].scaled else 1.0
     for share, explanation in zip(weights(explanations), explanations, strict=True):
         for key in {(p.effect.name, p.place.name) for p in explanation.hypothesis}:
             total[key] = total.get(key, 0.0) + known * float(share)
@@ -155,7 +156,7 @@ def indistinguishable(explanations: Sequence[Explanation]) -> tuple[tuple[str, .
     own = {p.key: p for p in best.hypothesis}
     sets: dict[str, set[str]] = {}
     for other in explanations[1:]:
-        if not other.hypothesis or _behind(explanations, other) > RIVAL:
+        if not other.hypothesis or _behind(explanations, other) > explanations[0].settings.judgement.rival:
             continue
         theirs = {p.key: p for p in other.hypothesis}
         lost = [own[key] for key in own.keys() - theirs.keys()]

@@ -21,12 +21,9 @@ from bench.discrepancy.likelihood.problem import Array, Problem
 from bench.discrepancy.likelihood.window_whitening import in_motion
 from bench.discrepancy.response.driving_loads import with_load_noise
 from bench.discrepancy.search.explain import Explanation
-from bench.discrepancy.search.fits import THOROUGH, consistent
-
-DRAWS = 8
-"""Draws of the parameters from their posterior, and of the noise of the loads."""
-CONTRADICTED = 2.0
-"""Error on the judging records over what noise and parameters explain, from which an explanation is contradicted."""
+from bench.discrepancy.search.fits import (
+    consistent,
+)
 
 
 def contradicted(case: Case, problem: Problem, best: Explanation, rng: np.random.Generator) -> bool:
@@ -45,6 +42,7 @@ def contradicted(case: Case, problem: Problem, best: Explanation, rng: np.random
 
 def fails(case: Case, problem: Problem, best: Explanation, rng: np.random.Generator) -> bool:
     """Whether an explanation misses the judging records by more than noise and its parameters' uncertainty; as `contradicted`."""
+    settings = problem.settings.judgement
     records = case.validation
     if problem.driven or problem.windowed or not problem.noise_stated or any(in_motion(r) for r in records):
         return False
@@ -60,13 +58,13 @@ def fails(case: Case, problem: Problem, best: Explanation, rng: np.random.Genera
         floor = noise_level(problem, channels, records)
         if not np.isfinite(error):
             return True
-        if error <= CONTRADICTED * floor:
+        if error <= settings.contradicted * floor:
             continue
         if not drawn:
-            others = [_drawn(best, rng) for _ in range(DRAWS)]
+            others = [_drawn(best, rng) for _ in range(settings.check_draws)]
             drawn = [[other.predict(with_load_noise(problem, r, rng)) for r in records] for other in others]
         spread = _rms(np.concatenate([judged(other) - simulated for other in drawn]))
-        if error > CONTRADICTED * np.hypot(floor, spread):
+        if error > settings.contradicted * np.hypot(floor, spread):
             return True
     return False
 
@@ -75,7 +73,9 @@ def _explains_all(best: Explanation, records: Sequence[CaseRecord]) -> bool:
     """Whether the laws of an explanation, fitted to the judging records as well, bring all records down to their noise."""
     for problem, fitted in best.parts:
         wider = problem.beside(records)
-        if not consistent(fit(wider, fitted.hypothesis, start=fitted.vector, iterations=THOROUGH)):
+        if not consistent(
+            fit(wider, fitted.hypothesis, start=fitted.vector, iterations=best.settings.search.thorough)
+        ):
             return False
     return True
 

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import math
 
-from bench.discrepancy.judgement.validation_discrepancy import AT_THE_NOISE, DIVERGED_GAP
+from bench.discrepancy.judgement.validation_discrepancy import (
+    DIVERGED_GAP,
+)
+from bench.discrepancy.settings import DEFAULT, JudgementSettings
 from bench.discrepancy.verdict import Gap
 
 SURE = 0.9995
@@ -16,15 +19,18 @@ def percent(share: float) -> str:
     return "over 99.9 %" if share >= SURE else f"{100.0 * max(share, 0.0):.1f} %"
 
 
-def closed_words(gap: Gap, value: float | None = None) -> str:
+def closed_words(
+    gap: Gap, value: float | None = None, *, settings: JudgementSettings = DEFAULT.judgement
+) -> str:
     """How much of a discrepancy is closed, in words.
 
     Args:
         gap: The discrepancy of a coordinate.
         value: What is left at one of its steps; `gap.after`, with its interval, where None.
+        settings: `JudgementSettings` of the diagnosis.
     """
     left = gap.after if value is None else value
-    if gap.before <= AT_THE_NOISE * gap.noise_floor:
+    if gap.before <= settings.at_the_noise * gap.noise_floor:
         return "nothing to close: it is that of the noise"
     if left >= DIVERGED_GAP:
         return "none: it diverges"

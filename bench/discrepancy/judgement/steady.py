@@ -17,9 +17,6 @@ from bench.discrepancy.fitting.map_fit import Fit, free_entries
 from bench.discrepancy.likelihood.problem import Array, Problem
 from bench.discrepancy.search.explain import Explanation
 
-DRAWS = 24
-"""Draws of the parameters from their posterior."""
-
 
 def diverges(explanation: Explanation, records: Sequence[CaseRecord]) -> bool:
     """Whether a free run of some records is not finite."""
@@ -38,7 +35,7 @@ def steadied(
         rng: For the draws.
     """
     found: list[tuple[float, Explanation]] = []
-    for _ in range(DRAWS):
+    for _ in range(explanation.settings.judgement.steady_draws):
         parts = tuple((problem, _drawn(problem, fitted, rng)) for problem, fitted in explanation.parts)
         drawn = Explanation(parts)
         cost = sum(fitted.cost for _, fitted in parts)

@@ -17,8 +17,10 @@ from bench.discrepancy.case.case import Case
 from bench.discrepancy.checks.initial_motion import with_starts_found
 from bench.discrepancy.effects.effect import Effect
 from bench.discrepancy.judgement import posterior as evidence
-from bench.discrepancy.judgement.coarse import SETTINGS
-from bench.discrepancy.judgement.coarse_finding import REFERENCE, coarse_explanations, coarse_finding
+from bench.discrepancy.judgement.coarse_finding import (
+    coarse_explanations,
+    coarse_finding,
+)
 from bench.discrepancy.judgement.finding import Finding
 from bench.discrepancy.judgement.nonparametric_rival import Rival, likelier_force
 from bench.discrepancy.judgement.predictive_check import contradicted
@@ -29,6 +31,7 @@ from bench.discrepancy.numerics.deadline import NEVER, Deadline
 from bench.discrepancy.search.explain import Explanation, explain
 from bench.discrepancy.search.fits import names
 from bench.discrepancy.search.load_interpolation import promising_readings
+from bench.discrepancy.settings import DEFAULT, DiagnosisSettings
 
 Progress = Callable[[str], None]
 
@@ -42,12 +45,14 @@ class How:
         most: Largest number of effects named together.
         progress: Called with a line of text at every stage.
         deadline: When no further stage is begun.
+        settings: Thresholds of the diagnosis.
     """
 
     catalogue: Sequence[Effect]
     most: int = 3
     progress: Progress = lambda text: None
     deadline: Deadline = NEVER
+    settings: DiagnosisSettings = DEFAULT
 
 
 def found_of(case: Case, how: How, rng: np.random.Generator) -> tuple[Case, Finding]:
@@ -62,23 +67,29 @@ def found_of(case: Case, how: How, rng: np.random.Generator) -> tuple[Case, Find
         The case with what its explanations tell of things that nobody stated, and what was found.
     """
 
-    few = replace(how, most=min(how.most, REFERENCE))
+    few = replace(how, most=min(how.most, how.settings.judgement.reference_effects))
 
     def search(case: Case, error: ModelError, known: Sequence[Explanation]) -> tuple[Case, list[Explanation]]:
         return _explained(case, few, error, [e for e in known if len(e.hypothesis) <= few.most])
 
     known: list[Explanation] = []
-    if Problem(case, structure_of(case), case.identification).noise_stated:
+    if Problem(
+        case, structure_of(case, settings=how.settings), case.identification, settings=how.settings
+    ).noise_stated:
         # half the time for either regime
         case, known = _explained(case, replace(how, deadline=how.deadline.part(0.5)))
         sharp = _sharp(case, known, how, rng)
         outside = sharp.rival is not None and sharp.rival.explanation.consistent
-        believed = sharp.kind != "unknown" and not strained(sharp.explanations[0], SETTINGS.within)
+        believed = sharp.kind != "unknown" and not strained(
+            sharp.explanations[0], how.settings.judgement.coarse.within
+        )
         if believed or outside or sharp.doubt:
             return case, sharp
     how.progress("weighed by the error of the model")
-    case, explanations = coarse_explanations(case, search, known, how.deadline)
-    problem = Problem(case, structure_of(case), case.identification)
+    case, explanations = coarse_explanations(case, search, known, how.deadline, settings=how.settings)
+    problem = Problem(
+        case, structure_of(case, settings=how.settings), case.identification, settings=how.settings
+    )
     return case, coarse_finding(case, problem, explanations, rng)
 
 
@@ -92,7 +103,12 @@ def strained(explanation: Explanation, within: float) -> bool:
 
 def _sharp(case: Case, explanations: list[Explanation], how: How, rng: np.random.Generator) -> Finding:
     """What is found by the stated noise."""
-    problem = Problem(case, structure_of(case), case.identification)
+    problem = Problem(
+        case,
+        structure_of(case, settings=explanations[0].settings),
+        case.identification,
+        settings=explanations[0].settings,
+    )
     best = explanations[0]
     kind, probabilities = evidence.judge(explanations)
     doubt, rival = "", None
@@ -102,7 +118,7 @@ def _sharp(case: Case, explanations: list[Explanation], how: How, rng: np.random
     if kind == "effect":
         doubt = _doubt(case, problem, best, rival, rng)
     if doubt:
-        kind, probabilities = "unknown", evidence.OUTSIDE_THE_CATALOGUE
+        kind, probabilities = "unknown", evidence.outside_the_catalogue(how.settings.judgement)
     words = evidence.plain_words(kind, explanations, doubt=doubt)
     if rival is not None and not doubt and rival.explanation.consistent:
         words += evidence.enough(rival.closure)
@@ -133,6 +149,7 @@ def _explained(
             error=error,
             deadline=how.deadline,
             seeds=seeds,
+            settings=how.settings,
         )
 
     explanations = explanations_of(case)
@@ -144,7 +161,7 @@ def _explained(
         if again[0].log_posterior > explanations[0].log_posterior:
             case, explanations = read, again
             break
-    started = with_starts_found(case, explanations[0].predict)
+    started = with_starts_found(case, explanations[0].predict, settings=how.settings)
     if any(a.at_rest != b.at_rest for a, b in zip(case.identification, started.identification, strict=True)):
         how.progress("once more, from the initial states estimated")
         explanations = explanations_of(started)

@@ -19,15 +19,12 @@ from bench.discrepancy.likelihood.noise_covariance import forces_of_noise
 from bench.discrepancy.likelihood.problem import Array, Problem
 from bench.discrepancy.model.placement import Hypothesis
 from bench.discrepancy.model.structure import Structure
+from bench.discrepancy.settings import DEFAULT, JudgementSettings
 from bench.discrepancy.verdict import Gap
 
 Prediction = Callable[[CaseRecord], Mapping[str, Array]]
 DIVERGED_GAP = 1e3
 """Gap that stands for a simulation that diverged."""
-AT_THE_NOISE = 1.05
-"""Discrepancy over its noise floor up to which there is nothing to close: the stated noise is known to a few percent at best."""
-BLOCKS = 24
-"""Blocks of a judging record for the bootstrap: some periods each, so that blocks are nearly independent."""
 
 
 def coordinates(structure: Structure) -> list[tuple[str, tuple[tuple[str, float], ...]]]:
@@ -87,7 +84,14 @@ def gaps(
         whole = np.concatenate(measured)
         values = [nrmse(whole, np.concatenate(stage)) for stage in simulated]
         floor = noise_level(problem, channels, case.validation, final) / max(float(np.std(whole)), 1e-300)
-        interval = _bootstrap(measured, simulated[0], simulated[-1], floor * float(np.std(whole)), rng)
+        interval = _bootstrap(
+            measured,
+            simulated[0],
+            simulated[-1],
+            floor * float(np.std(whole)),
+            rng,
+            settings=problem.settings.judgement,
+        )
         out.append(
             Gap(
                 metric=f"validation {_label(channels)} NRMSE, {run_kind(problem, case.validation)}",
@@ -95,7 +99,7 @@ def gaps(
                 parameters_only=values[1],
                 after=values[-1],
                 noise_floor=floor,
-                closed=closed_share(values[0], values[-1], floor),
+                closed=closed_share(values[0], values[-1], floor, settings=problem.settings.judgement),
                 closed_ci95=interval,
                 steps=tuple((label, value) for (label, _), value in zip(stages, values, strict=True)),
                 dof=name,
@@ -127,9 +131,11 @@ def noise_floors(problem: Problem, records: Sequence[CaseRecord]) -> Array:
     return np.array(found)
 
 
-def closed_share(before: float, after: float, floor: float) -> float:
+def closed_share(
+    before: float, after: float, floor: float, *, settings: JudgementSettings = DEFAULT.judgement
+) -> float:
     """``(before - after) / (before - floor)``; one where there was nothing to close."""
-    if before <= AT_THE_NOISE * floor:
+    if before <= settings.at_the_noise * floor:
         return 1.0
     return (before - after) / (before - floor)
 
@@ -202,6 +208,8 @@ def _bootstrap(
     after: Sequence[Array],
     noise: float,
     rng: np.random.Generator,
+    *,
+    settings: JudgementSettings,
 ) -> tuple[float, float]:
     """95 % interval of the closed share, blocks of the judging records drawn with replacement."""
     rows = []
@@ -209,7 +217,7 @@ def _bootstrap(
         if not (np.isfinite(b).all() and np.isfinite(a).all()):
             return (0.0, 1.0)
         centred = m - m.mean()
-        for block in np.array_split(np.arange(len(m)), BLOCKS):
+        for block in np.array_split(np.arange(len(m)), settings.blocks):
             rows.append(
                 [
                     np.sum((b - m)[block] ** 2),
@@ -222,7 +230,7 @@ def _bootstrap(
     draws = table[rng.integers(len(table), size=(1000, len(table)))].sum(axis=1)
     power = draws[:, 2]
     shares = [
-        closed_share(*np.sqrt([x[0] / p, x[1] / p, noise**2 * x[3] / p]))
+        closed_share(*np.sqrt([x[0] / p, x[1] / p, noise**2 * x[3] / p]), settings=settings)
         for x, p in zip(draws, np.maximum(power, 1e-300), strict=True)
     ]
     low, high = np.percentile(shares, [2.5, 97.5])

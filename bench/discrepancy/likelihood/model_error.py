@@ -27,34 +27,10 @@ from numpy.typing import NDArray
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.likelihood.whitening import RecordData, fast_length, masked
 from bench.discrepancy.model.structure import Structure
+from bench.discrepancy.settings import DEFAULT, ErrorSettings
 
 Array = NDArray[np.float64]
 Prediction = Callable[[CaseRecord], Mapping[str, Array]]
-
-
-@dataclass(frozen=True)
-class ErrorSettings:
-    """How the error of a model is estimated.
-
-    Attributes:
-        octaves: Width over which its spectrum is smoothed: wider than a resonance, narrower than what tells bands apart.
-        bins: Fewest frequency bins on either side.
-        samples: Independent samples an octave and record. A band of an octave and the record's time are divided as a sonogram would be,
-            into some half octaves and quarters of the record.
-        least: Model error that no rig goes below, as a part of the spectrum of a response: gains of sensors are known to a percent.
-        crude: Model error over the RMS of a channel, white, where nothing has been fitted yet.
-    """
-
-    octaves: float = 0.5
-    bins: int = 6
-    samples: float = 8.0
-    least: float = 0.01
-    crude: float = 0.05
-
-
-SETTINGS = ErrorSettings()
-OCTAVES = 10.0
-"""Octaves of a record of some thousand samples."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +49,7 @@ class ModelError:
     scale: float = 1.0
     together: float = 1.0
     crude: bool = False
-    settings: ErrorSettings = SETTINGS
+    settings: ErrorSettings = DEFAULT.likelihood.error
 
     def of(self, record: str, channels: Sequence[str], n_bins: int) -> Array:
         """Variance (n_bins, n_channels) in a record; the last value beyond the bins that it was estimated for, zero where it was not."""
@@ -89,7 +65,7 @@ class ModelError:
 
     def window_weight(self, n_residuals: int) -> float:
         """How much each residual of a record in windows counts: as many samples as `weights` leaves of a whole record."""
-        return min(1.0, OCTAVES * self.settings.samples / max(n_residuals, 1))
+        return min(1.0, self.settings.record_octaves * self.settings.samples / max(n_residuals, 1))
 
 
 def band_weights(n_bins: int, samples: float) -> Array:
@@ -101,7 +77,7 @@ def band_weights(n_bins: int, samples: float) -> Array:
     return np.minimum(1.0, samples / counts[octave])
 
 
-def smoothed(power: Array, settings: ErrorSettings = SETTINGS) -> Array:
+def smoothed(power: Array, settings: ErrorSettings = DEFAULT.likelihood.error) -> Array:
     """Mean of a spectrum (n_bins, k) over a part of an octave about each bin."""
     n = len(power)
     bins = np.arange(n)
@@ -128,7 +104,7 @@ def error_left(
     data: Sequence[RecordData],
     structure: Structure,
     predict: Prediction,
-    settings: ErrorSettings = SETTINGS,
+    settings: ErrorSettings = DEFAULT.likelihood.error,
 ) -> ModelError:
     """Error of the model that an explanation leaves.
 
@@ -151,7 +127,9 @@ def error_left(
     return ModelError(power, together=_together(structure), settings=settings)
 
 
-def crude_error(case: Case, structure: Structure, settings: ErrorSettings = SETTINGS) -> ModelError:
+def crude_error(
+    case: Case, structure: Structure, settings: ErrorSettings = DEFAULT.likelihood.error
+) -> ModelError:
     """Error of a model of which nothing is known yet: white, a part of each channel."""
     level = {
         (record.name, name): (settings.crude * float(np.std(record.values[name]))) ** 2

@@ -15,6 +15,7 @@ from scipy import ndimage
 
 from bench.discrepancy.case.case import CaseRecord
 from bench.discrepancy.likelihood.whitening import fast_length, masked
+from bench.discrepancy.settings import LikelihoodSettings
 from bench.discrepancy.simulation.stick_slip import Motion
 
 if TYPE_CHECKING:
@@ -22,9 +23,6 @@ if TYPE_CHECKING:
     from bench.discrepancy.model.placement import Hypothesis
 
 Array = NDArray[np.float64]
-SMOOTHED_BINS = 9
-"""Bins over which the spectrum of the draws of a motion's noise is averaged: with eight draws its level at a frequency is known to
-some 12 %, and chi-squared to far less."""
 
 
 def whitening_behind(
@@ -47,7 +45,12 @@ def whitening_behind(
     own = np.diag(problem.noise**2).astype(complex)
     noise = np.broadcast_to(own, (n_bins, *own.shape))
     if problem.driven:
-        noise = noise + _power(forces_of_noise(problem, record, model), compared)[:n_bins, None, None]
+        noise = (
+            noise
+            + _power(forces_of_noise(problem, record, model), compared, settings=problem.settings.likelihood)[
+                :n_bins, None, None
+            ]
+        )
     elif np.any(load_noise := problem.load_noise_of(record)):
         omega = 2.0 * np.pi * np.arange(n_bins) / (fast_length(len(record)) * record.step)
         linear = problem.structure.at(problem.split(*model)[0])
@@ -93,9 +96,11 @@ def forces_of_noise(problem: Problem, record: CaseRecord, model: tuple[Hypothesi
     return np.stack([force(motion) for motion in prescribed.noisy]) - force(prescribed.motion)
 
 
-def _power(forces: Array, compared: Array | None) -> Array:
+def _power(forces: Array, compared: Array | None, *, settings: LikelihoodSettings) -> Array:
     """Smoothed power (n_frequencies,) of the compared samples of draws (n_draws, n)."""
     n = forces.shape[1]
     spectra = np.fft.rfft(masked(forces.T, compared), fast_length(n), axis=0)
     power = np.mean(np.abs(spectra) ** 2, axis=1) / n
-    return np.asarray(ndimage.uniform_filter1d(power, SMOOTHED_BINS, mode="nearest"), dtype=np.float64)
+    return np.asarray(
+        ndimage.uniform_filter1d(power, settings.smoothed_bins, mode="nearest"), dtype=np.float64
+    )

@@ -43,13 +43,12 @@ from bench.discrepancy.motion.observer import ACCELERATION
 from bench.discrepancy.motion.prescribed import Prescribed, decided, prescribed_motion
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.response.driving_loads import driving_loads, fewest_steps, run_in
+from bench.discrepancy.settings import DEFAULT, DiagnosisSettings
 from bench.discrepancy.simulation.prescribed_response import driven_force
 from bench.discrepancy.simulation.step_size import rates, speeds, steps
 from bench.discrepancy.simulation.stick_slip import COLUMNS, Elements, Motion
 
 Array = NDArray[np.float64]
-MOTION_DRAWS = 8
-"""Draws of the noise of a prescribed motion."""
 
 
 @dataclass
@@ -64,6 +63,7 @@ class Problem:
         substeps: Integration steps a sample; chosen by the fastest rate where None.
         refinement: Multiple of the steps so chosen, as far as `step_size` lets it.
         within: Stated standard deviations that a nominal parameter may move.
+        settings: Thresholds of the diagnosis.
         error: Error of the model that residuals are weighed by besides their noise; None where noise is all that they hold.
         nominal: (n_nominal,) values of the structure's parameters, initial states of records in motion after them.
         spread: (n_nominal,) their one-sigma uncertainties.
@@ -82,6 +82,7 @@ class Problem:
     refinement: int = 1
     error: ModelError | None = None
     within: float = np.inf
+    settings: DiagnosisSettings = DEFAULT
     nominal: Array = field(init=False)
     spread: Array = field(init=False)
     noise: Array = field(init=False)
@@ -114,7 +115,10 @@ class Problem:
     def _noise_of(self, name: str) -> float:
         stated = self.case.channel(name).noise_std
         if stated is not None and stated > 0:
-            return max(raised_noise(stated, record.values[name]) for record in self.records)
+            return max(
+                raised_noise(stated, record.values[name], settings=self.settings.case)
+                for record in self.records
+            )
         return max(noise_floor(record.values[name]) for record in self.records)
 
     def prepare(self, record: CaseRecord, passed: tuple[Hypothesis, Array] | None = None) -> RecordData:
@@ -130,10 +134,12 @@ class Problem:
         n_bins = (
             self.bins[record.name]
             if self.bins and record.name in self.bins
-            else band_bins(responses, self.noise)
+            else band_bins(responses, self.noise, settings=self.settings.likelihood)
         )
         windows = self._weighed_windows(windows_of(self, record, n_bins, self.split(*passed)[0]))
-        compared = without_bridged(decided(self.prescribed(record)) if self.driven else None, record)
+        compared = without_bridged(
+            decided(self.prescribed(record), settings=self.settings.motion) if self.driven else None, record
+        )
         whitening = self._weighed(whitening_behind(self, record, n_bins, passed, compared), record)
         together = None
         if self.structure.springs and not self.windowed and self.error is None:
@@ -175,7 +181,9 @@ class Problem:
         """Cached prescribed motion of a record, with draws of its noise."""
         cache = self.__dict__.setdefault("_prescribed", {})
         if record.name not in cache:
-            cache[record.name] = prescribed_motion(self.case, record, MOTION_DRAWS)
+            cache[record.name] = prescribed_motion(
+                self.case, record, self.settings.likelihood.motion_draws, settings=self.settings.motion
+            )
         return cache[record.name]
 
     def load_noise_of(self, record: CaseRecord) -> Array:
@@ -195,7 +203,9 @@ class Problem:
         """Samples of run-in before a periodic record, see `driving_loads.run_in`."""
         if not record.periodic or self.driven or self.windowed:
             return 0
-        return run_in(self.structure.at(self.nominal), len(record), record.step)
+        return run_in(
+            self.structure.at(self.nominal), len(record), record.step, settings=self.settings.response
+        )
 
     @cached_property
     def finest(self) -> int:
@@ -218,7 +228,14 @@ class Problem:
         """Motion behind the response channels of a record of this structure."""
         samples = np.column_stack([record.values[name] for name in self.structure.channels])
         rest = not in_motion(record)
-        return measured_motion(self.structure.observers, samples, self.noise, record.step, at_rest=rest)
+        return measured_motion(
+            self.structure.observers,
+            samples,
+            self.noise,
+            record.step,
+            at_rest=rest,
+            settings=self.settings.motion,
+        )
 
     def scales(self, place: Place) -> Scales:
         """Magnitudes along the coordinates of a place, over all records."""
@@ -356,11 +373,21 @@ class Problem:
             return np.array([self.substeps])
         # loads known between their samples are given at the steps of the finest sample
         halving = self.case.load_interpolation == "band_limited"
-        return steps(phase, fewest=self.finest, multiple=self.refinement, halving=halving)
+        return steps(
+            phase,
+            fewest=self.finest,
+            multiple=self.refinement,
+            halving=halving,
+            settings=self.settings.simulation,
+        )
 
     def firsts(self, record: CaseRecord) -> NDArray[np.int64]:
         """First samples (n_windows,) of the runs that a simulation of a record is made of."""
-        return cut(self.case, record, len(self.noise))[0] if self.windowed else np.zeros(1, dtype=np.int64)
+        return (
+            cut(self.case, record, len(self.noise), settings=self.settings.likelihood)[0]
+            if self.windowed
+            else np.zeros(1, dtype=np.int64)
+        )
 
     def starts_of(self, record: CaseRecord, values: Array) -> Array:
         """Initial states (n_windows, 2 n_dof): at rest, as fitted (in `values`), or as measured."""
@@ -389,7 +416,9 @@ class Problem:
                 position=motion.position @ row,
                 velocity=motion.velocity @ row,
                 step=record.step,
-                substeps=steps(record.step * np.maximum(rates, self._own_rate(record))),
+                substeps=steps(
+                    record.step * np.maximum(rates, self._own_rate(record)), settings=self.settings.simulation
+                ),
                 start_time=record.start,
             )
             if not np.isfinite(driven).all():
@@ -498,7 +527,13 @@ class Problem:
                     1 + n_theta + len(parameters) if effect.schedule else 0,
                 ]
             )  # fmt: skip
-            own = rates(effect, effect.values(eta, scales), scales, self._speeds(placed, record))
+            own = rates(
+                effect,
+                effect.values(eta, scales),
+                scales,
+                self._speeds(placed, record),
+                settings=self.settings.simulation,
+            )
             fastest = np.maximum(fastest, own)
             rows.append(placed.place.rows)
             theta += [parameters, schedule]
@@ -523,7 +558,9 @@ class Problem:
         cache = self.__dict__.setdefault("_speeds_along", {})
         if (record.name, placed.place.name) not in cache:
             velocity = self.motion_of(record).velocity @ placed.place.rows[0]
-            cache[record.name, placed.place.name] = speeds(velocity, prescribed=self.driven)
+            cache[record.name, placed.place.name] = speeds(
+                velocity, prescribed=self.driven, settings=self.settings.simulation
+            )
         return cache[record.name, placed.place.name]
 
     def residual(self, hypothesis: Hypothesis, vector: Array) -> Array:
@@ -544,8 +581,10 @@ class Problem:
         excused = lenient and hypothesis and not self.driven
         for c, observer in enumerate(self.structure.observers if excused else ()):
             if observer.order == ACCELERATION:
-                residual[:, c] = timed(residual[:, c], predicted[:, c], self.noise[c])
-        return projected(residual, moved, data)
+                residual[:, c] = timed(
+                    residual[:, c], predicted[:, c], self.noise[c], settings=self.settings.likelihood
+                )
+        return projected(residual, moved, data, settings=self.settings.likelihood)
 
     @property
     def noise_stated(self) -> bool:

@@ -23,19 +23,12 @@ from scipy.linalg import cholesky, solve_triangular
 from bench.discrepancy.case.case import CaseRecord
 from bench.discrepancy.likelihood.whitening import fast_length
 from bench.discrepancy.motion.observer import ACCELERATION
+from bench.discrepancy.settings import LikelihoodSettings
 
 if TYPE_CHECKING:
     from bench.discrepancy.likelihood.problem import Problem
 
 Array = NDArray[np.float64]
-MOST_BINS = 400
-"""Bins that are whitened together, at most; above the resonances inertia alone decides, and that does not change."""
-ABOVE = 12.0
-"""Times the highest natural frequency at rest up to which they go: noise of a resonance that swings reaches far beyond it."""
-BLOCK = 1000
-"""Instants whose responses are held at once."""
-TERMS = 6
-"""Terms of the series of a step's transition."""
 
 
 def whitening_together(
@@ -53,6 +46,7 @@ def whitening_together(
     Returns:
         Lower triangular; rows and columns are the real parts of the bins, channel by channel within each, then the imaginary ones.
     """
+    settings = problem.settings.likelihood
     structure, load_noise = problem.structure, problem.load_noise_of(record)
     if not structure.springs or not np.any(load_noise):
         return None
@@ -61,20 +55,26 @@ def whitening_together(
     highest = float(
         np.sqrt(np.max(np.abs(np.linalg.eigvals(np.linalg.solve(linear.mass, linear.stiffness)))))
     )
-    count = int(np.clip(np.ceil(ABOVE * highest * length * step / (2.0 * np.pi)), 1, min(n_bins, MOST_BINS)))
+    count = int(
+        np.clip(
+            np.ceil(settings.together_above * highest * length * step / (2.0 * np.pi)),
+            1,
+            min(n_bins, settings.together_bins),
+        )
+    )
     omega = 2.0 * np.pi * np.arange(count) / (length * step)
     inverse = np.linalg.inv(linear.mass)
     rate = _rates(problem, record, values)
     inputs = np.vstack([np.zeros((n_dof, len(load_noise))), inverse @ linear.inputs * load_noise])
-    discrete = _discrete(rate, inputs, step)
+    discrete = _discrete(rate, inputs, step, settings=problem.settings.likelihood)
     n_channels = len(structure.observers)
     own = np.repeat(np.tile(problem.noise**2, count)[None], 2, axis=0)
     own[0, :n_channels] *= 2.0  # the mean is all real
     covariance = np.diag(own.ravel())
     seen, direct = _seen(problem, rate, inputs)
     later = np.zeros((n_channels, 2 * n_dof, count), dtype=np.complex128)
-    for end in range(len(record), 0, -BLOCK):
-        begin = max(end - BLOCK, 0)
+    for end in range(len(record), 0, -settings.together_block):
+        begin = max(end - settings.together_block, 0)
         moved = np.zeros((end - begin, len(load_noise), count, n_channels), dtype=np.complex128)
         for c in range(n_channels):
             _adjoint(begin, end, omega * step, *discrete, seen[c], direct[c], later[c], moved[..., c])
@@ -117,13 +117,15 @@ def _rates(problem: Problem, record: CaseRecord, values: Array) -> Array:
     return rate
 
 
-def _discrete(rate: Array, inputs: Array, step: float) -> tuple[Array, Array, Array]:
+def _discrete(
+    rate: Array, inputs: Array, step: float, *, settings: LikelihoodSettings
+) -> tuple[Array, Array, Array]:
     """Transitions (n - 1, m, m), and effects (n - 1, m, n_loads) of the loads at the start and end of each step, straight between."""
     middle = 0.5 * step * (rate[:-1] + rate[1:])
     eye = np.broadcast_to(np.eye(rate.shape[1]), middle.shape)
     transition, held, rising, term = eye.copy(), eye.copy(), 0.5 * eye, eye
     factorial = 1.0
-    for k in range(1, TERMS + 1):
+    for k in range(1, settings.transition_terms + 1):
         term = term @ middle
         factorial *= k
         transition = transition + term / factorial

@@ -13,14 +13,9 @@ from scipy import fft
 from bench.discrepancy.case.case import CaseRecord
 from bench.discrepancy.likelihood.window_whitening import Windows, orthonormal
 from bench.discrepancy.numerics.spectral_product import whiten
+from bench.discrepancy.settings import DEFAULT, LikelihoodSettings
 
 Array = NDArray[np.float64]
-ABOVE_NOISE = 1.5
-"""A frequency belongs to the band of a record while a smoothed response spectrum exceeds this many times its noise."""
-TIMED = 5.0
-"""Residual, in standard deviations of the noise, that a jump within a sample of its time may leave."""
-MAX_BINS = 2500
-"""Most frequency bins of a record; friction rattles an accelerometer up to the Nyquist frequency and one need not follow."""
 
 
 class RecordData(NamedTuple):
@@ -52,7 +47,7 @@ def fast_length(n: int) -> int:
     return int(fft.next_fast_len(n, real=True) or n)
 
 
-def band_bins(responses: Array, noise: Array) -> int:
+def band_bins(responses: Array, noise: Array, *, settings: LikelihoodSettings = DEFAULT.likelihood) -> int:
     """Number of frequency bins up to where every response has sunk into its noise."""
     n = fast_length(len(responses))
     last = 32
@@ -61,13 +56,15 @@ def band_bins(responses: Array, noise: Array) -> int:
         width = max(len(spectrum) // 200, 8)
         usable = len(spectrum) // width * width
         smooth = spectrum[:usable].reshape(-1, width).mean(axis=1)
-        above = np.flatnonzero(smooth > ABOVE_NOISE * noise[c] ** 2)
+        above = np.flatnonzero(smooth > settings.above_noise * noise[c] ** 2)
         if len(above):
             last = max(last, (above[-1] + 2) * width)
-    return int(min(last, n // 2, MAX_BINS))
+    return int(min(last, n // 2, settings.max_bins))
 
 
-def timed(residual: Array, predicted: Array, noise: float) -> Array:
+def timed(
+    residual: Array, predicted: Array, noise: float, *, settings: LikelihoodSettings = DEFAULT.likelihood
+) -> Array:
     """Residuals (n,) of one channel, limited where a predicted jump that comes a sample early or late explains them.
 
     Friction and stops make accelerations jump. The noise of the loads moves the time of a jump by microseconds; where a sample
@@ -77,9 +74,10 @@ def timed(residual: Array, predicted: Array, noise: float) -> Array:
         residual: Measured minus predicted.
         predicted: The free run.
         noise: Standard deviation of the channel's noise.
+        settings: `LikelihoodSettings` of the diagnosis.
     """
     out = residual.copy()
-    _excuse(residual, predicted, TIMED * noise, out)
+    _excuse(residual, predicted, settings.jump_residual * noise, out)
     return out
 
 
@@ -118,20 +116,23 @@ def whitened(residual: Array, data: RecordData) -> Array:
     return (white - (white @ data.windows.reachable) @ data.windows.reachable.T).ravel()
 
 
-def projected(residual: Array, moved: Sequence[Array], data: RecordData) -> Array:
+def projected(
+    residual: Array, moved: Sequence[Array], data: RecordData, *, settings: LikelihoodSettings
+) -> Array:
     """Whitened residuals (n, n_channels) of a record in windows, without what other starts would have changed.
 
     Args:
         residual: Residuals.
         moved: Change of the channels (n, n_channels) with each entry of the starts.
         data: The record.
+        settings: `LikelihoodSettings` of the diagnosis.
     """
     if data.windows is None:
         return whitened(residual, data)
     white = data.windows.whitened(residual)
     responses = np.stack([data.windows.whitened(change) for change in moved], axis=-1)
     for w, columns in enumerate(responses):
-        basis = orthonormal(columns)
+        basis = orthonormal(columns, settings=settings)
         white[w] -= basis @ (basis.T @ white[w])
     return white.ravel()
 

@@ -33,6 +33,7 @@ from scipy.linalg import cholesky, solve_triangular, toeplitz
 
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.model.structure import Structure
+from bench.discrepancy.settings import DEFAULT, LikelihoodSettings
 from bench.discrepancy.simulation.prescribed_response import driven_states
 from bench.discrepancy.simulation.stick_slip import (
     NO_ELEMENTS,
@@ -49,21 +50,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-DIFFERENCE = 1e-4
-"""Finite difference in a start, as a part of the spread of the motion."""
-WINDOWS = 10
-"""Windows a record is cut into where nothing else is asked for."""
-SHORTEST = 60
-"""Fewest samples of a window."""
 START = "start "
 """Beginning of the names of initial states among the parameters."""
-SINGULAR = 1e-7
-"""Relative size below which the response to one more start is nothing but rounding."""
-MODEL_ERROR = 0.01
-"""White force that stands for model error where no noise is stated, as a part of the loads' RMS: next to the positions' rounding only
-its being a force counts, not its size."""
-LARGEST = 1600
-"""Most samples times channels of a window: its whitening is a full matrix of that size."""
 
 
 @numba.njit(cache=True, error_model="numpy", nogil=True, fastmath={"reassoc", "contract"})
@@ -124,12 +112,20 @@ def drifts(structure: Structure, linear: LinearStructure, duration: float) -> bo
     return bool(any(np.any(np.abs(o.row @ modes[:, slow]) > 1e-9) for o in structure.observers))
 
 
-def cut(case: Case, record: CaseRecord, n_channels: int) -> tuple[NDArray[np.int64], int]:
+def cut(
+    case: Case, record: CaseRecord, n_channels: int, *, settings: LikelihoodSettings = DEFAULT.likelihood
+) -> tuple[NDArray[np.int64], int]:
     """First samples and length of the windows of a record; `window_s` in nominal.json overrides the length."""
     n = len(record)
     asked = case.options.get("window_s")
-    wanted = n / WINDOWS if asked is None else float(str(asked)) / record.step
-    length = int(np.clip(wanted, SHORTEST, min(n, max(LARGEST // n_channels, SHORTEST))))
+    wanted = n / settings.windows if asked is None else float(str(asked)) / record.step
+    length = int(
+        np.clip(
+            wanted,
+            settings.window_shortest,
+            min(n, max(settings.window_largest // n_channels, settings.window_shortest)),
+        )
+    )
     count = max(n // length, 1)
     length = n // count
     return np.arange(count, dtype=np.int64) * length, length
@@ -145,6 +141,7 @@ def window_weights(
     noise: Array,
     load_noise: Array,
     model_error: Array,
+    settings: LikelihoodSettings,
 ) -> tuple[Array, Array, Array]:
     """Whitening of the residuals of a window, what a start reaches, and the covariance of what noise leaves; see `Windows`.
 
@@ -157,6 +154,7 @@ def window_weights(
         noise: (n_channels,) of the response channels.
         load_noise: (n_loads,).
         model_error: (n_loads,) white force that is weighed like noise of a load, and is none.
+        settings: `LikelihoodSettings` of the diagnosis.
     """
     n_channels, n_dof = len(noise), linear.mass.shape[0]
     n_bins = int(np.clip(np.ceil(share * length / 2), min(16, length // 4), (length - 1) // 2))
@@ -187,27 +185,30 @@ def window_weights(
         passed = rows @ response.reshape(length * n_channels, -1)
         covariance += passed @ passed.T
     weights = solve_triangular(cholesky(covariance, lower=True), rows, lower=True)
-    reachable = orthonormal(weights @ spanned.reshape(length * n_channels, -1))
+    reachable = orthonormal(weights @ spanned.reshape(length * n_channels, -1), settings=settings)
     noisy = [
         (load_noise / error)[j] * response
         for j, response in zip(np.flatnonzero(error > 0), driven, strict=True)
     ]
-    return np.ascontiguousarray(weights), reachable, _left_by_noise(spanned, noisy, noise)
+    return np.ascontiguousarray(weights), reachable, _left_by_noise(spanned, noisy, noise, settings=settings)
 
 
-def orthonormal(columns: Array) -> Array:
+def orthonormal(columns: Array, *, settings: LikelihoodSettings) -> Array:
     """Orthonormal basis (n, rank) of what columns span; columns that add nothing to speak of are left out."""
     scaled = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
     basis, sizes, _ = np.linalg.svd(scaled, full_matrices=False)
     return np.asarray(
-        basis[:, sizes > SINGULAR * max(float(sizes.max(initial=0.0)), 1e-300)], dtype=np.float64
+        basis[:, sizes > settings.start_singular * max(float(sizes.max(initial=0.0)), 1e-300)],
+        dtype=np.float64,
     )
 
 
-def _left_by_noise(spanned: Array, driven: list[Array], noise: Array) -> Array:
+def _left_by_noise(
+    spanned: Array, driven: list[Array], noise: Array, *, settings: LikelihoodSettings
+) -> Array:
     """Mean covariance of the channels within a window after the start has been fitted to noise."""
     length, n_channels, _ = spanned.shape
-    basis = orthonormal((spanned / noise[:, None]).reshape(length * n_channels, -1))
+    basis = orthonormal((spanned / noise[:, None]).reshape(length * n_channels, -1), settings=settings)
     total = np.diag(noise**2)
     for response in driven:
         white = (response / noise[:, None]).reshape(length * n_channels, -1)
@@ -220,14 +221,14 @@ def windows_of(problem: Problem, record: CaseRecord, n_bins: int, values: Array)
     """Windows of a record that would drift, whitened for the structure at parameter `values`; None for other records."""
     if not problem.windowed:
         return None
-    firsts, length = cut(problem.case, record, len(problem.noise))
+    firsts, length = cut(problem.case, record, len(problem.noise), settings=problem.settings.likelihood)
     share = round(2.0 * n_bins / len(record), 2)
     cache, key = problem.__dict__.setdefault("_weights", {}), (record.step, length, share, values.tobytes())
     if key not in cache:
         cache[key] = window_weights(
             problem.structure, problem.structure.at(values), step=record.step, length=length, share=share,
             noise=problem.noise, load_noise=problem.load_noise, model_error=_model_error(problem),
-        )  # fmt: skip
+        settings=problem.settings.likelihood)  # fmt: skip
     return Windows(firsts, length, *cache[key])
 
 
@@ -236,7 +237,9 @@ def _model_error(problem: Problem) -> Array:
     stated = problem.noise_stated or bool(np.any(problem.load_noise > 0.0))
     loads = [[record.values[name] for name in problem.structure.loads] for record in problem.records]
     largest = np.max(np.sqrt(np.mean(np.square(np.concatenate(loads, axis=1)), axis=1)), initial=0.0)
-    return np.full(len(problem.load_noise), 0.0 if stated else MODEL_ERROR * largest)
+    return np.full(
+        len(problem.load_noise), 0.0 if stated else problem.settings.likelihood.white_force * largest
+    )
 
 
 def start_responses(
@@ -254,7 +257,7 @@ def start_responses(
     motion = problem.motion_of(record)
     starts = measured_states(motion, problem.firsts(record))
     spread = np.concatenate([np.std(motion.position, axis=0), np.std(motion.velocity, axis=0)])
-    steps = DIFFERENCE * np.where(spread > 0.0, spread, 1.0)
+    steps = problem.settings.likelihood.start_difference * np.where(spread > 0.0, spread, 1.0)
     return [
         problem.simulate(hypothesis, vector, record, starts=starts + step) - predicted
         for step in np.diag(steps)

@@ -14,6 +14,7 @@ References:
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,18 +26,18 @@ from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.screening.candidates import along
 from bench.discrepancy.screening.screen import Ground, Screen
 from bench.discrepancy.search.explain import Explanation
+from bench.discrepancy.settings import LocalisationSettings
 
-CELLS = 24
-"""Cells that the reach of a coordinate is cut into."""
-SIZES = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0)
-"""Sizes of the coefficients to be expected, as multiples of those of the unlimited force."""
-IMPRECISE = 1e-4
-"""Part of the evidence that a smaller part may lack: straight lines and smoothed motions are only as good as that, one percent of the
-force."""
-ENDING = 0.01
-"""Part of the samples that a region has to save for one end more: nobody knows what the force does where the motion seldom went."""
-SURE = math.log(10.0)
-"""Log odds of a limit from which its region is told."""
+
+@dataclass(frozen=True)
+class BoundedForceSettings:
+    """Numbers of `bench.discrepancy.localisation.bounded_force`."""
+
+    cells: int = 24
+    """Cells that the reach of a coordinate is cut into."""
+
+
+SETTINGS = BoundedForceSettings()
 COORDINATES = ("displacement", "velocity")
 SHAPES = 3
 """Coefficients of a cell: of the force itself, and of the parts in proportion to the other coordinate and to its magnitude."""
@@ -56,7 +57,7 @@ class _Part(NamedTuple):
     @property
     def coefficients(self) -> NDArray[np.int64]:
         """Numbers of the coefficients of its cells."""
-        return np.concatenate([self.cells + shape * CELLS for shape in range(SHAPES)])
+        return np.concatenate([self.cells + shape * SETTINGS.cells for shape in range(SHAPES)])
 
 
 class _Free(NamedTuple):
@@ -83,12 +84,12 @@ class _Free(NamedTuple):
     @property
     def cells(self) -> NDArray[np.int64]:
         """Cell of every sample (n_samples,)."""
-        return np.asarray(np.argmax(self.forces[:, :CELLS], axis=1), dtype=np.int64)
+        return np.asarray(np.argmax(self.forces[:, : SETTINGS.cells], axis=1), dtype=np.int64)
 
-    def extent(self, part: _Part) -> float:
+    def extent(self, part: _Part, ending: float) -> float:
         """Share of the samples in a part, and a little for each of its ends within the motion."""
         share = float(np.isin(self.cells, part.cells).mean())
-        return share + ENDING * sum((first > 0) + (end < CELLS) for first, end in part.intervals)
+        return share + ending * sum((first > 0) + (end < SETTINGS.cells) for first, end in part.intervals)
 
 
 def limited_regions(nominal: Explanation, best: Explanation) -> dict[str, tuple[dict[str, Any], ...]]:
@@ -119,22 +120,34 @@ def limited_regions(nominal: Explanation, best: Explanation) -> dict[str, tuple[
 
 def _regions(place: Place, screen: Screen, ground: Ground) -> tuple[dict[str, Any], ...]:
     """Regions of the force that is missing at a place; none where nothing is, or where it has no limits."""
+    settings = screen.problem.settings.localisation
     motions = [screen.problem.motion(i) for i in range(len(screen.problem.records))]
     states = [np.column_stack([m.position @ place.rows[0], m.velocity @ place.rows[0]]) for m in motions]
     free = [_free(place, states, over, screen, ground) for over in range(len(COORDINATES))]
     # what not even the better one explains is no less noise to the other
     excess = max(1.0, min(f.left for f in free) / len(ground.residual))
     parts = _parts()
-    everything = _Part(np.arange(CELLS), ((0, CELLS),))
-    whole = [_evidence(f, everything, excess) for f in free]
-    limited = [np.array([_evidence(f, part, excess) for part in parts]) for f in free]
+    everything = _Part(np.arange(SETTINGS.cells), ((0, SETTINGS.cells),))
+    whole = [_evidence(f, everything, excess, settings=screen.problem.settings.localisation) for f in free]
+    limited = [
+        np.array(
+            [_evidence(f, part, excess, settings=screen.problem.settings.localisation) for part in parts]
+        )
+        for f in free
+    ]
     weight = float(np.logaddexp.reduce(np.concatenate(limited))) - math.log(2 * len(parts))
-    if weight < max(0.0, float(np.logaddexp.reduce(whole)) - math.log(2.0)) + SURE:
+    if weight < max(0.0, float(np.logaddexp.reduce(whole)) - math.log(2.0)) + settings.region_sure:
         return ()
     over = int(np.argmax([own.max() for own in limited]))
     best = limited[over].max()
-    alike = [part for part, own in zip(parts, limited[over], strict=True) if own > best * (1.0 - IMPRECISE)]
-    return _described(free[over], min(alike, key=free[over].extent))
+    alike = [
+        part
+        for part, own in zip(parts, limited[over], strict=True)
+        if own > best * (1.0 - settings.region_imprecise)
+    ]
+    return _described(
+        free[over], min(alike, key=lambda part: free[over].extent(part, settings.region_ending))
+    )
 
 
 def _free(place: Place, states: list[Array], over: int, screen: Screen, ground: Ground) -> _Free:
@@ -142,10 +155,10 @@ def _free(place: Place, states: list[Array], over: int, screen: Screen, ground: 
     reach, other = (float(max(np.abs(s[:, i]).max() for s in states)) or 1.0 for i in (over, 1 - over))
     per_record = []
     for state in states:
-        at = np.asarray(0.5 * CELLS * (state[:, over] / reach + 1.0) - 0.5, dtype=np.float64)
-        hats = np.clip(1.0 - np.abs(at[:, None] - np.arange(CELLS)), 0.0, None)
+        at = np.asarray(0.5 * SETTINGS.cells * (state[:, over] / reach + 1.0) - 0.5, dtype=np.float64)
+        hats = np.clip(1.0 - np.abs(at[:, None] - np.arange(SETTINGS.cells)), 0.0, None)
         # beyond the middle of the outermost cells the force stays what it is there
-        hats[at < 0.0, 0], hats[at > CELLS - 1.0, -1] = 1.0, 1.0
+        hats[at < 0.0, 0], hats[at > SETTINGS.cells - 1.0, -1] = 1.0, 1.0
         along = state[:, [1 - over]] / other
         per_record.append(np.hstack([hats, hats * along, hats * np.abs(along)]))
     row = place.rows[0]
@@ -153,7 +166,9 @@ def _free(place: Place, states: list[Array], over: int, screen: Screen, ground: 
     def response(k: int) -> Array:
         return screen.response(lambda i: -np.outer(per_record[i][:, k], row))
 
-    columns = np.column_stack(in_threads(lambda k: ground.project(response(k)), range(SHAPES * CELLS)))
+    columns = np.column_stack(
+        in_threads(lambda k: ground.project(response(k)), range(SHAPES * SETTINGS.cells))
+    )
     alone = ground.left
     gram, seen = columns.T @ columns, columns.T @ alone
     best = np.asarray(np.linalg.lstsq(gram, seen, rcond=1e-9)[0], dtype=np.float64)
@@ -163,17 +178,17 @@ def _free(place: Place, states: list[Array], over: int, screen: Screen, ground: 
 
 def _parts() -> list[_Part]:
     """All intervals of the grid, and all grids without an interval within."""
-    cells, out = np.arange(CELLS), []
-    for i in range(CELLS):
-        for j in range(i + 1, CELLS + 1):
-            if j - i < CELLS:
+    cells, out = np.arange(SETTINGS.cells), []
+    for i in range(SETTINGS.cells):
+        for j in range(i + 1, SETTINGS.cells + 1):
+            if j - i < SETTINGS.cells:
                 out.append(_Part(cells[i:j], ((i, j),)))
-            if i > 0 and j < CELLS:
-                out.append(_Part(np.delete(cells, np.arange(i, j)), ((0, i), (j, CELLS))))
+            if i > 0 and j < SETTINGS.cells:
+                out.append(_Part(np.delete(cells, np.arange(i, j)), ((0, i), (j, SETTINGS.cells))))
     return out
 
 
-def _evidence(free: _Free, part: _Part, excess: float) -> float:
+def _evidence(free: _Free, part: _Part, excess: float, *, settings: LocalisationSettings) -> float:
     """Log evidence of a force limited to a part, against no force; `excess`: power of the residuals, one for noise."""
     own = part.coefficients
     powers, axes = np.linalg.eigh(free.gram[np.ix_(own, own)])
@@ -182,14 +197,14 @@ def _evidence(free: _Free, part: _Part, excess: float) -> float:
     size = float(np.sqrt(np.mean(free.coefficients**2))) or 1.0
     return max(
         float(0.5 * np.sum(squares / (powers + (size * s) ** -2)) - 0.5 * np.sum(np.log1p(powers * (size * s) ** 2)))
-        for s in SIZES
+        for s in settings.region_sizes
     )  # fmt: skip
 
 
 def _described(free: _Free, part: _Part) -> tuple[dict[str, Any], ...]:
     """The intervals of a part with the force in them, by decreasing share."""
     own = part.coefficients
-    coefficients = np.zeros(SHAPES * CELLS)
+    coefficients = np.zeros(SHAPES * SETTINGS.cells)
     coefficients[own] = np.linalg.lstsq(free.gram[np.ix_(own, own)], free.seen[own], rcond=1e-9)[0]
     force = free.forces @ coefficients
     at = free.cells
@@ -197,7 +212,7 @@ def _described(free: _Free, part: _Part) -> tuple[dict[str, Any], ...]:
     out: list[dict[str, Any]] = []
     for first, end in part.intervals:
         inside = (at >= first) & (at < end)
-        limits = tuple((2.0 * edge / CELLS - 1.0) * free.reach for edge in (first, end))
+        limits = tuple((2.0 * edge / SETTINGS.cells - 1.0) * free.reach for edge in (first, end))
         share = float(np.sum(force[inside] ** 2)) / total
         mean = float(np.mean(force[inside])) if inside.any() else 0.0
         out.append({free.coordinate: limits, "share": share, "force": mean})

@@ -29,17 +29,9 @@ from bench.discrepancy.case.case import CaseRecord
 from bench.discrepancy.likelihood.problem import Array, Problem
 from bench.discrepancy.model.nominal_elements import own_force
 from bench.discrepancy.model.structure import Place, Structure
+from bench.discrepancy.settings import LocalisationSettings
 from bench.discrepancy.simulation.stick_slip import LinearStructure, Motion
 
-INTENSITIES = 10.0 ** np.arange(-3.0, 2.1, 0.5)
-"""Multiples of a first guess of the walk's intensity that are compared by likelihood."""
-FORGETTING = 0.01
-"""Decay rate of the force, as a part of the mean circular frequency of the motion: a constant force in front of an
-accelerometer is not observable, and without decay its estimate would not settle."""
-LOOSE = 300.0
-"""How poorly the mean position counts as known where none is measured, as a multiple of the motion."""
-TUNED_ON = 8000
-"""Samples on which the intensity is chosen."""
 DOUBLINGS = 40
 
 _jit = numba.njit(cache=True, error_model="numpy", nogil=True)
@@ -262,7 +254,9 @@ class ForceObserver:
         start = np.concatenate([position[0], velocity[0], np.zeros(len(self.places))]) / model.scale
         if record.name not in self._intensity:
             guess = self._guess(loads, position, velocity)
-            self._intensity[record.name] = _tuned(model, samples, loads, start, guess)
+            self._intensity[record.name] = _tuned(
+                model, samples, loads, start, guess, settings=self.problem.settings.localisation
+            )
         gains = _gains(model, self._intensity[record.name])
         states = _smoothed(model, gains, samples, loads, start)
         passes = np.zeros((noise, len(record), len(self.places)))
@@ -283,6 +277,7 @@ class ForceObserver:
         return (level or 1.0) * np.sqrt(np.maximum(rate, 1e-3))
 
     def _model(self, values: Array, step: float, reach: Array) -> _Model:
+        settings = self.problem.settings.localisation
         linear = self.structure.at(values)
         inputs = self._inputs(linear)
         n, p, u = len(linear.mass), len(self.places), inputs.shape[1]
@@ -295,7 +290,7 @@ class ForceObserver:
         rate[:n, n : 2 * n] = np.eye(n)
         acceleration = np.hstack([-inverse @ linear.stiffness, -inverse @ linear.damping, -spread])
         rate[n : 2 * n] = acceleration
-        rate[2 * n :, 2 * n :] = -FORGETTING * stiffest * np.eye(p)
+        rate[2 * n :, 2 * n :] = -settings.forgetting * stiffest * np.eye(p)
         drive = np.zeros((d, u))
         drive[n : 2 * n] = inverse @ inputs
         # In steps as the unit of time the states are alike in size; the Riccati equation is hopeless in SI units.
@@ -320,7 +315,7 @@ class ForceObserver:
                 row[i] = 1.0
                 observe.append(row)
                 feed.append(np.zeros(u))
-                noise.append((LOOSE * reach[i]) ** 2)
+                noise.append((settings.loose * reach[i]) ** 2)
         measured = np.array(observe)
         # Channels in units of their noise, so that the innovations are of order one.
         size = np.sqrt(np.array(noise))
@@ -395,9 +390,11 @@ def _smoothed(model: _Model, gains: _Gains, samples: Array, loads: Array, start:
     return filtered * model.scale
 
 
-def _tuned(model: _Model, samples: Array, loads: Array, start: Array, guess: Array) -> Array:
+def _tuned(
+    model: _Model, samples: Array, loads: Array, start: Array, guess: Array, *, settings: LocalisationSettings
+) -> Array:
     """Most likely intensity of the walk at each place, one place after the other, twice round where there are several."""
-    y, drive = _signals(model, samples[:TUNED_ON], loads[:TUNED_ON])
+    y, drive = _signals(model, samples[: settings.tuned_on], loads[: settings.tuned_on])
     filtered = np.zeros((len(y), len(start)))
     predicted = np.zeros_like(filtered)
 
@@ -416,7 +413,7 @@ def _tuned(model: _Model, samples: Array, loads: Array, start: Array, guess: Arr
     for _ in range(1 if len(guess) == 1 else 2):
         for j in range(len(guess)):
             trials = []
-            for multiple in INTENSITIES:
+            for multiple in settings.walk_intensities:
                 trial = best.copy()
                 trial[j] = multiple * guess[j]
                 trials.append((score(trial), multiple * guess[j]))

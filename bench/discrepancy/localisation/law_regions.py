@@ -14,11 +14,7 @@ from bench.discrepancy.likelihood.problem import Array, Problem
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.screening.screen import force_along
 from bench.discrepancy.search.explain import Explanation
-
-NOTHING = 1e-5
-"""Part of an effect's largest force below which it does not act: less than a cubic spring exerts in the cells about its middle."""
-CELLS = 64
-"""Cells of the reach of a coordinate; what acts anywhere in a cell acts in it."""
+from bench.discrepancy.settings import LocalisationSettings
 
 
 def acting_regions(best: Explanation) -> dict[str, tuple[dict[str, Any], ...]]:
@@ -53,9 +49,12 @@ def _regions(problem: Problem, placed: Placed, eta: Array) -> list[dict[str, Any
         states.append(np.column_stack([motion.position @ row, motion.velocity @ row]))
         forces.append(force_along(problem, placed, eta, i) @ row / (row @ row))
     state, force = np.concatenate(states), np.concatenate(forces)
-    acts = np.abs(force) > NOTHING * np.abs(force).max()
+    acts = np.abs(force) > problem.settings.localisation.acts * np.abs(force).max()
     total = float(np.sum(force**2))
-    limits = {name: _intervals(state[:, i], acts) for i, name in enumerate(("displacement", "velocity"))}
+    limits = {
+        name: _intervals(state[:, i], acts, settings=problem.settings.localisation)
+        for i, name in enumerate(("displacement", "velocity"))
+    }
     limited = {name: intervals for name, intervals in limits.items() if intervals}
     out = []
     # each interval of the first coordinate that limits the effect, within the hull of what it does along the other
@@ -75,11 +74,15 @@ def _regions(problem: Problem, placed: Placed, eta: Array) -> list[dict[str, Any
     return out
 
 
-def _intervals(coordinate: Array, acts: np.ndarray) -> list[tuple[float, float]]:
+def _intervals(
+    coordinate: Array, acts: np.ndarray, *, settings: LocalisationSettings
+) -> list[tuple[float, float]]:
     """Intervals of a coordinate, out of those between the largest values either way, in which something acts; empty where that is
     all of the visited ones."""
     reach = float(np.abs(coordinate).max()) or 1.0
-    cell = np.clip(((coordinate / reach + 1.0) * 0.5 * CELLS).astype(int), 0, CELLS - 1)
+    cell = np.clip(
+        ((coordinate / reach + 1.0) * 0.5 * settings.law_cells).astype(int), 0, settings.law_cells - 1
+    )
     visited = np.unique(cell)
     active = np.isin(visited, np.unique(cell[acts]))
     if active.all():

@@ -27,20 +27,19 @@ from bench.discrepancy.likelihood.whitening import fast_length, whitened_spectru
 from bench.discrepancy.localisation.bounded_force import limited_regions
 from bench.discrepancy.localisation.law_regions import acting_regions
 from bench.discrepancy.localisation.parity_relations import Contradiction, contradictions
-from bench.discrepancy.localisation.state_map import FALSE_DISCOVERIES, Region, StateMap, state_maps
+from bench.discrepancy.localisation.state_map import (
+    Region,
+    StateMap,
+    state_maps,
+)
 from bench.discrepancy.localisation.state_splits import force_splits
 from bench.discrepancy.search.explain import Explanation
 from bench.discrepancy.search.fits import near
+from bench.discrepancy.settings import LocalisationSettings
 from bench.discrepancy.verdict import Location, Split
 
-BANDS = 12
-"""Frequency bands, evenly over the logarithm of frequency."""
-INTERVALS = 20
-"""Intervals of time a residual is split into."""
 STATES = ("displacement", "velocity")
 """Coordinates of a region of the state space."""
-HOLDS = (0.05, 0.95)
-"""Cumulated parts of the excess between which a band or an interval is said to hold it."""
 
 
 class Whereabouts(NamedTuple):
@@ -128,8 +127,8 @@ def locate(
                 channel=name,
                 dof=problem.structure.dofs[int(np.argmax(np.abs(observer.row)))],
                 share=share,
-                band_hz=_holding(own.frequency, own.power - 2.0),
-                time_s=_holding(own.time, own.signal**2 - 1.0),
+                band_hz=_holding(own.frequency, own.power - 2.0, settings=problem.settings.localisation),
+                time_s=_holding(own.time, own.signal**2 - 1.0, settings=problem.settings.localisation),
                 state_region={k: v for k, v in regions[0].items() if k in STATES} if regions else {},
                 p_value=float(adjusted[name]),
                 kind=kind,
@@ -235,13 +234,14 @@ def left_by(problem: Problem, explanation: Explanation) -> dict[str, Any] | None
     own = found[name]
     return {
         "channel": name,
-        "band_hz": _holding(own.frequency, own.power - 2.0),
-        "time_s": _holding(own.time, own.signal**2 - 1.0),
+        "band_hz": _holding(own.frequency, own.power - 2.0, settings=problem.settings.localisation),
+        "time_s": _holding(own.time, own.signal**2 - 1.0, settings=problem.settings.localisation),
     }
 
 
 def _residual_splits(problem: Problem, excess: dict[str, _Excess]) -> list[Split]:
     """Splits of the free run's residual by channel, and of every channel's by band and by time."""
+    settings = problem.settings.localisation
     if not excess:
         return []
     dofs = {
@@ -249,7 +249,17 @@ def _residual_splits(problem: Problem, excess: dict[str, _Excess]) -> list[Split
     }
     chi2 = np.array([e.chi2 for e in excess.values()])
     count = np.array([float(e.count) for e in excess.values()])
-    out = [split("channel", "free run", "", tuple(excess), chi2 - count, stats.chi2.sf(chi2, count))]
+    out = [
+        split(
+            "channel",
+            "free run",
+            "",
+            tuple(excess),
+            chi2 - count,
+            stats.chi2.sf(chi2, count),
+            settings=problem.settings.localisation,
+        )
+    ]
     by_dof = sorted(set(dofs.values()))
     if len(by_dof) > 1:
         own = [np.array([dofs[name] == dof for name in excess]) for dof in by_dof]
@@ -258,23 +268,51 @@ def _residual_splits(problem: Problem, excess: dict[str, _Excess]) -> list[Split
             split(
                 "dof", "free run", "", tuple(by_dof), np.array([a - b for a, b in sums]),
                 np.array([stats.chi2.sf(a, b) for a, b in sums]),
-            )
+            settings=problem.settings.localisation)
         )  # fmt: skip
     for name, e in excess.items():
         positive = e.frequency[e.frequency > 0.0]
-        edges = np.geomspace(positive.min(), e.frequency.max() * (1.0 + 1e-9), BANDS + 1)
+        edges = np.geomspace(positive.min(), e.frequency.max() * (1.0 + 1e-9), settings.residual_bands + 1)
         edges[0] = 0.0
         out.append(
-            _histogram("band_hz", name, dofs[name], edges, e.frequency, e.power, np.full(len(e.power), 2.0))
+            _histogram(
+                "band_hz",
+                name,
+                dofs[name],
+                edges,
+                e.frequency,
+                e.power,
+                np.full(len(e.power), 2.0),
+                settings=problem.settings.localisation,
+            )
         )
-        edges = np.linspace(e.time.min(), e.time.max() + 1e-9, INTERVALS + 1)
+        edges = np.linspace(e.time.min(), e.time.max() + 1e-9, settings.residual_intervals + 1)
         expected = np.full(len(e.signal), e.density)
-        out.append(_histogram("time_s", name, dofs[name], edges, e.time, e.signal**2 * e.density, expected))
+        out.append(
+            _histogram(
+                "time_s",
+                name,
+                dofs[name],
+                edges,
+                e.time,
+                e.signal**2 * e.density,
+                expected,
+                settings=problem.settings.localisation,
+            )
+        )
     return out
 
 
 def _histogram(
-    kind: str, channel: str, dof: str, edges: Array, axis: Array, squares: Array, expected: Array
+    kind: str,
+    channel: str,
+    dof: str,
+    edges: Array,
+    axis: Array,
+    squares: Array,
+    expected: Array,
+    *,
+    settings: LocalisationSettings,
 ) -> Split:
     """Split squares along an axis, each cell held against the chi-squared distribution of its expectation."""
     cell = np.clip(np.digitize(axis, edges) - 1, 0, len(edges) - 2)
@@ -282,11 +320,18 @@ def _histogram(
     count = np.bincount(cell, expected, len(edges) - 1)
     excess = np.asarray(power - count, dtype=np.float64)
     p_values = np.where(count > 0.0, stats.chi2.sf(power, np.maximum(count, 1e-9)), 1.0)
-    return split(kind, channel, dof, tuple(float(x) for x in edges), excess, p_values)
+    return split(kind, channel, dof, tuple(float(x) for x in edges), excess, p_values, settings=settings)
 
 
 def split(
-    kind: str, of: str, dof: str, cells: tuple[str, ...] | tuple[float, ...], excess: Array, p_values: Array
+    kind: str,
+    of: str,
+    dof: str,
+    cells: tuple[str, ...] | tuple[float, ...],
+    excess: Array,
+    p_values: Array,
+    *,
+    settings: LocalisationSettings,
 ) -> Split:
     """Make a split of excess power whose shares add up to one."""
     positive = np.maximum(np.nan_to_num(excess), 0.0)
@@ -299,15 +344,15 @@ def split(
         cells=cells,
         shares=tuple(float(x) for x in (positive / total if total > 0.0 else positive)),
         p_values=tuple(float(x) for x in adjusted),
-        significant=tuple(bool(x < FALSE_DISCOVERIES) for x in adjusted),
+        significant=tuple(bool(x < settings.false_discoveries) for x in adjusted),
     )
 
 
-def _holding(axis: Array, excess: Array) -> tuple[float, float]:
+def _holding(axis: Array, excess: Array, *, settings: LocalisationSettings) -> tuple[float, float]:
     """Interval of an axis between whose ends the cumulated excess grows from 5 to 95 %."""
     order = np.argsort(axis, kind="stable")
     cumulated = np.cumsum(np.maximum(excess[order], 0.0))
     if cumulated[-1] <= 0.0:
         return float(axis.min()), float(axis.max())
-    low, high = np.searchsorted(cumulated / cumulated[-1], HOLDS)
+    low, high = np.searchsorted(cumulated / cumulated[-1], settings.holds)
     return float(axis[order[low]]), float(axis[order[min(high, len(axis) - 1)]])

@@ -23,20 +23,6 @@ from bench.discrepancy.likelihood.whitening import fast_length
 
 WINDOW = Polynomial([1.0, 0.0, -1.0]) ** 4
 """``(1 - s^2)^4``: its first three derivatives vanish at the ends, so that sums over samples are as good as integrals."""
-SHORTEST = 24
-"""Samples of the shortest window."""
-LENGTHS = 5
-FEWEST = 12
-"""Fewest windows that a test rests on."""
-DOUBTFUL = 1e-3
-"""Probability below which, after correction, channels are said to contradict one another."""
-MATERIAL = 1.3
-"""Ratio of the power of the contradiction to that of its noise below which it is not spoken of: stated noise is never exact."""
-
-CLEARLY = 2.0
-"""Ratio of what two channels leave unexplained from which on the worse one is suspected."""
-PROBE = 0.1
-"""Step of the differences in the nominal parameters, in units of their uncertainty."""
 
 
 class Contradiction(NamedTuple):
@@ -48,6 +34,7 @@ class Contradiction(NamedTuple):
         ratio: Power of their contradiction over that of the noise, at the length of window that shows it best.
         p_value: Probability of such a contradiction from noise alone, after correction.
         window_s: That length of window [s].
+        found: Whether a fault of a sensor is to be concluded.
         suspect: The channel that the nominal model contradicts too; empty where it cannot be told.
     """
 
@@ -56,16 +43,13 @@ class Contradiction(NamedTuple):
     ratio: float
     p_value: float
     window_s: float
+    found: bool = False
     suspect: str = ""
-
-    @property
-    def found(self) -> bool:
-        """Whether a fault of a sensor is to be concluded."""
-        return bool(self.p_value < DOUBTFUL and self.ratio > MATERIAL)
 
 
 def contradictions(problem: Problem) -> tuple[Contradiction, ...]:
     """Hold against each other all pairs of response channels that measure one degree of freedom at different derivatives."""
+    settings = problem.settings.localisation
     if problem.driven:
         return ()
     observers = problem.structure.observers
@@ -83,12 +67,14 @@ def contradictions(problem: Problem) -> tuple[Contradiction, ...]:
         if not tests:
             continue
         p_value, ratio, window = min(tests)
+        corrected = min(1.0, p_value * len(tests) * len(pairs))
         found = Contradiction(
             problem.structure.dofs[int(np.argmax(np.abs(observers[a].row)))],
             (observers[a].channel, observers[b].channel),
             ratio,
-            min(1.0, p_value * len(tests) * len(pairs)),
+            corrected,
             window,
+            bool(corrected < settings.parity_doubtful and ratio > settings.parity_material),
         )
         out.append(found._replace(suspect=_suspect(problem, a, b)) if found.found else found)
     return tuple(out)
@@ -96,10 +82,17 @@ def contradictions(problem: Problem) -> tuple[Contradiction, ...]:
 
 def _tests(problem: Problem, a: int, b: int) -> list[tuple[float, float, float]]:
     """(p-value, power ratio, window [s]) for windows of several lengths, all records together."""
+    settings = problem.settings.localisation
     low, high = (problem.structure.observers[i] for i in (a, b))
     steps = high.order - low.order
     shortest = min(len(r) for r in problem.records)
-    lengths = np.unique(np.geomspace(SHORTEST, max(shortest // FEWEST, SHORTEST), LENGTHS).astype(int))
+    lengths = np.unique(
+        np.geomspace(
+            settings.parity_shortest,
+            max(shortest // settings.parity_windows, settings.parity_shortest),
+            settings.parity_lengths,
+        ).astype(int)
+    )
     out = []
     for length in lengths:
         s = (np.arange(length) + 0.5) / length * 2.0 - 1.0
@@ -117,7 +110,7 @@ def _tests(problem: Problem, a: int, b: int) -> list[tuple[float, float, float]]
             variance = noise * np.sum(kernel**2) + problem.noise[a] ** 2 * np.sum(derived**2)
             squares += float(np.sum(difference**2) / variance)
             count += n
-        if count >= FEWEST:
+        if count >= settings.parity_windows:
             out.append((float(stats.chi2.sf(squares, count)), float(squares / count), float(length * step)))
     return out
 
@@ -134,20 +127,21 @@ def _sampling(y: Array, noise: float) -> float:
 
 def _suspect(problem: Problem, a: int, b: int) -> str:
     """Of two channels, the one that the nominal model, its parameters re-estimated, explains worse on its own."""
+    settings = problem.settings.localisation
     if problem.windowed:
         return ""
     n = len(problem.nominal)
-    whole = [_by_channel(problem, step) for step in (np.zeros(n), *(PROBE * np.eye(n)))]
+    whole = [_by_channel(problem, step) for step in (np.zeros(n), *(settings.parity_probe * np.eye(n)))]
     if not all(np.isfinite(part).all() for part in whole):
         return ""
     left = []
     for c in (a, b):
         base = whole[0][c]
-        matrix = np.column_stack([part[c] - base for part in whole[1:]]) / PROBE
+        matrix = np.column_stack([part[c] - base for part in whole[1:]]) / settings.parity_probe
         deviation = -np.linalg.solve(matrix.T @ matrix + np.eye(n), matrix.T @ base)
         rest = base + matrix @ deviation
         left.append(float(rest @ rest) / len(rest))
-    if max(left) < CLEARLY * min(left):
+    if max(left) < settings.parity_clearly * min(left):
         return ""
     return problem.structure.channels[(a, b)[int(np.argmax(left))]]
 

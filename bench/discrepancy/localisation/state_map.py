@@ -28,38 +28,10 @@ from bench.discrepancy.case.case import CaseRecord
 from bench.discrepancy.likelihood.problem import Array, Problem
 from bench.discrepancy.localisation.force_smoother import ForceObserver, observers
 from bench.discrepancy.model.structure import Place
+from bench.discrepancy.settings import LocalisationSettings
 
 CELLS = 12
 """Cells a coordinate of the state space is cut into; even, so that zero is an edge."""
-TIMES = 40
-"""Intervals of a record."""
-FALSE_DISCOVERIES = 0.05
-WEAK = 0.15
-"""Cells and intervals whose force is below this part of the largest one belong to no region."""
-PASSES = 4
-"""Passes of noise alone; they count as that many degrees of freedom a cell."""
-FEWEST = 2
-"""Fewest visits of a cell that is judged."""
-FLOOR = 0.01
-"""Error of the estimate that is neither noise nor scatter, as a part of the largest force: smoothing of sudden changes."""
-MOST_SIGMAS = 3.0
-"""Largest deviation of a nominal parameter in units of its uncertainty."""
-NULL = 3.0
-"""Standard errors within which a sample counts as free of a missing force."""
-SPARSE = 0.25
-"""Part of the samples that must be free of a missing force before the deviations of the robust regression are taken. Friction
-that acts everywhere leaves a tenth free at most, where a wrong damping happens to cancel it."""
-WIDTHS = (100.0, 30.0, 10.0, 5.0, 2.0)
-"""Standard errors beyond which a sample loses its pull on the robust regression, in turn. A misfit that is not bounded would let the
-region itself pull the parameters."""
-ROUNDS = 3
-"""Linearisations of the robust regression."""
-SAMPLES = 3000
-"""Samples that the robust regression looks at."""
-WHOLE = 0.85
-"""Part of the visited cells along a coordinate from which on a region counts as unlimited in it."""
-SMALL = 0.02
-"""Share of the missing force below which a set of touching cells is not listed as a region."""
 
 
 class Region(NamedTuple):
@@ -162,7 +134,9 @@ def tracks(
         )
         if known is None:
             fitted = _freed(observer, records, fitted.values)
-        estimates = [observer.estimate(r, fitted.values, noise=PASSES) for r in records]
+        estimates = [
+            observer.estimate(r, fitted.values, noise=problem.settings.localisation.passes) for r in records
+        ]
         force = np.concatenate([e.force for e in estimates])
         noise = np.concatenate([e.noise for e in estimates], axis=1)
         for j, place in enumerate(observer.places):
@@ -192,6 +166,7 @@ def _freed(observer: ForceObserver, records: Sequence[CaseRecord], nominal: Arra
 
     Where no such parameters are found they stay, and all of their uncertainty remains as doubt.
     """
+    settings = observer.problem.settings.localisation
     spread = observer.spread()
     free = [i for i in range(len(spread)) if spread[i] > 0.0]
 
@@ -203,44 +178,52 @@ def _freed(observer: ForceObserver, records: Sequence[CaseRecord], nominal: Arra
         return _Fitted(nominal, np.zeros((0, *force.shape)))
     columns = np.array([force_at(nominal + spread * (np.arange(len(spread)) == i)) - force for i in free])
     noise = np.concatenate([observer.estimate(r, nominal, noise=1).noise[0] for r in records])
-    stride = max(1, len(force) // SAMPLES)
+    stride = max(1, len(force) // settings.robust_samples)
     count = len(force[::stride]) * force.shape[1]
     # Samples of one swing say the same thing: about as many are independent as there are swings, times a few.
     weight = min(1.0, 400.0 / count)
     deviation, values = np.zeros(len(free)), nominal
-    for _ in range(ROUNDS):
+    for _ in range(settings.robust_rounds):
         # linear about the values reached, and as exact as the force that is left there
-        error = np.sqrt(np.mean(noise**2, axis=0) + (FLOOR * np.abs(force).max(axis=0)) ** 2)
+        error = np.sqrt(np.mean(noise**2, axis=0) + (settings.map_floor * np.abs(force).max(axis=0)) ** 2)
         matrix = np.column_stack([(c / error)[::stride].ravel() for c in columns])
         y = (force / error)[::stride].ravel() - matrix @ deviation
-        starts = [deviation, _ridge(matrix, y, np.full(len(y), weight))]
-        candidates = [_robust(matrix, y, weight, start) for start in starts]
+        starts = [
+            deviation,
+            _ridge(matrix, y, np.full(len(y), weight), settings=observer.problem.settings.localisation),
+        ]
+        candidates = [
+            _robust(matrix, y, weight, start, settings=observer.problem.settings.localisation)
+            for start in starts
+        ]
         deviation = min(candidates, key=lambda d: _robust_cost(matrix, y, weight, d))
         values = nominal.copy()
         values[free] += spread[free] * deviation
         force = force_at(values)
-    error = np.sqrt(np.mean(noise**2, axis=0) + (FLOOR * np.abs(force).max(axis=0)) ** 2)
+    error = np.sqrt(np.mean(noise**2, axis=0) + (settings.map_floor * np.abs(force).max(axis=0)) ** 2)
     matrix = np.column_stack([(c / error)[::stride].ravel() for c in columns])
     rest = (force / error)[::stride].ravel()
-    if np.mean(np.abs(rest) < NULL) < SPARSE:
+    if np.mean(np.abs(rest) < settings.free_of_force) < settings.sparse:
         return _Fitted(nominal, columns)
     normal = matrix.T @ ((weight / (1.0 + rest**2) ** 2)[:, None] * matrix) + np.eye(len(free))
     root = np.linalg.cholesky(np.linalg.inv(normal))
     return _Fitted(values, np.asarray(np.tensordot(root.T, columns, 1), dtype=np.float64))
 
 
-def _ridge(matrix: Array, y: Array, weight: Array) -> Array:
+def _ridge(matrix: Array, y: Array, weight: Array, *, settings: LocalisationSettings) -> Array:
     normal = matrix.T @ (weight[:, None] * matrix) + np.eye(matrix.shape[1])
     minimum = np.asarray(-np.linalg.solve(normal, matrix.T @ (weight * y)), dtype=np.float64)
-    return np.clip(minimum, -MOST_SIGMAS, MOST_SIGMAS)
+    return np.clip(minimum, -settings.most_sigmas, settings.most_sigmas)
 
 
-def _robust(matrix: Array, y: Array, weight: float, deviation: Array) -> Array:
+def _robust(
+    matrix: Array, y: Array, weight: float, deviation: Array, *, settings: LocalisationSettings
+) -> Array:
     """Iteratively reweighted least squares of Geman and McClure's bounded misfit, its width narrowed step by step."""
-    for width in WIDTHS:
+    for width in settings.robust_widths:
         for _ in range(15):
             rest = (y + matrix @ deviation) / width
-            new = _ridge(matrix, y, weight / (1.0 + rest**2) ** 2)
+            new = _ridge(matrix, y, weight / (1.0 + rest**2) ** 2, settings=settings)
             settled = np.abs(new - deviation).max() < 1e-4
             deviation = new
             if settled:
@@ -260,9 +243,10 @@ def state_maps(
     known: dict[str, float] | None = None,
 ) -> tuple[StateMap, ...]:
     """Map the missing force at every place with one coordinate; the arguments are those of `tracks`."""
+    settings = problem.settings.localisation
     found = tracks(problem, records, known=known)
-    cells = [_cells(track) for _, track in found]
-    intervals = [_intervals(track) for _, track in found]
+    cells = [_cells(track, settings=problem.settings.localisation) for _, track in found]
+    intervals = [_intervals(track, settings=problem.settings.localisation) for _, track in found]
     p_values = np.concatenate([c[3][np.isfinite(c[1])] for c in cells]) if cells else np.zeros(0)
     time_p = np.concatenate([p for _, p in intervals]) if intervals else np.zeros(0)
     adjusted, time_adjusted = _adjusted(p_values), _adjusted(time_p)
@@ -276,17 +260,17 @@ def state_maps(
         corrected[visited] = adjusted[at : at + visited.sum()]
         at += int(visited.sum())
         largest = unit_size[place.force_unit]
-        strong = np.abs(np.nan_to_num(mean)) > WEAK * largest
-        significant = _joined((corrected < FALSE_DISCOVERIES) & strong, mean)
+        strong = np.abs(np.nan_to_num(mean)) > settings.weak * largest
+        significant = _joined((corrected < settings.false_discoveries) & strong, mean)
         own_p = time_adjusted[time_at : time_at + len(p)]
-        in_time = own_p < FALSE_DISCOVERIES
+        in_time = own_p < settings.false_discoveries
         time_at += len(p)
-        in_time &= power > WEAK**2 * power.max(initial=0.0)
+        in_time &= power > settings.weak**2 * power.max(initial=0.0)
         out.append(
             StateMap(
-                place, *edges, mean, error, p_value, significant, _regions(edges, mean, corrected, significant),
+                place, *edges, mean, error, p_value, significant, _regions(edges, mean, corrected, significant, settings=settings),
                 tuple(
-                    r.start + r.step * np.linspace(0, len(r), TIMES + 1) for r in records
+                    r.start + r.step * np.linspace(0, len(r), settings.intervals + 1) for r in records
                 ),
                 tuple(np.split(np.maximum(power, 0.0), len(records))),
                 tuple(np.split(own_p, len(records))),
@@ -340,7 +324,9 @@ def _edges(states: Array) -> Array:
     return np.linspace(-reach, reach, CELLS + 1)
 
 
-def _cells(track: Track) -> tuple[tuple[Array, Array], Array, Array, Array]:
+def _cells(
+    track: Track, *, settings: LocalisationSettings
+) -> tuple[tuple[Array, Array], Array, Array, Array]:
     """Edges, and (CELLS, CELLS) mean force, standard error and p-value."""
     edges = (_edges(track.displacement), _edges(track.velocity))
     cell = cell_index(track.displacement, track.velocity, edges)
@@ -362,12 +348,15 @@ def _cells(track: Track) -> tuple[tuple[Array, Array], Array, Array, Array]:
         scatter *= visits / np.maximum(visits - 1, 1)
         alone = np.mean([np.bincount(visited, row**2, n_cells) for row in noises], axis=0) / samples**2
         own = np.maximum(visits - 1, 0)
-        variance = (PASSES * alone + own * scatter) / (PASSES + own)
+        variance = (settings.passes * alone + own * scatter) / (settings.passes + own)
         for row in track.doubt:
             variance += (np.bincount(cell, row, n_cells) / samples) ** 2
-        variance += (FLOOR * np.nanmax(np.abs(np.where(visits >= FEWEST, mean, 0.0)), initial=0.0)) ** 2
-        p_value = 2.0 * stats.t.sf(np.abs(mean) / np.sqrt(variance), PASSES + own)
-    few = visits < FEWEST
+        variance += (
+            settings.map_floor
+            * np.nanmax(np.abs(np.where(visits >= settings.visits, mean, 0.0)), initial=0.0)
+        ) ** 2
+        p_value = 2.0 * stats.t.sf(np.abs(mean) / np.sqrt(variance), settings.passes + own)
+    few = visits < settings.visits
     mean[few], p_value[few] = np.nan, 1.0
     shape = (CELLS, CELLS)
     return edges, mean.reshape(shape), np.sqrt(variance).reshape(shape), p_value.reshape(shape)
@@ -399,12 +388,12 @@ def _trend(
     return out
 
 
-def _intervals(track: Track) -> tuple[Array, Array]:
-    """Power above that of noise, and p-value, in `TIMES` intervals of every record, one after the other."""
+def _intervals(track: Track, *, settings: LocalisationSettings) -> tuple[Array, Array]:
+    """Power above that of noise, and p-value, in `intervals` intervals of every record, one after the other."""
     powers, p_values = [], []
     at = 0
     for length in track.lengths:
-        for part in np.array_split(np.arange(at, at + length), TIMES):
+        for part in np.array_split(np.arange(at, at + length), settings.intervals):
             own = float(np.mean(track.force[part] ** 2))
             noise = track.noise[:, part]
             alone = float(np.mean(noise**2)) + float(np.sum(np.mean(track.doubt[:, part] ** 2, axis=1)))
@@ -412,7 +401,7 @@ def _intervals(track: Track) -> tuple[Array, Array]:
             count = independent(noise)
             ratio = own / max(alone, 1e-300)
             powers.append(own - alone)
-            p_values.append(float(stats.f.sf(ratio, count, PASSES * count)))
+            p_values.append(float(stats.f.sf(ratio, count, settings.passes * count)))
         at += length
     return np.array(powers), np.array(p_values)
 
@@ -429,7 +418,12 @@ def independent(noise: Array) -> float:
 
 
 def _regions(
-    edges: tuple[Array, Array], mean: Array, p_value: Array, significant: np.ndarray
+    edges: tuple[Array, Array],
+    mean: Array,
+    p_value: Array,
+    significant: np.ndarray,
+    *,
+    settings: LocalisationSettings,
 ) -> tuple[Region, ...]:
     visited = np.isfinite(mean)
     square = np.nan_to_num(mean) ** 2
@@ -440,7 +434,7 @@ def _regions(
         for k in range(1, int(labels.max()) + 1):
             own = labels == k
             share = float(square[own].sum()) / total
-            if share < SMALL:
+            if share < settings.small:
                 continue
             limits = []
             for axis in (0, 1):
@@ -449,7 +443,7 @@ def _regions(
                 # the cells that the motion visited at these values of the other coordinate
                 reachable = np.take(visited, rows, axis=1 - axis)
                 filled = np.take(own, rows, axis=1 - axis)
-                whole = filled.sum() >= WHOLE * reachable.sum()
+                whole = filled.sum() >= settings.whole * reachable.sum()
                 limits.append(
                     None if whole else (float(edges[axis][along[0]]), float(edges[axis][along[-1] + 1]))
                 )

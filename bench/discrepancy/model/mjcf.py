@@ -38,6 +38,7 @@ from bench.discrepancy.model.mjcf_limits import check_reach, free_of_constraints
 from bench.discrepancy.model.nominal_forces import NominalFriction, NominalSpring
 from bench.discrepancy.model.structure import Place, Structure
 from bench.discrepancy.motion.observer import Observer
+from bench.discrepancy.settings import DiagnosisSettings, ModelSettings, SimulationSettings
 from bench.errors import BenchError, FileFormatError, ModelError, UnknownNameError
 from bench.identification.linear_rig import LinearRig, current
 from bench.native.encoding import Coordinate
@@ -46,13 +47,11 @@ from bench.rig.building import STRUCTURE
 
 Array = NDArray[np.float64]
 QUANTITIES = ("position", "velocity", "acceleration")
-NEGLIGIBLE = 1e-9
-"""Part of the largest entry below which a coefficient read off a model counts as zero."""
 PROBE = "position of "
 """Beginning of the names of sensors added for channels that refer to joints."""
 
 
-def mjcf_structure(case: Case) -> Structure:
+def mjcf_structure(case: Case, *, settings: DiagnosisSettings) -> Structure:
     """Build the structure of a case whose rig is an MJCF file, relative to the folder of the case.
 
     Raises:
@@ -67,7 +66,7 @@ def mjcf_structure(case: Case) -> Structure:
     believed = {p.name: p.value for p in case.parameters if p.name not in declared}
     names = tuple(believed)
     structural = [_structural(name, rig) for name in names]
-    loads, responses = loads_and_responses(case, rig)
+    loads, responses = loads_and_responses(case, rig, settings=settings.model)
     parameters = [name for name in structural if not name.startswith("structure/frictionloss/")]
     try:
         linear, bent = _linear(rig, [sensor for _, sensor, _ in responses] + _cells(loads), parameters)
@@ -80,29 +79,32 @@ def mjcf_structure(case: Case) -> Structure:
     n_dof = len(linear.dofs)
     inputs = _inputs(loads, rig, linear, len(responses))
     observers = tuple(
-        _observer(channel, row, order, n_dof, rig)
+        _observer(channel, row, order, n_dof, rig, settings=settings.model)
         for (channel, _, order), row in zip(responses, linear.observation, strict=False)
     )
-    stacks, fixed = _stacks(structural, linear, rig)
+    stacks, fixed = _stacks(structural, linear, rig, settings=settings.model)
     # before gravity makes a stiffness of a mass: what is called the stiffness of a place is a spring of the model
-    places = _places(case, rig, linear, names, stacks)
+    places = _places(case, rig, linear, names, stacks, settings=settings.model)
     springs: tuple[NominalSpring, ...] = ()
     if bent:
-        springs, tangents, changes = gravity_springs(rig, linear, structural)
+        springs, tangents, changes = gravity_springs(rig, linear, structural, settings=settings.model)
         fixed[2] += np.diag(tangents)
         stacks[2][:] += np.array([np.diag(change) for change in changes])
     structure = Structure(
         tuple(rig.model.joint(int(rig.model.dof_jntid[dof])).name for dof in linear.dofs),
         names, *stacks, inputs, tuple(channel.name for channel, _ in loads), observers,
-        places, fixed, _frictions(own, linear, names, case.identification[0].step), springs,
+        places, fixed, _frictions(own, linear, names, case.identification[0].step, settings=settings.simulation), springs,
     )  # fmt: skip
     driving = {channel.name: actuator for channel, actuator in loads if actuator}
-    check_reach(case, structure, own, driving, linear.dofs)
+    check_reach(case, structure, own, driving, linear.dofs, settings=settings)
     structure = constrained(
         structure, rows_of(own.model, links, structure.dofs), [next(iter(link)) for link in links]
     )
     values = np.array(list(believed.values()))
-    return constrained(structure, stiff_modes(structure, values, min(r.step for r in case.identification)))
+    return constrained(
+        structure,
+        stiff_modes(structure, values, min(r.step for r in case.identification), settings=settings.model),
+    )
 
 
 def plain_rig(case: Case, own: Rig) -> tuple[Rig, list[dict[str, float]]]:
@@ -139,7 +141,7 @@ def _structural(name: str, rig: Rig) -> str:
 
 
 def loads_and_responses(
-    case: Case, rig: Rig
+    case: Case, rig: Rig, *, settings: ModelSettings
 ) -> tuple[list[tuple[CaseChannel, str]], list[tuple[CaseChannel, str, int | None]]]:
     """Loads with their actuator or its force sensor; responses with their sensor, and the order where a joint is meant."""
     columns = [c.name for c in rig.channels[len(rig.actuators) :]]
@@ -172,7 +174,7 @@ def loads_and_responses(
             ]
             if not axes:
                 raise UnknownNameError(f"sensor of '{rig.name}'", name, [*columns, *rig.actuators])
-            responses.append((channel, _axis(rig, channel, axes), None))
+            responses.append((channel, _axis(rig, channel, axes, settings=settings), None))
     if not loads:
         raise FileFormatError(
             f"case '{case.name}' has no load; name a channel after an actuator of the model ({', '.join(rig.actuators) or 'none'}) "
@@ -211,14 +213,16 @@ def _order(channel: CaseChannel) -> int:
     return QUANTITIES.index(channel.quantity)
 
 
-def _axis(rig: Rig, channel: CaseChannel, axes: list[str]) -> str:
+def _axis(rig: Rig, channel: CaseChannel, axes: list[str], *, settings: ModelSettings) -> str:
     """The one component of a sensor that the motion reaches."""
     if len(axes) == 1:
         return axes[0]
     moving = []
     for axis in axes:
         linear = LinearRig.of(rig, [axis])
-        if len(linear.dofs) and np.any(np.abs(linear.observation[:, : 3 * len(linear.dofs)]) > NEGLIGIBLE):
+        if len(linear.dofs) and np.any(
+            np.abs(linear.observation[:, : 3 * len(linear.dofs)]) > settings.negligible
+        ):
             moving.append(axis)
     if len(moving) != 1:
         raise FileFormatError(
@@ -249,25 +253,27 @@ def _inputs(loads: Sequence[tuple[CaseChannel, str]], rig: Rig, linear: LinearRi
     return out
 
 
-def _observer(channel: CaseChannel, row: Array, order: int | None, n_dof: int, rig: Rig) -> Observer:
+def _observer(
+    channel: CaseChannel, row: Array, order: int | None, n_dof: int, rig: Rig, *, settings: ModelSettings
+) -> Observer:
     """A response as a row of the motion, in the unit of its channel."""
     blocks = row[: 3 * n_dof].reshape(3, n_dof)
     if order is not None:
         return Observer(channel.name, order, blocks[0])
     largest = np.abs(blocks).max(axis=1)
-    present = np.flatnonzero(largest > NEGLIGIBLE * max(float(largest.max()), 1e-300))
+    present = np.flatnonzero(largest > settings.negligible * max(float(largest.max()), 1e-300))
     if len(present) != 1:
         what = " and ".join(QUANTITIES[i] for i in present) or "nothing of the motion"
         raise ModelError(
             f"channel '{channel.name}' of '{rig.name}' reads {what}; one of position, velocity, acceleration is expected"
         )
     scaled = blocks[present[0]].copy()
-    scaled[np.abs(scaled) <= NEGLIGIBLE * largest.max()] = 0.0
+    scaled[np.abs(scaled) <= settings.negligible * largest.max()] = 0.0
     return Observer(channel.name, int(present[0]), scaled)
 
 
 def _stacks(
-    structural: Sequence[str], linear: LinearRig, rig: Rig
+    structural: Sequence[str], linear: LinearRig, rig: Rig, *, settings: ModelSettings
 ) -> tuple[tuple[Array, Array, Array], Array]:
     """Contributions of the parameters to mass, damping and stiffness, and what no parameter changes."""
     n_dof = len(linear.dofs)
@@ -281,7 +287,7 @@ def _stacks(
             stacks[k][i] = change
             fixed[k] -= at * change
     for k, matrix in enumerate(linear.matrices[:3]):
-        fixed[k][np.abs(fixed[k]) <= NEGLIGIBLE * max(float(np.abs(matrix).max()), 1e-300)] = 0.0
+        fixed[k][np.abs(fixed[k]) <= settings.negligible * max(float(np.abs(matrix).max()), 1e-300)] = 0.0
     return (stacks[0], stacks[1], stacks[2]), fixed
 
 
@@ -297,7 +303,9 @@ def _row(model: mujoco.MjModel, name: str, dofs: NDArray[np.int64]) -> Array:
     return row[dofs] if np.count_nonzero(row) == np.count_nonzero(row[dofs]) else np.zeros(len(dofs))
 
 
-def _frictions(own: Rig, linear: LinearRig, names: Sequence[str], step: float) -> tuple[NominalFriction, ...]:
+def _frictions(
+    own: Rig, linear: LinearRig, names: Sequence[str], step: float, *, settings: SimulationSettings
+) -> tuple[NominalFriction, ...]:
     """Dry friction of the model itself."""
     model = own.model
     joints = [model.joint(int(model.dof_jntid[dof])).name for dof in linear.dofs]
@@ -308,11 +316,17 @@ def _frictions(own: Rig, linear: LinearRig, names: Sequence[str], step: float) -
         if f"frictionloss:{name}" in names or model.tendon_frictionloss[model.tendon(name).id] > 0.0
     ]
     rows = [(name, _row(model, name, linear.dofs)) for name in (*joints, *frictional)]
-    return nominal_frictions(model, rows, names, step)
+    return nominal_frictions(model, rows, names, step, settings=settings)
 
 
 def _places(
-    case: Case, rig: Rig, linear: LinearRig, names: Sequence[str], stacks: tuple[Array, Array, Array]
+    case: Case,
+    rig: Rig,
+    linear: LinearRig,
+    names: Sequence[str],
+    stacks: tuple[Array, Array, Array],
+    *,
+    settings: ModelSettings,
 ) -> tuple[Place, ...]:
     model = rig.model
     joints = [model.joint(int(model.dof_jntid[dof])).name for dof in linear.dofs]
@@ -333,7 +347,7 @@ def _places(
         if not np.any(row):
             continue
         hinge = _hinges(model, name)
-        own = [_carries(stack, row, k == 0) for k, stack in enumerate(stacks)]
+        own = [_carries(stack, row, k == 0, settings=settings) for k, stack in enumerate(stacks)]
         out.append(
             Place(
                 "" if len(wanted) == 1 else name, row[None, :], "rad" if hinge else "m", "N m" if hinge else "N",
@@ -357,7 +371,7 @@ def _hinges(model: mujoco.MjModel, name: str) -> bool:
     return int(model.jnt_type[model.dof_jntid[dof]]) == int(mujoco.mjtJoint.mjJNT_HINGE)
 
 
-def _carries(stack: Array, row: Array, any_motion: bool) -> list[int]:
+def _carries(stack: Array, row: Array, any_motion: bool, *, settings: ModelSettings) -> list[int]:
     """Parameters that act on a coordinate: inertias that it moves, or springs and dampers of just this coordinate."""
     out = []
     for i, matrix in enumerate(stack):
@@ -365,7 +379,7 @@ def _carries(stack: Array, row: Array, any_motion: bool) -> list[int]:
         if largest == 0.0:
             continue
         if any_motion:
-            acts = float(row @ matrix @ row) > NEGLIGIBLE * largest
+            acts = float(row @ matrix @ row) > settings.negligible * largest
         else:
             outer = np.outer(row, row)
             acts = bool(np.allclose(matrix, outer * largest / np.abs(outer).max(), atol=1e-9 * largest))

@@ -18,6 +18,7 @@ from scipy import linalg
 
 from bench import native
 from bench.discrepancy.model.structure import Place, Structure
+from bench.discrepancy.settings import ModelSettings
 from bench.errors import BenchError, ModelError
 from bench.rig import Rig
 from bench.rig.building import parse
@@ -25,8 +26,6 @@ from bench.rig.building import parse
 Array = NDArray[np.float64]
 LINK = "coupling "
 """Beginning of the names of tendons that stand for equalities."""
-FAST = 0.6 * 16.0
-"""Phase that a mode runs through in a sample from which a free run cannot follow it: sixteen steps a sample of a phase of 0.6."""
 
 
 def without_equalities(rig: Rig) -> tuple[Rig, list[dict[str, float]]]:
@@ -102,11 +101,11 @@ def rows_of(model: mujoco.MjModel, links: Sequence[dict[str, float]], dofs: Sequ
     return rows
 
 
-def stiff_modes(structure: Structure, values: Array, step: float) -> Array:
+def stiff_modes(structure: Structure, values: Array, step: float, *, settings: ModelSettings) -> Array:
     """Constraints (n, n_dof) that stand for modes which no record of such a step could show; none where all are so."""
     linear = structure.at(values)
     squares, modes = linalg.eigh(0.5 * (linear.stiffness + linear.stiffness.T), linear.mass)
-    fast = squares * step**2 > FAST**2
+    fast = squares * step**2 > settings.fast**2
     return np.zeros((0, len(squares))) if fast.all() else np.asarray(modes[:, fast].T @ linear.mass)
 
 

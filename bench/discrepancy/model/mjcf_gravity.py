@@ -15,8 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench import native
-from bench.discrepancy.model.nominal_forces import PIECES, NominalSpring
+from bench.discrepancy.model.nominal_forces import (
+    NOMINAL_FORCES_LIMITS,
+    NominalSpring,
+)
 from bench.discrepancy.numerics.cubic_spline import spline_through
+from bench.discrepancy.settings import ModelSettings
 from bench.errors import ModelError
 from bench.identification.linear_rig import LinearRig, current
 from bench.identification.parameter_address import address
@@ -26,14 +30,8 @@ from bench.rig.building import parse
 Array = NDArray[np.float64]
 REACH = 2.0 * np.pi
 """Angle either way up to which the torque is tabulated [rad]: a whole turn."""
-SMALL = 1e-4
-"""Angle either way of the differences that a tangent is taken by [rad]; a spline's own slope is good to fewer digits."""
 MASS = "structure/mass/"
 """Beginning of the names of the parameters that gravity depends on."""
-AGREEMENT = 1e-9
-"""Part of the largest torque that one joint's may depend on the position of another."""
-AT_REST = 1e-6
-"""Part of the largest torque that may be left at the reference position."""
 
 
 def has_gravity(rig: Rig) -> bool:
@@ -50,7 +48,7 @@ def without_gravity(rig: Rig) -> Rig:
 
 
 def gravity_springs(
-    rig: Rig, weightless: LinearRig, parameters: Sequence[str]
+    rig: Rig, weightless: LinearRig, parameters: Sequence[str], *, settings: ModelSettings
 ) -> tuple[tuple[NominalSpring, ...], Array, Array]:
     """Springs that gravity makes, beyond their tangents, and these.
 
@@ -58,6 +56,7 @@ def gravity_springs(
         rig: The model, with gravity.
         weightless: Its matrices without gravity.
         parameters: Names of the nominal parameters, as `address` takes them; others than masses change nothing.
+        settings: `ModelSettings` of the diagnosis.
 
     Returns:
         The springs; the tangent stiffness (n_dof,) that no parameter changes, on the diagonal; and its change (n_parameters, n_dof)
@@ -69,21 +68,21 @@ def gravity_springs(
     model, dofs = rig.model, weightless.dofs
     others = weightless.matrices[3][:, -1]  # what springs push at the reference position
     torque = _torque_of(model)
-    _check_separate(rig, torque, dofs)
+    _check_separate(rig, torque, dofs, settings=settings)
     heavier = {
         k: _torque_of(_with_more(rig, name)) for k, name in enumerate(parameters) if name.startswith(MASS)
     }
     values = np.array([current(rig, name) if k in heavier else 0.0 for k, name in enumerate(parameters)])
-    x = np.linspace(-1.0, 1.0, 4 * PIECES + 1)
-    angles = np.concatenate([REACH * x, [-SMALL, SMALL]])
+    x = np.linspace(-1.0, 1.0, 4 * NOMINAL_FORCES_LIMITS.pieces + 1)
+    angles = np.concatenate([REACH * x, [-settings.gravity_step, settings.gravity_step]])
     springs: list[NominalSpring] = []
     tangents, changes = np.zeros(len(dofs)), np.zeros((len(parameters), len(dofs)))
     for i, dof in enumerate(dofs):
         own = _along(torque, model, int(dof), angles)
         largest = float(np.abs(own).max())
-        if np.ptp(own) <= AGREEMENT * largest:
+        if np.ptp(own) <= settings.gravity_agreement * largest:
             continue  # a weight on a slide: the position is counted from where that has moved it to
-        if abs(own[2 * PIECES] - others[i]) > AT_REST * largest:
+        if abs(own[2 * NOMINAL_FORCES_LIMITS.pieces] - others[i]) > settings.gravity_at_rest * largest:
             name = model.joint(int(model.dof_jntid[dof])).name
             raise ModelError(
                 f"gravity turns joint '{name}' of '{rig.name}' out of its reference position; draw the bodies in the model as they "
@@ -92,12 +91,14 @@ def gravity_springs(
         table = np.zeros((len(angles), len(parameters)))
         for k, changed in heavier.items():
             table[:, k] = _along(changed, model, int(dof), angles) - own
-        changes[:, i] = (table[-1] - table[-2]) / (2.0 * SMALL)
-        tangents[i] = (own[-1] - own[-2]) / (2.0 * SMALL) - values @ changes[:, i]
+        changes[:, i] = (table[-1] - table[-2]) / (2.0 * settings.gravity_step)
+        tangents[i] = (own[-1] - own[-2]) / (2.0 * settings.gravity_step) - values @ changes[:, i]
         bent = np.column_stack([own - table @ values, table])[:-2]
         # springs bear what gravity pulls at rest
-        bent -= bent[2 * PIECES] + np.outer(REACH * x, np.append(tangents[i], changes[:, i]))
-        coefficients = spline_through(x, bent, PIECES)
+        bent -= bent[2 * NOMINAL_FORCES_LIMITS.pieces] + np.outer(
+            REACH * x, np.append(tangents[i], changes[:, i])
+        )
+        coefficients = spline_through(x, bent, NOMINAL_FORCES_LIMITS.pieces)
         row = np.eye(len(dofs))[i]
         springs.append(NominalSpring(row, REACH, coefficients[:, 0], coefficients[:, 1:].T.copy()))
     return tuple(springs), tangents, changes
@@ -136,7 +137,9 @@ def _along(torque: Callable[[Array], Array], model: mujoco.MjModel, dof: int, po
     return out
 
 
-def _check_separate(rig: Rig, torque: Callable[[Array], Array], dofs: NDArray[np.int64]) -> None:
+def _check_separate(
+    rig: Rig, torque: Callable[[Array], Array], dofs: NDArray[np.int64], *, settings: ModelSettings
+) -> None:
     """Raise where the torque of one joint depends on the position of another."""
     model, rng = rig.model, np.random.default_rng(0)
     for _ in range(4):
@@ -146,7 +149,9 @@ def _check_separate(rig: Rig, torque: Callable[[Array], Array], dofs: NDArray[np
             at = int(model.jnt_qposadr[model.dof_jntid[dof]])
             alone = model.qpos0.copy()
             alone[at] = q[at]
-            if abs(torque(alone)[dof] - whole[dof]) > AGREEMENT * max(float(np.abs(whole).max()), 1e-300):
+            if abs(torque(alone)[dof] - whole[dof]) > settings.gravity_agreement * max(
+                float(np.abs(whole).max()), 1e-300
+            ):
                 name = model.joint(int(model.dof_jntid[dof])).name
                 raise ModelError(
                     f"gravity at joint '{name}' of '{rig.name}' depends on the position of other joints, which that of a nominal "

@@ -13,13 +13,12 @@ from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.case.channel_noise import noise_floor
 from bench.discrepancy.model.structure import Structure
 from bench.discrepancy.motion.measured import measured_motion
+from bench.discrepancy.settings import DiagnosisSettings, MotionSettings
 from bench.errors import ModelError, UnknownNameError
 from bench.rig import Rig
 from bench.rig.building import parse
 
 Array = NDArray[np.float64]
-POSES = 200
-"""Measured positions of a record at which contacts are looked for."""
 DISABLED = 0
 
 
@@ -61,7 +60,13 @@ def free_of_constraints(rig: Rig, joints: Sequence[str], *, prefix: str) -> Rig:
 
 
 def check_reach(
-    case: Case, structure: Structure, rig: Rig, actuators: Mapping[str, str], dofs: NDArray[np.int64]
+    case: Case,
+    structure: Structure,
+    rig: Rig,
+    actuators: Mapping[str, str],
+    dofs: NDArray[np.int64],
+    *,
+    settings: DiagnosisSettings,
 ) -> None:
     """Refuse records whose motion reaches a stop or a contact of the model, or whose load is beyond a control range.
 
@@ -71,6 +76,7 @@ def check_reach(
         rig: The user's model, with them.
         actuators: Load channel to actuator.
         dofs: Degrees of freedom of the model that the structure has.
+        settings: Thresholds of the diagnosis.
     """
     model = rig.model
     for record in (*case.identification, *case.validation):
@@ -85,19 +91,21 @@ def check_reach(
                     f"'{channel}' in '{record.name}' runs from {reached.min():.4g} to {reached.max():.4g}, but the model clips "
                     f"actuator '{name}' to {low:g} … {high:g}; widen its ctrlrange, or check the unit of the channel"
                 )
-        position = _positions(case, structure, record)
+        position = _positions(case, structure, record, settings=settings.motion)
         _check_stops(record, position, model, dofs)
         _check_turns(record, position, structure)
-    _check_contacts(case, structure, rig, dofs)
+    _check_contacts(case, structure, rig, dofs, settings=settings)
 
 
-def _positions(case: Case, structure: Structure, record: CaseRecord) -> Array:
+def _positions(case: Case, structure: Structure, record: CaseRecord, *, settings: MotionSettings) -> Array:
     """Measured positions (n, n_dof); NaN for degrees of freedom that no position channel tells."""
     samples = np.column_stack([record.values[name] for name in structure.channels])
     noise = np.array(
         [case.channel(name).noise_std or noise_floor(record.values[name]) for name in structure.channels]
     )
-    position = measured_motion(structure.observers, samples, noise, record.step).position.copy()
+    position = measured_motion(
+        structure.observers, samples, noise, record.step, settings=settings
+    ).position.copy()
     rows = np.array([o.row for o in structure.observers if o.order == 0]).reshape(-1, position.shape[1])
     known = np.linalg.pinv(rows) @ rows if len(rows) else np.zeros((position.shape[1],) * 2)
     position[:, np.abs(np.diag(known) - 1.0) > 1e-9] = np.nan
@@ -130,15 +138,17 @@ def _check_turns(record: CaseRecord, position: Array, structure: Structure) -> N
             )
 
 
-def _check_contacts(case: Case, structure: Structure, rig: Rig, dofs: NDArray[np.int64]) -> None:
+def _check_contacts(
+    case: Case, structure: Structure, rig: Rig, dofs: NDArray[np.int64], *, settings: DiagnosisSettings
+) -> None:
     model = parse(rig.mjcf, rig.folder, rig.name).compile()
     if model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_CONTACT):
         return
     data = mujoco.MjData(model)
     addresses = [int(model.jnt_qposadr[model.dof_jntid[dof]]) for dof in dofs]
     for record in (*case.identification, *case.validation):
-        position = np.nan_to_num(_positions(case, structure, record))
-        for sample in np.unique(np.linspace(0, len(position) - 1, POSES).astype(int)):
+        position = np.nan_to_num(_positions(case, structure, record, settings=settings.motion))
+        for sample in np.unique(np.linspace(0, len(position) - 1, settings.model.poses).astype(int)):
             data.qpos[:] = model.qpos0
             data.qpos[addresses] += position[sample]
             with native.quiet():

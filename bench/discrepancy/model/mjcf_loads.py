@@ -13,20 +13,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.discrepancy.case.case import Case, CaseRecord
+from bench.discrepancy.settings import DEFAULT, ModelSettings
 from bench.rig import Rig
 
 Array = NDArray[np.float64]
-PARTS = 64
-"""Parts that the way between two samples is cut into where a load meets a limit on it."""
 
 
-def within_limits(case: Case, rig: Rig, actuators: dict[str, str]) -> tuple[Case, tuple[str, ...]]:
+def within_limits(
+    case: Case, rig: Rig, actuators: dict[str, str], *, settings: ModelSettings
+) -> tuple[Case, tuple[str, ...]]:
     """A case whose loads are those that the actuators of the model exert, and where that made a difference, in words.
 
     Args:
         case: The case.
         rig: The user's model, with its limits.
         actuators: Load channel to actuator.
+        settings: `ModelSettings` of the diagnosis.
     """
     limits = {}
     for channel, name in actuators.items():
@@ -44,7 +46,9 @@ def within_limits(case: Case, rig: Rig, actuators: dict[str, str]) -> tuple[Case
             samples = record.values[channel]
             if samples.min() >= low and samples.max() <= high:
                 continue
-            values[channel] = clipped_load(samples, low, high, straight=case.load_interpolation == "linear")
+            values[channel] = clipped_load(
+                samples, low, high, straight=case.load_interpolation == "linear", settings=settings
+            )
             values[channel].setflags(write=False)
             said.append(
                 f"'{channel}' runs from {samples.min():.4g} to {samples.max():.4g} in '{record.name}'; the model limits it to {low:.4g} … "
@@ -60,7 +64,9 @@ def within_limits(case: Case, rig: Rig, actuators: dict[str, str]) -> tuple[Case
     return (out, tuple(said)) if said else (case, ())
 
 
-def clipped_load(samples: Array, low: float, high: float, *, straight: bool) -> Array:
+def clipped_load(
+    samples: Array, low: float, high: float, *, straight: bool, settings: ModelSettings = DEFAULT.model
+) -> Array:
     """Samples (n,) of a load that an actuator clips.
 
     A load that runs straight between two samples is clipped on its way, and the straight line between the clipped samples cuts the
@@ -72,12 +78,13 @@ def clipped_load(samples: Array, low: float, high: float, *, straight: bool) -> 
         low: Least load.
         high: Largest load.
         straight: Whether the load runs straight between its samples; else it is held or smooth, and clipped as it is.
+        settings: `ModelSettings` of the diagnosis.
     """
     out = np.clip(samples, low, high)
     if not straight:
         return out
     crossing = np.flatnonzero(np.abs(np.diff(out)) < np.abs(np.diff(samples)) * (1.0 - 1e-12))
-    way = (np.arange(PARTS) + 0.5) / PARTS
+    way = (np.arange(settings.clipped_parts) + 0.5) / settings.clipped_parts
     start, end = samples[crossing, None], samples[crossing + 1, None]
     first, last = out[crossing, None], out[crossing + 1, None]
     cut = np.clip(start + (end - start) * way, low, high) - (first + (last - first) * way)

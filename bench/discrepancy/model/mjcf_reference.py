@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from bench import native
 from bench.discrepancy.case.case import Case, CaseChannel
 from bench.discrepancy.model.mjcf import loads_and_responses, plain_rig
+from bench.discrepancy.settings import ModelSettings
 from bench.rig import Rig
 from bench.rig.building import parse
 
 Array = NDArray[np.float64]
-NEWTON_STEPS = 20
 PROBES = {"position": mujoco.mjtSensor.mjSENS_JOINTPOS, "velocity": mujoco.mjtSensor.mjSENS_JOINTVEL}
 """Sensors for channels that refer to a joint; MuJoCo has none that reads its acceleration."""
 
@@ -45,24 +45,25 @@ class Reference:
     fastest: float
 
 
-def actuators_of(case: Case, rig: Rig) -> dict[str, str]:
+def actuators_of(case: Case, rig: Rig, *, settings: ModelSettings) -> dict[str, str]:
     """Load channel to the actuator that exerts it.
 
     Raises:
         FileFormatError: A channel is none of the model's.
         UnknownNameError: A channel names nothing in the model.
     """
-    loads, _ = loads_and_responses(case, plain_rig(case, rig)[0])
+    loads, _ = loads_and_responses(case, plain_rig(case, rig)[0], settings=settings)
     return {channel.name: actuator for channel, actuator in loads if actuator}
 
 
 @native.quiet()
-def reference_of(case: Case, rig: Rig) -> Reference:
+def reference_of(case: Case, rig: Rig, *, settings: ModelSettings) -> Reference:
     """The reference of a case.
 
     Args:
         case: For the nominal values.
         rig: The user's model.
+        settings: `ModelSettings` of the diagnosis.
     """
     probed = _probed(case, rig)
     values: dict[str, dict[str, float]] = {}
@@ -71,7 +72,7 @@ def reference_of(case: Case, rig: Rig) -> Reference:
         if colon:  # others are of laws beside the model
             values.setdefault(kind, {})[name] = parameter.value
     model = probed.with_structure(**values).model
-    loads, responses = loads_and_responses(case, plain_rig(case, rig)[0])
+    loads, responses = loads_and_responses(case, plain_rig(case, rig)[0], settings=settings)
     columns = [channel.name for channel in probed.channels[len(probed.actuators) :]]
     places = {
         channel.name: columns.index(sensor if order is None else _probe(channel))
@@ -86,7 +87,7 @@ def reference_of(case: Case, rig: Rig) -> Reference:
         # a force sensor reads what the actuator's gain makes of a command
         gain = float(model.actuator_gainprm[index, 0]) if channel.target.startswith("sensor:") else 1.0
         inputs[channel.name] = (int(model.actuator_ctrladr[index]), 1.0 / gain if gain else 1.0)
-    rest, unsteady, fastest = _at_rest(model)
+    rest, unsteady, fastest = _at_rest(model, settings=settings)
     data = mujoco.MjData(model)
     data.qpos[:] = rest
     mujoco.mj_forward(model, data)
@@ -117,7 +118,7 @@ def _probed(case: Case, rig: Rig) -> Rig:
 
 
 @native.quiet()
-def _at_rest(model: mujoco.MjModel) -> tuple[Array, bool, float]:
+def _at_rest(model: mujoco.MjModel, *, settings: ModelSettings) -> tuple[Array, bool, float]:
     """Positions at which springs and gravity balance, by Newton steps from the reference positions; whether there are none; and the
     rate of the fastest motion there [1/s]."""
     data = mujoco.MjData(model)
@@ -134,7 +135,7 @@ def _at_rest(model: mujoco.MjModel) -> tuple[Array, bool, float]:
     if model.nq != model.nv:
         return q, True, 0.0
     scale = max(float(np.abs(force(q)).max(initial=0.0)), 1e-300)
-    for _ in range(NEWTON_STEPS):
+    for _ in range(settings.newton_steps):
         here = force(q)
         if np.abs(here).max(initial=0.0) <= 1e-9 * scale:
             break

@@ -6,31 +6,30 @@ import mujoco
 import numpy as np
 
 from bench.discrepancy.case.case import Case, NominalParameter
+from bench.discrepancy.settings import ModelSettings
 from bench.identification.linear_rig import current
 from bench.rig import Rig
 from bench.rig.building import parse
 
-SIGMAS = 5.0
-"""Stated standard deviations beyond which a nominal value contradicts the model: chance does not take it there in any number of cases."""
 
-
-def value_notes(case: Case, rig: Rig) -> tuple[str, ...]:
+def value_notes(case: Case, rig: Rig, *, settings: ModelSettings) -> tuple[str, ...]:
     """Nominal values that the model contradicts, a sentence each.
 
     Args:
         case: For the nominal values, in the units of the model.
         rig: The user's model.
+        settings: `ModelSettings` of the diagnosis.
     """
-    return tuple(note for parameter in case.parameters if (note := _note(parameter, rig)))
+    return tuple(note for parameter in case.parameters if (note := _note(parameter, rig, settings=settings)))
 
 
-def _note(parameter: NominalParameter, rig: Rig) -> str:
+def _note(parameter: NominalParameter, rig: Rig, *, settings: ModelSettings) -> str:
     own = _own_value(parameter.name, rig)
     if own is None:
         return ""
     # what is stated as certain still has the digits that it is written with
     apart = abs(parameter.value - own)
-    if apart <= SIGMAS * parameter.std or apart <= 1e-3 * max(abs(own), abs(parameter.value)):
+    if apart <= settings.contradicts * parameter.std or apart <= 1e-3 * max(abs(own), abs(parameter.value)):
         return ""
     by = f"{apart / parameter.std:.3g} sigma" if parameter.std > 0.0 else "although it is stated as certain"
     factor = f", {parameter.value / own:.4g} times as much" if own else ""

@@ -8,7 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.discrepancy.effects.friction_limits import soft_coulomb_limit
-from bench.discrepancy.model.nominal_forces import PIECES, NominalFriction
+from bench.discrepancy.model.nominal_forces import (
+    NOMINAL_FORCES_LIMITS,
+    NominalFriction,
+)
 from bench.discrepancy.model.structure import Structure
 from bench.discrepancy.numerics.cubic_spline import cubic
 from bench.discrepancy.simulation.stick_slip import ROW, SCALE, THETA, Elements, Motion, full
@@ -19,9 +22,9 @@ Array = NDArray[np.float64]
 
 @kernel
 def spline_force(t, q, v, z, theta, f):
-    """A cubic spline over the displacement: its reach, then B-spline coefficients of `PIECES` equal pieces."""
+    """A cubic spline over the displacement: its reach, then B-spline coefficients of `pieces` equal pieces."""
     x = min(max(q[0] / theta[0], -1.0), 1.0)
-    f[0] += cubic(theta, 1, PIECES, 0.5 * PIECES * (1.0 + x))
+    f[0] += cubic(theta, 1, NOMINAL_FORCES_LIMITS.pieces, 0.5 * NOMINAL_FORCES_LIMITS.pieces * (1.0 + x))
 
 
 def with_own_forces(

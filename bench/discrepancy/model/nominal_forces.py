@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +13,17 @@ from bench.discrepancy.numerics.cubic_spline import spline_of
 from bench.discrepancy.simulation.stick_slip import Motion
 
 Array = NDArray[np.float64]
-PIECES = 256
-"""Pieces of the spline that a bending spring is tabulated as: over a turn of a pendulum either way it is good to 2e-8 of the torque."""
+
+
+class NominalForcesLimits(NamedTuple):
+    """Numbers of `bench.discrepancy.model.nominal_forces` that compiled code holds."""
+
+    pieces: int = 256
+    """Pieces of the spline that a bending spring is tabulated as: over a turn of a pendulum either way it is good to 2e-8 of the
+    torque."""
+
+
+NOMINAL_FORCES_LIMITS = NominalForcesLimits()
 
 
 @dataclass(frozen=True)

@@ -13,12 +13,22 @@ from bench.discrepancy.simulation.stick_slip import Elements, Motion
 from bench.laws import ForceLaw
 
 Array = NDArray[np.float64]
-STEPS = 16
-"""Integration steps a sample of a motion that hidden states follow."""
-PROBES, NUDGE = 40, 1e-4
-"""Samples at which the rate of a law is asked for, and the change of a hidden state, over its largest, that it is told by."""
-CHANGE = 1e-3
-"""Relative change of a parameter by which the change of a force is told."""
+
+
+@dataclass(frozen=True)
+class NominalLawsSettings:
+    """Numbers of `bench.discrepancy.model.nominal_laws`."""
+
+    steps: int = 16
+    """Integration steps a sample of a motion that hidden states follow."""
+    probes: int = 40
+    nudge: float = 1e-4
+    """Samples at which the rate of a law is asked for, and the change of a hidden state, over its largest, that it is told by."""
+    change: float = 1e-3
+    """Relative change of a parameter by which the change of a force is told."""
+
+
+SETTINGS = NominalLawsSettings()
 
 
 FRICTION = {
@@ -84,14 +94,14 @@ class NominalElement:
     def along(self, theta: Array, motion: Motion, step: float) -> Array:
         """Force (n,) along a motion."""
         q, v = (samples @ self.row[:, None] for samples in motion[:2])
-        substeps = STEPS if self.law.rate else 1
+        substeps = SETTINGS.steps if self.law.rate else 1
         return driven_force(self.alone(theta), position=q, velocity=v, step=step, substeps=substeps)[:, 0]
 
     def change(
         self, parameters: Sequence[str], values: Array, parameter: int, motion: Motion, step: float
     ) -> Array:
         """Change (n,) of the force along a motion with a unit of a nominal parameter."""
-        size = CHANGE * abs(values[parameter]) or CHANGE
+        size = SETTINGS.change * abs(values[parameter]) or SETTINGS.change
         moved = values.copy()
         moved[parameter] += size
         ends = [self.along(self.theta(parameters, v), motion, step) for v in (values, moved)]
@@ -102,9 +112,11 @@ class NominalElement:
         if self.law.rate is None:
             return 0.0
         q, v = (samples @ self.row[:, None] for samples in motion[:2])
-        at = np.unique(np.linspace(0, len(q) - 1, PROBES).astype(np.int64))
-        states = driven_states(self.alone(theta), position=q, velocity=v, step=step, substeps=STEPS, at=at)
-        size = NUDGE * (np.abs(states).max(axis=0) + 1e-300)
+        at = np.unique(np.linspace(0, len(q) - 1, SETTINGS.probes).astype(np.int64))
+        states = driven_states(
+            self.alone(theta), position=q, velocity=v, step=step, substeps=SETTINGS.steps, at=at
+        )
+        size = SETTINGS.nudge * (np.abs(states).max(axis=0) + 1e-300)
         fastest = 0.0
         for k, z in zip(at, states, strict=True):
             before, after = np.zeros(len(z)), np.zeros(len(z))

@@ -14,10 +14,11 @@ from bench.discrepancy.model.mjcf import mjcf_structure
 from bench.discrepancy.model.nominal_forces import NominalFriction
 from bench.discrepancy.model.structure import Place, Structure
 from bench.discrepancy.motion.observer import Observer
+from bench.discrepancy.settings import DEFAULT, DiagnosisSettings
 from bench.errors import FileFormatError
 
 
-def structure_of(case: Case) -> Structure:
+def structure_of(case: Case, *, settings: DiagnosisSettings = DEFAULT) -> Structure:
     """Build the structure that a case names.
 
     Raises:
@@ -27,7 +28,7 @@ def structure_of(case: Case) -> Structure:
     if case.rig in bench:
         return with_elements(bench[case.rig](case), case)
     if case.rig.endswith(".xml"):
-        return with_elements(mjcf_structure(case), case)
+        return with_elements(mjcf_structure(case, settings=settings), case)
     raise FileFormatError(
         f"rig '{case.rig}' is unknown; known: sdof, joint, damper, or the path of an MJCF file (ending in .xml)"
     )

@@ -17,17 +17,18 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_discrete_are
 
+from bench.discrepancy.settings import DEFAULT, MotionSettings
 from bench.errors import IdentificationError
 
-REST = 1e-6
-"""Part of the noise below which a channel is at rest."""
-CANDIDATES = 10.0 ** np.arange(-2.0, 3.1, 1.0)
-"""Multiples of a first guess of the jerk intensity that are compared by likelihood."""
 
-START = 12
-"""Samples whose slope through the first one starts the velocity."""
-LOOSE = 300.0
-"""How poorly the mean position counts as known where none is measured, as a multiple of the motion."""
+class KalmanSmootherLimits(NamedTuple):
+    """Numbers of `bench.discrepancy.motion.kalman_smoother` that compiled code holds."""
+
+    start: int = 12
+    """Samples whose slope through the first one starts the velocity."""
+
+
+KALMAN_SMOOTHER_LIMITS = KalmanSmootherLimits()
 
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
@@ -41,8 +42,17 @@ def _filter(y, h, transition, gain, out, predicted):  # noqa: PLR0912  (one comp
                 state[i] = y[0, c]
         if h[c, 0] == 1.0:
             # a record may start in motion: the stationary gains would take long to find its velocity
-            for k in range(1, START + 1):
-                state[1] += (y[k, c] - y[0, c]) * 6.0 * k / (START * (START + 1.0) * (2.0 * START + 1.0))
+            for k in range(1, KALMAN_SMOOTHER_LIMITS.start + 1):
+                state[1] += (
+                    (y[k, c] - y[0, c])
+                    * 6.0
+                    * k
+                    / (
+                        KALMAN_SMOOTHER_LIMITS.start
+                        * (KALMAN_SMOOTHER_LIMITS.start + 1.0)
+                        * (2.0 * KALMAN_SMOOTHER_LIMITS.start + 1.0)
+                    )
+                )
     squares = np.zeros((m, m))
     innovation = np.zeros(m)
     for k in range(n):
@@ -120,7 +130,12 @@ class Smoother(NamedTuple):
 
 
 def smooth_motion(
-    samples: NDArray[np.float64], orders: tuple[int, ...], noise_std: NDArray[np.float64], step: float
+    samples: NDArray[np.float64],
+    orders: tuple[int, ...],
+    noise_std: NDArray[np.float64],
+    step: float,
+    *,
+    settings: MotionSettings = DEFAULT.motion,
 ) -> NDArray[np.float64]:
     """Fuse the channels of one coordinate: `smoother_of` them, applied to them.
 
@@ -129,21 +144,30 @@ def smooth_motion(
         orders: Derivative that each channel measures: 0, 1 or 2.
         noise_std: (n_channels,) white noise.
         step: Time between samples [s].
+        settings: `MotionSettings` of the diagnosis.
 
     Returns:
         (n, 3) position, velocity, acceleration. Without a position channel the position is the double integral of
         what was measured, from zero.
     """
-    still = resting(samples, orders, noise_std)  # a free run that nothing drives
-    return smoother_of(samples, orders, noise_std, step).smooth(samples) if still is None else still
+    still = resting(samples, orders, noise_std, settings=settings)  # a free run that nothing drives
+    return (
+        smoother_of(samples, orders, noise_std, step, settings=settings).smooth(samples)
+        if still is None
+        else still
+    )
 
 
 def resting(
-    samples: NDArray[np.float64], orders: tuple[int, ...], noise_std: NDArray[np.float64]
+    samples: NDArray[np.float64],
+    orders: tuple[int, ...],
+    noise_std: NDArray[np.float64],
+    *,
+    settings: MotionSettings,
 ) -> NDArray[np.float64] | None:
     """The motion (n, 3) where channels show none, not even noise; None otherwise. Arguments as of `smooth_motion`."""
     where = samples[0] * (np.array(orders) == 0)
-    if np.any(np.abs(samples - where).max(axis=0) >= REST * noise_std):
+    if np.any(np.abs(samples - where).max(axis=0) >= settings.rest * noise_std):
         return None
     out = np.zeros((len(samples), 3))
     out[:, 0] = where.sum() / max(orders.count(0), 1)
@@ -151,7 +175,12 @@ def resting(
 
 
 def smoother_of(
-    samples: NDArray[np.float64], orders: tuple[int, ...], noise_std: NDArray[np.float64], step: float
+    samples: NDArray[np.float64],
+    orders: tuple[int, ...],
+    noise_std: NDArray[np.float64],
+    step: float,
+    *,
+    settings: MotionSettings,
 ) -> Smoother:
     """The likeliest smoother of the channels of one coordinate; arguments as of `smooth_motion`.
 
@@ -169,7 +198,7 @@ def smoother_of(
         reach = float(np.std(samples[:, orders.index(lowest)])) / omega**lowest
         orders = (*orders, 0)
         y = np.ascontiguousarray(np.column_stack([y, np.zeros(len(y))]))
-        noise_scaled = np.append(noise_scaled, LOOSE * reach)
+        noise_scaled = np.append(noise_scaled, settings.loose * reach)
     h = np.zeros((len(orders), 3))
     for c, order in enumerate(orders):
         h[c, order] = 1.0
@@ -179,7 +208,7 @@ def smoother_of(
     shape = np.array([[1 / 20, 1 / 8, 1 / 6], [1 / 8, 1 / 3, 1 / 2], [1 / 6, 1 / 2, 1.0]])
     noise = np.diag(noise_scaled**2)
     best: tuple[float, Smoother] | None = None
-    for multiple in CANDIDATES:
+    for multiple in settings.jerk_intensities:
         process = shape * guess * multiple
         try:
             covariance, gain, innovation = _stationary(transition, process, h, noise)

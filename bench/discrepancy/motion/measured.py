@@ -10,13 +10,20 @@ from numpy.typing import NDArray
 
 from bench.discrepancy.motion.kalman_smoother import smooth_motion
 from bench.discrepancy.motion.observer import Observer
+from bench.discrepancy.settings import MotionSettings
 from bench.discrepancy.simulation.stick_slip import Motion
 
 Array = NDArray[np.float64]
 
 
 def measured_motion(
-    observers: Sequence[Observer], samples: Array, noise: Array, step: float, *, at_rest: bool = True
+    observers: Sequence[Observer],
+    samples: Array,
+    noise: Array,
+    step: float,
+    *,
+    at_rest: bool = True,
+    settings: MotionSettings,
 ) -> Motion:
     """Smoothed motion of every degree of freedom that the channels determine; zero for the others.
 
@@ -30,6 +37,7 @@ def measured_motion(
         step: Time between samples [s].
         at_rest: Whether the record starts at rest. An integral starts at zero; where the motion does not, what grows
             evenly with time is the start that was missed and is taken off.
+        settings: `MotionSettings` of the diagnosis.
     """
     n_dof = len(observers[0].row)
     known: list[list[tuple[int, Array, float]]] = [[] for _ in range(n_dof)]
@@ -48,7 +56,9 @@ def measured_motion(
     for i, entries in enumerate(known):
         if entries:
             orders, columns, levels = zip(*entries, strict=True)
-            out[:, :, i] = smooth_motion(np.column_stack(columns), orders, np.array(levels), step).T
+            out[:, :, i] = smooth_motion(
+                np.column_stack(columns), orders, np.array(levels), step, settings=settings
+            ).T
             if not at_rest and min(orders) > 0:
                 missed = Polynomial.fit(
                     np.arange(len(samples)) * step, out[0, :, i], min(orders) - 1

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numba
@@ -14,38 +13,10 @@ from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.case.channel_noise import noise_floor
 from bench.discrepancy.case.single_axis import motion_channels
 from bench.discrepancy.motion.kalman_smoother import resting, smoother_of
+from bench.discrepancy.settings import DEFAULT, MemorySettings, MotionSettings
 from bench.discrepancy.simulation.stick_slip import Motion
 
 Array = NDArray[np.float64]
-
-DOUBT = 4.5
-"""Standard deviations of the velocity of a prescribed motion below which its direction is in doubt: a record has dozens of
-reversals, and a single sample on the wrong side of one is off by all of the friction."""
-MOST_IN_DOUBT = 0.7
-"""Part of a record that may be in doubt; a motion so slow or so noisy is compared as it is."""
-REVERSAL = 2.0
-"""Way back of a prescribed motion, in units of its noise, from which it counts as a reversal."""
-UNUSUAL, EDGE_WIDTH = 1.5, 9
-"""Error of a prescribed velocity, over its median, from which samples at an end of a record are not compared; and the number of
-samples over which it is averaged."""
-
-
-@dataclass(frozen=True)
-class MemorySettings:
-    """How long a component may remember what was before its record.
-
-    Attributes:
-        width: Way back from a turning point, over the reach of the motion, that makes a reversal.
-        reversals: Reversals after which a slider has been dragged both ways and where it stood before is forgotten.
-        longest: Part of a record that may be left out for that, at most.
-    """
-
-    width: float = 0.01
-    reversals: int = 2
-    longest: float = 0.25
-
-
-MEMORY = MemorySettings()
 
 
 class Prescribed(NamedTuple):
@@ -60,7 +31,9 @@ class Prescribed(NamedTuple):
     noisy: tuple[Motion, ...]
 
 
-def prescribed_motion(case: Case, record: CaseRecord, draws: int) -> Prescribed:
+def prescribed_motion(
+    case: Case, record: CaseRecord, draws: int, *, settings: MotionSettings = DEFAULT.motion
+) -> Prescribed:
     """The motion that drives a component, with draws of its noise.
 
     It is the measured displacement, and velocity where there is one, smoothed.
@@ -69,23 +42,24 @@ def prescribed_motion(case: Case, record: CaseRecord, draws: int) -> Prescribed:
         case: The case.
         record: Record of the motion.
         draws: Number of draws.
+        settings: `MotionSettings` of the diagnosis.
     """
     orders, samples, noise = _samples(case, record)
-    smooth = resting(samples, orders, noise)
+    smooth = resting(samples, orders, noise, settings=settings)
     errors: list[Array] = [np.zeros((len(samples), 3))] * draws
     if smooth is None:
-        smoother = smoother_of(samples, orders, noise, record.step)
+        smoother = smoother_of(samples, orders, noise, record.step, settings=settings)
         rng = np.random.default_rng(0)
         smooth = smoother.smooth(samples)
         errors = [smoother.smooth(noise * rng.standard_normal(samples.shape)) for _ in range(draws)]
     out = [smooth, *(smooth + error for error in errors)]
     for moved in out:
-        moved[:, 1] = held(moved[:, 0], moved[:, 1], REVERSAL * noise[0])
+        moved[:, 1] = held(moved[:, 0], moved[:, 1], settings.reversal * noise[0])
     motion, *noisy = (Motion(*(moved[:, [i]] for i in range(3))) for moved in out)
     return Prescribed(motion, tuple(noisy))
 
 
-def decided(prescribed: Prescribed) -> Array | None:
+def decided(prescribed: Prescribed, *, settings: MotionSettings = DEFAULT.motion) -> Array | None:
     """Samples (n,) of a prescribed motion whose direction the noise leaves in no doubt, as ones and zeros.
 
     Dry friction changes its sign at a reversal, and the moment of the reversal is known to the noise only: a few
@@ -94,27 +68,30 @@ def decided(prescribed: Prescribed) -> Array | None:
 
     Args:
         prescribed: The motion of one coordinate.
+        settings: `MotionSettings` of the diagnosis.
     """
     motion, draws = prescribed
     error = np.sqrt(np.mean([(drawn.velocity[:, 0] - motion.velocity[:, 0]) ** 2 for drawn in draws], axis=0))
     usual = float(np.sqrt(np.mean(error**2)))
-    sure = np.abs(motion.velocity[:, 0]) > DOUBT * usual
+    sure = np.abs(motion.velocity[:, 0]) > settings.doubt * usual
     sure = ndimage.binary_erosion(sure, iterations=2, border_value=1)
-    sure[_edges(error)] = False
-    sure[: remembering(motion.position[:, 0])] = False
-    return np.asarray(sure, dtype=np.float64) if sure.mean() > 1.0 - MOST_IN_DOUBT else None
+    sure[_edges(error, settings=settings)] = False
+    sure[: remembering(motion.position[:, 0], settings.memory)] = False
+    return np.asarray(sure, dtype=np.float64) if sure.mean() > 1.0 - settings.most_in_doubt else None
 
 
-def _edges(error: Array) -> NDArray[np.bool_]:
+def _edges(error: Array, *, settings: MotionSettings) -> NDArray[np.bool_]:
     """Samples (n,) at both ends up to where the error of a motion has become the usual one."""
-    local = np.sqrt(ndimage.convolve1d(error**2, np.full(EDGE_WIDTH, 1.0 / EDGE_WIDTH), mode="nearest"))
-    usual = np.flatnonzero(local <= UNUSUAL * float(np.median(local)))
+    local = np.sqrt(
+        ndimage.convolve1d(error**2, np.full(settings.edge_width, 1.0 / settings.edge_width), mode="nearest")
+    )
+    usual = np.flatnonzero(local <= settings.edge_error * float(np.median(local)))
     out = np.ones(len(error), dtype=bool)
     out[usual[0] : usual[-1] + 1] = False
     return out
 
 
-def remembering(position: Array, settings: MemorySettings = MEMORY) -> int:
+def remembering(position: Array, settings: MemorySettings = DEFAULT.motion.memory) -> int:
     """Samples at the start of a prescribed motion during which a component remembers what was before.
 
     Args:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -13,8 +14,17 @@ from bench.discrepancy.multibody.model import Joint
 from bench.errors import FileFormatError
 
 Array = NDArray[np.float64]
-ORDERS = {"position": 0, "velocity": 1}
-"""Derivatives of the position by the quantity of a channel."""
+
+
+@dataclass(frozen=True)
+class EncodersSettings:
+    """Numbers of `bench.discrepancy.multibody.encoders`."""
+
+    orders: Mapping[str, int] = field(default_factory=lambda: {"position": 0, "velocity": 1})
+    """Derivatives of the position by the quantity of a channel."""
+
+
+SETTINGS = EncodersSettings()
 
 
 class Encoder(NamedTuple):
@@ -72,11 +82,11 @@ def encoders_of(case: Case, joint: Joint) -> Encoders:
     found = {}
     for channel in case.channels:
         if channel.role == "response" and channel.target == f"joint:{joint.name}":
-            if channel.quantity not in ORDERS:
+            if channel.quantity not in SETTINGS.orders:
                 raise FileFormatError(
                     f"channel '{channel.name}' has the quantity '{channel.quantity}'; position or velocity of a joint is expected"
                 )
-            found[ORDERS[channel.quantity]] = channel
+            found[SETTINGS.orders[channel.quantity]] = channel
     if 0 not in found:
         raise FileFormatError(
             f'nothing measures the position of joint \'{joint.name}\'; give a channel "joint": "{joint.name}", '

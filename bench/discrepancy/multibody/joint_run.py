@@ -21,6 +21,7 @@ from __future__ import annotations
 
 import math
 from enum import IntEnum
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -77,8 +78,14 @@ class Slot(IntEnum):
 SLOTS = len(Slot)
 
 
-FAR = 1e6
-"""Error from which a run counts as diverged [rad, m, or these per second]."""
+class JointRunLimits(NamedTuple):
+    """Numbers of `bench.discrepancy.multibody.joint_run` that compiled code holds."""
+
+    far: float = 1e6
+    """Error from which a run counts as diverged [rad, m, or these per second]."""
+
+
+JOINT_RUN_LIMITS = JointRunLimits()
 
 _inlined = numba.njit(cache=True, error_model="numpy", nogil=True, inline="always")
 
@@ -235,7 +242,7 @@ def run(
         states[i, 0], states[i, 1], states[i, 2], states[i, 3] = q, v, ql, vl
         out[i, 0] = y[i] - (ql if on_link else q)
         out[i, 1] = v_measured[i] - (vl if on_link else v) if v_measured.shape[0] > 0 else 0.0
-        if not (abs(out[i, 0]) < FAR and abs(out[i, 1]) < FAR):
+        if not (abs(out[i, 0]) < JOINT_RUN_LIMITS.far and abs(out[i, 1]) < JOINT_RUN_LIMITS.far):
             out[i:] = math.nan
             return
         if i == n - 1:

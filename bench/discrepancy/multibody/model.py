@@ -31,8 +31,17 @@ LOCAL = ("damping", "frictionloss", "armature", "stiffness")
 """Parameters of joints."""
 DRIVES = ("kp", "kv", "gear")
 """Parameters of actuators."""
-DIFFERENCE = 1e-6
-"""Step of central differences of the inverse dynamics [rad or m], a cube root of rounding."""
+
+
+@dataclass(frozen=True)
+class ModelSettings:
+    """Numbers of `bench.discrepancy.multibody.model`."""
+
+    difference: float = 1e-6
+    """Step of central differences of the inverse dynamics [rad or m], a cube root of rounding."""
+
+
+SETTINGS = ModelSettings()
 
 
 class Drive(NamedTuple):
@@ -192,10 +201,10 @@ class ArticulatedModel:
         out = np.empty_like(q)
         for j in range(q.shape[1]):
             step = np.zeros(q.shape[1])
-            step[j] = DIFFERENCE
+            step[j] = SETTINGS.difference
             ahead = self.dynamics(q + step, v, a).torque[:, j]
             behind = self.dynamics(q - step, v, a).torque[:, j]
-            out[:, j] = (ahead - behind) / (2.0 * DIFFERENCE)
+            out[:, j] = (ahead - behind) / (2.0 * SETTINGS.difference)
         return out
 
 

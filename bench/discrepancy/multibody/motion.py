@@ -13,10 +13,9 @@ from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.motion.kalman_smoother import Smoother, resting, smoother_of
 from bench.discrepancy.multibody.encoders import TRUE, Encoder, encoders_of
 from bench.discrepancy.multibody.model import ArticulatedModel, Dynamics
+from bench.discrepancy.settings import ArticulatedSettings, MotionSettings
 
 Array = NDArray[np.float64]
-LONGEST_STEP = 1e-3
-"""Longest integration step [s]: MuJoCo's own default is two of them, and a servo of 10 Hz is then integrated to 3e-4."""
 
 
 class Motion(NamedTuple):
@@ -36,6 +35,8 @@ def motion_of(
     record: CaseRecord,
     encoders: Mapping[str, Encoder],
     like: Motion | None = None,
+    *,
+    settings: MotionSettings,
 ) -> Motion:
     """Smooth the motion of a record; `encoders` says what is wrong with which joint, `like` has smoothers to be used again.
 
@@ -50,10 +51,10 @@ def motion_of(
         raw = np.column_stack([record.values[c.name] for c in measured.channels])
         true = wrong.corrected(raw, measured.orders)
         noise = wrong.scaled(measured.noise, measured.orders)
-        still = resting(true, measured.orders, noise)
+        still = resting(true, measured.orders, noise, settings=settings)
         smoother = like.smoothers[j] if like else None
         if still is None and smoother is None:
-            smoother = smoother_of(true, measured.orders, noise, record.step)
+            smoother = smoother_of(true, measured.orders, noise, record.step, settings=settings)
         if like is not None and wrong == TRUE:
             out[:, :, j] = np.stack([like.position[:, j], like.velocity[:, j], like.acceleration[:, j]])
         elif still is not None or smoother is None:
@@ -85,9 +86,9 @@ class Clock(NamedTuple):
         return np.ascontiguousarray(CubicSpline(self.samples, samples, axis=0)(self.middles).T)
 
 
-def clock_of(record: CaseRecord) -> Clock:
+def clock_of(record: CaseRecord, *, settings: ArticulatedSettings) -> Clock:
     """Samples and integration steps of a record."""
-    n_sub = max(1, int(np.ceil(record.step / LONGEST_STEP - 1e-9)))
+    n_sub = max(1, int(np.ceil(record.step / settings.longest_step - 1e-9)))
     middles = (np.arange((len(record) - 1) * n_sub) + 0.5) * (record.step / n_sub)
     samples = np.arange(len(record)) * record.step
     return Clock(np.asarray(samples, dtype=np.float64), np.asarray(middles, dtype=np.float64), n_sub)

@@ -25,6 +25,7 @@ from bench.discrepancy.multibody.encoders import TRUE, Encoder, encoders_of, inp
 from bench.discrepancy.multibody.model import ArticulatedModel, Dynamics, Joint
 from bench.discrepancy.multibody.motion import Clock, Coefficients, Motion, clock_of, motion_of
 from bench.discrepancy.multibody.noise import torque_noise
+from bench.discrepancy.settings import DEFAULT, ArticulatedSettings, DiagnosisSettings
 
 Array = NDArray[np.float64]
 
@@ -114,7 +115,9 @@ class JointRecord:
     def window(self) -> int:
         """Samples that a free run goes without drifting off; zero where a servo holds it, so that it goes for the whole record."""
         drive = self.joint.drive
-        return 0 if drive is not None and drive.servo else max(2, round(WINDOW / self.sample))
+        return (
+            0 if drive is not None and drive.servo else max(2, round(RECORDS_SETTINGS.window / self.sample))
+        )
 
     def _system(self) -> tuple[Array, Array, Array, Array]:
         """Transition, process noise, observation and noise of the joint about its mean inertia, sample by sample."""
@@ -150,8 +153,16 @@ class JointRecord:
         return gain, np.asarray(np.linalg.inv(np.linalg.cholesky(innovation)), dtype=np.float64)
 
 
-WINDOW = 0.5
-"""Length of a free run of a joint that no servo holds [s]: some time constants of its drive, and far less than it takes to drift off."""
+@dataclass(frozen=True)
+class RecordsSettings:
+    """Numbers of `bench.discrepancy.multibody.records`."""
+
+    window: float = 0.5
+    """Length of a free run of a joint that no servo holds [s]: some time constants of its drive, and far less than it takes to drift
+    off."""
+
+
+RECORDS_SETTINGS = RecordsSettings()
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,11 +189,13 @@ class PreparedRecord:
         return replace(self, joints=tuple(joints))
 
 
-def prepare(case: Case, model: ArticulatedModel, record: CaseRecord) -> PreparedRecord:
+def prepare(
+    case: Case, model: ArticulatedModel, record: CaseRecord, *, settings: DiagnosisSettings = DEFAULT
+) -> PreparedRecord:
     """Prepare a record for all joints of a model at its nominal parameters."""
-    motion = motion_of(case, model, record, {})
+    motion = motion_of(case, model, record, {}, settings=settings.motion)
     moved = (motion.position, motion.velocity, motion.acceleration)
-    clock = clock_of(record)
+    clock = clock_of(record, settings=settings.articulated)
     dynamics = model.dynamics(*moved)
     base = Coefficients.of(dynamics, motion, clock)
 
@@ -196,7 +209,11 @@ def prepare(case: Case, model: ArticulatedModel, record: CaseRecord) -> Prepared
     payloads = {body: beside(model.with_payload(body, 1.0).dynamics(*moved)) for body in model.bodies}
     centres = {
         body: np.stack(
-            [beside(model.with_centre(body, SHIFT * axis).dynamics(*moved)) / SHIFT for axis in np.eye(3)]
+            [
+                beside(model.with_centre(body, settings.articulated.shift * axis).dynamics(*moved))
+                / settings.articulated.shift
+                for axis in np.eye(3)
+            ]
         )
         for body in model.bodies
     }
@@ -224,10 +241,12 @@ def corrected(
     model: ArticulatedModel,
     prepared: PreparedRecord,
     encoders: Mapping[str, Encoder],
+    *,
+    settings: DiagnosisSettings = DEFAULT,
 ) -> PreparedRecord:
     """A prepared record, the logs of its encoders corrected; derivatives by masses and postures are kept as they were."""
-    motion = motion_of(case, model, prepared.record, encoders, prepared.motion)
-    clock = clock_of(prepared.record)
+    motion = motion_of(case, model, prepared.record, encoders, prepared.motion, settings=settings.motion)
+    clock = clock_of(prepared.record, settings=settings.articulated)
     dynamics = model.dynamics(motion.position, motion.velocity, motion.acceleration)
     now = Coefficients.of(dynamics, motion, clock)
     joints = []
@@ -249,7 +268,12 @@ def corrected(
 
 
 def relinked(
-    case: Case, model: ArticulatedModel, prepared: PreparedRecord, links: Mapping[int, Array]
+    case: Case,
+    model: ArticulatedModel,
+    prepared: PreparedRecord,
+    links: Mapping[int, Array],
+    *,
+    settings: ArticulatedSettings = DEFAULT.articulated,
 ) -> PreparedRecord:
     """A prepared record with links where the runs of their elastic joints have them, not where their motors are.
 
@@ -258,17 +282,18 @@ def relinked(
         model: Its model.
         prepared: The record.
         links: Joint to position and velocity (n, 2) of its link.
+        settings: `ArticulatedSettings` of the diagnosis.
     """
     step = prepared.record.step
     out = [np.array(part) for part in prepared.motion[:3]]
-    sections = butter(2, min(2.0 * FOLLOWED * step, 0.9), output="sos")
+    sections = butter(2, min(2.0 * settings.followed * step, 0.9), output="sos")
     for j, states in links.items():
         away = sosfiltfilt(sections, states - np.column_stack([out[0][:, j], out[1][:, j]]), axis=0)
         out[0][:, j] += away[:, 0]
         out[1][:, j] += away[:, 1]
         out[2][:, j] += np.gradient(away[:, 1], step)
     motion = prepared.motion._replace(position=out[0], velocity=out[1], acceleration=out[2])
-    clock = clock_of(prepared.record)
+    clock = clock_of(prepared.record, settings=settings)
     dynamics = model.dynamics(*out)
     now = Coefficients.of(dynamics, motion, clock)
     joints = [
@@ -280,20 +305,12 @@ def relinked(
     return PreparedRecord(prepared.record, prepared.motion, tuple(joints))
 
 
-FOLLOWED = 20.0
-"""Frequency [Hz] up to which links are moved: what a robot is driven with lies below, and a second derivative lives on what lies above."""
-
-
 def _measured(motion: Motion, j: int) -> tuple[Array, Array, Array, Array]:
     """Measured positions, velocities, their noise, and the start of joint `j`."""
     samples = motion.samples[j]
     velocity = np.ascontiguousarray(samples[:, 1]) if samples.shape[1] > 1 else np.zeros(0)
     start = np.array([motion.position[0, j], motion.velocity[0, j]])
     return np.ascontiguousarray(samples[:, 0]), velocity, motion.noise[j], start
-
-
-SHIFT = 1e-4
-"""Shift of a centre of mass for its derivative [m]."""
 
 
 def _difference(changed: Dynamics, base: Dynamics) -> Dynamics:

@@ -4,7 +4,7 @@ The present records leave each rival a posterior; for the next test it is the pr
 normal with mean y and covariance ``I + J P J'`` in units of the noise, so that a difference which the rival makes up by
 other parameters does not count. The merit is the expected log Bayes factor of `bench.excitation.bayes_factor`. Its distribution
 under either rival, with the odds that the present records give already, is the power of the test: the probability that it ends
-with odds of `ODDS` for the true one.
+with odds of `odds` for the true one.
 
 Where the records call for no effect at all, or cannot tell two apart, the reason is put into words, from what the motion reached.
 """
@@ -24,26 +24,20 @@ from bench.discrepancy.likelihood.problem import Array, Problem
 from bench.discrepancy.likelihood.whitening import RecordData, whitened
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.next_test.distinguishability import why_alike, why_none
-from bench.discrepancy.next_test.feasible_excitations import LEVELS, Proposal, candidates, feasible, limits_of
+from bench.discrepancy.next_test.feasible_excitations import (
+    Proposal,
+    candidates,
+    feasible,
+    limits_of,
+)
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.search.explain import Explanation
 from bench.discrepancy.search.fits import names
+from bench.discrepancy.settings import NextTestSettings
 from bench.excitation.bayes_factor import Contrast, expected_log_bayes_factor
 
-ODDS = 99.0
-"""Odds at which a rival counts as decided: 99 %."""
-DECIDED = 9.2
-"""Log odds of the present records, ten thousand to one, above which no further test is proposed."""
-FINALISTS = 4
-"""Excitations whose merit is computed in full; the others fall out by the difference of the rivals' responses alone."""
-DRAWS = 4000
-"""Draws of the log Bayes factor behind a power."""
-SAMPLES = 20_000
-"""Longest proposed record, shorter with more degrees of freedom: simulations are what the search costs."""
 SPOKEN_OF = ("coulomb_friction", "gap", "cubic_stiffness", "quadratic_damping")
 """Effects whose detectable size is told where the records call for nothing: one of each family of forces."""
-OTHERS = 3
-"""Further rivals that are held against the chosen excitation."""
 
 
 class Rival(NamedTuple):
@@ -112,7 +106,7 @@ class Outlook(NamedTuple):
 
     Attributes:
         log_odds: Expected log Bayes factor in favour of the true one.
-        power: Probability that the test ends with `ODDS` for the true one, whichever it is by the present odds.
+        power: Probability that the test ends with `odds` for the true one, whichever it is by the present odds.
         power_first: The same, if the first one is true.
         power_second: The same, if the second one is true.
     """
@@ -136,7 +130,7 @@ def separate(problem: Problem, explanations: Sequence[Explanation]) -> dict[str,
     """
     best = explanations[0]
     rivals = [e for e in explanations[1:] if _is_rival(best, e)]
-    if not rivals or log_odds(best, rivals[0]) > DECIDED or problem.windowed:
+    if not rivals or log_odds(best, rivals[0]) > problem.settings.next_test.decided or problem.windowed:
         return {}
     first, second = Rival.of(best), Rival.of(rivals[0])
     odds = log_odds(best, rivals[0])
@@ -233,13 +227,13 @@ def outlook(
     a, b = (np.pad(m, ((0, 0), (0, size - m.shape[1]))) for m in (a, b))
     contrast = Contrast(np.asarray(r @ r), a.T @ r, b.T @ r, a.T @ a, b.T @ b, a.T @ b)
     expected = float(expected_log_bayes_factor(contrast))
-    chances = _power(r, a, b, odds)
+    chances = _power(r, a, b, odds, settings=problem.settings.next_test)
     prior = 1.0 / (1.0 + np.exp(-np.clip(odds, -50.0, 50.0)))
     return Outlook(expected, prior * chances[0] + (1.0 - prior) * chances[1], *chances)
 
 
-def _power(r: Array, a: Array, b: Array, odds: float) -> tuple[float, float]:
-    """Probability of `ODDS` for the true rival, under the first and under the second.
+def _power(r: Array, a: Array, b: Array, odds: float, *, settings: NextTestSettings) -> tuple[float, float]:
+    """Probability of `odds` for the true rival, under the first and under the second.
 
     All that differs lies in the span of the sensitivities and of the difference; there the draws are made.
     """
@@ -254,8 +248,8 @@ def _power(r: Array, a: Array, b: Array, odds: float) -> tuple[float, float]:
     out = []
     for true in (0, 1):
         noise = (
-            rng.standard_normal((DRAWS, n))
-            + rng.standard_normal((DRAWS, small[true].shape[1])) @ small[true].T
+            rng.standard_normal((settings.draws, n))
+            + rng.standard_normal((settings.draws, small[true].shape[1])) @ small[true].T
         )
         # coordinates with the first rival's mean at the origin and the second's at minus the difference
         y = noise if true == 0 else noise - offset
@@ -264,7 +258,13 @@ def _power(r: Array, a: Array, b: Array, odds: float) -> tuple[float, float]:
             for shift, inverse in zip((0.0, offset), inverses, strict=True)
         ]
         factor = 0.5 * (misfit[1] - misfit[0] + logs[1] - logs[0]) + odds
-        out.append(float(np.mean(factor > np.log(ODDS)) if true == 0 else np.mean(factor < -np.log(ODDS))))
+        out.append(
+            float(
+                np.mean(factor > np.log(settings.odds))
+                if true == 0
+                else np.mean(factor < -np.log(settings.odds))
+            )
+        )
     return out[0], out[1]
 
 
@@ -287,14 +287,15 @@ def _noise_scale(problem: Problem, best: Explanation) -> float:
 
 def _finalists(problem: Problem, first: Rival, second: Rival) -> list[Proposal]:
     """Feasible excitations by the whitened difference of the rivals' responses, the largest first."""
+    settings = problem.settings.next_test
     limits = limits_of(problem)
     longest = max(len(r) for r in problem.records)
-    samples = min(longest, SAMPLES // max(1, len(problem.structure.dofs) // 2))
+    samples = min(longest, settings.samples // max(1, len(problem.structure.dofs) // 2))
     loads = _loads(problem, (*first.explanation.hypothesis, *second.explanation.hypothesis))
 
     def weigh(entry: tuple[str, Array]) -> list[tuple[float, Proposal]]:
         out = []
-        for level in LEVELS:
+        for level in settings.levels:
             label, columns = entry
             shown = label if level == 1.0 else f"{label}, at {100 * level:.0f} % of what the rig can do"
             at_level = limits._replace(
@@ -312,7 +313,7 @@ def _finalists(problem: Problem, first: Rival, second: Rival) -> list[Proposal]:
 
     weighed = [x for part in in_threads(weigh, candidates(problem, loads, samples)) for x in part]
     weighed.sort(key=lambda entry: -entry[0])
-    return [proposal for _, proposal in weighed[:FINALISTS]]
+    return [proposal for _, proposal in weighed[: settings.finalists]]
 
 
 def _loads(problem: Problem, effects: Sequence[Placed]) -> list[int]:
@@ -349,10 +350,11 @@ def _others(
     problem: Problem, first: Rival, rivals: Sequence[Explanation], proposal: Proposal, scale: float
 ) -> list[dict[str, Any]]:
     """The same excitation against further rivals that the present records leave open."""
+    settings = problem.settings.next_test
     out = []
-    for rival in rivals[:OTHERS]:
+    for rival in rivals[: settings.others]:
         odds = log_odds(first.explanation, rival)
-        if odds > DECIDED:
+        if odds > settings.decided:
             break
         look = outlook(problem, first, Rival.of(rival), proposal.record, odds=odds, scale=scale)
         if look is not None:

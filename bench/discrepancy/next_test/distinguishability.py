@@ -10,14 +10,6 @@ from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.search.explain import Explanation
 from bench.discrepancy.search.fits import names
 
-BARELY = 0.9
-"""Part of the largest displacement from which on a clearance counts as hardly exceeded."""
-DETECTABLE = 25.0
-"""Gain in chi-squared from which an effect shows: five standard deviations."""
-INSENSITIVE = 0.1
-"""Force, as a part of the largest load, that an effect may have without showing, before sensitivity is called low."""
-PROBE = 0.02
-"""Force of the probe by which sensitivity is measured, as a part of the RMS load."""
 LIMITS = {"clearance": "gap", "position": "stop"}
 
 
@@ -54,7 +46,7 @@ def _reached(problem: Problem, part: Problem, placed: Placed, eta: Array) -> str
         share = _beyond(problem, placed, limit)
         if limit > largest:
             return f"The motion never left the {what} of the {title}: its largest displacement is {largest:.3g} {unit}."
-        if limit > BARELY * largest:
+        if limit > problem.settings.next_test.barely * largest:
             return (
                 f"The motion hardly left the {what} of the {title}: largest displacement {largest:.3g} {unit}, "
                 f"{what} at {limit:.3g} {unit}, {100 * share:.2g} % of the time beyond it."
@@ -114,6 +106,7 @@ def sensitivity(problem: Problem, candidates: list[Placed]) -> dict[tuple[str, s
     Returns:
         By (effect, place); infinite where an effect would not show however strong, since the motion never met it.
     """
+    settings = problem.settings.next_test
     n = len(problem.nominal)
     base = problem.residual((), np.zeros(n))
     columns = np.column_stack([(problem.residual((), 0.1 * np.eye(n)[i]) - base) / 0.1 for i in range(n)])
@@ -122,7 +115,7 @@ def sensitivity(problem: Problem, candidates: list[Placed]) -> dict[tuple[str, s
     for placed in candidates:
         effect = placed.effect
         eta = effect.grid()[len(effect.grid()) // 2].copy()
-        amplitude = PROBE if effect.parameters[0].signed else np.log(PROBE)
+        amplitude = settings.probe if effect.parameters[0].signed else np.log(settings.probe)
         eta[0] = amplitude
         changed = problem.residual((placed,), np.concatenate([np.zeros(n), eta]))
         if not np.isfinite(changed).all():
@@ -130,7 +123,9 @@ def sensitivity(problem: Problem, candidates: list[Placed]) -> dict[tuple[str, s
         full = np.concatenate([changed - base, np.zeros(n)])
         rest = full - basis @ (basis.T @ full)
         gain = float(rest @ rest)
-        out[(effect.name, placed.place.name)] = PROBE * np.sqrt(DETECTABLE / gain) if gain > 0.0 else np.inf
+        out[(effect.name, placed.place.name)] = (
+            settings.probe * np.sqrt(settings.detectable / gain) if gain > 0.0 else np.inf
+        )
     return out
 
 
@@ -141,6 +136,7 @@ def why_none(problem: Problem, candidates: list[Placed]) -> str:
         problem: Records and priors.
         candidates: Forces at places that are worth mentioning.
     """
+    settings = problem.settings.next_test
     found = sensitivity(problem, candidates)
     if not found:
         return ""
@@ -151,8 +147,8 @@ def why_none(problem: Problem, candidates: list[Placed]) -> str:
         unit = unit_of("position", place.position_unit, place.force_unit)
         where = f" on the {place.name} axis" if place.name else ""
         own = {name: value for (name, at), value in found.items() if at == place.name}
-        seen = sorted((value, name) for name, value in own.items() if value <= INSENSITIVE)
-        unseen = sorted(name.replace("_", " ") for name, value in own.items() if value > INSENSITIVE)
+        seen = sorted((value, name) for name, value in own.items() if value <= settings.insensitive)
+        unseen = sorted(name.replace("_", " ") for name, value in own.items() if value > settings.insensitive)
         if seen:
             largest, name = seen[-1]
             sentences.append(
@@ -161,7 +157,7 @@ def why_none(problem: Problem, candidates: list[Placed]) -> str:
             )
         if unseen:
             sentences.append(
-                f"The records say little about {', '.join(unseen)}{where}: even a force of {100 * INSENSITIVE:.0f} % of the RMS "
+                f"The records say little about {', '.join(unseen)}{where}: even a force of {100 * settings.insensitive:.0f} % of the RMS "
                 "load would be lost in the noise or taken for a nominal parameter."
             )
         sentences.append(

@@ -16,15 +16,6 @@ from bench.discrepancy.case.case import CaseRecord, record_from_arrays
 from bench.discrepancy.likelihood.problem import Array, Problem
 from bench.signals import BandLimitedNoise, Harmonic, ImpulseTrain, Multisine, Signal, Sweep, Tapered
 
-REACH = 1.5
-"""Largest proposed displacement and velocity, as multiples of the largest measured ones."""
-MARGIN = 0.97
-"""Part of a limit that a scaled excitation aims at."""
-SCALINGS = 6
-"""Simulations in which an excitation is scaled down to its limits."""
-LEVELS = (1.0, 0.3)
-"""Parts of the feasible size that are tried: some effects show at small motions only."""
-
 Simulate = Callable[[CaseRecord], Array]
 
 
@@ -69,7 +60,9 @@ def limits_of(problem: Problem) -> Limits:
         o.channel: given.get(
             o.channel,
             # an acceleration is limited by the load already, and friction makes its peaks erratic
-            REACH * max(float(np.abs(r.values[o.channel]).max()) for r in records) if o.order < 2 else np.inf,
+            problem.settings.next_test.reach * max(float(np.abs(r.values[o.channel]).max()) for r in records)
+            if o.order < 2
+            else np.inf,
         )
         for o in problem.structure.observers
     }
@@ -165,6 +158,7 @@ def feasible(
     Returns:
         The proposal and the rivals' responses; None where a rival diverges or cannot be kept within the limits.
     """
+    settings = problem.settings.next_test
     names = problem.structure.loads
     bounds = np.array([limits.motion[name] for name in problem.structure.channels])
     full = columns * np.array([limits.load[name] for name in names])
@@ -172,7 +166,7 @@ def feasible(
     time = step * np.arange(len(columns))
     zeros = dict.fromkeys(problem.structure.channels, np.zeros(len(columns)))
     scale = 1.0
-    for _ in range(SCALINGS):
+    for _ in range(settings.scalings):
         loads = {name: scale * full[:, j] for j, name in enumerate(names)}
         record = record_from_arrays(f"proposed: {label}", time, {**zeros, **loads})
         responses = [run(record) for run in simulate]
@@ -185,5 +179,5 @@ def feasible(
             peaks = {name: float(np.abs(loads[name]).max()) for name in names}
             motion = dict(zip(problem.structure.channels, (float(x) for x in largest), strict=True))
             return Proposal(label, record, peaks, motion), responses
-        scale *= float(np.clip(MARGIN / ratio, 0.2, MARGIN))
+        scale *= float(np.clip(settings.margin / ratio, 0.2, settings.margin))
     return None

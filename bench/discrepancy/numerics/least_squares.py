@@ -17,26 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.discrepancy.numerics.threads import in_threads
+from bench.discrepancy.settings import DEFAULT, NumericsSettings
 
 Array = NDArray[np.float64]
-
-DIFFERENCES = 1e-4, 0.1
-"""Steps of the finite differences, in units of the prior standard deviation: the second where the first leads no further, since
-stick-slip makes the cost rough on a small scale. Friction on a joint was seen to end there with 5 % more cost than it has to."""
-FAITHFUL = 0.3
-"""Part of the predicted decrease that a step has to bring for the updated Jacobian to be kept."""
-PATIENCE = 3
-"""Steps after which a minimisation may be given up."""
-OPTIMISM = 4.0
-"""How many times the decrease that the linearisation promises may still come."""
-NOISE = 1.2
-"""Squared residuals, over their number, up to which a minimisation is carried to its end."""
-COARSE = 1e-3
-"""Part of what lies beyond that is not worth a step: a wrong model is no less wrong for it."""
-DAMPING = 1e-3
-"""Of the first step."""
-FRESH_TRIALS, STALE_TRIALS = 7, 2
-"""Dampings that are tried with a Jacobian taken at the point and with one carried along."""
 
 
 class Prior(NamedTuple):
@@ -78,11 +61,6 @@ class _State(NamedTuple):
     residual: Array
     cost: float
 
-    @property
-    def excess(self) -> float:
-        """Cost beyond that from which a minimisation is carried to its end."""
-        return self.cost - NOISE * len(self.residual)
-
 
 class _Task(NamedTuple):
     """What stays the same during a minimisation, see there; all arrays (n_free,)."""
@@ -96,6 +74,11 @@ class _Task(NamedTuple):
     reach: Array
     tolerance: float
     limit: float
+    settings: NumericsSettings
+
+    def excess(self, state: _State) -> float:
+        """Cost beyond that from which a minimisation is carried to its end."""
+        return state.cost - self.settings.noise_level * len(state.residual)
 
     def state(self, vector: Array) -> _State:
         residual = self.residual_at(vector)
@@ -122,6 +105,7 @@ def minimise(
     tolerance: float = 0.05,
     limit: float = np.inf,
     exact: bool = True,
+    settings: NumericsSettings = DEFAULT.numerics,
 ) -> Minimum:
     """Minimise squared residuals plus the misfit of a Gaussian prior.
 
@@ -135,9 +119,10 @@ def minimise(
         tolerance: Decrease of the cost that is not worth a step.
         limit: Cost that has to be within sight; the iteration ends where the linearisation promises much less.
         exact: Whether the curvature is taken anew at the end, where the residuals have come near the noise.
+        settings: `NumericsSettings` of the diagnosis.
     """
     own = Prior(prior.mean[free], prior.std[free], prior.low[free], prior.high[free])
-    task = _Task(residual_at, free, *own, reach, tolerance, limit)
+    task = _Task(residual_at, free, *own, reach, tolerance, limit, settings)
     state = min((task.state(vector.copy()) for vector in np.atleast_2d(start)), key=lambda at: at.cost)
     identity = np.eye(len(free))
     if not np.isfinite(state.cost):
@@ -145,17 +130,17 @@ def minimise(
     finely: Array | None = None
     coarse = ends = steps = 0
     while True:
-        found = _descend(task, state, DIFFERENCES[coarse], range(steps, iterations))
+        found = _descend(task, state, settings.differences[coarse], range(steps, iterations))
         state, steps = found.state, found.steps
         ends = int(found.ended) * (1 if found.progressed else 1 + ends)
-        if not found.ended or ends == len(DIFFERENCES) or not exact or state.excess > 0.0:
+        if not found.ended or ends == len(settings.differences) or not exact or task.excess(state) > 0.0:
             break
         finely, coarse = (None if coarse else found.jacobian), 1 - coarse
     jacobian = found.jacobian
     if coarse:  # columns of fine differences at the same place, where there are any
         jacobian = finely if found.ended and not found.progressed else None
-    if jacobian is None or (exact and not found.fresh and state.excess <= 0.0):
-        anew = _jacobian(task, state, DIFFERENCES[0])
+    if jacobian is None or (exact and not found.fresh and task.excess(state) <= 0.0):
+        anew = _jacobian(task, state, settings.differences[0])
         jacobian = jacobian if anew is None else anew
     curvature = None if jacobian is None else _squared(jacobian)
     return Minimum(
@@ -187,7 +172,7 @@ def _descend(task: _Task, state: _State, difference: float, steps: range) -> _De
     """Take Levenberg and Marquardt's steps, of the given numbers at most, with one size of differences."""
     jacobian: Array | None = None
     fresh = progressed = False
-    damping = DAMPING
+    damping = task.settings.damping
     for step in steps:
         if jacobian is None:
             jacobian, fresh = _jacobian(task, state, difference), True
@@ -203,13 +188,20 @@ def _descend(task: _Task, state: _State, difference: float, steps: range) -> _De
         normal, gradient = _without(task.blocked(state.vector, gradient), normal, gradient)
         # least squares: far off, columns of very unequal size leave a normal matrix singular to working precision
         promise = float(gradient @ np.linalg.lstsq(normal, gradient, rcond=None)[0])
-        trifle = max(task.tolerance, COARSE * state.excess)
+        trifle = max(task.tolerance, task.settings.coarse * task.excess(state))
         ended = fresh and promise < trifle
-        hopeless = step >= PATIENCE and state.cost - OPTIMISM * promise > task.limit
+        hopeless = (
+            step >= task.settings.patience and state.cost - task.settings.optimism * promise > task.limit
+        )
         if ended or hopeless:
             return _Descent(state, jacobian, fresh, ended, progressed, step + 1)
         moved, damping = _step(
-            task, state, normal, gradient, damping, FRESH_TRIALS if fresh else STALE_TRIALS
+            task,
+            state,
+            normal,
+            gradient,
+            damping,
+            task.settings.fresh_trials if fresh else task.settings.stale_trials,
         )
         if moved is None:
             if fresh:
@@ -224,7 +216,7 @@ def _descend(task: _Task, state: _State, difference: float, steps: range) -> _De
         if fresh and gained < trifle:
             return _Descent(state, jacobian, fresh, True, progressed, step + 1)
         progressed = progressed or gained >= trifle
-        if gained < max(FAITHFUL * predicted, trifle):
+        if gained < max(task.settings.faithful * predicted, trifle):
             jacobian = None
         else:
             jacobian, fresh = jacobian + np.outer(surprise, move / (move @ move)), False

@@ -12,15 +12,24 @@ import os
 import threading
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, TypeVar
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
-MOST = 4
-"""Threads of a diagnosis, at most: what the interpreter does between compiled parts lets more of them wait for each other."""
-THREADS = min(MOST, os.cpu_count() or 1)
+
+@dataclass(frozen=True)
+class ThreadsSettings:
+    """Numbers of `bench.discrepancy.numerics.threads`."""
+
+    most: int = 4
+    """Threads of a diagnosis, at most: what the interpreter does between compiled parts lets more of them wait for each other."""
+
+
+SETTINGS = ThreadsSettings()
+THREADS = min(SETTINGS.most, os.cpu_count() or 1)
 
 _changed = threading.Condition()
 _open: list[_Shared] = []

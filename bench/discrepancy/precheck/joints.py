@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.discrepancy.articulated.admission import admitted_robot
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.checks.data_quality import compare
 from bench.discrepancy.multibody.channels import bound
-from bench.discrepancy.multibody.model import ArticulatedModel
-from bench.discrepancy.multibody.records import encoders_of, input_of
+from bench.discrepancy.multibody.encoders import encoders_of, input_of
+from bench.discrepancy.multibody.model import ArticulatedModel, compiled_model
 from bench.errors import BenchError
 
 Array = NDArray[np.float64]
@@ -30,13 +30,20 @@ def joint_doubts(case: Case) -> list[str]:
 
     Raises nothing: what the diagnosis would refuse is one of them.
     """
-    try:
-        compiled = mujoco.MjModel.from_xml_path(str(Path(case.folder or ".") / case.rig))
-        model = ArticulatedModel.of(compiled)
-        own = bound(case, compiled)
-    except (BenchError, ValueError) as error:
-        return [" ".join(str(error).split())]
     found: list[str] = []
+    try:
+        try:
+            own, compiled, notes = admitted_robot(case, anyway=True)
+            found += notes
+        except (
+            BenchError
+        ) as error:  # the first thing that is refused; what else is doubtful is told all the same
+            found.append(str(error))
+            compiled = compiled_model(Path(case.folder or ".") / case.rig)
+            own = bound(case, compiled)
+        model = ArticulatedModel.of(compiled)
+    except BenchError as error:
+        return list(dict.fromkeys((*found, " ".join(str(error).split()))))
     for joint in model.joints:
         try:
             encoders = encoders_of(own, joint)

@@ -15,7 +15,7 @@ class CheckSettings:
         identifiable: Posterior over prior standard deviation of a nominal parameter up to which the records tell it.
         weak: The same up to which they tell something of it; above it the stated value stays what it was.
         certain: Chi-squared that an effect keeps once the nominal parameters have taken what they can, from which it can be named: five
-            sigmas, the evidence that the search itself asks for before it fits (`screening.candidates.WORTH_A_FIT`).
+            sigmas, the evidence that the search itself asks for before it fits (`worth_a_fit` of the screening).
         hint: The same from which it shows: three sigmas.
         reach: Prior standard deviations within which an effect has to reach the size that matters.
         records_seconds: Seconds of each record that the information is computed on, so that it takes seconds itself.

@@ -6,6 +6,7 @@ re-estimated, and how to put the effect into one's own MJCF.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -18,8 +19,17 @@ from bench.recording import Recording
 
 Array = NDArray[np.float64]
 MEASURED, NOMINAL, FINAL = "measured", "nominal model", "with what is named"
-SHOWN_JOINTS = 3
-"""Joints whose histories are drawn: those with most of the discrepancy."""
+
+
+@dataclass(frozen=True)
+class ArticulatedSettings:
+    """Numbers of `bench.discrepancy.report.articulated`."""
+
+    shown_joints: int = 3
+    """Joints whose histories are drawn: those with most of the discrepancy."""
+
+
+SETTINGS = ArticulatedSettings()
 
 
 def simulated_joints(diagnosis: ArticulatedDiagnosis) -> dict[str, Recording]:
@@ -94,7 +104,9 @@ def _how_far(out: Page, diagnosis: ArticulatedDiagnosis) -> None:
         ],
     )
     runs = simulated_joints(diagnosis)
-    worst = sorted(diagnosis.verdict.gaps, key=lambda g: -g.before / max(g.noise_floor, 1e-12))[:SHOWN_JOINTS]
+    worst = sorted(diagnosis.verdict.gaps, key=lambda g: -g.before / max(g.noise_floor, 1e-12))[
+        : SETTINGS.shown_joints
+    ]
     section.figure(
         time_histories(runs, [g.dof for g in worst]),
         "Judging record: measured, the nominal model, and the model with what is named; one joint free at a time.",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import matplotlib
@@ -20,10 +21,18 @@ from bench.recording import Recording
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-SHOWN = 12
-"""Most effects of a ranking."""
-LEAST = 1e-12
-"""Probability below which none is told apart from zero."""
+
+@dataclass(frozen=True)
+class FiguresSettings:
+    """Numbers of `bench.discrepancy.report.figures`."""
+
+    shown: int = 12
+    """Most effects of a ranking."""
+    least: float = 1e-12
+    """Probability below which none is told apart from zero."""
+
+
+SETTINGS = FiguresSettings()
 LABELS = {
     "band_hz": "frequency [Hz]",
     "time_s": "time [s]",
@@ -145,9 +154,9 @@ def _bars(axes: Axes, part: Split, units: tuple[str, str]) -> None:
 
 def ranking_bars(ranked: Sequence[Ranked]) -> Figure:
     """Probability that each effect belongs to the explanation, on a logarithmic axis."""
-    shown = list(ranked[:SHOWN])
+    shown = list(ranked[: SETTINGS.shown])
     names = [r.name.replace("_", " ") + (f" ({r.where})" if r.where else "") for r in shown]
-    values = np.array([max(r.probability, LEAST) for r in shown])
+    values = np.array([max(r.probability, SETTINGS.least) for r in shown])
     with style():
         figure, grid = axes_grid(7.5, 0.9 + 0.27 * len(shown))
         axes = grid[0, 0]
@@ -155,7 +164,7 @@ def ranking_bars(ranked: Sequence[Ranked]) -> Figure:
         texts = [_probability(r.probability) for r in shown]
         axes.bar_label(bars, texts, padding=3, fontsize=8)
         axes.set_xscale("log")
-        axes.set_xlim(max(values.min() * 0.3, LEAST), 4.0)
+        axes.set_xlim(max(values.min() * 0.3, SETTINGS.least), 4.0)
         axes.set_yticks(np.arange(len(shown)), names)
         axes.invert_yaxis()
         axes.set_xlabel("probability that it belongs to the explanation [1]")
@@ -167,7 +176,7 @@ def ranking_bars(ranked: Sequence[Ranked]) -> Figure:
 def _probability(p: float) -> str:
     if p >= 1e-3:
         return f"{p:.3g}"
-    return f"{p:.0e}" if p > LEAST else f"< {LEAST:.0e}"
+    return f"{p:.0e}" if p > SETTINGS.least else f"< {SETTINGS.least:.0e}"
 
 
 def correlation_map(labels: Sequence[str], correlation: np.ndarray) -> Figure:

@@ -11,6 +11,7 @@ References:
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,10 +21,18 @@ from scipy.stats import kendalltau
 from bench.errors import BenchError, ParameterError
 from bench.page import Page
 
-TREND = 0.05
-"""Probability below which an order is told as a trend, the customary level of a two-sided test."""
-FEWEST = 4
-"""Cases that a trend needs: of three, the rarest order has a probability of a third by chance."""
+
+@dataclass(frozen=True)
+class FleetSettings:
+    """Numbers of `bench.discrepancy.report.fleet`."""
+
+    trend: float = 0.05
+    """Probability below which an order is told as a trend, the customary level of a two-sided test."""
+    fewest: int = 4
+    """Cases that a trend needs: of three, the rarest order has a probability of a third by chance."""
+
+
+SETTINGS = FleetSettings()
 
 
 class Options(NamedTuple):
@@ -142,11 +151,11 @@ def trends(found: Sequence[dict[str, Any]]) -> list[Trend]:
                 series.setdefault(label, []).append((k, float(estimate["value"])))
     out = []
     for label, points in series.items():
-        if len(points) < FEWEST:
+        if len(points) < SETTINGS.fewest:
             continue
         order, values = zip(*points, strict=True)
         test: Any = kendalltau(order, values)
-        if float(test.pvalue) < TREND:
+        if float(test.pvalue) < SETTINGS.trend:
             out.append(Trend(label, tuple(values), float(test.statistic), float(test.pvalue)))
     return out
 
@@ -181,6 +190,6 @@ def fleet_page(found: Sequence[dict[str, Any]]) -> Page:
         )
     else:
         grows.text(
-            f"Nothing rises or falls with their order ({FEWEST} cases with the same effect are needed to tell)."
+            f"Nothing rises or falls with their order ({SETTINGS.fewest} cases with the same effect are needed to tell)."
         )
     return page

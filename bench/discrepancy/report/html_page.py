@@ -7,6 +7,7 @@ what to measure next, and how to put the effect into one's own model.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -29,10 +30,18 @@ from bench.recording import Recording
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-CYCLES_SHOWN = 12
-"""Cycles around the largest response that the overlays show."""
-WORTH_SHOWING = 0.02
-"""Share of the excess below which a channel's own bands and times are not drawn."""
+
+@dataclass(frozen=True)
+class HtmlPageSettings:
+    """Numbers of `bench.discrepancy.report.html_page`."""
+
+    cycles_shown: int = 12
+    """Cycles around the largest response that the overlays show."""
+    worth_showing: float = 0.02
+    """Share of the excess below which a channel's own bands and times are not drawn."""
+
+
+SETTINGS = HtmlPageSettings()
 
 
 def simulated(diagnosis: Diagnosis) -> dict[str, Recording]:
@@ -111,7 +120,7 @@ def _window(diagnosis: Diagnosis, reference: Recording) -> tuple[float, float]:
     y = reference[channels[0]] - np.mean(reference[channels[0]])
     crossings = max(int(np.count_nonzero(np.diff(np.signbit(y)))), 1)
     first, last = float(reference.time[0]), float(reference.time[-1])
-    width = min((last - first) * 2.0 * CYCLES_SHOWN / crossings, last - first)
+    width = min((last - first) * 2.0 * SETTINGS.cycles_shown / crossings, last - first)
     middle = float(reference.time[int(np.argmax(np.abs(y)))])
     start = float(np.clip(middle - 0.5 * width, first, last - width))
     return start, start + width
@@ -122,12 +131,19 @@ def _gap_section(out: Page, diagnosis: Diagnosis, runs: Mapping[str, Recording])
 
     section = out.section("How far the gap shrinks")
     for gap in diagnosis.verdict.gaps:
+        closed = closed_words(gap, settings=diagnosis.problem.settings.judgement)
         section.table(
-            f"{gap.metric}{' (' + gap.dof + ')' if gap.dof else ''}; closed, with its 95 % interval: {closed_words(gap)}",
+            f"{gap.metric}{' (' + gap.dof + ')' if gap.dof else ''}; closed, with its 95 % interval: {closed}",
             ("stage", "NRMSE", "closed"),
             [
                 *(
-                    (label, f"{value:.4f}", "" if i == 0 else closed_words(gap, value))
+                    (
+                        label,
+                        f"{value:.4f}",
+                        ""
+                        if i == 0
+                        else closed_words(gap, value, settings=diagnosis.problem.settings.judgement),
+                    )
                     for i, (label, value) in enumerate(gap.steps)
                 ),
                 ("noise floor", f"{gap.noise_floor:.4f}", ""),
@@ -187,7 +203,7 @@ def _location_section(out: Page, diagnosis: Diagnosis, runs: Mapping[str, Record
                 f"{actor} acts at {_limits(region, found.place.position_unit)}: {region['force']:+.3g} "
                 f"{found.place.force_unit} on average, {100 * region['share']:.0f} % of its square."
             )
-    main = {location.channel for location in verdict.locations if location.share > WORTH_SHOWING}
+    main = {location.channel for location in verdict.locations if location.share > SETTINGS.worth_showing}
     residual = [s for s in verdict.splits if s.kind in {"band_hz", "time_s"} and s.of in main]
     if residual:
         from bench.discrepancy.report.figures import shares  # noqa: PLC0415  (matplotlib)

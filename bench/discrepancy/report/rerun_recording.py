@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,10 +22,18 @@ if TYPE_CHECKING:
     from bench.discrepancy.diagnosis import Diagnosis
     from bench.rerun_log import Band
 
-CLEAR = 3.0
-"""RMS error over half a cycle, in units of the noise, above which a simulation is said to miss the measurement."""
-SMALLEST_GAP = 0.02
-"""The same as a part of the channel's standard deviation: a gap below it nobody would see."""
+
+@dataclass(frozen=True)
+class RerunRecordingSettings:
+    """Numbers of `bench.discrepancy.report.rerun_recording`."""
+
+    clear: float = 3.0
+    """RMS error over half a cycle, in units of the noise, above which a simulation is said to miss the measurement."""
+    smallest_gap: float = 0.02
+    """The same as a part of the channel's standard deviation: a gap below it nobody would see."""
+
+
+SETTINGS = RerunRecordingSettings()
 
 
 def write_rerun(diagnosis: Diagnosis | ArticulatedDiagnosis, path: str | Path) -> None:
@@ -65,7 +74,7 @@ def _gap_bands(diagnosis: Diagnosis, runs) -> list[Band]:
         for name, _ in names:
             y = measured[name]
             noise = float(problem.noise[problem.structure.channels.index(name)])
-            limit = max(CLEAR * noise, SMALLEST_GAP * float(np.std(y)))
+            limit = max(SETTINGS.clear * noise, SETTINGS.smallest_gap * float(np.std(y)))
             out.append(Band(f"gap_in_{name}", GAP, (name,), _misses(y, limit), others))
     return out
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from bench.discrepancy.case.acquisition import upsampled
 from bench.discrepancy.case.case import CaseRecord
-from bench.discrepancy.simulation.step_size import MAX_SUBSTEPS
+from bench.discrepancy.settings import ResponseSettings
 from bench.discrepancy.simulation.stick_slip import LinearStructure
 
 if TYPE_CHECKING:
@@ -23,31 +23,23 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-CORNERS = 8
-"""Rows a sample of a load that is delayed: between samples of straight lines lie corners, and those move with the delay."""
-FORGOTTEN = 14.0
-"""Time constants of the slowest decay after which a start is forgotten: one part in a million."""
-MAX_PERIODS = 20
-"""Most periods of run-in."""
-INTEGRATION = 0.02
-"""Error of the integration that is left, as a part of the noise: a fit to 10 000 samples sees a hundredth of the noise."""
-EXACT = 1e-4
-"""Relative error of the integration below which no record asks for more: a tenth of what the best of models leave."""
 
-
-def run_in(linear: LinearStructure, length: int, step: float) -> int:
+def run_in(linear: LinearStructure, length: int, step: float, *, settings: ResponseSettings) -> int:
     """Samples of run-in from rest, in whole periods, after which a linear structure is in its steady state.
 
     Args:
         linear: The structure.
         length: Samples of a period, or of several.
         step: Time between samples [s].
+        settings: `ResponseSettings` of the diagnosis.
     """
     n_dof = len(linear.mass)
     lower = -np.linalg.solve(linear.mass, np.hstack([linear.stiffness, linear.damping]))
     companion = np.vstack([np.hstack([np.zeros((n_dof, n_dof)), np.eye(n_dof)]), lower])
     decay = max(-float(np.linalg.eigvals(companion).real.max()), 1e-12)
-    return length * int(np.clip(np.ceil(FORGOTTEN / (decay * step * length)), 1, MAX_PERIODS))
+    return length * int(
+        np.clip(np.ceil(settings.forgotten / (decay * step * length)), 1, settings.max_periods)
+    )
 
 
 def driving_loads(
@@ -61,6 +53,7 @@ def driving_loads(
         record: Record whose loads they are.
         substeps: Integration steps a sample; band-limited loads are given at the start, middle and end of each.
     """
+    settings = problem.settings.response
     acting = [
         (placed, placed.effect.signal, eta)
         for placed, eta in sorted(
@@ -81,7 +74,7 @@ def driving_loads(
         j = problem.structure.loads.index(placed.target)
         values = placed.effect.values(eta, problem.scales_of(placed))
         if placed.effect.between_samples and interpolation == "linear" and rows == 1:
-            loads, rows = upsampled(loads, CORNERS), CORNERS
+            loads, rows = upsampled(loads, settings.corners), settings.corners
         loads[:, j] = signal(loads[:, j], values, record.step / max(rows, 1))
     driving = (loads, rows)
     if interpolation == "band_limited":
@@ -110,14 +103,17 @@ def fewest_steps(problem: Problem) -> int:
     Args:
         problem: Records and nominal model, whose response to the first record is tried.
     """
+    settings = problem.settings
     if problem.case.load_interpolation == "linear" or problem.driven:
         return 1
     zero, steps = np.zeros(len(problem.nominal)), 1
     coarse = replace(problem, substeps=steps).simulate((), zero, problem.records[0])
-    while steps < MAX_SUBSTEPS:
+    while steps < settings.simulation.max_substeps:
         fine = replace(problem, substeps=2 * steps).simulate((), zero, problem.records[0])
         error = np.sqrt(np.mean((fine - coarse) ** 2, axis=0))
-        enough = np.maximum(INTEGRATION * problem.noise, EXACT * np.std(fine, axis=0))
+        enough = np.maximum(
+            settings.response.integration * problem.noise, settings.response.exact * np.std(fine, axis=0)
+        )
         if not np.isfinite(error).all() or np.all(error < enough):
             break
         steps, coarse = 2 * steps, fine

@@ -10,27 +10,20 @@ from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.screening.linear_amplitudes import Point
 from bench.discrepancy.screening.screen import Ground, Screen
-from bench.discrepancy.search.fits import SAME, consistent, near, sticks
-
-WORTH_A_FIT = 25.0
-"""Screened gain in chi-squared from which one more effect could overcome its prior and its Occam factor."""
-SHORT = 0.15
-"""Effects whose screened gain is less than this part of the best one are not fitted."""
-TRUSTED = 0.5
-"""The same part where one more effect is screened about a free run that follows the motion: gains are what they seem then."""
-REFINED_EFFECTS = 12
-"""Effects whose grid points are refined along the measured motion."""
-REFINED_STARTS = 3
-"""Grid points refined of each."""
-APART = 0.8
-"""Distance of starts of an effect, in prior standard deviations of its grid parameters."""
-NEARLY = 0.9
-"""Further starts of an effect are worth a fit if they gain this part of what its best one does."""
+from bench.discrepancy.search.fits import (
+    consistent,
+    near,
+    sticks,
+)
+from bench.discrepancy.settings import DiagnosisSettings
 
 
 def _at_ease(fitted: Fit, problem: Problem) -> bool:
     """Whether a hypothesis explains the records without nominal parameters far off their values."""
-    return consistent(fitted) and fitted.cost - fitted.chi2 < len(problem.nominal) + WORTH_A_FIT / 2
+    return (
+        consistent(fitted)
+        and fitted.cost - fitted.chi2 < len(problem.nominal) + fitted.settings.screening.worth_a_fit / 2
+    )
 
 
 def followed(base: Fit, problem: Problem) -> bool:
@@ -68,14 +61,17 @@ def refined(screen: Screen, ground: Ground, points: Sequence[Point]) -> list[Poi
         ground: What the base leaves.
         points: Solved grid points by decreasing gain.
     """
+    settings = screen.problem.settings.screening
     chosen: dict[tuple[str, str, str], list[Point]] = {}
     for point in points:
-        if point.gain < 0.5 * SHORT * points[0].gain:
+        if point.gain < 0.5 * settings.short * points[0].gain:
             break
-        if point.placed.key not in chosen and len(chosen) == REFINED_EFFECTS:
+        if point.placed.key not in chosen and len(chosen) == settings.refined_effects:
             continue
         starts = chosen.setdefault(point.placed.key, [])
-        if len(starts) < REFINED_STARTS and all(_apart(point, other) > APART for other in starts):
+        if len(starts) < settings.refined_starts and all(
+            _apart(point, other) > settings.apart for other in starts
+        ):
             starts.append(point)
     tasks = [point for starts in chosen.values() for point in starts]
     return sorted(in_threads(lambda point: screen.refine(point, ground), tasks), key=lambda p: -p.gain)
@@ -93,7 +89,9 @@ def _apart(point: Point, other: Point) -> float:
     )
 
 
-def leading(points: Sequence[Point], count: int, least: float, starts: int = 2) -> list[Point]:
+def leading(
+    points: Sequence[Point], count: int, least: float, starts: int = 2, *, settings: DiagnosisSettings
+) -> list[Point]:
     """Starts of the `count` effects of largest gain: the best of each, and further ones that are nearly as good."""
     grouped: dict[tuple[str, str, str], list[Point]] = {}
     for point in points:
@@ -104,21 +102,23 @@ def leading(points: Sequence[Point], count: int, least: float, starts: int = 2) 
         own = grouped.setdefault(point.placed.key, [])
         if not own or (
             len(own) < starts
-            and point.gain > NEARLY * own[0].gain
-            and all(_apart(point, other) > SAME for other in own)
+            and point.gain > settings.screening.nearly * own[0].gain
+            and all(_apart(point, other) > settings.search.same for other in own)
         ):
             own.append(point)
     return [point for own in grouped.values() for point in own]
 
 
-def passed_over(solved: Sequence[Point], chosen: Sequence[Point], count: int, least: float) -> list[Point]:
+def passed_over(
+    solved: Sequence[Point], chosen: Sequence[Point], count: int, least: float, *, settings: DiagnosisSettings
+) -> list[Point]:
     """Starts of forces with nothing but their size to be found that are not among the chosen ones.
 
     They are cheap to fit, and never to be lost to a law of seven parameters because their gain along a badly known motion was small.
     """
     begun = {point.placed.key for point in chosen}
     simplest = [p for p in solved if _plain(p.placed.effect) and p.placed.key not in begun]
-    return leading(simplest, count, least, starts=1)
+    return leading(simplest, count, least, starts=1, settings=settings)
 
 
 def _plain(effect: Effect) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -9,15 +10,21 @@ from numpy.typing import NDArray
 
 from bench.discrepancy.likelihood.problem import Array
 from bench.discrepancy.model.placement import Placed
+from bench.discrepancy.settings import ScreeningSettings
 
-SIGNAL_STEP = 0.1
-"""Value of eta at which a signed channel effect without grid is tried."""
 TINY = -60.0
 """Value of eta that makes a positive amplitude vanish."""
-IMITATED = 1e-10
-"""Part of an effect's squared response that rounding leaves of one that the base imitates altogether."""
-ROWS = 8192
-"""Rows of two matrices that are multiplied at once."""
+
+
+@dataclass(frozen=True)
+class LinearAmplitudesSettings:
+    """Numbers of `bench.discrepancy.screening.linear_amplitudes`."""
+
+    rows: int = 8192
+    """Rows of two matrices that are multiplied at once."""
+
+
+LINEAR_AMPLITUDES_SETTINGS = LinearAmplitudesSettings()
 
 
 class Node(NamedTuple):
@@ -85,8 +92,10 @@ def spanning(placed: Placed, eta: Array) -> list[Array]:
 def products(a: NDArray[np.floating], b: NDArray[np.floating]) -> Array:
     """Products (k, m) of the columns of two matrices (n, k) and (n, m), summed in double precision without a copy of either."""
     total = np.zeros((a.shape[1], b.shape[1]))
-    for first in range(0, len(a), ROWS):
-        x, y = (m[first : first + ROWS].astype(np.float64, copy=False) for m in (a, b))
+    for first in range(0, len(a), LINEAR_AMPLITUDES_SETTINGS.rows):
+        x, y = (
+            m[first : first + LINEAR_AMPLITUDES_SETTINGS.rows].astype(np.float64, copy=False) for m in (a, b)
+        )
         total += x.T @ y
     return total
 
@@ -99,13 +108,13 @@ def fainter(placed: Placed, eta: Array, share: float) -> Array:
     return out
 
 
-def read(node: Node, gram: Array, right: Array) -> Point | None:  # noqa: PLR0912  (one branch a kind of effect)
+def read(node: Node, gram: Array, right: Array, *, settings: ScreeningSettings) -> Point | None:  # noqa: PLR0912  (one branch a kind of effect)
     """Best coefficients of a node, and the parameters they stand for; None where their sign makes no sense."""
     effect = node.placed.effect
     parameters = effect.parameters
     eta = node.eta.copy()
     # what is left of a memory beside stiffness and damping is small, but it is all that tells it
-    if gram.trace() <= IMITATED * max(node.gram.trace(), 1e-300):
+    if gram.trace() <= settings.imitated * max(node.gram.trace(), 1e-300):
         return None
     # beside a base whose own run diverges when it is moved
     if not (np.isfinite(gram).all() and np.isfinite(right).all()):
@@ -117,7 +126,7 @@ def read(node: Node, gram: Array, right: Array) -> Point | None:  # noqa: PLR091
             if 2.0 * right[0] <= gram[0, 0]:
                 return None
         elif parameters[0].signed:
-            eta[0] = np.clip(SIGNAL_STEP * c[0], *parameters[0].bounds)
+            eta[0] = np.clip(settings.signal_step * c[0], *parameters[0].bounds)
         elif c[0] <= 0:
             return None
     elif effect.modulated:

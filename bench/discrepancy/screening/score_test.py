@@ -31,28 +31,10 @@ from bench.discrepancy.model.structure import Place
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.response.driving_loads import with_load_noise
 from bench.discrepancy.screening.screen import Ground, Screen
+from bench.discrepancy.settings import DEFAULT, ScreeningSettings
 
-KNOTS = 12
-"""Knots of a free force of one coordinate; between them it is straight."""
 PRODUCTS = ((1, 1), (2, 1), (1, 2))
 """Powers of displacement and velocity that a sum of two forces of one coordinate lacks."""
-NEGLIGIBLE = 1e-3
-"""Part of a model's columns that has to be its own: less is nothing but the base's inaccuracy."""
-FAINT, SCATTER = 4e-3, 1.25
-"""Part of its own below which a model finds more than noise in clean records, and by how much its coefficients scatter there: on the 81
-clean sealed cases of seeds 20261205 and 20261206 by 1.25 times the noise, and above it by 1.0."""
-
-SIGNIFICANCE, SEVERAL = 1e-3, 1e-2
-"""Probability with which noise alone may call an explanation lacking: of one effect, and of several. What several laws together
-imitate is as often one law that no catalogue holds, so it takes less to doubt them."""
-INACCURACY = 0.0005
-"""Part of chi-squared that is laid to the smoothing and integration of the diagnosis itself."""
-EXACTNESS = 1e-4
-"""Part of the chi-squared an explanation takes away that its laws may leave: a hundredth of the missing force."""
-DRAWS = 16
-"""Draws of the noise that are sent through an explanation in doubt: what they gain is known to some 10 % then."""
-IMITATING, STRICTNESS = 3, 1e-5
-"""Number of effects that together imitate nearly any force, and how exactly these have to: what they leave of it is small."""
 
 
 class LackOfFit(NamedTuple):
@@ -65,6 +47,7 @@ class LackOfFit(NamedTuple):
         expected: What noise alone would gain on average: a unit for every coefficient, or more behind nonlinear laws.
         p_value: Probability of such a gain from noise alone, after correction for the number of models tried.
         n_residuals: Number of residuals.
+        settings: When it is significant.
     """
 
     model: str
@@ -73,6 +56,7 @@ class LackOfFit(NamedTuple):
     expected: float
     p_value: float
     n_residuals: int
+    settings: ScreeningSettings = DEFAULT.screening
 
     def significant(self, explained: float, *, effects: int = 1) -> bool:
         """Whether something is left that is neither noise nor inaccuracy, of the diagnosis itself or of the laws it named.
@@ -81,9 +65,9 @@ class LackOfFit(NamedTuple):
             explained: Chi-squared that the explanation takes away.
             effects: Number of effects that the explanation holds.
         """
-        exactness = EXACTNESS if effects < IMITATING else STRICTNESS
-        inexact = max(INACCURACY * self.n_residuals, exactness * explained)
-        limit = SIGNIFICANCE if effects <= 1 else SEVERAL
+        exactness = self.settings.exactness if effects < self.settings.imitating else self.settings.strictness
+        inexact = max(self.settings.inaccuracy * self.n_residuals, exactness * explained)
+        limit = self.settings.significance if effects <= 1 else self.settings.significance_of_several
         return self.p_value < limit and self.gain - self.expected > inexact
 
 
@@ -98,6 +82,7 @@ def lack_of_fit(problem: Problem, fitted: Fit) -> LackOfFit:
     ground = screen.ground(fitted, simulated=True)
     free = _free(screen, ground)
     seen = free.columns.T @ ground.left[: len(ground.residual)]
+    own = problem.settings.screening
 
     def telling(expected: Mapping[str, float]) -> LackOfFit:
         tests = []
@@ -106,12 +91,14 @@ def lack_of_fit(problem: Problem, fitted: Fit) -> LackOfFit:
             if freedom == 0:
                 continue
             p_value = len(free.bases) * float(chi2.sf(gain * freedom / mean, freedom))
-            tests.append(LackOfFit(model, gain, freedom, mean, min(p_value, 1.0), len(ground.residual)))
-        nothing = LackOfFit("any", 0.0, 0, 0.0, 1.0, len(ground.residual))
+            tests.append(LackOfFit(model, gain, freedom, mean, min(p_value, 1.0), len(ground.residual), own))
+        nothing = LackOfFit("any", 0.0, 0, 0.0, 1.0, len(ground.residual), own)
         return min(tests, key=lambda test: (test.p_value, -test.gain), default=nothing)
 
     found = telling({model: free.freedom(model) for model in free.bases})
-    if found.p_value < SEVERAL and np.any(problem.load_noise > 0.0):
+    if found.p_value < problem.settings.screening.significance_of_several and np.any(
+        problem.load_noise > 0.0
+    ):
         found = telling(_expected(problem, fitted, free))
     return found
 
@@ -139,6 +126,7 @@ class _Free(NamedTuple):
 
 def _free(screen: Screen, ground: Ground) -> _Free:
     """Free models at all places of one coordinate, and all of them at once, beside what an explanation leaves."""
+    settings = screen.problem.settings.screening
     models: list[str] = []
     parts: list[Array] = []
     for place in (p for p in screen.problem.structure.places if len(p.rows) == 1):
@@ -153,8 +141,8 @@ def _free(screen: Screen, ground: Ground) -> _Free:
     for model in (*dict.fromkeys(models), "any"):
         own = np.flatnonzero([model in (m, "any") for m in models])
         squares, vectors = np.linalg.eigh(products[np.ix_(own, own)])
-        kept = squares > NEGLIGIBLE**2 * len(own)
-        scatter = np.where(squares[kept] < FAINT**2 * len(own), SCATTER, 1.0)
+        kept = squares > settings.own**2 * len(own)
+        scatter = np.where(squares[kept] < settings.faint**2 * len(own), settings.scatter, 1.0)
         bases[model] = own, vectors[:, kept] / np.sqrt(squares[kept]) / scatter
     return _Free(columns, bases)
 
@@ -171,7 +159,7 @@ def _expected(problem: Problem, fitted: Fit, free: _Free) -> dict[str, float]:
         (problem.simulate(fitted.hypothesis, fitted.vector, r), problem.simulate((), fitted.vector[:n], r))
         for r in problem.records
     ]
-    for _ in range(DRAWS):
+    for _ in range(problem.settings.screening.draws):
         drawn = problem.forgetful()
         passed: tuple[list[Array], list[Array]] = [], []
         for data, runs in zip(problem.data, clean, strict=True):
@@ -203,7 +191,12 @@ def free_responses(screen: Screen, place: Place) -> dict[str, Array]:
     position = max(float(np.abs(m.position @ row).max()) for m in motions) or 1.0
     velocity = max(float(np.abs(m.velocity @ row).max()) for m in motions) or 1.0
     forces = [
-        _free_forces(m.position @ row / position, m.velocity @ row / velocity, r.step * velocity / position)
+        _free_forces(
+            m.position @ row / position,
+            m.velocity @ row / velocity,
+            r.step * velocity / position,
+            settings=screen.problem.settings.screening,
+        )
         for m, r in zip(motions, problem.records, strict=True)
     ]
 
@@ -221,16 +214,16 @@ def free_responses(screen: Screen, place: Place) -> dict[str, Array]:
     return {model: responses(model) for model in forces[0]}
 
 
-def _free_forces(q: Array, v: Array, step: float) -> dict[str, Array]:
+def _free_forces(q: Array, v: Array, step: float, *, settings: ScreeningSettings) -> dict[str, Array]:
     """Forces (n, k) of unit coefficients of each free model along a motion scaled to one, time in radians of it."""
-    knots = np.linspace(-1.0, 1.0, KNOTS)
+    knots = np.linspace(-1.0, 1.0, settings.knots)
     memories = []
     for time in MEMORY:
         fade = np.exp(-step / time)
         memories.append(lfilter([1.0 - fade], [1.0, -fade], v))
     return {
-        "displacement": np.column_stack([np.interp(q, knots, unit) for unit in np.eye(KNOTS)]),
-        "velocity": np.column_stack([np.interp(v, knots, unit) for unit in np.eye(KNOTS)]),
+        "displacement": np.column_stack([np.interp(q, knots, unit) for unit in np.eye(settings.knots)]),
+        "velocity": np.column_stack([np.interp(v, knots, unit) for unit in np.eye(settings.knots)]),
         "product": np.column_stack([q**a * v**b for a, b in PRODUCTS]),
         "memory": np.column_stack(memories),
     }

@@ -29,24 +29,17 @@ from bench.discrepancy.model.nominal_elements import own_change, own_force, own_
 from bench.discrepancy.model.placement import Hypothesis, Placed
 from bench.discrepancy.numerics.least_squares import Prior, minimise
 from bench.discrepancy.numerics.threads import in_threads
-from bench.discrepancy.screening.linear_amplitudes import SIGNAL_STEP, Node, Point, products, read, spanning
+from bench.discrepancy.screening.linear_amplitudes import (
+    Node,
+    Point,
+    products,
+    read,
+    spanning,
+)
 from bench.discrepancy.simulation.linear_response import linear_run
 from bench.discrepancy.simulation.prescribed_response import driven_force
 from bench.discrepancy.simulation.step_size import steps
 from bench.discrepancy.simulation.stick_slip import Elements, LinearStructure
-
-REFINED = 1e-3
-"""Part of chi-squared that is not worth a step of a refinement."""
-REFINING_REACH = 1.5
-"""Longest step of a refinement, in prior standard deviations."""
-LARGEST = 1e15
-"""Whitened response beyond which a grid point counts as diverged."""
-SMALL_CHANGE = 1e-3
-"""Change of the channels, over their peak, whose effect behind a sensor is taken."""
-SHAPE_STEP = 0.02
-"""Finite difference in the shape parameters of a base effect, in units of their prior standard deviation."""
-RUN_STEP = 1e-3
-"""The same in all parameters where free runs are compared, which are smoother than the measured motion."""
 
 
 class Ground(NamedTuple):
@@ -179,7 +172,9 @@ class Screen:
         # a unit of an effect may be many times the motion: a sensor that clips would clip all of it
         peaks, changes = np.abs(free).max(axis=0), np.abs(channels).max(axis=0)
         moved = changes > 0.0
-        small = SMALL_CHANGE * np.min(peaks[moved] / changes[moved], initial=np.inf)
+        small = self.problem.settings.screening.small_change * np.min(
+            peaks[moved] / changes[moved], initial=np.inf
+        )
         if not np.isfinite(small) or small == 0.0:
             return channels
         with_change = self.problem.sensed(placed, etas, free + small * channels, step)
@@ -261,7 +256,7 @@ class Screen:
         in_threads(write, range(len(further)))
         # a hidden resonance can make more of a record than rounding leaves of anything else
         largest = max(columns.max(), -columns.min())
-        if not 0.0 < largest < LARGEST:
+        if not 0.0 < largest < self.problem.settings.screening.largest:
             return None
         return Node(placed, eta, columns, products(columns, columns))
 
@@ -322,7 +317,12 @@ class Screen:
 
         def solved(node: Node) -> Point | None:
             inner = products(ground.head, node.columns)
-            return read(node, node.gram - inner.T @ inner, products(node.columns, rest[:, None])[:, 0])
+            return read(
+                node,
+                node.gram - inner.T @ inner,
+                products(node.columns, rest[:, None])[:, 0],
+                settings=self.problem.settings.screening,
+            )
 
         points = [point for point in in_threads(solved, nodes) if point is not None]
         return sorted(points, key=lambda point: -point.gain)
@@ -346,6 +346,7 @@ class Screen:
 
         Costs no free run of the nonlinear model: a handful of forces along the measured motion and linear responses.
         """
+        settings = self.problem.settings.screening
         effect = point.placed.effect
         if effect.site != "joint" or not any(p.grid and not p.fixed for p in effect.parameters):
             return point
@@ -359,10 +360,11 @@ class Screen:
             point.eta,
             prior=prior,
             free=free,
-            reach=np.full(len(free), REFINING_REACH),
+            reach=np.full(len(free), settings.refining_reach),
             iterations=iterations,
-            tolerance=max(1.0, REFINED * float(alone @ alone)),
+            tolerance=max(1.0, settings.refined * float(alone @ alone)),
             exact=False,
+            settings=self.problem.settings.numerics,
         )
         if not np.isfinite(found.cost):
             return point
@@ -395,7 +397,7 @@ class Screen:
         points = np.repeat(eta[None], 1 + len(free), axis=0)
         for point, k in zip(points[1:], free, strict=True):
             parameter = placed.effect.parameters[k]
-            step = SHAPE_STEP * parameter.std
+            step = self.problem.settings.screening.shape_step * parameter.std
             point[k] += step if point[k] + step <= parameter.bounds[1] else -step
         response, *moved = in_threads(lambda point: self.effect_response(placed, point), points)
         changes = [(m - response) / (p[k] - eta[k]) for m, p, k in zip(moved, points[1:], free, strict=True)]
@@ -408,7 +410,14 @@ class Screen:
         held = [False] * len(self.problem.nominal) + shapes
         return np.column_stack(
             in_threads(
-                lambda i: self._simulated_column(hypothesis, vector, residual, i, RUN_STEP * std[i], high[i]),
+                lambda i: self._simulated_column(
+                    hypothesis,
+                    vector,
+                    residual,
+                    i,
+                    self.problem.settings.screening.run_step * std[i],
+                    high[i],
+                ),
                 np.flatnonzero(~np.array(held)).tolist(),
             )
         )
@@ -436,7 +445,7 @@ class Screen:
             placed, eta = task
             point = eta.copy()
             if placed.effect.parameters[0].signed:
-                point[0] = SIGNAL_STEP
+                point[0] = self.problem.settings.screening.signal_step
             changed = self.problem.residual((*hypothesis, placed), np.concatenate([vector, point]))
             if changed.shape != base.shape or not np.any(changed != base):
                 return None
@@ -484,7 +493,7 @@ def force_along(problem: Problem, placed: Placed, eta: Array, index: int) -> Arr
         position=motion.position @ rows.T,
         velocity=motion.velocity @ rows.T,
         step=record.step,
-        substeps=steps(record.step * rates),
+        substeps=steps(record.step * rates, settings=problem.settings.simulation),
         start_time=record.start,
     )
     if placed.effect.in_place:

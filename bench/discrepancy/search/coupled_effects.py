@@ -11,8 +11,6 @@ from bench.discrepancy.fitting.map_fit import Fit
 from bench.discrepancy.model.placements import placements
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.screening.candidates import (
-    TRUSTED,
-    WORTH_A_FIT,
     about,
     followed,
     leading,
@@ -21,25 +19,15 @@ from bench.discrepancy.screening.candidates import (
 )
 from bench.discrepancy.screening.linear_amplitudes import Point, fainter
 from bench.discrepancy.screening.screen import Ground, Screen
-from bench.discrepancy.search.fits import IMMATERIAL, Search, converge, names
-from bench.discrepancy.search.forward_selection import STALLED, first_fit
+from bench.discrepancy.search.fits import (
+    Search,
+    converge,
+    names,
+)
+from bench.discrepancy.search.forward_selection import (
+    first_fit,
+)
 from bench.discrepancy.search.rivals import reduce_best
-
-HOPELESS_COUPLING = 50.0
-"""Reduced chi-squared of a coupling effect alone above which only a second coupling is added to it."""
-HOPELESS_THIRD = 5.0
-"""Reduced chi-squared of a pair that a coupling effect belongs to above which no third effect is added: it would repair little."""
-HOPELESS_PAIR = 8.0
-"""Reduced chi-squared that the screening beside a coupling effect must promise to go below: pairs that explain promise 1 to 2.
-Of couplings, which are few, less is asked: that they take away a good part (`STALLED`), since a fit without the other coupling may
-have ended far from the motion."""
-CONVERGED_PAIRS, CONVERGED_BEYOND = 4, 2
-"""Pairs that hold a coupling effect, and larger hypotheses, that are carried on to convergence."""
-TRIALS = 4
-"""Effects that are fitted beside a coupling, but for plain forces that the screening passes over."""
-
-FAINT = (0.3, 0.1)
-"""Parts of the promised size from which an effect is begun as well: friction that sticks at once takes the motion from a coupling."""
 
 Keys = Collection[tuple[str, str, str]]
 
@@ -90,15 +78,16 @@ def _alone(kept: Search, screen: Screen, coupling: Keys) -> None:
 
 def _one_more(kept: Search, screen: Screen, coupling: Keys, progress: Callable[[str], None]) -> bool:
     """Fit one more effect beside the best hypothesis; whether that has brought it far enough for another."""
+    settings = kept.problem.settings
     base = kept.ranked()[0]
-    if len(base.hypothesis) > 1 and base.reduced > HOPELESS_THIRD:
+    if len(base.hypothesis) > 1 and base.reduced > settings.search.coupled.hopeless_third:
         return False
     if not any(placed.key in coupling for placed in base.hypothesis):
         return False  # the groups' own searches know more of such
     progress(f"{names(base.hypothesis)}, chi-squared {base.reduced:.3g}")
     along, local, ground = _ground(screen, base)
     solved = local.ranked(base, ground)
-    if base.reduced > HOPELESS_COUPLING:
+    if base.reduced > settings.search.coupled.hopeless_coupling:
         solved = [p for p in solved if p.placed.key in coupling]
     points = refined(local, ground, solved) + local.inertia_points(base, ground)
     worth = _worth(sorted(points, key=lambda p: -p.gain), base, ground, coupling)
@@ -108,19 +97,25 @@ def _one_more(kept: Search, screen: Screen, coupling: Keys, progress: Callable[[
     def extended(point: Point) -> Fit:
         starts = local.starts(point, ground, base)
         if point.placed.effect.site == "joint":
-            faint = [fainter(point.placed, point.eta, share) for share in FAINT]
+            faint = [fainter(point.placed, point.eta, share) for share in settings.search.coupled.faint]
             starts = np.vstack([starts, *(np.append(base.vector, eta) for eta in faint)])
         return first_fit(kept.problem, (*base.hypothesis, point.placed), starts)
 
-    least = TRUSTED * worth[0].gain if along else WORTH_A_FIT
-    chosen = leading(worth, TRIALS, least, starts=1)
-    chosen += passed_over(solved, chosen, TRIALS, least)
+    least = settings.screening.trusted * worth[0].gain if along else settings.screening.worth_a_fit
+    chosen = leading(worth, settings.search.coupled.trials, least, starts=1, settings=kept.problem.settings)
+    chosen += passed_over(
+        solved, chosen, settings.search.coupled.trials, least, settings=kept.problem.settings
+    )
     trials = sorted(in_threads(extended, chosen), key=lambda f: f.cost)
-    some = trials[: CONVERGED_PAIRS if len(base.hypothesis) == 1 else CONVERGED_BEYOND]
+    some = trials[
+        : settings.search.coupled.converged_pairs
+        if len(base.hypothesis) == 1
+        else settings.search.coupled.converged_beyond
+    ]
     converge(kept, [(f.hypothesis, f.vector) for f in some])
     reduce_best(kept)
     best = kept.ranked()[0]
-    return best is not base and best.reduced - 1.0 <= STALLED * (base.reduced - 1.0)
+    return best is not base and best.reduced - 1.0 <= settings.search.stalled * (base.reduced - 1.0)
 
 
 def _ground(screen: Screen, base: Fit) -> tuple[bool, Screen, Ground]:
@@ -139,8 +134,18 @@ def _ground(screen: Screen, base: Fit) -> tuple[bool, Screen, Ground]:
 
 def _worth(points: Sequence[Point], base: Fit, ground: Ground, coupling: Keys) -> list[Point]:
     """Points that are worth a fit beside a base; only couplings where none promises to explain the records."""
-    worth = [p for p in points if p.gain > max(WORTH_A_FIT, IMMATERIAL * base.n_residuals)]
+    settings = base.settings
+    worth = [
+        p
+        for p in points
+        if p.gain > max(settings.screening.worth_a_fit, settings.search.immaterial * base.n_residuals)
+    ]
     alone = float(np.sum(ground.left**2))
-    if alone - max((p.gain for p in worth), default=0.0) > HOPELESS_PAIR * base.n_residuals:
-        worth = [p for p in worth if p.placed.key in coupling and alone - p.gain < STALLED * alone]
+    if (
+        alone - max((p.gain for p in worth), default=0.0)
+        > settings.search.coupled.hopeless_pair * base.n_residuals
+    ):
+        worth = [
+            p for p in worth if p.placed.key in coupling and alone - p.gain < settings.search.stalled * alone
+        ]
     return worth

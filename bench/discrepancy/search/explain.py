@@ -32,9 +32,6 @@ from bench.discrepancy.screening.score_test import LackOfFit, lack_of_fit
 from bench.discrepancy.screening.screen import Screen
 from bench.discrepancy.search.coupled_effects import coupled_fits
 from bench.discrepancy.search.fits import (
-    SIGHT,
-    THOROUGH,
-    WITHIN_REACH,
     Search,
     Task,
     consistent,
@@ -44,25 +41,12 @@ from bench.discrepancy.search.fits import (
     near,
     posterior,
 )
-from bench.discrepancy.search.forward_selection import STALLED, Prepared, attribute, prepare
-
-HELPFUL = 0.3
-"""A catalogued explanation that leaves less than this part of the excess is kept under a closure; others only disturb it."""
-HOPELESS_GROUP = 5.0
-"""Reduced chi-squared of a group of degrees of freedom above which no second effect is searched on the others: whatever it is, the
-whole stays unexplained."""
-PROMISING = 4.0
-"""Reduced chi-squared that a screening must promise in every group, if groups are to be searched before couplings."""
-CLOSED, TRIED = 3, 2
-"""Most closures of a group of degrees of freedom, and of those tried for each."""
-NOISIER = 0.01
-"""Change of the reduced chi-squared with the noise behind an explanation from which the search is repeated."""
-RECONSIDERED = 3
-"""Explanations behind one in which something is left that are asked whether they leave nothing."""
-SEEDS = 8
-"""Explanations in other weights that are fitted again."""
-KEPT = 12
-"""Hypotheses of a group that are combined with those of other groups."""
+from bench.discrepancy.search.forward_selection import (
+    Prepared,
+    attribute,
+    prepare,
+)
+from bench.discrepancy.settings import DiagnosisSettings
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +63,11 @@ class Explanation:
     def hypothesis(self) -> Hypothesis:
         """All effects."""
         return tuple(placed for _, fitted in self.parts for placed in fitted.hypothesis)
+
+    @property
+    def settings(self) -> DiagnosisSettings:
+        """Thresholds of the problems it explains."""
+        return self.parts[0][0].settings
 
     @property
     def n_free(self) -> int:
@@ -168,6 +157,7 @@ def explain(
     error: ModelError | None = None,
     deadline: Deadline = NEVER,
     seeds: Sequence[Explanation] = (),
+    settings: DiagnosisSettings,
 ) -> list[Explanation]:
     """Search the explanations of a case; by decreasing posterior.
 
@@ -179,12 +169,13 @@ def explain(
         error: Error of the model that residuals are weighed by besides their noise.
         deadline: When no further stage is begun.
         seeds: Explanations of the same records in other weights, the best first, which are fitted again; of rigs that do not fall apart.
+        settings: Thresholds of the diagnosis.
     """
-    structure = structure_of(case)
+    structure = structure_of(case, settings=settings)
     groups = structure.groups()
     if len(groups) == 1:
         search = _attributed(
-            Problem(case, structure, case.identification, error=error),
+            Problem(case, structure, case.identification, error=error, settings=settings),
             placements(case, structure, catalogue),
             most=most,
             progress=progress,
@@ -194,19 +185,19 @@ def explain(
         converge(search, _again(search, seeds))
         found = [Explanation(((problem, fitted),)) for fitted in search.ranked()]
         return _nothing_left_first(found) if problem.scaled else _parsimonious(found)
-    bins = _common_bins(case, structure)
-    whole = Problem(case, structure, case.identification, bins, error=error)
+    bins = _common_bins(case, structure, settings=settings)
+    whole = Problem(case, structure, case.identification, bins, error=error, settings=settings)
     prepared = []
     for group in groups:
         part = structure.restricted(group)
-        problem = Problem(case, part, case.identification, bins, error=error)
+        problem = Problem(case, part, case.identification, bins, error=error, settings=settings)
         progress(f"screening of {', '.join(part.dofs)}")
         prepared.append(prepare(problem, placements(case, part, catalogue)))
     odd = [entry for entry in prepared if not consistent(entry[0].ranked(0)[0])]
     coupled = Search(whole)
     deep = settled = False
     if len(odd) > 1:
-        little = max(_promise(entry) for entry in odd) > PROMISING
+        little = max(_promise(entry) for entry in odd) > settings.search.promising
         deep = coupled_fits(
             coupled, catalogue, most, progress, lambda alone: little or _beyond(alone, prepared)
         )
@@ -225,7 +216,7 @@ def explain(
                 prepared=entry,
                 deadline=deadline,
             )
-            hopeless = hopeless or search.ranked()[0].reduced > HOPELESS_GROUP
+            hopeless = hopeless or search.ranked()[0].reduced > settings.search.hopeless_group
     found = _nothing_left_first(_combined([entry[0] for entry in prepared]))
     missing = odd and not deep and not _leaves_nothing(found)
     if missing and deadline.allows("effects that couple the degrees of freedom"):
@@ -238,7 +229,11 @@ def explain(
 
 def _again(search: Search, seeds: Sequence[Explanation]) -> list[Task]:
     """Fits of the foremost of other explanations that a search has not come to: what explained enough ended it early."""
-    tasks = [(e.hypothesis, e.parts[0][1].vector) for e in seeds[:SEEDS] if len(e.parts) == 1]
+    tasks = [
+        (e.hypothesis, e.parts[0][1].vector)
+        for e in seeds[: search.problem.settings.search.seeds]
+        if len(e.parts) == 1
+    ]
     starts = len(search.problem.nominal)
     return [
         (hypothesis, vector)
@@ -268,7 +263,7 @@ def _attributed(
     if (problem.driven or sensors) and stated and best.hypothesis and near(best):
         behind = problem.behind(best.hypothesis, best.vector)
         left = float(np.sum(behind.residual(best.hypothesis, best.vector) ** 2))
-        if abs(left - best.chi2) > NOISIER * best.n_residuals:
+        if abs(left - best.chi2) > problem.settings.search.noisier * best.n_residuals:
             progress(f"the noise behind {names(best.hypothesis)}")
             return attribute(behind, candidates, most=most, progress=progress, deadline=deadline)
     return search
@@ -287,7 +282,7 @@ def _promise(entry: Prepared) -> float:
 
 def _beyond(coupled: Fit, prepared: Sequence[Prepared]) -> bool:
     """Whether an effect on each group of degrees of freedom promises far less than a coupling has kept."""
-    return sum(_promised(entry) for entry in prepared) > coupled.chi2 + SIGHT
+    return sum(_promised(entry) for entry in prepared) > coupled.chi2 + coupled.settings.search.sight
 
 
 def _nothing_left_first(found: list[Explanation]) -> list[Explanation]:
@@ -298,8 +293,12 @@ def _nothing_left_first(found: list[Explanation]) -> list[Explanation]:
     if not found[0].consistent or _leaves_nothing(found):
         return found
     nothing = nominal_alone(found)
-    near = [e for e in found[1:] if e.log_posterior > found[0].log_posterior - WITHIN_REACH and e.consistent]
-    for other in near[:RECONSIDERED]:
+    near = [
+        e
+        for e in found[1:]
+        if e.log_posterior > found[0].log_posterior - found[0].settings.search.within_reach and e.consistent
+    ]
+    for other in near[: found[0].settings.search.reconsidered]:
         if not any(other.lacking(nothing)):
             return [other, *(e for e in found if e is not other)]
     return found
@@ -332,23 +331,28 @@ def plainest(found: Sequence[Explanation]) -> Explanation:
     ordered = sorted(found, key=lambda e: (e.n_free, e.reduced))
     chosen = ordered[0]
     for larger in ordered[1:]:
-        if larger.reduced < STALLED * chosen.reduced:
+        if larger.reduced < found[0].settings.search.stalled * chosen.reduced:
             chosen = larger
     return chosen
 
 
-def _common_bins(case: Case, structure: Structure) -> dict[str, int]:
-    whole = Problem(case, structure, case.identification)
+def _common_bins(case: Case, structure: Structure, *, settings: DiagnosisSettings) -> dict[str, int]:
+    whole = Problem(case, structure, case.identification, settings=settings)
     bins = {d.record.name: d.n_bins for d in whole.data}
     for record in case.validation:
         responses = np.column_stack([record.values[name] for name in structure.channels])
-        bins[record.name] = band_bins(responses, whole.noise)
+        bins[record.name] = band_bins(responses, whole.noise, settings=settings.likelihood)
     return bins
 
 
 def _combined(searches: Sequence[Search]) -> list[Explanation]:
     ranked = [
-        [(s.problem, fitted) for fitted in dict.fromkeys((*s.ranked()[:KEPT], s.ranked(0)[0]))]
+        [
+            (s.problem, fitted)
+            for fitted in dict.fromkeys(
+                (*s.ranked()[: searches[0].problem.settings.search.kept], s.ranked(0)[0])
+            )
+        ]
         for s in searches
     ]
     found = [Explanation(tuple(parts)) for parts in product(*ranked)]
@@ -366,16 +370,17 @@ def close(best: Explanation, nothing: Explanation, closures: Sequence[Effect]) -
     Returns:
         The closed explanation, and the names of the closures used.
     """
+    settings = best.settings.search
     parts, used = [], []
     for (problem, fitted), lacks in zip(best.parts, best.lacking(nothing), strict=True):
         current = fitted
         if lacks or not consistent(fitted) or problem.error is not None:
             candidates = placements(problem.case, problem.structure, closures)
             screen = Screen(problem, candidates)
-            current = fit(problem, (), start=np.zeros(len(problem.nominal)), iterations=THOROUGH)
-            if fitted.reduced - 1.0 < HELPFUL * (current.reduced - 1.0):
+            current = fit(problem, (), start=np.zeros(len(problem.nominal)), iterations=settings.thorough)
+            if fitted.reduced - 1.0 < settings.helpful * (current.reduced - 1.0):
                 current = fitted
-            for _ in range(CLOSED):
+            for _ in range(settings.closures):
                 closed = _closed(problem, screen, current)
                 if closed is None:
                     break
@@ -389,13 +394,18 @@ def close(best: Explanation, nothing: Explanation, closures: Sequence[Effect]) -
 
 def _closed(problem: Problem, screen: Screen, current: Fit) -> Fit | None:
     """One more closure on top of a fit: of those that the screening likes best the first that pays; None where none does."""
+    settings = problem.settings.search
     own = {placed.key for placed in current.hypothesis}
     for point in leading(
-        [p for p in screen.ranked(current) if p.placed.key not in own], TRIED, 0.0, starts=1
+        [p for p in screen.ranked(current) if p.placed.key not in own],
+        settings.closures_tried,
+        0.0,
+        starts=1,
+        settings=problem.settings,
     ):
         start = np.concatenate([current.vector, point.eta])
         closed = fit(problem, (*current.hypothesis, point.placed), start=start, iterations=12)
-        idle = not consistent(current) and closed.reduced - 1.0 > STALLED * (current.reduced - 1.0)
+        idle = not consistent(current) and closed.reduced - 1.0 > settings.stalled * (current.reduced - 1.0)
         if not idle and closed.log_evidence > current.log_evidence:
             return closed
     return None

@@ -11,51 +11,12 @@ from numpy.typing import NDArray
 from bench.discrepancy.fitting.map_fit import Fit, fit, free_entries, laplace
 from bench.discrepancy.likelihood.problem import Array, Problem
 from bench.discrepancy.model.placement import Hypothesis
-from bench.discrepancy.numerics.least_squares import DIFFERENCES, differences
+from bench.discrepancy.numerics.least_squares import (
+    differences,
+)
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.screening.linear_amplitudes import Point
-
-THOROUGH = 60
-"""Iterations of a fit that is carried on to convergence."""
-LOG_PRIOR_EFFECT = -3.4
-"""Log prior odds of one more effect: about one in the number of effects of the catalogue."""
-SIGNIFICANT = 4.0
-"""Standard deviations by which chi-squared may exceed its expectation before a hypothesis counts as refuted."""
-IMMATERIAL = 0.001
-"""Relative improvement of chi-squared that one more effect has to pay for, since the smoothing of stick-slip and the
-interpolation of loads are themselves only as good as that; records of extreme signal-to-noise ratio would else name trifles. Effects
-that are exact by themselves pay nothing where they are alone."""
-HOPELESS = 3.0
-"""A first fit that leaves more than this many times the excess of the best one is not carried on."""
-WITHIN_REACH = 30.0
-"""Difference in log posterior that carrying a first fit on to convergence may still make up."""
-SIGHT = 4.0 * WITHIN_REACH
-"""Cost above that of an explanation at which another one is still in sight of it."""
-MODEL_ERROR = 0.02
-"""Relative excess of chi-squared that is laid to the smoothing and integration of the diagnosis itself."""
-SAME = 0.3
-"""Distance within which two refined starts of an effect count as one."""
-NEAR = 2.0
-"""Reduced chi-squared up to which a free run is off by less than the noise, and tells the motion better than the records do."""
-INTEGRATED, FINEST = 4.0, 8
-"""Sum of squares by which halving the integration steps may change the whitened residuals, so that evidence stays the same to a unit
-or two; and the largest multiple of the steps."""
-CONVERGING = 0.5
-"""Part of the last change that a further halving may make; more is no error of the integration but friction that stops elsewhere."""
-SHAKEN, SHAKEN_REACH = 4, 100.0
-"""Hypotheses that are shaken, at most, and the difference in log posterior that this may still make up where the best one sticks
-too: two laws of friction then differ by what dents they lie in."""
-BEGUN_AGAIN = 500.0
-"""Difference in log posterior that a start with the nominal parameters of the best fit may make up: dents of one law against another's
-have come to half of that."""
-SHAKES, IN_VAIN, DRAWS = 6, 2, 48
-"""Rounds, those in vain after which there is no further one, and draws of a round."""
-FOLLOWED = 2
-"""Draws of a round that are followed to their minima."""
-SCALES = ((1.0,), (2.0,), (4.0,))
-"""Sizes of the draws' moves, in posterior standard deviations."""
-DENT = 1.0
-"""Decrease of the cost below which a round was in vain."""
+from bench.discrepancy.settings import DEFAULT, SearchSettings
 
 Task = tuple[Hypothesis, np.ndarray]
 """Effects, and the vector or vectors that a fit of them starts from."""
@@ -82,7 +43,7 @@ class Search:
     def start(self, base: Hypothesis, point: Point) -> bool:
         """Note that a fit begins here; False where one has begun so near before."""
         spread = [p.std for p in point.placed.effect.parameters]
-        place = tuple(int(x) for x in np.round(point.eta / spread / SAME))
+        place = tuple(int(x) for x in np.round(point.eta / spread / self.problem.settings.search.same))
         mark = (key_of((*base, point.placed)), point.placed.key, place)
         if mark in self.started:
             return False
@@ -108,36 +69,38 @@ def key_of(hypothesis: Hypothesis) -> frozenset:
 
 def posterior(fitted: Fit) -> float:
     """Log posterior of a hypothesis up to a constant."""
+    settings = fitted.settings.search
     # the inaccuracy of one effect may be made good by any other
     exact = all(placed.effect.exact for placed in fitted.hypothesis)
-    tolerance = 0.0 if exact else 0.5 * IMMATERIAL * fitted.n_residuals
-    return fitted.log_evidence + (LOG_PRIOR_EFFECT - tolerance) * len(fitted.hypothesis)
+    tolerance = 0.0 if exact else 0.5 * settings.immaterial * fitted.n_residuals
+    return fitted.log_evidence + (settings.log_prior_effect - tolerance) * len(fitted.hypothesis)
 
 
-def log_prior_of(hypothesis: Hypothesis) -> float:
+def log_prior_of(hypothesis: Hypothesis, *, settings: SearchSettings) -> float:
     """Log prior odds of a hypothesis against the nominal model alone."""
-    return sum(LOG_PRIOR_EFFECT + placed.effect.log_prior for placed in hypothesis)
+    return sum(settings.log_prior_effect + placed.effect.log_prior for placed in hypothesis)
 
 
-def complexity(hypothesis: Hypothesis) -> float:
+def complexity(hypothesis: Hypothesis, *, settings: SearchSettings = DEFAULT.search) -> float:
     """How much a hypothesis takes to be described, in units of log prior.
 
     A parameter counts as one, which is what it gains on average where nothing is to be gained. A law of seven parameters is larger so
     than two of one each, and what holds a law at the limit of its parameters is better told by the two.
     """
     free = sum(not p.fixed for placed in hypothesis for p in placed.effect.parameters)
-    return free - log_prior_of(hypothesis)
+    return free - log_prior_of(hypothesis, settings=settings)
 
 
 def consistent(fitted: Fit) -> bool:
     """Whether the residuals of a fit are as small as the stated noise lets them be."""
+    settings = fitted.settings.search
     spread = np.sqrt(2.0 / fitted.n_residuals)
-    return fitted.reduced < 1.0 + SIGNIFICANT * spread + MODEL_ERROR
+    return fitted.reduced < 1.0 + settings.significant * spread + settings.model_error
 
 
 def near(fitted: Fit) -> bool:
     """Whether the free run of a fit is off by less than the noise."""
-    return fitted.reduced < NEAR
+    return fitted.reduced < fitted.settings.search.near
 
 
 def names(hypothesis: Hypothesis) -> str:
@@ -150,7 +113,8 @@ def names(hypothesis: Hypothesis) -> str:
 
 def carry_on(search: Search, size: int, *, most: int) -> None:
     """Carry the fits of one size that may still become the best on to convergence."""
-    for share in (HOPELESS, 0.0):
+    settings = search.problem.settings.search
+    for share in (settings.hopeless, 0.0):
         ranked = [f for f in search.ranked(size) if np.isfinite(f.cost)]
         if not ranked:
             return
@@ -159,7 +123,7 @@ def carry_on(search: Search, size: int, *, most: int) -> None:
             f
             for f in ranked[:most]
             if key_of(f.hypothesis) not in search.converged
-            and (f.reduced < limit or posterior(f) > posterior(ranked[0]) - WITHIN_REACH)
+            and (f.reduced < limit or posterior(f) > posterior(ranked[0]) - settings.within_reach)
         ]
         converge(search, [(f.hypothesis, f.vector) for f in chosen])
 
@@ -176,7 +140,13 @@ def converge(
     limits = {size: limit_of(search, size) if limit is None else limit for size in sizes}
 
     def thorough(task: Task) -> Fit:
-        return fit(search.problem, task[0], start=task[1], iterations=THOROUGH, limit=limits[len(task[0])])
+        return fit(
+            search.problem,
+            task[0],
+            start=task[1],
+            iterations=search.problem.settings.search.thorough,
+            limit=limits[len(task[0])],
+        )
 
     for fitted in in_threads(thorough, tasks):
         search.add(fitted)
@@ -192,29 +162,30 @@ def integrate_finer(search: Search) -> None:
     Args:
         search: Fits so far; its problem is integrated in finer steps from here on.
     """
+    settings = search.problem.settings.search
     problem, best = search.problem, search.ranked()[0]
     if problem.driven or problem.windowed:
         return
     refinement, coarse = problem.refinement, problem.residual(best.hypothesis, best.vector)
     before = np.inf
-    while problem.refinement < FINEST:
+    while problem.refinement < settings.finest:
         fine = problem.finer(2 * problem.refinement).residual(best.hypothesis, best.vector)
         change = float(np.sum((fine - coarse) ** 2))
-        if not INTEGRATED < change < CONVERGING * before:
+        if not settings.integrated < change < settings.converging * before:
             break
         problem.refinement, coarse, before = 2 * problem.refinement, fine, change
     if problem.refinement == refinement:
         return
-    for fitted in [f for f in search.ranked() if near(f)][:SHAKEN]:
+    for fitted in [f for f in search.ranked() if near(f)][: settings.restarts.restarted]:
         search.fits[key_of(fitted.hypothesis)] = fit(
-            problem, fitted.hypothesis, start=fitted.vector, iterations=THOROUGH
+            problem, fitted.hypothesis, start=fitted.vector, iterations=settings.thorough
         )
 
 
 def limit_of(search: Search, size: int) -> float:
     """Cost beyond which a fit of so many effects is of no more interest."""
     best = min((f.cost for f in search.fits.values() if len(f.hypothesis) == size), default=np.inf)
-    return best + SIGHT + max(best - search.problem.n_residuals, 0.0)
+    return best + search.problem.settings.search.sight + max(best - search.problem.n_residuals, 0.0)
 
 
 def shake(search: Search) -> None:
@@ -226,12 +197,13 @@ def shake(search: Search) -> None:
     Args:
         search: Fits so far; better ones take their places.
     """
+    settings = search.problem.settings.search
     best = search.ranked()[0]
-    if not consistent(best) and best.chi2 - best.n_residuals > 2.0 * BEGUN_AGAIN:
+    if not consistent(best) and best.chi2 - best.n_residuals > 2.0 * settings.restarts.begun_again:
         return  # no dent is that deep: whatever explains the records is not among these
     both_stick = sticks(best)
-    reach = SHAKEN_REACH if both_stick else WITHIN_REACH
-    for fitted in [f for f in search.ranked() if near(f) and sticks(f)][:SHAKEN]:
+    reach = settings.restarts.reach if both_stick else settings.within_reach
+    for fitted in [f for f in search.ranked() if near(f) and sticks(f)][: settings.restarts.restarted]:
         begun = _beside_the_best(search, fitted) if both_stick else fitted
         behind = posterior(search.ranked()[0]) - posterior(begun)
         if behind < reach:
@@ -240,11 +212,12 @@ def shake(search: Search) -> None:
 
 def _beside_the_best(search: Search, fitted: Fit) -> Fit:
     """The better of a fit and the same begun with the nominal parameters of the best one, which may have got over its dents."""
+    settings = search.problem.settings.search
     best, n = search.ranked()[0], len(search.problem.nominal)
-    if fitted is best or posterior(best) - posterior(fitted) > BEGUN_AGAIN:
+    if fitted is best or posterior(best) - posterior(fitted) > settings.restarts.begun_again:
         return fitted
     start = np.concatenate([best.vector[:n], fitted.vector[n:]])
-    again = fit(search.problem, fitted.hypothesis, start=start, iterations=THOROUGH)
+    again = fit(search.problem, fitted.hypothesis, start=start, iterations=settings.thorough)
     search.add(again)
     return min(fitted, again, key=lambda f: f.cost)
 
@@ -256,6 +229,7 @@ def sticks(fitted: Fit) -> bool:
 
 def _shaken(search: Search, fitted: Fit, behind: float) -> None:
     """Shake one fit, while rounds like the last one could make up the cost by which it is `behind`."""
+    settings = search.problem.settings.search
     problem, hypothesis = search.problem, fitted.hypothesis
     mean, std, low, high = problem.prior(hypothesis)
     free = free_entries(problem, hypothesis)
@@ -266,39 +240,44 @@ def _shaken(search: Search, fitted: Fit, behind: float) -> None:
         return float(residual @ residual + np.sum(((vector - mean) / std) ** 2))
 
     def again_from(start: Array) -> Fit:
-        return fit(problem, hypothesis, start=start, iterations=THOROUGH)
+        return fit(problem, hypothesis, start=start, iterations=settings.thorough)
 
     in_vain = 0
-    for further in reversed(range(SHAKES)):
+    for further in reversed(range(settings.restarts.rounds)):
         fitted = _overlooking_dents(fitted, problem, free)
         spread = np.linalg.cholesky(fitted.covariance[np.ix_(free, free)])
-        draws = np.repeat(fitted.vector[None], DRAWS, axis=0)
-        draws[:, free] += rng.standard_normal((DRAWS, len(free))) @ spread.T * np.resize(SCALES, (DRAWS, 1))
+        draws = np.repeat(fitted.vector[None], settings.restarts.draws, axis=0)
+        draws[:, free] += (
+            rng.standard_normal((settings.restarts.draws, len(free)))
+            @ spread.T
+            * np.resize(settings.restarts.scales, (settings.restarts.draws, 1))
+        )
         draws = np.clip(draws, low, high)
-        best = draws[np.argsort(in_threads(cost, draws))[:FOLLOWED]]
+        best = draws[np.argsort(in_threads(cost, draws))[: settings.restarts.followed]]
         again = min(in_threads(again_from, best), key=lambda f: f.cost)
         gained = fitted.cost - again.cost
-        in_vain = in_vain + 1 if gained < DENT else 0
+        in_vain = in_vain + 1 if gained < settings.restarts.gain else 0
         fitted = min(fitted, again, key=lambda f: f.cost)
         behind -= max(gained, 0.0)
-        if in_vain == IN_VAIN or behind > further * max(gained, DENT):
+        if in_vain == settings.restarts.in_vain or behind > further * max(gained, settings.restarts.gain):
             break
     search.fits[key_of(hypothesis)] = _overlooking_dents(fitted, problem, free)
 
 
 def _overlooking_dents(fitted: Fit, problem: Problem, free: NDArray[np.int64]) -> Fit:
     """A fit whose precision and evidence are those of the landscape, not of the dent it lies in: by coarse differences."""
+    settings = fitted.settings.numerics
     _, std, _, high = problem.prior(fitted.hypothesis)
     changes = differences(
         lambda vector: problem.residual(fitted.hypothesis, vector),
         fitted.vector,
         problem.residual(fitted.hypothesis, fitted.vector),
         free=free,
-        steps=DIFFERENCES[1] * std[free],
+        steps=settings.differences[1] * std[free],
         high=high[free],
     )
     if changes is None:
         return fitted
-    curvature = np.eye(len(free)) + changes.T @ changes / DIFFERENCES[1] ** 2
+    curvature = np.eye(len(free)) + changes.T @ changes / settings.differences[1] ** 2
     precision, evidence = laplace(problem, fitted.hypothesis, fitted.cost, curvature, free)
     return replace(fitted, precision=precision, log_evidence=evidence)

@@ -11,7 +11,6 @@ starts, so that no flexible law wins because a simpler one was fitted carelessly
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -24,9 +23,6 @@ from bench.discrepancy.model.placement import Hypothesis, Placed
 from bench.discrepancy.numerics.deadline import NEVER, Deadline
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.screening.candidates import (
-    SHORT,
-    TRUSTED,
-    WORTH_A_FIT,
     about,
     followed,
     leading,
@@ -37,9 +33,6 @@ from bench.discrepancy.screening.linear_amplitudes import Point
 from bench.discrepancy.screening.score_test import lack_of_fit
 from bench.discrepancy.screening.screen import Screen
 from bench.discrepancy.search.fits import (
-    IMMATERIAL,
-    LOG_PRIOR_EFFECT,
-    THOROUGH,
     Search,
     Task,
     carry_on,
@@ -58,38 +51,6 @@ from bench.discrepancy.search.scheduled import with_schedules
 from bench.discrepancy.search.soft_friction import soften, stand_in
 from bench.discrepancy.search.timed_force import with_timed_force
 
-QUICK = 6
-"""Iterations of a first fit; the best are carried on to convergence."""
-NOTICEABLE = 15.0
-"""Screened gain from which the first effect is fitted: noise alone lets the best of the catalogue gain so much in few cases."""
-LEVELS = (-2.0, -1.0, 0.0, 1.0)
-"""Sizes of contacts that are simulated on their grid, in prior standard deviations from their mean."""
-SIMULATED = 2
-"""Starts of each that are fitted."""
-STALLED = 0.7
-"""If one more effect leaves more than this part of the excess of chi-squared, a further one is not tried."""
-SEVERAL = 2
-"""Number of effects as which a force that is lacking is doubted: a second one is looked for at the least suspicion."""
-CONSIDERED, PROMISED = 12, 2
-"""Hypotheses that are asked what they promise together with one more effect, and those that are extended for that alone."""
-UNPROMISING = 0.25
-"""Part of the excess of a base that one more effect must promise to take away, or none is fitted beside it."""
-
-
-@dataclass(frozen=True)
-class PlainSettings:
-    """When two plain effects are tried in place of a large one.
-
-    Attributes:
-        parameters: Parameters of a plain effect, at most: a size and a shape.
-        bases: Plain effects that are extended.
-    """
-
-    parameters: int = 2
-    bases: int = 2
-
-
-PLAIN = PlainSettings()
 Prepared = tuple[Search, Screen, list[Point]]
 """A search before its first step: the nominal model fitted, the catalogue screened, its grid points by decreasing gain."""
 
@@ -116,12 +77,13 @@ def attribute(
     Returns:
         All fits made.
     """
+    settings = problem.settings.search
     search, screen, points = prepared or prepare(problem, candidates)
     nothing = search.ranked(0)[0]
     progress(f"nominal model: chi-squared {nothing.reduced:.3g} of its expectation")
     if followed(nothing, problem):
         points = about(screen, nothing, explained=True).ranked()
-        if not points or points[0].gain < NOTICEABLE:
+        if not points or points[0].gain < settings.noticeable:
             return search
     _single(search, screen, candidates, progress, deadline)
     for size in range(1, most):
@@ -138,7 +100,7 @@ def attribute(
                 break
             # what is down to the noise and lacks a force all the same may be neither of two effects
             lacks = not (problem.windowed or problem.error) and lack_of_fit(problem, best).significant(
-                nothing.chi2 - best.chi2, effects=SEVERAL
+                nothing.chi2 - best.chi2, effects=settings.several
             )
             plain = _plain_bases(search, best)
             if not lacks and not plain and not _promising(screen, best):
@@ -149,7 +111,9 @@ def attribute(
             reduce_best(search)
             continue
         ranked = search.ranked(size)
-        if not ranked or ranked[0].reduced - 1.0 > STALLED * (search.ranked(size - 1)[0].reduced - 1.0):
+        if not ranked or ranked[0].reduced - 1.0 > settings.stalled * (
+            search.ranked(size - 1)[0].reduced - 1.0
+        ):
             break
         _extend(search, screen, worth_extending(search, screen, size, 4 - size), count=6 - size)
         soften(search, size + 1)
@@ -219,6 +183,7 @@ def worth_extending(search: Search, screen: Screen, size: int, most: int) -> lis
     Returns:
         The hypotheses by decreasing posterior.
     """
+    settings = search.problem.settings.search
     problem, ranked = search.problem, search.ranked(size)
 
     def promised(base: Fit) -> float:
@@ -226,8 +191,8 @@ def worth_extending(search: Search, screen: Screen, size: int, most: int) -> lis
         points = screen.ranked(base, ground)[:1]
         return float(np.sum(ground.left**2)) - sum(point.gain for point in points)
 
-    far = [f for f in ranked[:CONSIDERED] if np.isfinite(f.cost) and not followed(f, problem)]
-    chosen = ranked[:most] + sorted(far, key=promised)[:PROMISED]
+    far = [f for f in ranked[: settings.considered] if np.isfinite(f.cost) and not followed(f, problem)]
+    chosen = ranked[:most] + sorted(far, key=promised)[: settings.promised]
     return [f for f in ranked if any(f is own for own in chosen)]
 
 
@@ -237,11 +202,16 @@ def _plain_bases(search: Search, best: Fit) -> list[Fit]:
     Where the error of the model weighs, a law of many parameters soon explains enough, at values at which it is another one: one of
     backlash without play, say, whose asymmetry is that of friction beside a constant force.
     """
-    largest = 2.0 * PLAIN.parameters + 2.0 * abs(LOG_PRIOR_EFFECT)
-    if search.problem.error is None or len(best.hypothesis) != 1 or complexity(best.hypothesis) <= largest:
+    settings = search.problem.settings.search
+    largest = 2.0 * settings.plain.parameters + 2.0 * abs(settings.log_prior_effect)
+    if (
+        search.problem.error is None
+        or len(best.hypothesis) != 1
+        or complexity(best.hypothesis, settings=search.problem.settings.search) <= largest
+    ):
         return []
-    plain = [f for f in search.ranked(1) if _free(f) <= PLAIN.parameters and np.isfinite(f.cost)]
-    return plain[: PLAIN.bases]
+    plain = [f for f in search.ranked(1) if _free(f) <= settings.plain.parameters and np.isfinite(f.cost)]
+    return plain[: settings.plain.bases]
 
 
 def _free(fitted: Fit) -> int:
@@ -250,10 +220,13 @@ def _free(fitted: Fit) -> int:
 
 def _promising(screen: Screen, best: Fit) -> bool:
     """Whether one more effect could still be in the residual of a hypothesis that is down to the noise."""
+    settings = screen.problem.settings
     screen = about(screen, best, explained=True)
     ground = screen.ground(best, simulated=True)
     points = screen.ranked(best, ground)[:1] + screen.inertia_points(best, ground)[:1]
-    return max((p.gain for p in points), default=0.0) > max(WORTH_A_FIT, IMMATERIAL * best.n_residuals)
+    return max((p.gain for p in points), default=0.0) > max(
+        settings.screening.worth_a_fit, settings.search.immaterial * best.n_residuals
+    )
 
 
 def prepare(problem: Problem, candidates: Sequence[Placed]) -> Prepared:
@@ -264,7 +237,9 @@ def prepare(problem: Problem, candidates: Sequence[Placed]) -> Prepared:
         candidates: Effects at their places.
     """
     search = Search(problem)
-    search.add(fit(problem, (), start=np.zeros(len(problem.nominal)), iterations=THOROUGH))
+    search.add(
+        fit(problem, (), start=np.zeros(len(problem.nominal)), iterations=problem.settings.search.thorough)
+    )
     screen = Screen(problem, [p for p in candidates if not p.effect.rare])
     return search, screen, screen.ranked()
 
@@ -316,6 +291,7 @@ def _offers(
     among: Collection[tuple[str, str, str]],
 ) -> _Offers:
     """Screen one more effect beside a base, of those `among` where some are given."""
+    settings = search.problem.settings
     problem = search.problem
     named = base if base.hypothesis else None
     along = followed(base, problem)
@@ -328,23 +304,30 @@ def _offers(
     inertia = [] if among else local.inertia_points(base, ground)
     most = max((p.gain for p in [*points, *inertia]), default=0.0)
     excess = base.chi2 - base.n_residuals
-    if named and problem.scaled and not consistent(base) and most < UNPROMISING * excess:
+    if named and problem.scaled and not consistent(base) and most < settings.search.unpromising * excess:
         return _Offers(base, [], [])
 
     def task(point: Point) -> Task:
         return (*base.hypothesis, point.placed), local.starts(point, ground, named)
 
     # a screening can promise more than there is
-    most = min(most, max(excess, WORTH_A_FIT))
-    short = (TRUSTED if named and along else SHORT) * most
-    chosen = leading(points, count, short)
+    most = min(most, max(excess, settings.screening.worth_a_fit))
+    short = (settings.screening.trusted if named and along else settings.screening.short) * most
+    chosen = leading(points, count, short, settings=search.problem.settings)
     if not among:
-        chosen += passed_over(solved, chosen, count, WORTH_A_FIT)
+        chosen += passed_over(
+            solved, chosen, count, settings.screening.worth_a_fit, settings=search.problem.settings
+        )
     begun = {point.placed.key for point in chosen}
     rest = [p for p in points if p.placed.key not in begun] if named and along else []
-    spare = [(p, task(p)) for p in leading(rest, count, WORTH_A_FIT, starts=1)]
+    spare = [
+        (p, task(p))
+        for p in leading(
+            rest, count, settings.screening.worth_a_fit, starts=1, settings=search.problem.settings
+        )
+    ]
     tasks = [task(p) for p in chosen if search.start(base.hypothesis, p)]
-    least = min(short, WORTH_A_FIT) if consistent(base) else short
+    least = min(short, settings.screening.worth_a_fit) if consistent(base) else short
     tasks += [
         ((*base.hypothesis, p.placed), np.append(base.vector, p.eta)) for p in inertia if p.gain > least
     ]
@@ -370,7 +353,8 @@ def first_fit(problem: Problem, hypothesis: Hypothesis, start: np.ndarray, *, li
         start: Start vector (n,), or several (k, n).
         limit: Cost that has to be within sight, see `minimise`.
     """
-    iterations = QUICK if hypothesis[-1].effect.site == "joint" else 2 * QUICK
+    settings = problem.settings.search
+    iterations = settings.quick if hypothesis[-1].effect.site == "joint" else 2 * settings.quick
     return fit(problem, hypothesis, start=start, iterations=iterations, exact=False, limit=limit)
 
 
@@ -380,6 +364,7 @@ def _simulated(search: Search, candidates: Sequence[Placed]) -> None:
     Where only velocities or accelerations are measured, the middle of the motion is unknown, and a stop that shifts it is screened
     at the wrong place. Contacts have few shapes and cost little to simulate.
     """
+    settings = search.problem.settings.search
     problem = search.problem
     still = np.zeros(len(problem.nominal))
     tasks: list[Task] = []
@@ -391,7 +376,7 @@ def _simulated(search: Search, candidates: Sequence[Placed]) -> None:
         starts = [
             np.concatenate([still, [size.mean + level * size.std], eta[1:]])
             for eta in effect.grid()
-            for level in LEVELS
+            for level in settings.contact_levels
         ]
 
         def cost(start: np.ndarray, placed: Placed = placed) -> float:
@@ -399,7 +384,11 @@ def _simulated(search: Search, candidates: Sequence[Placed]) -> None:
             return float(residual @ residual)
 
         costs = np.array(in_threads(cost, starts))
-        tasks += [((placed,), starts[i]) for i in np.argsort(costs)[:SIMULATED] if np.isfinite(costs[i])]
+        tasks += [
+            ((placed,), starts[i])
+            for i in np.argsort(costs)[: settings.contact_starts]
+            if np.isfinite(costs[i])
+        ]
     converge(search, tasks)
 
 

@@ -18,16 +18,9 @@ from bench.discrepancy.case.case import Case
 from bench.discrepancy.fitting.map_fit import fit
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.search.explain import Explanation
-from bench.discrepancy.search.fits import THOROUGH
 
 STATED = "load_interpolation"
 """Option of a case that says it; where it is given, nothing is looked for."""
-INSTEAD = 0.8
-"""Part of what further effects take from chi-squared that a reading has to take in their stead."""
-LIKELY = 0.5
-"""Part of the wanted decrease of chi-squared that a reading has to promise to first order, or it is not fitted."""
-BETTER = 0.5
-"""Part of chi-squared, beyond what noise leaves where it is stated, that a reading has to leave with as many effects."""
 IN_WORDS = {
     "linear": "along straight lines",
     "band_limited": "as the band-limited signal through them",
@@ -66,10 +59,11 @@ def _ladder(explanations: Sequence[Explanation]) -> Iterator[Explanation]:
 
 def _promises(read: Case, rung: Explanation, best: Explanation) -> bool:
     """Whether the effects of an explanation, fitted in another reading, leave little enough for a search in it."""
+    settings = rung.settings.search
     noise = sum(fitted.n_residuals for _, fitted in best.parts) if best.scaled else 0
-    limit = rung.chi2 - INSTEAD * (rung.chi2 - best.chi2)
+    limit = rung.chi2 - settings.readings.instead * (rung.chi2 - best.chi2)
     if rung is best:
-        limit = noise + BETTER * (best.chi2 - noise)
+        limit = noise + settings.readings.better * (best.chi2 - noise)
     parts = [(_read(read, problem), problem, fitted) for problem, fitted in rung.parts]
     able = 0.0
     for problem, before, fitted in parts:
@@ -78,10 +72,10 @@ def _promises(read: Case, rung: Explanation, best: Explanation) -> bool:
             return False
         # at the optimum the residual is orthogonal to all that parameters could do about the change
         able += 2.0 * float(residual @ (residual - changed))
-    if able < LIKELY * (rung.chi2 - limit):
+    if able < settings.readings.likely * (rung.chi2 - limit):
         return False
     fits = (
-        fit(problem, f.hypothesis, start=f.vector, iterations=THOROUGH, limit=limit, exact=False)
+        fit(problem, f.hypothesis, start=f.vector, iterations=settings.thorough, limit=limit, exact=False)
         for problem, _, f in parts
     )
     return sum(found.chi2 for found in fits) < limit
@@ -90,7 +84,9 @@ def _promises(read: Case, rung: Explanation, best: Explanation) -> bool:
 def _read(case: Case, problem: Problem) -> Problem:
     """A problem of the same records and structure whose loads are read as a case says."""
     bins = {data.record.name: data.n_bins for data in problem.data}
-    return Problem(case, problem.structure, problem.records, bins, error=problem.error)
+    return Problem(
+        case, problem.structure, problem.records, bins, error=problem.error, settings=problem.settings
+    )
 
 
 def reading_notes(told: Case, read: Case) -> tuple[str, ...]:

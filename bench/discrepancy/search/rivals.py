@@ -11,16 +11,24 @@ from bench.discrepancy.effects.effect import Effect
 from bench.discrepancy.fitting.map_fit import Fit
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Hypothesis, Placed
-from bench.discrepancy.screening.candidates import REFINED_STARTS, about, followed, leading, refined
+from bench.discrepancy.screening.candidates import (
+    about,
+    followed,
+    leading,
+    refined,
+)
 from bench.discrepancy.screening.screen import Screen
-from bench.discrepancy.search.fits import SIGHT, Search, Task, carry_on, consistent, converge, key_of
+from bench.discrepancy.search.fits import (
+    Search,
+    Task,
+    carry_on,
+    consistent,
+    converge,
+    key_of,
+)
 
-SIMPLIFIED = 6
-"""Hypotheses whose effects are tried with fewer parameters."""
 PLAINER = {"hysteresis": "friction", "damping": "friction"}
 """Families whose laws become those of another one at the limits of their parameters."""
-LEFT = 0.02
-"""Part of a named effect's gain along the motion that a challenger may lack, besides twice what the effect leaves."""
 
 
 def challenge(search: Search, screen: Screen, *, rounds: int = 3) -> None:
@@ -34,6 +42,7 @@ def challenge(search: Search, screen: Screen, *, rounds: int = 3) -> None:
         screen: Screening of the same problem.
         rounds: A rival that wins is challenged in turn, so many times at most; once where nothing explains the records.
     """
+    settings = search.problem.settings
     challenged: set[frozenset] = set()
     for _ in range(rounds):
         best = search.ranked()[0]
@@ -56,7 +65,13 @@ def challenge(search: Search, screen: Screen, *, rounds: int = 3) -> None:
                 points = refined(local, ground, local.ranked(named, ground))
             own = max((p.gain for p in points if p.placed.key == placed.key), default=np.inf)
             left = max(alone - own, search.problem.n_residuals)
-            for point in leading(points, 5, own - left - LEFT * own, starts=REFINED_STARTS):
+            for point in leading(
+                points,
+                5,
+                own - left - settings.search.challenger_lacks * own,
+                starts=settings.screening.refined_starts,
+                settings=search.problem.settings,
+            ):
                 if search.start(rest, point):
                     tasks.append(((*rest, point.placed), np.concatenate([vector, point.eta])))
                     continue
@@ -66,7 +81,7 @@ def challenge(search: Search, screen: Screen, *, rounds: int = 3) -> None:
                 if begun is not None and not known and key_of(begun.hypothesis) not in search.converged:
                     tasks.append((begun.hypothesis, begun.vector))
             tasks += _alike(placed, rest, vector, search, screen)
-        converge(search, tasks, limit=best.cost + SIGHT)
+        converge(search, tasks, limit=best.cost + settings.search.sight)
         carry_on(search, len(best.hypothesis), most=6)
         reduce_best(search)
 
@@ -103,7 +118,7 @@ def simplify(search: Search, candidates: Sequence[Placed]) -> None:
         candidates: Effects at their places.
     """
     tasks: dict[frozenset, Task] = {}
-    for fitted in search.ranked()[:SIMPLIFIED]:
+    for fitted in search.ranked()[: search.problem.settings.search.simplified]:
         for i, placed in enumerate(fitted.hypothesis):
             rest, vector = _without(i, fitted, search.problem)
             for other in candidates:
@@ -129,7 +144,7 @@ def reduce_best(search: Search) -> None:
     if len(best.hypothesis) < 2:
         return
     tasks = [_without(i, best, search.problem) for i in range(len(best.hypothesis))]
-    converge(search, tasks, limit=best.cost + SIGHT)
+    converge(search, tasks, limit=best.cost + search.problem.settings.search.sight)
 
 
 def _without(i: int, best: Fit, problem: Problem) -> tuple[Hypothesis, np.ndarray]:

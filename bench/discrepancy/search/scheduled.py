@@ -24,7 +24,13 @@ from numpy.typing import NDArray
 from bench.discrepancy.case.case import Case, CaseChannel, CaseRecord
 from bench.discrepancy.case.schema import RIGS
 from bench.discrepancy.effects.catalogue import FRICTION, effect_named
-from bench.discrepancy.effects.effect import RARE, Effect, FreeParameter, Scales, Values
+from bench.discrepancy.effects.effect import (
+    EFFECT_SETTINGS,
+    Effect,
+    FreeParameter,
+    Scales,
+    Values,
+)
 from bench.discrepancy.effects.read_off import DIFFERS, FOLLOWED, SENSITIVITY, schedulable
 from bench.discrepancy.fitting.map_fit import Fit
 from bench.discrepancy.likelihood.problem import Problem
@@ -34,10 +40,6 @@ from bench.discrepancy.search.fits import Search, Task, consistent, converge, ke
 from bench.discrepancy.search.soft_friction import IDEAL, RUBBING, frictional, nominal_level
 
 Array = NDArray[np.float64]
-SCHEDULED = 4
-"""Effects that are tried with a schedule: those that come nearest alone."""
-FAINT = 0.1
-"""Part of the nominal model's own friction with which more of it begins."""
 LOADS = ("force", "torque")
 """Load channels of the bench's own rigs."""
 
@@ -78,15 +80,18 @@ def _seeds(search: Search) -> list[tuple[Placed, Array]]:
 
     Friction of the mean limit may be in the nominal model already, so that no fit has asked for any.
     """
+    settings = search.problem.settings.search
     problem = search.problem
-    seeds = [(f.hypothesis[0], f.vector) for f in search.ranked(1) if _schedulable(f)][:SCHEDULED]
+    seeds = [(f.hypothesis[0], f.vector) for f in search.ranked(1) if _schedulable(f)][: settings.scheduled]
     known = {placed.key for placed, _ in seeds}
     still, ideal = search.ranked(0)[0].vector, effect_named(IDEAL)
     for place in problem.structure.places:
         placed = Placed(ideal, place)
         if len(place.rows) == 1 and placed.key not in known:
             level = nominal_level(problem, placed, problem.split((), still)[0]) or 0.0
-            faint = FAINT * level or FRICTION.value(FRICTION.mean, problem.scales_of(placed))
+            faint = settings.scheduled_faint * level or FRICTION.value(
+                FRICTION.mean, problem.scales_of(placed)
+            )
             seeds.append((placed, np.append(still, FRICTION.eta(faint, problem.scales_of(placed)))))
     return seeds
 
@@ -146,7 +151,7 @@ def followed(effect: Effect, channel: CaseChannel, problem: Problem) -> Effect:
     return replace(
         effect, name=FOLLOWED + effect.name, equation=f"(1 - kappa + kappa s/s0) f, s = {name}; {effect.equation}",
         parameters=(*effect.parameters, SENSITIVITY, FreeParameter("reference", signed=True, fixed=True, unit=channel.unit or "1")),
-        theta=own_theta, schedule=schedule, log_prior=effect.log_prior + 0.5 * RARE,
+        theta=own_theta, schedule=schedule, log_prior=effect.log_prior + 0.5 * EFFECT_SETTINGS.rare,
         rate_bound=None if bound is None else lambda values, scales: bound(values[:count], scales),
     )  # fmt: skip
 
@@ -189,6 +194,6 @@ def differing(records: list[str]) -> Effect:
     return replace(
         ideal, name=DIFFERS, equation="f = Fc_i sgn(v) in record i",
         parameters=tuple(replace(FRICTION, name=f"friction_force_{name}") for name in records),
-        theta=lambda values, scales: theta(np.array([np.mean(values)]), scales), schedule=schedule, log_prior=RARE,
+        theta=lambda values, scales: theta(np.array([np.mean(values)]), scales), schedule=schedule, log_prior=EFFECT_SETTINGS.rare,
         n_linear=1,
     )  # fmt: skip

@@ -31,16 +31,8 @@ from bench.laws.soft_friction import SOFT_COULOMB
 Array = NDArray[np.float64]
 IDEAL = "coulomb_friction"
 """The effect that the others are variants of."""
-SOFTENED = 2
-"""Hypotheses of one size whose friction is softened."""
 RUBBING = ("friction", "hysteresis")
 """Families that may take the place of the nominal model's own friction."""
-STANDING_IN = 4
-"""Effects that are tried there: those that come nearest beside it."""
-CREEPS = (1e-4, 1e-3, 1e-2, 0.1)
-"""Creep velocities, over the largest velocity, from which a fit may begin."""
-LEADS = (1e-3, 0.01)
-"""Lead times from which a fit may begin [s]; MuJoCo's default is 9.5 ms."""
 CREEP = FreeParameter(
     "creep_velocity", "velocity", mean=math.log(0.01), std=2.3, bounds=(math.log(1e-5), math.log(1.0))
 )
@@ -92,7 +84,9 @@ def soften(search: Search, size: int) -> None:
     """
     ranked = search.ranked(size)
     tasks: list[Task] = []
-    for fitted in [f for f in ranked if _ideal_at(f) is not None and np.isfinite(f.cost)][:SOFTENED]:
+    for fitted in [f for f in ranked if _ideal_at(f) is not None and np.isfinite(f.cost)][
+        : search.problem.settings.search.soft.softened
+    ]:
         own_friction = bool(frictional(search.problem).any())
         within = fitted.chi2 - fitted.n_residuals < np.sqrt(2.0 * fitted.n_residuals)
         if own_friction or fitted is not ranked[0] or not within:
@@ -112,7 +106,9 @@ def stand_in(search: Search) -> None:
     if not frictional(problem).any() or consistent(search.ranked()[0]):
         return
     tasks: list[Task] = []
-    for fitted in [f for f in search.ranked(1) if _rubs(f)][:STANDING_IN]:
+    for fitted in [f for f in search.ranked(1) if _rubs(f)][
+        : search.problem.settings.search.soft.standing_in
+    ]:
         (placed,), n = fitted.hypothesis, len(problem.nominal)
         values, (eta,) = problem.split(fitted.hypothesis, fitted.vector)
         loss = nominal_level(problem, placed, values)
@@ -146,6 +142,7 @@ def _ideal_at(fitted: Fit) -> int | None:
 
 def _softened(problem: Problem, fitted: Fit) -> Iterator[Task]:
     """A fit of every variant that can take the place of the friction in a hypothesis."""
+    settings = problem.settings.search
     i = _ideal_at(fitted)
     assert i is not None
     placed = fitted.hypothesis[i]
@@ -162,10 +159,12 @@ def _softened(problem: Problem, fitted: Fit) -> Iterator[Task]:
     for effect, limit in variants:
         head = [FRICTION.eta(limit, scales)]
         if effect.law is COULOMB and not effect.limit:
-            shapes = [[math.log(creep)] for creep in CREEPS]
+            shapes = [[math.log(creep)] for creep in settings.soft.creeps]
         else:
             shapes = (
-                [[math.log(c), math.log(t)] for c, t in product(CREEPS, LEADS)] if effect.creeps else [[]]
+                [[math.log(c), math.log(t)] for c, t in product(settings.soft.creeps, settings.soft.leads)]
+                if effect.creeps
+                else [[]]
             )
         hypothesis = (*fitted.hypothesis[:i], Placed(effect, placed.place), *fitted.hypothesis[i + 1 :])
         starts = [

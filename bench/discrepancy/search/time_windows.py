@@ -1,7 +1,7 @@
 """Windows of time in which a force acts: steps of the force that a record lacks.
 
 The missing force along the measured motion is cut into pieces of constant level, as many as pay (optimal partitioning of block
-means; the price of a piece is that of its two numbers under the noise of the force, `PRICE`). Pieces whose level stands out are
+means; the price of a piece is that of its two numbers under the noise of the force, `price`). Pieces whose level stands out are
 windows; their edges are set where the area under the measured force says, to a fraction of a sample.
 
 References:
@@ -18,30 +18,10 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.discrepancy.settings import DEFAULT, SearchSettings
 from bench.discrepancy.simulation.stick_slip import Motion
 
 Array = NDArray[np.float64]
-BLOCKS = 1500
-"""Block means, at most, that a record is cut from."""
-PRICE = 2.0
-"""Numbers that a piece costs, each the logarithm of the number of blocks times the variance of the means (Schwarz)."""
-STANDS_OUT = 0.5
-"""Part of the largest level from which a piece is a window; what is nearer to zero is what the model leaves besides."""
-ALIKE = 0.2
-"""Relative difference of levels up to which windows have the same force."""
-STAIR = 0.4
-"""Relative difference of levels from which neighbouring pieces are stairs of a force, not one that the model blurs."""
-SHORTEST = 4
-"""Blocks that a window lasts at least."""
-SHARE = 0.7
-"""Part of the power of the missing force that windows have to take away, or they are no description of it."""
-SUDDEN = 0.2
-"""Time that edges take, over that of the pieces on both sides, from which a force swells rather than is switched on: those of a sine take
-two thirds."""
-MIDDLE = (0.25, 0.75)
-"""Part of the height of an edge, half of it, by which its time is measured."""
-FOLLOWS = 0.6
-"""Correlation with the motion, or with its direction, from which windows are those of a force of the motion."""
 
 
 class Windows(NamedTuple):
@@ -65,28 +45,29 @@ class Windows(NamedTuple):
         return out
 
 
-def windows_of(time: Array, force: Array) -> Windows | None:
+def windows_of(time: Array, force: Array, *, settings: SearchSettings = DEFAULT.search) -> Windows | None:
     """Windows in a missing force.
 
     Args:
         time: (n,), uniform.
         force: (n,) external force that the model lacks.
+        settings: `SearchSettings` of the diagnosis.
 
     Returns:
         The windows; None where pieces of constant force are no description of it.
     """
-    factor = -(-len(force) // BLOCKS)
+    factor = -(-len(force) // settings.timed.blocks)
     count = len(force) // factor
     means = force[: count * factor].reshape(count, factor).mean(axis=1)
     jumps = np.diff(means)
     variance = float((np.median(np.abs(jumps - np.median(jumps))) / 0.6745) ** 2 / 2.0)
-    price = PRICE * np.log(count) * max(variance, 1e-6 * float(np.var(means)))
+    price = settings.timed.price * np.log(count) * max(variance, 1e-6 * float(np.var(means)))
     cuts = np.zeros(count + 1, dtype=np.int64)
-    _partition(means, price, SHORTEST, cuts)
+    _partition(means, price, settings.timed.shortest, cuts)
     edges = [count]
     while edges[-1] > 0:
         edges.append(int(cuts[edges[-1]]))
-    return _standing_out(time, force, [factor * edge for edge in reversed(edges)], factor)
+    return _standing_out(time, force, [factor * edge for edge in reversed(edges)], factor, settings=settings)
 
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
@@ -109,10 +90,12 @@ def _partition(means, price, shortest, cuts):
                 cuts[stop] = start
 
 
-def _standing_out(time: Array, force: Array, edges: list[int], factor: int) -> Windows | None:
+def _standing_out(
+    time: Array, force: Array, edges: list[int], factor: int, *, settings: SearchSettings
+) -> Windows | None:
     """The pieces between edges whose level stands out, their edges refined; None where there are none or they explain little."""
-    edges, levels, opened = _merged(force, edges)
-    if not np.any(opened) or np.all(opened) or not _sudden(force, edges, levels):
+    edges, levels, opened = _merged(force, edges, settings=settings)
+    if not np.any(opened) or np.all(opened) or not _sudden(force, edges, levels, settings=settings):
         return None
     found = []
     for i in np.flatnonzero(opened):
@@ -123,17 +106,23 @@ def _standing_out(time: Array, force: Array, edges: list[int], factor: int) -> W
         found.append((start, stop - start, levels[i]))
     windows = Windows(*(np.array(column) for column in zip(*found, strict=True)))
     left = float(np.sum((force - windows.inside(time)) ** 2))
-    return windows if left < (1.0 - SHARE) * float(np.sum(force**2)) else None
+    return windows if left < (1.0 - settings.timed.share) * float(np.sum(force**2)) else None
 
 
-def _merged(force: Array, edges: list[int]) -> tuple[list[int], Array, NDArray[np.bool_]]:
+def _merged(
+    force: Array, edges: list[int], *, settings: SearchSettings
+) -> tuple[list[int], Array, NDArray[np.bool_]]:
     """Edges of pieces, neighbours of like force and those that do not stand out made one; their levels, and whether they stand out."""
     levels = [float(np.median(force[a:b])) for a, b in pairwise(edges)]
     largest = max((abs(level) for level in levels), default=0.0)
     kept, out, opened = [edges[0]], [], []
     for stop, level in zip(edges[1:], levels, strict=True):
-        stands = abs(level) > STANDS_OUT * largest
-        if out and stands == opened[-1] and (not stands or abs(level - out[-1]) < STAIR * abs(out[-1])):
+        stands = abs(level) > settings.timed.stands_out * largest
+        if (
+            out
+            and stands == opened[-1]
+            and (not stands or abs(level - out[-1]) < settings.timed.stair * abs(out[-1]))
+        ):
             kept[-1] = stop
             out[-1] = float(np.median(force[kept[-2] : stop]))
             continue
@@ -143,16 +132,20 @@ def _merged(force: Array, edges: list[int]) -> tuple[list[int], Array, NDArray[n
     return kept, np.array(out), np.array(opened)
 
 
-def _sudden(force: Array, edges: list[int], levels: Array) -> bool:
+def _sudden(force: Array, edges: list[int], levels: Array, *, settings: SearchSettings) -> bool:
     """Whether most of the edges are steep."""
     steepness = []
     for i in range(1, len(levels)):
         before, after = levels[i - 1], levels[i]
         first, last = (edges[i - 1] + edges[i]) // 2, (edges[i] + edges[i + 1]) // 2
         height = (force[first:last] - before) / (after - before)
-        inside = np.count_nonzero((height > MIDDLE[0]) & (height < MIDDLE[1]))
-        steepness.append(inside / (MIDDLE[1] - MIDDLE[0]) / (last - first))
-    return float(np.median(steepness)) < SUDDEN
+        inside = np.count_nonzero(
+            (height > settings.timed.edge_middle[0]) & (height < settings.timed.edge_middle[1])
+        )
+        steepness.append(
+            inside / (settings.timed.edge_middle[1] - settings.timed.edge_middle[0]) / (last - first)
+        )
+    return float(np.median(steepness)) < settings.timed.sudden
 
 
 def _edge(time: Array, force: Array, edge: int, before: float, after: float, factor: int) -> float:
@@ -168,12 +161,14 @@ def _edge(time: Array, force: Array, edge: int, before: float, after: float, fac
     )
 
 
-def follows_motion(windows: Windows, time: Array, motion: Motion, row: Array) -> bool:
+def follows_motion(
+    windows: Windows, time: Array, motion: Motion, row: Array, *, settings: SearchSettings
+) -> bool:
     """Whether windows open and close with the motion along a coordinate (n_dof,), so that they are no matter of time."""
     inside = windows.inside(time)
     position, velocity, acceleration = (samples @ row for samples in motion)
     for signal in (position, velocity, acceleration):
         for shape in (signal, np.sign(signal), np.abs(signal)):
-            if np.std(shape) > 0.0 and abs(np.corrcoef(inside, shape)[0, 1]) > FOLLOWS:
+            if np.std(shape) > 0.0 and abs(np.corrcoef(inside, shape)[0, 1]) > settings.timed.follows_motion:
                 return True
     return False

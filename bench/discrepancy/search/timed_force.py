@@ -18,7 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.discrepancy.case.case import CaseRecord
-from bench.discrepancy.effects.effect import RARE, Effect, FreeParameter, Scales, Values
+from bench.discrepancy.effects.effect import (
+    EFFECT_SETTINGS,
+    Effect,
+    FreeParameter,
+    Scales,
+    Values,
+)
 from bench.discrepancy.effects.read_off import FORCE, TIMED
 from bench.discrepancy.fitting.map_fit import Fit
 from bench.discrepancy.likelihood.problem import Problem
@@ -27,23 +33,16 @@ from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.model.structure import Place
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.search.fits import Search, consistent, converge, key_of
-from bench.discrepancy.search.time_windows import ALIKE, BLOCKS, Windows, follows_motion, windows_of
+from bench.discrepancy.search.time_windows import (
+    Windows,
+    follows_motion,
+    windows_of,
+)
+from bench.discrepancy.settings import SearchSettings
 from bench.laws.timed_force import MAX_WINDOWS, timed_force_law
 
 Array = NDArray[np.float64]
-REGULAR = 0.1
-"""Relative spread of the times between windows up to which they are told as periodic."""
 SHIFT = FreeParameter("shift", "step", signed=True, std=1.0, bounds=(-20.0, 20.0), unit="s")
-
-
-REFINED = 6
-"""Times that edges are moved and the force is fitted again."""
-MOVES = 6
-"""Steps by which edges are moved at once."""
-SHORTER = (1.0, 0.5, 0.2)
-"""Parts of a step that are tried."""
-DIFFERENCE = 0.5
-"""Part of a sample by which they are moved to see what that changes."""
 
 
 class _Found(NamedTuple):
@@ -72,7 +71,7 @@ def with_timed_force(search: Search) -> None:
     best = max(found, key=lambda one: one.share)
     placed = Placed(_effect(problem, best), best.place)
     start = np.concatenate([np.zeros(len(problem.nominal)), _start(placed, best, problem)])
-    for _ in range(REFINED):
+    for _ in range(search.problem.settings.search.timed.refinements):
         converge(search, [((placed,), start)])
         fitted = search.fits[key_of((placed,))]
         if not np.isfinite(fitted.cost) or consistent(fitted):
@@ -102,30 +101,34 @@ def _sharpened(problem: Problem, fitted: Fit, found: _Found) -> dict[str, Window
             return problem.residual_of(data, hypothesis, vector, lenient=False)
 
         out[record.name] = own
-        edges = _moved(residual, edges, record.step)
+        edges = _moved(residual, edges, record.step, settings=problem.settings.search)
         first, last = np.split(edges, 2)
         if np.all(last > first):
             out[record.name] = Windows(first, last - first, own.level)
     return out
 
 
-def _moved(residual: Callable[[Array], Array | None], edges: Array, step: float) -> Array:
+def _moved(
+    residual: Callable[[Array], Array | None], edges: Array, step: float, *, settings: SearchSettings
+) -> Array:
     """Edges (k,) moved by Gauss-Newton steps, a sample each at most, while what is left goes down.
 
     They have a prior of one sample about where they were: the area under the measured force has told them to about that.
     """
     origin, before = edges, residual(edges)
-    for _ in range(MOVES):
+    for _ in range(settings.timed.moves):
         if before is None:
             break
-        nearby = in_threads(residual, list(edges + DIFFERENCE * step * np.eye(len(edges))))
+        nearby = in_threads(residual, list(edges + settings.timed.difference * step * np.eye(len(edges))))
         if any(after is None for after in nearby):
             break
-        slopes = np.array([after - before for after in nearby if after is not None]).T / DIFFERENCE
+        slopes = (
+            np.array([after - before for after in nearby if after is not None]).T / settings.timed.difference
+        )
         right = slopes.T @ before + (edges - origin) / step
         move = -np.linalg.solve(slopes.T @ slopes + np.eye(len(edges)), right)
         longest = step * min(1.0, 1.0 / float(np.abs(move).max()))
-        tried = [edges + share * longest * move for share in SHORTER]
+        tried = [edges + share * longest * move for share in settings.timed.steps]
         ended = [(residual(moved), moved) for moved in tried]
         better = [
             (after, moved) for after, moved in ended if after is not None and after @ after < before @ before
@@ -155,12 +158,14 @@ def _at(problem: Problem, place: Place) -> _Found | None:
     for record in problem.records:
         lacking = missing_force(problem, record, place)
         power += float(np.sum(lacking**2))
-        own = windows_of(record.time, lacking)
+        own = windows_of(record.time, lacking, settings=problem.settings.search)
         if own is None:
             left += float(np.sum(lacking**2))
             continue
         if (
-            follows_motion(own, record.time, problem.motion_of(record), place.rows[0])
+            follows_motion(
+                own, record.time, problem.motion_of(record), place.rows[0], settings=problem.settings.search
+            )
             or len(own.start) > MAX_WINDOWS
         ):
             return None
@@ -171,7 +176,7 @@ def _at(problem: Problem, place: Place) -> _Found | None:
     levels = np.concatenate([own.level for own in windows.values()])
     reference = float(np.median(np.abs(levels))) * (1.0 if np.median(levels) >= 0.0 else -1.0)
     for record in problem.case.validation:
-        own = windows_of(record.time, missing_force(problem, record, place))
+        own = windows_of(record.time, missing_force(problem, record, place), settings=problem.settings.search)
         if own is not None and len(own.start) <= MAX_WINDOWS:
             windows[record.name] = own
     return _Found(place, windows, reference, 1.0 - left / power)
@@ -179,15 +184,20 @@ def _at(problem: Problem, place: Place) -> _Found | None:
 
 def _start(placed: Placed, found: _Found, problem: Problem) -> Array:
     scales = problem.scales_of(placed)
-    told = [p.eta(v, scales) for p, v in zip(placed.effect.parameters[2:], _told(found), strict=True)]
+    told = [
+        p.eta(v, scales)
+        for p, v in zip(
+            placed.effect.parameters[2:], _told(found, settings=problem.settings.search), strict=True
+        )
+    ]
     return np.array([placed.effect.parameters[0].eta(found.reference, scales), 0.0, *told])
 
 
-def _told(found: _Found) -> list[float]:
+def _told(found: _Found, *, settings: SearchSettings) -> list[float]:
     """Start and duration of the first window, the number of windows, and their period (0 for none), of the first record that has any."""
     first = next(iter(found.windows.values()))
     between = np.diff(first.start)
-    regular = len(between) > 1 and np.std(between) < REGULAR * np.mean(between)
+    regular = len(between) > 1 and np.std(between) < settings.timed.regular * np.mean(between)
     return [
         float(first.start[0]), float(np.median(first.duration)), float(len(first.start)),
         float(np.mean(between)) if regular else 0.0,
@@ -197,7 +207,10 @@ def _told(found: _Found) -> list[float]:
 def _effect(problem: Problem, found: _Found) -> Effect:
     """The effect with the windows that were found."""
     step = problem.records[0].step
-    tables = {name: _table(windows, found.reference) for name, windows in found.windows.items()}
+    tables = {
+        name: _table(windows, found.reference, settings=problem.settings.search)
+        for name, windows in found.windows.items()
+    }
     first = next(iter(tables.values()))
     count = sum(len(found.windows[r.name].start) for r in problem.records if r.name in found.windows)
 
@@ -212,7 +225,7 @@ def _effect(problem: Problem, found: _Found) -> Effect:
         TIMED, "external", "joint",
         (FORCE, SHIFT, *held),
         "f = -F in windows of time", law=timed_force_law(len(first)), theta=theta, of_record=of_record,
-        log_prior=RARE - 2.0 * math.log(BLOCKS) * count,
+        log_prior=EFFECT_SETTINGS.rare - 2.0 * math.log(problem.settings.search.timed.blocks) * count,
     )  # fmt: skip
 
 
@@ -220,10 +233,10 @@ TOLD = (("start", "s"), ("duration", "s"), ("windows", "1"), ("period", "s"))
 """What is told of the windows besides their force; the fits hold it."""
 
 
-def _table(windows: Windows, reference: float) -> Array:
+def _table(windows: Windows, reference: float, *, settings: SearchSettings) -> Array:
     """Start, duration and relative force (k, 3); windows of like force have the same."""
     relative = windows.level / reference
-    relative[np.abs(relative - 1.0) < ALIKE] = 1.0
+    relative[np.abs(relative - 1.0) < settings.timed.alike] = 1.0
     return np.column_stack([windows.start, windows.duration, relative])
 
 

@@ -16,7 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from bench.discrepancy.simulation.stick_slip import DIVERGED, LinearStructure, Motion
+from bench.discrepancy.simulation.stick_slip import (
+    STICK_SLIP_LIMITS,
+    LinearStructure,
+    Motion,
+)
 
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
@@ -85,7 +89,7 @@ def linear_run(
     for first, last in pairwise(firsts):
         _march(transition, driven[first:last], states[first:last])
     sampled = states[:: max(load_factor, 1)]
-    if not np.abs(sampled[-1]).max() < DIVERGED:
+    if not np.abs(sampled[-1]).max() < STICK_SLIP_LIMITS.diverged:
         sampled = np.full_like(sampled, np.nan)
     acceleration = sampled @ rate[:, :n].T + loads[:: max(load_factor, 1)] @ rate[:, n:].T
     return Motion(sampled[:, :n_dof], sampled[:, n_dof:], acceleration)

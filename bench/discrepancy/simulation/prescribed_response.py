@@ -12,15 +12,14 @@ from numpy.typing import NDArray
 
 from bench.discrepancy.simulation.stick_slip import (
     FORCE,
-    GRIPS,
     LIMIT,
-    MAX_ROWS,
     N_ROWS,
     N_STATES,
     RATE,
     ROW,
     SCALE,
     STATE,
+    STICK_SLIP_LIMITS,
     THETA,
     Elements,
     full,
@@ -34,7 +33,7 @@ from bench.laws.calling import advance, call_kernel, pointer_at
 def _driven(dt, t0, substeps, q, v, table, theta, z, force):  # noqa: PLR0912, PLR0915  (one compiled loop)
     """Force (n, n_rows) and hidden states of elements whose coordinates follow the samples `q`, `v` (n, n_rows)."""
     n_states = z.shape[0]
-    work = np.zeros((3, MAX_ROWS + GRIPS))
+    work = np.zeros((3, STICK_SLIP_LIMITS.max_rows + STICK_SLIP_LIMITS.grips))
     slopes = np.zeros((4, max(n_states, 1)))
     stage = np.zeros(max(n_states, 1))
     wq = pointer_at(work[0].ctypes.data)
@@ -54,7 +53,7 @@ def _driven(dt, t0, substeps, q, v, table, theta, z, force):  # noqa: PLR0912, P
                 work[0, r] = q[k, first + r]
                 work[1, r] = v[k, first + r]
                 work[2, r] = 0.0
-            work[2, MAX_ROWS:] = 0.0
+            work[2, STICK_SLIP_LIMITS.max_rows :] = 0.0
             zp = advance(z_pointer, table[e, STATE])
             if table[e, FORCE] != 0:
                 call_kernel(table[e, FORCE], t, wq, wv, zp, parameters, wf)
@@ -64,10 +63,12 @@ def _driven(dt, t0, substeps, q, v, table, theta, z, force):  # noqa: PLR0912, P
                 for r in range(rows):
                     work[2, r] *= scale
             if table[e, LIMIT] != 0:
-                call_kernel(table[e, LIMIT], t, wq, wv, zp, parameters, advance(wf, MAX_ROWS))
-                limit = max(scale * work[2, MAX_ROWS], 0.0)
-                creep = work[2, MAX_ROWS + 1]
-                lead = work[2, MAX_ROWS + 2]
+                call_kernel(
+                    table[e, LIMIT], t, wq, wv, zp, parameters, advance(wf, STICK_SLIP_LIMITS.max_rows)
+                )
+                limit = max(scale * work[2, STICK_SLIP_LIMITS.max_rows], 0.0)
+                creep = work[2, STICK_SLIP_LIMITS.max_rows + 1]
+                lead = work[2, STICK_SLIP_LIMITS.max_rows + 2]
                 if creep > 0.0 or lead > 0.0:
                     # the velocity a lead time on; what creeps not at all but only in time turns round early
                     after = min(k + 1, q.shape[0] - 1)

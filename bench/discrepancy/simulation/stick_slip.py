@@ -29,9 +29,6 @@ from numpy.typing import NDArray
 
 from bench.laws.calling import advance, call_kernel, load_int, pointer_at
 
-MAX_EVENTS = 12
-"""Most friction events resolved within one step; beyond it the step is completed with the mode it has."""
-
 FORCE, RATE, LIMIT, N_ROWS, ROW, THETA, STATE, N_STATES, SCALE = range(9)
 """Columns of the element table passed to the compiled loop."""
 
@@ -39,9 +36,6 @@ FORCE, RATE, LIMIT, N_ROWS, ROW, THETA, STATE, N_STATES, SCALE = range(9)
 COLUMNS = 9
 """Their number."""
 
-
-DIVERGED = 1e12
-"""Position beyond which a simulation counts as diverged."""
 
 _jit = numba.njit(cache=True, error_model="numpy", nogil=True)
 _inline = numba.njit(cache=True, error_model="numpy", nogil=True, forceinline=True)
@@ -98,14 +92,25 @@ class Motion(NamedTuple):
 NO_ELEMENTS = Elements(np.zeros((0, 8), dtype=np.int64), np.zeros((0, 1)), np.zeros(1), np.zeros(0))
 """No force law: the linear structure alone."""
 
-MAX_ROWS = 16
-"""Most coordinates of an element; `GRIPS` further scratch entries hold what a friction limit writes."""
-GRIPS = 3
-"""A friction limit, its creep velocity and its lead time, see `friction_limits`."""
-SOFT = 2.0
-"""Mode of friction that creeps rather than sticks; it has no events."""
-SWEEPS = 12
-"""Gauss-Seidel sweeps over several friction forces that creep at once; one alone is solved exactly by the first."""
+
+class StickSlipLimits(NamedTuple):
+    """Numbers of `bench.discrepancy.simulation.stick_slip` that compiled code holds."""
+
+    max_events: int = 12
+    """Most friction events resolved within one step; beyond it the step is completed with the mode it has."""
+    diverged: float = 1e12
+    """Position beyond which a simulation counts as diverged."""
+    max_rows: int = 16
+    """Most coordinates of an element; `grips` further scratch entries hold what a friction limit writes."""
+    grips: int = 3
+    """A friction limit, its creep velocity and its lead time, see `friction_limits`."""
+    soft: float = 2.0
+    """Mode of friction that creeps rather than sticks; it has no events."""
+    sweeps: int = 12
+    """Gauss-Seidel sweeps over several friction forces that creep at once; one alone is solved exactly by the first."""
+
+
+STICK_SLIP_LIMITS = StickSlipLimits()
 
 
 class _Plan(NamedTuple):
@@ -171,8 +176,8 @@ def _derivative(p, t, y, slope, load):  # noqa: PLR0912, PLR0915  (one compiled 
             )
         work[slope + n_dof + i] = total
     q = 7 * p.n
-    v = q + MAX_ROWS
-    f = v + MAX_ROWS
+    v = q + STICK_SLIP_LIMITS.max_rows
+    f = v + STICK_SLIP_LIMITS.max_rows
     held = False
     creeping = 0
     for e in range(p.n_elements):
@@ -199,15 +204,21 @@ def _derivative(p, t, y, slope, load):  # noqa: PLR0912, PLR0915  (one compiled 
             for r in range(n_rows):
                 work[f + r] *= scale
         if _entry(p, e, LIMIT) != 0:
-            for i in range(GRIPS):
-                work[f + MAX_ROWS + i] = 0.0
+            for i in range(STICK_SLIP_LIMITS.grips):
+                work[f + STICK_SLIP_LIMITS.max_rows + i] = 0.0
             call_kernel(
-                _entry(p, e, LIMIT), t, q_pointer, v_pointer, z, theta, advance(p.work, (f + MAX_ROWS))
+                _entry(p, e, LIMIT),
+                t,
+                q_pointer,
+                v_pointer,
+                z,
+                theta,
+                advance(p.work, (f + STICK_SLIP_LIMITS.max_rows)),
             )
-            p.grip[p.n_elements + e] = max(scale * work[f + MAX_ROWS], 0.0)
-            if p.mode[e] == SOFT:
-                p.grip[2 * p.n_elements + e] = work[f + MAX_ROWS + 1]
-                p.grip[3 * p.n_elements + e] = work[f + MAX_ROWS + 2]
+            p.grip[p.n_elements + e] = max(scale * work[f + STICK_SLIP_LIMITS.max_rows], 0.0)
+            if p.mode[e] == STICK_SLIP_LIMITS.soft:
+                p.grip[2 * p.n_elements + e] = work[f + STICK_SLIP_LIMITS.max_rows + 1]
+                p.grip[3 * p.n_elements + e] = work[f + STICK_SLIP_LIMITS.max_rows + 2]
                 creeping += 1
             else:
                 work[f] += p.mode[e] * p.grip[p.n_elements + e]
@@ -219,7 +230,7 @@ def _derivative(p, t, y, slope, load):  # noqa: PLR0912, PLR0915  (one compiled 
             zdot = advance(p.work, (slope + 2 * n_dof + _entry(p, e, STATE)))
             call_kernel(_entry(p, e, RATE), t, q_pointer, v_pointer, z, theta, zdot)
     if creeping > 0:
-        _creep(p, y, slope, SWEEPS if creeping > 1 else 1)
+        _creep(p, y, slope, STICK_SLIP_LIMITS.sweeps if creeping > 1 else 1)
     if held:
         _hold(p, slope)
 
@@ -228,10 +239,10 @@ def _derivative(p, t, y, slope, load):  # noqa: PLR0912, PLR0915  (one compiled 
 def _creep(p, y, slope, sweeps):
     """Add the forces of the elements that creep: each the one that goes with the acceleration that it leaves."""
     for e in range(p.n_elements):
-        p.grip[e] = p.grip[e] if p.mode[e] != SOFT else 0.0
+        p.grip[e] = p.grip[e] if p.mode[e] != STICK_SLIP_LIMITS.soft else 0.0
     for _ in range(sweeps):
         for e in range(p.n_elements):
-            if _entry(p, e, LIMIT) == 0 or p.mode[e] != SOFT:
+            if _entry(p, e, LIMIT) == 0 or p.mode[e] != STICK_SLIP_LIMITS.soft:
                 continue
             row = _entry(p, e, ROW)
             relative = 0.0
@@ -275,7 +286,7 @@ def _rk4(p, t, dt, known):
     """One classical Runge-Kutta step from the state into the trial state; `known`: the first slope is there already."""
     n = p.n
     work = p.work
-    load = 7 * n + 3 * MAX_ROWS + GRIPS
+    load = 7 * n + 3 * STICK_SLIP_LIMITS.max_rows + STICK_SLIP_LIMITS.grips
     n_inputs = p.n_inputs
     if not known:
         _derivative(p, t, 0, 3 * n, load)
@@ -321,8 +332,8 @@ def _settle(p, e, t, load):
 @_jit
 def _creeps(p, e, t):
     """Whether friction element `e` creeps rather than sticks; that does not change with the motion."""
-    limit = 7 * p.n + 3 * MAX_ROWS
-    for i in range(limit, limit + GRIPS):
+    limit = 7 * p.n + 3 * STICK_SLIP_LIMITS.max_rows
+    for i in range(limit, limit + STICK_SLIP_LIMITS.grips):
         p.work[i] = 0.0
     first = 7 * p.n
     call_kernel(
@@ -335,7 +346,7 @@ def _creeps(p, e, t):
 @_inline
 def _fill_loads(p, u, k, fraction, share):
     """Loads at the start, middle and end of a step that begins at `fraction` of sample `k` and is `share` of it long."""
-    load = 7 * p.n + 3 * MAX_ROWS + GRIPS
+    load = 7 * p.n + 3 * STICK_SLIP_LIMITS.max_rows + STICK_SLIP_LIMITS.grips
     n_inputs = u.shape[1]
     for i in range(3):
         at = (fraction + 0.5 * i * share) * p.load_factor
@@ -354,9 +365,9 @@ def _first_event(p, t, dt, rest):
     """Element whose mode ends first within the trial step of length `rest`, and the share of it until then."""
     event = -1
     first = rest
-    load = 7 * p.n + 3 * MAX_ROWS + GRIPS
+    load = 7 * p.n + 3 * STICK_SLIP_LIMITS.max_rows + STICK_SLIP_LIMITS.grips
     for e in range(p.n_elements):
-        if _entry(p, e, LIMIT) == 0 or p.mode[e] == SOFT:
+        if _entry(p, e, LIMIT) == 0 or p.mode[e] == STICK_SLIP_LIMITS.soft:
             continue
         if p.mode[e] == 0.0:
             # grip holds the values of the last stage, that is of the end of the step, until it is asked for the start
@@ -397,7 +408,12 @@ def _pass_event(p, u, k, t, dt, event, fraction, first, rest):
     for i in range(p.n):
         p.work[i] = p.work[p.n + i]
     if sliding:
-        _settle(p, event, t + first * dt, 7 * p.n + 3 * MAX_ROWS + GRIPS + 2 * u.shape[1])
+        _settle(
+            p,
+            event,
+            t + first * dt,
+            7 * p.n + 3 * STICK_SLIP_LIMITS.max_rows + STICK_SLIP_LIMITS.grips + 2 * u.shape[1],
+        )
     else:
         p.mode[event] = 1.0 if p.grip[event] > 0.0 else -1.0
     return first
@@ -424,13 +440,13 @@ def _free_run(clock, u, start, scratch, n_dof, matrices, table, rows, spread, th
         pointer_at(theta.ctypes.data), advance(base, 5 * n_elements),
     )  # fmt: skip
     work[:n] = start
-    load = 7 * n + 3 * MAX_ROWS + GRIPS
+    load = 7 * n + 3 * STICK_SLIP_LIMITS.max_rows + STICK_SLIP_LIMITS.grips
     frictional = False
     for j in range(u.shape[1]):
         work[load + j] = u[0, j]
     for e in range(n_elements):
         if _entry(p, e, LIMIT) != 0 and _creeps(p, e, t0):
-            mode[e] = SOFT
+            mode[e] = STICK_SLIP_LIMITS.soft
         elif _entry(p, e, LIMIT) != 0:
             frictional = True
             rate = _relative_velocity(p, 0, _entry(p, e, ROW))
@@ -449,7 +465,7 @@ def _free_run(clock, u, start, scratch, n_dof, matrices, table, rows, spread, th
             position[k, i] = work[i]
             velocity[k, i] = work[n_dof + i]
             acceleration[k, i] = work[3 * n + n_dof + i]
-        if not abs(work[0]) < DIVERGED:
+        if not abs(work[0]) < STICK_SLIP_LIMITS.diverged:
             position[k:] = np.nan
             return
         if k == n_samples - 1:
@@ -463,7 +479,7 @@ def _free_run(clock, u, start, scratch, n_dof, matrices, table, rows, spread, th
                 _rk4(p, t + fraction * dt, rest * dt, s == 0 and events == 0)
                 event = -1
                 first = rest
-                if frictional and events < MAX_EVENTS:
+                if frictional and events < STICK_SLIP_LIMITS.max_events:
                     event, first = _first_event(p, t + fraction * dt, rest * dt, rest)
                 if event < 0:
                     for i in range(n):
@@ -523,7 +539,13 @@ def free_run(
         y[: 2 * n_dof] = start
     y[2 * n_dof :] = elements.start
     n, n_inputs = (len(loads) - 1) // max(load_factor, 1) + 1, loads.shape[1]
-    scratch = np.zeros(5 * len(elements.table) + 7 * len(y) + 3 * MAX_ROWS + GRIPS + 3 * n_inputs)
+    scratch = np.zeros(
+        5 * len(elements.table)
+        + 7 * len(y)
+        + 3 * STICK_SLIP_LIMITS.max_rows
+        + STICK_SLIP_LIMITS.grips
+        + 3 * n_inputs
+    )
     motion = Motion(np.zeros((n, n_dof)), np.zeros((n, n_dof)), np.zeros((n, n_dof)))
     _free_run(
         (step, start_time, steps_of_each(substeps, n), load_factor), np.ascontiguousarray(loads), y, scratch, n_dof, matrices,

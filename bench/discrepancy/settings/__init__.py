@@ -1,0 +1,62 @@
+"""Thresholds of the diagnosis: frozen dataclasses, one a room, each value with its meaning and its reason."""
+
+from bench.discrepancy.settings.articulated import (
+    ArticulatedJudgementSettings,
+    ArticulatedSearchSettings,
+    ArticulatedSettings,
+)
+from bench.discrepancy.settings.case import CaseSettings
+from bench.discrepancy.settings.checks import ChecksSettings, LikenessSettings, ScaleSettings
+from bench.discrepancy.settings.describing import Described, described, setting
+from bench.discrepancy.settings.diagnosis import DEFAULT, DiagnosisSettings, changed, with_values
+from bench.discrepancy.settings.document import SettingsDocument, read_settings, settings_of
+from bench.discrepancy.settings.fitting import FittingSettings
+from bench.discrepancy.settings.judgement import CoarseSettings, HeldOutSettings, JudgementSettings
+from bench.discrepancy.settings.likelihood import ErrorSettings, LikelihoodSettings
+from bench.discrepancy.settings.localisation import LocalisationSettings
+from bench.discrepancy.settings.model import ModelSettings
+from bench.discrepancy.settings.motion import MemorySettings, MotionSettings
+from bench.discrepancy.settings.next_test import NextTestSettings
+from bench.discrepancy.settings.numerics import NumericsSettings
+from bench.discrepancy.settings.response import ResponseSettings
+from bench.discrepancy.settings.screening import ScreeningSettings
+from bench.discrepancy.settings.search import SearchSettings
+from bench.discrepancy.settings.search_parts import TimedForceSettings
+from bench.discrepancy.settings.simulation import SimulationSettings
+
+__all__ = [
+    "DEFAULT",
+    "ArticulatedJudgementSettings",
+    "ArticulatedSearchSettings",
+    "ArticulatedSettings",
+    "CaseSettings",
+    "ChecksSettings",
+    "CoarseSettings",
+    "Described",
+    "DiagnosisSettings",
+    "ErrorSettings",
+    "FittingSettings",
+    "HeldOutSettings",
+    "JudgementSettings",
+    "LikelihoodSettings",
+    "LikenessSettings",
+    "LocalisationSettings",
+    "MemorySettings",
+    "ModelSettings",
+    "MotionSettings",
+    "NextTestSettings",
+    "NumericsSettings",
+    "ResponseSettings",
+    "ScaleSettings",
+    "ScreeningSettings",
+    "SearchSettings",
+    "SettingsDocument",
+    "SimulationSettings",
+    "TimedForceSettings",
+    "changed",
+    "described",
+    "read_settings",
+    "setting",
+    "settings_of",
+    "with_values",
+]

@@ -1,0 +1,159 @@
+"""Thresholds of the room `articulated`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from bench.discrepancy.settings.describing import setting
+
+
+@dataclass(frozen=True)
+class ArticulatedSearchSettings:
+    """The search on articulated models."""
+
+    most: int = setting(3, "Largest number of effects named together.", "Convention.")
+    fitted: int = setting(10, "Screened effects that are fitted in a round, at most.", "Convention.")
+    least: int = setting(3, "Of those, the ones that are fitted whatever they promise.", "Convention.")
+    hope: float = setting(
+        0.5,
+        "The others are fitted while they promise more than this part of what the best fit so far has gained.",
+        "A screening is a linearisation, and errs by less than that where it matters.",
+    )
+    starts: int = setting(2, "Grid points from which one effect is fitted.", "Convention.")
+    iterations: int = setting(20, "Steps of a fit.", "Convention.")
+    refits: int = setting(
+        3, "Fits of the nominal model alone, each with the scales that the last one left.", "Convention."
+    )
+    worth: float = setting(
+        4.6,
+        "Log posterior that a further effect has to add, ten to one being 2.3 and a hundred to one 4.6.",
+        "Convention.",
+    )
+    softening: tuple[float, ...] = setting(
+        (0.2, 0.02),
+        (
+            "Noise of the torque, as parts of its RMS, with which effects are screened and fitted one after the other before "
+            "the stated noise holds (`ArticulatedProblem.softened`)."
+        ),
+        "From what a crude model errs by to what motor currents tell.",
+    )
+    strained: float = setting(
+        3.0,
+        "Deviation of a nominal parameter, in its stated standard uncertainties, from which it counts as a finding.",
+        "Convention.",
+    )
+    finalists: int = setting(5, "Effects that are fitted again without it.", "Convention.")
+
+
+@dataclass(frozen=True)
+class ArticulatedJudgementSettings:
+    """The judgement on articulated models."""
+
+    blocks: int = setting(
+        24,
+        "Blocks of a judging record, over which an improvement has to be sure.",
+        "Some periods of the motion each.",
+    )
+    sure: float = setting(
+        2.0, "Standard errors by which a further effect has to improve on the judging records.", "Convention."
+    )
+    noise_known: float = setting(
+        0.05,
+        "Relative accuracy to which the stated noise is taken to be known.",
+        "What leaves no more than this beyond it is complete.",
+    )
+    material: float = setting(
+        0.5,
+        "Part of the discrepancy that the effects together have to close for them to be called its cause.",
+        "Convention.",
+    )
+    rival: float = setting(
+        4.6,
+        "Difference in log posterior (odds of 100) within which explanations stand for one another.",
+        "Convention.",
+    )
+    outside: float = setting(
+        0.01,
+        "Probability kept for what no catalogue holds, also where a catalogued effect explains the records.",
+        "That of the linear structures (`judgement.posterior`).",
+    )
+    strained: float = setting(
+        4.0,
+        (
+            "Deviation of a nominal parameter, in its stated standard uncertainties, beyond which it is not believed (one "
+            "normal number in 16000 is as far out)."
+        ),
+        "Predictions are made with it there, and what needs more is not complete.",
+    )
+    small: float = setting(
+        0.05,
+        (
+            "Part of the discrepancy that a further effect has to close where it does not complete the explanation, the "
+            "accuracy to which laws of friction hold on real joints."
+        ),
+        "Convention.",
+    )
+
+
+@dataclass(frozen=True)
+class ArticulatedSettings:
+    """Arms and legs: their records, fits and judgement."""
+
+    postures: int = setting(
+        8, "Random postures at which the mass matrix is compared.", "One that matters shows at nearly any."
+    )
+    shown: float = setting(
+        0.01, "Share of the excess below which a joint counts as clean.", "A resolution of the picture."
+    )
+    holds: tuple[float, ...] = setting(
+        (0.05, 0.95),
+        "Cumulated parts of a power between which a band or an interval is said to hold it.",
+        "Nine tenths of it.",
+    )
+    effect_reach: float = setting(
+        4.0,
+        "Longest step of a fit in the parameters of effects.",
+        "Responses are not linear in shapes.",
+        unit="sigmas",
+    )
+    nominal_reach: float = setting(
+        40.0,
+        "The same in nominal parameters.",
+        "Their priors are narrow and the equations linear in them.",
+        unit="sigmas",
+    )
+    difference: float = setting(
+        1e-4,
+        "Difference of a parameter for what the joints know of the masses.",
+        "The equations are linear in it.",
+        unit="sigmas",
+    )
+    kept_motions: int = setting(
+        24,
+        "Corrected records kept.",
+        "One sensor effect's derivatives over all identification records; memory.",
+    )
+    diverged: float = setting(
+        1000000.0,
+        "Residual that stands for a run that is not finite.",
+        "Larger than any that is one.",
+        unit="sigmas",
+    )
+    at_bound: float = setting(1e-6, "Distance from a bound at which a parameter sits on it.", "Rounding.")
+    longest_step: float = setting(
+        1e-3,
+        "Longest integration step.",
+        "MuJoCo's own default is two of them, and a servo of 10 Hz is then integrated to 3e-4.",
+        unit="s",
+    )
+    followed: float = setting(
+        20.0,
+        "Frequency up to which links are moved.",
+        "What a robot is driven with lies below, and a second derivative lives on what lies above.",
+        unit="Hz",
+    )
+    shift: float = setting(
+        1e-4, "Shift of a centre of mass for its derivative.", "The equations are linear in it.", unit="m"
+    )
+    search: ArticulatedSearchSettings = field(default_factory=ArticulatedSearchSettings)
+    judgement: ArticulatedJudgementSettings = field(default_factory=ArticulatedJudgementSettings)

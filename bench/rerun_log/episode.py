@@ -1,0 +1,80 @@
+"""An excitation episode in the rerun viewer: the rig under the commands, how near its limits, and what is known by when."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.excitation import Experiment
+from bench.recording import Recording
+from bench.rerun_log.comparison import log_comparison
+from bench.rig import Rig, simulate
+
+WINDOWS = 12
+"""Instants at which the information is told; each costs a simulation of every drawn rig."""
+
+
+def episode_record(rig: Rig, experiment: Experiment, controls: NDArray[np.float64]) -> Recording:
+    """The rig under the commands, with its nearness to the limits and the information so far as further channels.
+
+    Args:
+        rig: The rig.
+        experiment: What is asked of it; its merit of the commands up to an instant is the information by then.
+        controls: Commands (n, n_actuators) [N, N m].
+
+    Returns:
+        The record, with "limit/…" for each limited channel, force and energy [1] (1 at the limit), and "information" [1] (nat; of
+        rivals the mean logarithm of the expected Bayes factor).
+    """
+    limits = experiment.limits
+    record = simulate(rig, {name: controls[:, i] for i, name in enumerate(limits.actuators)})
+    n = len(record.time)
+    shares = {
+        f"limit/{name}": np.abs(record[name]) / limit
+        for name, limit in limits.watched.items()
+        if name in record.names and np.isfinite(limit)
+    }
+    step = experiment.timestep
+    for i, name in enumerate(limits.actuators):
+        shares[f"limit/force of {name}"] = _long(np.abs(controls[:, i]) / limits.force[name], n)
+        if name in limits.energy:
+            spent = step * np.cumsum(controls[:, i] ** 2) / limits.energy[name]
+            shares[f"limit/energy of {name}"] = _long(spent, n)
+    ends = np.linspace(0, len(controls), WINDOWS + 1).astype(int)[1:]
+    # A test that ends there: what the free decay after it would tell is not known yet.
+    told = np.array([0.0, *(float(experiment.merit(controls[None, :end])[0]) for end in ends)])
+    course = np.interp(np.arange(n), np.concatenate([[0], ends]), told)
+    arrays = shares | {"information": course}
+    return record.with_channels(arrays, units=dict.fromkeys(arrays, "1"))
+
+
+def _long(values: NDArray[np.float64], n: int) -> NDArray[np.float64]:
+    """Values of each command at the n samples of the record, the last held."""
+    return values[np.minimum(np.arange(n), len(values) - 1)]
+
+
+def log_episode(
+    path: str | Path | None,
+    rig: Rig,
+    experiment: Experiment,
+    controls: Sequence[NDArray[np.float64]] | NDArray[np.float64],
+    *,
+    title: str = "",
+) -> Path | None:
+    """Log an excitation episode: the rig in 3-D, its channels and loops, its limits, and what is known by when.
+
+    Args:
+        path: The ``.rrd`` file; None opens the viewer.
+        rig: The rig that is excited.
+        experiment: The question, its means and limits.
+        controls: Commands (n, n_actuators) [N, N m].
+        title: Name of the recording.
+
+    Returns:
+        The file written, or None where the viewer was opened.
+    """
+    record = episode_record(rig, experiment, np.asarray(controls, dtype=float))
+    return log_comparison(path, {"rig": rig}, {"rig": record}, title=title or "excitation episode")
