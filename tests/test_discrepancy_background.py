@@ -10,7 +10,7 @@ import pytest
 from bench.cli import main
 from bench.discrepancy import score_blind
 from bench.discrepancy.blind.background import ACTING, RECORDED, Background, draw_background
-from bench.discrepancy.blind.background_score import background_scored
+from bench.discrepancy.blind.background_score import background_scored, background_summary
 from bench.discrepancy.blind.background_settings import STATED, BackgroundSettings
 from bench.discrepancy.blind.drawing import (
     DRAWING_SETTINGS,
@@ -185,6 +185,11 @@ def test_both_worlds_have_figures_of_their_own(tmp_path):
     assert score.background.wrong == (
         "b: ['gap'] -> unknown []; not: main effect named or in a declared set, and first",
     )
+    drift = result("effect", [("stiffness_drift", 0.9), ("gap", 0.5)])
+    for background, error in ((["slow_stiffness"], 0.3), (["hum"], 0.7)):
+        told = background_summary([("a", answer([], background), drift)])
+        # 0.9 and 0.5, of which the drift is so in the first case only
+        assert told.calibration == pytest.approx(error)
     assert "With a background" in [table.caption for table in tables(score)]
     assert score.to_json()["background"]["shares"][MAIN]
 

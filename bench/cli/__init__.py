@@ -16,6 +16,7 @@ from rich.console import Console
 import bench
 from bench import __version__, kernel_cache
 from bench.cli.application import Apply
+from bench.cli.check import Check
 from bench.cli.console import Terminated, terminable
 from bench.cli.diagnose import Diagnose
 from bench.cli.diagnosis import Blind
@@ -43,6 +44,7 @@ COMMANDS: dict[str, type] = {
     "convert": Convert,
     "excite": Excite,
     "init": Init,
+    "check": Check,
     "diagnose": Diagnose,
     "apply": Apply,
     "blind": Blind,

@@ -61,6 +61,8 @@ class Diagnose:
     """Seconds after which no further stage of the search is begun; the verdict is then the best one so far and says what was not tried."""
     settings: Path | None = None
     """File (JSON or TOML) with thresholds that differ from their defaults, as tables by room (see docs/thresholds.md)."""
+    check: bool = True
+    """Look at the records first, as `jointbench check` does, and say at once what is doubtful."""
     force: bool = False
     """Overwrite files that exist."""
     progress: bool = True
@@ -212,10 +214,16 @@ def _diagnosed(asked: Diagnose, case: Case, stage: Callable[[str], None]) -> Dia
     import numpy as np
 
     from bench.discrepancy import diagnose
+    from bench.discrepancy.precheck.checking import check
     from bench.discrepancy.settings import DEFAULT, read_settings
     from bench.errors import IdentificationError
 
     settings = DEFAULT if asked.settings is None else read_settings(asked.settings)
+    if asked.check:
+        stage("looking at the records")
+        told = Console(stderr=True, soft_wrap=True)
+        for doubt in check(case, informed=False).doubts:
+            told.print(f"check: {doubt}", style="yellow", markup=False, highlight=False)
     try:
         return diagnose(
             case,

@@ -5,20 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 
 from bench.cli.console import emit
 
-if TYPE_CHECKING:
-    from bench.cli.diagnose import Diagnose
-
 Stages = Callable[[bool], AbstractContextManager[Callable[[str], None]]]
 
 
-def diagnose_fleet(asked: Diagnose, stages: Stages) -> None:
+def diagnose_fleet(asked: Any, stages: Stages) -> None:
     """Diagnose the cases of a command, tell of all in one table, and write what was asked for."""
     import json
 

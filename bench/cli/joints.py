@@ -150,7 +150,7 @@ class Swap:
 class Compare:
     """Drive a rig with its true joint and with the reduced one alike, and tell how far they part.
 
-    Example: jointbench compare rig.toml joint.json --seed 7 --html compared.html
+    Example: jointbench compare rig.toml joint.json --seed 7 --picture compared.png
     """
 
     rig: tyro.conf.Positional[Path]

@@ -32,7 +32,7 @@ def summary(verdict: Verdict) -> list[Any]:
                 f"{name} = {p.value:.5g} ± {p.std:.2g} {p.unit if p.unit != '1' else ''}".rstrip()
                 for name, p in effect.parameters.items()
             )
-            where = " ".join(text for text in (effect.where, effect.channel) if text)
+            where = " ".join(dict.fromkeys(text for text in (effect.where, effect.channel) if text))
             closes = interval(effect.closed, effect.closed_ci95)
             table.add_row(effect.name, where, probability(effect.probability), closes, Text(values))
         parts.append(table)

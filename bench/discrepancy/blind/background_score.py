@@ -28,6 +28,14 @@ from bench.discrepancy.blind.proportions import (
 )
 
 CLASSES = ("main", "unstated", "background", "clean")
+BY_ANOTHER_NAME = {
+    "warming": "stiffness_drift",
+    "slow_stiffness": "stiffness_drift",
+    "hidden_resonator": "base_flexibility",
+    "stroke_friction": "coulomb_friction",
+}
+"""Things of a background that the catalogue knows by a name of its own, in another shape: a stiffness that changes along the record, a
+further mass on a spring, friction whose mean along the stroke is not zero. Who names one of these says what is so."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +61,8 @@ class BackgroundScore:
 
     Attributes:
         shares: What is scored to its share.
-        calibration: Expected calibration error of the names' probabilities.
+        calibration: Expected calibration error of the names' probabilities; a name is right if it is that of the withheld effect, or
+            of something in the background (`BY_ANOTHER_NAME`).
         scatter: What it would be on average if every probability were exact: so many names scatter by it.
         reliability: Stated probability, share right and number of each bin.
         wrong: Names of the cases that are not right, and what was said.
@@ -173,8 +182,9 @@ def _within_a_set(true: str, said: list[str], result: Mapping[str, Any]) -> bool
 
 
 def _stated(answer: Mapping[str, Any], result: Mapping[str, Any]) -> Iterable[tuple[float, bool]]:
-    """Probability of every name, and whether it is right."""
+    """Probability of every name, and whether it is right: the effect that was withheld, or what a thing of the background is."""
     true = {effect["name"] for effect in answer["effects"]}
+    true.update(BY_ANOTHER_NAME[name] for name in answer.get("background") or () if name in BY_ANOTHER_NAME)
     for effect in result["named"]:
         yield effect["probability"], effect["name"] in true
 

@@ -92,6 +92,18 @@ def notes(case: Case, problem: Problem) -> tuple[str, ...]:
     return tuple(dict.fromkeys(found))
 
 
+def doubts(case: Case, problem: Problem) -> tuple[str, ...]:
+    """Those of `notes` that speak of a fault of the records rather than of what was left open; arguments as there."""
+    found: list[str] = []
+    for check in (_short, _clock, _repeated, _saturated, _understated, _still, _tipping):
+        found += check(case, problem)
+    channels = tuple(_between_channels(problem))
+    found += channels
+    if not problem.driven and not channels:
+        found += _against_model(problem)
+    return tuple(dict.fromkeys(found))
+
+
 def _unstated(case: Case, problem: Problem) -> Iterator[str]:
     for name in problem.structure.channels:
         if case.channel(name).noise_std is None:

@@ -184,12 +184,26 @@ def _sets(judged: Judged) -> tuple[tuple[str, ...], ...]:
     return tuple(tuple(sorted(entry)) for entry in sets.values())
 
 
+def _other_kinds(judged: Judged) -> str:
+    """A sentence on explanations of other families that do as well; empty where there is none."""
+    own = {p.effect.family for p in judged.chosen.explanation.hypothesis}
+    others = [
+        names(entry.explanation.hypothesis)
+        for entry in judged.alike
+        if entry.explanation.hypothesis and {p.effect.family for p in entry.explanation.hypothesis} != own
+    ]
+    if not others:
+        return ""
+    return f" What kind of thing it is stays open: {', or '.join(dict.fromkeys(others))} would do as well."
+
+
 def _words(kind: Kind, judged: Judged, nearest: Explanation) -> str:
     chosen = judged.chosen.explanation
     if kind == "effect":
         return (
             f"Missing from the model: {names(chosen.hypothesis)}. What is left is more than the stated noise, or no noise is stated: "
             "the model stays wrong in small ways, and explanations were weighed by what they predict of blocks that they did not see."
+            + _other_kinds(judged)
         )
     if kind == "none":
         return "No effect of the catalogue predicts the records better than the nominal model does with its parameters re-estimated."

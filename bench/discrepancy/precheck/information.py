@@ -1,0 +1,189 @@
+"""What the records can tell of nominal parameters and effects: Fisher information about the nominal model.
+
+With the responses whitened, a nominal parameter changes them by a column a sigma of it; what all of them leave of its prior width is the
+diagonal of ``(J'J + I)^-1``. An effect at the size that would matter changes them by a further column, of which the parameters imitate
+what they can within their priors; the square of what remains is the chi-squared by which it will show.
+
+References:
+    S. M. Kay, Fundamentals of Statistical Signal Processing: Estimation Theory, 1993, ch. 3 (Fisher information).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.discrepancy.case.case import Case, CaseRecord
+from bench.discrepancy.effects.catalogue import CATALOGUE
+from bench.discrepancy.likelihood.problem import Problem
+from bench.discrepancy.model.placement import Placed
+from bench.discrepancy.model.placements import placements
+from bench.discrepancy.numerics.threads import in_threads
+from bench.discrepancy.precheck.settings import CheckSettings
+
+Array = NDArray[np.float64]
+Word = Literal["identifiable", "weak", "not identifiable"]
+STEP = 0.1
+"""Step of the differences, in sigmas of a parameter: curvature is left out, and rounding is far."""
+
+
+class Told(NamedTuple):
+    """How well the records tell something.
+
+    Attributes:
+        name: The parameter or effect.
+        where: Place of an effect.
+        word: In a word.
+        figure: Posterior over prior width of a parameter; square root of the chi-squared by which an effect shows, in sigmas.
+        text: In words.
+    """
+
+    name: str
+    where: str
+    word: Word
+    figure: float
+    text: str
+
+
+def shortened(case: Case, seconds: float) -> Case:
+    """The case with the beginnings of its identification records."""
+
+    def cut(record: CaseRecord) -> CaseRecord:
+        n = max(round(seconds / record.step), 200)
+        values = {name: samples[:n] for name, samples in record.values.items()}
+        return replace(record, values=values, periodic=record.periodic and n >= len(record))
+
+    return replace(case, identification=tuple(cut(record) for record in case.identification))
+
+
+def parameter_columns(problem: Problem, record: CaseRecord, predicted: Array) -> list[Array]:
+    """Changes (n, n_channels) of the predicted responses by a sigma of each uncertain parameter."""
+    out = []
+    for p in np.flatnonzero(problem.spread > 0.0):
+        moved = np.zeros(len(problem.nominal))
+        moved[p] = STEP
+        out.append((problem.simulate((), moved, record) - predicted) / STEP)
+    return out
+
+
+def parameters_told(problem: Problem, settings: CheckSettings) -> tuple[list[Told], Array]:
+    """How well the records tell each uncertain nominal parameter, and their whitened columns (n, n_parameters)."""
+    rest = problem.residual((), np.zeros(len(problem.nominal)))
+    uncertain = [int(p) for p in np.flatnonzero(problem.spread > 0.0)]
+    columns = []
+    for p in uncertain:
+        moved = np.zeros(len(problem.nominal))
+        moved[p] = STEP
+        column = (problem.residual((), moved) - rest) / STEP
+        columns.append(column if np.shape(column) == rest.shape else np.zeros_like(rest))
+    if not columns:
+        return [], np.zeros((len(rest), 0))
+    J = np.column_stack(columns)
+    cover = np.linalg.inv(J.T @ J + np.eye(J.shape[1]))
+    found = []
+    for k, p in enumerate(uncertain[: len(problem.structure.parameters)]):
+        if p >= len(problem.structure.parameters):
+            continue
+        width = float(np.sqrt(cover[k, k]))
+        word: Word = (
+            "identifiable"
+            if width <= settings.identifiable
+            else "weak"
+            if width <= settings.weak
+            else "not identifiable"
+        )
+        sigma = float(problem.spread[p] * width)
+        text = {
+            "identifiable": f"known to ± {sigma:.3g} after these records",
+            "weak": f"± {sigma:.3g} instead of ± {problem.spread[p]:.3g}: excite it more, or for longer",
+            "not identifiable": "these records say nothing of it: its stated uncertainty stays; leave it, or excite what it acts on",
+        }[word]
+        found.append(Told(problem.structure.parameters[p], "", word, width, text))
+    return found, J
+
+
+def effects_told(case: Case, problem: Problem, parameters: Array, settings: CheckSettings) -> list[Told]:
+    """How well the records tell each effect of the catalogue at the size that would matter."""
+    chosen = [e for e in CATALOGUE if e.site != "record" and not e.rare and e.variant == ""]
+    placed = [p for p in placements(case, problem.structure, chosen) if not p.source]
+    rest = problem.residual((), np.zeros(len(problem.nominal)))
+    inner = np.linalg.inv(parameters.T @ parameters + np.eye(parameters.shape[1]))
+
+    def told(one: Placed) -> Told:
+        sized = _at_size(problem, one, settings)
+        where = one.place.site or one.target
+        if sized is None:
+            text = f"reaches {100 * settings.matters:.0f} % of no response within these motions: larger or slower ones would show it"
+            return Told(one.effect.name, where, "not identifiable", 0.0, text)
+        column = problem.residual((one,), sized) - rest
+        if np.shape(column) != rest.shape or not np.isfinite(column).all():
+            return Told(
+                one.effect.name, where, "weak", 0.0, "drives the nominal model out of bounds at that size"
+            )
+        along = parameters.T @ column
+        left = float(column @ column - along @ inner @ along)
+        imitated = 1.0 - left / max(float(column @ column), 1e-300)
+        figure = math.sqrt(max(left, 0.0))
+        word: Word = (
+            "identifiable"
+            if left >= settings.certain
+            else "weak"
+            if left >= settings.hint
+            else "not identifiable"
+        )
+        text = f"{figure:.3g} sigmas at {100 * settings.matters:.0f} % of a response"
+        if imitated > 0.9:
+            text += f"; nominal parameters imitate {100 * imitated:.0f} % of it"
+        return Told(one.effect.name, where, word, figure, text)
+
+    return _best(in_threads(told, placed))
+
+
+def _best(found: Sequence[Told]) -> list[Told]:
+    """The best told of the targets of each effect and place."""
+    best: dict[tuple[str, str], Told] = {}
+    for one in found:
+        key = (one.name, one.where)
+        if key not in best or one.figure > best[key].figure:
+            best[key] = one
+    return list(best.values())
+
+
+def _at_size(problem: Problem, placed: Placed, settings: CheckSettings) -> Array | None:
+    """The vector of an effect whose amplitude changes a response by the part that matters; None where it reaches none."""
+    eta = placed.effect.grid()[len(placed.effect.grid()) // 2].copy()
+    first = placed.effect.parameters[0]
+    low, high = first.mean - settings.reach * first.std, first.mean + settings.reach * first.std
+    low, high = max(low, first.bounds[0]), min(high, first.bounds[1])
+    if first.signed and eta[0] == 0.0:
+        eta[0] = first.std
+    for _ in range(3):
+        change = _change(problem, placed, eta)
+        if change is None or change <= 0.0:
+            return None
+        ratio = settings.matters / change
+        wanted = eta[0] * ratio if first.signed else eta[0] + math.log(ratio)
+        eta[0] = min(max(wanted, low), high)
+    change = _change(problem, placed, eta)
+    if change is None or change < 0.3 * settings.matters:
+        return None
+    return np.concatenate([np.zeros(len(problem.nominal)), eta])
+
+
+def _change(problem: Problem, placed: Placed, eta: Array) -> float | None:
+    """Largest change of a response over its rms, over all records; None where the run diverged."""
+    vector = np.concatenate([np.zeros(len(problem.nominal)), eta])
+    most = 0.0
+    for record in problem.records:
+        with_it = problem.simulate((placed,), vector, record)
+        without = problem.simulate((), np.zeros(len(problem.nominal)), record)
+        if not np.isfinite(with_it).all():
+            return None
+        size = np.maximum(np.sqrt(np.mean(without**2, axis=0)), 1e-300)
+        most = max(most, float(np.max(np.sqrt(np.mean((with_it - without) ** 2, axis=0)) / size)))
+    return most

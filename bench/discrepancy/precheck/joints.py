@@ -1,0 +1,122 @@
+"""Doubts about records of an articulated model, joint by joint: drives and encoders that are missing, still, late or turned round."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.discrepancy.case.case import Case, CaseRecord
+from bench.discrepancy.checks.data_quality import compare
+from bench.discrepancy.multibody.channels import bound
+from bench.discrepancy.multibody.model import ArticulatedModel
+from bench.discrepancy.multibody.records import encoders_of, input_of
+from bench.errors import BenchError
+
+Array = NDArray[np.float64]
+FOLLOWS = 0.5
+"""Correlation of a servo's target with its joint from which their order in time tells something."""
+STILL = 30.0
+"""Noise that the motion of a joint has to exceed, so that friction and inertia can be told from it."""
+REVERSALS = 4
+"""Reversals of a joint that its friction needs to be told from gravity."""
+
+
+def joint_doubts(case: Case) -> list[str]:
+    """What is doubtful about an articulated case, a sentence each.
+
+    Raises nothing: what the diagnosis would refuse is one of them.
+    """
+    try:
+        compiled = mujoco.MjModel.from_xml_path(str(Path(case.folder or ".") / case.rig))
+        model = ArticulatedModel.of(compiled)
+        own = bound(case, compiled)
+    except (BenchError, ValueError) as error:
+        return [" ".join(str(error).split())]
+    found: list[str] = []
+    for joint in model.joints:
+        try:
+            encoders = encoders_of(own, joint)
+            driving = input_of(own, joint)
+        except BenchError as error:
+            found.append(str(error))
+            continue
+        position = encoders.channels[0]
+        servo = joint.drive is not None and joint.drive.servo
+        for record in own.identification:
+            q = np.asarray(record.values[position.name])
+            u = np.asarray(record.values[driving.name])
+            found += _moves(joint.name, record, q, float(position.noise_std or 0.0))
+            if servo:
+                found += _follows(joint.name, driving.name, record, q, u)
+            velocity = next((c for c in encoders.channels if c.quantity == "velocity"), None)
+            if velocity is not None:
+                noise = float(position.noise_std or 0.0), float(velocity.noise_std or 0.0)
+                found += _derivatives(position.name, velocity.name, record, q, *noise)
+    return list(dict.fromkeys(found))
+
+
+def _moves(joint: str, record: CaseRecord, q: Array, noise: float) -> Iterator[str]:
+    if np.ptp(q) <= STILL * max(noise, 1e-12):
+        yield f"joint '{joint}' hardly moves in '{record.name}': its friction, inertia and drive cannot be told from that"
+        return
+    smooth = np.convolve(q, np.ones(5) / 5.0, "valid")
+    hysteresis = 0.05 * np.ptp(smooth)
+    turns, last, rising = 0, smooth[0], True
+    for value in smooth:
+        if rising:
+            last = max(last, value)
+            if value < last - hysteresis:
+                turns, last, rising = turns + 1, value, False
+        else:
+            last = min(last, value)
+            if value > last + hysteresis:
+                turns, last, rising = turns + 1, value, True
+    if turns < REVERSALS:
+        yield (
+            f"joint '{joint}' reverses {turns} time(s) in '{record.name}'; {REVERSALS} are wanted to tell friction from gravity"
+        )
+
+
+def _follows(joint: str, target: str, record: CaseRecord, q: Array, u: Array) -> Iterator[str]:
+    if min(np.std(q), np.std(u)) == 0.0:
+        return
+    correlation = float(np.corrcoef(q, u)[0, 1])
+    if correlation < -FOLLOWS:
+        yield f"joint '{joint}' runs against its target '{target}' in '{record.name}'; turn one of them round"
+    factor = float(np.std(q) / np.std(u))
+    if abs(correlation) > FOLLOWS and not 0.2 < factor < 5.0:
+        yield (
+            f"joint '{joint}' moves {factor:.3g} times as far as its target '{target}' in '{record.name}': degrees, or a gear?"
+        )
+    if correlation > FOLLOWS:
+        n = len(q)
+        spectra = np.fft.rfft(q - q.mean(), 2 * n) * np.conj(np.fft.rfft(u - u.mean(), 2 * n))
+        lags = np.fft.irfft(spectra)
+        reach = min(n // 4, round(1.0 / record.step))
+        window = np.concatenate([lags[-reach:], lags[: reach + 1]])
+        lag = (int(np.argmax(window)) - reach) * record.step
+        if lag < -1.5 * record.step:
+            yield (
+                f"joint '{joint}' moves {-1e3 * lag:.3g} ms before its target '{target}' in '{record.name}': the clocks of the two differ; "
+                "align them"
+            )
+
+
+def _derivatives(
+    position: str, velocity: str, record: CaseRecord, q: Array, noise_q: float, noise_v: float
+) -> Iterator[str]:
+    v = np.asarray(record.values[velocity])
+    pair = compare(q, v, orders=(0, 1), noise=(noise_q, noise_v), step=record.step)
+    if pair is None or abs(pair.correlation) < 0.9:
+        return
+    if pair.correlation < 0.0:
+        yield f"'{position}' and '{velocity}' have opposite signs in '{record.name}'; turn one of them round"
+    if not 0.5 < pair.factor < 2.0:
+        yield f"'{position}' is {pair.factor:.3g} times what '{velocity}' says in '{record.name}': look at their units"
+    if abs(pair.lag) > 1.5 * record.step:
+        late, early = (position, velocity) if pair.lag > 0.0 else (velocity, position)
+        yield f"'{late}' lags '{early}' by {1e3 * abs(pair.lag):.3g} ms in '{record.name}'; align them"

@@ -1,0 +1,40 @@
+"""Thresholds of the check."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class CheckSettings:
+    """When something counts.
+
+    Attributes:
+        matters: Change of a response, over its rms, of an effect at the size that would matter. A fit that good is what a model of a
+            machine is called accurate for; smaller effects hide in the 5 to 10 % by which nominal parameters are off.
+        identifiable: Posterior over prior standard deviation of a nominal parameter up to which the records tell it.
+        weak: The same up to which they tell something of it; above it the stated value stays what it was.
+        certain: Chi-squared that an effect keeps once the nominal parameters have taken what they can, from which it can be named: five
+            sigmas, the evidence that the search itself asks for before it fits (`screening.candidates.WORTH_A_FIT`).
+        hint: The same from which it shows: three sigmas.
+        reach: Prior standard deviations within which an effect has to reach the size that matters.
+        records_seconds: Seconds of each record that the information is computed on, so that it takes seconds itself.
+        shift: Power that is left of the residual at the best shift in time, over that at none, from which the shift is told.
+        one_sided: Share of a load's samples of one sign from which it may be a magnitude.
+        unsigned: By how much the magnitude of the load that the motion implies has to correlate better with it than the load itself.
+        glitch: Jump from a neighbour to a sample and back, over what the samples around do at most, from which it is a torn value.
+        frozen: Samples in a row with one value, of a channel that otherwise moves at every sample, from which it is a stuck one.
+    """
+
+    matters: float = 0.05
+    identifiable: float = 0.5
+    weak: float = 0.9
+    certain: float = 25.0
+    hint: float = 9.0
+    reach: float = 4.0
+    records_seconds: float = 20.0
+    shift: float = 0.1
+    one_sided: float = 0.98
+    unsigned: float = 0.3
+    glitch: float = 8.0
+    frozen: int = 12

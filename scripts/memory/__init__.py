@@ -1,0 +1,1 @@
+"""Joints with memory against their rivals: one module a task, each with `rows(progress)`."""
