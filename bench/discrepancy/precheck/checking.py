@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -23,8 +24,17 @@ from bench.discrepancy.precheck.settings import CheckSettings
 from bench.errors import BenchError
 
 Word = Literal["ready", "doubtful", "unusable"]
-STATUS: dict[str, int] = {"ready": 0, "doubtful": 1, "unusable": 2}
-"""Exit status of each word."""
+
+
+@dataclass(frozen=True)
+class CheckingSettings:
+    """Numbers of `bench.discrepancy.precheck.checking`."""
+
+    status: Mapping[str, int] = field(default_factory=lambda: {"ready": 0, "doubtful": 1, "unusable": 2})
+    """Exit status of each word."""
+
+
+SETTINGS = CheckingSettings()
 UNUSED = "columns that nominal.json does not name are not used"
 """Beginning of a note that is no doubt."""
 
@@ -52,7 +62,7 @@ class Checked:
     @property
     def status(self) -> int:
         """Exit status."""
-        return STATUS[self.word]
+        return SETTINGS.status[self.word]
 
     def to_json(self) -> dict[str, Any]:
         """As JSON values."""
@@ -115,7 +125,10 @@ def check(case: Case, settings: CheckSettings | None = None, *, informed: bool =
                 "these records tell none of the nominal parameters: excite more strongly, or in another band"
             )
         if effects and not any(one.word == "identifiable" for one in effects):
-            found.append("these records would not show any effect of the catalogue: excite more strongly, or measure with less noise")  # fmt: skip
+            found.append(
+                "these records would not show any effect of the catalogue: excite more strongly, or measure with "
+                "less noise"
+            )
     return replace(_said(found, notes, began), parameters=tuple(parameters), effects=tuple(effects))
 
 
