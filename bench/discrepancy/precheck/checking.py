@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -24,8 +25,17 @@ from bench.discrepancy.precheck.settings import CheckSettings
 from bench.errors import BenchError
 
 Word = Literal["ready", "doubtful", "unusable"]
-STATUS: dict[str, int] = {"ready": 0, "doubtful": 1, "unusable": 2}
-"""Exit status of each word."""
+
+
+@dataclass(frozen=True)
+class CheckingSettings:
+    """Numbers of `bench.discrepancy.precheck.checking`."""
+
+    status: Mapping[str, int] = field(default_factory=lambda: {"ready": 0, "doubtful": 1, "unusable": 2})
+    """Exit status of each word."""
+
+
+SETTINGS = CheckingSettings()
 UNUSED = "columns that nominal.json does not name are not used"
 """Beginning of a note that is no doubt."""
 
@@ -53,7 +63,7 @@ class Checked:
     @property
     def status(self) -> int:
         """Exit status."""
-        return STATUS[self.word]
+        return SETTINGS.status[self.word]
 
     def to_json(self) -> dict[str, Any]:
         """As JSON values."""

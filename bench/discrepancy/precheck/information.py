@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -28,8 +28,17 @@ from bench.discrepancy.precheck.settings import CheckSettings
 
 Array = NDArray[np.float64]
 Word = Literal["identifiable", "weak", "not identifiable"]
-STEP = 0.1
-"""Step of the differences, in sigmas of a parameter: curvature is left out, and rounding is far."""
+
+
+@dataclass(frozen=True)
+class InformationSettings:
+    """Numbers of `bench.discrepancy.precheck.information`."""
+
+    step: float = 0.1
+    """Step of the differences, in sigmas of a parameter: curvature is left out, and rounding is far."""
+
+
+SETTINGS = InformationSettings()
 
 
 class Told(NamedTuple):
@@ -66,8 +75,8 @@ def parameter_columns(problem: Problem, record: CaseRecord, predicted: Array) ->
     out = []
     for p in np.flatnonzero(problem.spread > 0.0):
         moved = np.zeros(len(problem.nominal))
-        moved[p] = STEP
-        out.append((problem.simulate((), moved, record) - predicted) / STEP)
+        moved[p] = SETTINGS.step
+        out.append((problem.simulate((), moved, record) - predicted) / SETTINGS.step)
     return out
 
 
@@ -78,8 +87,8 @@ def parameters_told(problem: Problem, settings: CheckSettings) -> tuple[list[Tol
     columns = []
     for p in uncertain:
         moved = np.zeros(len(problem.nominal))
-        moved[p] = STEP
-        column = (problem.residual((), moved) - rest) / STEP
+        moved[p] = SETTINGS.step
+        column = (problem.residual((), moved) - rest) / SETTINGS.step
         columns.append(column if np.shape(column) == rest.shape else np.zeros_like(rest))
     if not columns:
         return [], np.zeros((len(rest), 0))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -17,12 +18,21 @@ from bench.discrepancy.multibody.model import ArticulatedModel, compiled_model
 from bench.errors import BenchError
 
 Array = NDArray[np.float64]
-FOLLOWS = 0.5
-"""Correlation of a servo's target with its joint from which their order in time tells something."""
-STILL = 30.0
-"""Noise that the motion of a joint has to exceed, so that friction and inertia can be told from it."""
-REVERSALS = 4
-"""Reversals of a joint that its friction needs to be told from gravity."""
+
+
+@dataclass(frozen=True)
+class JointsSettings:
+    """Numbers of `bench.discrepancy.precheck.joints`."""
+
+    follows: float = 0.5
+    """Correlation of a servo's target with its joint from which their order in time tells something."""
+    still: float = 30.0
+    """Noise that the motion of a joint has to exceed, so that friction and inertia can be told from it."""
+    reversals: int = 4
+    """Reversals of a joint that its friction needs to be told from gravity."""
+
+
+SETTINGS = JointsSettings()
 
 
 def joint_doubts(case: Case) -> list[str]:
@@ -67,7 +77,7 @@ def joint_doubts(case: Case) -> list[str]:
 
 
 def _moves(joint: str, record: CaseRecord, q: Array, noise: float) -> Iterator[str]:
-    if np.ptp(q) <= STILL * max(noise, 1e-12):
+    if np.ptp(q) <= SETTINGS.still * max(noise, 1e-12):
         yield f"joint '{joint}' hardly moves in '{record.name}': its friction, inertia and drive cannot be told from that"
         return
     smooth = np.convolve(q, np.ones(5) / 5.0, "valid")
@@ -82,9 +92,9 @@ def _moves(joint: str, record: CaseRecord, q: Array, noise: float) -> Iterator[s
             last = min(last, value)
             if value > last + hysteresis:
                 turns, last, rising = turns + 1, value, True
-    if turns < REVERSALS:
+    if turns < SETTINGS.reversals:
         yield (
-            f"joint '{joint}' reverses {turns} time(s) in '{record.name}'; {REVERSALS} are wanted to tell friction from gravity"
+            f"joint '{joint}' reverses {turns} time(s) in '{record.name}'; {SETTINGS.reversals} are wanted to tell friction from gravity"
         )
 
 
@@ -92,14 +102,14 @@ def _follows(joint: str, target: str, record: CaseRecord, q: Array, u: Array) ->
     if min(np.std(q), np.std(u)) == 0.0:
         return
     correlation = float(np.corrcoef(q, u)[0, 1])
-    if correlation < -FOLLOWS:
+    if correlation < -SETTINGS.follows:
         yield f"joint '{joint}' runs against its target '{target}' in '{record.name}'; turn one of them round"
     factor = float(np.std(q) / np.std(u))
-    if abs(correlation) > FOLLOWS and not 0.2 < factor < 5.0:
+    if abs(correlation) > SETTINGS.follows and not 0.2 < factor < 5.0:
         yield (
             f"joint '{joint}' moves {factor:.3g} times as far as its target '{target}' in '{record.name}': degrees, or a gear?"
         )
-    if correlation > FOLLOWS:
+    if correlation > SETTINGS.follows:
         n = len(q)
         spectra = np.fft.rfft(q - q.mean(), 2 * n) * np.conj(np.fft.rfft(u - u.mean(), 2 * n))
         lags = np.fft.irfft(spectra)

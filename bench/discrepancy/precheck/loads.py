@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +14,17 @@ from bench.discrepancy.precheck.information import parameter_columns
 from bench.discrepancy.precheck.settings import CheckSettings
 
 Array = NDArray[np.float64]
-SHIFTS = 60
-"""Largest shift that is looked for, in samples."""
+
+
+@dataclass(frozen=True)
+class LoadsSettings:
+    """Numbers of `bench.discrepancy.precheck.loads`."""
+
+    shifts: int = 60
+    """Largest shift that is looked for, in samples."""
+
+
+SETTINGS = LoadsSettings()
 
 
 def load_doubts(problem: Problem, settings: CheckSettings) -> Iterator[str]:
@@ -75,9 +85,9 @@ def _late(problem: Problem, record: CaseRecord, settings: CheckSettings) -> Iter
     if columns:
         basis, _ = np.linalg.qr(np.column_stack([column.ravel() for column in columns]))
     powers = {}
-    for shift in range(-SHIFTS, SHIFTS + 1):
+    for shift in range(-SETTINGS.shifts, SETTINGS.shifts + 1):
         left = (np.roll(measured, -shift, axis=0) - predicted) / scale
-        left[: SHIFTS + 1] = left[-SHIFTS - 1 :] = 0.0
+        left[: SETTINGS.shifts + 1] = left[-SETTINGS.shifts - 1 :] = 0.0
         flat = left.ravel()
         powers[shift] = float(flat @ flat - (np.sum((basis.T @ flat) ** 2) if basis is not None else 0.0))
     best = min(powers, key=lambda s: powers[s])
