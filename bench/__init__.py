@@ -45,10 +45,12 @@ _HOMES = {
     "chain_rig": "bench.rig.library",
     "Excitation": "bench.signals",
     "compare": "bench.reduction",
+    "diagnose": "bench.discrepancy.intake.asking",
     "reduced_joint": "bench.reduction",
 }
 
 if TYPE_CHECKING:
+    from bench.discrepancy.intake.asking import diagnose
     from bench.errors import BenchError
     from bench.laws import LAWS, ForceLaw, Parameter
     from bench.mjcf import model_path
@@ -72,6 +74,7 @@ __all__ = [
     "chain_rig",
     "compare",
     "damper_rig",
+    "diagnose",
     "joint_rig",
     "laboratory_joint_rig",
     "model_path",

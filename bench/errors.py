@@ -153,6 +153,10 @@ class IdentificationError(BenchError, ValueError):
     """An identification cannot be carried out on the data given (too short, not exciting, singular)."""
 
 
+class MissingPackageError(BenchError, ImportError):
+    """A package of an extra is not installed."""
+
+
 class RangeWarning(UserWarning):
     """A reduced-order model was used outside the range of the data it was identified from."""
 

@@ -26,7 +26,7 @@ from rich.table import Table
 from bench.errors import BenchError
 from bench.files import write_text
 
-TASKS = ("laboratory", "damper", "benchmark", "chain", "coverage", "passivity", "speed")
+TASKS = ("laboratory", "damper", "benchmark", "chain", "passivity", "speed")
 
 
 @dataclass

@@ -168,6 +168,19 @@ def _measured(told: Any) -> Figures:
     return figures
 
 
+def _memory_joint(told: Any) -> Figures:
+    rows = []
+    for row in told["rows"]:
+        figure = (
+            "diverges"
+            if row["value"] is None
+            else f"{row['value']:.3g} {row['unit'].replace('1', '')}".strip()
+        )
+        limit = "" if row["limit"] is None else f"{'≥' if row['least'] else '≤'} {row['limit']:.3g}"
+        rows.append((f"{row['task']}, {row['model']}: {row['quantity']}", figure, limit))
+    return rows
+
+
 def _localisation(told: Any) -> Figures:
     figures = [(f"F1 over (degree of freedom, state cell), mean of {told['cases']}", told["f1"], "≥ 0.9")]
     figures += [(f"F1, {kind}", value, "") for kind, value in told["by_kind"].items()]
@@ -356,6 +369,13 @@ CAPABILITIES: Sequence[Capability] = (
             ("sdof", ()),
             ("rivals", ("--steps", "2000000", "--n-envs", "96", "--discount", "0.98")),
         )
+    ),
+    Capability(
+        "memory_joint",
+        "The joint with memory against its rivals ([memory-joint.md](memory-joint.md))",
+        ("python", "scripts/memory_joint.py", "--data", "{data}", "--fresh", "--json"),
+        _memory_joint,
+        data="bouc_wen_benchmark",
     ),
     Capability(
         "bouc_wen",

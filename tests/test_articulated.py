@@ -11,7 +11,12 @@ import pytest
 
 from bench.discrepancy import diagnose, read_case
 from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis, applies
+from bench.discrepancy.articulated.effects import CATALOGUE
 from bench.discrepancy.articulated.judgement import JudgementSettings, complete
+from bench.discrepancy.articulated.problem import ArticulatedProblem, placements
+from bench.discrepancy.multibody.channels import bound
+from bench.discrepancy.multibody.encoders import weight_of_readings
+from bench.discrepancy.multibody.model import ArticulatedModel, compiled_model
 from bench.discrepancy.report.html_page import write_report
 from bench.discrepancy.report.rerun_recording import write_rerun
 from bench.errors import BenchError
@@ -183,3 +188,52 @@ def test_a_joint_that_nothing_measures_is_refused_with_what_to_do(tmp_path):
     with pytest.raises(BenchError, match="elbow") as error:
         diagnose(read_case(folder))
     assert "\n" not in str(error.value)
+
+
+def test_readings_that_stay_the_same_are_believed_as_far_as_they_tell_something():
+    step, t = 1.0, np.arange(2000) / 100.0
+    rng = np.random.default_rng(1)
+    regressor = np.sin(2 * np.pi * 0.02 * t)  # a few steps in twenty seconds, readings that stay for a second
+    scores = {"weighted": [], "white": []}
+    for size in rng.uniform(2.0, 6.0, 300):
+        truth = size * regressor + rng.uniform(-0.5, 0.5)
+        readings = np.round(truth / step) * step
+        weight = weight_of_readings(readings, step, step / np.sqrt(12.0))
+        for name, w in (("weighted", weight), ("white", np.ones(len(t)))):
+            error = w * (readings - truth) / (step / np.sqrt(12.0))
+            scores[name].append(float(w * regressor @ error) / np.sqrt(float(np.sum((w * regressor) ** 2))))
+    # a parameter's error in units of its own standard error: about one, where white noise would believe it five times too well
+    assert np.std(scores["weighted"]) < 1.3
+    assert np.std(scores["white"]) > 4.0
+    fast = weight_of_readings(np.cumsum(np.full(50, 3.0)), step, step / np.sqrt(12.0))
+    np.testing.assert_allclose(fast, 1.0)
+    # a joint at rest whose reading is thrown to and fro: its mean square is neither raised nor lowered
+    squares, counts, noise = 0.0, 0.0, np.hypot(step / np.sqrt(12.0), 0.13)
+    for rest in rng.uniform(-0.5, 0.5, 400):
+        readings = np.round((rest + 0.13 * rng.standard_normal(500)) / step) * step
+        weight = weight_of_readings(readings, step, float(noise))
+        squares += float(np.sum((weight * (readings - rest) / noise) ** 2))
+        counts += float(np.sum(weight**2))
+    assert squares / counts == pytest.approx(1.0, abs=0.2)
+
+
+def test_a_free_run_behind_a_late_encoder_starts_on_the_clock_of_its_log(tmp_path):
+    late = 4
+    folder = write_case(tmp_path, mjcf(servo=False), servo=False)
+    for name in ("identification", "validation"):
+        table = np.loadtxt(folder / f"{name}.csv", delimiter=",", skiprows=1)
+        header = (folder / f"{name}.csv").read_text().splitlines()[0]
+        table[late:, 4] = table[:-late, 4]
+        np.savetxt(folder / f"{name}.csv", table, delimiter=",", header=header, comments="", fmt="%.9g")
+    case = read_case(folder)
+    compiled = compiled_model(folder / "model.xml")
+    case = bound(case, compiled)
+    problem = ArticulatedProblem.of(case, ArticulatedModel.of(compiled), case.validation)
+    placed = next(p for p in placements(problem, CATALOGUE) if p.key == ("position_delay", "elbow"))
+    vector = np.zeros(problem.size((placed,)))
+    vector[-1] = np.log(late / RATE)
+    assert placed.effect.values(vector[-1:], placed.scales)["delay_s"] == pytest.approx(late / RATE)
+    (motion,) = problem.motions((placed,), vector)
+    for j in range(2):
+        left = np.sqrt(np.mean(problem.free_run(j, (placed,), vector, motion) ** 2))
+        assert left < 1.6 * problem.free_run_noise(j, (placed,), vector, 0)

@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 
+import bench
 from bench.cli import main
 from bench.discrepancy.case.reading import read_case
 from bench.discrepancy.intake.matching import match_columns
@@ -137,6 +138,26 @@ def test_logs_give_the_verdict_of_the_case_folder(logs, tmp_path, capsys):
     cases = json.loads(out.read_text())["cases"]
     assert [entry["named"] for entry in cases] == [direct["named"]] * 2
     assert "gap" in page.read_text()
+
+
+@pytest.mark.slow
+def test_in_python_from_arrays_and_a_spec_and_the_simulator_is_named_before_physics():
+    runs = []
+    for seed in (1, 2):
+        t, f, x = _run(seed, 1.0)  # buffers that are never reached: the model lacks nothing
+        runs.append({"time": t, "shaker": f, "guide_position": x})
+    answer = bench.diagnose(mujoco.MjSpec.from_string(STAGE), runs, most=1)
+    assert answer.verdict.verdict == "none"
+    assert all(place.kind != "simulator" for place in answer.verdict.locations)
+    pytest.importorskip("pandas")
+    assert {"mass:table", "stiffness:guide"} <= set(answer.to_pandas()["parameter"])
+    assert answer._repr_html_().startswith("<p>")
+    assert answer.plot().axes
+    coarse = STAGE.replace('timestep=".0005" integrator="RK4"', 'timestep=".02" integrator="Euler"')
+    other = bench.diagnose(coarse, runs, most=1)
+    assert other.verdict.verdict == "none"
+    assert other.verdict.locations[-1].kind == "simulator"
+    assert "step of 0.02 s, Euler" in other.verdict.warnings[0]
 
 
 @pytest.mark.parametrize(

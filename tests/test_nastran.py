@@ -262,7 +262,7 @@ DMIG*,STIF,1003,0
 SPOINT,1001,1002
 SPOINT\t1003\tTHRU\t1005
 SLOAD   501     1001    2.      1002    3.5     1003    -1.D0
-CONM2,1,2,0,1.
+CQUAD4,1,2,0,1.
 ENDDATA
 SPOINT,9999
 """
@@ -278,7 +278,7 @@ def test_all_forms_mix_in_one_deck():
     ]
     assert [card.ids for card in deck.of(ScalarPoints)] == [(1001, 1002), (1003, 1004, 1005)]
     assert deck.of(Sload) == (Sload(501, ((1001, 2.0), (1002, 3.5), (1003, -1.0))),)
-    assert [card.name for card in deck.of(OtherCard)] == ["CONM2"]
+    assert [card.name for card in deck.of(OtherCard)] == ["CQUAD4"]
     assert parse_deck(deck_text(deck.cards, form="large")) == deck
     assert parse_deck(deck_text(deck.cards, form="small")) == deck
 

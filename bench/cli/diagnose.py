@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -214,6 +214,7 @@ def _diagnosed(asked: Diagnose, case: Case, stage: Callable[[str], None]) -> Dia
     import numpy as np
 
     from bench.discrepancy import diagnose
+    from bench.discrepancy.application.own_share import with_simulator
     from bench.discrepancy.precheck.checking import check
     from bench.discrepancy.settings import DEFAULT, read_settings
     from bench.errors import IdentificationError
@@ -225,7 +226,7 @@ def _diagnosed(asked: Diagnose, case: Case, stage: Callable[[str], None]) -> Dia
         for doubt in check(case, informed=False).doubts:
             told.print(f"check: {doubt}", style="yellow", markup=False, highlight=False)
     try:
-        return diagnose(
+        found = diagnose(
             case,
             exclude=asked.exclude,
             most=asked.most,
@@ -234,6 +235,8 @@ def _diagnosed(asked: Diagnose, case: Case, stage: Callable[[str], None]) -> Dia
             budget=asked.budget,
             settings=settings,
         )
+        stage("the simulator's own share")
+        return replace(found, verdict=with_simulator(found.verdict, case))
     except (np.linalg.LinAlgError, ArithmeticError) as error:
         raise IdentificationError(
             f"the numbers of '{case.name}' cannot be worked with ({error}); check nominal values, units and noise_std: "

@@ -220,7 +220,12 @@ def _diagnose(case: Case, how: How, rng: np.random.Generator, anyway: bool) -> D
         splits=where.splits,
         seconds=time.perf_counter() - began,
         complete=kind != "unknown"
-        and complete(found, sharp=not finding.coarse, settings=how.settings.judgement),
+        and complete(
+            found,
+            sharp=not finding.coarse,
+            stated=problem.noise_stated,
+            settings=how.settings.judgement,
+        ),
         remainder=remainder(problem, final, widest),
         nominal=nominal_estimates(final),
         nearest=nearest,

@@ -91,7 +91,7 @@ class Location:
         state_region: Interval by coordinate ("displacement", "velocity") of the first of `regions`.
         p_value: Probability of such an excess from noise alone, after correction for the number of cells looked at.
         kind: "force" where channels of the same coordinate agree with one another, "sensor" where they contradict each
-            other, "undetermined" where there is only one.
+            other, "undetermined" where there is only one, "simulator" for the share of step, integrator and soft friction.
         regions: Regions of the state space at the places the channel touches, the strongest first: their limits by
             coordinate, "share" of the squared force there, and mean "force". Where a named "effect" acts in a part of the state
             space only, those of that effect's force; where an unknown one does, as free runs tell, its limits; else those where

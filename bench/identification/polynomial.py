@@ -389,8 +389,9 @@ def fit_polynomial(
         accelerations: Absolute accelerations ``(n, k)`` [m/s², rad/s²] of the body the forces act on, where its mass
             is unknown: the mass matrix is fitted along with the coefficients.
         rcond: Singular values below `rcond` times the largest are left out [1].
-        bounded: Whether the polynomial is held at the edge of its range, with the stiffness and damping of a linear fit to the same
-            records beyond it: its force then brings the motion back, where an unbounded one runs away. Needs `normalise`.
+        bounded: Whether the polynomial is held at the edge of its range, with a spring and a damper beyond it that outweigh the
+            largest force met one half-range further: they bring the motion back, where an unbounded one runs away. Both are
+            needed, since a polynomial may drive the motion at the edge of the speeds. Needs `normalise`.
 
     Returns:
         The model with condition number, rank and error in its report.
@@ -444,7 +445,7 @@ def fit_polynomial(
         range=ValidityRange.of(s),
         report=pending,
         mass=mass,
-        beyond=_linear(s, f, a) if bounded else None,
+        beyond=_beyond(f, scale) if bounded else None,
     )
     estimated = model.predict(s) + (0.0 if mass is None else a @ mass.T)
     return replace(
@@ -452,14 +453,10 @@ def fit_polynomial(
     )
 
 
-def _linear(
-    states: NDArray[np.float64], forces: NDArray[np.float64], accelerations: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Stiffness and damping (2, k) of each coordinate by a linear fit, none below zero."""
-    k = forces.shape[1]
-    regressors = np.hstack([states, accelerations, np.ones((len(states), 1))])
-    solution = np.linalg.lstsq(regressors, forces, rcond=None)[0]
-    return frozen(np.maximum([np.diag(solution[:k]), np.diag(solution[k : 2 * k])], 0.0))
+def _beyond(forces: NDArray[np.float64], scale: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Stiffness and damping (2, k) that outweigh the largest force met one half-range beyond the edge of the range."""
+    largest = np.max(np.abs(forces), axis=0)
+    return frozen(largest / scale.reshape(2, -1))
 
 
 def _orders_of(orders: int | Sequence[int], n_states: int) -> tuple[int, ...]:

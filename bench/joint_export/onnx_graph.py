@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.errors import BenchError
+from bench.errors import MissingPackageError
 from bench.joint_export.polynomial_terms import terms_of
 from bench.joint_models.document import JointFile
 from bench.nastran import network_weights
@@ -23,10 +23,6 @@ class OnnxGraphSettings:
 
 
 SETTINGS = OnnxGraphSettings()
-
-
-class MissingPackageError(BenchError, ImportError):
-    """A package of an extra is not installed."""
 
 
 def onnx_bytes(joint: JointFile) -> bytes:

@@ -7,7 +7,7 @@ A kind is a function from motions and restoring forces to a law of the bench wit
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from types import MappingProxyType
 from typing import Any
 
@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.errors import IdentificationError, UnknownNameError
+from bench.identification.memory import fit_memory
 from bench.identification.network import fit_network
 from bench.identification.parametric import Motion, fit_law
 from bench.identification.polynomial import ValidityRange, fit_polynomial, nmse_percent
@@ -130,12 +131,21 @@ def _law(motions: Sequence[Motion], settings: Settings, rng: np.random.Generator
     return best[1]
 
 
+def _memory(motions: Sequence[Motion], _: Settings, __: np.random.Generator) -> Fitted:
+    time = np.concatenate([m.time - m.time[0] for m in motions])
+    model = fit_memory(*stacked(motions), time=time)
+    return Fitted(model.law, model.theta, model.range, asdict(model.report))
+
+
 KINDS: Mapping[str, JointKind] = MappingProxyType(
     {
         "polynomial": JointKind("Chebyshev polynomial of displacements and velocities", _polynomial),
         "network": JointKind("tanh network of displacements and velocities", _network),
         "law": JointKind(
             "a force law of the bench, hidden states included (name it with --law)", _law, memory=True
+        ),
+        "memory": JointKind(
+            "joint that remembers: slip, springs and dampers that are passive", _memory, memory=True
         ),
     }
 )

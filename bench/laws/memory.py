@@ -15,9 +15,10 @@ A slip element's hidden state is the elastic strain e of a spring behind a slide
 
     e' = s' (1 - h(abs(e) / r)) while e s' > 0 (loading), else s'
 
-Slip needs ``sigma(e) s' h >= 0``, and h(1) = 1 keeps e within the range: no weights, however learned, make the joint give out more
-than it took in, and no motion makes a slip element's force exceed ``sigma(r)``. With n coordinates the same holds along any
-direction, so also for axes that slip together.
+Slip needs ``sigma(e) s' h >= 0``: where ``phi != 1/2`` has moved the place of zero force, h is 0 until sigma has the sign of s'.
+h(1) = 1 keeps e within the range, at whose ends ``0 <= phi <= 1`` gives sigma the right sign. So no weights, however learned,
+make the joint give out more than it took in, and no motion makes a slip element's force exceed that at its ends. With n
+coordinates the same holds along any direction, so also for axes that slip together.
 
 Two families of slip profile h, and with them the two forms of the model:
 
@@ -167,6 +168,14 @@ def rate(t, q, v, z, theta, zdot):
                 left = theta[at + 1 + parts + g] if g > 0 else 0.0
                 right = theta[at + 2 + parts + g] if g < profile - 1 else 1.0
                 slip = left + (x * profile - g) * (right - left)
+            if slip > 0.0 and x < 1.0:
+                # where zero force is not at e = 0, slip begins only once the force resists: it must not give out energy
+                y = (z[i] / theta[at] + 1.0) * 0.5 * parts
+                sigma = 0.0
+                for b in range(parts):
+                    sigma += theta[at + 2 + b] * (min(max(y - b, 0.0), 1.0) - theta[at + 1])
+                if sigma * rate < 0.0:
+                    slip = 0.0
         zdot[i] = rate * (1.0 - slip)
         at += stride
     index += n_slips

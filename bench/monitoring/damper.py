@@ -277,7 +277,7 @@ class DamperMonitor:
         x = np.array([self._motion(period) for period in self._learnt])
         terms = np.concatenate([[True], x[:, 1:].std(axis=0) > SETTINGS.varied])
         used = x[:, terms]
-        inverse = np.linalg.pinv(used.T @ used)
+        inverse = np.asarray(np.linalg.pinv(used.T @ used), dtype=np.float64)
         b = inverse @ used.T @ y
         e = y - used @ b
         freedom = float(len(y) - used.shape[1])

@@ -92,7 +92,8 @@ class JointModel:
                 f"clearance_{label}": axis.clearance * motion[i],
                 f"c_coupling_{label}": axis.coupling * linear / motion[1 - i],
             }
-        return Element.of("axial_torsional_joint", *joints, name=name, **values)
+        law = find_law("axial_torsional_joint")
+        return Element(law, joints, law.theta(**values), name=name)
 
 
 def read_joint_model(deck: Deck, *, units: Units = SI) -> JointModel:
@@ -251,7 +252,7 @@ def _bars(deck: Deck) -> dict[tuple[int, int], tuple[float, float]]:
     found = {}
     for bar in deck.of(Cbar):
         try:
-            section = sections[bar.property]
+            section = sections[bar.section]
             material = materials[section.material]
             a, b = (np.array(grids[end].position) for end in bar.ends)
         except KeyError as error:

@@ -40,7 +40,9 @@ class ScalarElement(Card):
         points = [(raw.integer(i, f"G{k}", 0), raw.integer(i + 1, f"C{k}", 0)) for i, k in ((2, 1), (4, 2))]
         if points[0][0] == 0:
             points.reverse()
-        return cls(raw.integer(0, "element"), raw.real(1, "stiffness or damping"), *points, raw.name)
+        return cls(
+            raw.integer(0, "element"), raw.real(1, "stiffness or damping"), points[0], points[1], raw.name
+        )
 
 
 @dataclass(frozen=True)
@@ -48,7 +50,7 @@ class Cbar(Card):
     """CBAR: a bar between two grids; `pins` are the components released at either end, "14" for axial force and torque."""
 
     id: int
-    property: int
+    section: int
     ends: tuple[int, int]
     orientation: tuple[float, float, float] = (0.0, 1.0, 0.0)
     pins: tuple[str, str] = ("", "")
@@ -57,7 +59,7 @@ class Cbar(Card):
     def fields(self) -> list[Field]:
         """EID, PID, GA, GB, X1, X2, X3, blank, then the pins."""
         pins = [int(pin) if pin else None for pin in self.pins]
-        return [self.id, self.property, *self.ends, *self.orientation, None, *pins]
+        return [self.id, self.section, *self.ends, *self.orientation, None, *pins]
 
     @classmethod
     def read(cls, raw: RawCard) -> Self:

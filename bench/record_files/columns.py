@@ -19,7 +19,10 @@ from bench.limits import READING_LIMITS, ReadingLimits, regular_file
 from bench.record_files.arrays import read_mat, read_npz
 from bench.record_files.column_map import ColumnMap, Variable, base_name, find, name_and_unit
 from bench.record_files.hdf5 import read_hdf5
+from bench.record_files.laboratory_logs import read_lvm, read_tdms, read_uff
 from bench.record_files.parquet import read_parquet
+from bench.record_files.robot_logs import BAGS, read_bag, read_folder, read_lists
+from bench.record_files.samples_json import read_samples
 from bench.record_files.text import read_csv
 from bench.record_files.times import Clock, clock_of, is_time, time_source
 from bench.recording import Recording
@@ -27,8 +30,15 @@ from bench.recording import Recording
 TEXT = (".csv", ".tsv", ".txt", ".dat", ".asc")
 """Suffixes of text tables, which may be gzipped."""
 
+FOREIGN = {
+    ".json": read_samples, ".lvm": read_lvm, ".tdms": read_tdms, ".uff": read_uff, ".unv": read_uff,
+    **dict.fromkeys(BAGS, read_bag),
+}  # fmt: skip
+"""Readers of logs by suffix, some of which need the extra `io`."""
+
 READABLE = (
     *(".parquet", ".csv", ".csv.gz", ".mat", ".npz", ".h5", ".hdf5"),
+    *FOREIGN,
     *(f"{suffix}{packed}" for suffix in TEXT[1:] for packed in ("", ".gz")),
 )
 """Suffixes of the files that are read, in small or capital letters."""
@@ -80,7 +90,8 @@ def read_columns(
         UnknownNameError: The file has no such column.
         UnitError: The unit of the time is none.
     """
-    file = regular_file(path, limits.file_bytes)
+    file = Path(path)
+    file = file if file.is_dir() else regular_file(path, limits.file_bytes)
     try:
         passed: list[str] = []
         contents, notes = _contents(file, layout, limits, passed)
@@ -98,18 +109,36 @@ def _contents(
     path: Path, layout: ColumnMap, limits: ReadingLimits, passed: list[str]
 ) -> tuple[Recording | dict[str, Variable], tuple[str, ...]]:
     suffix = suffix_of(path)
+    if path.is_dir():
+        return read_folder(path)
     wanted = _wanted(layout, passed)
+    if suffix in FOREIGN:
+        return FOREIGN[suffix](path)
     if suffix == ".parquet":
+        lists = _lists(path)
+        if lists is not None:
+            return lists, ()
         return read_parquet(path, wanted, limits=limits), ()
     if suffix.removesuffix(".gz") in TEXT:
         return read_csv(path, wanted, limits=limits)
     if suffix == ".npz":
         return read_npz(path, wanted, limits=limits), ()
     if suffix == ".mat":
+        with path.open("rb") as stream:
+            if stream.read(10) == b"MATLAB 7.3":  # HDF5 behind a block of text
+                return read_hdf5(path, wanted, limits=limits), ()
         return read_mat(path, limits=limits), ()
     if suffix in (".h5", ".hdf5"):
         return read_hdf5(path, wanted, limits=limits), ()
     raise FileFormatError(f"'{path}' has the suffix '{suffix}'; readable are {', '.join(READABLE)}")
+
+
+def _lists(path: Path) -> dict[str, Variable] | None:
+    """Columns of a Parquet file that holds lists; None where it holds none, or is no Parquet file, as the reader of these will say."""
+    try:
+        return read_lists(path)
+    except (OSError, ValueError):
+        return None
 
 
 def _wanted(layout: ColumnMap, passed: list[str]) -> Callable[[str], bool] | None:

@@ -213,5 +213,10 @@ def _layout(
 
 
 def _digest(path: Path) -> str:
+    if path.is_dir():
+        whole = hashlib.sha256()
+        for file in sorted(file for file in path.rglob("*") if file.is_file()):
+            whole.update(file.name.encode() + file.read_bytes())
+        return whole.hexdigest()
     with path.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()

@@ -13,12 +13,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from bench.identification.memory_output_error import refine_in_rig
 from numpy.typing import NDArray
 from scipy.io import loadmat
 from scipy.signal import firwin
 
 from bench.identification.memory import MemoryModel, MemorySettings, fit_memory
+from bench.identification.memory_output_error import refine_in_rig
 from bench.record_files.hdf5 import read_hdf5
 from bench.recording import Recording
 from bench.rig import Element, Rig, simulate

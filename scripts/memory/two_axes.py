@@ -148,10 +148,11 @@ def _along(
     forces = np.concatenate([element_forces(record, true, bench.axes) for record in records])
     time = np.concatenate([record.time - record.time[0] for record in records])
     assert data.time is not None
+    seen = data.time
     rows = []
     for label, run in (
-        ("NARX, degree 2", lambda: narx(data.states, data.forces, data.time, unseen, time)),
-        ("LSTM of equal size", lambda: lstm(data.states, data.forces, data.time, unseen, time, size=130)),
+        ("NARX, degree 2", lambda: narx(data.states, data.forces, seen, unseen, time)),
+        ("LSTM of equal size", lambda: lstm(data.states, data.forces, seen, unseen, time, size=130)),
     ):
         progress(label)
         found = run()

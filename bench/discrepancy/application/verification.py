@@ -171,7 +171,7 @@ def verify(
     """
     settings = settings or VerificationSettings()
     articulated = is_articulated(findings, case)
-    replay = _replay(path, case, articulated=articulated)
+    replay = replay_of(path, case, articulated=articulated)
     nothing = Findings(())
 
     def errors(what: Findings, options: Options) -> dict[str, NDArray[np.float64]]:
@@ -180,7 +180,9 @@ def verify(
     def figures(options: Options) -> tuple[Figure, ...]:
         before, after = errors(nothing, options), errors(findings, options)
         return tuple(
-            Figure(g.dof, _rms(before[g.dof]), _rms(after[g.dof]), g.after, g.noise_floor)
+            Figure(
+                g.dof, root_mean_square(before[g.dof]), root_mean_square(after[g.dof]), g.after, g.noise_floor
+            )
             for g in gaps
             if g.dof in before
         )
@@ -195,14 +197,15 @@ def verify(
         )
     out = Verification(step, INTEGRATORS[integrator], found)
     fine = errors(nothing, Options(step / settings.converged, mujoco.mjtIntegrator.mjINT_RK4, hard=True))
-    own = _rms(errors(nothing, Options())[out.worst.dof] - fine[out.worst.dof])
+    own = root_mean_square(errors(nothing, Options())[out.worst.dof] - fine[out.worst.dof])
     out = replace(out, own_share=own)
     if _short(found) <= settings.short:
         return out
     return _remedied(out, figures, settings, progress)
 
 
-def _rms(error: NDArray[np.float64]) -> float:
+def root_mean_square(error: NDArray[np.float64]) -> float:
+    """Root of the mean square of all entries."""
     return float(np.sqrt(np.mean(error**2)))
 
 
@@ -246,7 +249,12 @@ def _remedied(
     return replace(out, remedy=words, better=best if label else ())
 
 
-def _replay(path: str | Path, case: Case, *, articulated: bool) -> Replay:
+def replay_of(path: str | Path, case: Case, *, articulated: bool) -> Replay:
+    """What runs the judging records of a case in a model, and gives the normalised errors by coordinate.
+
+    Raises:
+        ModelError: The case is one of a rig of the bench.
+    """
     if articulated:
         return JointReplay.of(case, specification(path).compile()).errors
     if not case.rig.endswith(".xml"):

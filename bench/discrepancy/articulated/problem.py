@@ -17,6 +17,7 @@ from threading import Lock
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 
 from bench.discrepancy.articulated.effects import ArticulatedEffect, JointScales
 from bench.discrepancy.case.case import Case, CaseRecord
@@ -250,7 +251,12 @@ class ArticulatedProblem:
         """
         record, motion = prepared.joints[j], prepared.motion
         every = record.window or len(record.position)
-        starts = np.column_stack([motion.position[::every, j], motion.velocity[::every, j]])
+        states = np.column_stack([motion.position[:, j], motion.velocity[:, j]])
+        if record.encoder.delay:  # the run keeps the clock of the log, which shows what the joint did before
+            samples = np.arange(len(states)) * record.sample
+            late = np.maximum(samples - record.encoder.delay, 0.0)
+            states = CubicSpline(samples, states, axis=0)(late)
+        starts = states[::every]
         if any(placed.effect.train and placed.joint == j for placed in hypothesis):
             _, states = self.innovations(j, hypothesis, vector, prepared)
             starts = np.hstack([starts, states[::every, 2:] - states[::every, :2]])

@@ -25,6 +25,17 @@ def noise_floor(x: Array) -> float:
     return float(np.sqrt(max(min(blocks), (1e-6 * np.std(x)) ** 2, 1e-300)))
 
 
+def quiet_noise(x: Array) -> float:
+    """White noise of a channel from the median size of its third differences, which jumps now and then do not move.
+
+    A contact or a reversal of friction leaves an acceleration with power at all frequencies, of which the flattest quarter of a spectrum
+    knows nothing; between them there is noise alone. Third differences of white noise have twenty times its variance.
+    """
+    if len(x) < 8:
+        return float("inf")
+    return float(np.median(np.abs(np.diff(x, 3))) / (0.6745 * np.sqrt(20.0)))
+
+
 def quantisation_step(samples: NDArray[np.float64], *, settings: CaseSettings = DEFAULT.case) -> float:
     """Step of the lattice on which all samples lie; zero where there is none.
 

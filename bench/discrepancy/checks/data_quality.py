@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.discrepancy.case.case import Case, CaseRecord
-from bench.discrepancy.case.channel_noise import noise_floor, quantisation_step
+from bench.discrepancy.case.channel_noise import noise_floor, quantisation_step, quiet_noise
 from bench.discrepancy.checks.scales import observed
 from bench.discrepancy.likelihood.problem import Array, Problem
 from bench.discrepancy.settings import DEFAULT, ChecksSettings, DiagnosisSettings
@@ -207,7 +207,10 @@ def _levelled(samples: Array, noise: float, *, settings: DiagnosisSettings) -> b
 def _understated(case: Case, problem: Problem) -> Iterator[str]:
     for c, name in enumerate(problem.structure.channels):
         stated = case.channel(name).noise_std
-        floor = min(noise_floor(record.values[name]) for record in problem.records)
+        floor = min(
+            min(noise_floor(record.values[name]), quiet_noise(record.values[name]))
+            for record in problem.records
+        )
         unit = case.channel(name).unit
         if stated and floor > problem.settings.checks.understated * max(stated, problem.noise[c]):
             yield (

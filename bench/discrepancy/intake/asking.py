@@ -5,15 +5,22 @@ from __future__ import annotations
 import contextlib
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from html import escape
 from pathlib import Path
 from typing import Any
 
+from bench.discrepancy.application.own_share import with_simulator
+from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.case.reading import read_case
+from bench.discrepancy.diagnosis import Diagnosis
 from bench.discrepancy.intake.assumptions import Assumptions
 from bench.discrepancy.intake.drafting import Draft, draft
 from bench.discrepancy.intake.logs import log_of
 from bench.discrepancy.intake.models import model_file
+from bench.discrepancy.verdict import Verdict
+from bench.errors import MissingPackageError
 
 
 def drafted(
@@ -53,3 +60,103 @@ def case_from(logs: Sequence[Any], model: Any, **options: Any) -> Iterator[tuple
     with tempfile.TemporaryDirectory() as folder:
         made, _ = drafted(logs, model, Path(folder), **options)
         yield read_case(folder), made
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """A diagnosis of logs against a model, as a notebook shows it.
+
+    Attributes:
+        verdict: What it says.
+        diagnosis: All behind it, for `write_report` and `write_rerun`.
+        assumed: What was assumed, a sentence each.
+    """
+
+    verdict: Verdict
+    diagnosis: Diagnosis | ArticulatedDiagnosis
+    assumed: tuple[str, ...]
+    folder: tempfile.TemporaryDirectory[str] = field(repr=False)
+    """Folder of the case, which lives as long as this."""
+
+    def to_pandas(self) -> Any:
+        """Parameters of the named effects and the nominal parameters as re-estimated, a row each.
+
+        Raises:
+            MissingPackageError: pandas is not installed.
+        """
+        try:
+            import pandas as pd  # noqa: PLC0415  (not needed by the bench)
+        except ImportError:
+            raise MissingPackageError("a DataFrame needs pandas: pip install pandas") from None
+        rows = [
+            {"what": e.name, "where": e.where or e.channel, "parameter": name, "value": x.value, "std": x.std, "unit": x.unit,
+             "closed": e.closed}
+            for e in self.verdict.named
+            for name, x in e.parameters.items()
+        ]  # fmt: skip
+        rows += [
+            {"what": "nominal", "where": "", "parameter": p.name, "value": p.value, "std": p.std, "unit": "", "closed": float("nan")}
+            for p in self.verdict.nominal
+        ]  # fmt: skip
+        return pd.DataFrame(rows, columns=["what", "where", "parameter", "value", "std", "unit", "closed"])
+
+    def plot(self) -> Any:
+        """The judging record, measured and simulated before and after, over time: a matplotlib figure."""
+        from bench.discrepancy.report.articulated import simulated_joints  # noqa: PLC0415
+        from bench.discrepancy.report.simulated_records import variants  # noqa: PLC0415
+        from bench.figures import time_histories  # noqa: PLC0415
+
+        robot = isinstance(self.diagnosis, ArticulatedDiagnosis)
+        runs = simulated_joints(self.diagnosis) if robot else variants(self.diagnosis)  # type: ignore[arg-type]
+        names = list(runs.values())[-1].names
+        responses = {c.name for c in self.diagnosis.case.channels if c.role == "response"}
+        return time_histories(runs, [n for n in names if robot or n in responses])
+
+    def _repr_html_(self) -> str:
+        gaps = [
+            f"{g.before:.3g} → {g.after:.3g} (noise alone {g.noise_floor:.2g})" for g in self.verdict.gaps
+        ]
+        rows = "".join(
+            f"<tr><td>{escape(e.name)}</td><td>{escape(e.where or e.channel)}</td><td>{escape(name)}</td>"
+            f"<td>{x.value:.5g} ± {x.std:.2g} {escape(x.unit)}</td></tr>"
+            for e in self.verdict.named
+            for name, x in e.parameters.items()
+        )
+        table = (
+            f"<table><tr><th>effect</th><th>where</th><th>parameter</th><th>value</th></tr>{rows}</table>"
+            if rows
+            else ""
+        )
+        return f"<p>{escape(self.verdict.explanation)}</p>{table}<p>gap: {escape('; '.join(gaps))}</p>"
+
+
+def diagnose(model: Any, records: Any, **options: Any) -> Answer:
+    """Diagnose records against a model, in Python.
+
+    Args:
+        model: MJCF as path or text, `mujoco.MjSpec` or `mujoco.MjModel`.
+        records: One log or several: files, Recordings, DataFrames, or mappings of columns to arrays; the last one judges.
+        **options: `judging`, `columns`, `units`, `assumptions`, `rate` as of `case_from`; the others as of
+            `bench.discrepancy.diagnose` (`exclude`, `most`, `budget`, `progress`, …).
+
+    Raises:
+        BenchError: As the command `jointbench diagnose`.
+
+    Example:
+        >>> answer = diagnose("stage.xml", [run_1, run_2], columns={"x": "guide.position"})  # doctest: +SKIP
+        >>> answer.to_pandas()  # doctest: +SKIP
+    """
+    from bench.discrepancy.diagnosis import diagnose as ask  # noqa: PLC0415
+
+    several = isinstance(records, (list, tuple))
+    own = {
+        key: options.pop(key)
+        for key in ("judging", "columns", "units", "assumptions", "rate")
+        if key in options
+    }
+    folder = tempfile.TemporaryDirectory()
+    made, _ = drafted(records if several else [records], model, Path(folder.name), **own)
+    case = read_case(folder.name)
+    found = ask(case, **options)
+    verdict = with_simulator(found.verdict, case)
+    return Answer(verdict, replace(found, verdict=verdict), made.assumed, folder)

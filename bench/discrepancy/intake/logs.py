@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,6 +17,10 @@ from bench.record_files.times import clock_of, time_source
 from bench.recording import Recording
 
 Array = NDArray[np.float64]
+JITTERY = 0.3
+"""Part of a step that a time may lie off a uniform clock, as for every record (`bench.recording.clock`)."""
+LONGEST = 10.0
+"""Median steps from which a step is a pause: beyond it straight lines say nothing, as for dropouts in `bench.record_files`."""
 
 
 class Log(NamedTuple):
@@ -52,14 +57,49 @@ def log_of(source: Any, *, rate: float = 0.0, name: str = "log") -> Log:
     if isinstance(source, Recording):
         return _of_recording(source, name)
     if isinstance(source, (str, Path)):
-        return _of_file(Path(source), rate)
+        return regular(_of_file(Path(source), rate))
     if hasattr(source, "columns") and hasattr(source, "__getitem__"):
-        return _of_table({str(c): source[c] for c in source.columns}, rate, name)
+        return regular(_of_table({str(c): source[c] for c in source.columns}, rate, name))
     if isinstance(source, Mapping):
-        return _of_table({str(c): values for c, values in source.items()}, rate, name)
+        return regular(_of_table({str(c): values for c, values in source.items()}, rate, name))
     raise RecordingError(
         f"a {type(source).__name__} came for a log; a path, a Recording, a DataFrame, or a mapping of columns to arrays is expected"
     )
+
+
+def regular(log: Log) -> Log:
+    """The log on a uniform clock where its own is irregular beyond what every reader bridges: by straight lines, at the median step.
+
+    A log of a program that polls has steps of its own length each. Straight lines keep what is slow against them; how far the steps
+    scatter is noted, and the result ends where a step is `LONGEST` times the median, which is a pause.
+    """
+    steps = np.diff(log.time)
+    if len(steps) < 2 or not np.isfinite(steps).all():
+        return log
+    order = np.argsort(log.time, kind="stable")
+    time = np.asarray(log.time)[order]
+    kept = np.append(np.diff(time) > 0.0, True)
+    time = time[kept]
+    step = float(np.median(np.diff(time)))
+    drift = np.abs(time - time[0] - step * np.round((time - time[0]) / step))
+    if float(np.quantile(drift, 0.99)) <= JITTERY * step and np.max(np.diff(time)) < 1.5 * step:
+        return log
+    pauses = np.flatnonzero(np.diff(time) > LONGEST * step)
+    edges = [0, *(pauses + 1).tolist(), len(time)]
+    first, end = max(itertools.pairwise(edges), key=lambda pair: pair[1] - pair[0])
+    own = time[first:end]
+    step = float(np.median(np.diff(own)))
+    clock = own[0] + step * np.arange(int((own[-1] - own[0]) / step) + 1)
+    arrays = {
+        name: np.interp(clock, own, values[order][kept][first:end]) for name, values in log.arrays.items()
+    }
+    note = (
+        f"steps of {1e3 * np.min(np.diff(own)):.3g} to {1e3 * np.max(np.diff(own)):.3g} ms, brought onto a clock of {1.0 / step:.4g} Hz by "
+        "straight lines"
+    )
+    if len(pauses):
+        note += f"; of {len(pauses) + 1} stretches between pauses the longest is taken"
+    return log._replace(time=clock, arrays=arrays, notes=(*log.notes, note))
 
 
 def _of_file(path: Path, rate: float) -> Log:

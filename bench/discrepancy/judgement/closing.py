@@ -73,6 +73,15 @@ def nominal_estimates(explanation: Explanation) -> tuple[NominalEstimate, ...]:
     return tuple(out.values())
 
 
-def complete(found: Sequence[Gap], *, sharp: bool, settings: JudgementSettings) -> bool:
-    """Whether what an explanation leaves is noise: by the stated one, or by what is left on the judging records."""
-    return sharp or all(gap.after <= settings.within_noise * gap.noise_floor for gap in found)
+def complete(found: Sequence[Gap], *, sharp: bool, stated: bool, settings: JudgementSettings) -> bool:
+    """Whether what an explanation leaves is noise.
+
+    Args:
+        found: Discrepancies of the judging records.
+        sharp: Whether the stated noise explains what is left.
+        stated: Whether the noise is stated: where it is and does not, more is left, and be it in channels that are not judged.
+        settings: How near to noise counts as noise where none is stated.
+    """
+    return sharp or (
+        not stated and all(gap.after <= settings.within_noise * gap.noise_floor for gap in found)
+    )

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -102,12 +103,29 @@ def noise_of(channel: CaseChannel) -> float:
     return max(channel.noise_std or 0.0, channel.resolution / np.sqrt(12.0))
 
 
+@numba.njit(cache=True)
+def _runs(readings, resolution):
+    """Number (n,) of the run that every reading belongs to: a run goes on while its readings lie within one step."""
+    run = np.zeros(len(readings), dtype=np.int64)
+    low = high = readings[0]
+    for i in range(1, len(readings)):
+        low, high = min(low, readings[i]), max(high, readings[i])
+        run[i] = run[i - 1]
+        if high - low > 1.5 * resolution:
+            low = high = readings[i]
+            run[i] += 1
+    return run
+
+
 def weight_of_readings(readings: Array, resolution: float, noise: float) -> Array:
     """Weight (n,) of an encoder's readings (n,): how far each tells something that the others do not.
 
     While a reading stays the same, its error of quantisation does. Of ``L`` equal readings in a row the mean has the variance
     ``noise^2 (s + (1 - s) / L)``, with the part ``s`` of the noise's variance that is the step's; each counts by the root of one L-th
     of the inverse of that, in units of the noise. Where the motion crosses steps between samples these are white and weigh one.
+
+    A reading that noise throws to and fro between two values stays the same, too: counted as short runs, those near the edge of a step,
+    whose errors are largest, would weigh most. So a run holds two neighbouring values, and of a motion that goes on it holds two steps.
 
     Args:
         readings: As logged.
@@ -119,9 +137,8 @@ def weight_of_readings(readings: Array, resolution: float, noise: float) -> Arra
     """
     if resolution <= 0.0 or noise <= 0.0:
         return np.ones(len(readings))
-    starts = np.concatenate([[True], np.abs(np.diff(readings)) > 0.5 * resolution])
-    run = np.cumsum(starts) - 1
-    length = np.bincount(run)[run]
+    run = _runs(np.ascontiguousarray(readings, dtype=np.float64), resolution)
+    length = np.maximum(0.5 * np.bincount(run)[run], 1.0)
     share = min(resolution**2 / 12.0 / noise**2, 1.0)
     return np.asarray(1.0 / np.sqrt(1.0 + share * (length - 1.0)), dtype=np.float64)
 

@@ -18,6 +18,7 @@ from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.precheck.information import Told, effects_told, parameters_told, shortened
 from bench.discrepancy.precheck.joints import joint_doubts
 from bench.discrepancy.precheck.loads import load_doubts
+from bench.discrepancy.precheck.motions import motion_doubts
 from bench.discrepancy.precheck.samples import sample_doubts
 from bench.discrepancy.precheck.settings import CheckSettings
 from bench.errors import BenchError
@@ -103,7 +104,8 @@ def check(case: Case, settings: CheckSettings | None = None, *, informed: bool =
     except BenchError as error:
         return Checked("unusable", (str(error), *found), notes, seconds=time.perf_counter() - began)
     problem = Problem(told, structure_of(told), told.identification)
-    found += [*_of_admission(admission), *doubts(told, problem), *load_doubts(problem, own)]
+    found += [*_of_admission(admission), *doubts(told, problem)]
+    found += [*motion_doubts(problem, own), *load_doubts(problem, own)]
     parameters: list[Told] = []
     effects: list[Told] = []
     if informed:

@@ -15,7 +15,7 @@ class CheckSettings:
         identifiable: Posterior over prior standard deviation of a nominal parameter up to which the records tell it.
         weak: The same up to which they tell something of it; above it the stated value stays what it was.
         certain: Chi-squared that an effect keeps once the nominal parameters have taken what they can, from which it can be named: five
-            sigmas, the evidence that the search itself asks for before it fits (`screening.candidates.WORTH_A_FIT`).
+            sigmas, the evidence that the search itself asks for before it fits (`worth_a_fit` of the screening).
         hint: The same from which it shows: three sigmas.
         reach: Prior standard deviations within which an effect has to reach the size that matters.
         records_seconds: Seconds of each record that the information is computed on, so that it takes seconds itself.
@@ -24,6 +24,10 @@ class CheckSettings:
         unsigned: By how much the magnitude of the load that the motion implies has to correlate better with it than the load itself.
         glitch: Jump from a neighbour to a sample and back, over what the samples around do at most, from which it is a torn value.
         frozen: Samples in a row with one value, of a channel that otherwise moves at every sample, from which it is a stuck one.
+        one_motion: Correlation, at frequencies where both are strong, below which two channels of one motion do not tell the same: what
+            kinematics ties together is apart by noise alone, a thousandth there.
+        far_off: Factor between measured and predicted size of all responses from which the load is another thing: a resonance in the wrong
+            place makes up to its amplification of it, 10 at a damping of 5 %.
     """
 
     matters: float = 0.05
@@ -38,3 +42,5 @@ class CheckSettings:
     unsigned: float = 0.3
     glitch: float = 8.0
     frozen: int = 12
+    one_motion: float = 0.9
+    far_off: float = 20.0

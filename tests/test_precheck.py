@@ -1,0 +1,67 @@
+"""The check before any fit: faults of every kind are found in words, sound records are called ready, and what they tell is graded."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bench.cli import main
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
+from planted_faults import FAULTS, check_one, measured
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_fault_of_each_kind_is_found(fault, tmp_path):
+    word, _, doubts = check_one(fault, 3, tmp_path / "case")
+    assert word != "ready"
+    assert doubts
+
+
+def _write(folder, records, nominal):
+    folder.mkdir()
+    (folder / "nominal.json").write_text(json.dumps(nominal))
+    for name, columns in records.items():
+        table = np.column_stack(list(columns.values()))
+        np.savetxt(
+            folder / f"{name}.csv", table, delimiter=",", header=",".join(columns), comments="", fmt="%.10g"
+        )
+    return folder
+
+
+@pytest.mark.slow
+def test_sound_records_are_ready_and_graded(tmp_path, capsys):
+    folder = _write(tmp_path / "case", *measured(np.random.default_rng(7)))
+    assert main(["check", str(folder), "--json", "-"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["word"] == "ready"
+    told = {one["name"]: one["word"] for one in found["parameters"]}
+    assert told == {"mass": "identifiable", "stiffness": "identifiable", "damping": "identifiable"}
+    effects = {one["name"]: one for one in found["effects"]}
+    assert effects["cubic_stiffness"]["word"] == "identifiable"
+    # what a nominal parameter can do as well keeps next to nothing of its own
+    assert effects["cubic_stiffness"]["figure"] > 3.0 * effects["stiffness_error"]["figure"]
+
+
+def test_exit_status_says_what_was_found(tmp_path, capsys):
+    records, nominal = measured(np.random.default_rng(8))
+    for columns in records.values():
+        columns["acceleration"] = -columns["acceleration"]
+    folder = _write(tmp_path / "turned", records, nominal)
+    with pytest.raises(SystemExit) as stop:
+        main(["check", str(folder), "--no-information"])
+    assert stop.value.code == 2
+    assert "unusable" in capsys.readouterr().out
+    for columns in records.values():
+        columns["acceleration"] = -columns["acceleration"]
+        columns["acceleration"] = np.clip(columns["acceleration"], -0.5 * columns["acceleration"].max(), None)
+    folder = _write(tmp_path / "clipped", records, nominal)
+    with pytest.raises(SystemExit) as stop:
+        main(["check", str(folder), "--no-information"])
+    assert stop.value.code == 1
+    assert "dwells at its extreme" in capsys.readouterr().out
