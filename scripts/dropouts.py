@@ -20,7 +20,7 @@ from bench.recording.jumps import JUMPS, JumpSettings, hidden_dropouts
 
 Array = NDArray[np.float64]
 RATE, N = 500.0, 3000
-LOST = (3, 10, 30)
+LOST: tuple[int, ...] = (3, 10, 30)
 KINDS = ("noise", "sweep", "multisine", "steps", "impacts")
 
 

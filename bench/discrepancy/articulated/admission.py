@@ -19,9 +19,8 @@ from numpy.typing import NDArray
 from bench import native
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.case.unit_conversion import converted
-from bench.discrepancy.checks.like_mujoco import ITEMS, LikenessSettings
+from bench.discrepancy.checks.like_mujoco import ITEMS
 from bench.discrepancy.checks.scales import (
-    ScaleSettings,
     bands_between,
     common_factor,
     compare_channels,
@@ -38,6 +37,7 @@ from bench.discrepancy.model.mjcf_values import value_notes
 from bench.discrepancy.multibody.channels import bound
 from bench.discrepancy.multibody.model import ArticulatedModel, Joint, with_nominal_values
 from bench.discrepancy.multibody.records import Motion, encoders_of, input_of, motion_of
+from bench.discrepancy.settings import DEFAULT, DiagnosisSettings, LikenessSettings, ScaleSettings
 from bench.errors import ModelError, RecordingError, UnitError
 
 Array = NDArray[np.float64]
@@ -72,12 +72,15 @@ class AdmittedRobot(NamedTuple):
     notes: tuple[str, ...]
 
 
-def admitted_robot(declared: Case, *, anyway: bool = False) -> AdmittedRobot:
+def admitted_robot(
+    declared: Case, *, anyway: bool = False, settings: DiagnosisSettings = DEFAULT
+) -> AdmittedRobot:
     """Admit a case of an articulated model to the diagnosis.
 
     Args:
         declared: The case as read.
         anyway: Whether what is doubtful is noted rather than refused.
+        settings: Thresholds of the diagnosis.
 
     Raises:
         UnitError: A unit does not fit, or a channel is off by a factor or a sign.
@@ -94,17 +97,19 @@ def admitted_robot(declared: Case, *, anyway: bool = False) -> AdmittedRobot:
     _refuse(case, model)
     case, clipped = _within_ranges(case, model)
     records = (*case.identification, *case.validation)
-    moving = [(record, motion_of(case, model, record, {})) for record in records]
-    doubts = _suspicions(declared, case, model, moving[: len(case.identification)])
+    moving = [(record, motion_of(case, model, record, {}, settings=settings.motion)) for record in records]
+    doubts = _suspicions(declared, case, model, moving[: len(case.identification)], settings.checks.scales)
     for first in doubts:
         if not anyway:
             more = f" (and {len(doubts) - 1} more such)" if len(doubts) > 1 else ""
             raise UnitError(f"{first}{more}; --anyway diagnoses the records as they are")
-    apart = _left_out(case, model, compiled, moving, ComparisonSettings())
+    apart = _left_out(case, model, compiled, moving, ComparisonSettings(like=settings.checks.likeness))
     if apart and not anyway:
         raise ModelError(f"{apart}; --anyway diagnoses with the nominal model all the same")
     doubts = (*doubts, apart) if apart else doubts
-    return AdmittedRobot(case, compiled, (*said, *clipped, *value_notes(case, rig), *doubts))
+    return AdmittedRobot(
+        case, compiled, (*said, *clipped, *value_notes(case, rig, settings=settings.model), *doubts)
+    )
 
 
 def _refuse(case: Case, model: ArticulatedModel) -> None:
@@ -161,10 +166,12 @@ def _within_ranges(case: Case, model: ArticulatedModel) -> tuple[Case, tuple[str
     return (out, tuple(said)) if said else (case, ())
 
 
-def _suspicions(declared: Case, case: Case, model: ArticulatedModel, moving: list[Moving]) -> tuple[str, ...]:
+def _suspicions(
+    declared: Case, case: Case, model: ArticulatedModel, moving: list[Moving], scales: ScaleSettings
+) -> tuple[str, ...]:
     """Factors and signs of the recording, a sentence each; what is found first makes nonsense of the comparisons after it."""
     # the input asked for is an inverse: no resonance turns its sign, only inertia and stiffness near the frequency at which they cancel
-    settings = ScaleSettings(octaves=1.0)
+    settings = replace(scales, octaves=min(scales.octaves, 1.0))
     for found in (
         _between(declared, case, model, settings),
         _beyond_ranges(declared, case, model, settings),
@@ -189,7 +196,7 @@ def _between(declared: Case, case: Case, model: ArticulatedModel, settings: Scal
                 noise=(shown_noise(case, first, record), shown_noise(case, second, record)),
             )  # fmt: skip
             if pair is not None and grossly_apart(pair, settings):
-                yield pair_words(declared, second, first, pair, 1, record)
+                yield pair_words(declared, second, first, pair, 1, record, settings)
 
 
 def _beyond_ranges(

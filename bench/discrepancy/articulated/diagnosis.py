@@ -169,7 +169,7 @@ def diagnose_articulated(
     catalogue = [effect for effect in CATALOGUE if effect.name not in exclude]
     progress("reading the model and the records")
     stated = all((c.noise_std or 0.0) > 0.0 for c in case.channels if c.role == "response")
-    case, compiled, notes = admitted_robot(case, anyway=anyway)
+    case, compiled, notes = admitted_robot(case, anyway=anyway, settings=settings)
     model = ArticulatedModel.of(compiled, case.rig)
     problem = ArticulatedProblem.of(case, model, case.identification, settings)
     judging = ArticulatedProblem.of(case, model, case.validation, settings)
