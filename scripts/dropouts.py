@@ -95,7 +95,8 @@ def main(args: Args) -> None:
 
 def _row(settings: JumpSettings, whole: list[Array], torn: list[tuple[int, int, Array]]) -> str:
     alarms = sum(bool(hidden_dropouts(table, settings)) for table in whole)
-    hits, wrong = dict.fromkeys(LOST, 0), 0
+    hits: dict[int, int] = dict.fromkeys(LOST, 0)
+    wrong = 0
     for lost, at, table in torn:
         told = hidden_dropouts(table, settings)
         hits[lost] += len(told) == 1 and abs(told[0] - at) <= 2

@@ -8,7 +8,7 @@ import numpy as np
 
 from bench.discrepancy import BlindOptions, Case
 from bench.discrepancy.blind.drawing import draw_case
-from bench.discrepancy.blind.withheld_effects import RECIPES
+from bench.discrepancy.truth.withheld_effects import RECIPES
 from bench.discrepancy.effects.catalogue import effect_named
 from bench.discrepancy.fitting.map_fit import Fit, fit
 from bench.discrepancy.likelihood.problem import Problem

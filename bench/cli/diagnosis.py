@@ -57,9 +57,9 @@ class BlindMake:
         import numpy as np
 
         from bench.discrepancy import BlindOptions, make_blind
-        from bench.discrepancy.blind.background_settings import BackgroundSettings
+        from bench.discrepancy.truth.background_settings import BackgroundSettings
         from bench.discrepancy.blind.protocol import SEAL
-        from bench.discrepancy.blind.rigs import (
+        from bench.discrepancy.truth.rigs import (
             RIGS_SETTINGS,
         )
         from bench.targets import check_folder

@@ -70,7 +70,7 @@ SETTINGS = LookSettings()
 @contextmanager
 def style() -> Iterator[None]:
     """The bench's look, for code that draws its own axes: matplotlib's settings are restored afterwards."""
-    with matplotlib.rc_context(SETTINGS.style):
+    with matplotlib.rc_context(dict(SETTINGS.style)):
         yield
 
 

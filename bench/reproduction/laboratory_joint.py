@@ -156,7 +156,7 @@ def measured(record: Recording, rng: np.random.Generator) -> Recording:
     return sensed.with_channels(rates)
 
 
-def tests(seeds: dict[str, int]) -> dict[str, Recording]:
+def tests(seeds: Mapping[str, int]) -> dict[str, Recording]:
     """True records by loading."""
     return {
         name: simulate(rig(), drive(loaded), rng=np.random.default_rng(seeds[name]))

@@ -16,15 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
-from bench.discrepancy.blind.background_settings import STATED, BackgroundSettings
-from bench.discrepancy.blind.ground_truth import Placed
-from bench.discrepancy.blind.out_of_catalogue import (
+from bench.discrepancy.truth.background_settings import STATED, BackgroundSettings
+from bench.discrepancy.truth.ground_truth import Placed
+from bench.discrepancy.truth.out_of_catalogue import (
     HIDDEN_RESONATOR,
     MODULATED_STIFFNESS,
     POSITION_DEPENDENT_FRICTION,
 )
-from bench.discrepancy.blind.rigs import Bench, reach_of
-from bench.discrepancy.blind.withheld_effects import Drawn, Reach, Recipe, Shape
+from bench.discrepancy.truth.rigs import Bench, reach_of
+from bench.discrepancy.truth.withheld_effects import Drawn, Reach, Recipe, Shape
 
 Array = NDArray[np.float64]
 Records = Sequence[dict[str, Array]]

@@ -7,7 +7,7 @@ is why steps are short (`substeps` a sample).
 
 This is a second integrator on purpose. The fits have one of their own (`bench.discrepancy.simulation.stick_slip`: Runge-Kutta between
 events that are located); a case made with that would forgive its mistakes. Smooth laws go through MuJoCo instead, see
-`bench.discrepancy.blind.ground_truth`; the tests hold all three equal.
+`bench.discrepancy.truth.ground_truth`; the tests hold all three equal.
 
 References:
     J. J. Moreau, Unilateral contact and dry friction in finite freedom dynamics, CISM 302 (1988).
@@ -35,7 +35,7 @@ FORCE, RATE, LIMIT, N_ROWS, ROW, THETA, STATE, N_STATES = range(8)
 
 @dataclass(frozen=True)
 class MoreauTimeSteppingSettings:
-    """Numbers of `bench.discrepancy.blind.moreau_time_stepping`."""
+    """Numbers of `bench.discrepancy.truth.moreau_time_stepping`."""
 
     substeps: int = 200
     """Steps a sample: at 500 Hz 10 µs, which leaves errors of 1e-4 of the motion after hundreds of reversals (tested)."""
@@ -46,7 +46,7 @@ SETTINGS = MoreauTimeSteppingSettings()
 
 
 class MoreauTimeSteppingLimits(NamedTuple):
-    """Numbers of `bench.discrepancy.blind.moreau_time_stepping` that compiled code holds."""
+    """Numbers of `bench.discrepancy.truth.moreau_time_stepping` that compiled code holds."""
 
     diverged: float = 1e12
 

@@ -18,7 +18,7 @@ they are laws all the same, so that MuJoCo's callback integrates them like any o
 - `position_dependent_friction`: friction that rises and falls along the stroke, as a lead screw's does.
 - `unmeasured_load`: a blow from outside at one moment.
 - `restitution_stop`: a rigid stop that throws back with a coefficient of restitution; an impulse, hence no law: the time
-  stepping of `bench.discrepancy.blind.moreau_time_stepping` knows it.
+  stepping of `bench.discrepancy.truth.moreau_time_stepping` knows it.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from bench.laws.base import ForceLaw, Parameter, kernel
 
 @dataclass(frozen=True)
 class OutOfCatalogueSettings:
-    """Numbers of `bench.discrepancy.blind.out_of_catalogue`."""
+    """Numbers of `bench.discrepancy.truth.out_of_catalogue`."""
 
     branches: int = 8
     """Relaxations that stand for a fractional derivative: two a decade keep its storage and loss to 2 % over the middle ones."""

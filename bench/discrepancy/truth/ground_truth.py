@@ -2,7 +2,7 @@
 
 Smooth and continuous laws on the sdof and the joint rig are integrated by MuJoCo through the bench's native callback,
 Runge-Kutta with `steps` steps a sample: the engine that users run. Set-valued friction and rigid stops, which MuJoCo's
-callback can only round, go through Moreau's time stepping (`bench.discrepancy.blind.moreau_time_stepping`). A component under prescribed
+callback can only round, go through Moreau's time stepping (`bench.discrepancy.truth.moreau_time_stepping`). A component under prescribed
 motion needs no dynamics; its hidden states are integrated along the finely sampled motion. None of these is the integrator of
 the fits. What they share with the fits are the kernels of the laws, which is the point of having them written once.
 
@@ -19,15 +19,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
-from bench.discrepancy.blind.moreau_time_stepping import Acting, Matrices, Stop, TrueMotion, follow, march
-from bench.discrepancy.blind.withheld_effects import Drawn, Recipe
+from bench.discrepancy.truth.moreau_time_stepping import Acting, Matrices, Stop, TrueMotion, follow, march
+from bench.discrepancy.truth.withheld_effects import Drawn, Recipe
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class GroundTruthSettings:
-    """Numbers of `bench.discrepancy.blind.ground_truth`."""
+    """Numbers of `bench.discrepancy.truth.ground_truth`."""
 
     steps: int = 20
     """Integration steps of MuJoCo a sample, and samples of a prescribed motion a sample of the record."""

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bench.discrepancy.blind import out_of_catalogue as foreign
+from bench.discrepancy.truth import out_of_catalogue as foreign
 from bench.discrepancy.effects import friction_limits as limits
 from bench.errors import UnknownNameError
 from bench.laws.base import ForceLaw, Kernel
@@ -35,7 +35,7 @@ from bench.laws.stribeck import STRIBECK
 
 @dataclass(frozen=True)
 class WithheldEffectsSettings:
-    """Numbers of `bench.discrepancy.blind.withheld_effects`."""
+    """Numbers of `bench.discrepancy.truth.withheld_effects`."""
 
     slow: float = 1e-4
     """Velocity that rounds a law at rest, as a part of V; friction proper is set-valued in sealed cases."""

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import bessel, chirp, fftconvolve, sosfilt
 
-from bench.discrepancy.blind.background_settings import BackgroundSettings
-from bench.discrepancy.blind.ground_truth import (
+from bench.discrepancy.truth.background_settings import BackgroundSettings
+from bench.discrepancy.truth.ground_truth import (
     GROUND_TRUTH_SETTINGS,
     ROWS,
     Placed,
@@ -19,8 +19,8 @@ from bench.discrepancy.blind.ground_truth import (
     motion_of,
     sensed,
 )
-from bench.discrepancy.blind.moreau_time_stepping import TrueMotion
-from bench.discrepancy.blind.withheld_effects import Reach, Recipe, recipe_named
+from bench.discrepancy.truth.moreau_time_stepping import TrueMotion
+from bench.discrepancy.truth.withheld_effects import Reach, Recipe, recipe_named
 from bench.errors import ParameterError
 
 Array = NDArray[np.float64]
@@ -31,7 +31,7 @@ SIGNALS = ("random", "sweep", "multisine", "stepped", "decaying")
 
 @dataclass(frozen=True)
 class RigsSettings:
-    """Numbers of `bench.discrepancy.blind.rigs`."""
+    """Numbers of `bench.discrepancy.truth.rigs`."""
 
     machine: float = 6.0
     """Bandwidth of the machine that prescribes a motion, as a multiple of the signal's central frequency."""
