@@ -37,7 +37,13 @@ from bench.discrepancy.model.mjcf_values import value_notes
 from bench.discrepancy.multibody.channels import bound
 from bench.discrepancy.multibody.model import ArticulatedModel, Joint, with_nominal_values
 from bench.discrepancy.multibody.records import Motion, encoders_of, input_of, motion_of
-from bench.discrepancy.settings import DEFAULT, DiagnosisSettings, LikenessSettings, ScaleSettings
+from bench.discrepancy.settings import (
+    DEFAULT,
+    ChecksSettings,
+    DiagnosisSettings,
+    LikenessSettings,
+    ScaleSettings,
+)
 from bench.errors import ModelError, RecordingError, UnitError
 
 Array = NDArray[np.float64]
@@ -98,7 +104,7 @@ def admitted_robot(
     case, clipped = _within_ranges(case, model)
     records = (*case.identification, *case.validation)
     moving = [(record, motion_of(case, model, record, {}, settings=settings.motion)) for record in records]
-    doubts = _suspicions(declared, case, model, moving[: len(case.identification)], settings.checks.scales)
+    doubts = _suspicions(declared, case, model, moving[: len(case.identification)], settings.checks)
     for first in doubts:
         if not anyway:
             more = f" (and {len(doubts) - 1} more such)" if len(doubts) > 1 else ""
@@ -167,13 +173,13 @@ def _within_ranges(case: Case, model: ArticulatedModel) -> tuple[Case, tuple[str
 
 
 def _suspicions(
-    declared: Case, case: Case, model: ArticulatedModel, moving: list[Moving], scales: ScaleSettings
+    declared: Case, case: Case, model: ArticulatedModel, moving: list[Moving], checks: ChecksSettings
 ) -> tuple[str, ...]:
     """Factors and signs of the recording, a sentence each; what is found first makes nonsense of the comparisons after it."""
     # the input asked for is an inverse: no resonance turns its sign, only inertia and stiffness near the frequency at which they cancel
-    settings = replace(scales, octaves=min(scales.octaves, 1.0))
+    settings = replace(checks.scales, octaves=min(checks.scales.octaves, 1.0))
     for found in (
-        _between(declared, case, model, settings),
+        _between(declared, case, model, settings, checks),
         _beyond_ranges(declared, case, model, settings),
         _against_model(declared, case, model, moving, settings),
     ):
@@ -183,7 +189,9 @@ def _suspicions(
     return ()
 
 
-def _between(declared: Case, case: Case, model: ArticulatedModel, settings: ScaleSettings) -> Iterator[str]:
+def _between(
+    declared: Case, case: Case, model: ArticulatedModel, settings: ScaleSettings, checks: ChecksSettings
+) -> Iterator[str]:
     """Position and velocity of one joint that are no derivatives of one another."""
     for joint in model.joints:
         channels = encoders_of(case, joint).channels
@@ -196,7 +204,7 @@ def _between(declared: Case, case: Case, model: ArticulatedModel, settings: Scal
                 noise=(shown_noise(case, first, record), shown_noise(case, second, record)),
             )  # fmt: skip
             if pair is not None and grossly_apart(pair, settings):
-                yield pair_words(declared, second, first, pair, 1, record, settings)
+                yield pair_words(declared, second, first, pair, 1, record, settings=checks)
 
 
 def _beyond_ranges(
