@@ -16,6 +16,7 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -30,7 +31,11 @@ RATE, DURATION = 250.0, 12.0
 
 def measured(rng: np.random.Generator, peak: float = 30.0) -> tuple[dict[str, Columns], dict]:
     """Records by name and nominal.json of a sound case."""
-    true = {"mass": 2.0, "stiffness": rng.uniform(800.0, 3000.0), "damping": rng.uniform(3.0, 10.0)}
+    true: dict[str, Any] = {
+        "mass": 2.0,
+        "stiffness": rng.uniform(800.0, 3000.0),
+        "damping": rng.uniform(3.0, 10.0),
+    }
     std = {"mass": 0.02, "stiffness": 0.03, "damping": 0.2}
     hidden = [
         (),

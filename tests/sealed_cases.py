@@ -8,12 +8,12 @@ import numpy as np
 
 from bench.discrepancy import BlindOptions, Case
 from bench.discrepancy.blind.drawing import draw_case
-from bench.discrepancy.truth.withheld_effects import RECIPES
 from bench.discrepancy.effects.catalogue import effect_named
 from bench.discrepancy.fitting.map_fit import Fit, fit
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placements import placements
 from bench.discrepancy.model.rigs import structure_of
+from bench.discrepancy.truth.withheld_effects import RECIPES
 
 LATER = {
     "saturating_spring", "hertz_contact", "hidden_resonator", "displacement_dependent_damping", "stress_softening",

@@ -11,19 +11,19 @@ from bench.cli import main
 from bench.discrepancy import score_blind
 from bench.discrepancy.blind.background import ACTING, RECORDED, Background, draw_background
 from bench.discrepancy.blind.background_score import background_scored, background_summary
-from bench.discrepancy.truth.background_settings import STATED, BackgroundSettings
 from bench.discrepancy.blind.drawing import (
     DRAWING_SETTINGS,
     draw_case,
     draw_plan,
 )
 from bench.discrepancy.blind.proportions import calibration_error, calibration_scatter
+from bench.discrepancy.blind.score_report import tables
+from bench.discrepancy.truth.background_settings import STATED, BackgroundSettings
 from bench.discrepancy.truth.rigs import (
     RIGS_SETTINGS,
     BlindOptions,
     draw_bench,
 )
-from bench.discrepancy.blind.score_report import tables
 from bench.errors import ParameterError
 
 RIGS = {"sdof": (1.0, 0.0, 0.0), "damper": (0.0, 1.0, 0.0), "joint": (0.0, 0.0, 1.0)}

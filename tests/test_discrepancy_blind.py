@@ -12,23 +12,23 @@ from hypothesis import strategies as st
 
 from bench.cli import main
 from bench.discrepancy import make_blind, read_case, run_blind, score_blind
-from bench.discrepancy.truth import out_of_catalogue as foreign
 from bench.discrepancy.blind.drawing import (
     DRAWING_SETTINGS,
     draw_case,
     draw_plan,
 )
-from bench.discrepancy.truth.ground_truth import ROWS, Placed, Truth, motion_of, played, sensed
-from bench.discrepancy.truth.moreau_time_stepping import Acting, Matrices, Stop, march
 from bench.discrepancy.blind.proportions import calibration_error, share_of
 from bench.discrepancy.blind.region_overlap import region_scores
-from bench.discrepancy.truth.rigs import SIGNALS, BlindOptions, Plan, draw_bench, load, reach_of
 from bench.discrepancy.blind.score_report import markdown, page, tables
 from bench.discrepancy.blind.scoring import score_cases
-from bench.discrepancy.truth.withheld_effects import RECIPES, Reach, recipe_named
 from bench.discrepancy.effects import friction_limits as limits
 from bench.discrepancy.effects.catalogue import CATALOGUE
 from bench.discrepancy.simulation.stick_slip import Elements, LinearStructure, free_run
+from bench.discrepancy.truth import out_of_catalogue as foreign
+from bench.discrepancy.truth.ground_truth import ROWS, Placed, Truth, motion_of, played, sensed
+from bench.discrepancy.truth.moreau_time_stepping import Acting, Matrices, Stop, march
+from bench.discrepancy.truth.rigs import SIGNALS, BlindOptions, Plan, draw_bench, load, reach_of
+from bench.discrepancy.truth.withheld_effects import RECIPES, Reach, recipe_named
 from bench.errors import FileFormatError, ParameterError, UnknownNameError
 from bench.laws import LAWS
 from bench.laws.coulomb import COULOMB

@@ -57,8 +57,8 @@ class BlindMake:
         import numpy as np
 
         from bench.discrepancy import BlindOptions, make_blind
-        from bench.discrepancy.truth.background_settings import BackgroundSettings
         from bench.discrepancy.blind.protocol import SEAL
+        from bench.discrepancy.truth.background_settings import BackgroundSettings
         from bench.discrepancy.truth.rigs import (
             RIGS_SETTINGS,
         )

@@ -29,6 +29,10 @@ class SteppingLimits(NamedTuple):
 
 
 STEPPING_LIMITS = SteppingLimits()
+_STATES, _VALUES = (
+    STEPPING_LIMITS.max_states,
+    STEPPING_LIMITS.max_values,
+)  # sizes on the stack have to be globals of the module
 
 
 class Packed(NamedTuple):
@@ -195,11 +199,11 @@ def _advance_single(case, m, d, run):  # noqa: PLR0912  (one compiled loop)
     rows, columns = p.rows.ctypes.data, p.columns.ctypes.data
     q, v, f = stack_array(1), stack_array(1), stack_array(1)
     z, rate, total = (
-        stack_array(STEPPING_LIMITS.max_states),
-        stack_array(STEPPING_LIMITS.max_states),
-        stack_array(STEPPING_LIMITS.max_states),
+        stack_array(_STATES),
+        stack_array(_STATES),
+        stack_array(_STATES),
     )
-    values = stack_array(STEPPING_LIMITS.max_values)
+    values = stack_array(_VALUES)
     u = advance(values, nx + 1)
     hidden = pointer_at(states.ctypes.data + 8 * (nx * (m + states.shape[1] * case) + 2))
     y = pointer_at(outputs.ctypes.data + 8 * nc * n_steps * (m + outputs.shape[1] * case))

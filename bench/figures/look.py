@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import matplotlib
 import numpy as np
@@ -70,7 +70,7 @@ SETTINGS = LookSettings()
 @contextmanager
 def style() -> Iterator[None]:
     """The bench's look, for code that draws its own axes: matplotlib's settings are restored afterwards."""
-    with matplotlib.rc_context(dict(SETTINGS.style)):
+    with matplotlib.rc_context(cast(Any, dict(SETTINGS.style))):
         yield
 
 

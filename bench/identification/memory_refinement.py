@@ -64,7 +64,9 @@ def refined(
                     np.diag(curvature), 1e-12 * max(float(np.max(np.diag(curvature))), 1e-300)
                 )
                 move = np.linalg.solve(curvature + damping * factor * np.diag(scaled), slope)
-                trial = _evaluate(_moved(at.terms, np.asarray(move, dtype=np.float64)), thinned, spreads, penalty)
+                trial = _evaluate(
+                    _moved(at.terms, np.asarray(move, dtype=np.float64)), thinned, spreads, penalty
+                )
                 trials += 1
                 if trial.loss < at.loss:
                     at, damping = trial, damping * factor * 0.5

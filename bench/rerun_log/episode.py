@@ -13,17 +13,17 @@ from bench.recording import Recording
 from bench.rerun_log.comparison import log_comparison
 from bench.rig import Rig, simulate
 
-WINDOWS = 12
-"""Instants at which the information is told; each costs a simulation of every drawn rig."""
 
-
-def episode_record(rig: Rig, experiment: Experiment, controls: NDArray[np.float64]) -> Recording:
+def episode_record(
+    rig: Rig, experiment: Experiment, controls: NDArray[np.float64], *, n_told: int = 12
+) -> Recording:
     """The rig under the commands, with its nearness to the limits and the information so far as further channels.
 
     Args:
         rig: The rig.
         experiment: What is asked of it; its merit of the commands up to an instant is the information by then.
         controls: Commands (n, n_actuators) [N, N m].
+        n_told: Instants at which the information is told; each costs a simulation of every drawn rig.
 
     Returns:
         The record, with "limit/…" for each limited channel, force and energy [1] (1 at the limit), and "information" [1] (nat; of
@@ -43,7 +43,7 @@ def episode_record(rig: Rig, experiment: Experiment, controls: NDArray[np.float6
         if name in limits.energy:
             spent = step * np.cumsum(controls[:, i] ** 2) / limits.energy[name]
             shares[f"limit/energy of {name}"] = _long(spent, n)
-    ends = np.linspace(0, len(controls), WINDOWS + 1).astype(int)[1:]
+    ends = np.linspace(0, len(controls), n_told + 1).astype(int)[1:]
     # A test that ends there: what the free decay after it would tell is not known yet.
     told = np.array([0.0, *(float(experiment.merit(controls[None, :end])[0]) for end in ends)])
     course = np.interp(np.arange(n), np.concatenate([[0], ends]), told)

@@ -28,6 +28,7 @@ from bench.discrepancy.multibody.motion import Motion, motion_of
 from bench.discrepancy.multibody.records import (
     RECORDS_SETTINGS,
 )
+from bench.discrepancy.settings import DEFAULT
 from bench.discrepancy.verdict import NamedEffect
 
 Array = NDArray[np.float64]
@@ -74,9 +75,12 @@ class JointReplay:
         """
         wrong = encoders_wrong(effects)
         found: dict[str, list[Array]] = {joint.name: [] for joint in self.model.joints}
-        raw = [motion_of(self.case, self.model, record, {}) for record in self.case.validation]
+        raw = [
+            motion_of(self.case, self.model, record, {}, settings=DEFAULT.motion)
+            for record in self.case.validation
+        ]
         motions = [
-            motion_of(self.case, self.model, record, wrong, like) if wrong else like
+            motion_of(self.case, self.model, record, wrong, like, settings=DEFAULT.motion) if wrong else like
             for record, like in zip(self.case.validation, raw, strict=True)
         ]
         reference = applied.compiled()

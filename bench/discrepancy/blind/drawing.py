@@ -21,15 +21,15 @@ from numpy.typing import NDArray
 
 from bench.discrepancy.blind.background import draw_background
 from bench.discrepancy.blind.detectability import detectability
-from bench.discrepancy.truth.ground_truth import ROWS, Placed
 from bench.discrepancy.blind.handed_over import (
     HANDED_OVER_SETTINGS,
     measured,
 )
+from bench.discrepancy.case.case import Case
+from bench.discrepancy.truth.ground_truth import ROWS, Placed
 from bench.discrepancy.truth.moreau_time_stepping import TrueMotion
 from bench.discrepancy.truth.rigs import Bench, BlindOptions, Plan, draw_bench, reach_of
 from bench.discrepancy.truth.withheld_effects import RECIPES, Drawn, Recipe, Shape
-from bench.discrepancy.case.case import Case
 from bench.errors import ParameterError, SimulationError
 
 Array = NDArray[np.float64]

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.discrepancy.blind.background import Background
+from bench.discrepancy.case.case import Case, CaseChannel, NominalParameter, record_from_arrays
 from bench.discrepancy.truth.ground_truth import (
     GROUND_TRUTH_SETTINGS,
     Truth,
 )
 from bench.discrepancy.truth.rigs import Bench
-from bench.discrepancy.case.case import Case, CaseChannel, NominalParameter, record_from_arrays
 
 Array = NDArray[np.float64]
 

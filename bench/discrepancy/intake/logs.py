@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,10 +18,23 @@ from bench.record_files.times import clock_of, time_source
 from bench.recording import Recording
 
 Array = NDArray[np.float64]
-JITTERY = 0.3
-"""Part of a step that a time may lie off a uniform clock, as for every record (`bench.recording.clock`)."""
-LONGEST = 10.0
-"""Median steps from which a step is a pause: beyond it straight lines say nothing, as for dropouts in `bench.record_files`."""
+
+
+@dataclass(frozen=True)
+class LogSettings:
+    """When the clock of a log is irregular.
+
+    Attributes:
+        jittery: Part of a step that a time may lie off a uniform clock, as for every record (`bench.recording.clock`).
+        longest: Median steps from which a step is a pause: beyond it straight lines say nothing, as for dropouts in
+            `bench.record_files`.
+    """
+
+    jittery: float = 0.3
+    longest: float = 10.0
+
+
+LOGS = LogSettings()
 
 
 class Log(NamedTuple):
@@ -67,11 +81,11 @@ def log_of(source: Any, *, rate: float = 0.0, name: str = "log") -> Log:
     )
 
 
-def regular(log: Log) -> Log:
+def regular(log: Log, settings: LogSettings = LOGS) -> Log:
     """The log on a uniform clock where its own is irregular beyond what every reader bridges: by straight lines, at the median step.
 
     A log of a program that polls has steps of its own length each. Straight lines keep what is slow against them; how far the steps
-    scatter is noted, and the result ends where a step is `LONGEST` times the median, which is a pause.
+    scatter is noted, and the result ends where a step is `settings.longest` times the median, which is a pause.
     """
     steps = np.diff(log.time)
     if len(steps) < 2 or not np.isfinite(steps).all():
@@ -82,9 +96,9 @@ def regular(log: Log) -> Log:
     time = time[kept]
     step = float(np.median(np.diff(time)))
     drift = np.abs(time - time[0] - step * np.round((time - time[0]) / step))
-    if float(np.quantile(drift, 0.99)) <= JITTERY * step and np.max(np.diff(time)) < 1.5 * step:
+    if float(np.quantile(drift, 0.99)) <= settings.jittery * step and np.max(np.diff(time)) < 1.5 * step:
         return log
-    pauses = np.flatnonzero(np.diff(time) > LONGEST * step)
+    pauses = np.flatnonzero(np.diff(time) > settings.longest * step)
     edges = [0, *(pauses + 1).tolist(), len(time)]
     first, end = max(itertools.pairwise(edges), key=lambda pair: pair[1] - pair[0])
     own = time[first:end]

@@ -10,8 +10,8 @@ from bench.discrepancy.judgement.validation_discrepancy import (
 from bench.discrepancy.settings import DEFAULT, JudgementSettings
 from bench.discrepancy.verdict import Gap
 
-SURE = 0.9995
-"""Share from which one more digit would be a statement about digits that nobody knows."""
+SURE = 1.0 - 0.5 * 10**-3
+"""Share that a percentage of one decimal would round to the whole."""
 
 
 def percent(share: float) -> str:

@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bench.discrepancy.truth import out_of_catalogue as foreign
 from bench.discrepancy.effects import friction_limits as limits
+from bench.discrepancy.truth import out_of_catalogue as foreign
 from bench.errors import UnknownNameError
 from bench.laws.base import ForceLaw, Kernel
 from bench.laws.bouc_wen import BOUC_WEN
