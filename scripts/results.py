@@ -263,6 +263,32 @@ def _excitation_task(task: str, title: str) -> Capability:
     return Capability(f"excitation_{task}", title, command, _excitation, hours=True)
 
 
+def _graded(told: Any) -> Figures:
+    """Measured cases, each right, honest or wrong by what was written down before."""
+    rows = []
+    for case in told:
+        names = " + ".join(f"{name} {p:.2f}" for name, p in case["named"].items())
+        sets = "; ".join(" or ".join(one) for one in case["sets"])
+        figure = f"{case['grade'] or 'not graded'}: {names or case['verdict']}" + (
+            f" (declared: {sets})" if sets else ""
+        )
+        rows.append((case["case"], figure, "right or honest"))
+    count = {grade: sum(case["grade"] == grade for case in told) for grade in ("right", "honest", "wrong")}
+    rows.append(("all", ", ".join(f"{n} {grade}" for grade, n in count.items()), "0 wrong"))
+    return rows
+
+
+def _planted(told: Any) -> Figures:
+    """Faults planted into sound records, and what `jointbench check` says of them."""
+    rows = [(fault, found, "") for fault, found in told["found"].items()]
+    rows.append(("all faults", f"{100.0 * told['found_share']:.1f} % found", "≥ 95 %"))
+    rows.append(("sound records doubted", told["false_alarms"], "≤ 2 %"))
+    rows.append(
+        ("seconds a case", f"{told['median_seconds']:.2f}, at most {told['longest_seconds']:.1f}", "< 5")
+    )
+    return rows
+
+
 def _benchmark_group(name: str, title: str) -> Capability:
     return Capability(name, title, ("python", "scripts/benchmark.py", name, "--json"), _benchmark)
 
@@ -319,6 +345,19 @@ CAPABILITIES: Sequence[Capability] = (
         ("python", "scripts/diagnose_measured.py", "--data", "{data}", "--json"),
         _measured,
         data=".",
+    ),
+    Capability(
+        "measured_cases",
+        "Measured records, graded by what was written down before",
+        ("python", "scripts/measured_cases.py", "--data", "{data}", "--json"),
+        _graded,
+        data=".",
+    ),
+    Capability(
+        "check",
+        "Faults planted into records of a slide, and what `jointbench check` says",
+        ("python", "scripts/planted_faults.py", "--faults", "200", "--sound", "100"),
+        _planted,
     ),
     Capability(
         "unstated",
