@@ -27,4 +27,4 @@ def test_demo_holds_what_it_promises_and_leaves_its_files(tmp_path, capsys):
     assert page.count("data:image/png;base64,") >= 4
     assert (tmp_path / "demo" / "joint.rrd").stat().st_size > 100_000
     unseen = read_recording(tmp_path / "demo" / "records" / "unseen_true.parquet")
-    assert unseen.duration == pytest.approx(demo.joint.DURATION, abs=0.01)
+    assert unseen.duration == pytest.approx(demo.joint.JOINT_SETUP.duration, abs=0.01)

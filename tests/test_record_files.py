@@ -463,7 +463,7 @@ def test_special_files_are_named(tmp_path):
     (tmp_path / "d.mat").write_bytes(
         b"MATLAB 7.3 MAT-file".ljust(116) + bytes(8) + b"\x00\x02IM" + bytes(512)
     )
-    with pytest.raises(FileFormatError, match=r"version 7.3.*\.h5"):
+    with pytest.raises(FileFormatError, match="no readable HDF5 file"):
         read_recording(tmp_path / "d.mat")
 
 

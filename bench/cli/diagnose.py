@@ -223,7 +223,9 @@ def _diagnosed(asked: Diagnose, case: Case, stage: Callable[[str], None]) -> Dia
     if asked.check:
         stage("looking at the records")
         told = Console(stderr=True, soft_wrap=True)
-        for doubt in check(case, informed=False).doubts:
+        looked = check(case, informed=False)
+        # what is unusable is refused below, in the same words
+        for doubt in () if looked.word == "unusable" else looked.doubts:
             told.print(f"check: {doubt}", style="yellow", markup=False, highlight=False)
     try:
         found = diagnose(

@@ -66,6 +66,9 @@ class RecordLoopLimits(NamedTuple):
 
 
 RECORD_LOOP_LIMITS = RecordLoopLimits()
+_SMALLEST, _GROWTH, _KINK, _OVER = (
+    RECORD_LOOP_LIMITS  # globals, which compiled code folds as the literals that they are
+)
 
 
 def _sparse(table: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
@@ -226,7 +229,7 @@ def _controlled(p, t, length, h, tolerance, y, u, stage, slope, peak):
             scale = max(peak[i], abs(stage[i]), 1e-300)
             if not error <= worst * tolerance * scale:
                 worst = error / (tolerance * scale)
-        if worst <= 1.0 or step <= RECORD_LOOP_LIMITS.smallest * length or not worst < np.inf:
+        if worst <= 1.0 or step <= _SMALLEST * length or not worst < np.inf:
             done = length if count == 1 else done + step
             for i in range(n):
                 y[i] = stage[i]  # the last stage is the step's result
@@ -349,8 +352,8 @@ def _accelerated(p, observe):
 def _wanted(h, worst):
     """The step whose error should be what is allowed, after one whose error is `worst` times that."""
     return h * min(
-        RECORD_LOOP_LIMITS.growth,
-        max(0.2, 0.9 * worst ** (-0.125) if worst > 0.0 else RECORD_LOOP_LIMITS.growth),
+        _GROWTH,
+        max(0.2, 0.9 * worst ** (-0.125) if worst > 0.0 else _GROWTH),
     )
 
 
@@ -383,10 +386,10 @@ def _across(p, t, step, h, tolerance, place, y, u, work, peak, observe, out):
         worst = _error(n, h, new, slope, peak) / tolerance
         taken = h
         h = _wanted(h, worst)
-        if not (worst <= 1.0 or taken <= RECORD_LOOP_LIMITS.smallest * step or not worst < np.inf):
-            if worst > RECORD_LOOP_LIMITS.kink:
+        if not (worst <= 1.0 or taken <= _SMALLEST * step or not worst < np.inf):
+            if worst > _KINK:
                 before = before if wall > done else taken
-                wall, reach, h = done + taken, taken * worst**RECORD_LOOP_LIMITS.over, 0.5 * taken
+                wall, reach, h = done + taken, taken * worst**_OVER, 0.5 * taken
             continue
         if k < last and (k - first) * step <= done + taken:
             for s in range(_RESULT + 1, _STAGES8):

@@ -338,15 +338,13 @@ def _beside(
         new = fit(
             problem, found.hypothesis, np.array(starts), scale=found.scale, iterations=settings.iterations, others=others,
         )  # fmt: skip
-        if new.log_posterior <= found.log_posterior + RISE:
+        if new.log_posterior <= found.log_posterior + settings.rise:
             return found
         found = new
 
 
 PERIODS = "periods_per_turn"
 """Whole number among the parameters of a periodic effect."""
-RISE = 0.5
-"""Log posterior by which a neighbouring number has to be likelier: some twenty times what ends a fit, so that the search ends, too."""
 
 
 def sound(problem: ArticulatedProblem, found: ArticulatedFit) -> bool:

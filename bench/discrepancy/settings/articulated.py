@@ -43,6 +43,11 @@ class ArticulatedSearchSettings:
         "Convention.",
     )
     finalists: int = setting(5, "Effects that are fitted again without it.", "Convention.")
+    rise: float = setting(
+        0.5,
+        "Log posterior by which a neighbouring number of periods in a turn has to be likelier.",
+        "Some twenty times what ends a fit, so that the search ends, too.",
+    )
 
 
 @dataclass(frozen=True)
