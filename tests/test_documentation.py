@@ -75,3 +75,19 @@ def test_every_public_module_says_what_it_holds():
         if not ast.get_docstring(ast.parse(path.read_text("utf-8")))
     ]
     assert silent == []
+
+
+def test_every_page_is_in_the_navigation():
+    navigation = (ROOT / "scripts" / "site" / "mkdocs.yml").read_text(encoding="utf-8").partition("\nnav:")[2]
+    listed = set(re.findall(r"([\w/.-]+\.(?:md|ipynb))$", navigation, re.MULTILINE))
+    folders = (
+        "reference/laws",
+        "reference/effects",
+        "reference/environments",
+    )  # whole folders are listed by their names
+    pages = {
+        p.relative_to(ROOT / "docs").as_posix()
+        for kind in ("*.md", "*.ipynb")
+        for p in (ROOT / "docs").rglob(kind)
+    }
+    assert {page for page in pages if not page.startswith(folders)} == listed
