@@ -282,7 +282,8 @@ def _planted(told: Any) -> Figures:
     """Faults planted into sound records, and what `jointbench check` says of them."""
     rows = [(fault, found, "") for fault, found in told["found"].items()]
     rows.append(("all faults", f"{100.0 * told['found_share']:.1f} % found", "≥ 95 %"))
-    rows.append(("sound records doubted", told["false_alarms"], "≤ 2 %"))
+    doubted, sound = map(int, told["false_alarms"].split("/"))
+    rows.append(("sound records doubted", f"{100.0 * doubted / sound:.1f} % of {sound}", "≤ 2 %"))
     rows.append(
         ("seconds a case", f"{told['median_seconds']:.2f}, at most {told['longest_seconds']:.1f}", "< 5")
     )
