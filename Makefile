@@ -21,7 +21,7 @@ types: .venv/full
 layers: .venv/full
 	$(BIN)/lint-imports
 
-docs: .venv/docs
+docs: .venv/full
 	$(BIN)/python scripts/docs.py --check
 	NO_MKDOCS_2_WARNING=1 DISABLE_MKDOCS_2_WARNING=true $(BIN)/python -m mkdocs build --strict -f scripts/site/mkdocs.yml
 	$(BIN)/python scripts/snippets.py
@@ -40,13 +40,9 @@ results: .venv/full
 	touch $@
 
 .venv/full: pyproject.toml constraints.txt | .venv/bin/python
-	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[rl,scale,io,peers,test]'
+	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[rl,scale,io,onnx,peers,docs,test]'
 	$(BIN)/python -m pip install --quiet --no-deps $(NASTRAN)
 	touch $@ .venv/core
-
-.venv/docs: .venv/full
-	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[docs]'
-	touch $@ .venv/core .venv/full
 
 clean:
 	rm -rf .venv out build dist
