@@ -20,6 +20,8 @@ from bench import native
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.case.unit_conversion import converted
 from bench.discrepancy.checks.like_mujoco import ITEMS
+from bench.discrepancy.checks.load_limits import clipped_case
+from bench.discrepancy.checks.nominal_values import value_notes
 from bench.discrepancy.checks.scales import (
     bands_between,
     common_factor,
@@ -32,9 +34,7 @@ from bench.discrepancy.checks.scales import (
     suggestion,
 )
 from bench.discrepancy.model.mjcf_file import rig_of
-from bench.discrepancy.model.mjcf_loads import clipped_case
 from bench.discrepancy.model.mjcf_units import expected_units
-from bench.discrepancy.model.mjcf_values import value_notes
 from bench.discrepancy.multibody.channels import bound
 from bench.discrepancy.multibody.model import ArticulatedModel, Joint, with_nominal_values
 from bench.discrepancy.multibody.records import Motion, encoders_of, input_of, motion_of

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from bench import native
 from bench.discrepancy.case.case import CaseRecord
+from bench.discrepancy.checks.reference import Reference
 from bench.discrepancy.likelihood.problem import Problem
-from bench.discrepancy.model.mjcf_reference import Reference
 from bench.discrepancy.settings import LikenessSettings
 
 Array = NDArray[np.float64]
