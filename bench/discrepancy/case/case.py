@@ -35,6 +35,8 @@ class CaseSettings:
 
     min_samples: int = 200
     """Shortest record that is accepted; below it no spectrum, and so no statement about noise, is possible."""
+    largest: float = 1e100
+    """Largest value of a sample: its square over a power of the step is still a number."""
 
 
 SETTINGS = CaseSettings()
@@ -202,6 +204,14 @@ def record_from_arrays(
         raise RecordingError(
             f"record '{name}' has {clock.size} samples; at least {SETTINGS.min_samples} are needed: give a longer record"
         )
+    for channel, samples in values.items():
+        size = np.abs(np.asarray(samples, dtype=float))
+        if np.any(np.isfinite(size) & (size > SETTINGS.largest)):
+            raise RecordingError(
+                f"record '{name}': '{channel}' holds {float(size[np.isfinite(size)].max()):.3g} at sample "
+                f"{int(np.nanargmax(np.where(np.isfinite(size), size, -1.0)))}, which no sensor reads: the file is damaged, or its columns "
+                "are not those that nominal.json names"
+            )
     try:
         noted = on_one_clock(clock, {channel: np.asarray(v, dtype=float) for channel, v in values.items()})
     except RecordingError as error:

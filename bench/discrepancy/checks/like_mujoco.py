@@ -192,7 +192,7 @@ def simulated(
     )  # the middle of each step: held loads are else late by half of one
     control = np.tile(reference.control, (len(at), 1))
     for channel, (index, factor) in reference.loads.items():
-        control[:, index] = factor * np.interp(at, np.arange(len(record)), record.values[channel])
+        control[:, index] += factor * np.interp(at, np.arange(len(record)), record.values[channel])
     data = mujoco.MjData(variant)
     data.qpos[:] = reference.rest
     size = mujoco.mj_stateSize(variant, int(mujoco.mjtState.mjSTATE_FULLPHYSICS))
