@@ -84,6 +84,7 @@ def test_swapped_and_compared_the_law_beats_the_network_beats_the_polynomial(fol
 
 def test_exports_compute_the_same_forces(folder):
     import onnx.reference
+
     rng = np.random.default_rng(0)
     for kind in ("polynomial", "network"):
         joint = read_joint(folder / f"{kind}.json")

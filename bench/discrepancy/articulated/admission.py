@@ -19,20 +19,11 @@ from numpy.typing import NDArray
 from bench import native
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.case.unit_conversion import converted
+from bench.discrepancy.checks.bands import bands_between, common_factor, compare_channels, spectra
 from bench.discrepancy.checks.like_mujoco import ITEMS
 from bench.discrepancy.checks.load_limits import clipped_case
 from bench.discrepancy.checks.nominal_values import value_notes
-from bench.discrepancy.checks.scales import (
-    bands_between,
-    common_factor,
-    compare_channels,
-    grossly_apart,
-    model_words,
-    pair_words,
-    shown_noise,
-    spectra,
-    suggestion,
-)
+from bench.discrepancy.checks.scales import grossly_apart, model_words, pair_words, shown_noise, suggestion
 from bench.discrepancy.model.mjcf_file import rig_of
 from bench.discrepancy.model.mjcf_units import expected_units
 from bench.discrepancy.multibody.channels import bound

@@ -8,7 +8,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.discrepancy.case.case import NO_LOAD, Case, CaseChannel
+from bench.discrepancy.case.case import Case, CaseChannel
+from bench.discrepancy.case.free_decay import NO_LOAD
 from bench.discrepancy.model.mjcf_prescribed import MOTION, loads_of_motion, prescribed_channels
 from bench.discrepancy.motion.observer import ORDERS, Observer
 from bench.discrepancy.settings import ModelSettings

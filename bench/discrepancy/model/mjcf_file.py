@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import mujoco
@@ -14,8 +15,16 @@ from bench.errors import ModelError
 from bench.rig import Rig
 from bench.rig.building import parse
 
-LARGEST = 1e30
-"""Largest number of a model [SI units]: the mass of the sun; squares of products of such still are numbers."""
+
+@dataclass(frozen=True)
+class MjcfFileSettings:
+    """Numbers of `bench.discrepancy.model.mjcf_file`."""
+
+    largest: float = 1e30
+    """Largest number of a model [SI units]: the mass of the sun; squares of products of such still are numbers."""
+
+
+SETTINGS = MjcfFileSettings()
 SIZES = (
     "body_mass", "body_inertia", "body_ipos", "body_pos", "jnt_pos", "jnt_stiffness", "dof_damping", "dof_armature",
     "dof_frictionloss", "actuator_gear", "actuator_gainprm", "actuator_biasprm",
@@ -47,9 +56,10 @@ def rig_of(case: Case) -> Rig:
 def _refuse_beyond_numbers(rig: Rig) -> None:
     for name in SIZES:
         largest = float(np.abs(getattr(rig.model, name)).max(initial=0.0))
-        if largest > LARGEST:
+        if largest > SETTINGS.largest:
             raise ModelError(
-                f"the MJCF '{rig.name}' holds {largest:.3g} (MuJoCo's {name}); numbers up to {LARGEST:g} are expected: correct the model"
+                f"the MJCF '{rig.name}' holds {largest:.3g} (MuJoCo's {name}); "
+                f"numbers up to {SETTINGS.largest:g} are expected: correct the model"
             )
 
 
