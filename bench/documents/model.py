@@ -8,15 +8,28 @@ report, so that the place within the document stands before them.
 
 from __future__ import annotations
 
+import ast
 import contextlib
 import functools
+import inspect
+import itertools
+import textwrap
 from collections.abc import Callable, Iterator, Mapping
 from importlib import import_module
 from pathlib import Path
 from typing import Any, ClassVar, NoReturn, ParamSpec, Self, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
-from pydantic_core import PydanticCustomError
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    GetJsonSchemaHandler,
+    TypeAdapter,
+    ValidationError,
+    model_validator,
+)
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema, PydanticCustomError
 
 from bench.documents.loading import LIMITS, Limits, load_document, spelt
 from bench.errors import (
@@ -43,9 +56,7 @@ class Entry(BaseModel):
         entry_open: Whether others may add entries of their own.
     """
 
-    model_config = ConfigDict(
-        strict=True, extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True
-    )
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
     entry_name: ClassVar[str] = "a table"
     entry_misnomers: ClassVar[Mapping[str, str]] = {}
     entry_hints: ClassVar[Mapping[str, str]] = {}
@@ -73,12 +84,49 @@ class Entry(BaseModel):
             refuse(f"{cls.entry_name} needs {', '.join(needed)}; {', '.join(missing)} missing{hint}")
         return dict(data)
 
+    @classmethod
+    def __get_pydantic_json_schema__(
+        cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        """The JSON Schema, fields described by the strings under them: they are looked for here only, since it takes long."""
+        made = handler(core_schema)
+        properties = handler.resolve_ref_schema(made).get("properties", {})
+        for name, text in _strings_under_fields(cls).items():
+            field = cls.model_fields[name]
+            properties.get(field.alias or name, {}).setdefault("description", text)
+        return made
+
     @property
     def given(self) -> dict[str, Any]:
         """Fields that the document states, by name, in the order of the model."""
         return {
             name: getattr(self, name) for name in type(self).model_fields if name in self.model_fields_set
         }
+
+
+def _strings_under_fields(model: type[BaseModel]) -> dict[str, str]:
+    """The string that stands under each field of a class and of its bases, by the field's name."""
+    found: dict[str, str] = {}
+    for base in reversed(model.__mro__):
+        if not base.__module__.startswith("bench.") or "__annotations__" not in vars(base):
+            continue
+        try:
+            source = textwrap.dedent(inspect.getsource(base))
+        except OSError:  # made at run time, with descriptions of its own
+            continue
+        (definition,) = ast.parse(source).body
+        body = getattr(definition, "body", [])
+        for field, below in itertools.pairwise(body):
+            if (
+                isinstance(field, ast.AnnAssign)
+                and isinstance(field.target, ast.Name)
+                and field.target.id in model.model_fields
+                and isinstance(below, ast.Expr)
+                and isinstance(below.value, ast.Constant)
+                and isinstance(below.value.value, str)
+            ):
+                found[field.target.id] = inspect.cleandoc(below.value.value)
+    return found
 
 
 class Document(Entry):
