@@ -226,12 +226,14 @@ class Problem:
 
     def smoothed(self, record: CaseRecord) -> Motion:
         """Motion behind the response channels of a record of this structure."""
-        samples = np.column_stack([record.values[name] for name in self.structure.channels])
+        told = (*self.structure.observers, *self.structure.prescribed)
+        samples = np.column_stack([record.values[observer.channel] for observer in told])
+        prescribed = [self._noise_of(observer.channel) for observer in self.structure.prescribed]
         rest = not in_motion(record)
         return measured_motion(
-            self.structure.observers,
+            told,
             samples,
-            self.noise,
+            np.append(self.noise, prescribed),
             record.step,
             at_rest=rest,
             settings=self.settings.motion,
@@ -275,7 +277,8 @@ class Problem:
         group = next(g for g in self.structure.groups() if np.any(row[list(g)] != 0.0))
         acting = np.abs(self.structure.inputs[list(group)]).sum(axis=0) > 0
         power = [float(np.mean(d.loads[:, acting] ** 2)) for d in self.data] if acting.any() else [0.0]
-        if not any(power):
+        # of a prescribed motion the load is an acceleration
+        if not any(power) or self.structure.prescribed:
             moved = [self.motion(i).acceleration @ row for i in range(len(self.records))]
             power = [float(np.mean((a / self._mobility(row)) ** 2)) for a in moved]
         return float(np.sqrt(np.mean(power))) or 1.0
