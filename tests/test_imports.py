@@ -11,15 +11,6 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 DIAGNOSIS = ROOT / "bench" / "discrepancy"
-OWED = {
-    ("bench.discrepancy.response.driving_loads", "bench.discrepancy.likelihood.problem"),
-    ("bench.discrepancy.likelihood.noise_covariance", "bench.discrepancy.likelihood.problem"),
-    ("bench.discrepancy.likelihood.time_varying_noise", "bench.discrepancy.likelihood.problem"),
-    ("bench.discrepancy.likelihood.window_whitening", "bench.discrepancy.likelihood.problem"),
-}
-"""Imports for type checkers that close a circle until the problem is cut in two."""
-UPWARDS = {("bench.discrepancy.screening.candidates", "bench.discrepancy.search.fits")}
-"""Imports that the contract of rooms lists as owed."""
 LEAVES = {"verdict", "verdict_schema", "settings"}
 """Types of results and thresholds, which any room may use: not drawn."""
 TOO_LARGE = {"model": 2600, "articulated": 2800}
@@ -73,10 +64,7 @@ def circle(edges: dict[str, set[str]]) -> list[str]:
 def test_no_file_imports_itself_by_way_of_others():
     sources = {name: (path.read_text(), path.name == "__init__.py") for name, path in modules().items()}
     assert len(sources) > 200
-    edges = graph(sources)
-    for name, target in OWED:
-        edges[name].remove(target)  # what is paid is to be struck off
-    assert circle(edges) == []
+    assert circle(graph(sources)) == []
 
 
 @pytest.mark.parametrize(
@@ -109,15 +97,13 @@ def drawn(page: str) -> set[tuple[str, str]]:
 
 
 def rooms_imported() -> set[tuple[str, str]]:
-    """Imports between rooms, without those that longer ways imply; what is owed left out."""
+    """Imports between rooms, without those that longer ways imply."""
     sources = {name: (path.read_text(), path.name == "__init__.py") for name, path in modules().items()}
     prefix = "bench.discrepancy."
     edges: dict[str, set[str]] = {}
     for name, targets in graph(sources).items():
         for target in targets:
-            both = (
-                name.startswith(prefix) and target.startswith(prefix) and (name, target) not in OWED | UPWARDS
-            )
+            both = name.startswith(prefix) and target.startswith(prefix)
             room, other = name.removeprefix(prefix).split(".")[0], target.removeprefix(prefix).split(".")[0]
             if both and room != other and not {room, other} & LEAVES:
                 edges.setdefault(room, set()).add(other)

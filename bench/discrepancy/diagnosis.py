@@ -34,6 +34,7 @@ from bench.discrepancy.checks.quantisation import recorded
 from bench.discrepancy.effects.catalogue import CATALOGUE
 from bench.discrepancy.effects.effect import Effect
 from bench.discrepancy.effects.nonparametric import CLOSURES
+from bench.discrepancy.fitting.goodness_of_fit import names
 from bench.discrepancy.fitting.initial_state_fit import start_warnings
 from bench.discrepancy.judgement import posterior as evidence
 from bench.discrepancy.judgement.closing import complete, nominal_estimates, with_closed
@@ -48,7 +49,6 @@ from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.next_test.discriminating_excitation import separate, told_apart
 from bench.discrepancy.numerics.deadline import Deadline
 from bench.discrepancy.search.explain import Explanation, close, nominal_alone
-from bench.discrepancy.search.fits import names
 from bench.discrepancy.search.load_interpolation import reading_notes
 from bench.discrepancy.settings import DEFAULT, DiagnosisSettings, changed
 from bench.discrepancy.verdict import Gap, Kind, NamedEffect, Ranked, Verdict

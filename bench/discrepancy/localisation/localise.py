@@ -22,6 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import stats
 
+from bench.discrepancy.fitting.goodness_of_fit import near
 from bench.discrepancy.likelihood.problem import Array, Problem
 from bench.discrepancy.likelihood.whitening import fast_length, whitened_spectrum
 from bench.discrepancy.localisation.bounded_force import limited_regions
@@ -34,7 +35,6 @@ from bench.discrepancy.localisation.state_map import (
 )
 from bench.discrepancy.localisation.state_splits import force_splits
 from bench.discrepancy.search.explain import Explanation
-from bench.discrepancy.search.fits import near
 from bench.discrepancy.settings import LocalisationSettings
 from bench.discrepancy.verdict import Location, Split
 

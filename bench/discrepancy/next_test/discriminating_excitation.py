@@ -19,6 +19,7 @@ from scipy.linalg import block_diag
 
 from bench.discrepancy.case.case import CaseRecord
 from bench.discrepancy.effects.effect import Effect
+from bench.discrepancy.fitting.goodness_of_fit import names
 from bench.discrepancy.judgement.posterior import weights
 from bench.discrepancy.likelihood.problem import Array, Problem
 from bench.discrepancy.likelihood.whitening import RecordData, whitened
@@ -32,7 +33,6 @@ from bench.discrepancy.next_test.feasible_excitations import (
 )
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.search.explain import Explanation
-from bench.discrepancy.search.fits import names
 from bench.discrepancy.settings import NextTestSettings
 from bench.excitation.bayes_factor import Contrast, expected_log_bayes_factor
 

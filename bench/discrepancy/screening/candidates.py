@@ -5,16 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from bench.discrepancy.effects.effect import Effect
+from bench.discrepancy.fitting.goodness_of_fit import consistent, near, sticks
 from bench.discrepancy.fitting.map_fit import Fit
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.screening.linear_amplitudes import Point
 from bench.discrepancy.screening.screen import Ground, Screen
-from bench.discrepancy.search.fits import (
-    consistent,
-    near,
-    sticks,
-)
 from bench.discrepancy.settings import DiagnosisSettings
 
 

@@ -12,7 +12,6 @@ simulated channels instead.
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -24,11 +23,12 @@ from bench.discrepancy.effects.channel_operators import quantise
 from bench.discrepancy.fitting.map_fit import Fit
 from bench.discrepancy.likelihood.problem import Array, Problem
 from bench.discrepancy.likelihood.whitening import whitened
-from bench.discrepancy.likelihood.window_whitening import channels_of, in_motion
 from bench.discrepancy.model.nominal_elements import own_change, own_force, own_friction
 from bench.discrepancy.model.placement import Hypothesis, Placed
 from bench.discrepancy.numerics.least_squares import Prior, minimise
 from bench.discrepancy.numerics.threads import in_threads
+from bench.discrepancy.response.initial_states import in_motion
+from bench.discrepancy.response.windows import channels_of
 from bench.discrepancy.screening.linear_amplitudes import (
     Node,
     Point,
@@ -476,9 +476,7 @@ def _moving(problem: Problem, about: About, unspoilt: Sequence[Array]) -> Proble
         channels = measured - problem.simulate(hypothesis, vector, record) + free
         values = dict(zip(problem.structure.channels, channels.T, strict=True))
         motions[record.name] = problem.smoothed(replace(record, values={**record.values, **values}))
-    moving = copy.copy(problem)
-    moving.motions = motions
-    return moving
+    return problem.moving(motions)
 
 
 def force_along(problem: Problem, placed: Placed, eta: Array, index: int) -> Array:

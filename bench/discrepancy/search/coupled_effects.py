@@ -7,6 +7,7 @@ from collections.abc import Callable, Collection, Sequence
 import numpy as np
 
 from bench.discrepancy.effects.effect import Effect
+from bench.discrepancy.fitting.goodness_of_fit import names
 from bench.discrepancy.fitting.map_fit import Fit
 from bench.discrepancy.model.placements import placements
 from bench.discrepancy.numerics.threads import in_threads
@@ -19,11 +20,7 @@ from bench.discrepancy.screening.candidates import (
 )
 from bench.discrepancy.screening.linear_amplitudes import Point, fainter
 from bench.discrepancy.screening.screen import Ground, Screen
-from bench.discrepancy.search.fits import (
-    Search,
-    converge,
-    names,
-)
+from bench.discrepancy.search.fits import Search, converge
 from bench.discrepancy.search.forward_selection import (
     first_fit,
 )

@@ -17,6 +17,7 @@ import numpy as np
 
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.effects.effect import Effect
+from bench.discrepancy.fitting.goodness_of_fit import consistent, key_of, names, near, posterior
 from bench.discrepancy.fitting.initial_state_fit import predict
 from bench.discrepancy.fitting.map_fit import Fit, fit
 from bench.discrepancy.likelihood.model_error import ModelError
@@ -31,16 +32,7 @@ from bench.discrepancy.screening.candidates import leading
 from bench.discrepancy.screening.score_test import LackOfFit, lack_of_fit
 from bench.discrepancy.screening.screen import Screen
 from bench.discrepancy.search.coupled_effects import coupled_fits
-from bench.discrepancy.search.fits import (
-    Search,
-    Task,
-    consistent,
-    converge,
-    key_of,
-    names,
-    near,
-    posterior,
-)
+from bench.discrepancy.search.fits import Search, Task, converge
 from bench.discrepancy.search.forward_selection import (
     Prepared,
     attribute,
@@ -186,11 +178,11 @@ def explain(
         found = [Explanation(((problem, fitted),)) for fitted in search.ranked()]
         return _nothing_left_first(found) if problem.scaled else _parsimonious(found)
     bins = _common_bins(case, structure, settings=settings)
-    whole = Problem(case, structure, case.identification, bins, error=error, settings=settings)
+    whole = Problem(case, structure, case.identification, bins=bins, error=error, settings=settings)
     prepared = []
     for group in groups:
         part = structure.restricted(group)
-        problem = Problem(case, part, case.identification, bins, error=error, settings=settings)
+        problem = Problem(case, part, case.identification, bins=bins, error=error, settings=settings)
         progress(f"screening of {', '.join(part.dofs)}")
         prepared.append(prepare(problem, placements(case, part, catalogue)))
     odd = [entry for entry in prepared if not consistent(entry[0].ranked(0)[0])]

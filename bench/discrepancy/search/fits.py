@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.discrepancy.fitting.goodness_of_fit import consistent, key_of, near, posterior, sticks
 from bench.discrepancy.fitting.map_fit import Fit, fit, free_entries, laplace
 from bench.discrepancy.likelihood.problem import Array, Problem
 from bench.discrepancy.model.placement import Hypothesis
@@ -16,7 +17,6 @@ from bench.discrepancy.numerics.least_squares import (
 )
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.screening.linear_amplitudes import Point
-from bench.discrepancy.settings import DEFAULT, SearchSettings
 
 Task = tuple[Hypothesis, np.ndarray]
 """Effects, and the vector or vectors that a fit of them starts from."""
@@ -60,55 +60,6 @@ class Search:
         """Fits by decreasing posterior, of one number of effects or of all."""
         chosen = [f for f in self.fits.values() if size is None or len(f.hypothesis) == size]
         return sorted(chosen, key=lambda f: -posterior(f))
-
-
-def key_of(hypothesis: Hypothesis) -> frozenset:
-    """Key of a hypothesis, regardless of the order of its effects."""
-    return frozenset(placed.key for placed in hypothesis)
-
-
-def posterior(fitted: Fit) -> float:
-    """Log posterior of a hypothesis up to a constant."""
-    settings = fitted.settings.search
-    # the inaccuracy of one effect may be made good by any other
-    exact = all(placed.effect.exact for placed in fitted.hypothesis)
-    tolerance = 0.0 if exact else 0.5 * settings.immaterial * fitted.n_residuals
-    return fitted.log_evidence + (settings.log_prior_effect - tolerance) * len(fitted.hypothesis)
-
-
-def log_prior_of(hypothesis: Hypothesis, *, settings: SearchSettings) -> float:
-    """Log prior odds of a hypothesis against the nominal model alone."""
-    return sum(settings.log_prior_effect + placed.effect.log_prior for placed in hypothesis)
-
-
-def complexity(hypothesis: Hypothesis, *, settings: SearchSettings = DEFAULT.search) -> float:
-    """How much a hypothesis takes to be described, in units of log prior.
-
-    A parameter counts as one, which is what it gains on average where nothing is to be gained. A law of seven parameters is larger so
-    than two of one each, and what holds a law at the limit of its parameters is better told by the two.
-    """
-    free = sum(not p.fixed for placed in hypothesis for p in placed.effect.parameters)
-    return free - log_prior_of(hypothesis, settings=settings)
-
-
-def consistent(fitted: Fit) -> bool:
-    """Whether the residuals of a fit are as small as the stated noise lets them be."""
-    settings = fitted.settings.search
-    spread = np.sqrt(2.0 / fitted.n_residuals)
-    return fitted.reduced < 1.0 + settings.significant * spread + settings.model_error
-
-
-def near(fitted: Fit) -> bool:
-    """Whether the free run of a fit is off by less than the noise."""
-    return fitted.reduced < fitted.settings.search.near
-
-
-def names(hypothesis: Hypothesis) -> str:
-    """Readable names of a hypothesis."""
-    return (
-        " + ".join(p.effect.name + (f" ({p.place.name})" if p.place.name else "") for p in hypothesis)
-        or "nothing"
-    )
 
 
 def carry_on(search: Search, size: int, *, most: int) -> None:
@@ -220,11 +171,6 @@ def _beside_the_best(search: Search, fitted: Fit) -> Fit:
     again = fit(search.problem, fitted.hypothesis, start=start, iterations=settings.thorough)
     search.add(again)
     return min(fitted, again, key=lambda f: f.cost)
-
-
-def sticks(fitted: Fit) -> bool:
-    """Whether a hypothesis holds friction that is set-valued at rest."""
-    return any(placed.effect.sticks for placed in fitted.hypothesis)
 
 
 def _shaken(search: Search, fitted: Fit, behind: float) -> None:

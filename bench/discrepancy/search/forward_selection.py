@@ -17,6 +17,7 @@ import numpy as np
 
 from bench.discrepancy.effects.effect import Effect
 from bench.discrepancy.effects.read_off import TIMED
+from bench.discrepancy.fitting.goodness_of_fit import complexity, consistent, key_of, names, near
 from bench.discrepancy.fitting.map_fit import Fit, fit
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Hypothesis, Placed
@@ -32,20 +33,7 @@ from bench.discrepancy.screening.candidates import (
 from bench.discrepancy.screening.linear_amplitudes import Point
 from bench.discrepancy.screening.score_test import lack_of_fit
 from bench.discrepancy.screening.screen import Screen
-from bench.discrepancy.search.fits import (
-    Search,
-    Task,
-    carry_on,
-    complexity,
-    consistent,
-    converge,
-    integrate_finer,
-    key_of,
-    limit_of,
-    names,
-    near,
-    shake,
-)
+from bench.discrepancy.search.fits import Search, Task, carry_on, converge, integrate_finer, limit_of, shake
 from bench.discrepancy.search.rivals import challenge, reduce_best, simplify
 from bench.discrepancy.search.scheduled import with_schedules
 from bench.discrepancy.search.soft_friction import soften, stand_in

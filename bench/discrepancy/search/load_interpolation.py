@@ -85,7 +85,7 @@ def _read(case: Case, problem: Problem) -> Problem:
     """A problem of the same records and structure whose loads are read as a case says."""
     bins = {data.record.name: data.n_bins for data in problem.data}
     return Problem(
-        case, problem.structure, problem.records, bins, error=problem.error, settings=problem.settings
+        case, problem.structure, problem.records, bins=bins, error=problem.error, settings=problem.settings
     )
 
 

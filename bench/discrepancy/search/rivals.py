@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from bench.discrepancy.effects.effect import Effect
+from bench.discrepancy.fitting.goodness_of_fit import consistent, key_of
 from bench.discrepancy.fitting.map_fit import Fit
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Hypothesis, Placed
@@ -18,14 +19,7 @@ from bench.discrepancy.screening.candidates import (
     refined,
 )
 from bench.discrepancy.screening.screen import Screen
-from bench.discrepancy.search.fits import (
-    Search,
-    Task,
-    carry_on,
-    consistent,
-    converge,
-    key_of,
-)
+from bench.discrepancy.search.fits import Search, Task, carry_on, converge
 
 PLAINER = {"hysteresis": "friction", "damping": "friction"}
 """Families whose laws become those of another one at the limits of their parameters."""

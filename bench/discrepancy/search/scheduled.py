@@ -32,11 +32,12 @@ from bench.discrepancy.effects.effect import (
     Values,
 )
 from bench.discrepancy.effects.read_off import DIFFERS, FOLLOWED, SENSITIVITY, schedulable
+from bench.discrepancy.fitting.goodness_of_fit import consistent, key_of
 from bench.discrepancy.fitting.map_fit import Fit
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.model.structure import Place
-from bench.discrepancy.search.fits import Search, Task, consistent, converge, key_of
+from bench.discrepancy.search.fits import Search, Task, converge
 from bench.discrepancy.search.soft_friction import IDEAL, RUBBING, frictional, nominal_level
 
 Array = NDArray[np.float64]

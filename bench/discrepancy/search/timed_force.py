@@ -26,13 +26,14 @@ from bench.discrepancy.effects.effect import (
     Values,
 )
 from bench.discrepancy.effects.read_off import FORCE, TIMED
+from bench.discrepancy.fitting.goodness_of_fit import consistent, key_of
 from bench.discrepancy.fitting.map_fit import Fit
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.nominal_elements import own_force
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.model.structure import Place
 from bench.discrepancy.numerics.threads import in_threads
-from bench.discrepancy.search.fits import Search, consistent, converge, key_of
+from bench.discrepancy.search.fits import Search, converge
 from bench.discrepancy.search.time_windows import (
     Windows,
     follows_motion,
