@@ -39,7 +39,8 @@ from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.model.placements import placements
 from bench.discrepancy.screening.candidates import along
 from bench.discrepancy.screening.linear_amplitudes import Node, products
-from bench.discrepancy.screening.screen import Ground, Screen
+from bench.discrepancy.screening.projection import Ground
+from bench.discrepancy.screening.screen import Screen
 from bench.discrepancy.search.explain import Explanation
 from bench.discrepancy.settings import JudgementSettings
 

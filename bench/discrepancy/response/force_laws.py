@@ -12,8 +12,9 @@ from bench.discrepancy.case.case import CaseRecord
 from bench.discrepancy.effects.effect import Scales
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.settings import SimulationSettings
+from bench.discrepancy.simulation.equations_of_motion import COLUMNS
 from bench.discrepancy.simulation.step_size import rates
-from bench.discrepancy.simulation.stick_slip import COLUMNS, Elements
+from bench.discrepancy.simulation.stick_slip import Elements
 
 Array = NDArray[np.float64]
 

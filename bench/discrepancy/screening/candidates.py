@@ -10,7 +10,8 @@ from bench.discrepancy.fitting.map_fit import Fit
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.screening.linear_amplitudes import Point
-from bench.discrepancy.screening.screen import Ground, Screen
+from bench.discrepancy.screening.projection import Ground
+from bench.discrepancy.screening.screen import Screen
 from bench.discrepancy.settings import DiagnosisSettings
 
 

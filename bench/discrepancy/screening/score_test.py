@@ -29,7 +29,8 @@ from bench.discrepancy.likelihood.problem import Array, Problem
 from bench.discrepancy.likelihood.whitening import whitened
 from bench.discrepancy.model.structure import Place
 from bench.discrepancy.numerics.threads import in_threads
-from bench.discrepancy.screening.screen import Ground, Screen
+from bench.discrepancy.screening.projection import Ground
+from bench.discrepancy.screening.screen import Screen
 from bench.discrepancy.settings import DEFAULT, ScreeningSettings
 
 PRODUCTS = ((1, 1), (2, 1), (1, 2))

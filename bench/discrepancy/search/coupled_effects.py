@@ -19,7 +19,8 @@ from bench.discrepancy.screening.candidates import (
     refined,
 )
 from bench.discrepancy.screening.linear_amplitudes import Point, fainter
-from bench.discrepancy.screening.screen import Ground, Screen
+from bench.discrepancy.screening.projection import Ground
+from bench.discrepancy.screening.screen import Screen
 from bench.discrepancy.search.fits import Search, converge
 from bench.discrepancy.search.forward_selection import (
     first_fit,
