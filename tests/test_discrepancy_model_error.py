@@ -25,7 +25,7 @@ from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.localisation.remainder import free_force
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.model.rigs import structure_of
-from bench.discrepancy.search.explain import Explanation
+from bench.discrepancy.search.explanation import Explanation
 
 FEW = [
     effect_named(name)

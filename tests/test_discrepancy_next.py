@@ -21,7 +21,7 @@ from bench.discrepancy.next_test.discriminating_excitation import (
 from bench.discrepancy.next_test.distinguishability import why_none
 from bench.discrepancy.next_test.feasible_excitations import limits_of
 from bench.discrepancy.report.model_update import element_code, element_toml
-from bench.discrepancy.search.explain import Explanation
+from bench.discrepancy.search.explanation import Explanation
 
 RATE, N = 500.0, 3000
 NOISE = 0.02

@@ -24,7 +24,8 @@ from bench.discrepancy.screening.candidates import followed
 from bench.discrepancy.screening.linear_amplitudes import Point
 from bench.discrepancy.screening.score_test import LackOfFit, lack_of_fit
 from bench.discrepancy.screening.screen import Screen
-from bench.discrepancy.search.explain import Explanation, close
+from bench.discrepancy.search.closures import close
+from bench.discrepancy.search.explanation import Explanation
 from bench.discrepancy.search.fits import Search, integrate_finer
 from bench.discrepancy.search.forward_selection import attribute
 from bench.discrepancy.search.rivals import challenge

@@ -20,7 +20,7 @@ from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.screening.score_test import lack_of_fit
 from bench.discrepancy.screening.screen import Screen
 from bench.discrepancy.search.coupled_effects import coupled_fits
-from bench.discrepancy.search.explain import Explanation
+from bench.discrepancy.search.explanation import Explanation
 from bench.discrepancy.search.fits import Search, shake
 from bench.discrepancy.search.forward_selection import attribute, prepare, worth_extending
 from bench.discrepancy.search.rivals import challenge

@@ -48,7 +48,8 @@ from bench.discrepancy.model.placement import Hypothesis
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.next_test.discriminating_excitation import separate, told_apart
 from bench.discrepancy.numerics.deadline import Deadline
-from bench.discrepancy.search.explain import Explanation, close, nominal_alone
+from bench.discrepancy.search.closures import close
+from bench.discrepancy.search.explanation import Explanation, nominal_alone
 from bench.discrepancy.search.load_interpolation import reading_notes
 from bench.discrepancy.settings import DEFAULT, DiagnosisSettings, changed
 from bench.discrepancy.verdict import Gap, Kind, NamedEffect, Ranked, Verdict

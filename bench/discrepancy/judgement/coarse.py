@@ -22,7 +22,7 @@ from bench.discrepancy.judgement.held_out import HeldOut, held_out, shares
 from bench.discrepancy.judgement.steady import diverges, steadied
 from bench.discrepancy.judgement.validation_discrepancy import discrepancies, noise_floors
 from bench.discrepancy.likelihood.problem import Array, Problem
-from bench.discrepancy.search.explain import Explanation, nominal_alone
+from bench.discrepancy.search.explanation import Explanation, nominal_alone
 from bench.discrepancy.settings import DEFAULT, CoarseSettings
 
 

@@ -15,7 +15,7 @@ from bench.discrepancy.likelihood.model_error import ModelError, crude_error, er
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.numerics.deadline import NEVER, Deadline
-from bench.discrepancy.search.explain import Explanation
+from bench.discrepancy.search.explanation import Explanation
 from bench.discrepancy.settings import DiagnosisSettings
 from bench.discrepancy.verdict import Kind, Ranked
 

@@ -41,7 +41,7 @@ from bench.discrepancy.screening.candidates import along
 from bench.discrepancy.screening.linear_amplitudes import Node, products
 from bench.discrepancy.screening.projection import Ground
 from bench.discrepancy.screening.screen import Screen
-from bench.discrepancy.search.explain import Explanation
+from bench.discrepancy.search.explanation import Explanation
 from bench.discrepancy.settings import JudgementSettings
 
 CONTACTS = ("one_sided_stop", "gap")

@@ -14,7 +14,7 @@ from bench.discrepancy.judgement.validation_discrepancy import (
     closed_share,
 )
 from bench.discrepancy.model.placement import Placed
-from bench.discrepancy.search.explain import Explanation, nominal_alone, plainest
+from bench.discrepancy.search.explanation import Explanation, nominal_alone, plainest
 from bench.discrepancy.settings import DEFAULT, JudgementSettings
 from bench.discrepancy.verdict import Estimate, Gap, Kind, NamedEffect, Ranked
 

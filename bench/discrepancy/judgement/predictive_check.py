@@ -20,7 +20,7 @@ from bench.discrepancy.fitting.map_fit import Fit, fit
 from bench.discrepancy.judgement.validation_discrepancy import coordinates, noise_level
 from bench.discrepancy.likelihood.problem import Array, Problem
 from bench.discrepancy.response.initial_states import in_motion
-from bench.discrepancy.search.explain import Explanation
+from bench.discrepancy.search.explanation import Explanation
 
 
 def contradicted(case: Case, problem: Problem, best: Explanation, rng: np.random.Generator) -> bool:

@@ -29,7 +29,8 @@ from bench.discrepancy.likelihood.model_error import ModelError
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.numerics.deadline import NEVER, Deadline
-from bench.discrepancy.search.explain import Explanation, explain
+from bench.discrepancy.search.explain import explain
+from bench.discrepancy.search.explanation import Explanation
 from bench.discrepancy.search.load_interpolation import promising_readings
 from bench.discrepancy.settings import DEFAULT, DiagnosisSettings
 

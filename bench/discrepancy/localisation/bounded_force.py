@@ -26,7 +26,7 @@ from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.screening.candidates import along
 from bench.discrepancy.screening.projection import Ground
 from bench.discrepancy.screening.screen import Screen
-from bench.discrepancy.search.explain import Explanation
+from bench.discrepancy.search.explanation import Explanation
 from bench.discrepancy.settings import LocalisationSettings
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from bench.discrepancy.likelihood.problem import Array, Problem
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.screening.motion_response import force_along
-from bench.discrepancy.search.explain import Explanation
+from bench.discrepancy.search.explanation import Explanation
 from bench.discrepancy.settings import LocalisationSettings
 
 

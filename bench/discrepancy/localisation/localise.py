@@ -34,7 +34,7 @@ from bench.discrepancy.localisation.state_map import (
     state_maps,
 )
 from bench.discrepancy.localisation.state_splits import force_splits
-from bench.discrepancy.search.explain import Explanation
+from bench.discrepancy.search.explanation import Explanation
 from bench.discrepancy.settings import LocalisationSettings
 from bench.discrepancy.verdict import Location, Split
 

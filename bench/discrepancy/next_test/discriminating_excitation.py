@@ -32,7 +32,7 @@ from bench.discrepancy.next_test.feasible_excitations import (
     limits_of,
 )
 from bench.discrepancy.numerics.threads import in_threads
-from bench.discrepancy.search.explain import Explanation
+from bench.discrepancy.search.explanation import Explanation
 from bench.discrepancy.settings import NextTestSettings
 from bench.excitation.bayes_factor import Contrast, expected_log_bayes_factor
 

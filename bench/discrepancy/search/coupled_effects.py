@@ -21,10 +21,8 @@ from bench.discrepancy.screening.candidates import (
 from bench.discrepancy.screening.linear_amplitudes import Point, fainter
 from bench.discrepancy.screening.projection import Ground
 from bench.discrepancy.screening.screen import Screen
+from bench.discrepancy.search.extension import first_fit
 from bench.discrepancy.search.fits import Search, converge
-from bench.discrepancy.search.forward_selection import (
-    first_fit,
-)
 from bench.discrepancy.search.rivals import reduce_best
 
 Keys = Collection[tuple[str, str, str]]

@@ -17,7 +17,7 @@ from bench.discrepancy.case.acquisition import INTERPOLATIONS
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.fitting.map_fit import fit
 from bench.discrepancy.likelihood.problem import Problem
-from bench.discrepancy.search.explain import Explanation
+from bench.discrepancy.search.explanation import Explanation
 
 STATED = "load_interpolation"
 """Option of a case that says it; where it is given, nothing is looked for."""
