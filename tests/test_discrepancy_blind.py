@@ -26,9 +26,11 @@ from bench.discrepancy.effects.catalogue import CATALOGUE
 from bench.discrepancy.simulation.stick_slip import Elements, LinearStructure, free_run
 from bench.discrepancy.truth import out_of_catalogue as foreign
 from bench.discrepancy.truth.ground_truth import ROWS, Placed, Truth, motion_of, played, sensed
+from bench.discrepancy.truth.loads import SIGNALS, load
 from bench.discrepancy.truth.moreau_time_stepping import Acting, Matrices, Stop, march
-from bench.discrepancy.truth.rigs import SIGNALS, BlindOptions, Plan, draw_bench, load, reach_of
-from bench.discrepancy.truth.withheld_effects import RECIPES, Reach, recipe_named
+from bench.discrepancy.truth.recipe import Reach
+from bench.discrepancy.truth.rigs import BlindOptions, Plan, draw_bench, reach_of
+from bench.discrepancy.truth.withheld_effects import RECIPES, recipe_named
 from bench.errors import FileFormatError, ParameterError, UnknownNameError
 from bench.laws import LAWS
 from bench.laws.coulomb import COULOMB

@@ -28,8 +28,9 @@ from bench.discrepancy.blind.handed_over import (
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.truth.ground_truth import ROWS, Placed
 from bench.discrepancy.truth.moreau_time_stepping import TrueMotion
+from bench.discrepancy.truth.recipe import Drawn, Recipe, Shape
 from bench.discrepancy.truth.rigs import Bench, BlindOptions, Plan, draw_bench, reach_of
-from bench.discrepancy.truth.withheld_effects import RECIPES, Drawn, Recipe, Shape
+from bench.discrepancy.truth.withheld_effects import RECIPES
 from bench.errors import ParameterError, SimulationError
 
 Array = NDArray[np.float64]

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from bench.discrepancy.case.case import Case, CaseChannel, CaseRecord
 from bench.discrepancy.case.schema import RIGS
-from bench.discrepancy.effects.catalogue import FRICTION, effect_named
+from bench.discrepancy.effects.catalogue import effect_named
 from bench.discrepancy.effects.effect import (
     EFFECT_SETTINGS,
     Effect,
@@ -31,6 +31,7 @@ from bench.discrepancy.effects.effect import (
     Scales,
     Values,
 )
+from bench.discrepancy.effects.force_priors import FRICTION
 from bench.discrepancy.effects.read_off import DIFFERS, FOLLOWED, SENSITIVITY, schedulable
 from bench.discrepancy.fitting.goodness_of_fit import consistent, key_of
 from bench.discrepancy.fitting.map_fit import Fit

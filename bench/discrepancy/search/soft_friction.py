@@ -19,8 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.discrepancy.effects import friction_limits as limits
-from bench.discrepancy.effects.catalogue import FRICTION, effect_named
+from bench.discrepancy.effects.catalogue import effect_named
 from bench.discrepancy.effects.effect import Effect, FreeParameter, Scales, Values
+from bench.discrepancy.effects.force_priors import FRICTION
 from bench.discrepancy.fitting.goodness_of_fit import consistent
 from bench.discrepancy.fitting.map_fit import Fit
 from bench.discrepancy.likelihood.problem import Problem

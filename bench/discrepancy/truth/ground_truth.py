@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
 from bench.discrepancy.truth.moreau_time_stepping import Acting, Matrices, Stop, TrueMotion, follow, march
-from bench.discrepancy.truth.withheld_effects import Drawn, Recipe
+from bench.discrepancy.truth.recipe import Drawn, Recipe
 
 Array = NDArray[np.float64]
 
