@@ -18,7 +18,7 @@ TOO_LARGE = {"model": 2600, "articulated": 2800}
 LARGEST_ROOM, MOST_LOOSE = 2500, 4
 """Lines of a room of the diagnosis, and files beside its rooms."""
 LARGEST_FILE, LARGEST_FUNCTION, LARGEST_CLASS = 350, 60, 300
-"""Lines of a file of the diagnosis, of a function and of a class in it."""
+"""Lines of a file of the diagnosis, of a function and of a class in it, these without their docstrings."""
 OWED = {
     "articulated/admission.py",
     "articulated/diagnosis.py",
@@ -27,11 +27,9 @@ OWED = {
     "articulated/problem.py: ArticulatedProblem",
     "articulated/search.py",
     "blind/scoring.py: summary",
-    "case/reading.py: read_case",
     "checks/data_quality.py",
     "checks/scales.py",
     "model/mjcf.py",
-    "multibody/joint_run.py: run",
     "multibody/model.py",
     "report/html_page.py",
 }
@@ -116,6 +114,13 @@ def test_diagnosis_lives_in_rooms():
         assert lines <= TOO_LARGE.get(room.name, LARGEST_ROOM), room.name
 
 
+def lines_of(node: ast.FunctionDef | ast.ClassDef) -> int:
+    """Lines of a function or class without its docstring."""
+    doc, end = node.body[0], node.end_lineno or node.lineno
+    documented = isinstance(doc, ast.Expr) and isinstance(doc.value, ast.Constant)
+    return end - node.lineno + 1 - ((doc.end_lineno or 0) - doc.lineno + 1 if documented else 0)
+
+
 def too_large() -> set[str]:
     """Files of the diagnosis, and functions and classes in them, that are longer than the limits."""
     found = set()
@@ -125,7 +130,7 @@ def too_large() -> set[str]:
         for node in ast.walk(ast.parse(text)):
             if isinstance(node, ast.FunctionDef | ast.ClassDef):
                 most = LARGEST_CLASS if isinstance(node, ast.ClassDef) else LARGEST_FUNCTION
-                found |= {f"{name}: {node.name}"} if node.end_lineno - node.lineno >= most else set()
+                found |= {f"{name}: {node.name}"} if lines_of(node) > most else set()
     return found
 
 
