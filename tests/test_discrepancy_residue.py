@@ -20,7 +20,7 @@ from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.likelihood.whitening import timed
 from bench.discrepancy.model.placements import placements
 from bench.discrepancy.model.rigs import structure_of
-from bench.discrepancy.screening.candidates import followed
+from bench.discrepancy.screening.candidates import tells_motion
 from bench.discrepancy.screening.linear_amplitudes import Point
 from bench.discrepancy.screening.score_test import LackOfFit, lack_of_fit
 from bench.discrepancy.screening.screen import Screen
@@ -79,11 +79,11 @@ def test_one_more_effect_is_screened_along_a_free_run_that_follows_the_motion_an
     case = planted_case(lambda f: motion_with(f, one_relaxation, 1))
     problem, relaxing = fitted(case, "viscoelastic_relaxation", [-2.2, -3.0])
     friction = placements(case, problem.structure, [effect_named("coulomb_friction")])
-    assert followed(replace(relaxing, chi2=1.5 * relaxing.n_residuals), problem)
-    assert not followed(replace(relaxing, chi2=2.5 * relaxing.n_residuals), problem)
+    assert tells_motion(replace(relaxing, chi2=1.5 * relaxing.n_residuals), problem)
+    assert not tells_motion(replace(relaxing, chi2=2.5 * relaxing.n_residuals), problem)
     sticking = replace(relaxing, hypothesis=tuple(friction))
-    assert not followed(replace(sticking, chi2=1.5 * relaxing.n_residuals), problem)
-    assert followed(replace(sticking, chi2=relaxing.n_residuals), problem)
+    assert not tells_motion(replace(sticking, chi2=1.5 * relaxing.n_residuals), problem)
+    assert tells_motion(replace(sticking, chi2=relaxing.n_residuals), problem)
 
 
 def test_several_effects_are_doubted_sooner_than_one():

@@ -19,7 +19,7 @@ from scipy.interpolate import make_interp_spline
 from bench.discrepancy.truth.background_settings import STATED, BackgroundSettings
 from bench.discrepancy.truth.foreign_memory import HIDDEN_RESONATOR
 from bench.discrepancy.truth.foreign_shapes import modulated, resonator, wavy
-from bench.discrepancy.truth.ground_truth import Placed
+from bench.discrepancy.truth.ground_truth import WithheldEffect
 from bench.discrepancy.truth.out_of_catalogue import MODULATED_STIFFNESS, POSITION_DEPENDENT_FRICTION
 from bench.discrepancy.truth.recipe import Recipe, Shape, between
 from bench.discrepancy.truth.rigs import Bench, reach_of
@@ -40,7 +40,7 @@ class Background:
         settings: What it was drawn from.
     """
 
-    acting: tuple[Placed, ...] = ()
+    acting: tuple[WithheldEffect, ...] = ()
     recorded: Mapping[str, float] = field(default_factory=dict)
     share: float = 0.0
     stated: str = "true"
@@ -120,7 +120,7 @@ ACTING = (
 )
 RECORDED = ("hum", "coloured_noise", "jitter")
 PLACES = {"sdof": ("",), "damper": ("",), "joint": ("axial", "torsional")}
-GapOf = Callable[[Sequence[Placed]], float]
+GapOf = Callable[[Sequence[WithheldEffect]], float]
 
 
 def draw_background(
@@ -144,7 +144,7 @@ def draw_background(
     sizes = rng.uniform(0.5, 1.0, count)
     parts = dict(zip(chosen, share * bench.plan.gap * sizes / np.linalg.norm(sizes), strict=True))
 
-    def gap(acting: Sequence[Placed]) -> float:
+    def gap(acting: Sequence[WithheldEffect]) -> float:
         return max(bench.gaps(bench.responses(acting, quick=True, judging=False), bare))
 
     acting = []
@@ -162,10 +162,12 @@ def draw_background(
     return Background(tuple(acting), recorded, share, stated, settings)
 
 
-def _sized(recipe: Recipe, where: str, shape: Shape, gap: GapOf, wanted: float, bisections: int) -> Placed:
+def _sized(
+    recipe: Recipe, where: str, shape: Shape, gap: GapOf, wanted: float, bisections: int
+) -> WithheldEffect:
     low, high = -9.0, 2.0
     for _ in range(bisections):
         middle = 0.5 * (low + high)
-        smaller = gap([Placed(recipe, where, shape(math.exp(middle)))]) < wanted
+        smaller = gap([WithheldEffect(recipe, where, shape(math.exp(middle)))]) < wanted
         low, high = (middle, high) if smaller else (low, middle)
-    return Placed(recipe, where, shape(math.exp(0.5 * (low + high))))
+    return WithheldEffect(recipe, where, shape(math.exp(0.5 * (low + high))))

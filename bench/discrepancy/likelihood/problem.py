@@ -19,7 +19,7 @@ from bench.discrepancy.likelihood.model_error import ModelError
 from bench.discrepancy.likelihood.noise_covariance import sensor_gains, whitening_behind
 from bench.discrepancy.likelihood.time_varying_noise import whitening_together
 from bench.discrepancy.likelihood.whitening import RecordData, band_bins, projected, timed, without_bridged
-from bench.discrepancy.likelihood.window_whitening import Windows, white_force, window_weights
+from bench.discrepancy.likelihood.window_whitening import RestartWindows, white_force, window_weights
 from bench.discrepancy.model.placement import Hypothesis
 from bench.discrepancy.motion.observer import ACCELERATION
 from bench.discrepancy.motion.prescribed import decided
@@ -95,7 +95,7 @@ class Problem(Simulator):
         white = np.linalg.inv(np.linalg.cholesky(covariance)) * np.sqrt(weights)[:, None, None]
         return np.asarray(white, dtype=np.complex128)
 
-    def _windows_of(self, record: CaseRecord, n_bins: int, values: Array) -> Windows | None:
+    def _windows_of(self, record: CaseRecord, n_bins: int, values: Array) -> RestartWindows | None:
         """Windows of a record that would drift, whitened for the structure at parameter `values`; None for other records."""
         if not self.windowed:
             return None
@@ -115,16 +115,16 @@ class Problem(Simulator):
                 model_error=white_force(self),
                 settings=settings,
             )
-        return Windows(firsts, length, *self._weights[key])
+        return RestartWindows(firsts, length, *self._weights[key])
 
-    def _weighed_windows(self, windows: Windows | None) -> Windows | None:
+    def _weighed_windows(self, windows: RestartWindows | None) -> RestartWindows | None:
         """Windows, weighed by the error of the model besides."""
         if windows is None or self.error is None:
             return windows
         factor = np.sqrt(self._window_weight(windows) / self.error.scale)
         return windows._replace(weights=windows.weights * factor)
 
-    def _window_weight(self, windows: Windows) -> float:
+    def _window_weight(self, windows: RestartWindows) -> float:
         """How much each residual of windows counts."""
         return 1.0 if self.error is None else self.error.window_weight(windows.n_residuals)
 

@@ -45,7 +45,7 @@ def _products(parts, weights, out):
             out[w, i] = total
 
 
-class Windows(NamedTuple):
+class RestartWindows(NamedTuple):
     """Windows of one record, restarted each from the measured state.
 
     Attributes:
@@ -87,7 +87,7 @@ def window_weights(
     model_error: Array,
     settings: LikelihoodSettings,
 ) -> tuple[Array, Array, Array]:
-    """Whitening of the residuals of a window, what a start reaches, and the covariance of what noise leaves; see `Windows`.
+    """Whitening of the residuals of a window, what a start reaches, and the covariance of what noise leaves; see `RestartWindows`.
 
     Args:
         structure: For its observers.

@@ -23,7 +23,7 @@ def _at_ease(fitted: Fit, problem: Problem) -> bool:
     )
 
 
-def followed(base: Fit, problem: Problem) -> bool:
+def tells_motion(base: Fit, problem: Problem) -> bool:
     """Whether one more effect is best screened along the free run of a base, since that tells the motion better than the records.
 
     Where friction sticks it is not, unless all is explained: a small force more moves the stops, which no linear response does.
@@ -46,7 +46,7 @@ def along(screen: Screen, fitted: Fit) -> Screen:
     Not where a sensor is part of it; what the sensor told instead would be no residual of another force.
     """
     spoilt = any(placed.effect.site == "sensor" for placed in fitted.hypothesis)
-    told = fitted.hypothesis and followed(fitted, screen.problem) and not spoilt
+    told = fitted.hypothesis and tells_motion(fitted, screen.problem) and not spoilt
     return screen.beside(fitted, simulated=True) if told else screen
 
 

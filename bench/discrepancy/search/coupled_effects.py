@@ -13,10 +13,10 @@ from bench.discrepancy.model.placements import placements
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.screening.candidates import (
     about,
-    followed,
     leading,
     passed_over,
     refined,
+    tells_motion,
 )
 from bench.discrepancy.screening.linear_amplitudes import Point, fainter
 from bench.discrepancy.screening.projection import Ground
@@ -119,7 +119,7 @@ def _ground(screen: Screen, base: Fit) -> tuple[bool, Screen, Ground]:
 
     A free run that misses the noise by far still tells the motion better than accelerations, twice integrated, if it leaves less.
     """
-    if not followed(base, screen.problem):
+    if not tells_motion(base, screen.problem):
         local = about(screen, base, explained=False)
         ground = local.ground(base)
         if float(np.sum(ground.left**2)) < base.chi2:

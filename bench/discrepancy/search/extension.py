@@ -15,10 +15,10 @@ from bench.discrepancy.model.placement import Hypothesis, Placed
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.screening.candidates import (
     about,
-    followed,
     leading,
     passed_over,
     refined,
+    tells_motion,
 )
 from bench.discrepancy.screening.linear_amplitudes import Point
 from bench.discrepancy.screening.screen import Screen
@@ -75,7 +75,7 @@ def _offers(
     settings = search.problem.settings
     problem = search.problem
     named = base if base.hypothesis else None
-    along = followed(base, problem)
+    along = tells_motion(base, problem)
     local = about(screen, base, explained=along)
     ground = local.ground(named, simulated=named is not None and along)
     solved = [p for p in local.ranked(named, ground) if not among or p.placed.key in among]

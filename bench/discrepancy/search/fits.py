@@ -139,7 +139,7 @@ def limit_of(search: Search, size: int) -> float:
     return best + search.problem.settings.search.sight + max(best - search.problem.n_residuals, 0.0)
 
 
-def shake(search: Search) -> None:
+def multistart(search: Search) -> None:
     """Fit hypotheses near the best again, from draws about where they ended, if friction sticks in them.
 
     Whether a slider stops at a reversal hangs on trifles, so the cost is rough: a descent ends in the first of many dents, some

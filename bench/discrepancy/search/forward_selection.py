@@ -22,13 +22,13 @@ from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.numerics.deadline import NEVER, Deadline
 from bench.discrepancy.screening.candidates import (
     about,
-    followed,
+    tells_motion,
 )
 from bench.discrepancy.screening.linear_amplitudes import Point
 from bench.discrepancy.screening.score_test import lack_of_fit
 from bench.discrepancy.screening.screen import Screen
 from bench.discrepancy.search.extension import contacts, extend
-from bench.discrepancy.search.fits import Search, integrate_finer, shake
+from bench.discrepancy.search.fits import Search, integrate_finer, multistart
 from bench.discrepancy.search.rivals import challenge, reduce_best, simplify
 from bench.discrepancy.search.scheduled import with_schedules
 from bench.discrepancy.search.soft_friction import soften, stand_in
@@ -64,7 +64,7 @@ def attribute(
     search, screen, points = prepared or prepare(problem, candidates)
     nothing = search.ranked(0)[0]
     progress(f"nominal model: chi-squared {nothing.reduced:.3g} of its expectation")
-    if followed(nothing, problem):
+    if tells_motion(nothing, problem):
         points = about(screen, nothing, explained=True).ranked()
         if not points or points[0].gain < settings.noticeable:
             return search
@@ -96,7 +96,7 @@ def attribute(
         challenge(search, screen, rounds=3 if problem.error is None else 1)
         soften(search, len(search.ranked()[0].hypothesis))
         if problem.error is None:
-            shake(search)
+            multistart(search)
     return search
 
 
@@ -178,7 +178,7 @@ def worth_extending(search: Search, screen: Screen, size: int, most: int) -> lis
         points = screen.ranked(base, ground)[:1]
         return float(np.sum(ground.left**2)) - sum(point.gain for point in points)
 
-    far = [f for f in ranked[: settings.considered] if np.isfinite(f.cost) and not followed(f, problem)]
+    far = [f for f in ranked[: settings.considered] if np.isfinite(f.cost) and not tells_motion(f, problem)]
     chosen = ranked[:most] + sorted(far, key=promised)[: settings.promised]
     return [f for f in ranked if any(f is own for own in chosen)]
 

@@ -14,9 +14,9 @@ from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Hypothesis, Placed
 from bench.discrepancy.screening.candidates import (
     about,
-    followed,
     leading,
     refined,
+    tells_motion,
 )
 from bench.discrepancy.screening.screen import Screen
 from bench.discrepancy.search.fits import Search, Task, carry_on, converge
@@ -45,7 +45,7 @@ def challenge(search: Search, screen: Screen, *, rounds: int = 3) -> None:
         if known or (challenged and not consistent(best)):
             return
         challenged.add(key_of(best.hypothesis))
-        along = followed(best, search.problem)
+        along = tells_motion(best, search.problem)
         tasks = []
         for i, placed in enumerate(best.hypothesis):
             rest, vector = _without(i, best, search.problem)

@@ -109,7 +109,7 @@ def _followed(problem: Problem, placed: Placed, start: Array, channel: CaseChann
     """Fits of an effect whose force follows a channel: added to the nominal model, and in the place of its friction."""
     values, (eta,) = problem.split((placed,), start)
     n = len(problem.nominal)
-    effect = followed(placed.effect, channel, problem)
+    effect = scheduled_by(placed.effect, channel, problem)
     reference = _reference(problem, channel)
     shapes = [np.append(eta, [kappa, reference]) for kappa in (0.5, 1.0)]
     new = Placed(effect, placed.place, channel.name)
@@ -134,7 +134,7 @@ def _followed(problem: Problem, placed: Placed, start: Array, channel: CaseChann
     return tasks
 
 
-def followed(effect: Effect, channel: CaseChannel, problem: Problem) -> Effect:
+def scheduled_by(effect: Effect, channel: CaseChannel, problem: Problem) -> Effect:
     """An effect whose force follows a channel."""
     count = len(effect.parameters)
     theta, bound, name = effect.theta, effect.rate_bound, channel.name

@@ -35,7 +35,7 @@ from bench.discrepancy.model.structure import Place
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.search.fits import Search, converge
 from bench.discrepancy.search.time_windows import (
-    Windows,
+    TimeWindows,
     follows_motion,
     windows_of,
 )
@@ -50,7 +50,7 @@ class _Found(NamedTuple):
     """Windows at a place: by record, the reference force, and the share of the missing force that they are."""
 
     place: Place
-    windows: Mapping[str, Windows]
+    windows: Mapping[str, TimeWindows]
     reference: float
     share: float
 
@@ -84,7 +84,7 @@ def with_timed_force(search: Search) -> None:
         converge(search, [((placed,), start)])
 
 
-def _sharpened(problem: Problem, fitted: Fit, found: _Found) -> dict[str, Windows]:
+def _sharpened(problem: Problem, fitted: Fit, found: _Found) -> dict[str, TimeWindows]:
     """Windows of every record, their edges moved to where the free run of a fit misses least, each by a sample or so."""
     (placed,), vector = fitted.hypothesis, fitted.vector
     out = {}
@@ -97,7 +97,7 @@ def _sharpened(problem: Problem, fitted: Fit, found: _Found) -> dict[str, Window
 
         def residual(edges: Array, own=own, data=data) -> Array | None:
             first, last = np.split(edges, 2)
-            moved = found._replace(windows={data.record.name: Windows(first, last - first, own.level)})
+            moved = found._replace(windows={data.record.name: TimeWindows(first, last - first, own.level)})
             hypothesis = (Placed(_effect(problem, moved), placed.place),)
             return problem.residual_of(data, hypothesis, vector, lenient=False)
 
@@ -105,7 +105,7 @@ def _sharpened(problem: Problem, fitted: Fit, found: _Found) -> dict[str, Window
         edges = _moved(residual, edges, record.step, settings=problem.settings.search)
         first, last = np.split(edges, 2)
         if np.all(last > first):
-            out[record.name] = Windows(first, last - first, own.level)
+            out[record.name] = TimeWindows(first, last - first, own.level)
     return out
 
 
@@ -154,7 +154,7 @@ def missing_force(problem: Problem, record: CaseRecord, place: Place) -> Array:
 
 def _at(problem: Problem, place: Place) -> _Found | None:
     """Windows at a place in the records for identification and those for judging; None where the former have none."""
-    windows: dict[str, Windows] = {}
+    windows: dict[str, TimeWindows] = {}
     power = left = 0.0
     for record in problem.records:
         lacking = missing_force(problem, record, place)
@@ -234,7 +234,7 @@ TOLD = (("start", "s"), ("duration", "s"), ("windows", "1"), ("period", "s"))
 """What is told of the windows besides their force; the fits hold it."""
 
 
-def _table(windows: Windows, reference: float, *, settings: SearchSettings) -> Array:
+def _table(windows: TimeWindows, reference: float, *, settings: SearchSettings) -> Array:
     """Start, duration and relative force (k, 3); windows of like force have the same."""
     relative = windows.level / reference
     relative[np.abs(relative - 1.0) < settings.timed.alike] = 1.0

@@ -81,7 +81,7 @@ class CoupledSettings:
 
 
 @dataclass(frozen=True)
-class ReadingSettings:
+class LoadReadingSettings:
     """Other readings of the loads between their samples."""
 
     instead: float = setting(

@@ -28,7 +28,7 @@ class RigsSettings:
 RIGS_SETTINGS = RigsSettings()
 
 
-def followed(signal: Array, frequency: float, rate: float) -> Array:
+def machine_motion(signal: Array, frequency: float, rate: float) -> Array:
     """Motion (n,) of a machine that is asked for a signal: no actuator jumps, nor does it turn a corner."""
     return np.asarray(
         sosfilt(bessel(4, RIGS_SETTINGS.machine * frequency, fs=rate, output="sos"), signal), dtype=np.float64

@@ -41,7 +41,7 @@ class MoreauTimeSteppingSettings:
 SETTINGS = MoreauTimeSteppingSettings()
 
 
-class Matrices(NamedTuple):
+class RigMatrices(NamedTuple):
     """``M q'' + C q' + K q = B u - forces``: (n_dof, n_dof) each, inputs (n_dof, n_loads)."""
 
     mass: Array
@@ -92,7 +92,7 @@ class TrueMotion(NamedTuple):
 
 
 def march(
-    matrices: Matrices,
+    matrices: RigMatrices,
     acting: Sequence[Acting],
     *,
     loads: Array,

@@ -11,13 +11,13 @@ from bench.discrepancy.truth.background_settings import BackgroundSettings
 from bench.discrepancy.truth.ground_truth import (
     GROUND_TRUTH_SETTINGS,
     ROWS,
-    Placed,
     Truth,
+    WithheldEffect,
     force_under,
     motion_of,
     sensed,
 )
-from bench.discrepancy.truth.loads import RIGS_SETTINGS, SIGNALS, Array, followed, load
+from bench.discrepancy.truth.loads import RIGS_SETTINGS, SIGNALS, Array, load, machine_motion
 from bench.discrepancy.truth.moreau_time_stepping import TrueMotion
 from bench.discrepancy.truth.recipe import Reach, Recipe
 from bench.discrepancy.truth.withheld_effects import recipe_named
@@ -78,7 +78,7 @@ class BlindOptions:
 
 
 @dataclass(frozen=True)
-class Plan:
+class CasePlan:
     """What a case is to be, before its numbers are drawn."""
 
     kind: str
@@ -103,20 +103,20 @@ class Bench:
         loads: (n, n_loads) each; for a prescribed motion the displacement, sampled finely (n * STEPS, 1).
     """
 
-    plan: Plan
+    plan: CasePlan
     truth: Truth
     names: tuple[str, ...]
     signals: tuple[str, ...]
     loads: tuple[Array, ...]
 
     def responses(
-        self, effects: Sequence[Placed], *, quick: bool = False, judging: bool = True
+        self, effects: Sequence[WithheldEffect], *, quick: bool = False, judging: bool = True
     ) -> list[dict[str, Array]]:
         """Response channels of every record without noise; see `run`."""
         return [r for r, _ in self.run(effects, quick=quick, judging=judging)]
 
     def run(
-        self, effects: Sequence[Placed], *, quick: bool = False, judging: bool = True
+        self, effects: Sequence[WithheldEffect], *, quick: bool = False, judging: bool = True
     ) -> list[tuple[dict[str, Array], TrueMotion]]:
         """Response channels and motion of every record.
 
@@ -182,7 +182,7 @@ class Bench:
         return [{f"{quantity}_2": 1.0, f"{quantity}_1": -1.0} for quantity in pairs]
 
 
-def _channels(plan: Plan) -> list[tuple[str, int, int]]:
+def _channels(plan: CasePlan) -> list[tuple[str, int, int]]:
     """(channel, order of the derivative, column of the motion) of the response channels."""
     position, acceleration = plan.sensors != "acceleration", plan.sensors != "position"
     if plan.rig == "sdof":
@@ -233,7 +233,7 @@ def reach_of(bench: Bench, where: str) -> Reach:
     )  # fmt: skip
 
 
-def draw_bench(plan: Plan, rng: np.random.Generator, options: BlindOptions) -> Bench:
+def draw_bench(plan: CasePlan, rng: np.random.Generator, options: BlindOptions) -> Bench:
     """Draw the rig's true parameters and its loads."""
     rate = options.sample_rate
     n = round(options.duration * rate)
@@ -263,7 +263,7 @@ def draw_bench(plan: Plan, rng: np.random.Generator, options: BlindOptions) -> B
         fine = rate * GROUND_TRUTH_SETTINGS.steps
         loads = tuple(
             stroke
-            * followed(load(s, frequency, n * GROUND_TRUTH_SETTINGS.steps, fine, rng), frequency, fine)[
+            * machine_motion(load(s, frequency, n * GROUND_TRUTH_SETTINGS.steps, fine, rng), frequency, fine)[
                 :, None
             ]
             for s in signals
