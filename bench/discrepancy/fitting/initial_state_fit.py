@@ -76,7 +76,7 @@ def _costs(residual: Array, firsts: NDArray[np.int64]) -> Array:
 
 
 def run_kind(problem: Problem, records: Sequence[CaseRecord]) -> str:
-    """How the judging records are simulated, for the name of the metric."""
+    """How the validation records are simulated, for the name of the metric."""
     if problem.driven:
         return "prescribed motion"
     if problem.windowed:

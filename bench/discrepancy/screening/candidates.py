@@ -15,7 +15,7 @@ from bench.discrepancy.screening.screen import Screen
 from bench.discrepancy.settings import DiagnosisSettings
 
 
-def _at_ease(fitted: Fit, problem: Problem) -> bool:
+def _within_priors(fitted: Fit, problem: Problem) -> bool:
     """Whether a hypothesis explains the records without nominal parameters far off their values."""
     return (
         consistent(fitted)
@@ -27,10 +27,10 @@ def tells_motion(base: Fit, problem: Problem) -> bool:
     """Whether one more effect is best screened along the free run of a base, since that tells the motion better than the records.
 
     Where friction sticks it is not, unless all is explained: a small force more moves the stops, which no linear response does.
-    The nominal model alone is asked whether it is at ease with what it leaves.
+    The nominal model alone is asked whether it explains the records within its priors.
     """
     if not base.hypothesis:
-        return _at_ease(base, problem)
+        return _within_priors(base, problem)
     return consistent(base) or (near(base) and not sticks(base))
 
 

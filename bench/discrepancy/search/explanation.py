@@ -130,7 +130,7 @@ def leaves_nothing(found: Sequence[Explanation]) -> bool:
 def nothing_left_first(found: list[Explanation]) -> list[Explanation]:
     """Put an explanation that leaves nothing before a likelier one in which free models find a force.
 
-    The toll that an effect pays for the inaccuracy of the diagnosis may else let a law win that the records refute.
+    The complexity penalty that an effect pays for the inaccuracy of the diagnosis may else let a law win that the records refute.
     """
     if not found[0].consistent or leaves_nothing(found):
         return found

@@ -29,7 +29,7 @@ def challenge(search: Search, screen: Screen, *, rounds: int = 3) -> None:
     """Fit the rivals of every effect of the best hypothesis, and that effect itself, from several starts.
 
     The rivals are screened along the free run of that hypothesis where it follows the motion: a run driven through accelerations
-    alone knows its middle, which no record told. What a rival makes superfluous is struck.
+    alone knows its middle, which no record told. What a rival makes superfluous is eliminated.
 
     Args:
         search: Fits so far; the new ones are added.

@@ -4,7 +4,7 @@ No grid can hold windows: they are read off the missing force along the measured
 them, with one force for all and a common shift to be fitted, competes with those of the catalogue. Each window costs the
 logarithm of what could have been chosen instead, so that a force of the motion, whose windows would be many, stays one of the motion.
 
-When the windows are open is a property of a record, not of the rig: those of the judging records are read off these, as initial
+When the windows are open is a property of a record, not of the rig: those of the validation records are read off these, as initial
 states are. Their force is not; it is what the records for identification say.
 """
 

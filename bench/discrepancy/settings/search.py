@@ -42,7 +42,7 @@ class SearchSettings:
         "Relative improvement of chi-squared that one more effect has to pay for.",
         (
             "Smoothing of stick-slip and interpolation of loads are only as good as that; records of extreme signal-to-noise "
-            "ratio would else name trifles."
+            "ratio would else name spurious terms."
         ),
     )
     hopeless: float = setting(

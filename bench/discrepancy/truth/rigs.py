@@ -123,7 +123,7 @@ class Bench:
         Args:
             effects: What is withheld.
             quick: Coarse, for a search.
-            judging: The judging record as well.
+            judging: The validation record as well.
         """
         step = 1.0 / self.truth.rate
         out = []

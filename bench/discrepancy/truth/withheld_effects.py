@@ -33,7 +33,7 @@ from bench.laws.stribeck import STRIBECK
 
 FREE = ("sdof", "joint")
 BOTH = ("both",)
-SHAKEN = ("sdof",)
+DRIVEN_BY_FORCE = ("sdof",)
 
 RECIPES: tuple[Recipe, ...] = (
     Recipe("coulomb_friction", "joint", shapes.one("friction_force", shapes.force, shapes.slow), law=COULOMB, limit=limits.coulomb_limit),
@@ -63,15 +63,15 @@ RECIPES: tuple[Recipe, ...] = (
         shapes.one("stiffness_rate", lambda r: r.stiffness / r.duration, lambda r: 0.0, signed=True), law=STIFFNESS_DRIFT,
     ),
     Recipe("mass_error", "inertia", shapes.relative, rigs=FREE),
-    Recipe("actuator_delay", "actuator", shapes.delay, rigs=SHAKEN),
-    Recipe("actuator_lag", "actuator", shapes.one("time_constant", lambda r: 1.0 / r.omega), rigs=SHAKEN),
-    Recipe("force_gain_error", "actuator", shapes.relative, rigs=SHAKEN),
+    Recipe("actuator_delay", "actuator", shapes.delay, rigs=DRIVEN_BY_FORCE),
+    Recipe("actuator_lag", "actuator", shapes.one("time_constant", lambda r: 1.0 / r.omega), rigs=DRIVEN_BY_FORCE),
+    Recipe("force_gain_error", "actuator", shapes.relative, rigs=DRIVEN_BY_FORCE),
     Recipe(
-        "displacement_drift", "sensor", shapes.one("drift", lambda r: r.position, signed=True), rigs=SHAKEN,
+        "displacement_drift", "sensor", shapes.one("drift", lambda r: r.position, signed=True), rigs=DRIVEN_BY_FORCE,
         target="displacement", sensors=BOTH,
     ),
-    Recipe("displacement_delay", "sensor", shapes.delay, rigs=SHAKEN, target="displacement", sensors=BOTH),
-    Recipe("displacement_gain_error", "sensor", shapes.relative, rigs=SHAKEN, target="displacement", sensors=BOTH),
+    Recipe("displacement_delay", "sensor", shapes.delay, rigs=DRIVEN_BY_FORCE, target="displacement", sensors=BOTH),
+    Recipe("displacement_gain_error", "sensor", shapes.relative, rigs=DRIVEN_BY_FORCE, target="displacement", sensors=BOTH),
     Recipe("gap_coupling", "joint", shapes.gap_coupling, rigs=("joint",), law=GAP_COUPLING, weight=3.0),
     Recipe(
         "cross_stiffness", "joint", shapes.one("k_cross", lambda r: math.sqrt(r.stiffness * r.stiffness2), signed=True),
@@ -79,14 +79,14 @@ RECIPES: tuple[Recipe, ...] = (
     ),
     Recipe("backlash_friction", "joint", shapes.backlash, law=JENKINS_BACKLASH, weight=0.4),
     Recipe("force_offset", "joint", shapes.one("offset", shapes.force, signed=True), law=CONSTANT_FORCE, weight=0.4),
-    Recipe("actuator_saturation", "actuator", shapes.saturation, rigs=SHAKEN, weight=0.4),
+    Recipe("actuator_saturation", "actuator", shapes.saturation, rigs=DRIVEN_BY_FORCE, weight=0.4),
     Recipe(
-        "displacement_bias", "sensor", shapes.one("bias", lambda r: r.position, signed=True), rigs=SHAKEN,
+        "displacement_bias", "sensor", shapes.one("bias", lambda r: r.position, signed=True), rigs=DRIVEN_BY_FORCE,
         target="displacement", weight=0.4, sensors=BOTH,
     ),
-    Recipe("displacement_clipping", "sensor", shapes.clipping, rigs=SHAKEN, target="displacement", weight=0.4, sensors=BOTH),
-    Recipe("acceleration_gain_error", "sensor", shapes.relative, rigs=SHAKEN, target="acceleration", weight=0.4, sensors=BOTH),
-    Recipe("acceleration_delay", "sensor", shapes.delay, rigs=SHAKEN, target="acceleration", weight=0.4, sensors=BOTH),
+    Recipe("displacement_clipping", "sensor", shapes.clipping, rigs=DRIVEN_BY_FORCE, target="displacement", weight=0.4, sensors=BOTH),
+    Recipe("acceleration_gain_error", "sensor", shapes.relative, rigs=DRIVEN_BY_FORCE, target="acceleration", weight=0.4, sensors=BOTH),
+    Recipe("acceleration_delay", "sensor", shapes.delay, rigs=DRIVEN_BY_FORCE, target="acceleration", weight=0.4, sensors=BOTH),
     Recipe(
         "modulated_stiffness", "joint",
         foreign_shapes.modulated(lambda rng, r: rng.uniform(0.15, 0.9) * r.omega / (2.0 * np.pi)), law=foreign.MODULATED_STIFFNESS,
@@ -106,7 +106,7 @@ RECIPES: tuple[Recipe, ...] = (
     Recipe("position_dependent_friction", "joint", foreign_shapes.wavy(0.5), law=foreign.POSITION_DEPENDENT_FRICTION),
     Recipe("unmeasured_load", "joint", foreign_shapes.blow, rigs=FREE, law=foreign.UNMEASURED_LOAD),
     # the impulse of an impact falls between the samples of an accelerometer: positions only
-    Recipe("restitution_stop", "stop", foreign_shapes.restitution, rigs=SHAKEN, sensors=("position",)),
+    Recipe("restitution_stop", "stop", foreign_shapes.restitution, rigs=DRIVEN_BY_FORCE, sensors=("position",)),
 )  # fmt: skip
 """Effects of the catalogue, the trials' list first, the usual suspects less often; then the foreign ones."""
 
