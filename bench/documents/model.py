@@ -31,7 +31,7 @@ from pydantic import (
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError
 
-from bench.documents.loading import LIMITS, Limits, load_document, spelt
+from bench.documents.loading import LIMITS, DocumentLimits, load_document, spelt
 from bench.errors import (
     BenchError,
     DocumentError,
@@ -136,7 +136,7 @@ class Document(Entry):
     """Address or path of the JSON Schema, for editors; not looked at."""
 
     @classmethod
-    def read(cls, path: str | Path, *, limits: Limits = LIMITS) -> Self:
+    def read(cls, path: str | Path, *, limits: DocumentLimits = LIMITS) -> Self:
         """Read a file.
 
         Raises:
