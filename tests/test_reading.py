@@ -21,6 +21,7 @@ import scipy.io
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "scripts"))
 
 from fuzz import run
+from fuzzing.products import PRODUCT_TARGETS
 from fuzzing.records import RECORD_TARGETS, make_hdf5, make_mat, make_npz, make_parquet
 
 from bench.discrepancy import read_case
@@ -471,6 +472,8 @@ def test_a_version_4_file_is_read(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", RECORD_TARGETS)
-def test_the_fuzzer_finds_nothing_in_a_short_run(name):
-    assert run(name, 25, seed=11) == []
+@pytest.mark.parametrize(
+    ("name", "count"), [*((name, 25) for name in RECORD_TARGETS), *((name, 6) for name in PRODUCT_TARGETS)]
+)
+def test_the_fuzzer_finds_nothing_in_a_short_run(name, count):
+    assert run(name, count, seed=11) == []
