@@ -86,8 +86,9 @@ class LikenessSettings:
         1.5,
         "Times the largest measured response up to which the runs are compared.",
         (
-            "What acts only beyond the motion that was measured (a pendulum without its friction that goes over the top) has "
-            "nothing to do with the records."
+            "A part that acted in the records acts in a run before the run has left their motion: once would do. Half as much again is "
+            "for parts beside the channels (a contact, a tendon), which a nominal model wrong by some sigmas reaches elsewhere. What "
+            "acts only beyond (a pendulum without its friction that goes over the top) has nothing to do with the records."
         ),
     )
     steps: int = setting(
