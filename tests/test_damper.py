@@ -21,11 +21,11 @@ from bench.identification.damper_study import (
     DAMPER_STUDY_SETTINGS,
     INCH,
     VISCOUS_DAMPER,
-    harmonic_campaign,
     harmonic_record,
     polynomial_experiment,
     random_record,
 )
+from bench.identification.harmonic_tests import harmonic_campaign
 from bench.identification.order_study import order_study
 from bench.laws.evaluate import evaluate
 

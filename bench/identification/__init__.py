@@ -12,7 +12,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from bench.identification.adaptive import AdaptiveHistory, AdaptiveLeastSquares, Sample
+    from bench.identification.adaptive import AdaptiveLeastSquares
+    from bench.identification.adaptive_history import AdaptiveHistory, Sample
     from bench.identification.damper import (
         DesignFit,
         OnlineDesignFit,
@@ -28,12 +29,7 @@ if TYPE_CHECKING:
     from bench.identification.order_study import ForceRecord, OrderStudy
     from bench.identification.output_error import OutputErrorModel, fit_output_error
     from bench.identification.parametric import ParametricModel, fit_law
-    from bench.identification.polynomial import (
-        PolynomialModel,
-        PolynomialReport,
-        ValidityRange,
-        fit_polynomial,
-    )
+    from bench.identification.polynomial import PolynomialModel, PolynomialReport, fit_polynomial
     from bench.identification.regressors import (
         RegressorModel,
         bouc_wen_model,
@@ -44,9 +40,10 @@ if TYPE_CHECKING:
     )
     from bench.identification.restoring_force import JointData, joint_data, joint_forces, unknown_mass_data
     from bench.identification.surface import RestoringSurface, coverage, fit_surface
+    from bench.identification.validity_range import ValidityRange
 
 _HOMES = {
-    "AdaptiveHistory": "adaptive",
+    "AdaptiveHistory": "adaptive_history",
     "AdaptiveLeastSquares": "adaptive",
     "DesignFit": "damper",
     "ForceRecord": "order_study",
@@ -65,9 +62,9 @@ _HOMES = {
     "PolynomialReport": "polynomial",
     "RegressorModel": "regressors",
     "RestoringSurface": "surface",
-    "Sample": "adaptive",
+    "Sample": "adaptive_history",
     "TrustReport": "damper",
-    "ValidityRange": "polynomial",
+    "ValidityRange": "validity_range",
     "bouc_wen_model": "regressors",
     "check_design_model": "damper",
     "coverage": "surface",

@@ -28,10 +28,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bench.errors import FileFormatError, IdentificationError
+from bench.identification.fit_data import checked_data, nmse_percent, read_only
 from bench.identification.memory_refinement import refined
 from bench.identification.memory_settings import MemorySettings, dictionary
 from bench.identification.memory_terms import JointRecord, Terms, fold, smoothness, solve
-from bench.identification.polynomial import ValidityRange, checked_data, frozen, nmse_percent
+from bench.identification.validity_range import ValidityRange
 from bench.laws.base import ForceLaw
 from bench.laws.evaluate import evaluate
 from bench.laws.memory import memory_law
@@ -92,7 +93,7 @@ class MemoryModel:
     @cached_property
     def theta(self) -> Array:
         """Header and parameters, as an element takes them."""
-        return frozen(self.law.theta(self.parameters))
+        return read_only(self.law.theta(self.parameters))
 
     def predict(self, states: ArrayLike, *, time: ArrayLike, substeps: int = 4) -> Array:
         """Restoring forces (n, k) [N, N m] along a motion that begins at rest in the joint's virgin state.
@@ -141,10 +142,10 @@ class MemoryModel:
             report = {f.name: values["report"][f.name] for f in fields(MemoryReport)}
             report["nmse"] = tuple(report["nmse"])
             parameters = memory_law(layout).theta(values["parameters"])[len(values["header"]) :]
-            mass = None if values["mass"] is None else frozen(values["mass"])
+            mass = None if values["mass"] is None else read_only(values["mass"])
             return cls(
                 layout,
-                frozen(parameters),
+                read_only(parameters),
                 ValidityRange.from_dict(values["range"]),
                 MemoryReport(**report),
                 mass,
@@ -216,8 +217,8 @@ def fit_memory(
     if chosen.refine and terms.layout.slips + terms.layout.maxwells:
         terms, steps = refined(terms, records, spreads, strength, chosen.refine)
         terms, weights = _pruned(terms, records, spreads, chosen, strength)
-    parameters = frozen(terms.parameters(weights))
-    mass = frozen(weights[len(weights) - k :]) if a.shape[1] else None
+    parameters = read_only(terms.parameters(weights))
+    mass = read_only(weights[len(weights) - k :]) if a.shape[1] else None
     report = MemoryReport(
         (), held_out, n_weights, len(parameters), len(memory_law(terms.layout).states), strength, steps, 0.0
     )

@@ -20,12 +20,8 @@ from bench.identification.damper import (
     fit_design_model,
     fit_design_model_online,
 )
-from bench.identification.damper_study import (
-    DamperRecord,
-    HarmonicCampaign,
-    harmonic_campaign,
-    harmonic_record,
-)
+from bench.identification.damper_study import DamperRecord, harmonic_record
+from bench.identification.harmonic_tests import HarmonicCampaign, harmonic_campaign
 from bench.reproduction import damper_random
 from bench.reproduction.damper_records import LOOPS, beside
 from bench.reproduction.estimates import (
