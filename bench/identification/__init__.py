@@ -17,11 +17,10 @@ if TYPE_CHECKING:
     from bench.identification.damper import (
         DesignFit,
         OnlineDesignFit,
-        TrustReport,
-        check_design_model,
         fit_design_model,
         fit_design_model_online,
     )
+    from bench.identification.damper_trust import TrustReport, check_design_model
     from bench.identification.linear_rig import LinearRig
     from bench.identification.memory import MemoryModel, MemoryReport, fit_memory
     from bench.identification.memory_settings import MemorySettings
@@ -63,10 +62,10 @@ _HOMES = {
     "RegressorModel": "regressors",
     "RestoringSurface": "surface",
     "Sample": "adaptive_history",
-    "TrustReport": "damper",
+    "TrustReport": "damper_trust",
     "ValidityRange": "validity_range",
     "bouc_wen_model": "regressors",
-    "check_design_model": "damper",
+    "check_design_model": "damper_trust",
     "coverage": "surface",
     "damper_model": "regressors",
     "fit_design_model": "damper",

@@ -154,24 +154,32 @@ class AdaptiveLeastSquares:
         state[list(settings)] = list(settings.values())
         state[layout.USES_F : layout.USES_A + 1] = model.uses
         state[layout.LAST_VALUE : layout.LAST_VALUE + 4] = math.nan
-        views = layout.split(state)
-        self._header, self._theta, self._d, self._phi = views[:4]
-        views[6][:] = 1.0 / np.array(model.scale)
-        self._level, self._peak = views[7:9]
-        self._u, self._start, self._pull = views[10], views[12], views[13]
-        self._pull[:] = math.inf
+        self._look_into(state)
         self._report_time = math.nan
         self._last_seen: dict[str, int] = {}
         self._events_made = 0
         self.reset_covariance()
         if theta0 is not None:
-            start = np.asarray(theta0, dtype=float)
-            if start.shape != (n,) or not np.all(np.isfinite(start)):
-                raise ParameterError(
-                    f"theta0 of shape {start.shape} came; {n} finite values are expected: {', '.join(model.names)}"
-                )
-            self._theta[:] = start / model.to_physical
-            self._start[:] = self._theta
+            self._begin_at(np.asarray(theta0, dtype=float))
+
+    def _look_into(self, state: NDArray[np.float64]) -> None:
+        """Keep views of the parts of the state."""
+        views = layout.split(state)
+        self._header, self._theta, self._d, self._phi = views[:4]
+        views[6][:] = 1.0 / np.array(self.model.scale)
+        self._level, self._peak = views[7:9]
+        self._u, self._start, self._pull = views[10], views[12], views[13]
+        self._pull[:] = math.inf
+
+    def _begin_at(self, start: NDArray[np.float64]) -> None:
+        """Begin with an estimate (n,) in physical units."""
+        n = self.model.n_parameters
+        if start.shape != (n,) or not np.all(np.isfinite(start)):
+            raise ParameterError(
+                f"theta0 of shape {start.shape} came; {n} finite values are expected: {', '.join(self.model.names)}"
+            )
+        self._theta[:] = start / self.model.to_physical
+        self._start[:] = self._theta
 
     def update(self, sample: Sample | Sequence[float]) -> bool:
         """Take one sample.

@@ -33,10 +33,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bench.identification.damper import (
-    TrustReport,
-    check_design_model,
-)
+from bench.identification.damper_trust import TrustReport, check_design_model
 from bench.identification.order_study import OrderStudy as OrderStudy  # noqa: PLC0414  (part of the study)
 from bench.identification.order_study import order_study as order_study  # noqa: PLC0414
 from bench.laws.base import ForceLaw, Parameter, kernel

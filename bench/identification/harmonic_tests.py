@@ -8,12 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from bench.errors import ParameterError
-from bench.identification.damper import (
-    check_design_model,
-    fit_design_model,
-    fit_design_model_online,
-)
+from bench.identification.damper import fit_design_model, fit_design_model_online
 from bench.identification.damper_study import DAMPER_STUDY_SETTINGS, harmonic_record
+from bench.identification.damper_trust import check_design_model
 from bench.laws.coupling import INCH
 
 

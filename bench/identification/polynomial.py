@@ -228,16 +228,7 @@ def fit_polynomial(
     begun = time.perf_counter()
     s, f, a = checked_data(states, forces, accelerations)
     powers = _orders_of(orders, s.shape[1])
-    if basis == "chebyshev" and not normalise:
-        raise ParameterError(
-            "a Chebyshev basis came with normalise=False; it needs states scaled to [-1, 1], use basis='power'"
-        )
-    if bounded and not normalise:
-        raise ParameterError(
-            "a bounded polynomial came with normalise=False; its range is that of the normalised states"
-        )
-    if ridge < 0.0:
-        raise ParameterError(f"ridge is {ridge:g}; 0 or more is expected")
+    _check(basis, normalise=normalise, bounded=bounded, ridge=ridge)
     centre, scale = centre_and_scale(s) if normalise else (np.zeros(s.shape[1]), np.ones(s.shape[1]))
     exponents = polynomial_exponents(powers, kind, degree=degree)
     n_terms = len(exponents)
@@ -272,6 +263,20 @@ def fit_polynomial(
     return replace(
         model, report=replace(pending, nmse=nmse_percent(f, estimated), seconds=time.perf_counter() - begun)
     )
+
+
+def _check(basis: Basis, *, normalise: bool, bounded: bool, ridge: float) -> None:
+    """Raise a `ParameterError` for settings of a fit that do not go together."""
+    if basis == "chebyshev" and not normalise:
+        raise ParameterError(
+            "a Chebyshev basis came with normalise=False; it needs states scaled to [-1, 1], use basis='power'"
+        )
+    if bounded and not normalise:
+        raise ParameterError(
+            "a bounded polynomial came with normalise=False; its range is that of the normalised states"
+        )
+    if ridge < 0.0:
+        raise ParameterError(f"ridge is {ridge:g}; 0 or more is expected")
 
 
 def _beyond(forces: NDArray[np.float64], scale: NDArray[np.float64]) -> NDArray[np.float64]:
