@@ -14,7 +14,7 @@ from bench.errors import ParameterError, UnknownNameError
 from bench.excitation.ensemble import available_threads
 
 from .base import action_space, make_benches, observation_space, rest_info
-from .benches import require_count
+from .options import require_count
 from .rendering import Picture
 
 
