@@ -13,7 +13,7 @@ ROOT = Path(__file__).resolve().parents[1]
 DIAGNOSIS = ROOT / "bench" / "discrepancy"
 LEAVES = {"verdict", "verdict_schema", "settings"}
 """Types of results and thresholds, which any room may use: not drawn."""
-TOO_LARGE = {"model": 2600, "articulated": 2800}
+TOO_LARGE = {"articulated": 2800}
 """Rooms that owe a cut, and what they must not grow beyond until then [lines]."""
 LARGEST_ROOM, MOST_LOOSE = 2500, 4
 """Lines of a room of the diagnosis, and files beside its rooms."""

@@ -139,10 +139,12 @@ class MeasuredCase:
 
     def smoothed(self, record: CaseRecord) -> Motion:
         """Motion behind the response channels of a record of this structure."""
+        prescribed = self.structure.prescribed
+        driving = [record.values[observer.channel] for observer in prescribed]
         return measured_motion(
-            self.structure.observers,
-            self.responses_of(record),
-            self.noise,
+            (*self.structure.observers, *prescribed),
+            np.column_stack([self.responses_of(record), *driving]),
+            np.append(self.noise, [self._noise_of(observer.channel) for observer in prescribed]),
             record.step,
             at_rest=not in_motion(record),
             settings=self.settings.motion,
@@ -211,7 +213,8 @@ class MeasuredCase:
         power = [0.0]
         if acting.any():
             power = [float(np.mean(self.loads_of(record)[:, acting] ** 2)) for record in self.records]
-        if not any(power):
+        # of a prescribed motion the load is an acceleration
+        if not any(power) or self.structure.prescribed:
             moved = [self.motion(i).acceleration @ row for i in range(len(self.records))]
             power = [float(np.mean((a / self._mobility(row)) ** 2)) for a in moved]
         return float(np.sqrt(np.mean(power))) or 1.0

@@ -28,9 +28,12 @@ def drifts(structure: Structure, linear: LinearStructure, duration: float) -> bo
         linear: Matrices of the nominal model.
         duration: Length of the longest record [s].
     """
-    squares, modes = np.linalg.eig(np.linalg.solve(linear.mass, linear.stiffness))
+    free = np.ix_(structure.free, structure.free)
+    squares, modes = np.linalg.eig(np.linalg.solve(linear.mass[free], linear.stiffness[free]))
     slow = np.abs(squares) < (2.0 * np.pi / duration) ** 2
-    return bool(any(np.any(np.abs(o.row @ modes[:, slow]) > 1e-9) for o in structure.observers))
+    return bool(
+        any(np.any(np.abs(o.row[structure.free] @ modes[:, slow]) > 1e-9) for o in structure.observers)
+    )
 
 
 def cut(
