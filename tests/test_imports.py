@@ -27,9 +27,6 @@ OWED = {
     "articulated/problem.py: ArticulatedProblem",
     "articulated/search.py",
     "blind/scoring.py: summary",
-    "checks/data_quality.py",
-    "checks/scales.py",
-    "model/mjcf.py",
     "multibody/model.py",
     "report/html_page.py",
 }
