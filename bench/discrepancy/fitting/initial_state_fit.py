@@ -26,7 +26,7 @@ def predict(simulator: Simulator, hypothesis: Hypothesis, vector: Array, record:
     Args:
         simulator: Records and nominal model.
         hypothesis: Effects.
-        vector: See `Problem.simulate`.
+        vector: See `Simulator.simulate`.
         record: Any record of the case.
     """
     settings = simulator.settings

@@ -31,7 +31,7 @@ class Fit:
 
     Attributes:
         hypothesis: Its effects.
-        vector: MAP parameters, see `Problem.simulate`.
+        vector: MAP parameters, see `Simulator.simulate`.
         chi2: Sum of squared whitened residuals.
         cost: chi2 plus the prior's misfit.
         n_residuals: Number of residuals.
