@@ -31,7 +31,7 @@ from bench.errors import FileFormatError, IdentificationError
 from bench.identification.fit_data import checked_data, nmse_percent, read_only
 from bench.identification.memory_refinement import refined
 from bench.identification.memory_settings import MemorySettings, dictionary
-from bench.identification.memory_terms import JointRecord, Terms, fold, smoothness, solve
+from bench.identification.memory_terms import MemoryRecord, MemoryTerms, fold, smoothness, solve
 from bench.identification.validity_range import ValidityRange
 from bench.laws.base import ForceLaw
 from bench.laws.evaluate import evaluate
@@ -229,7 +229,7 @@ def fit_memory(
     return replace(model, report=report)
 
 
-def _records(t: Array, s: Array, f: Array, a: Array, settle: float, most: int) -> list[JointRecord]:
+def _records(t: Array, s: Array, f: Array, a: Array, settle: float, most: int) -> list[MemoryRecord]:
     """The records, with evenly spread samples to be fitted."""
     k = f.shape[1]
     pieces = runs(t)
@@ -238,7 +238,7 @@ def _records(t: Array, s: Array, f: Array, a: Array, settle: float, most: int) -
     for i, j in pieces:
         used = np.arange(0, j - i, stride)
         used = used[t[i:j][used] - t[i] >= settle]
-        found.append(JointRecord(t[i:j], s[i:j, :k], s[i:j, k:], f[i:j], a[i:j], used))
+        found.append(MemoryRecord(t[i:j], s[i:j, :k], s[i:j, k:], f[i:j], a[i:j], used))
     if not sum(len(record.used) for record in found):
         raise IdentificationError(f"no sample is left after a settling time of {settle:g} s; shorten it")
     return found
@@ -256,7 +256,7 @@ SETTINGS = MemoryModuleSettings()
 
 
 def _strength(
-    terms: Terms, records: Sequence[JointRecord], spreads: Array, settings: MemorySettings
+    terms: MemoryTerms, records: Sequence[MemoryRecord], spreads: Array, settings: MemorySettings
 ) -> tuple[float, float]:
     """Strength of smoothing that predicts segments held out best, and the NMSE there [%]."""
     fitted, held = [], []
@@ -273,8 +273,12 @@ def _strength(
 
 
 def _pruned(
-    terms: Terms, records: Sequence[JointRecord], spreads: Array, settings: MemorySettings, strength: float
-) -> tuple[Terms, Array]:
+    terms: MemoryTerms,
+    records: Sequence[MemoryRecord],
+    spreads: Array,
+    settings: MemorySettings,
+    strength: float,
+) -> tuple[MemoryTerms, Array]:
     """The terms without those that add nothing, and their weights."""
     factor = fold(terms, records, spreads)
     weights = solve(factor, smoothness(terms, factor, strength))
