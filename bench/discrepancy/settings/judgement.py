@@ -58,6 +58,11 @@ class CoarseSettings:
         "Part of the discrepancy's power that small things leave on average.",
         "Backgrounds of 30 % leave 9 % of it.",
     )
+    kind: float = setting(
+        0.5,
+        "Probability of a family of effects from which one of it is named.",
+        "Likelier than not.",
+    )
     telling: float = setting(
         4.0,
         "Difference of the scores (odds of 7) below which the samples cannot tell two explanations apart.",
