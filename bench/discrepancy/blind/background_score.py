@@ -22,20 +22,26 @@ import numpy as np
 from bench.discrepancy.blind.proportions import (
     Share,
     calibration_error,
+    calibration_interval,
     calibration_scatter,
     reliability,
     share_of,
 )
 
 CLASSES = ("main", "unstated", "background", "clean")
-BY_ANOTHER_NAME = {
-    "warming": "stiffness_drift",
-    "slow_stiffness": "stiffness_drift",
-    "hidden_resonator": "base_flexibility",
-    "stroke_friction": "coulomb_friction",
-}
-"""Things of a background that the catalogue knows by a name of its own, in another shape: a stiffness that changes along the record, a
-further mass on a spring, friction whose mean along the stroke is not zero. Who names one of these says what is so."""
+BY_ANOTHER_NAME = {"hidden_resonator": "base_flexibility"}
+"""Things of a background whose force is, by derivation, that of an effect of the catalogue with nominal parameters re-estimated.
+
+A resonator of mass m on k and c pulls with ``f = k (q - y) + c (v - y')``, ``m y'' = f``. Of a base flexibility
+``-kappa (w + tau w')``, ``w'' + 2 zeta omega w' + omega^2 w = omega^2 (q + tau v)``; with ``omega^2 = k/m``, ``tau = c/k`` and
+``2 zeta = omega tau`` both states obey one equation, so ``w = y`` and ``f = k q + c v + (the base's force, kappa = k)``: a
+resonator is a base flexibility beside a stiffness k and a damping c more. The catalogue takes ``tau`` from the nominal joint, by which
+the phase of the resonance, of damping zeta, is off by less than 4 zeta.
+
+Nothing else of a background is here. A stiffness that swings as ``sin(2 pi f t + phase)`` is no ramp: of a third of a period a ramp and a
+constant hold 98 % of its power, of a whole one 61 % to none by its phase, and no answer tells which. Friction that comes and goes along
+the stroke is no constant one, which holds two thirds of its power. Both stand outside the catalogue where they are withheld, and such
+names count as wrong there."""
 
 
 @dataclass(frozen=True)
@@ -63,6 +69,7 @@ class BackgroundScore:
         shares: What is scored to its share.
         calibration: Expected calibration error of the names' probabilities; a name is right if it is that of the withheld effect, or
             of something in the background (`BY_ANOTHER_NAME`).
+        interval: Its 95 % interval over a bootstrap of the names.
         scatter: What it would be on average if every probability were exact: so many names scatter by it.
         reliability: Stated probability, share right and number of each bin.
         wrong: Names of the cases that are not right, and what was said.
@@ -70,6 +77,7 @@ class BackgroundScore:
 
     shares: Mapping[str, Share]
     calibration: float
+    interval: tuple[float, float]
     scatter: float
     reliability: tuple[tuple[float, float, int], ...]
     wrong: tuple[str, ...] = field(repr=False)
@@ -124,6 +132,7 @@ def background_summary(cases: Iterable[tuple[str, Mapping[str, Any], Mapping[str
     return BackgroundScore(
         {what: share_of(flags) for what, flags in hits.items()},
         calibration_error(stated),
+        calibration_interval(stated),
         calibration_scatter([p for p, _ in stated]),
         tuple(reliability(stated)),
         tuple(wrong),
