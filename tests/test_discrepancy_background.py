@@ -155,6 +155,9 @@ MAIN = "main effect named or in a declared set"
         (result("unknown", []), answer(["gap"], ["hum"]), {MAIN, "and first"}),
         (result("none", []), answer(["gap"], ["hum"]), {MAIN, "and first", "not none"}),
         (result("effect", [("gap", 0.95)]), answer([], ["hum"]), set()),  # it pays
+        (result("none", []) | {"seconds": float("nan")}, answer([], ["hum"]), {"every number is finite"}),
+        (result("effect", [("gap", 0.9)]) | {"named": [{"name": "gap", "probability": 0.9, "parameters": {}, "closed": -0.1}]},
+         answer([], ["hum"]), {"none of them makes it larger"}),
         (result("effect", [("gap", 0.95)], after=0.39), answer([], ["hum"]),
          {"background: no certain name that does not pay on the judging record", "names shrink the judged discrepancy"}),
         (result("effect", [("gap", 0.95)]), answer([], [], stated="no"),

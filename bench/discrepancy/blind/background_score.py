@@ -6,13 +6,15 @@ A case is "main" (one effect and a background), "unstated" (one effect and no st
 - main, unstated: the effect is named, or a set is declared that holds it; it closes the largest share; one other name at most; and
   where there is a background whose noise is stated, what is named is not said to be complete.
 - background, clean: nothing is named with certainty that does not shrink the discrepancy of the judging record.
-- all: what is named shrinks that discrepancy, and no nominal parameter lies beyond four of its stated standard deviations unsaid.
+- all: what is named shrinks that discrepancy, no name of several makes it larger, every number is finite, and no nominal parameter lies
+  beyond four of its stated standard deviations unsaid.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+import math
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -171,8 +173,19 @@ def background_scored(answer: Mapping[str, Any], result: Mapping[str, Any]) -> I
         )
     if said:
         yield "names shrink the judged discrepancy", pays
+        yield "none of them makes it larger", all(effect.get("closed", 1.0) >= 0.0 for effect in named)
+    yield "every number is finite", all(map(math.isfinite, _numbers(result)))
     far = [p for p in result.get("nominal", []) if abs(p["shift_in_std"]) > SETTINGS.far]
     yield "no nominal parameter beyond 4 stated sigma unsaid", not far
+
+
+def _numbers(document: Any) -> Iterator[float]:
+    """All numbers of a JSON document."""
+    if isinstance(document, int | float):
+        yield float(document)
+    elif isinstance(document, Mapping | list):
+        for entry in document.values() if isinstance(document, Mapping) else document:
+            yield from _numbers(entry)
 
 
 def _above_noise(answer: Mapping[str, Any]) -> bool:
