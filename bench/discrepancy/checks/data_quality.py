@@ -117,8 +117,7 @@ def _tipping(case: Case, problem: Problem) -> Iterator[str]:
     for spring in structure.springs:
         angle = np.linspace(-spring.reach, spring.reach, problem.settings.checks.angles)
         bent = spring.slope_along(spring.coefficients(values), np.outer(angle, spring.row))
-        stiffness = bent + float(spring.row @ tangent @ spring.row)
-        limit = float(np.min(np.abs(angle[stiffness < 0.0]), initial=np.inf))
+        limit = _first_loss(angle, bent + float(spring.row @ tangent @ spring.row))
         for record in case.identification + case.validation:
             reached = float(np.abs(problem.motion_of(record).position @ spring.row).max())
             if reached > limit:
@@ -127,6 +126,14 @@ def _tipping(case: Case, problem: Problem) -> Iterator[str]:
                     f"'{name}' swings to {np.degrees(reached):.0f} degrees in '{record.name}'; beyond {np.degrees(limit):.0f} gravity "
                     "drives it on, and a free run leaves it there on the least error: swing it less"
                 )
+
+
+def _first_loss(angle: np.ndarray, stiffness: np.ndarray) -> float:
+    """Smallest angle at which the stiffness changes its sign [rad], by straight lines between points; infinite without one."""
+    crossings = np.flatnonzero(np.signbit(stiffness[1:]) != np.signbit(stiffness[:-1]))
+    rise = stiffness[crossings + 1] - stiffness[crossings]
+    zeros = angle[crossings] - stiffness[crossings] * (angle[crossings + 1] - angle[crossings]) / rise
+    return float(np.min(np.abs(zeros), initial=np.inf))
 
 
 def _short(case: Case, problem: Problem) -> Iterator[str]:
