@@ -168,6 +168,21 @@ def test_what_counts_as_right_beside_a_background(said, truth, missed):
     assert {what for what, hit in background_scored(truth, said) if not hit} == missed
 
 
+@pytest.mark.parametrize(("rate", "held"), [(7.2, True), (6.0, False), (70.0, False)])
+def test_an_interval_is_held_against_the_parameter_that_the_law_has(rate, held):
+    drift = {
+        "name": "stiffness_drift", "where": "", "probability": 0.9, "law": "stiffness_drift", "theta": [7.0, 0.0],
+        "parameters": {"stiffness_change": {"value": 70.0, "std": 4.0, "unit": "N/m"}},
+    }  # fmt: skip
+    truth = answer(["stiffness_drift"], ["hum"])
+    truth["effects"][0] |= {"names": ["rate"], "parameters": [rate]}
+    said = result("effect", []) | {"named": [drift]}
+    assert (
+        dict(background_scored(truth, said))["95 % intervals of the main effect's parameters hold the truth"]
+        is held
+    )
+
+
 def test_both_worlds_have_figures_of_their_own(tmp_path):
     cases = {
         "a": (result("effect", [("gap", 0.95)]), answer(["gap"], ["hum"])),

@@ -29,6 +29,7 @@ from bench.discrepancy.blind.proportions import (
     reliability,
     share_of,
 )
+from bench.laws.registry import find_law
 
 CLASSES = ("main", "unstated", "background", "clean")
 BY_ANOTHER_NAME = {"hidden_resonator": "base_flexibility"}
@@ -212,9 +213,28 @@ def _stated(answer: Mapping[str, Any], result: Mapping[str, Any]) -> Iterable[tu
 
 
 def _covered(truth: Mapping[str, Any], named: list[Mapping[str, Any]]) -> bool | None:
-    """Whether the interval of the first parameter of the true effect holds it; None where it was not named as such."""
+    """Whether the interval of the first parameter of the true effect holds it; None where no estimate of it was named."""
     own = next((effect for effect in named if effect["name"] == truth["name"]), None)
     if own is None or not own["parameters"] or not truth["parameters"]:
         return None
-    estimate = next(iter(own["parameters"].values()))
-    return abs(estimate["value"] - truth["parameters"][0]) <= SETTINGS.interval * estimate["std"]
+    found = _estimate(own, next(iter(truth.get("names") or own["parameters"])))
+    if found is None:
+        return None
+    value, std = found
+    return abs(value - truth["parameters"][0]) <= SETTINGS.interval * std
+
+
+def _estimate(effect: Mapping[str, Any], name: str) -> tuple[float, float] | None:
+    """Value and standard deviation of a parameter as its law has it, whatever the effect's own is referred to (a record's length, say).
+
+    The law's is in proportion to the effect's, so it is known as well relative to its size.
+    """
+    parameters, theta = effect["parameters"], effect.get("theta") or ()
+    law = [p.name for p in find_law(effect["law"]).parameters] if effect.get("law") else []
+    own = parameters.get(name) or (next(iter(parameters.values())) if name in law else None)
+    if own is None:
+        return None
+    if name not in law or len(theta) != len(law) or not own["value"]:
+        return own["value"], own["std"]
+    value = theta[law.index(name)]
+    return value, abs(value / own["value"]) * own["std"]

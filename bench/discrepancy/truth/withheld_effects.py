@@ -454,7 +454,7 @@ RECIPES: tuple[Recipe, ...] = (
     ),
     Recipe(
         "stiffness_drift", "joint",
-        _one("stiffness_rate", lambda r: r.stiffness / r.duration, lambda r: 0.0, signed=True), law=STIFFNESS_DRIFT,
+        _one("rate", lambda r: r.stiffness / r.duration, lambda r: 0.0, signed=True), law=STIFFNESS_DRIFT,
     ),
     Recipe("mass_error", "inertia", _relative, rigs=FREE),
     Recipe("actuator_delay", "actuator", _delay, rigs=SHAKEN),
