@@ -19,12 +19,9 @@ from bench.discrepancy.blind.drawing import (
 from bench.discrepancy.blind.proportions import calibration_error, calibration_scatter
 from bench.discrepancy.blind.score_report import tables
 from bench.discrepancy.truth.background_settings import STATED, BackgroundSettings
-from bench.discrepancy.truth.out_of_catalogue import HIDDEN_RESONATOR
-from bench.discrepancy.truth.rigs import (
-    RIGS_SETTINGS,
-    BlindOptions,
-    draw_bench,
-)
+from bench.discrepancy.truth.foreign_memory import HIDDEN_RESONATOR
+from bench.discrepancy.truth.loads import RIGS_SETTINGS
+from bench.discrepancy.truth.rigs import BlindOptions, draw_bench
 from bench.errors import ParameterError
 from bench.laws.base_flexibility import BASE_FLEXIBILITY
 
