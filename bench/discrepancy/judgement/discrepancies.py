@@ -71,7 +71,7 @@ class Discrepancies:
         settings = explanation.settings.judgement
         before, after = self._judged(rest, explanation)
         bar = np.maximum(before, settings.about_noise * self._floor) * settings.unchanged
-        return float(np.max(np.where(after < DIVERGED_GAP, after / bar, np.inf)))
+        return float(np.max(np.where(after < DIVERGED_GAP, after / np.maximum(bar, 1e-300), np.inf)))
 
     def left(self, explanation: Explanation, nothing: Explanation) -> float:
         """Part of the power of the judging records' discrepancy, beyond noise, that an explanation leaves where it is largest."""
