@@ -16,6 +16,7 @@ from bench.discrepancy.judgement.coarse import Judged, judge, outside
 from bench.discrepancy.judgement.discrepancies import Discrepancies
 from bench.discrepancy.judgement.held_out import HeldOut, held_out, shares
 from bench.discrepancy.likelihood.model_error import (
+    ModelError,
     band_weights,
     crude_error,
     error_left,
@@ -139,9 +140,18 @@ def test_blocks_of_judging_records_weigh_as_much_as_those_left_out():
 
 
 def test_records_in_windows_count_as_many_samples_as_whole_ones():
-    error = crude_error(case := planted_case(n=600), structure_of(case))
+    error = crude_error(case := planted_case(n=1500), structure_of(case))
     for n in (2000, 8000):
         assert n * error.window_weight(n) == pytest.approx(80.0)
+    slide = replace(
+        case,
+        parameters=tuple(
+            replace(p, value=0.0, std=0.0) if p.name == "stiffness" else p for p in case.parameters
+        ),
+    )
+    problem = problem_of(slide, ModelError({}, scale=4.0))
+    assert problem.windowed
+    assert problem.n_residuals == pytest.approx(80.0)
 
 
 def placed(problem, *names):
