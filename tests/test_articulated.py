@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 
 from bench.discrepancy import diagnose, read_case
-from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis, applies
-from bench.discrepancy.articulated.effects import CATALOGUE
+from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis
+from bench.discrepancy.articulated.free_runs import FreeRuns
 from bench.discrepancy.articulated.judgement import JudgementSettings, complete
-from bench.discrepancy.articulated.problem import ArticulatedProblem, placements
+from bench.discrepancy.articulated.recognition import applies
+from bench.discrepancy.articulated_search.catalogue import CATALOGUE
+from bench.discrepancy.articulated_search.problem import ArticulatedProblem, placements
 from bench.discrepancy.multibody.channels import bound
 from bench.discrepancy.multibody.encoders import weight_of_readings
 from bench.discrepancy.multibody.model import ArticulatedModel, compiled_model
@@ -234,6 +236,7 @@ def test_a_free_run_behind_a_late_encoder_starts_on_the_clock_of_its_log(tmp_pat
     vector[-1] = np.log(late / RATE)
     assert placed.effect.values(vector[-1:], placed.scales)["delay_s"] == pytest.approx(late / RATE)
     (motion,) = problem.motions((placed,), vector)
+    runs = FreeRuns(problem)
     for j in range(2):
-        left = np.sqrt(np.mean(problem.free_run(j, (placed,), vector, motion) ** 2))
-        assert left < 1.6 * problem.free_run_noise(j, (placed,), vector, 0)
+        left = np.sqrt(np.mean(runs.errors(j, (placed,), vector, motion) ** 2))
+        assert left < 1.6 * runs.noise(j, (placed,), vector, 0)

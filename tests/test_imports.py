@@ -22,7 +22,7 @@ UPWARDS = {("bench.discrepancy.screening.candidates", "bench.discrepancy.search.
 """Imports that the contract of rooms lists as owed."""
 LEAVES = {"verdict", "verdict_schema", "settings"}
 """Types of results and thresholds, which any room may use: not drawn."""
-TOO_LARGE = {"model": 2600, "articulated": 2800}
+TOO_LARGE = {"model": 2600}
 """Rooms that owe a cut, and what they must not grow beyond until then [lines]."""
 LARGEST_ROOM, MOST_LOOSE = 2500, 4
 """Lines of a room of the diagnosis, and files beside its rooms."""

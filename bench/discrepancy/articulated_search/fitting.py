@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.discrepancy.articulated.problem import ArticulatedProblem, Hypothesis, misfit_of
+from bench.discrepancy.articulated_search.hypothesis import Hypothesis
+from bench.discrepancy.articulated_search.problem import ArticulatedProblem, misfit_of
 from bench.discrepancy.numerics.least_squares import Prior, minimise
 from bench.discrepancy.numerics.threads import in_threads
 
