@@ -109,14 +109,16 @@ def kept(
     """How many effects of a ladder the judging records bear out, and the predictions of every rung.
 
     Effects are kept up to the last that improves on what was kept before it by more than the standard error allows for, and that takes
-    away more than it leaves. Nothing is added to what is complete, and nothing small where even then something is left: it stands in
-    for a little of the form of the law that is not right.
+    away more than it leaves. What is complete gets no more but what is certain, and nothing small is added where even then something
+    is left: it stands in for a little of the form of the law that is not right.
     """
     floor = noise_floor(problem, rungs[-1], settings)
     predictions = [predict(problem, rung, floor, settings) for rung in rungs]
     last = 0
     for k in range(1, len(rungs)):
-        if complete(problem, rungs[last], settings):
+        # of what is complete to the accuracy of the stated noise, records may still tell more than that accuracy
+        likelier = rungs[k].log_posterior - rungs[last].log_posterior
+        if complete(problem, rungs[last], settings) and likelier < settings.certain:
             break
         difference = predictions[last].excess - predictions[k].excess
         error = float(np.std(difference, ddof=1)) / np.sqrt(len(difference))

@@ -179,6 +179,47 @@ def fit(
     return _summary(problem, hypothesis, found.vector, found.curvature, free, scale, active, others)
 
 
+def refitted(
+    problem: ArticulatedProblem,
+    hypothesis: Hypothesis,
+    start: Array,
+    *,
+    scale: Array,
+    others: Others | None = None,
+) -> ArticulatedFit:
+    """Fit a hypothesis again and again, each time with the scale that the last fit left, until that makes it no likelier.
+
+    The log-likelihood with its scales profiled out is concave in the squares, so that every such fit is a step of a majorisation and
+    none loses. One fit alone may stop where a joint that it has spoilt is believed no more: its scale was taken at the start.
+
+    Args:
+        problem: Records and priors.
+        hypothesis: Effects.
+        start: Vector to start from, or several (k, n).
+        scale: (n_joints,) of the residuals at the start.
+        others: As of `fit`.
+
+    References:
+        D. R. Hunter and K. Lange, A tutorial on MM algorithms, The American Statistician 58 (2004) 30-37.
+    """
+    settings = problem.settings.articulated.search
+    found = fit(problem, hypothesis, start, scale=scale, iterations=settings.iterations, others=others)
+    for _ in range(settings.refits - 1):
+        new = fit(
+            problem,
+            hypothesis,
+            found.vector,
+            scale=found.scale,
+            iterations=settings.iterations,
+            others=others,
+        )
+        gained = new.log_posterior - found.log_posterior
+        found = new if gained > 0.0 or not np.isfinite(found.log_posterior) else found
+        if gained < settings.rise:
+            break
+    return found
+
+
 def free_entries(
     problem: ArticulatedProblem, hypothesis: Hypothesis, active: Sequence[int] | None = None
 ) -> NDArray[np.int64]:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.discrepancy.articulated_search.fitting import ArticulatedFit, Others, fit
+from bench.discrepancy.articulated_search.fitting import ArticulatedFit, Others, fit, refitted
 from bench.discrepancy.articulated_search.hypothesis import Hypothesis, Placed
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.articulated_search.screening import Screened, by_effect, screen
@@ -33,17 +33,10 @@ def _untouched(problem: ArticulatedProblem, base: ArticulatedFit) -> Articulated
     return ArticulatedFit.at(problem, base.hypothesis, vector)
 
 
-def nominal_fit(problem: ArticulatedProblem, settings: SearchSettings) -> ArticulatedFit:
+def nominal_fit(problem: ArticulatedProblem) -> ArticulatedFit:
     """The nominal model alone, with the scales of the joints that it leaves."""
     vector = np.zeros(len(problem.nominal))
-    scale = ArticulatedFit.at(problem, (), vector).scale
-    current = fit(problem, (), vector, scale=scale, iterations=settings.iterations)
-    for _ in range(settings.refits - 1):
-        before = current.scale
-        current = fit(problem, (), current.vector, scale=before, iterations=settings.iterations)
-        if np.allclose(before, current.scale, rtol=0.05):
-            break
-    return current
+    return refitted(problem, (), vector, scale=ArticulatedFit.at(problem, (), vector).scale)
 
 
 def search(
@@ -56,7 +49,7 @@ def search(
     """All fitted hypotheses, the likeliest first."""
     settings = settings or problem.settings.articulated.search
     progress("nominal model")
-    current = nominal_fit(problem, settings)
+    current = nominal_fit(problem)
     found = [current]
     for count in range(1, settings.most + 1):
         taken = {placed.key for placed in current.hypothesis}
@@ -98,7 +91,7 @@ def _round(
     for level in settings.softening:
         soft = problem.softened(level)
         if first:
-            first = [_again(soft, f, settings) for f in first]
+            first = [_again(soft, f) for f in first]
             continue
         ground = fit(
             soft, base.hypothesis, base.vector, scale=_scale_of(soft, base), iterations=settings.iterations
@@ -117,25 +110,8 @@ def _round(
     fits = []
     first = [f for f in first if sound(problem, f)] or first
     for one in sorted(first, key=lambda f: -f.log_posterior)[: settings.finalists]:
-        new = fit(
-            problem,
-            one.hypothesis,
-            one.vector,
-            scale=_scale_of(problem, one),
-            iterations=settings.iterations,
-            others=others,
-        )
-        # once more with the scale that it leaves: what a joint says of the masses counts for more then
-        fits.append(
-            fit(
-                problem,
-                one.hypothesis,
-                new.vector,
-                scale=new.scale,
-                iterations=settings.iterations,
-                others=others,
-            )
-        )
+        scale = _scale_of(problem, one)
+        fits.append(refitted(problem, one.hypothesis, one.vector, scale=scale, others=others))
     fits = [f for f in fits if sound(problem, f)]
     if not fits:
         return None, fits
@@ -144,13 +120,11 @@ def _round(
     return whole, [*(f for f in fits if f is not best), whole]
 
 
-def _again(problem: ArticulatedProblem, found: ArticulatedFit, settings: SearchSettings) -> ArticulatedFit:
+def _again(problem: ArticulatedProblem, found: ArticulatedFit) -> ArticulatedFit:
     """A fit once more in another problem, on the joints that its last effect changes."""
     base = ArticulatedFit.at(problem, found.hypothesis[:-1], found.vector)
-    return fit(
-        problem, found.hypothesis, found.vector, scale=_scale_of(problem, found), iterations=settings.iterations,
-        others=Others.of(problem, base),
-    )  # fmt: skip
+    scale = _scale_of(problem, found)
+    return refitted(problem, found.hypothesis, found.vector, scale=scale, others=Others.of(problem, base))
 
 
 def _beside(

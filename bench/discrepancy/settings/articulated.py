@@ -22,7 +22,9 @@ class ArticulatedSearchSettings:
     starts: int = setting(2, "Grid points from which one effect is fitted.", "Convention.")
     iterations: int = setting(20, "Steps of a fit.", "Convention.")
     refits: int = setting(
-        3, "Fits of the nominal model alone, each with the scales that the last one left.", "Convention."
+        6,
+        "Fits of one hypothesis, each with the scales that the last one left, at most.",
+        "Each gains; most end after two or three.",
     )
     worth: float = setting(
         4.6,
@@ -45,7 +47,7 @@ class ArticulatedSearchSettings:
     finalists: int = setting(5, "Effects that are fitted again without it.", "Convention.")
     rise: float = setting(
         0.5,
-        "Log posterior by which a neighbouring number of periods in a turn has to be likelier.",
+        "Log posterior by which a further fit of the same effects, or a neighbouring number of periods in a turn, has to be likelier.",
         "Some twenty times what ends a fit, so that the search ends, too.",
     )
 
@@ -66,6 +68,11 @@ class ArticulatedJudgementSettings:
         0.05,
         "Relative accuracy to which the stated noise is taken to be known.",
         "What leaves no more than this beyond it is complete.",
+    )
+    certain: float = setting(
+        13.8,
+        "Log posterior (odds of a million) that a further effect has to add to what is complete within the accuracy of the noise.",
+        "A clean model is offered a few hundred effects, and the noise is not quite what its model says.",
     )
     material: float = setting(
         0.5,
