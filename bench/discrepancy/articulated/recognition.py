@@ -10,9 +10,10 @@ import numpy as np
 from bench import native
 from bench.discrepancy.articulated_search.hypothesis import nominal_parameters
 from bench.discrepancy.case.case import Case
+from bench.discrepancy.model.mjcf_file import rig_of
 from bench.discrepancy.multibody.channels import bound
 from bench.discrepancy.multibody.encoders import encoders_of, input_of
-from bench.discrepancy.multibody.model import ArticulatedModel, compiled_model
+from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.multibody.nominal_values import DRIVES
 from bench.discrepancy.settings import DEFAULT, ArticulatedSettings
 from bench.errors import BenchError
@@ -26,7 +27,7 @@ def applies(case: Case, *, settings: ArticulatedSettings = DEFAULT.articulated) 
     if any(p.name.partition(":")[0] in DRIVES for p in case.parameters):
         return True
     try:
-        model = compiled_model(path)
+        model = rig_of(case).model
     except BenchError:
         return False  # refused where the model is read for a diagnosis
     # one joint on its own is a linear structure first: forces on it have a larger catalogue there
@@ -40,7 +41,7 @@ def drives_only(case: Case) -> bool:
     if case.rig in ("sdof", "joint", "damper") or not path.is_file():
         return False
     try:
-        compiled = compiled_model(path)
+        compiled = rig_of(case).model
         model, own = ArticulatedModel.of(compiled), bound(case, compiled)
         for joint in model.joints:
             encoders_of(own, joint)

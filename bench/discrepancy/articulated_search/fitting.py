@@ -82,7 +82,7 @@ class Others:
         masses = list(problem.masses)
 
         def eliminated(j: int) -> tuple[Array, Array]:
-            own = [*problem.locals(j), *_own_effects(problem, base.hypothesis, j)]
+            own = own_entries(problem, base.hypothesis, j)
             columns = own + masses
             jacobian, residual = linearised(problem, base, j, columns)
             _, std, _, _ = problem.prior(base.hypothesis)
@@ -100,9 +100,9 @@ class Others:
         return cls(base, tuple(f for f, _ in found), tuple(t for _, t in found))
 
 
-def _own_effects(problem: ArticulatedProblem, hypothesis: Hypothesis, j: int) -> list[int]:
-    """Entries of a vector that belong to free parameters of effects at joint `j` alone."""
-    out, at = [], len(problem.nominal)
+def own_entries(problem: ArticulatedProblem, hypothesis: Hypothesis, j: int) -> list[int]:
+    """Entries of a vector that belong to joint `j` alone: its nominal parameters, and the free ones of effects there."""
+    out, at = list(problem.locals(j)), len(problem.nominal)
     for placed in hypothesis:
         for p in placed.effect.parameters:
             if problem.reached((placed,)) == (j,) and not p.fixed:
@@ -176,7 +176,7 @@ def fit(
     found = minimise(
         residual_at, starts, prior=Prior(mean, std, low, high), free=free, reach=reach, iterations=iterations, limit=limit,
     settings=problem.settings.numerics)  # fmt: skip
-    return _summary(problem, hypothesis, found.vector, found.curvature, free, scale, active, others)
+    return _summary(problem, hypothesis, found.vector, found.curvature, free, active, others)
 
 
 def refitted(
@@ -243,7 +243,6 @@ def _summary(
     vector: Array,
     curvature: Array,
     free: NDArray[np.int64],
-    scale: Array,
     active: Sequence[int],
     others: Others | None,
 ) -> ArticulatedFit:
@@ -259,7 +258,7 @@ def _summary(
             base = others.base
             now = others.factors[j] @ vector[masses] - others.targets[j]
             then = others.factors[j] @ base.vector[masses] - others.targets[j]
-            chi2[j] = base.chi2[j] + scale[j] ** 2 * float(now @ now - then @ then)
+            chi2[j] = base.chi2[j] + base.scale[j] ** 2 * float(now @ now - then @ then)
     total = sum(misfit_of(c, n) for c, n in zip(chi2, count, strict=True))
     mean, std, _, _ = problem.prior(hypothesis)
     covariance = np.zeros((len(vector), len(vector)))

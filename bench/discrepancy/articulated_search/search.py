@@ -7,11 +7,12 @@ parameters could do as well, is regressed on the residuals: what that takes away
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.discrepancy.articulated_search.fitting import ArticulatedFit, Others, fit, refitted
+from bench.discrepancy.articulated_search.fitting import ArticulatedFit, Others, fit, own_entries, refitted
 from bench.discrepancy.articulated_search.hypothesis import Hypothesis, Placed
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.articulated_search.screening import Screened, by_effect, screen
@@ -88,14 +89,14 @@ def _round(
         The best, all joints free, and all that were fitted as they are.
     """
     first: list[ArticulatedFit] = []
+    ground = base
     for level in settings.softening:
         soft = problem.softened(level)
+        ground = refitted(soft, base.hypothesis, ground.vector, scale=_scale_of(soft, ground))
         if first:
-            first = [_again(soft, f) for f in first]
+            others = Others.of(soft, ground)
+            first = [_again(soft, ground, others, f) for f in first]
             continue
-        ground = fit(
-            soft, base.hypothesis, base.vector, scale=_scale_of(soft, base), iterations=settings.iterations
-        )
         progress("screening")
         points = screen(soft, ground, candidates)
         if _strained(
@@ -107,24 +108,27 @@ def _round(
         if soft is problem:  # servos hold every joint: nothing forgets more than it does anyway
             break
     others = Others.of(problem, base)
-    fits = []
     first = [f for f in first if sound(problem, f)] or first
-    for one in sorted(first, key=lambda f: -f.log_posterior)[: settings.finalists]:
-        scale = _scale_of(problem, one)
-        fits.append(refitted(problem, one.hypothesis, one.vector, scale=scale, others=others))
-    fits = [f for f in fits if sound(problem, f)]
+    finalists = sorted(first, key=lambda f: -f.log_posterior)[: settings.finalists]
+    fits = [f for f in (_again(problem, base, others, one) for one in finalists) if sound(problem, f)]
     if not fits:
         return None, fits
     best = max(fits, key=lambda f: f.log_posterior)
-    whole = fit(problem, best.hypothesis, best.vector, scale=best.scale, iterations=settings.iterations)
+    whole = refitted(problem, best.hypothesis, best.vector, scale=best.scale)
     return whole, [*(f for f in fits if f is not best), whole]
 
 
-def _again(problem: ArticulatedProblem, found: ArticulatedFit) -> ArticulatedFit:
-    """A fit once more in another problem, on the joints that its last effect changes."""
-    base = ArticulatedFit.at(problem, found.hypothesis[:-1], found.vector)
-    scale = _scale_of(problem, found)
-    return refitted(problem, found.hypothesis, found.vector, scale=scale, others=Others.of(problem, base))
+def _again(
+    problem: ArticulatedProblem, base: ArticulatedFit, others: Others, found: ArticulatedFit
+) -> ArticulatedFit:
+    """A fit once more in another problem, on the joints that its last effect changes; the other joints as a fit there has them."""
+    active = problem.reached(found.hypothesis[len(base.hypothesis) :])
+    vector = found.vector.copy()
+    for j in (j for j in range(len(problem.joints)) if j not in active):
+        own = own_entries(problem, base.hypothesis, j)
+        vector[own] = base.vector[own]
+    scale = _scale_of(problem, replace(found, vector=vector))
+    return refitted(problem, found.hypothesis, vector, scale=scale, others=others)
 
 
 def _beside(
