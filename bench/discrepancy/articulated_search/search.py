@@ -47,13 +47,13 @@ def search(
     settings: SearchSettings | None = None,
     progress: Callable[[str], None] = lambda text: None,
 ) -> list[ArticulatedFit]:
-    """All fitted hypotheses, the likeliest first."""
+    """All fitted hypotheses: the one that nothing is worth adding to or taking from, then the likeliest first."""
     settings = settings or problem.settings.articulated.search
     progress("nominal model")
     current = nominal_fit(problem)
-    found = [current]
-    for count in range(1, settings.most + 1):
-        taken = {placed.key for placed in current.hypothesis}
+    found, dropped = [current], set[tuple[str, str]]()
+    for count in range(1, 2 * settings.most + 1):
+        taken = {placed.key for placed in current.hypothesis} | dropped
         rest = [c for c in candidates if c.key not in taken]
         best, fits = _round(
             problem, current, rest, settings, lambda text, n=count: progress(f"effect {n}: {text}")
@@ -61,19 +61,52 @@ def search(
         found += fits
         if best is None or best.log_posterior < current.log_posterior + settings.worth:
             break
-        current = best
-        settled = problem.settled(current.hypothesis, current.vector)
-        if settled is not problem:
-            problem = settled
-            current = fit(
-                problem,
-                current.hypothesis,
-                current.vector,
-                scale=current.scale,
-                iterations=settings.iterations,
-            )
-            found.append(current)
-    return sorted(found, key=lambda f: -f.log_posterior)
+        problem = problem.settled(best.hypothesis, best.vector)
+        current, fits = _without_idle(problem, best, settings)
+        found += fits
+        dropped |= {placed.key for placed in best.hypothesis} - {placed.key for placed in current.hypothesis}
+        if len(current.hypothesis) == settings.most:
+            break
+    found += _predecessors(problem, current, found)
+    return sorted(found, key=lambda f: (f is not current, -f.log_posterior))
+
+
+def _without_idle(
+    problem: ArticulatedProblem, found: ArticulatedFit, settings: SearchSettings
+) -> tuple[ArticulatedFit, list[ArticulatedFit]]:
+    """A fit without the effects that its last one has made superfluous, and all fits made for that.
+
+    What was taken first may have stood in for what was found later: it stays if without it the explanation loses what a further effect
+    has to add.
+    """
+    made: list[ArticulatedFit] = []
+    for placed in found.hypothesis[:-1]:
+        shorter = tuple(other for other in found.hypothesis if other.key != placed.key)
+        kept = [*range(len(problem.nominal))]
+        at = len(problem.nominal)
+        for other in found.hypothesis:
+            more = range(at, at + len(other.effect.parameters))
+            kept += more if other.key != placed.key else ()
+            at = more.stop
+        new = refitted(problem, shorter, found.vector[kept], scale=found.scale)
+        made.append(new)
+        if new.log_posterior > found.log_posterior - settings.worth and sound(problem, new):
+            found = new
+    return found, made
+
+
+def _predecessors(
+    problem: ArticulatedProblem, best: ArticulatedFit, found: Sequence[ArticulatedFit]
+) -> list[ArticulatedFit]:
+    """Fits with the first effects of a fit alone, where there is none among those found."""
+    out = []
+    for size in range(1, len(best.hypothesis)):
+        first = best.hypothesis[:size]
+        if all(f.hypothesis != first for f in found):
+            vector = best.vector[: problem.size(first)]
+            scale = ArticulatedFit.at(problem, first, vector).scale
+            out.append(refitted(problem, first, vector, scale=scale))
+    return out
 
 
 def _round(
@@ -111,11 +144,21 @@ def _round(
     first = [f for f in first if sound(problem, f)] or first
     finalists = sorted(first, key=lambda f: -f.log_posterior)[: settings.finalists]
     fits = [f for f in (_again(problem, base, others, one) for one in finalists) if sound(problem, f)]
+    fits = [_where_links_are(problem, f) for f in fits]
     if not fits:
         return None, fits
     best = max(fits, key=lambda f: f.log_posterior)
-    whole = refitted(problem, best.hypothesis, best.vector, scale=best.scale)
+    settled = problem.settled(best.hypothesis, best.vector)
+    whole = refitted(settled, best.hypothesis, best.vector, scale=best.scale)
     return whole, [*(f for f in fits if f is not best), whole]
+
+
+def _where_links_are(problem: ArticulatedProblem, found: ArticulatedFit) -> ArticulatedFit:
+    """A fit once more with the links of its elastic joints where it has them: what the other joints feel is part of the explanation."""
+    settled = problem.settled(found.hypothesis, found.vector)
+    return (
+        found if settled is problem else refitted(settled, found.hypothesis, found.vector, scale=found.scale)
+    )
 
 
 def _again(
