@@ -3,9 +3,10 @@
     python scripts/robots.py --data FOLDER                 FOLDER holds so101, ur10, tx40, … (formats: their own READMEs)
     python scripts/robots.py UR10 TX40 --data FOLDER
 
-A row for every robot: the discrepancy (NRMSE of free runs of the judging records, worst joint) of the model as stated, what is named with the
-share that it closes, what is left, the noise floor, and seconds of the processor. Nothing is tuned to them; a robot that is refused has
-a row that says why. The bench for backlash is left out: at ten samples a second it has no dynamics, and no encoder outside the loop.
+A row for every robot: the discrepancy (NRMSE of free runs of the judging records, worst joint) of the model as stated, what is named
+with the share that it closes, what is left, the noise floor, and seconds of the processor. Nothing is tuned to them; a robot that is
+refused has a row that says why. The bench for backlash is left out: at ten samples a second it has no dynamics, and no encoder
+outside the loop.
 """
 
 from __future__ import annotations
@@ -83,7 +84,7 @@ def row_of(name: str, data: Path) -> Row:
     with tempfile.TemporaryDirectory() as folder:
         write_folder(records, Path(folder))
         try:
-            verdict = diagnose_articulated(read_case(folder), anyway=True).verdict
+            verdict = diagnose_articulated(read_case(folder), anyway=True, most=records.most).verdict
         except BenchError as error:
             nan = float("nan")
             return Row(

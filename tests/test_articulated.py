@@ -10,11 +10,14 @@ import numpy as np
 import pytest
 
 from bench.discrepancy import diagnose, read_case
+from bench.discrepancy.articulated.admission import admitted_robot
 from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis
 from bench.discrepancy.articulated.free_runs import FreeRuns
 from bench.discrepancy.articulated.judgement import JudgementSettings, complete
+from bench.discrepancy.articulated.next_test import propose
 from bench.discrepancy.articulated.recognition import applies
 from bench.discrepancy.articulated_search.catalogue import CATALOGUE
+from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem, placements
 from bench.discrepancy.multibody.channels import bound
 from bench.discrepancy.multibody.encoders import weight_of_readings
@@ -180,6 +183,59 @@ def test_models_that_it_cannot_take_are_refused_in_one_line(tmp_path, says):
     with pytest.raises(BenchError, match=says) as error:
         diagnose(read_case(folder))
     assert "\n" not in str(error.value)
+
+
+def test_a_joint_that_was_held_is_welded_where_it_was(tmp_path):
+    folder = write_case(tmp_path, mjcf(servo=True), servo=True)
+    document = json.loads((folder / "nominal.json").read_text())
+    for name in ("elbow_in", "elbow_q"):
+        del document["channels"][name]
+    for name in (
+        "mass:fore",
+        "damping:elbow",
+        "kp:elbow_drive",
+    ):
+        del document["parameters"][name]
+    document["joints"] = {"elbow": 0.4}
+    (folder / "nominal.json").write_text(json.dumps(document))
+    admitted = admitted_robot(read_case(folder), anyway=True)
+    welded, free = admitted.compiled, compiled_model(folder / "model.xml")
+    assert [welded.joint(i).name for i in range(welded.njnt)] == ["shoulder"]
+    torques = []
+    for model in (welded, free):
+        data = mujoco.MjData(model)
+        data.qpos[0] = 0.3
+        data.qpos[1:] = 0.4
+        mujoco.mj_forward(model, data)
+        torques.append(data.qfrc_bias[0])
+    assert torques[0] == pytest.approx(torques[1], rel=1e-6)
+    document["joints"] = {"elbwo": "hold"}
+    (folder / "nominal.json").write_text(json.dumps(document))
+    with pytest.raises(BenchError, match="elbwo"):
+        admitted_robot(read_case(folder))
+
+
+def test_the_next_test_tells_two_explanations_apart_within_what_the_arm_has_shown(tmp_path):
+    folder = write_case(tmp_path, mjcf(servo=True), servo=True)
+    case, compiled, _ = admitted_robot(read_case(folder))
+    problem = ArticulatedProblem.of(case, ArticulatedModel.of(compiled), case.identification)
+    fits = []
+    for name, eta in (("coulomb_friction", [-3.0]), ("quadratic_damping", [-3.0])):
+        placed = next(p for p in placements(problem, CATALOGUE) if p.key == (name, "elbow"))
+        vector = np.concatenate([np.zeros(len(problem.nominal)), eta])
+        fits.append(ArticulatedFit.at(problem, (placed,), vector))
+    told, trajectory = propose(problem, compiled, *fits) or pytest.fail("no test")
+    assert told["expected_log_odds"] > 0.0
+    assert 0.0 <= told["power"] <= 1.0
+    shown = problem.records[0].motion
+    speed = np.diff(trajectory.position, axis=0) * RATE
+    assert (
+        np.abs(trajectory.position[200:]).max(axis=0) < 1.01 * np.abs(shown.position).max(axis=0) + 1e-3
+    ).all()
+    assert (np.abs(speed[200:]).max(axis=0) < 1.05 * np.abs(shown.velocity).max(axis=0)).all()
+    lines = trajectory.as_csv(list(KP)).splitlines()
+    assert lines[0] == "time,shoulder,elbow"
+    assert len(lines) == len(trajectory.time) + 1
 
 
 def test_a_joint_that_nothing_measures_is_refused_with_what_to_do(tmp_path):

@@ -54,9 +54,9 @@ class Records:
         rate: Samples a second, on which the tables are put.
         servo: Whether the commands are position targets.
         spreads: Relative one-sigma uncertainty of masses, damping, armature and kp, where the model has them.
-        floors: One-sigma uncertainty of a damping or armature that the model has as zero.
         held: Joints that are held, see ``"joints"`` of nominal.json.
         known: What is published or was seen of the robot, a sentence.
+        most: Most effects named together.
     """
 
     model: str
@@ -70,6 +70,7 @@ class Records:
         default_factory=lambda: {"mass": 0.05, "damping": 0.25, "armature": 0.2, "kp": 0.05}
     )
     held: Mapping[str, float | str] = field(default_factory=dict)
+    most: int = 3
 
 
 def table(path: Path) -> dict[str, Array]:

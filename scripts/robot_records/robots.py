@@ -165,7 +165,8 @@ def simple_pendulum(data: Path) -> Records:
     )  # fmt: skip
 
 
-SERVO = """<mujoco><option timestep="0.001"/><worldbody><body name="arm"><joint name="servo" axis="0 1 0" armature="{armature}" damping="{damping}"/>
+SERVO = """<mujoco><option timestep="0.001"/>
+<worldbody><body name="arm"><joint name="servo" axis="0 1 0" armature="{armature}" damping="{damping}"/>
 <inertial pos="0 0 -{length}" mass="{mass}" diaginertia="1e-6 1e-6 1e-6"/></body></worldbody>
 <actuator><position name="servo" joint="servo" kp="{kp}" kv="0" forcerange="-{most} {most}"/></actuator></mujoco>"""
 

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from bench.discrepancy.articulated.admission import admitted_robot
 from bench.discrepancy.articulated.judgement import kept, ladder, predict
-from bench.discrepancy.articulated.naming import verdict_of
+from bench.discrepancy.articulated.naming import closest_rival, verdict_of
+from bench.discrepancy.articulated.next_test import Trajectory, propose
 from bench.discrepancy.articulated.places import matrix_of
 from bench.discrepancy.articulated_search.catalogue import CATALOGUE
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
@@ -46,6 +47,7 @@ class ArticulatedDiagnosis:
         final: The one behind `verdict`.
         matrix: Joint to effect to the part of that joint's discrepancy that the effect alone closes, where it was fitted.
         verdict: The verdict.
+        next_test: Joint trajectories that would tell its explanation from the closest rival; None where nothing is to be told apart.
     """
 
     case: Case
@@ -56,6 +58,7 @@ class ArticulatedDiagnosis:
     final: ArticulatedFit
     matrix: dict[str, dict[str, float]]
     verdict: Verdict
+    next_test: Trajectory | None = None
 
 
 def diagnose_articulated(
@@ -109,7 +112,12 @@ def diagnose_articulated(
     final = rungs[last]
     verdict = verdict_of(problem, fits, rungs, last, untouched, predictions, judged, rng, stated=stated)
     verdict = replace(verdict, warnings=(*verdict.warnings, *notes), settings=changed(settings))
+    rival = closest_rival(fits, final, judged) if verdict.named else None
+    proposal = None if rival is None else propose(problem, compiled, final, rival)
+    if proposal is not None:
+        verdict = replace(verdict, next_excitation=proposal.told)
     verdict = verdict.timed(time.perf_counter() - began)
     return ArticulatedDiagnosis(
-        case, model, problem, judging, tuple(fits), final, matrix_of(problem, fits), verdict
-    )
+        case, model, problem, judging, tuple(fits), final, matrix_of(problem, fits), verdict,
+        None if proposal is None else proposal.trajectory,
+    )  # fmt: skip

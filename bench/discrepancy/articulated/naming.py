@@ -151,6 +151,18 @@ def _ranking(
     return tuple(Ranked(name, where, probability) for (name, where), probability in ordered)
 
 
+def closest_rival(
+    fits: Sequence[ArticulatedFit], final: ArticulatedFit, settings: JudgementSettings
+) -> ArticulatedFit | None:
+    """The likeliest other explanation of as many effects that the records cannot tell from the final one; None where they can."""
+    near = [
+        (f, behind)
+        for f, behind in _rivals(fits, final, settings)
+        if f is not final and behind <= settings.rival
+    ]
+    return min(near, key=lambda entry: entry[1])[0] if near else None
+
+
 def _sets(
     fits: Sequence[ArticulatedFit], final: ArticulatedFit, settings: JudgementSettings
 ) -> tuple[tuple[str, ...], ...]:

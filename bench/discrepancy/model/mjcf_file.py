@@ -46,8 +46,16 @@ def _held(rig: Rig, joints: object) -> Rig:
         for item in (*spec.actuators, *spec.sensors):
             if (item.target if isinstance(item, mujoco.MjsActuator) else item.objname) == name:
                 spec.delete(item)
-        _turned(joint.parent, joint, 0.0 if at == "hold" else float(at))
+        body = joint.parent
+        _turned(body, joint, 0.0 if at == "hold" else float(at))
         spec.delete(joint)
+        # a body that something refers to is not made a part of the one before it, whose stated mass would then be that of both
+        spec.add_sensor(
+            name=f"held_{name}",
+            type=mujoco.mjtSensor.mjSENS_FRAMEPOS,
+            objtype=mujoco.mjtObj.mjOBJ_BODY,
+            objname=body.name,
+        )
     return Rig(rig.name, spec.to_xml(), timestep=rig.timestep, folder=rig.folder)
 
 

@@ -108,6 +108,34 @@ class ArticulatedJudgementSettings:
 
 
 @dataclass(frozen=True)
+class ArticulatedNextTestSettings:
+    """The next test of an arm."""
+
+    duration: float = setting(10.0, "Length of the test.", "Some periods of its slowest motion.", unit="s")
+    ramp: float = setting(0.8, "Time over which a motion begins.", "A joint starts at rest.", unit="s")
+    parts: tuple[float, ...] = setting(
+        (0.8, 0.25),
+        "Amplitudes that are tried, as parts of the reach that the records show.",
+        "Wide and small.",
+    )
+    speeds: tuple[float, ...] = setting(
+        (0.8, 0.3, 0.08),
+        "Speeds that are tried, as parts of the largest that the records show.",
+        "Fast to creeping.",
+    )
+    highest: float = setting(
+        3.0,
+        "Highest frequency of a motion.",
+        "What arms follow; beyond it their own flexibility answers.",
+        unit="Hz",
+    )
+    poses: int = setting(
+        100, "Postures on the way that are looked at for collisions.", "One a tenth of a second."
+    )
+    decided: float = setting(4.6, "Log odds (of a hundred to one) from which a test decides.", "Convention.")
+
+
+@dataclass(frozen=True)
 class ArticulatedSettings:
     """Arms and legs: their records, fits and judgement."""
 
@@ -169,3 +197,4 @@ class ArticulatedSettings:
     )
     search: ArticulatedSearchSettings = field(default_factory=ArticulatedSearchSettings)
     judgement: ArticulatedJudgementSettings = field(default_factory=ArticulatedJudgementSettings)
+    next_test: ArticulatedNextTestSettings = field(default_factory=ArticulatedNextTestSettings)
