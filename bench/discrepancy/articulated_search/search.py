@@ -12,7 +12,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.discrepancy.articulated_search.fitting import ArticulatedFit, Others, fit, own_entries, refitted
+from bench.discrepancy.articulated_search.fitting import (
+    ArticulatedFit,
+    Others,
+    fit,
+    free_entries,
+    own_entries,
+    refitted,
+)
 from bench.discrepancy.articulated_search.hypothesis import Hypothesis, Placed
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.articulated_search.screening import Screened, by_effect, screen
@@ -88,11 +95,21 @@ def _without_idle(
             more = range(at, at + len(other.effect.parameters))
             kept += more if other.key != placed.key else ()
             at = more.stop
-        new = refitted(problem, shorter, found.vector[kept], scale=found.scale)
+        start, scale = found.vector[kept], found.scale
+        within = float(np.sum(found.chi2 / scale**2)) + _surprise(problem, found) + 2.0 * settings.sight
+        new = fit(problem, shorter, start, scale=scale, iterations=settings.iterations, limit=within)
+        if new.log_posterior > found.log_posterior - settings.sight:
+            new = refitted(problem, shorter, new.vector, scale=new.scale)
         made.append(new)
         if new.log_posterior > found.log_posterior - settings.worth and sound(problem, new):
             found = new
     return found, made
+
+
+def _surprise(problem: ArticulatedProblem, found: ArticulatedFit) -> float:
+    """Misfit of the prior at a fit: the sum of squared deviations."""
+    mean, std, _, _ = problem.prior(found.hypothesis)
+    return float(np.sum(((found.vector - mean) / std)[free_entries(problem, found.hypothesis)] ** 2))
 
 
 def _predecessors(

@@ -44,6 +44,11 @@ class ArticulatedSearchSettings:
         "Deviation of a nominal parameter, in its stated standard uncertainties, from which it counts as a finding.",
         "Convention.",
     )
+    sight: float = setting(
+        50.0,
+        "Log posterior that an explanation may have lost without one of its effects for that effect to be tried as superfluous.",
+        "A cost cut-off; ten times what an effect has to add.",
+    )
     finalists: int = setting(5, "Effects that are fitted again without it.", "Convention.")
     rise: float = setting(
         0.5,
