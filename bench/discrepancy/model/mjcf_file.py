@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import mujoco
@@ -10,19 +10,41 @@ import numpy as np
 
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.case.free_decay import NO_LOAD
-from bench.errors import ModelError, UnknownNameError
+from bench.discrepancy.model.mjcf_prescribed import prescribed_channels, with_prescribed_joints
+from bench.errors import ModelError
 from bench.rig import Rig
 from bench.rig.building import parse
+from bench.rig.held_joints import with_held_joints
+
+
+@dataclass(frozen=True)
+class MjcfFileSettings:
+    """Numbers of `bench.discrepancy.model.mjcf_file`."""
+
+    largest: float = 1e30
+    """Largest number of a model [SI units]: the mass of the sun; squares of products of such still are numbers."""
+
+
+SETTINGS = MjcfFileSettings()
+SIZES = (
+    "body_mass", "body_inertia", "body_ipos", "body_pos", "jnt_pos", "jnt_stiffness", "dof_damping", "dof_armature",
+    "dof_frictionloss", "actuator_gear", "actuator_gainprm", "actuator_biasprm",
+)  # fmt: skip
+"""What a model's forces are made of."""
 
 
 def rig_of(case: Case) -> Rig:
-    """The user's model, joints that were held welded; where a case has no load, with an actuator that exerts none.
+    """The user's model, held joints welded; with an actuator that exerts nothing for a case without load, and motors for motions.
 
     Raises:
-        ModelError: The file cannot be read, or a joint cannot be held.
-        UnknownNameError: A joint that was held is none of the model.
+        ModelError: The file cannot be read, holds a number that no force can be computed with, or a joint that cannot be held.
+        UnknownNameError: A prescribed motion, or a joint that was held, is that of nothing in the model.
+        FileFormatError: A prescribed motion is not that of one joint.
     """
-    rig = _held(Rig.from_file(Path(case.folder or ".") / case.rig), case.options.get("joints", {}))
+    rig = Rig.from_file(Path(case.folder or ".") / case.rig)
+    _refuse_beyond_numbers(rig)
+    rig = with_held_joints(rig, case.options.get("joints", {}))
+    rig = with_prescribed_joints(rig, {entry.joint for entry in prescribed_channels(case, rig)})
     if not case.has(NO_LOAD) or NO_LOAD in rig.actuators:
         return rig
     spec = parse(rig.mjcf, rig.folder, rig.name)
@@ -33,52 +55,14 @@ def rig_of(case: Case) -> Rig:
     return Rig(rig.name, spec.to_xml(), timestep=rig.timestep, folder=rig.folder)
 
 
-def _held(rig: Rig, joints: object) -> Rig:
-    """A rig whose joints of the given names are welded: "hold" at their zero, a number at that coordinate [rad or m]."""
-    if not isinstance(joints, Mapping) or not joints:
-        return rig
-    spec = parse(rig.mjcf, rig.folder, rig.name)
-    known = [joint.name for joint in spec.joints]
-    for name, at in joints.items():
-        if name not in known:
-            raise UnknownNameError("joint that was held", name, known)
-        joint = spec.joint(name)
-        for item in (*spec.actuators, *spec.sensors):
-            if (item.target if isinstance(item, mujoco.MjsActuator) else item.objname) == name:
-                spec.delete(item)
-        body = joint.parent
-        _turned(body, joint, 0.0 if at == "hold" else float(at))
-        spec.delete(joint)
-        # a body that something refers to is not made a part of the one before it, whose stated mass would then be that of both
-        spec.add_sensor(
-            name=f"held_{name}",
-            type=mujoco.mjtSensor.mjSENS_FRAMEPOS,
-            objtype=mujoco.mjtObj.mjOBJ_BODY,
-            objname=body.name,
-        )
-    return Rig(rig.name, spec.to_xml(), timestep=rig.timestep, folder=rig.folder)
-
-
-def _turned(body: mujoco.MjsBody, joint: mujoco.MjsJoint, at: float) -> None:
-    """Move a body as its joint does at a coordinate."""
-    if joint.type not in (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE):
-        raise ModelError(
-            f"joint '{joint.name}' is no hinge and no slide; one of those is expected where a joint was held"
-        )
-    if at == 0.0:
-        return
-    turn, moved, own = np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3), np.array(body.quat)
-    axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
-    if joint.type == mujoco.mjtJoint.mjJNT_SLIDE:
-        moved = at * axis
-    else:
-        mujoco.mju_axisAngle2Quat(turn, axis, at)
-        mujoco.mju_rotVecQuat(moved, np.array(joint.pos), turn)
-        moved = np.array(joint.pos) - moved
-    shift, quaternion = np.zeros(3), np.zeros(4)
-    mujoco.mju_rotVecQuat(shift, moved, own)
-    mujoco.mju_mulQuat(quaternion, own, turn)
-    body.pos, body.quat = np.array(body.pos) + shift, quaternion
+def _refuse_beyond_numbers(rig: Rig) -> None:
+    for name in SIZES:
+        largest = float(np.abs(getattr(rig.model, name)).max(initial=0.0))
+        if largest > SETTINGS.largest:
+            raise ModelError(
+                f"the MJCF '{rig.name}' holds {largest:.3g} (MuJoCo's {name}); "
+                f"numbers up to {SETTINGS.largest:g} are expected: correct the model"
+            )
 
 
 def _measured_joint(case: Case, rig: Rig) -> str:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from bench.discrepancy.articulated.admission import admitted_robot
 from bench.discrepancy.case.case import Case, CaseRecord
-from bench.discrepancy.checks.data_quality import compare
+from bench.discrepancy.checks.channel_comparison import compare
 from bench.discrepancy.model.mjcf_file import rig_of
 from bench.discrepancy.multibody.channels import bound
 from bench.discrepancy.multibody.encoders import encoders_of, input_of
