@@ -17,8 +17,9 @@ from bench.discrepancy.articulated.judgement import JudgementSettings, complete
 from bench.discrepancy.articulated.next_test import propose
 from bench.discrepancy.articulated.recognition import applies
 from bench.discrepancy.articulated_search.catalogue import CATALOGUE
-from bench.discrepancy.articulated_search.fitting import ArticulatedFit
+from bench.discrepancy.articulated_search.fitting import ArticulatedFit, fit, refitted
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem, placements
+from bench.discrepancy.articulated_search.search import without_idle
 from bench.discrepancy.multibody.channels import bound
 from bench.discrepancy.multibody.encoders import weight_of_readings
 from bench.discrepancy.multibody.model import ArticulatedModel, compiled_model
@@ -236,6 +237,30 @@ def test_the_next_test_tells_two_explanations_apart_within_what_the_arm_has_show
     lines = trajectory.as_csv(list(KP)).splitlines()
     assert lines[0] == "time,shoulder,elbow"
     assert len(lines) == len(trajectory.time) + 1
+
+
+def test_what_a_later_effect_makes_superfluous_is_dropped_and_refits_gain(tmp_path):
+    folder = write_case(tmp_path, mjcf(servo=True, friction=LIMIT), servo=True)
+    case, compiled, _ = admitted_robot(read_case(folder), anyway=True)
+    problem = ArticulatedProblem.of(case, ArticulatedModel.of(compiled), case.identification)
+    places = {p.key: p for p in placements(problem, CATALOGUE)}
+    friction, offset = places["coulomb_friction", "elbow"], places["force_offset", "shoulder"]
+    starts = np.concatenate([np.zeros(len(problem.nominal)), [0.1, -2.0]])
+    scale = ArticulatedFit.at(problem, (offset, friction), starts).scale
+    assert scale.max() > 3.0  # far from the truth: a joint is believed little
+    once = fit(problem, (offset, friction), starts, scale=scale, iterations=20)
+    again = refitted(problem, (offset, friction), starts, scale=scale)
+    assert np.sum(again.chi2) <= np.sum(once.chi2)
+    # what it is known to, and so its evidence, is that of the noise and no more that of where it started
+    assert np.trace(again.covariance) < 0.5 * np.trace(once.covariance)
+    assert again.scale.max() < 1.1
+    kept, tried = without_idle(problem, again, problem.settings.articulated.search)
+    assert [placed.key for placed in kept.hypothesis] == [friction.key]
+    assert tried
+    whole, _ = without_idle(problem, refitted(problem, (friction, offset), again.vector, scale=again.scale), replace(
+        problem.settings.articulated.search, worth=-1e9, sight=1e9
+    ))  # fmt: skip
+    assert [placed.key for placed in whole.hypothesis] == [friction.key, offset.key]
 
 
 def test_a_joint_that_nothing_measures_is_refused_with_what_to_do(tmp_path):

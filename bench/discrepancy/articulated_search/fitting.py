@@ -187,10 +187,11 @@ def refitted(
     scale: Array,
     others: Others | None = None,
 ) -> ArticulatedFit:
-    """Fit a hypothesis again and again, each time with the scale that the last fit left, until that makes it no likelier.
+    """Fit a hypothesis again and again, each time with the scale that the last fit left, until it leaves the scale that it was given.
 
     The log-likelihood with its scales profiled out is concave in the squares, so that every such fit is a step of a majorisation and
-    none loses. One fit alone may stop where a joint that it has spoilt is believed no more: its scale was taken at the start.
+    none loses. One fit alone may stop where a joint that it has spoilt is believed no more, and what its parameters are known to, which
+    weighs it against others, is that of the scale at the start.
 
     Args:
         problem: Records and priors.
@@ -205,18 +206,12 @@ def refitted(
     settings = problem.settings.articulated.search
     found = fit(problem, hypothesis, start, scale=scale, iterations=settings.iterations, others=others)
     for _ in range(settings.refits - 1):
-        new = fit(
-            problem,
-            hypothesis,
-            found.vector,
-            scale=found.scale,
-            iterations=settings.iterations,
-            others=others,
-        )
-        gained = new.log_posterior - found.log_posterior
-        found = new if gained > 0.0 or not np.isfinite(found.log_posterior) else found
-        if gained < settings.rise:
+        if np.allclose(found.scale, scale, rtol=settings.rescaled):
             break
+        scale = found.scale
+        found = fit(
+            problem, hypothesis, found.vector, scale=scale, iterations=settings.iterations, others=others
+        )
     return found
 
 

@@ -69,7 +69,7 @@ def search(
         if best is None or best.log_posterior < current.log_posterior + settings.worth:
             break
         problem = problem.settled(best.hypothesis, best.vector)
-        current, fits = _without_idle(problem, best, settings)
+        current, fits = without_idle(problem, best, settings)
         found += fits
         dropped |= {placed.key for placed in best.hypothesis} - {placed.key for placed in current.hypothesis}
         if len(current.hypothesis) == settings.most:
@@ -78,7 +78,7 @@ def search(
     return sorted(found, key=lambda f: (f is not current, -f.log_posterior))
 
 
-def _without_idle(
+def without_idle(
     problem: ArticulatedProblem, found: ArticulatedFit, settings: SearchSettings
 ) -> tuple[ArticulatedFit, list[ArticulatedFit]]:
     """A fit without the effects that its last one has made superfluous, and all fits made for that.
@@ -296,9 +296,7 @@ def _fits(
             ),
             key=lambda f: f.log_posterior,
         )
-        new = fit(
-            problem, hypothesis, new.vector, scale=new.scale, iterations=settings.iterations, others=others
-        )
+        new = refitted(problem, hypothesis, new.vector, scale=new.scale, others=others)
         new = _beside(problem, new, others, settings)
         out.append(new)
         gained = max(gained, 2.0 * (new.log_posterior - base.log_posterior))

@@ -26,6 +26,11 @@ class ArticulatedSearchSettings:
         "Fits of one hypothesis, each with the scales that the last one left, at most.",
         "Each gains; most end after two or three.",
     )
+    rescaled: float = setting(
+        0.02,
+        "Relative change of a scale from which a fit is repeated with it.",
+        "Of twenty parameters the evidence is then known to half a nat.",
+    )
     worth: float = setting(
         4.6,
         "Log posterior that a further effect has to add, ten to one being 2.3 and a hundred to one 4.6.",
@@ -52,7 +57,7 @@ class ArticulatedSearchSettings:
     finalists: int = setting(5, "Effects that are fitted again without it.", "Convention.")
     rise: float = setting(
         0.5,
-        "Log posterior by which a further fit of the same effects, or a neighbouring number of periods in a turn, has to be likelier.",
+        "Log posterior by which a neighbouring number of periods in a turn has to be likelier.",
         "Some twenty times what ends a fit, so that the search ends, too.",
     )
 
