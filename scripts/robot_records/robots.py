@@ -168,42 +168,40 @@ def simple_pendulum(data: Path) -> Records:
 SERVO = """<mujoco><option timestep="0.001"/>
 <worldbody><body name="arm"><joint name="servo" axis="0 1 0" armature="{armature}" damping="{damping}"/>
 <inertial pos="0 0 -{length}" mass="{mass}" diaginertia="1e-6 1e-6 1e-6"/></body></worldbody>
-<actuator><position name="servo" joint="servo" kp="{kp}" kv="0" forcerange="-{most} {most}"/></actuator></mujoco>"""
+<actuator><position name="servo" joint="servo" kp="{kp}" kv="{kv}" forcerange="-{most} {most}"/></actuator></mujoco>"""
 
 
 def _servo(
     data: Path, runs: tuple[str, ...], judging: tuple[str, ...], known: str, rate: float, **numbers: float
 ) -> Records:
-    """A servo's pendulum by its voltage equation: torque = kt / R (V gain kp (goal - q) - kt qd)."""
-    kt, resistance, volts, gain = (numbers[k] for k in ("kt", "resistance", "volts", "gain"))
-    text = SERVO.format(
-        kp=kt / resistance * volts * gain, damping=kt**2 / resistance, most=kt / resistance * volts, armature=numbers["armature"],
-        length=numbers["length"], mass=numbers["mass"],
-    )  # fmt: skip
+    """A servo with a point mass on an arm, for as long as its torque is on."""
     read = {}
     for name in (*runs, *judging):
         columns = table(data / "bam_servos" / "runs" / f"{name}.parquet")
         columns["time"] = columns.pop("timestamp")
-        read[name] = columns
-    axes = [Axis("servo", "position", "goal_position", 3e-4, 1.534e-3)]
+        on = int(np.argmin(np.append(columns["torque_enable"], 0.0)))
+        read[name] = {key: samples[:on] for key, samples in columns.items()}
+    axes = [Axis("servo", "position", "goal_position", 3e-4, TURN / 4096.0)]
+    text = SERVO.format(**numbers)
     return Records(text, axes, [read[n] for n in runs], [read[n] for n in judging], rate, True, known)
 
 
 def xl330(data: Path) -> Records:
-    """The XL330 at a gain of 400, as its makers publish motor and resistance."""
+    """The XL330 at a gain of 400: torque = kt / R (V gain (goal - q) - kt qd), kt and R as published with the simplest friction."""
+    kt, resistance, volts, gain = 0.387, 4.02, 7.4, 400.0 * 4096.0 / TURN / (256.0 * 885.0)
     return _servo(
         data, ("xl330_kp400_sin_sin", "xl330_kp400_up_and_down"), ("xl330_kp400_sin_time_square",),
         "friction that grows with the torque carried, preferred to Coulomb; a zero of 30 mrad", 190.0,
-        kt=0.37, resistance=3.0, volts=7.4, gain=0.002877 * 400.0, armature=0.0018, mass=0.49, length=0.10,
+        kp=kt / resistance * volts * gain, damping=kt**2 / resistance, most=kt / resistance * volts, kv=0.0, armature=0.0018,
+        mass=0.49, length=0.10,
     )  # fmt: skip
 
 
 def sts3250(data: Path) -> Records:
-    """The STS3250; motor and resistance as published of its kin."""
+    """The STS3250 as a servo of the published stiffness and damping, without its friction."""
     return _servo(
-        data, ("sts3250_kp32_sin_sin",), ("sts3250_kp32_lift_and_drop",),
-        "load-dependent friction; torque is off from 2 s on in the judging record", 49.0,
-        kt=1.0, resistance=3.0, volts=12.0, gain=0.002877 * 16.0 * 32.0, armature=0.03, mass=1.13, length=0.12,
+        data, ("sts3250_kp32_sin_sin",), ("sts3250_kp32_lift_and_drop",), "load-dependent friction: 0.2 N m and 0.2 of the load", 49.0,
+        kp=67.3, kv=2.35, damping=0.0, most=100.0, armature=0.001, mass=1.13, length=0.12,
     )  # fmt: skip
 
 
