@@ -88,6 +88,13 @@ def _what(out: Page, diagnosis: ArticulatedDiagnosis) -> None:
         )
     for group in diagnosis.verdict.indistinguishable:
         section.text(f"These records cannot tell apart: {', '.join(group)}.")
+    proposal = diagnosis.verdict.next_excitation
+    if proposal:
+        first, second = proposal["separates"]
+        section.text(
+            f"A test that would tell {first} from {second}: {proposal['excitation']}, for {proposal['duration_s']:.3g} s, with expected "
+            f"log odds of {proposal['expected_log_odds']:.3g} where the present records give {proposal['log_odds_now']:.3g}."
+        )
     for warning in diagnosis.verdict.warnings:
         section.text(f"Note: {warning}.")
 
