@@ -131,14 +131,6 @@ def test_weights_average_over_what_blocks_say():
     assert shares(lucky, np.zeros(2), rng)[1] > 1e3 * shares(steady, np.zeros(2), rng)[1]
 
 
-def test_blocks_of_judging_records_weigh_as_much_as_those_left_out():
-    left_out, judged = np.array([np.zeros(12), np.ones(12)]), np.array([np.ones(12), np.zeros(12)])
-    found = [HeldOut(Explanation(()), scores) for scores in left_out]
-    rng = np.random.default_rng(0)
-    assert shares(found, np.zeros(2), rng)[0] > 0.98
-    assert shares(found, np.zeros(2), rng, judged=judged)[0] == pytest.approx(0.5, abs=0.05)
-
-
 def test_records_in_windows_count_as_many_samples_as_whole_ones():
     error = crude_error(case := planted_case(n=1500), structure_of(case))
     for n in (2000, 8000):

@@ -122,11 +122,12 @@ def judge(
             )
             break
         vetoed = True
-    judged = known.scores([entry.explanation for entry in found], nothing.explanation)
+    weights = shares(found, _log_priors(found), rng, judgement.held_out.draws)
+    preferred = [other for other in found if known.prefers(other.explanation, chosen.explanation)]
     return Judged(
         chosen,
         tuple(found),
-        shares(found, _log_priors(found), rng, judgement.held_out.draws, judged),
+        _undecided(weights, found, [chosen, *preferred]) if chosen.explanation.hypothesis else weights,
         within,
         alike,
         vetoed,
@@ -158,6 +159,13 @@ def _with(entry: HeldOut, own: HeldOut, found: Sequence[HeldOut]) -> list[HeldOu
     if entry in found:
         return [other for other in found if other is entry or other is not own]
     return [entry if other is own else other for other in found]
+
+
+def _undecided(weights: Array, found: Sequence[HeldOut], among: Sequence[HeldOut]) -> Array:
+    """Weights (n,) of which some explanations have equal parts: the records for finding speak for one of them, those for judging for
+    others, and neither is to be believed more."""
+    own = np.array([entry in among for entry in found])
+    return np.where(own, float(weights[own].mean()), weights)
 
 
 def _steady(entry: HeldOut, case: Case, rng: np.random.Generator) -> HeldOut:

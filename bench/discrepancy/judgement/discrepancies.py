@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -31,17 +29,6 @@ class Discrepancies:
         """NRMSE (n_coordinates,) of an explanation, on the judging records or on those for identification."""
         errors = self._errors(explanation, judging=judging)
         return np.minimum(np.sqrt(errors.sum(axis=1)), DIVERGED_GAP)
-
-    def scores(self, explanations: Sequence[Explanation], nothing: Explanation) -> Array:
-        """Weighed squared errors (n, n_blocks) of explanations on blocks of the judging records, where `nothing` is farthest off.
-
-        Weighed as the records for identification are: by what the best of them leaves, and so that a record counts as a few samples.
-        """
-        widest = int(np.argmax(self._beyond(self.of(nothing, judging=True))))
-        table = np.array([self._errors(e, judging=True)[widest] for e in explanations])
-        least = max(float(table.sum(axis=1).min()), float(self._floor[widest]) ** 2, 1e-300)
-        error = self.problem.settings.likelihood.error
-        return error.samples * error.record_octaves * len(self.case.validation) * table / least
 
     def _errors(self, explanation: Explanation, *, judging: bool) -> Array:
         key = explanation, judging
