@@ -234,19 +234,22 @@ def sized(
     low, high = first.mean - settings.reach * first.std, first.mean + settings.reach * first.std
     low, high = max(low, first.bounds[0]), min(high, first.bounds[1])
     eta, now = _moving(points, first, change)
-    power = 1.0
+    power, shorter = 1.0, 1.0
     for _ in range(SETTINGS.secants):
         if now is None or now <= 0.0:
             return None
         if abs(now / size - 1.0) < SETTINGS.near_enough:
             break
-        step = math.log(size / now) / power
+        step = shorter * math.log(size / now) / power
         wanted = eta[0] * math.exp(step) if first.signed else eta[0] + step
         tried = eta.copy()
         tried[0] = min(max(wanted, low), high)
         then = change(tried)
+        if then is None or then <= 0.0:  # beyond where it changes anything
+            shorter *= 0.5
+            continue
         made = math.log(tried[0] / eta[0]) if first.signed else tried[0] - eta[0]
-        if then is not None and then > 0.0 and abs(made) > 1e-9:
+        if abs(made) > 1e-9:
             found = math.log(then / now) / made
             power = math.copysign(min(max(abs(found), 0.2), 5.0), found)
         eta, now = tried, then
