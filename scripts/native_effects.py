@@ -90,7 +90,7 @@ MODELS = {
 
 
 def joint(**values: Any) -> Change:
-    """Attributes of the joint; ``stiffness=(2, 5e5)`` sets one entry of a row."""
+    """Attributes of the joint; ``stiffness={2: 5e5}`` sets one entry of a row."""
     return lambda spec: _set(spec.joints[0], values)
 
 
@@ -108,10 +108,10 @@ def _set(item: Any, values: dict[str, Any]) -> None:
     for name, value in values.items():
         if isinstance(value, dict):
             row = np.array(getattr(item, name), dtype=float)
-            for index, entry in value.items():
-                row[index] = entry
-            value = row
-        setattr(item, name, value)
+            row[list(value)] = list(value.values())
+            setattr(item, name, row)
+        else:
+            setattr(item, name, value)
 
 
 @dataclass(frozen=True)
@@ -204,7 +204,9 @@ def measure(folder: Path, model: Model, change: Change, seed: int = 0) -> None:
         start = np.empty(mujoco.mj_stateSize(real, mujoco.mjtState.mjSTATE_FULLPHYSICS))
         mujoco.mj_getState(real, data, start, mujoco.mjtState.mjSTATE_FULLPHYSICS)
         states, _ = rollout.rollout(real, data, start[None], control[None])
-        position = np.concatenate([start[None, 1:2], np.asarray(states)[0, every - 1 : -1 : every, 1:2]])[:, 0]
+        position = np.concatenate([start[None, 1:2], np.asarray(states)[0, every - 1 : -1 : every, 1:2]])[
+            :, 0
+        ]
         noise = noise or NOISE * float(np.std(position))
         position = position + noise * rng.standard_normal(len(position))
         table = np.column_stack([np.arange(len(command)) / RATE, command, position])
@@ -213,7 +215,12 @@ def measure(folder: Path, model: Model, change: Change, seed: int = 0) -> None:
         )  # fmt: skip
     channels = {
         "command": {"unit": model.units[0], "role": "command", "actuator": "drive", "noise_std": 0.0},
-        "position": {"unit": model.units[1], "joint": model.joint, "quantity": "position", "noise_std": noise},
+        "position": {
+            "unit": model.units[1],
+            "joint": model.joint,
+            "quantity": "position",
+            "noise_std": noise,
+        },
     }
     parameters = {name: {"value": value, "std": std * value} for name, (value, std) in model.believed.items()}
     told = {

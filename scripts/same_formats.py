@@ -65,7 +65,8 @@ def samples(path: Path, record: Recording) -> None:
 def labview(path: Path, record: Recording) -> None:
     """A LabVIEW measurement."""
     n, count = len(record.time), len(record.names)
-    head = ["LabVIEW Measurement\t", "Writer_Version\t2", "Separator\tTab", "Decimal_Separator\t.", "***End_of_Header***\t", ""]  # fmt: skip
+    head = ["LabVIEW Measurement\t", "Writer_Version\t2", "Separator\tTab", "Decimal_Separator\t."]
+    head += ["***End_of_Header***\t", ""]
     head += [f"Channels\t{count}\t", "\t".join(["Samples", *[str(n)] * count]), "***End_of_Header***\t\t"]
     rows = ["\t".join(map(repr, map(float, row))) for row in zip(*_table(record).values(), strict=True)]
     path.write_text("\n".join([*head, "\t".join(["X_Value", *record.names, "Comment"]), *rows]) + "\n")
@@ -129,7 +130,9 @@ def main() -> None:
             folder = rewritten(asked.case, kind, Path(root) / kind / asked.case.name)
             found[kind] = list(differences(plain, verdict_of(folder)))
             if not asked.json:
-                print(f"{kind:8s} {'the same' if not found[kind] else '; '.join(found[kind][:3])}", flush=True)
+                print(
+                    f"{kind:8s} {'the same' if not found[kind] else '; '.join(found[kind][:3])}", flush=True
+                )
     if asked.json:
         named = [effect["name"] for effect in plain["named"]]
         print(json.dumps({"verdict": plain["verdict"], "named": named, "differences": found}, indent=1))

@@ -191,7 +191,9 @@ def effects_of(
         for placed in fitted.hypothesis:
             stop = start + len(placed.effect.parameters)
             out.append(
-                named_effect(problem, placed, fitted.vector[start:stop], deviations[start:stop], probabilities)
+                named_effect(
+                    problem, placed, fitted.vector[start:stop], deviations[start:stop], probabilities
+                )
             )
             start = stop
     return tuple(out)

@@ -125,7 +125,13 @@ def check(case: Case, settings: CheckSettings | None = None, *, informed: bool =
 
 
 def _of_joints(
-    case: Case, settings: CheckSettings, found: list[str], notes: tuple[str, ...], began: float, *, informed: bool
+    case: Case,
+    settings: CheckSettings,
+    found: list[str],
+    notes: tuple[str, ...],
+    began: float,
+    *,
+    informed: bool,
 ) -> Checked:
     """The check of an articulated model."""
     own, model, said = admitted_joints(case)

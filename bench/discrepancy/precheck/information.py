@@ -11,7 +11,7 @@ References:
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
@@ -108,13 +108,18 @@ def parameters_told(problem: Problem, settings: CheckSettings) -> tuple[list[Tol
         if p >= len(problem.structure.parameters):
             continue
         width = float(np.sqrt(cover[k, k]))
-        found.append(graded_parameter(problem.structure.parameters[p], width, float(problem.spread[p]), settings))
+        found.append(
+            graded_parameter(problem.structure.parameters[p], width, float(problem.spread[p]), settings)
+        )
     return found, J
 
 
-def effects_told(case: Case, problem: Problem, parameters: Array, settings: CheckSettings) -> list[Told]:
-    """How well the records tell each effect of the catalogue at the size that would matter."""
+def effects_told(
+    case: Case, problem: Problem, parameters: Array, settings: CheckSettings, only: Collection[str] = ()
+) -> list[Told]:
+    """How well the records tell each effect of the catalogue, or some of them, at the size that would matter."""
     chosen = [e for e in CATALOGUE if e.site != "record" and not e.rare and e.variant == ""]
+    chosen = [e for e in chosen if not only or e.name in only]
     placed = [p for p in placements(case, problem.structure, chosen) if not p.source]
     rest = problem.residual((), np.zeros(len(problem.nominal)))
     inner = np.linalg.inv(parameters.T @ parameters + np.eye(parameters.shape[1]))

@@ -6,6 +6,8 @@ the positions of free runs, which is what a verdict is judged by.
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -30,7 +32,7 @@ Array = NDArray[np.float64]
 
 
 def joints_told(
-    case: Case, model: ArticulatedModel, settings: CheckSettings
+    case: Case, model: ArticulatedModel, settings: CheckSettings, only: Collection[str] = ()
 ) -> tuple[list[Told], list[Told]]:
     """How well the identification records tell each uncertain nominal parameter and each effect of the catalogue.
 
@@ -38,6 +40,7 @@ def joints_told(
         case: The case, its channels bound to joints and actuators.
         model: The model at its nominal parameters.
         settings: When something counts.
+        only: Names of effects; all where empty.
     """
     problem = ArticulatedProblem.of(case, model, case.identification)
     zero = np.zeros(len(problem.nominal))
@@ -53,6 +56,8 @@ def joints_told(
         for i, entry in enumerate(problem.nominal)
     ]
 
+    chosen = [effect for effect in CATALOGUE if not only or effect.name in only]
+
     def told(placed: Placed) -> Told:
         vector = at_size(problem, placed, settings.matters, settings)
         if vector is None:
@@ -60,13 +65,13 @@ def joints_told(
         column = _residuals(problem, (placed,), vector) - rest
         return graded_effect(placed.effect.name, placed.where, column, J, inner, settings)
 
-    return parameters, best_of(in_threads(told, placements(problem, CATALOGUE)))
+    return parameters, best_of(in_threads(told, placements(problem, chosen)))
 
 
 def at_size(
     problem: ArticulatedProblem, placed: Placed, size: float, settings: CheckSettings
 ) -> Array | None:
-    """The vector of an effect whose amplitude changes the motion of a joint by a part of its standard deviation; None where it reaches none."""
+    """The vector of an effect whose amplitude moves a joint otherwise by a part of its standard deviation; None where it reaches none."""
     drive = problem.joints[placed.joint].drive
     # on which side of a train an encoder sits does not matter for its size
     points = grid(placed, servo=bool(drive and drive.servo), sides=(0.0,))

@@ -257,7 +257,9 @@ def _fingerprint(laboratory: Laboratory, sizes: Sequence[float], seed: int) -> s
     """Of the model, what is believed of it, the commands and the options."""
     case = laboratory.case
     whole = hashlib.sha256(laboratory.path.read_bytes())
-    whole.update(repr((case.parameters, case.channels, sorted(case.options.items()), tuple(sizes), seed)).encode())
+    whole.update(
+        repr((case.parameters, case.channels, sorted(case.options.items()), tuple(sizes), seed)).encode()
+    )
     inputs = [c.name for c in case.channels if c.role != "response"]
     for record in (*case.identification, *case.validation):
         whole.update(f"{record.name} {record.step!r}".encode())

@@ -124,6 +124,23 @@ class Laboratory:
             validation=tuple(map(record, self.case.validation)),
         )
 
+    @native.quiet()
+    def played(self, commands: Mapping[str, Array]) -> Case:
+        """The case with one record of the nominal model, as its user runs it and without noise, for commands (n,) by channel.
+
+        Raises:
+            SimulationError: It leaves all bounds.
+        """
+        applied = apply(self.path, Findings(()), case=self.case, linear=not self.articulated)
+        planned = self.case.identification[0]
+        planned = replace(planned, values={**planned.values, **commands})
+        return replace(self.case, identification=(self._record(applied, (), planned, None),), validation=())
+
+    def logged(self, record: CaseRecord, rng: np.random.Generator) -> CaseRecord:
+        """A record with the noise of its channels."""
+        values = {c.name: _logged(np.asarray(record.values[c.name]), c, rng) for c in self.case.channels}
+        return replace(record, values=values)
+
     def _record(
         self,
         applied: Applied,
@@ -138,9 +155,8 @@ class Laboratory:
                 raise SimulationError(
                     f"the model leaves all bounds in '{planned.name}' with {', '.join(e.name for e in effects) or 'nothing put in'}"
                 )
-            if rng is not None:
-                values[channel.name] = _logged(values[channel.name], channel, rng)
-        return replace(planned, values=values, notes=(), bridged=())
+        out = replace(planned, values=values, notes=(), bridged=())
+        return out if rng is None else self.logged(out, rng)
 
     def drawn(self, rng: np.random.Generator) -> tuple[NominalEstimate, ...]:
         """True values of the nominal parameters, within their stated uncertainties."""
