@@ -44,7 +44,8 @@ JOINT = """<mujoco model="joint">
   <option timestep="0.001" integrator="implicitfast" gravity="0 0 0"/>
   <worldbody>{bodies}</worldbody>
   <tendon>
-    <fixed name="axial" stiffness="{k_axial}" damping="{c_axial}" springlength="0"><joint joint="x1" coef="-1"/><joint joint="x2" coef="1"/></fixed>
+    <fixed name="axial" stiffness="{k_axial}" damping="{c_axial}" springlength="0">
+      <joint joint="x1" coef="-1"/><joint joint="x2" coef="1"/></fixed>
     <fixed name="torsional" stiffness="{k_torsional}" damping="{c_torsional}" springlength="0">
       <joint joint="theta1" coef="-1"/><joint joint="theta2" coef="1"/></fixed>
   </tendon>
