@@ -141,6 +141,14 @@ class Laboratory:
         values = {c.name: _logged(np.asarray(record.values[c.name]), c, rng) for c in self.case.channels}
         return replace(record, values=values)
 
+    def logged_case(self, case: Case, rng: np.random.Generator) -> Case:
+        """A case with the noise of its channels in every record."""
+        return replace(
+            case,
+            identification=tuple(self.logged(record, rng) for record in case.identification),
+            validation=tuple(self.logged(record, rng) for record in case.validation),
+        )
+
     def _record(
         self,
         applied: Applied,
