@@ -54,6 +54,8 @@ class DesigningSettings:
     """Seconds in which a signal rises from rest."""
     centres: tuple[float, ...] = (0.3, 1.0)
     """Frequencies about which joints of an arm are moved [Hz]: slow, where gravity and friction rule, and quick, where inertia does."""
+    periods: float = 4.0
+    """Periods of these frequencies that a record holds at least."""
     apart: float = 0.17
     """Part by which the frequency of each further joint lies above the one before, so that no two move alike."""
 
@@ -288,7 +290,8 @@ def _of_joints(
     case, model = bound(laboratory.case, compiled), ArticulatedModel.of(compiled)
     inputs = [input_of(case, joint).name for joint in model.joints]
     out = []
-    for centre in SETTINGS.centres:
+    slowest = SETTINGS.periods / (samples * step)
+    for centre in sorted({max(centre, slowest) for centre in SETTINGS.centres}):
         lists = [shapes(centre * (1.0 + SETTINGS.apart * j), samples * step) for j in range(len(inputs))]
         for entries in zip(*lists, strict=True):
             columns = {}
