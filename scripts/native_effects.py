@@ -145,7 +145,7 @@ EFFECTS: dict[str, Native] = {
     ),
     "delay": Native("arm", actuator(delay=0.02, nsample=25, interp=1), ("actuator_delay",)),
     "filter": Native(
-        "arm", actuator(dyntype=mujoco.mjtDyn.mjDYN_FILTEREXACT, dynprm={0: 0.03}, actdim=1, actearly=True), ("actuator_lag",)
+        "stage", actuator(dyntype=mujoco.mjtDyn.mjDYN_FILTEREXACT, dynprm={0: 0.02}, actdim=1, actearly=True), ("actuator_lag",)
     ),
     "kp": Native("arm", actuator(gainprm={0: 8.0}, biasprm={1: -8.0}), ("servo_gain_error",)),
     "forcerange": Native("arm", actuator(forcerange=(-1.6, 1.6), forcelimited=LIMITED), ("actuator_saturation",)),
