@@ -148,7 +148,7 @@ EFFECTS: dict[str, Native] = {
         "stage", actuator(dyntype=mujoco.mjtDyn.mjDYN_FILTEREXACT, dynprm={0: 0.02}, actdim=1, actearly=True), ("actuator_lag",)
     ),
     "kp": Native("arm", actuator(gainprm={0: 8.0}, biasprm={1: -8.0}), ("servo_gain_error",)),
-    "forcerange": Native("arm", actuator(forcerange=(-1.6, 1.6), forcelimited=LIMITED), ("actuator_saturation",)),
+    "forcerange": Native("arm", actuator(forcerange=(-6.0, 6.0), forcelimited=LIMITED), ("actuator_saturation",)),
     "gravcomp": Native("arm", body(gravcomp=0.5), ("gravity_compensation",)),
 }  # fmt: skip
 """Attribute to where it is tried."""
