@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from bench import native
 from bench.discrepancy.case.acquisition import at_times
 from bench.discrepancy.case.case import CaseRecord
+from bench.discrepancy.checks.reference import Reference
 from bench.discrepancy.likelihood.problem import Problem
-from bench.discrepancy.model.mjcf_reference import Reference
 from bench.discrepancy.settings import LikenessSettings
 
 Array = NDArray[np.float64]
@@ -200,7 +200,7 @@ def simulated(
     )  # the middle of each step: held loads are else late by half of one
     control = np.tile(reference.control, (len(at), 1))
     for channel, (index, factor) in reference.loads.items():
-        control[:, index] = factor * at_times(record.values[channel], at, interpolation)
+        control[:, index] += factor * at_times(record.values[channel], at, interpolation)
     data = mujoco.MjData(variant)
     data.qpos[:] = reference.rest
     size = mujoco.mj_stateSize(variant, int(mujoco.mjtState.mjSTATE_FULLPHYSICS))

@@ -122,7 +122,8 @@ def effects_told(
     chosen = [e for e in chosen if not only or e.name in only]
     placed = [p for p in placements(case, problem.structure, chosen) if not p.source]
     rest = problem.residual((), np.zeros(len(problem.nominal)))
-    inner = np.linalg.inv(parameters.T @ parameters + np.eye(parameters.shape[1]))
+    gram = parameters.T @ parameters + np.eye(parameters.shape[1])
+    inner = np.asarray(np.linalg.inv(gram), dtype=np.float64)
 
     def told(one: Placed) -> Told:
         sized = at_size(problem, one, settings.matters, settings)

@@ -50,7 +50,7 @@ def joints_told(
         moved = zero.copy()
         moved[i] = SETTINGS.step
         J[:, i] = (_residuals(problem, (), moved) - rest) / SETTINGS.step
-    inner = np.linalg.inv(J.T @ J + np.eye(J.shape[1]))
+    inner = np.asarray(np.linalg.inv(J.T @ J + np.eye(J.shape[1])), dtype=np.float64)
     parameters = [
         graded_parameter(entry.name, float(np.sqrt(inner[i, i])), entry.std, settings)
         for i, entry in enumerate(problem.nominal)

@@ -30,7 +30,7 @@ from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.multibody.channels import bound
 from bench.discrepancy.multibody.encoders import input_of
 from bench.discrepancy.multibody.model import ArticulatedModel
-from bench.discrepancy.next_test.feasible_excitations import Limits, candidates, shapes
+from bench.discrepancy.next_test.feasible_excitations import RigLimits, candidates, shapes
 from bench.discrepancy.precheck.information import Told, effects_told, parameters_told
 from bench.discrepancy.precheck.joint_information import joints_told
 from bench.discrepancy.precheck.joints import admitted_joints
@@ -206,7 +206,7 @@ def _blank(case: Case, samples: int, step: float) -> Case:
     return replace(case, identification=records["identification"], validation=records["validation"])
 
 
-def _limits(case: Case, laboratory: Laboratory) -> Limits:
+def _limits(case: Case, laboratory: Laboratory) -> RigLimits:
     """What commands and responses may reach: as stated, as the model limits them, as earlier records bore it."""
     stated: Any = case.options.get("limits", {})
     records = (*case.identification, *case.validation)
@@ -226,11 +226,11 @@ def _limits(case: Case, laboratory: Laboratory) -> Limits:
                 f'nothing limits \'{channel.name}\'; give "limits": {{"{channel.name}": LARGEST}} in nominal.json'
             )
         load[channel.name] = most
-    return Limits(load, motion)
+    return RigLimits(load, motion)
 
 
 def _of_model(laboratory: Laboratory) -> dict[str, float]:
-    """Limits that the model itself has: ranges of joints and of controls, by channel."""
+    """RigLimits that the model itself has: ranges of joints and of controls, by channel."""
     compiled = specification(laboratory.path).compile()
     try:
         case = bound(laboratory.case, compiled)
@@ -258,7 +258,7 @@ def _ramped(columns: Array, step: float) -> Array:
 
 
 def _of_structure(
-    laboratory: Laboratory, limits: Limits, samples: int, step: float, seed: int
+    laboratory: Laboratory, limits: RigLimits, samples: int, step: float, seed: int
 ) -> list[tuple[str, dict[str, Array]]]:
     """Shapes around the resonances of a linear structure."""
     rng = np.random.default_rng(seed)
@@ -283,7 +283,7 @@ def _of_structure(
 
 
 def _of_joints(
-    laboratory: Laboratory, limits: Limits, samples: int, step: float, seed: int
+    laboratory: Laboratory, limits: RigLimits, samples: int, step: float, seed: int
 ) -> list[tuple[str, dict[str, Array]]]:
     """Shapes in all joints of an arm at once, apart in frequency."""
     compiled = specification(laboratory.path).compile()
@@ -304,7 +304,9 @@ def _of_joints(
     return out
 
 
-def _within(laboratory: Laboratory, label: str, commands: dict[str, Array], limits: Limits) -> Tried | None:
+def _within(
+    laboratory: Laboratory, label: str, commands: dict[str, Array], limits: RigLimits
+) -> Tried | None:
     """A signal scaled down until the responses of the nominal model keep their limits; None where it cannot be."""
     scale, settings = 1.0, DEFAULT.next_test
     for _ in range(settings.scalings):

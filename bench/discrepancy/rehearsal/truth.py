@@ -159,9 +159,12 @@ class Laboratory:
         values = {name: np.asarray(samples) for name, samples in planned.values.items()}
         values |= self.readings(applied, effects, planned)
         for channel in self.case.channels:
-            if not np.isfinite(values[channel.name]).all():
+            bad = np.flatnonzero(~np.isfinite(values[channel.name]))
+            if len(bad):
+                put_in = ", ".join(effect.name for effect in effects) or "nothing put in"
                 raise SimulationError(
-                    f"the model leaves all bounds in '{planned.name}' with {', '.join(e.name for e in effects) or 'nothing put in'}"
+                    f"the model leaves all bounds in '{planned.name}' with {put_in}; play weaker signals",
+                    time=float(planned.time[max(int(bad[0]) - 1, 0)]),
                 )
         out = replace(planned, values=values, notes=(), bridged=())
         return out if rng is None else self.logged(out, rng)
@@ -212,7 +215,7 @@ class _OfJoints:
         control = np.vstack([np.repeat(played[:1], settling, axis=0), played])
         start = Window(0, np.array(compiled.qpos0), np.zeros(compiled.nv))
         position, velocity = run(compiled, hook_of(applied), [start], control, len(control), rested=False)
-        times = np.arange(len(record)) * record.step
+        times = np.asarray(np.arange(len(record)) * record.step, dtype=np.float64)
         motion = sampled(position[0, settling:], velocity[0, settling:], compiled, times)
         wrong = encoders_wrong(effects)
         out = {}
