@@ -11,9 +11,10 @@ from collections.abc import Collection
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.discrepancy.articulated.effects import CATALOGUE
-from bench.discrepancy.articulated.problem import ArticulatedProblem, Placed, placements
-from bench.discrepancy.articulated.search import grid
+from bench.discrepancy.articulated_search.catalogue import CATALOGUE
+from bench.discrepancy.articulated_search.hypothesis import Placed
+from bench.discrepancy.articulated_search.problem import ArticulatedProblem, placements
+from bench.discrepancy.articulated_search.screening import grid
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.numerics.threads import in_threads

@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.discrepancy.articulated import effects as articulated
-from bench.discrepancy.articulated import problem as joints
+from bench.discrepancy.articulated_search import hypothesis, problem
+from bench.discrepancy.articulated_search.catalogue import CATALOGUE as JOINTS
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.checks.admission import admitted
 from bench.discrepancy.effects.catalogue import CATALOGUE
@@ -91,40 +91,40 @@ def sites(case: Case, wanted: Sequence[str], *, articulated: bool) -> list[Site]
 
 def _of_structure(case: Case) -> list[Site]:
     told, _ = admitted(case, anyway=True)
-    problem = Problem(told, structure_of(told), told.identification)
+    structural = Problem(told, structure_of(told), told.identification)
     settings = CheckSettings()
     # what sits in a record or follows a clock of its own is nothing that a model can hold
     chosen = [e for e in CATALOGUE if e.site != "record" and not e.rare and e.variant == ""]
 
     def site(placed) -> Site:  # type: ignore[no-untyped-def]
         def at(size: float) -> NamedEffect | None:
-            vector = information.at_size(problem, placed, size, settings)
+            vector = information.at_size(structural, placed, size, settings)
             if vector is None:
                 return None
-            eta = vector[len(problem.nominal) :]
-            return named_effect(problem, placed, eta, np.zeros(len(eta)), {})
+            eta = vector[len(structural.nominal) :]
+            return named_effect(structural, placed, eta, np.zeros(len(eta)), {})
 
         where = placed.place.site or placed.place.name or placed.target
         return Site(placed.effect.name, where, frozenset({where, placed.place.name, placed.target}), at)
 
-    return [site(p) for p in placements(told, problem.structure, chosen) if not p.source]
+    return [site(p) for p in placements(told, structural.structure, chosen) if not p.source]
 
 
 def _of_joints(case: Case) -> list[Site]:
     own, model, said = admitted_joints(case)
     if own is None or model is None:
         raise ParameterError(f"the case cannot be rehearsed: {said[0]}")
-    problem = joints.ArticulatedProblem.of(own, model, own.identification)
+    found = problem.ArticulatedProblem.of(own, model, own.identification)
     settings = CheckSettings()
 
-    def site(placed: joints.Placed) -> Site:
-        joint = problem.joints[placed.joint]
+    def site(placed: hypothesis.Placed) -> Site:
+        joint = found.joints[placed.joint]
 
         def at(size: float) -> NamedEffect | None:
-            vector = joint_information.at_size(problem, placed, size, settings)
+            vector = joint_information.at_size(found, placed, size, settings)
             if vector is None:
                 return None
-            values = joints.placed_values(placed, vector[len(problem.nominal) :])
+            values = hypothesis.placed_values(placed, vector[len(found.nominal) :])
             estimates = {
                 p.name: Estimate(float(values[p.name]), 0.0, placed.effect.unit(p, joint.unit))
                 for p in placed.effect.parameters
@@ -135,4 +135,4 @@ def _of_joints(case: Case) -> list[Site]:
 
         return Site(placed.effect.name, placed.where, frozenset({placed.where, joint.name}), at)
 
-    return [site(p) for p in joints.placements(problem, articulated.CATALOGUE)]
+    return [site(p) for p in problem.placements(found, JOINTS)]

@@ -21,7 +21,7 @@ from bench.discrepancy.application.linear_replay import LinearReplay
 from bench.discrepancy.application.running import Window, controls, hook_of, run, sampled
 from bench.discrepancy.application.target import PREFIX
 from bench.discrepancy.application.verification import VerificationSettings
-from bench.discrepancy.articulated.diagnosis import applies
+from bench.discrepancy.articulated.recognition import applies
 from bench.discrepancy.case.case import Case, CaseChannel, CaseRecord
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.multibody.channels import bound
