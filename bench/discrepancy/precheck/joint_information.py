@@ -11,6 +11,7 @@ from collections.abc import Collection
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.discrepancy.articulated.free_runs import FreeRuns
 from bench.discrepancy.articulated_search.catalogue import CATALOGUE
 from bench.discrepancy.articulated_search.hypothesis import Placed
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem, placements
@@ -78,14 +79,15 @@ def at_size(
     points = grid(placed, servo=bool(drive and drive.servo), sides=(0.0,))
     zero = np.zeros(len(problem.nominal))
     reached = problem.reached((placed,))
-    before = [[problem.free_run(j, (), zero, record) for j in reached] for record in problem.records]
+    runs_of = FreeRuns(problem)
+    before = [[runs_of.errors(j, (), zero, record) for j in reached] for record in problem.records]
 
     def change(eta: Array) -> float | None:
         vector = np.concatenate([zero, eta])
         most = 0.0
         for runs, record in zip(before, problem.motions((placed,), vector), strict=True):
             for j, old in zip(reached, runs, strict=True):
-                new = problem.free_run(j, (placed,), vector, record)
+                new = runs_of.errors(j, (placed,), vector, record)
                 if not np.isfinite(new).all():
                     return None
                 n = min(len(new), len(old))  # an elastic drive leaves its first window out
