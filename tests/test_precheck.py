@@ -12,7 +12,8 @@ import pytest
 from bench.cli import main
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
-from planted_faults import FAULTS, check_one, measured
+from planted_faults import FAULTS, check_one
+from planted_machines import measured
 
 
 @pytest.mark.slow

@@ -26,6 +26,7 @@ from bench.cli.installation import Doctor, Example
 from bench.cli.joints import Compare, Export, Identify, Swap
 from bench.cli.monitoring import Monitor
 from bench.cli.records import Convert, Plot
+from bench.cli.rehearsal import Design, Rehearse
 from bench.cli.rigs import Demo, Laws, Simulate, View
 from bench.cli.schema import Schema
 from bench.cli.studies import Campaign, Reproduce
@@ -45,6 +46,8 @@ COMMANDS: dict[str, type] = {
     "excite": Excite,
     "init": Init,
     "check": Check,
+    "design": Design,
+    "rehearse": Rehearse,
     "diagnose": Diagnose,
     "apply": Apply,
     "blind": Blind,

@@ -13,8 +13,11 @@ import numpy as np
 
 from bench.errors import BenchError, FileFormatError
 from bench.limits import READING_LIMITS, ReadingLimits, size_text
-from bench.record_files.column_map import Variable
+from bench.record_files.column_map import Variable, name_and_unit
 from bench.record_files.mat_claims import check_claims
+
+UNITS = "units"
+"""Array of texts "CHANNEL [UNIT]" that tells the units of the other arrays, as `plain_writing` writes it."""
 
 
 def read_npz(
@@ -45,13 +48,13 @@ def read_npz(
             left = limits.numbers
             for info in members:
                 name = info.filename.removesuffix(".npy")
-                if wanted is not None and not wanted(name):
+                if wanted is not None and name != UNITS and not wanted(name):
                     variables[name] = Variable(np.empty(0))
                     continue
                 array = _member(path, archive, info, left)
                 left -= array.size
                 variables[name] = Variable(array)
-            return variables
+            return _with_units(variables)
     except BenchError:
         raise
     # zipfile and numpy raise what their documentation does not list (RuntimeError of an encrypted member, struct.error, …)
@@ -116,7 +119,23 @@ def read_mat(path: Path, *, limits: ReadingLimits = READING_LIMITS) -> dict[str,
     for name, value in contents.items():
         if not name.startswith("__"):
             _flatten(name, value, variables, limits.depth)
-    return variables
+    texts = np.ravel(contents.get(UNITS, ()))
+    if len(texts) and all(isinstance(text, str) for text in texts):
+        variables[UNITS] = Variable(texts.astype(str))
+    return _with_units(variables)
+
+
+def _with_units(variables: dict[str, Variable]) -> dict[str, Variable]:
+    """The arrays with the units that one of them tells; all as they are where it is something else."""
+    texts = variables.get(UNITS)
+    if texts is None or np.asarray(texts.values).dtype.kind != "U":
+        return variables
+    told = dict(name_and_unit(str(text)) for text in np.ravel(texts.values))
+    return {
+        name: variable._replace(unit=variable.unit or told.get(name, ""))
+        for name, variable in variables.items()
+        if name != UNITS
+    }
 
 
 def _flatten(name: str, value: Any, into: dict[str, Variable], depth: int) -> None:

@@ -20,7 +20,7 @@ def write_record(path: str | Path, recording: Recording) -> None:
     """Write a record in the format of its suffix, whole or not at all.
 
     CSV has 17 significant digits, which read back to the bit. npz and MAT hold `time`, one array a channel (in MAT under a name that
-    MATLAB takes), and `units`, one text a channel.
+    MATLAB takes), and `units`, one text "CHANNEL [UNIT]" a channel, from which the units are read back.
 
     Raises:
         FileFormatError: No such suffix.
@@ -56,7 +56,7 @@ def _npz(recording: Recording) -> bytes:
     np.savez_compressed(
         stream,
         time=recording.time,
-        units=np.array([channel.unit for channel in recording.channels]),
+        units=np.array([f"{channel.name} [{channel.unit}]" for channel in recording.channels]),
         **arrays,  # type: ignore[arg-type]
     )
     return stream.getvalue()
@@ -68,7 +68,8 @@ def _mat(recording: Recording) -> bytes:
     stream = io.BytesIO()
     names = [_matlab_name(channel.name) for channel in recording.channels]
     arrays = {name: recording.values[:, k] for k, name in enumerate(names)}
-    units = np.array([channel.unit for channel in recording.channels], dtype=object)
+    headings = [f"{name} [{channel.unit}]" for name, channel in zip(names, recording.channels, strict=True)]
+    units = np.array(headings, dtype=object)
     savemat(stream, {"time": recording.time, "units": units, **arrays}, oned_as="column")
     return stream.getvalue()
 

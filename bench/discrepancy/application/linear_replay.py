@@ -76,6 +76,12 @@ class LinearReplay:
             out[name] = error if np.isfinite(error).all() else np.full(len(error), DIVERGED_GAP)
         return out
 
+    def readings(
+        self, applied: Applied, effects: Sequence[NamedEffect], record: CaseRecord
+    ) -> dict[str, Array]:
+        """What the response channels read (n,) when a model plays a record's loads; of wrong sensors what they say."""
+        return _read(effects, _Player(self, applied, applied.compiled()).channels(record), record)
+
 
 def _sum(values: Mapping[str, Array], channels: Sequence[tuple[str, float]]) -> Array:
     return np.sum([sign * np.asarray(values[name]) for name, sign in channels], axis=0)

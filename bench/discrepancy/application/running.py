@@ -14,6 +14,7 @@ from scipy.interpolate import CubicSpline
 from bench import native
 from bench.discrepancy.application.applying import Applied
 from bench.discrepancy.application.writing import hook_text
+from bench.discrepancy.case.acquisition import at_times
 from bench.discrepancy.case.case import CaseRecord
 
 Array = NDArray[np.float64]
@@ -43,17 +44,10 @@ def controls(
 ) -> Array:
     """Controls (steps, nu) of the actuators in `columns`, in the middle of every step; zero for the others."""
     step = float(model.opt.timestep)
-    middles = (np.arange(steps) + 0.5) * step
-    clock = np.arange(len(record)) * record.step
+    middles = (np.arange(steps) + 0.5) * step / record.step
     out = np.zeros((steps, model.nu))
     for name, samples in columns.items():
-        u = model.actuator(name).id
-        if interpolation == "zero_order_hold":
-            out[:, u] = samples[np.clip(np.searchsorted(clock, middles, side="right") - 1, 0, len(clock) - 1)]
-        elif interpolation == "band_limited":
-            out[:, u] = CubicSpline(clock, samples)(np.minimum(middles, clock[-1]))
-        else:
-            out[:, u] = np.interp(middles, clock, samples)
+        out[:, model.actuator(name).id] = at_times(samples, middles, interpolation)
     return out
 
 

@@ -20,6 +20,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft, signal
+from scipy.interpolate import CubicSpline
 
 from bench.errors import ParameterError, UnknownNameError
 
@@ -168,6 +169,16 @@ class Antialias:
         back = after[-1] + (samples[0] - after[-1]) * way
         extended = np.concatenate([np.full(pad, samples[0]), samples, after, back])
         return _filtered(extended, _gain_of(self, length, step))[pad : pad + n]
+
+
+def at_times(samples: Array, at: Array, interpolation: str) -> Array:
+    """Values (m,) of a load (n,) at times (m,) counted in samples, as it ran between them; its last value beyond its end."""
+    if interpolation == "zero_order_hold":
+        return samples[np.clip(np.floor(at + 1e-9).astype(np.int64), 0, len(samples) - 1)]
+    clock = np.arange(len(samples))
+    if interpolation == "band_limited":
+        return np.asarray(CubicSpline(clock, samples)(np.clip(at, 0.0, clock[-1])), dtype=np.float64)
+    return np.interp(at, clock, samples)
 
 
 def _filtered(samples: Array, gain: NDArray[np.complex128]) -> Array:

@@ -55,11 +55,12 @@ class _Channels(NamedTuple):
     sample_rate: float
 
 
-def read_case(folder: str | Path) -> Case:
+def read_case(folder: str | Path, *, planned: bool = False) -> Case:
     """Read a case folder.
 
     Args:
         folder: Folder with ``nominal.json`` and the records.
+        planned: Whether the records are only planned: they hold what is to be commanded, and responses that they lack are zero.
 
     Raises:
         FileFormatError: A file is missing or malformed.
@@ -88,7 +89,7 @@ def read_case(folder: str | Path) -> Case:
     moving = nominal.starts_in_motion
     in_motion = set(moving) if isinstance(moving, tuple) else set()
     periodic = set(nominal.periodic)
-    files = _record_files(folder)
+    files = _record_files(folder, optional=planned)
     have = [name for group in GROUPS for name in files[group]]
     for name in sorted(periodic.union(in_motion, *(c.antialias.records for c in channels if c.antialias))):
         if name not in have:
@@ -97,7 +98,14 @@ def read_case(folder: str | Path) -> Case:
     records = {
         group: tuple(
             replace(
-                _read_record(file, name, known, units, moving is not True and name not in in_motion),
+                _read_record(
+                    file,
+                    name,
+                    known,
+                    units,
+                    at_rest=moving is not True and name not in in_motion,
+                    planned=planned,
+                ),
                 periodic=name in periodic,
             )
             for name, file in files[group].items()
@@ -124,8 +132,8 @@ def _channels_of(nominal: NominalDocument) -> tuple[CaseChannel, ...]:
     )  # fmt: skip
 
 
-def _record_files(folder: Path) -> dict[str, dict[str, Path]]:
-    """The files of each group by the name of their record.
+def _record_files(folder: Path, *, optional: bool = False) -> dict[str, dict[str, Path]]:
+    """The files of each group by the name of their record; a group may have none where they are optional.
 
     Raises:
         FileFormatError: A group has none, or a record has two.
@@ -151,7 +159,7 @@ def _record_files(folder: Path) -> dict[str, dict[str, Path]]:
                 f"'{other.name}' and '{file.name}' in '{folder}' are two files of one record '{name}'; keep one, or rename the other"
             )
     for group, records in found.items():
-        if not records:
+        if not records and not optional:
             beside = [name for name in unread if name.startswith(group)]
             hint = f" ('{beside[0]}' is none of them)" if beside else ""
             raise FileFormatError(
@@ -160,11 +168,16 @@ def _record_files(folder: Path) -> dict[str, dict[str, Path]]:
     return found
 
 
-def _read_record(file: Path, name: str, known: _Channels, units: dict[str, str], at_rest: bool) -> CaseRecord:
+def _read_record(
+    file: Path, name: str, known: _Channels, units: dict[str, str], *, at_rest: bool, planned: bool
+) -> CaseRecord:
     """One record; `units` gathers what headings say of channels whose unit ``nominal.json`` leaves open."""
-    layout = ColumnMap({c.name: c.name for c in known.channels}, time_unit=known.time_unit)
+    named = {} if planned else {c.name: c.name for c in known.channels}
+    layout = ColumnMap(named, time_unit=known.time_unit)
     try:
         contents = read_columns(file, layout, time_optional=known.sample_rate > 0.0)
+        if planned and not isinstance(contents, Recording):
+            contents = _with_responses(contents, known, file)
     except UnknownNameError as error:
         raise FileFormatError(f"'{file}' lacks a column: {error}") from None
     try:
@@ -183,6 +196,24 @@ def _read_record(file: Path, name: str, known: _Channels, units: dict[str, str],
         )
         notes = (*notes, f"columns that nominal.json does not name are not used: {listed}{more}")
     return record_from_arrays(name, time, arrays, at_rest=at_rest, notes=(*contents.notes, *notes))
+
+
+def _with_responses(contents: Columns, known: _Channels, file: Path) -> Columns:
+    """The columns of a planned record, responses that it lacks at zero.
+
+    Raises:
+        FileFormatError: It lacks a command.
+    """
+    arrays = dict(contents.arrays)
+    for channel in known.channels:
+        if channel.name in arrays:
+            continue
+        if channel.role != "response":
+            raise FileFormatError(
+                f"'{file}' lacks the column '{channel.name}' (role {channel.role}): what is to be commanded has to be there"
+            )
+        arrays[channel.name] = np.zeros(len(next(iter(arrays.values()))))
+    return contents._replace(arrays=arrays)
 
 
 def _at(file: Path, error: BenchError) -> BenchError:

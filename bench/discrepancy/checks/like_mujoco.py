@@ -18,6 +18,7 @@ from mujoco import rollout
 from numpy.typing import NDArray
 
 from bench import native
+from bench.discrepancy.case.acquisition import at_times
 from bench.discrepancy.case.case import CaseRecord
 from bench.discrepancy.checks.reference import Reference
 from bench.discrepancy.likelihood.problem import Problem
@@ -137,8 +138,9 @@ def _deviations(
 ) -> list[Deviation]:  # fmt: skip
     """Channels on which the simulations part."""
     own = problem.simulate((), np.zeros(len(problem.nominal)), record)[:length]
-    coarse = simulated(reference, model, record, length, split)
-    fine = simulated(reference, model, record, length, 2 * split)
+    between = problem.case.load_interpolation
+    coarse = simulated(reference, model, record, length, split, between)
+    fine = simulated(reference, model, record, length, 2 * split, between)
     largest = np.array([np.max(np.abs(record.values[name])) for name in reference.responses])
     beyond = np.any(np.abs(fine) > settings.reached * largest, axis=1)
     length = int(np.argmax(beyond)) if beyond.any() else length
@@ -174,7 +176,12 @@ def _rms(x: Array) -> float:
 
 @native.quiet()
 def simulated(
-    reference: Reference, model: mujoco.MjModel, record: CaseRecord, length: int, split: int
+    reference: Reference,
+    model: mujoco.MjModel,
+    record: CaseRecord,
+    length: int,
+    split: int,
+    interpolation: str = "linear",
 ) -> Array:
     """Responses (length, n_responses) of a model in MuJoCo, counted from rest, under the loads of a record.
 
@@ -184,6 +191,7 @@ def simulated(
         record: For the loads.
         length: Samples.
         split: MuJoCo's steps a sample.
+        interpolation: How loads ran between their samples, as of `Case.load_interpolation`.
     """
     variant = copy.copy(model)
     variant.opt.timestep = record.step / split
@@ -192,7 +200,7 @@ def simulated(
     )  # the middle of each step: held loads are else late by half of one
     control = np.tile(reference.control, (len(at), 1))
     for channel, (index, factor) in reference.loads.items():
-        control[:, index] += factor * np.interp(at, np.arange(len(record)), record.values[channel])
+        control[:, index] += factor * at_times(record.values[channel], at, interpolation)
     data = mujoco.MjData(variant)
     data.qpos[:] = reference.rest
     size = mujoco.mj_stateSize(variant, int(mujoco.mjtState.mjSTATE_FULLPHYSICS))
@@ -212,7 +220,8 @@ def _culprit(problem: Problem, reference: Reference, record: CaseRecord, setting
     columns = [problem.structure.channels.index(name) for name in reference.responses]
 
     def distance(model: mujoco.MjModel) -> float:
-        difference = simulated(reference, model, record, length, split) - own[:, columns]
+        found = simulated(reference, model, record, length, split, problem.case.load_interpolation)
+        difference = found - own[:, columns]
         return float(np.sum((difference / problem.noise[columns]) ** 2))
 
     whole = distance(reference.model)

@@ -134,6 +134,10 @@ def draft(
 
 
 def _articulated(model: ModelFile) -> bool:
+    """Whether drives are among what may be wrong: of a single joint on a servo, too, whose gain is then an uncertain parameter."""
+    compiled = model.compiled
+    if any(is_servo(compiled, u) for u in range(compiled.nu)):
+        return True
     return applies(
         Case("", model.path.name, (NominalParameter("", 1.0, 0.0),), (), (), (), model.path.parent)
     )

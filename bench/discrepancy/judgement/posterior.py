@@ -191,13 +191,22 @@ def effects_of(
         for placed in fitted.hypothesis:
             stop = start + len(placed.effect.parameters)
             out.append(
-                _named(problem, placed, fitted.vector[start:stop], deviations[start:stop], probabilities)
+                named_effect(
+                    problem, placed, fitted.vector[start:stop], deviations[start:stop], probabilities
+                )
             )
             start = stop
     return tuple(out)
 
 
-def _named(problem, placed: Placed, eta: np.ndarray, std: np.ndarray, probabilities) -> NamedEffect:
+def named_effect(
+    problem,
+    placed: Placed,
+    eta: np.ndarray,
+    std: np.ndarray,
+    probabilities: Mapping[tuple[str, str], float],
+) -> NamedEffect:
+    """An effect at a place with its parameters (n,), their deviations, and its probability by (name, place), one where that is not told."""
     effect, place = placed.effect, placed.place
     scales = problem.scales_of(placed)
     estimates = {}
@@ -211,7 +220,7 @@ def _named(problem, placed: Placed, eta: np.ndarray, std: np.ndarray, probabilit
     return NamedEffect(
         name=effect.name,
         where=place.name,
-        probability=probabilities[(effect.name, place.name)],
+        probability=probabilities.get((effect.name, place.name), 1.0),
         parameters=estimates,
         channel=placed.target,
         equation=effect.equation,

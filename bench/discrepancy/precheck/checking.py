@@ -17,7 +17,8 @@ from bench.discrepancy.checks.data_quality import doubts
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.precheck.information import Told, effects_told, parameters_told, shortened
-from bench.discrepancy.precheck.joints import joint_doubts
+from bench.discrepancy.precheck.joint_information import joints_told
+from bench.discrepancy.precheck.joints import admitted_joints, joint_doubts
 from bench.discrepancy.precheck.loads import load_doubts
 from bench.discrepancy.precheck.motions import motion_doubts
 from bench.discrepancy.precheck.samples import sample_doubts
@@ -104,11 +105,9 @@ def check(case: Case, settings: CheckSettings | None = None, *, informed: bool =
     found = list(sample_doubts(case, own))
     notes: tuple[str, ...] = tuple(note for note in said if note.startswith(UNUSED))
     found = [note for note in said if not note.startswith(UNUSED)] + found
-    if applies(case):
-        found += joint_doubts(case)
-        notes = (*notes, "what the records tell of parameters is not computed for an articulated model")
-        return _said(found, notes, began)
     brief = shortened(case, own.records_seconds)
+    if applies(case):
+        return _of_joints(brief, own, found, notes, began, informed=informed)
     try:
         told, admission = admitted(brief)
     except BenchError as error:
@@ -121,16 +120,48 @@ def check(case: Case, settings: CheckSettings | None = None, *, informed: bool =
     if informed:
         parameters, columns = parameters_told(problem, own)
         effects = effects_told(told, problem, columns, own)
-        nothing = [one for one in parameters if one.word == "not identifiable"]
-        if parameters and len(nothing) == len(parameters):
-            found.append(
-                "these records tell none of the nominal parameters: excite more strongly, or in another band"
-            )
-        if effects and not any(one.word == "identifiable" for one in effects):
-            found.append(
-                "these records would not show any effect of the catalogue: excite more strongly, or measure with less noise"
-            )
+        found += _of_information(parameters, effects)
     return replace(_said(found, notes, began), parameters=tuple(parameters), effects=tuple(effects))
+
+
+def _of_joints(
+    case: Case,
+    settings: CheckSettings,
+    found: list[str],
+    notes: tuple[str, ...],
+    began: float,
+    *,
+    informed: bool,
+) -> Checked:
+    """The check of an articulated model."""
+    own, model, said = admitted_joints(case)
+    found = [*found, *said]
+    if own is None or model is None:
+        return _said(found, notes, began)
+    found += joint_doubts(own, model)
+    parameters: list[Told] = []
+    effects: list[Told] = []
+    if informed:
+        try:
+            parameters, effects = joints_told(own, model, settings)
+        except BenchError as error:
+            notes = (*notes, f"what the records tell of parameters is not computed: {error}")
+        found += _of_information(parameters, effects)
+    return replace(_said(found, notes, began), parameters=tuple(parameters), effects=tuple(effects))
+
+
+def _of_information(parameters: list[Told], effects: list[Told]) -> list[str]:
+    """Doubts about records that tell too little."""
+    found = []
+    if parameters and all(one.word == "not identifiable" for one in parameters):
+        found.append(
+            "these records tell none of the nominal parameters: excite more strongly, or in another band"
+        )
+    if effects and not any(one.word == "identifiable" for one in effects):
+        found.append(
+            "these records would not show any effect of the catalogue: excite more strongly, or measure with less noise"
+        )
+    return found
 
 
 def _said(found: list[str], notes: tuple[str, ...], began: float) -> Checked:

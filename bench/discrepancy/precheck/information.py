@@ -11,7 +11,7 @@ References:
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.effects.catalogue import CATALOGUE
+from bench.discrepancy.effects.effect import FreeParameter
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.model.placements import placements
@@ -36,6 +37,14 @@ class InformationSettings:
 
     step: float = 0.1
     """Step of the differences, in sigmas of a parameter: curvature is left out, and rounding is far."""
+    secants: int = 8
+    """Most steps towards an amplitude of a stated size: most effects are nearly a power of it and need two."""
+    near_enough: float = 0.1
+    """Part of the stated size at which they end."""
+    starts: int = 6
+    """Points of a grid that are tried for one that changes anything."""
+    near: float = 0.5
+    """Part of the stated size that an amplitude has to come to, and over which it must not be as far, to stand for it."""
 
 
 SETTINGS = InformationSettings()
@@ -99,61 +108,100 @@ def parameters_told(problem: Problem, settings: CheckSettings) -> tuple[list[Tol
         if p >= len(problem.structure.parameters):
             continue
         width = float(np.sqrt(cover[k, k]))
-        word: Word = (
-            "identifiable"
-            if width <= settings.identifiable
-            else "weak"
-            if width <= settings.weak
-            else "not identifiable"
+        found.append(
+            graded_parameter(problem.structure.parameters[p], width, float(problem.spread[p]), settings)
         )
-        sigma = float(problem.spread[p] * width)
-        text = {
-            "identifiable": f"known to ± {sigma:.3g} after these records",
-            "weak": f"± {sigma:.3g} instead of ± {problem.spread[p]:.3g}: excite it more, or for longer",
-            "not identifiable": "these records say nothing of it: its stated uncertainty stays; leave it, or excite what it acts on",
-        }[word]
-        found.append(Told(problem.structure.parameters[p], "", word, width, text))
     return found, J
 
 
-def effects_told(case: Case, problem: Problem, parameters: Array, settings: CheckSettings) -> list[Told]:
-    """How well the records tell each effect of the catalogue at the size that would matter."""
+def effects_told(
+    case: Case, problem: Problem, parameters: Array, settings: CheckSettings, only: Collection[str] = ()
+) -> list[Told]:
+    """How well the records tell each effect of the catalogue, or some of them, at the size that would matter."""
     chosen = [e for e in CATALOGUE if e.site != "record" and not e.rare and e.variant == ""]
+    chosen = [e for e in chosen if not only or e.name in only]
     placed = [p for p in placements(case, problem.structure, chosen) if not p.source]
     rest = problem.residual((), np.zeros(len(problem.nominal)))
-    inner = np.linalg.inv(parameters.T @ parameters + np.eye(parameters.shape[1]))
+    gram = parameters.T @ parameters + np.eye(parameters.shape[1])
+    inner = np.asarray(np.linalg.inv(gram), dtype=np.float64)
 
     def told(one: Placed) -> Told:
-        sized = _at_size(problem, one, settings)
+        sized = at_size(problem, one, settings.matters, settings)
         where = one.place.site or one.target
         if sized is None:
-            text = f"reaches {100 * settings.matters:.0f} % of no response within these motions: larger or slower ones would show it"
-            return Told(one.effect.name, where, "not identifiable", 0.0, text)
+            return out_of_reach(one.effect.name, where, settings)
         column = problem.residual((one,), sized) - rest
         if np.shape(column) != rest.shape or not np.isfinite(column).all():
             return Told(
                 one.effect.name, where, "weak", 0.0, "drives the nominal model out of bounds at that size"
             )
-        along = parameters.T @ column
-        left = float(column @ column - along @ inner @ along)
-        imitated = 1.0 - left / max(float(column @ column), 1e-300)
-        figure = math.sqrt(max(left, 0.0))
-        word: Word = (
-            "identifiable"
-            if left >= settings.certain
-            else "weak"
-            if left >= settings.hint
-            else "not identifiable"
-        )
-        text = f"{figure:.3g} sigmas at {100 * settings.matters:.0f} % of a response"
-        if imitated > 0.9:
-            text += f"; nominal parameters imitate {100 * imitated:.0f} % of it"
-        return Told(one.effect.name, where, word, figure, text)
+        return graded_effect(one.effect.name, where, column, parameters, inner, settings)
 
-    return _best(in_threads(told, placed))
+    return best_of(in_threads(told, placed))
 
 
-def _best(found: Sequence[Told]) -> list[Told]:
+def graded_parameter(name: str, width: float, spread: float, settings: CheckSettings) -> Told:
+    """How well the records tell a nominal parameter.
+
+    Args:
+        name: The parameter.
+        width: Posterior over prior width.
+        spread: Its stated uncertainty.
+        settings: When something counts.
+    """
+    word: Word = (
+        "identifiable"
+        if width <= settings.identifiable
+        else "weak"
+        if width <= settings.weak
+        else "not identifiable"
+    )
+    sigma = spread * width
+    text = {
+        "identifiable": f"known to ± {sigma:.3g} after these records",
+        "weak": f"± {sigma:.3g} instead of ± {spread:.3g}: excite it more, or for longer",
+        "not identifiable": "these records say nothing of it: its stated uncertainty stays; leave it, or excite what it acts on",
+    }[word]
+    return Told(name, "", word, width, text)
+
+
+def graded_effect(
+    name: str, where: str, column: Array, parameters: Array, inner: Array, settings: CheckSettings
+) -> Told:
+    """How well the records tell an effect at the size that would matter.
+
+    Args:
+        name: The effect.
+        where: Its place.
+        column: Change (n,) of the whitened residuals by it.
+        parameters: Changes (n, n_parameters) by a sigma of each nominal parameter.
+        inner: ``(J'J + I)^-1`` of these.
+        settings: When something counts.
+    """
+    along = parameters.T @ column
+    left = float(column @ column - along @ inner @ along)
+    imitated = 1.0 - left / max(float(column @ column), 1e-300)
+    figure = math.sqrt(max(left, 0.0))
+    word: Word = (
+        "identifiable"
+        if left >= settings.certain
+        else "weak"
+        if left >= settings.hint
+        else "not identifiable"
+    )
+    text = f"{figure:.3g} sigmas at {100 * settings.matters:.0f} % of a response"
+    if imitated > 0.9:
+        text += f"; nominal parameters imitate {100 * imitated:.0f} % of it"
+    return Told(name, where, word, figure, text)
+
+
+def out_of_reach(name: str, where: str, settings: CheckSettings) -> Told:
+    """What is told of an effect that no amplitude of its prior makes large enough."""
+    text = f"reaches {100 * settings.matters:.0f} % of no response within these motions: larger or slower ones would show it"
+    return Told(name, where, "not identifiable", 0.0, text)
+
+
+def best_of(found: Sequence[Told]) -> list[Told]:
     """The best told of the targets of each effect and place."""
     best: dict[tuple[str, str], Told] = {}
     for one in found:
@@ -163,25 +211,71 @@ def _best(found: Sequence[Told]) -> list[Told]:
     return list(best.values())
 
 
-def _at_size(problem: Problem, placed: Placed, settings: CheckSettings) -> Array | None:
-    """The vector of an effect whose amplitude changes a response by the part that matters; None where it reaches none."""
-    eta = placed.effect.grid()[len(placed.effect.grid()) // 2].copy()
-    first = placed.effect.parameters[0]
+def at_size(problem: Problem, placed: Placed, size: float, settings: CheckSettings) -> Array | None:
+    """The vector of an effect whose amplitude changes a response by a part of its rms; None where it reaches none."""
+    eta = sized(
+        placed.effect.grid(), placed.effect.parameters[0], size, lambda x: _change(problem, placed, x), settings
+    )  # fmt: skip
+    return None if eta is None else np.concatenate([np.zeros(len(problem.nominal)), eta])
+
+
+def sized(
+    points: Sequence[Array],
+    first: FreeParameter,
+    size: float,
+    change: Callable[[Array], float | None],
+    settings: CheckSettings,
+) -> Array | None:
+    """Parameters whose amplitude changes a response by a part of its rms; None where none within its prior does.
+
+    The change is taken as a power of the amplitude, one at first: a force grows with it, a saturation shrinks.
+
+    Args:
+        points: Parameters to start from, the amplitude first; the middle one is tried first.
+        first: The amplitude.
+        size: The part.
+        change: Parameters to the part by which they change a response; None where the run diverged.
+        settings: Within how many standard deviations of its prior the amplitude is looked for.
+    """
     low, high = first.mean - settings.reach * first.std, first.mean + settings.reach * first.std
     low, high = max(low, first.bounds[0]), min(high, first.bounds[1])
-    if first.signed and eta[0] == 0.0:
-        eta[0] = first.std
-    for _ in range(3):
-        change = _change(problem, placed, eta)
-        if change is None or change <= 0.0:
+    eta, now = _moving(points, first, change)
+    power, shorter = 1.0, 1.0
+    for _ in range(SETTINGS.secants):
+        if now is None or now <= 0.0:
             return None
-        ratio = settings.matters / change
-        wanted = eta[0] * ratio if first.signed else eta[0] + math.log(ratio)
-        eta[0] = min(max(wanted, low), high)
-    change = _change(problem, placed, eta)
-    if change is None or change < 0.3 * settings.matters:
-        return None
-    return np.concatenate([np.zeros(len(problem.nominal)), eta])
+        if abs(now / size - 1.0) < SETTINGS.near_enough:
+            break
+        step = shorter * math.log(size / now) / power
+        wanted = eta[0] * math.exp(step) if first.signed else eta[0] + step
+        tried = eta.copy()
+        tried[0] = min(max(wanted, low), high)
+        then = change(tried)
+        if then is None or then <= 0.0:  # beyond where it changes anything
+            shorter *= 0.5
+            continue
+        made = math.log(tried[0] / eta[0]) if first.signed else tried[0] - eta[0]
+        if abs(made) > 1e-9:
+            found = math.log(then / now) / made
+            power = math.copysign(min(max(abs(found), 0.2), 5.0), found)
+        eta, now = tried, then
+    return None if now is None or not SETTINGS.near < now / size < 1.0 / SETTINGS.near else eta
+
+
+def _moving(
+    points: Sequence[Array], first: FreeParameter, change: Callable[[Array], float | None]
+) -> tuple[Array, float | None]:
+    """The first of some points, the middle one foremost, that changes anything, and by how much."""
+    middle = len(points) // 2
+    order = [middle, *(k for k in range(len(points)) if k != middle)][: SETTINGS.starts]
+    for k in order:
+        eta = points[k].copy()
+        if first.signed and eta[0] == 0.0:
+            eta[0] = first.std
+        now = change(eta)
+        if now is not None and now > 0.0:
+            return eta, now
+    return points[middle].copy(), None
 
 
 def _change(problem: Problem, placed: Placed, eta: Array) -> float | None:

@@ -35,10 +35,10 @@ class JointsSettings:
 SETTINGS = JointsSettings()
 
 
-def joint_doubts(case: Case) -> list[str]:
-    """What is doubtful about an articulated case, a sentence each.
+def admitted_joints(case: Case) -> tuple[Case | None, ArticulatedModel | None, list[str]]:
+    """The case as the diagnosis takes it, its model, and what is said of both; what it would refuse is said, nothing is raised.
 
-    Raises nothing: what the diagnosis would refuse is one of them.
+    Without case and model where they cannot be read at all.
     """
     found: list[str] = []
     try:
@@ -51,9 +51,19 @@ def joint_doubts(case: Case) -> list[str]:
             found.append(str(error))
             compiled = rig_of(case).model
             own = bound(case, compiled)
-        model = ArticulatedModel.of(compiled)
+        return own, ArticulatedModel.of(compiled), found
     except BenchError as error:
-        return list(dict.fromkeys((*found, " ".join(str(error).split()))))
+        return None, None, list(dict.fromkeys((*found, " ".join(str(error).split()))))
+
+
+def joint_doubts(own: Case, model: ArticulatedModel) -> list[str]:
+    """What is doubtful about the records of an articulated case, a sentence each.
+
+    Args:
+        own: The case, its channels bound to joints and actuators.
+        model: Its model.
+    """
+    found: list[str] = []
     for joint in model.joints:
         try:
             encoders = encoders_of(own, joint)
