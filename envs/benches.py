@@ -30,11 +30,13 @@ from bench.excitation.stepping import run_of
 from bench.excitation.windows import Window, advance, advance_prior, advance_rivals
 from bench.limits import READING_LIMITS, size_text
 
+from .coverage import CoverageReward
 from .laboratory import Laboratories
 from .setups import Setup
 
 ENFORCEMENTS = ("terminate", "cost")
 AVERAGES = ("prior", "posterior")
+REWARDS = ("information", "coverage")
 
 
 @dataclass(frozen=True)
@@ -65,6 +67,7 @@ class Options:
     duration: float | None = None
     enforcement: str = "terminate"
     penalty: float = 10.0
+    reward: str = "information"
     average: str = "prior"
     terminate_when_certain: bool = False
 
@@ -72,6 +75,7 @@ class Options:
         for kind, name, known in (
             ("shaping of actions", self.shaping, SHAPINGS),
             ("enforcement of limits", self.enforcement, ENFORCEMENTS),
+            ("reward", self.reward, REWARDS),
             ("average of rewards", self.average, AVERAGES),
         ):
             if name not in known:
@@ -83,6 +87,10 @@ class Options:
             if value is not None and not (_is_number(value) and value > 0.0):
                 raise ParameterError(f"{name} is {value} s; a positive number is expected")
         require_count("n_knots", self.n_knots)
+        if self.reward == "coverage" and self.terminate_when_certain:
+            raise ParameterError(
+                "terminate_when_certain came with reward='coverage', which tells nothing of rivals; reward='information' is expected"
+            )
 
 
 def require_count(name: str, value: Any, most: int | None = None) -> int:
@@ -193,6 +201,7 @@ class SteppedBenches(ABC):
         self.desk = Desk(self.station, n)
         self.truth: list[Draw | None] = [None] * n
         self._rivals = isinstance(setup.questions[0], Rivals)
+        self._coverage = CoverageReward(setup, n) if options.reward == "coverage" else None
         # The sensors' noise of an episode and, last, of the rest before it: drawn at once, which is faster.
         self._disturbance = np.zeros((n, self.n_windows + 1, self.n_steps, len(self.station.channels)))
 
@@ -238,12 +247,14 @@ class SteppedBenches(ABC):
         """
         actions = np.clip(self._checked(actions, len(places)), -1.0, 1.0)
         commands, exhausted = self.desk.commands(places, actions)
+        if self._coverage is not None:
+            self._coverage.begin(places[self.desk.window[places] == 0])
         measured, lost = self._measured(places, commands)
         reached = self.desk.book(places, measured)
         reached[lost] = SETTINGS.lost
         self.desk.window[places] += 1
         observation = self.desk.observe(places, measured, commands, actions, self.question)
-        gain, effective = self._told(places, measured)
+        gain, effective = self._worth(places, measured)
         over = reached > 1.0
         stop = lost | (over[:, 0] & (self.options.enforcement == "terminate"))
         excess = np.minimum(np.maximum(reached - 1.0, 0.0), 1.0).sum(axis=1)
@@ -266,6 +277,16 @@ class SteppedBenches(ABC):
             "violation": over.any(axis=1),
         }
         return Outcome(observation, gain - cost, terminated, truncated, info)
+
+    def _worth(
+        self, places: NDArray[np.int64], measured: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Growth of the merit by the window that was run last [nat], and effective number of draws ``(m,)``."""
+        if self._coverage is None:
+            return self._told(places, measured)
+        gain = self._coverage.gain(places, measured)
+        self._merit[places] += gain
+        return gain, self.effective_draws(places)
 
     def _checked(self, actions: NDArray, m: int) -> NDArray[np.float64]:
         given = np.asarray(actions)
@@ -407,7 +428,8 @@ class Benches(SteppedBenches):
     def _measured(
         self, places: NDArray[np.int64], commands: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        self._account = self._opened(places, commands)  # of which other threads take care meanwhile
+        if self._coverage is None:
+            self._account = self._opened(places, commands)  # of which other threads take care meanwhile
         ideal = self._laboratories.run(places, commands)
         noise = self._noise * self._disturbance[places, self.desk.window[places] % self.n_windows]
         return sensed(ideal, noise)
