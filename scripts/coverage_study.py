@@ -75,7 +75,7 @@ def unseen() -> dict[str, Excitation]:
 
 def _memory(data: JointData) -> Element:
     assert data.time is not None
-    model = fit_memory(data.states, data.forces, time=data.time, refine=6)
+    model = fit_memory(data.states, data.forces, time=data.time, form="sliders", refine=6)
     return Element(model.law, laboratory.AXES, model.theta, name="joint")
 
 
@@ -120,10 +120,8 @@ def rows_of(seed: int, progress: Callable[[str], None]) -> list[Row]:
         for name, fit in MODELS.items():
             progress(f"seed {seed}: {label}, {name}")
             element = fit(data)
-            for test in tests:
-                worst, _ = closed_loop(
-                    bench._replace(tests={test: tests[test]}), (element,), true.elements
-                )
+            for test, judged in tests.items():
+                worst, _ = closed_loop(bench._replace(tests={test: judged}), (element,), true.elements)
                 found.append({"seed": seed, "set": label, "model": name, "test": test, "nmse": worst})
     return found
 
@@ -138,7 +136,11 @@ def summary(rows: list[Row]) -> list[Row]:
             by_test = {t: [r["nmse"] for r in own if r["test"] == t] for t in unseen()}
             entry |= {test: float(np.median(values)) for test, values in by_test.items()}
             worst = np.max(list(by_test.values()), axis=0)
-            entry |= {"worst": float(np.median(worst)), "least": float(worst.min()), "largest": float(worst.max())}
+            entry |= {
+                "worst": float(np.median(worst)),
+                "least": float(worst.min()),
+                "largest": float(worst.max()),
+            }
             found.append(entry)
     return found
 
@@ -169,7 +171,9 @@ def drawn(lines: list[Row]) -> Figure:
             own = [line for line in lines if line["set"] == label]
             x = np.arange(len(own)) + 0.18 * (place - 0.5 * (len(labels) - 1))
             middle = np.array([line["worst"] for line in own])
-            ends = np.array([[line["worst"] - line["least"], line["largest"] - line["worst"]] for line in own]).T
+            ends = np.array(
+                [[line["worst"] - line["least"], line["largest"] - line["worst"]] for line in own]
+            ).T
             axes.errorbar(x, middle, ends, fmt="o", color=COLOURS[place], label=label, capsize=3)
         axes.set_yscale("log")
         axes.set_xticks(np.arange(len(MODELS)), list(MODELS))

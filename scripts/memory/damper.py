@@ -21,7 +21,7 @@ from memory.row import Progress, Row
 
 _RATE_INDEPENDENT = {"unequal": True, "cells": 0, "knots": 0, "substeps": 1}
 FORMS = {
-    "memory, sliders": MemorySettings(slips=8, smallest=0.02, parts=8, **_RATE_INDEPENDENT),
+    "memory, sliders": MemorySettings(form="sliders", slips=8, smallest=0.02, parts=8, **_RATE_INDEPENDENT),
     "memory, profiles": MemorySettings(form="profiles", slips=2, parts=12, **_RATE_INDEPENDENT),
 }
 

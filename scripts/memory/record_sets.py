@@ -95,7 +95,9 @@ def _loads(rng: np.random.Generator) -> list[Array]:
         high = max(high, low + 2.0 / seconds)  # two lines of the spectrum at least
         level = float(np.exp(rng.uniform(*np.log(SETTINGS.levels))))
         noise = BandLimitedNoise(low=low, cutoff=high, peak=peak * level)
-        signal: Signal = Constant(0.0) if off else Tapered(noise, fade_in=SETTINGS.fade, fade_out=SETTINGS.fade)
+        signal: Signal = (
+            Constant(0.0) if off else Tapered(noise, fade_in=SETTINGS.fade, fade_out=SETTINGS.fade)
+        )
         found.append(signal.sample(round(seconds * rate), rate, rng))
     return found
 
@@ -140,7 +142,7 @@ def sets(true: Rig, seed: int, timestep: float, progress: Progress) -> Sets:
     pilot = simulate(true, both, rng=np.random.default_rng(noise[0]), sample_rate=laboratory.SETUP.rate)
     progress("a rough joint from the first record")
     data = laboratory.view(laboratory.measured(pilot, rng))
-    rough = fit_memory(data.states, data.forces, time=data.time, refine=0)
+    rough = fit_memory(data.states, data.forces, time=data.time, form="sliders", refine=0)
     twin = laboratory.rig().with_(elements=(Element(rough.law, laboratory.AXES, rough.theta, name="joint"),))
     pool = candidates(rng)
     progress(f"motions under {len(pool)} candidates")

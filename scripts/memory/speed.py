@@ -46,7 +46,10 @@ def rows(progress: Progress) -> list[Row]:
     data = laboratory.view(*records)
     assert data.time is not None
     found = []
-    for label, changes in (("memory, sliders", {}), ("memory, profiles", {"form": "profiles", "slips": 2})):
+    for label, changes in (
+        ("memory, sliders", {"form": "sliders"}),
+        ("memory, profiles", {"form": "profiles"}),
+    ):
         model = fit_memory(data.states, data.forces, time=data.time, **changes)
         element = Element(model.law, laboratory.AXES, model.theta, name="joint")
         for integrator in ("RK4", "implicitfast"):
