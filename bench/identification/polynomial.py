@@ -461,7 +461,7 @@ def fit_polynomial(
         range=ValidityRange.of(s),
         report=pending,
         mass=mass,
-        beyond=_beyond(f, scale) if bounded else None,
+        beyond=slopes_beyond(f, scale) if bounded else None,
     )
     estimated = model.predict(s) + (0.0 if mass is None else a @ mass.T)
     return replace(
@@ -469,7 +469,7 @@ def fit_polynomial(
     )
 
 
-def _beyond(forces: NDArray[np.float64], scale: NDArray[np.float64]) -> NDArray[np.float64]:
+def slopes_beyond(forces: NDArray[np.float64], scale: NDArray[np.float64]) -> NDArray[np.float64]:
     """Stiffness and damping (2, k) that outweigh the largest force met one half-range beyond the edge of the range."""
     largest = np.max(np.abs(forces), axis=0)
     return frozen(largest / scale.reshape(2, -1))
