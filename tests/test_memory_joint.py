@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import ast
 from dataclasses import replace
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -269,6 +273,28 @@ def test_bounded_polynomial_is_of_the_forces_size_in_corners_without_records() -
     assert sizes[None] < min(2.0, 0.5 * sizes[0.0])
     with pytest.raises(ParameterError, match="assumed"):
         fit_polynomial(states, forces, assumed=-1.0)
+
+
+@pytest.mark.parametrize(
+    "task", ["laboratory", "damper", "benchmark", "chain", "passivity", "speed", "record_sets"]
+)
+def test_tasks_of_the_comparison_use_names_that_there_are(task: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    scripts = Path(__file__).resolve().parents[1] / "scripts"
+    monkeypatch.syspath_prepend(str(scripts))
+    module = import_module(f"memory.{task}")
+    # what a task takes of the rooms it imports as a whole
+    tree = ast.parse((scripts / "memory" / f"{task}.py").read_text(encoding="utf-8"))
+    taken = [
+        (node.value.id, node.attr)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name)
+    ]
+    rooms = [
+        (name, attribute) for name, attribute in taken if isinstance(getattr(module, name, None), ModuleType)
+    ]
+    assert [
+        f"{name}.{attribute}" for name, attribute in rooms if not hasattr(getattr(module, name), attribute)
+    ] == []
 
 
 def test_refuses_what_does_not_fit() -> None:

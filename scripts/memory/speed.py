@@ -39,7 +39,8 @@ def rows(progress: Progress) -> list[Row]:
     rig, rng = laboratory.rig_with_friction(), np.random.default_rng(70)
     records = [
         laboratory.measured(
-            simulate(rig, laboratory.drive(loaded), rng=np.random.default_rng(laboratory.SEEDS[name])), rng
+            simulate(rig, laboratory.drive(loaded), rng=np.random.default_rng(laboratory.SETUP.seeds[name])),
+            rng,
         )
         for name, loaded in LOADINGS.items()
     ]
