@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from itertools import combinations
-from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
@@ -22,8 +20,18 @@ Form = Literal["sliders", "profiles"]
 FORMS: tuple[Form, ...] = ("sliders", "profiles")
 """The forms of a joint with memory."""
 
-SLIPS: Mapping[Form, int] = MappingProxyType({"sliders": 14, "profiles": 2})
-"""Slip elements along a direction: sliders a factor of 1.5 apart in range; of profiles one more than a Bouc-Wen law has."""
+
+@dataclass(frozen=True)
+class SlipSettings:
+    """Slip elements along a direction where their number was not said."""
+
+    sliders: int = 14
+    """A factor of 1.5 apart in range."""
+    profiles: int = 2
+    """One more than a Bouc-Wen law has."""
+
+
+SLIPS = SlipSettings()
 
 
 @dataclass(frozen=True)
@@ -86,7 +94,7 @@ class MemorySettings:
 
     def of_form(self, form: Form) -> MemorySettings:
         """The settings of one form, with its number of slip elements."""
-        return replace(self, form=form, slips=SLIPS[form] if self.slips is None else self.slips)
+        return replace(self, form=form, slips=getattr(SLIPS, form) if self.slips is None else self.slips)
 
 
 def _directions(settings: MemorySettings, s: Array) -> tuple[Direction, ...]:

@@ -29,7 +29,8 @@ from scipy.linalg.lapack import dgeqrf
 from threadpoolctl import threadpool_limits
 
 from bench.errors import FileFormatError, IdentificationError, ParameterError, RangeWarning
-from bench.identification.surroundings import ASSUMED, surroundings
+from bench.identification.surroundings import SETTINGS as SURROUNDINGS
+from bench.identification.surroundings import surroundings
 from bench.laws.base import ForceLaw
 from bench.laws.polynomial import Basis, Kind, polynomial_exponents, polynomial_law
 
@@ -424,7 +425,7 @@ def fit_polynomial(
         raise ParameterError(
             "a bounded polynomial came with normalise=False; its range is that of the normalised states"
         )
-    weight = (ASSUMED if bounded else 0.0) if assumed is None else assumed
+    weight = (SURROUNDINGS.weight if bounded else 0.0) if assumed is None else assumed
     if min(ridge, weight) < 0.0:
         raise ParameterError(f"ridge {ridge:g} and assumed {weight:g} came; 0 or more are expected")
     centre, scale = centre_and_scale(s) if normalise else (np.zeros(s.shape[1]), np.ones(s.shape[1]))

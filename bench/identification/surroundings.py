@@ -4,7 +4,7 @@ A polynomial is free wherever its records were not: in the corners of their box 
 tensor of order 3 is larger than any force by orders, and a closed loop that comes near is driven on by whatever force stands there. So
 the fit is shown these places too. At points spread evenly over the box the force is taken as that of the nearest sample, continued
 by a spring and a damper on each coordinate, both positive: the ones that explain the records best. It is a weak opinion
-(`ASSUMED`), which the records outweigh wherever there are any.
+(`SurroundingsSettings.weight`), which the records outweigh wherever there are any.
 
 Networks do without: the same points doubled the error of ones of 20 units and more, on the records and in closed loop.
 
@@ -31,19 +31,19 @@ class SurroundingsSettings:
     """Numbers of `bench.identification.surroundings`.
 
     Attributes:
+        weight: Weight of what is assumed, all of it over all samples of the records, in a fit: on the joint rig's records, the
+            outermost tenth of the samples held out, a tensor of order 3 and a polynomial of total degree 5 are near their least error
+            out there from 1e-3 on (180 and 8 % without, 9 and 5 % with it), and lose little within. In the chain of D3, under three
+            loads of other seeds than the item's, a decade less doubles the tensor's errors of force at least, two decades more raise
+            them by a third.
         samples: Most samples that a nearest one is sought among.
     """
 
+    weight: float = 1e-3
     samples: int = 20_000
 
 
 SETTINGS = SurroundingsSettings()
-
-ASSUMED = 1e-3
-"""Weight of what is assumed, all of it over all samples of the records, in a fit: on the joint rig's records, the outermost tenth of
-the samples held out, a tensor of order 3 and a polynomial of total degree 5 are near their least error out there from 1e-3 on (180 and 8 %
-without, 9 and 5 % with it), and lose little within. In the chain of D3, under three loads of other seeds than the item's, a decade less
-doubles the tensor's errors of force at least, two decades more raise them by a third."""
 
 
 class Surroundings(NamedTuple):
