@@ -220,8 +220,9 @@ def run(progress: Progress) -> Item:
         "the joint differs, and errors feed back through the structure. The full tensor of order 3, "
         "which fits the forces to some 10 %, runs away in closed loop as soon as a state leaves its "
         "data; a polynomial of total degree 5 with half as many coefficients does not. Held at the edge of their data, with a spring "
-        "and a damper beyond, and the polynomial told besides what is assumed in the corners that no record reached, both stay: "
-        "what a network says beyond its data depends on the random start that won. (An answer of no "
+        "and a damper beyond, and the polynomial told besides what is assumed in the corners that no record reached, neither runs away. "
+        "What a network says beyond its data, and in their corners, depends on the random start that won: this one's torque there is "
+        "several times too large, and its error on the samples held out does not show it. (An answer of no "
         f"force at all would score {both['training']:.0f} %.)"
     )
     searched = "total degree of the second polynomial, because the printed form diverges; seeds and band of the loads, and the "
