@@ -122,7 +122,8 @@ def rows_of(seed: int, progress: Callable[[str], None]) -> list[Row]:
             element = fit(data)
             for test, judged in tests.items():
                 worst, _ = closed_loop(bench._replace(tests={test: judged}), (element,), true.elements)
-                found.append({"seed": seed, "set": label, "model": name, "test": test, "nmse": worst})
+                row = {"seed": seed, "set": label, "model": name, "test": test, "nmse": worst}
+                found.append(row | {"covered": planned.covered.get(label)})
     return found
 
 
