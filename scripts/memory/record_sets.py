@@ -105,10 +105,10 @@ def _loads(rng: np.random.Generator) -> list[Array]:
 def played(pieces: list[Piece]) -> Excitation:
     """Pieces one after the other."""
     rate = laboratory.SETUP.rate
+    seconds = tuple(len(piece.force) / rate for piece in pieces)
     signals = {}
     for name in ("force", "torque"):
         parts = [getattr(piece, name) for piece in pieces]
-        seconds = tuple(len(part) / rate for part in parts)
         signals[name] = Concatenation(tuple(Record(part, rate) for part in parts), seconds)
     return Excitation(signals, duration=sum(seconds), sample_rate=rate)
 
