@@ -5,7 +5,7 @@ Three steps, each through what the law itself does along the measured motion:
 1. A dictionary of slip elements of ranges spread logarithmically over the motion, beside potentials and damping along every
    direction: all weights by non-negative least squares (`bench.identification.memory_terms`), which leaves few of them above zero.
    How smooth neighbouring weights are is chosen on segments held out.
-2. Terms that add nothing are dropped.
+2. MemoryTerms that add nothing are dropped.
 3. Ranges, profiles and relaxation times are refined by separable least squares: a step changes them, the hidden states are
    integrated anew, and the weights that belong to them are solved for. Nothing restricts how they enter, since the states do not
    depend on the weights.
@@ -32,10 +32,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bench.errors import FileFormatError, IdentificationError
+from bench.identification.fit_data import checked_data, nmse_percent, read_only
 from bench.identification.memory_refinement import refined
 from bench.identification.memory_settings import FORMS, Form, MemorySettings, dictionary
-from bench.identification.memory_terms import JointRecord, Terms, fold, smoothness, solve
-from bench.identification.polynomial import ValidityRange, checked_data, frozen, nmse_percent
+from bench.identification.memory_terms import MemoryRecord, MemoryTerms, fold, smoothness, solve
+from bench.identification.validity_range import ValidityRange
 from bench.laws.base import ForceLaw
 from bench.laws.evaluate import evaluate
 from bench.laws.memory import memory_law
@@ -100,7 +101,7 @@ class MemoryModel:
     @cached_property
     def theta(self) -> Array:
         """Header and parameters, as an element takes them."""
-        return frozen(self.law.theta(self.parameters))
+        return read_only(self.law.theta(self.parameters))
 
     def predict(self, states: ArrayLike, *, time: ArrayLike, substeps: int = 4) -> Array:
         """Restoring forces (n, k) [N, N m] along a motion that begins at rest in the joint's virgin state.
@@ -151,10 +152,10 @@ class MemoryModel:
             report["nmse"] = tuple(report["nmse"])
             report["tried"] = tuple((name, loss) for name, loss in report.get("tried", ()))
             parameters = memory_law(layout).theta(values["parameters"])[len(values["header"]) :]
-            mass = None if values["mass"] is None else frozen(values["mass"])
+            mass = None if values["mass"] is None else read_only(values["mass"])
             return cls(
                 layout,
-                frozen(parameters),
+                read_only(parameters),
                 ValidityRange.from_dict(values["range"]),
                 MemoryReport(**report),
                 mass,
@@ -225,8 +226,8 @@ def fit_memory(
     ]  # fmt: skip
     best = min(tried, key=lambda shape: shape.held_out)
     terms, weights, steps = _shaped(best.terms, records, spreads, chosen, best.strength)
-    parameters = frozen(terms.parameters(weights))
-    mass = frozen(weights[len(weights) - k :]) if a.shape[1] else None
+    parameters = read_only(terms.parameters(weights))
+    mass = read_only(weights[len(weights) - k :]) if a.shape[1] else None
     report = MemoryReport(
         (), best.held_out, best.n_weights, len(parameters), len(memory_law(terms.layout).states), best.strength,
         best.steps + steps, 0.0, best.form, tuple((shape.form, shape.held_out) for shape in tried if len(tried) > 1),
@@ -238,7 +239,7 @@ def fit_memory(
     return replace(model, report=report)
 
 
-def _records(t: Array, s: Array, f: Array, a: Array, settle: float, most: int) -> list[JointRecord]:
+def _records(t: Array, s: Array, f: Array, a: Array, settle: float, most: int) -> list[MemoryRecord]:
     """The records, with evenly spread samples to be fitted."""
     k = f.shape[1]
     pieces = runs(t)
@@ -247,7 +248,7 @@ def _records(t: Array, s: Array, f: Array, a: Array, settle: float, most: int) -
     for i, j in pieces:
         used = np.arange(0, j - i, stride)
         used = used[t[i:j][used] - t[i] >= settle]
-        found.append(JointRecord(t[i:j], s[i:j, :k], s[i:j, k:], f[i:j], a[i:j], used))
+        found.append(MemoryRecord(t[i:j], s[i:j, :k], s[i:j, k:], f[i:j], a[i:j], used))
     if not sum(len(record.used) for record in found):
         raise IdentificationError(f"no sample is left after a settling time of {settle:g} s; shorten it")
     return found
@@ -268,7 +269,7 @@ class _Shape(NamedTuple):
     """A form after what held-out segments have to say of it."""
 
     form: Form
-    terms: Terms
+    terms: MemoryTerms
     strength: float  # of smoothing
     held_out: float  # [%]
     n_weights: int
@@ -278,9 +279,9 @@ class _Shape(NamedTuple):
 def _tried(
     form: Form,
     settings: MemorySettings,
-    records: Sequence[JointRecord],
+    records: Sequence[MemoryRecord],
     spreads: Array,
-    terms: Terms,
+    terms: MemoryTerms,
     *,
     rivals: bool,
 ) -> _Shape:
@@ -297,8 +298,12 @@ def _tried(
 
 
 def _shaped(
-    terms: Terms, records: Sequence[JointRecord], spreads: Array, settings: MemorySettings, strength: float
-) -> tuple[Terms, Array, int]:
+    terms: MemoryTerms,
+    records: Sequence[MemoryRecord],
+    spreads: Array,
+    settings: MemorySettings,
+    strength: float,
+) -> tuple[MemoryTerms, Array, int]:
     """The terms that add something, refined, their weights, and the evaluations that took."""
     terms, weights = _pruned(terms, records, spreads, settings, strength)
     steps = 0
@@ -308,7 +313,7 @@ def _shaped(
     return terms, weights, steps
 
 
-def _split(records: Sequence[JointRecord]) -> tuple[list[JointRecord], list[JointRecord]]:
+def _split(records: Sequence[MemoryRecord]) -> tuple[list[MemoryRecord], list[MemoryRecord]]:
     """The records with the samples that are fitted, and with those held out: every fourth of ten segments of each."""
     fitted, held = [], []
     for record in records:
@@ -321,8 +326,12 @@ def _split(records: Sequence[JointRecord]) -> tuple[list[JointRecord], list[Join
 
 
 def _pruned(
-    terms: Terms, records: Sequence[JointRecord], spreads: Array, settings: MemorySettings, strength: float
-) -> tuple[Terms, Array]:
+    terms: MemoryTerms,
+    records: Sequence[MemoryRecord],
+    spreads: Array,
+    settings: MemorySettings,
+    strength: float,
+) -> tuple[MemoryTerms, Array]:
     """The terms without those that add nothing, and their weights."""
     factor = fold(terms, records, spreads)
     weights = solve(factor, smoothness(terms, factor, strength))
