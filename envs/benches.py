@@ -140,7 +140,8 @@ class Benches(SteppedBenches):
     def _measured(
         self, places: NDArray[np.int64], commands: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        self._account = self._opened(places, commands)  # of which other threads take care meanwhile
+        if self._coverage is None:
+            self._account = self._opened(places, commands)  # of which other threads take care meanwhile
         ideal = self._laboratories.run(places, commands)
         noise = self._noise * self._disturbance[places, self.desk.window[places] % self.n_windows]
         return sensed(ideal, noise)

@@ -16,6 +16,8 @@ ENFORCEMENTS = ("terminate", "cost")
 
 AVERAGES = ("prior", "posterior")
 
+REWARDS = ("information", "coverage")
+
 
 @dataclass(frozen=True)
 class Options:
@@ -27,6 +29,7 @@ class Options:
     duration: float | None = None
     enforcement: str = "terminate"
     penalty: float = 10.0
+    reward: str = "information"
     average: str = "prior"
     terminate_when_certain: bool = False
 
@@ -34,6 +37,7 @@ class Options:
         for kind, name, known in (
             ("shaping of actions", self.shaping, SHAPINGS),
             ("enforcement of limits", self.enforcement, ENFORCEMENTS),
+            ("reward", self.reward, REWARDS),
             ("average of rewards", self.average, AVERAGES),
         ):
             if name not in known:
@@ -45,6 +49,10 @@ class Options:
             if value is not None and not (is_number(value) and value > 0.0):
                 raise ParameterError(f"{name} is {value} s; a positive number is expected")
         require_count("n_knots", self.n_knots)
+        if self.reward == "coverage" and self.terminate_when_certain:
+            raise ParameterError(
+                "terminate_when_certain came with reward='coverage', which tells nothing of rivals; reward='information' is expected"
+            )
 
 
 def require_count(name: str, value: Any, most: int | None = None) -> int:

@@ -171,6 +171,8 @@ class SDOFExcitationEnv(BenchEnv):
     record so far, whitened by the noise and by the prior's standard deviations, so that directions of the parameter space that
     the record leaves open add nothing. It is averaged over a fixed set of prior draws, never taken at the hidden rig:
     with `average="prior"` with the prior's weights; with "posterior" with weights that follow from the measurements so far.
+    With `reward="coverage"` the merit is that of `bench.excitation.Coverage` instead: cells of state and memory, within the
+    limits of stroke and velocity, that the measured motion has entered. It needs no draws and knows of no law.
 
     | Limit | Value | What happens |
     |---|---|---|
@@ -204,6 +206,7 @@ class SDOFExcitationEnv(BenchEnv):
     | `duration` | 8 s | duration of an episode |
     | `enforcement` | "terminate" | or "cost": what passing the stroke limit does |
     | `penalty` | 10 nat | size of the cost |
+    | `reward` | "information" | or "coverage": of the states and the memory of a joint of unknown kind |
     | `average` | "prior" | or "posterior": weights of the draws in the reward |
     | `n_draws` | two a law | prior draws in the reward |
     | `render_mode` | None | "rgb_array" or "human" |

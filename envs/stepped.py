@@ -14,6 +14,7 @@ from bench.errors import ParameterError
 from bench.excitation import Draw, Rivals
 from bench.excitation.station import Desk
 
+from .coverage import CoverageReward
 from .options import Options, check_size
 from .setups import Setup
 
@@ -114,6 +115,7 @@ class SteppedBenches(ABC):
         self.desk = Desk(self.station, n)
         self.truth: list[Draw | None] = [None] * n
         self._rivals = isinstance(setup.questions[0], Rivals)
+        self._coverage = CoverageReward(setup, n) if options.reward == "coverage" else None
         # The sensors' noise of an episode and, last, of the rest before it: drawn at once, which is faster.
         self._disturbance = np.zeros((n, self.n_windows + 1, self.n_steps, len(self.station.channels)))
 
@@ -159,12 +161,14 @@ class SteppedBenches(ABC):
         """
         actions = np.clip(self._checked(actions, len(places)), -1.0, 1.0)
         commands, exhausted = self.desk.commands(places, actions)
+        if self._coverage is not None:
+            self._coverage.begin(places[self.desk.window[places] == 0])
         measured, lost = self._measured(places, commands)
         reached = self.desk.book(places, measured)
         reached[lost] = SETTINGS.lost
         self.desk.window[places] += 1
         observation = self.desk.observe(places, measured, commands, actions, self.question)
-        gain, effective = self._told(places, measured)
+        gain, effective = self._worth(places, measured)
         over = reached > 1.0
         stop = lost | (over[:, 0] & (self.options.enforcement == "terminate"))
         excess = np.minimum(np.maximum(reached - 1.0, 0.0), 1.0).sum(axis=1)
@@ -187,6 +191,16 @@ class SteppedBenches(ABC):
             "violation": over.any(axis=1),
         }
         return StepOutcome(observation, gain - cost, terminated, truncated, info)
+
+    def _worth(
+        self, places: NDArray[np.int64], measured: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Growth of the merit by the window that was run last [nat], and effective number of draws ``(m,)``."""
+        if self._coverage is None:
+            return self._told(places, measured)
+        gain = self._coverage.gain(places, measured)
+        self._merit[places] += gain
+        return gain, self.effective_draws(places)
 
     def _checked(self, actions: NDArray, m: int) -> NDArray[np.float64]:
         given = np.asarray(actions)

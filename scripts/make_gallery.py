@@ -2,6 +2,7 @@
 
     python scripts/make_gallery.py          makes what is not there yet of this version in out/reproduce, then the pages
     python scripts/make_gallery.py FOLDER   takes another folder
+    python scripts/make_gallery.py --items D3 C3   makes these alone; the others stay as the pages have them
     python scripts/results.py reproduce     makes all anew, with the rows of docs/results.md as well
 
 Both pages are written from one set of results, which docs/reproduction.json keeps: a test makes them again from it.
@@ -48,11 +49,11 @@ def write_pages(results: Sequence[Result], folder: Path, docs: Path) -> None:
 
     Args:
         results: All items.
-        folder: Where their pictures lie.
+        folder: Where their pictures lie; of those that are not there the page's own stay.
         docs: The documentation's folder.
     """
     shown = {shown.file for result in results for shown in result.pictures}
-    for file in sorted(shown):
+    for file in sorted(file for file in shown if (folder / file).exists()):
         with replacing(docs / "gallery" / file) as temporary:
             temporary.write_bytes(small_png(folder / file))
     for stale in sorted(path for path in (docs / "gallery").glob("*.png") if path.name not in shown):
@@ -71,6 +72,8 @@ class Args:
     """Folder of `jointbench reproduce`."""
     docs: Path = Path("docs")
     """The documentation's folder."""
+    items: tuple[str, ...] = ()
+    """Items to make; the others stay as docs/reproduction.json has them, with the version of the code that made them."""
     fresh: bool = False
     """Make all items again."""
     json: bool = False
@@ -84,8 +87,13 @@ def main() -> None:
     def show(label: str, share: float) -> None:
         print(f"{100 * share:3.0f} % {label}", file=sys.stderr)
 
-    made = reproduce(None, args.folder, fresh=args.fresh, progress=show)
-    write_pages(made.results, args.folder, args.docs)
+    made = reproduce(args.items, args.folder, fresh=args.fresh, progress=show)
+    results = made.results
+    if args.items:
+        kept = json.loads((args.docs / "reproduction.json").read_text(encoding="utf-8"))["items"]
+        new = {result.identifier: result for result in results}
+        results = tuple(new.get(item["identifier"]) or Result.from_dict(item) for item in kept)
+    write_pages(results, args.folder, args.docs)
     if args.json:
         print(json.dumps(made.to_dict(), ensure_ascii=False))
 

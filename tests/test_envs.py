@@ -33,6 +33,7 @@ VARIANTS: list[tuple[str, dict[str, Any]]] = [
     (SDOF, {"laws": ("gap",), "n_knots": 2, "window": 0.08, "duration": 1.0, "n_draws": 3, "penalty": 0.0}),
     (SDOF, {"laws": ("bouc_wen", "coulomb")}),
     (JOINT, {}),
+    (JOINT, {"reward": "coverage", "n_draws": 1}),
     (JOINT, {"shaping": "amplitude_frequency", "n_draws": 2, "average": "posterior"}),
     (DISCRIMINATION, {}),
     (DISCRIMINATION, {**QUICK, "shaping": "amplitude_frequency"}),

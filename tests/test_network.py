@@ -189,6 +189,29 @@ class TestLaw:
         )
         assert network_law_of(law.header).parameter_names == law.parameter_names
 
+    @given(n_joints=st.integers(1, 3), n_hidden=st.integers(1, 20), seed=st.integers(0, 1000))
+    @settings(max_examples=10, deadline=None)
+    def test_a_bounded_network_leads_back_into_its_box(self, n_joints, n_hidden, seed):
+        rng = np.random.default_rng(seed)
+        high = rng.uniform(0.5, 2.0, 2 * n_joints)
+        law = network_law(n_joints, n_hidden, box=(-high, high))
+        weights = rng.standard_normal(len(law.parameters) - 2 * n_joints)
+        theta = law.theta(np.concatenate([weights, np.full(2 * n_joints, 50.0)]))
+        free = network_law(n_joints, n_hidden)
+        inside, beyond = (
+            high * rng.uniform(-1.0, 1.0, (5, 2 * n_joints)),
+            high * rng.choice([-3.0, 3.0], (5, 1)),
+        )
+        # within the box the same; beyond it the force at the edge and the spring and damper of what is beyond
+        np.testing.assert_allclose(
+            compiled_force(law, theta, inside), compiled_force(free, free.theta(weights), inside), atol=1e-12
+        )
+        edge = compiled_force(free, free.theta(weights), np.clip(beyond, -high, high))
+        further = 50.0 * (beyond - np.clip(beyond, -high, high))
+        expected = edge + further[:, :n_joints] + further[:, n_joints:]
+        np.testing.assert_allclose(compiled_force(law, theta, beyond), expected, atol=1e-9)
+        assert network_law_of(law.header).header == law.header
+
     def test_far_outside_it_saturates(self):
         law = network_law(1, 3)
         f = np.zeros(1)
@@ -216,6 +239,10 @@ class TestLaw:
             network_law(1, 0)
         with pytest.raises(ParameterError, match="header"):
             network_law_of((1.5, 3))
+        with pytest.raises(ParameterError, match="header"):
+            network_law_of((-1.0, 3.0, 0.0))
+        with pytest.raises(ParameterError, match="box"):
+            network_law(1, 3, box=([0.0, 1.0], [1.0, 0.0]))
 
 
 class TestTraining:

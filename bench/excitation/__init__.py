@@ -17,6 +17,7 @@
 """
 
 from bench.excitation.bayes_factor import Contrast, contrast_of, expected_log_bayes_factor
+from bench.excitation.coverage import Coverage, CoverageSettings
 from bench.excitation.ensemble import Ensemble
 from bench.excitation.estimation import Estimates, Records, estimate
 from bench.excitation.experiment import Experiment
@@ -43,6 +44,8 @@ from bench.excitation.station import Desk, Station
 __all__ = [
     "METHODS",
     "Contrast",
+    "Coverage",
+    "CoverageSettings",
     "Design",
     "Desk",
     "Directions",

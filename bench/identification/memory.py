@@ -5,10 +5,13 @@ Three steps, each through what the law itself does along the measured motion:
 1. A dictionary of slip elements of ranges spread logarithmically over the motion, beside potentials and damping along every
    direction: all weights by non-negative least squares (`bench.identification.memory_terms`), which leaves few of them above zero.
    How smooth neighbouring weights are is chosen on segments held out.
-2. Terms that add nothing are dropped.
+2. MemoryTerms that add nothing are dropped.
 3. Ranges, profiles and relaxation times are refined by separable least squares: a step changes them, the hidden states are
    integrated anew, and the weights that belong to them are solved for. Nothing restricts how they enter, since the states do not
    depend on the weights.
+
+Unless its form was said, this is done for sliders and for profiles with segments of the records held out; the form that predicts
+these better goes on with all samples.
 
 `bench.identification.output_error` goes on from there where only the motion of a whole rig was measured: every parameter of the
 law is a free parameter to it, and none of them within its bounds makes the joint active.
@@ -23,6 +26,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -30,7 +34,7 @@ from numpy.typing import ArrayLike, NDArray
 from bench.errors import FileFormatError, IdentificationError
 from bench.identification.fit_data import checked_data, nmse_percent, read_only
 from bench.identification.memory_refinement import refined
-from bench.identification.memory_settings import MemorySettings, dictionary
+from bench.identification.memory_settings import FORMS, Form, MemorySettings, dictionary
 from bench.identification.memory_terms import MemoryRecord, MemoryTerms, fold, smoothness, solve
 from bench.identification.validity_range import ValidityRange
 from bench.laws.base import ForceLaw
@@ -49,6 +53,8 @@ class MemoryReport:
     Attributes:
         nmse: Normalised mean-square error of each force along the records, from rest [%].
         nmse_validation: The same on the segments held out, before they too were fitted [%], mean of the forces.
+        form: Form of the slip elements.
+        tried: Forms that were tried, and what each left of the segments held out [%]; empty where the form was given.
         n_weights: Weights that the fit began with.
         n_parameters: Parameters of the model.
         n_states: Hidden states of the model.
@@ -65,6 +71,8 @@ class MemoryReport:
     smoothing: float
     steps: int
     seconds: float
+    form: str = "sliders"
+    tried: tuple[tuple[str, float], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -139,8 +147,10 @@ class MemoryModel:
             if values["type"] != "memory":
                 raise FileFormatError(f"a model of type '{values['type']}' came; 'memory' is expected")
             layout = MemoryLayout.of_header(values["header"])
-            report = {f.name: values["report"][f.name] for f in fields(MemoryReport)}
+            known = {f.name for f in fields(MemoryReport)}
+            report = {name: value for name, value in values["report"].items() if name in known}
             report["nmse"] = tuple(report["nmse"])
+            report["tried"] = tuple((name, loss) for name, loss in report.get("tried", ()))
             parameters = memory_law(layout).theta(values["parameters"])[len(values["header"]) :]
             mass = None if values["mass"] is None else read_only(values["mass"])
             return cls(
@@ -209,19 +219,19 @@ def fit_memory(
             f"{len(s)} samples of a motion with the spreads {np.std(s, axis=0)[:k]} came; at least 100 of a joint in motion are expected"
         )
     records = _records(t, s, f, a, settle, chosen.max_samples)
-    terms = dictionary(chosen, s, t, a.shape[1])
-    n_weights = terms.n_weights()
-    strength, held_out = _strength(terms, records, spreads, chosen)
-    terms, weights = _pruned(terms, records, spreads, chosen, strength)
-    steps = 0
-    if chosen.refine and terms.layout.slips + terms.layout.maxwells:
-        terms, steps = refined(terms, records, spreads, strength, chosen.refine)
-        terms, weights = _pruned(terms, records, spreads, chosen, strength)
+    forms = FORMS if chosen.form == "auto" else (chosen.form,)
+    tried = [
+        _tried(form, chosen, records, spreads, dictionary(chosen.of_form(form), s, t, a.shape[1]), rivals=len(forms) > 1)
+        for form in forms
+    ]  # fmt: skip
+    best = min(tried, key=lambda shape: shape.held_out)
+    terms, weights, steps = _shaped(best.terms, records, spreads, chosen, best.strength)
     parameters = read_only(terms.parameters(weights))
     mass = read_only(weights[len(weights) - k :]) if a.shape[1] else None
     report = MemoryReport(
-        (), held_out, n_weights, len(parameters), len(memory_law(terms.layout).states), strength, steps, 0.0
-    )
+        (), best.held_out, best.n_weights, len(parameters), len(memory_law(terms.layout).states), best.strength,
+        best.steps + steps, 0.0, best.form, tuple((shape.form, shape.held_out) for shape in tried if len(tried) > 1),
+    )  # fmt: skip
     model = MemoryModel(terms.layout, parameters, ValidityRange.of(s), report, mass)
     predicted = model.predict(s, time=t, substeps=chosen.substeps) + (0.0 if mass is None else a * mass)
     kept = np.concatenate([t[i:j] - t[i] >= settle for i, j in runs(t)])
@@ -249,16 +259,62 @@ class MemoryModuleSettings:
     """Numbers of `bench.identification.memory`."""
 
     segments: int = 10
-    """Segments that the samples are cut into; every other pair of them is held out in turn to choose the smoothing."""
+    """Segments that the samples of a record are cut into; every fourth is held out to choose smoothing and form."""
 
 
 SETTINGS = MemoryModuleSettings()
 
 
-def _strength(
-    terms: MemoryTerms, records: Sequence[MemoryRecord], spreads: Array, settings: MemorySettings
-) -> tuple[float, float]:
-    """Strength of smoothing that predicts segments held out best, and the NMSE there [%]."""
+class _Shape(NamedTuple):
+    """A form after what held-out segments have to say of it."""
+
+    form: Form
+    terms: MemoryTerms
+    strength: float  # of smoothing
+    held_out: float  # [%]
+    n_weights: int
+    steps: int
+
+
+def _tried(
+    form: Form,
+    settings: MemorySettings,
+    records: Sequence[MemoryRecord],
+    spreads: Array,
+    terms: MemoryTerms,
+    *,
+    rivals: bool,
+) -> _Shape:
+    """A form with its strength of smoothing and its error on segments held out; refined without them where it has rivals."""
+    fitted, held = _split(records)
+    seen, unseen = fold(terms, fitted, spreads), fold(terms, held, spreads)
+    losses = [unseen.loss(solve(seen, smoothness(terms, seen, x))) for x in settings.smoothing]
+    best = int(np.argmin(losses))
+    loss, strength, steps, n_weights = losses[best], settings.smoothing[best], 0, terms.n_weights()
+    if rivals:
+        terms, weights, steps = _shaped(terms, fitted, spreads, settings, strength)
+        loss = fold(terms, held, spreads).loss(weights)
+    return _Shape(form, terms, strength, 100.0 * loss / max(unseen.total, 1e-300), n_weights, steps)
+
+
+def _shaped(
+    terms: MemoryTerms,
+    records: Sequence[MemoryRecord],
+    spreads: Array,
+    settings: MemorySettings,
+    strength: float,
+) -> tuple[MemoryTerms, Array, int]:
+    """The terms that add something, refined, their weights, and the evaluations that took."""
+    terms, weights = _pruned(terms, records, spreads, settings, strength)
+    steps = 0
+    if settings.refine and terms.layout.slips + terms.layout.maxwells:
+        terms, steps = refined(terms, records, spreads, strength, settings.refine)
+        terms, weights = _pruned(terms, records, spreads, settings, strength)
+    return terms, weights, steps
+
+
+def _split(records: Sequence[MemoryRecord]) -> tuple[list[MemoryRecord], list[MemoryRecord]]:
+    """The records with the samples that are fitted, and with those held out: every fourth of ten segments of each."""
     fitted, held = [], []
     for record in records:
         segment = np.minimum(
@@ -266,10 +322,7 @@ def _strength(
         )
         fitted.append(record._replace(used=record.used[segment % 4 != 3]))
         held.append(record._replace(used=record.used[segment % 4 == 3]))
-    seen, unseen = fold(terms, fitted, spreads), fold(terms, held, spreads)
-    losses = [unseen.loss(solve(seen, smoothness(terms, seen, x))) for x in settings.smoothing]
-    best = int(np.argmin(losses))
-    return settings.smoothing[best], 100.0 * losses[best] / max(unseen.total, 1e-300)
+    return fitted, held
 
 
 def _pruned(

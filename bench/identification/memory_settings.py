@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from itertools import combinations
 from typing import Literal
 
@@ -16,14 +16,33 @@ from bench.laws.memory_layout import Direction, MemoryLayout
 Array = NDArray[np.float64]
 
 
+Form = Literal["sliders", "profiles"]
+FORMS: tuple[Form, ...] = ("sliders", "profiles")
+"""The forms of a joint with memory."""
+
+
+@dataclass(frozen=True)
+class SlipSettings:
+    """Slip elements along a direction where their number was not said."""
+
+    sliders: int = 14
+    """A factor of 1.5 apart in range."""
+    profiles: int = 2
+    """One more than a Bouc-Wen law has."""
+
+
+SLIPS = SlipSettings()
+
+
 @dataclass(frozen=True)
 class MemorySettings:
     """What a joint with memory is made of before the data have chosen.
 
     Attributes:
-        form: "sliders" (many rounded sliders) or "profiles" (few slip elements with learned slip profiles).
+        form: "sliders" (many rounded sliders), "profiles" (few slip elements with learned slip profiles), or "auto": both are learnt,
+            and the one kept that predicts segments held out better.
         directions: "axes", or "pairs": also the sum and the difference of every two coordinates, scaled by their spreads.
-        slips: Slip elements along each direction, 0 for a joint without memory.
+        slips: Slip elements along each direction, 0 for a joint without memory; None for 14 sliders or 2 profiles.
         smallest: Smallest range of a slider over the half-range of the motion; the largest is the half-range itself.
         parts: Parts of a slip element's range with stiffnesses of their own: 1 for linear springs.
         unequal: Whether the limits of a slip element may differ, as those of a band brake do.
@@ -41,9 +60,9 @@ class MemorySettings:
         substeps: Integration steps of the hidden states a sample: a slider of small range is passed within one sample.
     """
 
-    form: Literal["sliders", "profiles"] = "sliders"
+    form: Literal["auto", "sliders", "profiles"] = "auto"
     directions: Literal["axes", "pairs"] = "axes"
-    slips: int = 14
+    slips: int | None = None
     smallest: float = 0.004
     parts: int = 1
     unequal: bool = False
@@ -60,11 +79,11 @@ class MemorySettings:
     substeps: int = 4
 
     def __post_init__(self) -> None:
-        if self.form not in ("sliders", "profiles") or self.directions not in ("axes", "pairs"):
+        if self.form not in ("auto", *FORMS) or self.directions not in ("axes", "pairs"):
             raise ParameterError(
-                f"form '{self.form}' and directions '{self.directions}' came; sliders or profiles, and axes or pairs, are expected"
+                f"form '{self.form}' and directions '{self.directions}' came; auto, sliders or profiles, and axes or pairs, are expected"
             )
-        counts = (self.slips, self.parts - 1, self.profile - 1, self.cells, self.knots, self.maxwells)
+        counts = (self.slips or 0, self.parts - 1, self.profile - 1, self.cells, self.knots, self.maxwells)
         if min(*counts, self.refine, self.max_samples - 100, self.substeps - 1) < 0:
             raise ParameterError(f"a size among {asdict(self)} is too small")
         if not (0.0 < self.smallest < 1.0 and self.reach > 0.0 and self.smoothing):
@@ -72,6 +91,10 @@ class MemorySettings:
                 f"smallest {self.smallest:g}, reach {self.reach:g} and smoothing {self.smoothing} came; "
                 "a share of the motion, a positive number and at least one strength are expected"
             )
+
+    def of_form(self, form: Form) -> MemorySettings:
+        """The settings of one form, with its number of slip elements."""
+        return replace(self, form=form, slips=getattr(SLIPS, form) if self.slips is None else self.slips)
 
 
 def _directions(settings: MemorySettings, s: Array) -> tuple[Direction, ...]:
@@ -94,7 +117,8 @@ def _directions(settings: MemorySettings, s: Array) -> tuple[Direction, ...]:
 
 
 def dictionary(settings: MemorySettings, s: Array, t: Array, n_masses: int) -> MemoryTerms:
-    """The terms that a fit begins with, for states (n, 2 k) and their clock (n,)."""
+    """The terms that a fit of one form (`of_form`) begins with, for states (n, 2 k) and their clock (n,)."""
+    assert settings.slips is not None
     directions = _directions(settings, s)
     every = range(len(directions))
     sliders = settings.form == "sliders"

@@ -20,7 +20,7 @@ import os
 import time
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -39,6 +39,7 @@ from bench.identification.network_training import (
     held_out_split,
     spread_order,
 )
+from bench.identification.polynomial import slopes_beyond
 from bench.identification.validity_range import ValidityRange
 from bench.laws.base import ForceLaw
 from bench.laws.network import NetworkWeights, fold_scaling, network_law, published_network
@@ -88,6 +89,7 @@ class NetworkModel:
         mass: Mean mass matrix (k, k) seen by the network [kg, kg m²], where it was trained on accelerations.
         mass_std: Standard deviation of it over the samples (k, k) [kg, kg m²]: a network need not be linear in the
             acceleration, and this says how far it is from it.
+        beyond: Stiffness and damping (2, k) [N/m, N m/rad; N s/m, N m s/rad] of a bounded network beyond its range, or None.
     """
 
     weights: NetworkWeights = field(repr=False)
@@ -95,6 +97,7 @@ class NetworkModel:
     report: NetworkReport
     mass: NDArray[np.float64] | None = None
     mass_std: NDArray[np.float64] | None = None
+    beyond: NDArray[np.float64] | None = None
 
     @cached_property
     def joint(self) -> NetworkWeights:
@@ -105,16 +108,33 @@ class NetworkModel:
     @cached_property
     def law(self) -> ForceLaw:
         """The law whose parameters are the weights."""
-        return network_law(len(self.weights.b2), len(self.weights.b1))
+        box = None if self.beyond is None else (self.range.minimum, self.range.maximum)
+        return network_law(len(self.weights.b2), len(self.weights.b1), box=box)
 
     @cached_property
     def theta(self) -> NDArray[np.float64]:
         """Header and weights, as an element takes them."""
-        return read_only(self.law.theta(self.joint.flat()))
+        beyond = () if self.beyond is None else self.beyond.ravel()
+        return read_only(self.law.theta(np.concatenate([self.joint.flat(), beyond])))
 
     def predict(self, states: ArrayLike) -> NDArray[np.float64]:
         """Restoring forces (n, k) [N, N m] at states (n, 2 k) [m, rad, m/s, rad/s]."""
-        return self.joint(np.atleast_2d(np.asarray(states, dtype=float)))
+        data = np.atleast_2d(np.asarray(states, dtype=float))
+        if self.beyond is None:
+            return self.joint(data)
+        inside = np.clip(data, self.range.minimum, self.range.maximum)
+        outside = (data - inside) * self.beyond.ravel()
+        k = len(self.weights.b2)
+        return self.joint(inside) + outside[:, :k] + outside[:, k:]
+
+    def bounded(self, forces: ArrayLike) -> NetworkModel:
+        """The same network held at the edge of its range, with a spring and a damper beyond.
+
+        Args:
+            forces: Restoring forces (n, k) [N, N m] it was identified from; beyond, the largest is outweighed within half a range.
+        """
+        half = centre_and_scale(np.stack([self.range.minimum, self.range.maximum]))[1]
+        return replace(self, beyond=slopes_beyond(np.asarray(forces, dtype=float), half))
 
     def to_json(self) -> str:
         """The model as JSON text; numbers survive to the last bit."""
@@ -125,6 +145,7 @@ class NetworkModel:
             "report": vars(self.report),
             "mass": None if self.mass is None else self.mass.tolist(),
             "mass_std": None if self.mass_std is None else self.mass_std.tolist(),
+            "beyond": None if self.beyond is None else self.beyond.tolist(),
         }
         return json.dumps(values)
 
@@ -142,14 +163,13 @@ class NetworkModel:
             weights = NetworkWeights(*(read_only(values["weights"][name]) for name in NetworkWeights._fields))
             report = values["report"]
             lists = {name: tuple(report[name]) for name in ("nmse", "nmse_validation", "starts")}
-            masses = [
-                None if values[name] is None else read_only(values[name]) for name in ("mass", "mass_std")
-            ]
+            rest = ("mass", "mass_std", "beyond")
+            given = [None if values.get(name) is None else read_only(values[name]) for name in rest]
             return cls(
                 weights,
                 ValidityRange.from_dict(values["range"]),
                 NetworkReport(**{**report, **lists}),
-                *masses,
+                *given,
             )
         except (KeyError, TypeError, ValueError) as error:
             if isinstance(error, FileFormatError):
@@ -178,6 +198,7 @@ def fit_network(
     max_iterations: int = 250,
     tolerance: float = 0.005,
     regularise: bool = True,
+    bounded: bool = False,
     validation_fraction: float = 0.1,
     accelerations: ArrayLike | None = None,
     time_limit: float | None = None,
@@ -198,6 +219,8 @@ def fit_network(
         max_iterations: Most accepted steps of the last stage; the earlier ones have half as many.
         tolerance: Normalised mean-square error at which the last stage ends [%].
         regularise: Whether the weights have a prior estimated from the evidence.
+        bounded: Whether the network is held at the edge of its range, with a spring and a damper beyond it as a bounded polynomial has:
+            what it would say out there depends on the start that happened to win, and closed loops run away on it.
         validation_fraction: Fraction of the samples held out, in twenty segments, to choose between the starts [1].
         accelerations: Absolute accelerations ``(n, k)`` [m/s², rad/s²] of the body the forces act on, where its mass
             is unknown: they become inputs, and the joint is the network at zero acceleration.
@@ -242,7 +265,8 @@ def fit_network(
     judged = held_out if len(train) < len(s) else None
     report = _report(starts, f, weights(raw), judged, n_samples=sizes[-1], seconds=time.monotonic() - begun)
     mass, deviation = _mass(weights, raw[order[:most]]) if a.shape[1] else (None, None)
-    return NetworkModel(weights, ValidityRange.of(s), report, mass, deviation)
+    model = NetworkModel(weights, ValidityRange.of(s), report, mass, deviation)
+    return model.bounded(f) if bounded else model
 
 
 def _check(

@@ -13,7 +13,9 @@ matrix of three 30 s records at 1 kHz and 256 terms would take 180 MB.
 
 from __future__ import annotations
 
+import itertools
 import json
+import math
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -26,6 +28,8 @@ from threadpoolctl import threadpool_limits
 
 from bench.errors import FileFormatError, IdentificationError, ParameterError
 from bench.identification.fit_data import centre_and_scale, checked_data, nmse_percent, read_only
+from bench.identification.surroundings import SETTINGS as SURROUNDINGS
+from bench.identification.surroundings import surroundings
 from bench.identification.validity_range import ValidityRange
 from bench.laws.base import ForceLaw
 from bench.laws.polynomial import Basis, Kind, polynomial_exponents, polynomial_law
@@ -36,6 +40,8 @@ class PolynomialSettings:
     """Numbers of `bench.identification.polynomial`."""
 
     block: int = 4096
+    around: int = 20
+    """Points of the surroundings for each term: as many times over-determined as a record should be."""
 
 
 SETTINGS = PolynomialSettings()
@@ -193,6 +199,7 @@ def fit_polynomial(
     accelerations: ArrayLike | None = None,
     rcond: float = 1e-12,
     bounded: bool = False,
+    assumed: float | None = None,
 ) -> PolynomialModel:
     """Fit a polynomial of the states to forces by linear least squares.
 
@@ -213,6 +220,9 @@ def fit_polynomial(
         bounded: Whether the polynomial is held at the edge of its range, with a spring and a damper beyond it that outweigh the
             largest force met one half-range further: they bring the motion back, where an unbounded one runs away. Both are
             needed, since a polynomial may drive the motion at the edge of the speeds. Needs `normalise`.
+        assumed: Weight of what is assumed within the box of the records where none of them was
+            (`bench.identification.surroundings`), relative to that of the samples [1]; None for 1e-3 where `bounded`, else 0. An
+            unknown mass leaves it out.
 
     Returns:
         The model with condition number, rank and error in its report.
@@ -228,7 +238,8 @@ def fit_polynomial(
     begun = time.perf_counter()
     s, f, a = checked_data(states, forces, accelerations)
     powers = _orders_of(orders, s.shape[1])
-    _check(basis, normalise=normalise, bounded=bounded, ridge=ridge)
+    weight = (SURROUNDINGS.weight if bounded else 0.0) if assumed is None else assumed
+    _check(basis, normalise=normalise, bounded=bounded, weights=(ridge, weight))
     centre, scale = centre_and_scale(s) if normalise else (np.zeros(s.shape[1]), np.ones(s.shape[1]))
     exponents = polynomial_exponents(powers, kind, degree=degree)
     n_terms = len(exponents)
@@ -239,9 +250,15 @@ def fit_polynomial(
         )
     blocks = (
         np.hstack(parts)
-        for parts in zip(_regressors(s, exponents, basis, centre, scale), _blocks(a), strict=True)
+        for parts in zip(_regressors(s, exponents, basis, centre, scale), _blocks(a), _blocks(f), strict=True)
     )
-    solution, singular, rank = _solve(blocks, f, unknowns, ridge, rcond)
+    if weight and not a.shape[1]:
+        around = surroundings(s, f, SETTINGS.around * n_terms)
+        factor = math.sqrt(weight * len(s) / len(around.states))
+        terms = _regressors(around.states, exponents, basis, centre, scale)
+        beside = (factor * np.hstack(parts) for parts in zip(terms, _blocks(around.forces), strict=True))
+        blocks = itertools.chain(blocks, beside)
+    solution, singular, rank = _solve(blocks, f.shape[1], unknowns, ridge, rcond)
     coefficients = read_only(solution[:n_terms].T)
     mass = read_only(solution[n_terms:].T) if a.shape[1] else None
     condition = float(singular[0] / singular[-1]) if singular[-1] > 0.0 else float("inf")
@@ -257,7 +274,7 @@ def fit_polynomial(
         range=ValidityRange.of(s),
         report=pending,
         mass=mass,
-        beyond=_beyond(f, scale) if bounded else None,
+        beyond=slopes_beyond(f, scale) if bounded else None,
     )
     estimated = model.predict(s) + (0.0 if mass is None else a @ mass.T)
     return replace(
@@ -265,7 +282,7 @@ def fit_polynomial(
     )
 
 
-def _check(basis: Basis, *, normalise: bool, bounded: bool, ridge: float) -> None:
+def _check(basis: Basis, *, normalise: bool, bounded: bool, weights: tuple[float, float]) -> None:
     """Raise a `ParameterError` for settings of a fit that do not go together."""
     if basis == "chebyshev" and not normalise:
         raise ParameterError(
@@ -275,11 +292,11 @@ def _check(basis: Basis, *, normalise: bool, bounded: bool, ridge: float) -> Non
         raise ParameterError(
             "a bounded polynomial came with normalise=False; its range is that of the normalised states"
         )
-    if ridge < 0.0:
-        raise ParameterError(f"ridge is {ridge:g}; 0 or more is expected")
+    if min(weights) < 0.0:
+        raise ParameterError(f"ridge {weights[0]:g} and assumed {weights[1]:g} came; 0 or more are expected")
 
 
-def _beyond(forces: NDArray[np.float64], scale: NDArray[np.float64]) -> NDArray[np.float64]:
+def slopes_beyond(forces: NDArray[np.float64], scale: NDArray[np.float64]) -> NDArray[np.float64]:
     """Stiffness and damping (2, k) that outweigh the largest force met one half-range beyond the edge of the range."""
     largest = np.max(np.abs(forces), axis=0)
     return read_only(largest / scale.reshape(2, -1))
@@ -323,18 +340,18 @@ def _regressors(
 
 def _solve(
     blocks: Iterator[NDArray[np.float64]],
-    forces: NDArray[np.float64],
+    n_outputs: int,
     unknowns: int,
     ridge: float,
     rcond: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], int]:
-    """Least-squares solution (unknowns, n_outputs), singular values and rank, by sequential QR."""
-    width = unknowns + forces.shape[1]
+    """Least-squares solution (unknowns, n_outputs), singular values and rank, by sequential QR of regressors beside targets."""
+    width = unknowns + n_outputs
     triangle = np.zeros((0, width))
     # One BLAS thread: OpenBLAS' own spin when another process is busy, which made this twenty times slower.
     with threadpool_limits(1, user_api="blas"):
-        for regressors, target in zip(blocks, _blocks(forces), strict=True):
-            stacked = np.vstack([triangle, np.hstack([regressors, target])])
+        for block in blocks:
+            stacked = np.vstack([triangle, block])
             factor = dgeqrf(np.asfortranarray(stacked), lwork=64 * width, overwrite_a=1)[0]
             triangle = np.triu(factor[:width])
         # Columns of unit norm: rank and condition then speak of the data, not of the units of the states.

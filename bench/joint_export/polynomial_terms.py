@@ -37,6 +37,11 @@ def terms_of(element: Element) -> Terms:
             "export it as MJCF (.xml), or call bench.laws.evaluate"
         )
     header = element.law.header
+    if header[0] >= 2.0:
+        raise ParameterError(
+            f"element '{element.name}' is a polynomial that is held at the edge of its data; only one that is its terms everywhere can be "
+            "written so: identify it with bounded=False, or export it as MJCF (.xml)"
+        )
     n = int(header[1])
     names = [name for name in element.law.parameter_names if name.startswith("a1[")]
     exponents = np.array([[int(x) for x in name[3:-1].split(",")] for name in names], dtype=np.int64)

@@ -2,8 +2,10 @@
 
 The reduced-order joint of the dissertation's section 4.1.4 (4–l–2 there). The normalisation used in training is folded
 into the weights (appendix A), so that the law reads metres and gives newtons, and so that it can be written as a deck
-of scalar equations (section 5.1.2). Outside the training range it saturates, which keeps a simulation bounded and is
-no less wrong than a polynomial's growth.
+of scalar equations (section 5.1.2). Outside the training range it saturates, or falls, as its weights happen to have it.
+
+A *bounded* network takes the states at the nearest point of the box of its data and adds ``k (q - q_box) + c (v - v_box)`` with
+k, c >= 0 along each coordinate, as a bounded polynomial does: whatever the weights, its force then leads back into the box.
 """
 
 from __future__ import annotations
@@ -20,29 +22,41 @@ from numpy.typing import ArrayLike, NDArray
 from bench.errors import ParameterError
 from bench.laws.base import MAX_COORDINATES, ForceLaw, Parameter, kernel
 from bench.laws.coupling import INCH, POUND_FORCE
+from bench.laws.polynomial import beyond_parameters
 
 
 @kernel
 def force(t, q, v, z, theta, f):
-    """``f = W2 tanh(W1 s + b1) + b2`` with ``s = (q, v)``."""
-    n = int(theta[0])
+    """``f = W2 tanh(W1 s + b1) + b2`` with ``s = (q, v)``, of a bounded network within its box and with what lies beyond added."""
+    bounded = theta[0] < 0.0
+    n = int(abs(theta[0]))
     width = int(theta[1])
-    b1 = 2 + 2 * n * width
+    w1 = 2 + 4 * n if bounded else 2
+    b1 = w1 + 2 * n * width
     w2 = b1 + width
     b2 = w2 + n * width
     for o in range(n):
         f[o] += theta[b2 + o]
     for j in range(width):
-        row = 2 + 2 * n * j
+        row = w1 + 2 * n * j
         s = theta[b1 + j]
-        for i in range(n):
-            s += theta[row + i] * q[i] + theta[row + n + i] * v[i]
+        if bounded:
+            for i in range(n):
+                s += theta[row + i] * min(max(q[i], theta[2 + i]), theta[2 + 2 * n + i])
+                s += theta[row + n + i] * min(max(v[i], theta[2 + n + i]), theta[2 + 3 * n + i])
+        else:
+            for i in range(n):
+                s += theta[row + i] * q[i] + theta[row + n + i] * v[i]
         # tanh by one exponential, twice as quick as the library's; beyond 20 it is ±1 to the last bit, and exp is kept
         # from overflowing. Near zero its absolute error stays at 1e-16, which is what a sum of neurons needs.
         s = min(max(s, -20.0), 20.0)
         hidden = 1.0 - 2.0 / (math.exp(2.0 * s) + 1.0)
         for o in range(n):
             f[o] += theta[w2 + o * width + j] * hidden
+    if bounded:
+        for i in range(n):
+            f[i] += theta[b2 + n + i] * (q[i] - min(max(q[i], theta[2 + i]), theta[2 + 2 * n + i]))
+            f[i] += theta[b2 + 2 * n + i] * (v[i] - min(max(v[i], theta[2 + n + i]), theta[2 + 3 * n + i]))
 
 
 class NetworkWeights(NamedTuple):
@@ -97,19 +111,23 @@ def fold_scaling(
     )
 
 
-def network_law(n_joints: int = 2, n_hidden: int = 30) -> ForceLaw:
+def network_law(
+    n_joints: int = 2, n_hidden: int = 30, *, box: tuple[ArrayLike, ArrayLike] | None = None
+) -> ForceLaw:
     """Build the network law of one size; weights and biases are its parameters.
 
     Args:
         n_joints: Number of joints; the inputs are their displacements, then their velocities.
         n_hidden: Number of tanh units.
+        box: Smallest and largest value of each state (2 n_joints,) [m, rad, m/s, rad/s] of a bounded network; None for one that
+            is its weights everywhere.
 
     Returns:
-        A law on `n_joints` coordinates with parameters W1, b1, W2, b2 row by row, in SI units. The defaults make it a
-        spring and damper that saturate.
+        A law on `n_joints` coordinates with parameters W1, b1, W2, b2 row by row, in SI units, and of a bounded one the stiffness,
+        then the damping, of each coordinate beyond the box. The defaults make it a spring and damper that saturate.
 
     Raises:
-        ParameterError: `n_joints` or `n_hidden` is out of range.
+        ParameterError: `n_joints` or `n_hidden` is out of range, or the box is none.
 
     References:
         Tasbihgoo 2006, eqs. 4.14, 4.15, A.13, A.14.
@@ -133,6 +151,20 @@ def network_law(n_joints: int = 2, n_hidden: int = 30) -> ForceLaw:
             default = {o: 1000.0, n + o: 1.0}.get(j % states, 0.0)
             parameters.append(Parameter(f"W2[{o + 1},{j + 1}]", "N", default, rotational="N m"))
     parameters += [Parameter(f"b2[{o + 1}]", "N", 0.0, rotational="N m") for o in range(n)]
+    header = [float(n), float(n_hidden)]
+    if box is not None:
+        low, high = (np.asarray(end, dtype=float) for end in box)
+        if (
+            low.shape != (states,)
+            or high.shape != (states,)
+            or not np.all(low <= high)
+            or not np.all(np.isfinite([low, high]))
+        ):
+            raise ParameterError(
+                f"a box from {low} to {high} came; {states} finite values of the states each, none falling, are expected"
+            )
+        header = [-float(n), float(n_hidden), *low.tolist(), *high.tolist()]
+        parameters += beyond_parameters(n)
     return ForceLaw(
         name="network",
         parameters=tuple(parameters),
@@ -140,7 +172,7 @@ def network_law(n_joints: int = 2, n_hidden: int = 30) -> ForceLaw:
         equation="f = W2 tanh(W1 s + b1) + b2, s = (q, v)",
         reference="Tasbihgoo 2006, eqs. 4.14, 4.15, A.13, A.14",
         n_coordinates=n,
-        header=(float(n), float(n_hidden)),
+        header=tuple(header),
     )
 
 
@@ -150,9 +182,15 @@ def network_law_of(header: Sequence[float]) -> ForceLaw:
     Raises:
         ParameterError: No network law has it.
     """
-    if len(header) != 2 or any(entry != int(entry) for entry in header):
-        raise ParameterError(f"a network's header is (joints, hidden units); {tuple(header)} came")
-    return network_law(int(header[0]), int(header[1]))
+    box = tuple(header[2:])
+    if len(header) < 2 or any(entry != int(entry) for entry in header[:2]):
+        raise ParameterError(f"a network's header begins with joints and hidden units; {tuple(header)} came")
+    n, width = int(header[0]), int(header[1])
+    if len(box) != (4 * -n if n < 0 else 0):
+        raise ParameterError(
+            f"a network's header is (joints, hidden units), of a bounded one (-joints, hidden units, box); {tuple(header)} came"
+        )
+    return network_law(abs(n), width, box=(box[: -2 * n], box[-2 * n :]) if box else None)
 
 
 class PublishedNetwork(NamedTuple):

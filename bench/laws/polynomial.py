@@ -186,7 +186,7 @@ def polynomial_law(
     header = [*fixed, float(len(fixed) + 1 + 2 * n_states + len(runs)), *middle, *(1.0 / width), *runs]
     return ForceLaw(
         name="polynomial",
-        parameters=(*_coefficients(exponents, middle, width), *(_beyond(n) if bounded else ())),
+        parameters=(*_coefficients(exponents, middle, width), *(beyond_parameters(n) if bounded else ())),
         force=force,
         equation="f_o = sum a_o[e] prod P_e_i(u_i), u = (s - centre) / scale, s = (q, v)",
         reference="Masri and Caughey 1979; Tasbihgoo 2006, eqs. 4.10-4.13",
@@ -246,8 +246,8 @@ def _runs(exponents: NDArray[np.int64]) -> tuple[list[float], int]:
     return encoded, n_runs
 
 
-def _beyond(n: int) -> list[Parameter]:
-    """Stiffness, then damping, of every coordinate beyond the range."""
+def beyond_parameters(n: int) -> list[Parameter]:
+    """Stiffness, then damping, of every coordinate beyond the range of a bounded law."""
     kinds = (("k", "N/m", "N m/rad", 1000.0, "stiffness"), ("c", "N s/m", "N m s/rad", 1.0, "damping"))
     return [
         Parameter(

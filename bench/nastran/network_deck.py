@@ -132,6 +132,11 @@ def network_weights(network: Element | NetworkWeights) -> NetworkWeights:
                 f"element '{network.name}' holds the law '{network.law.name}'; only a network can be written as a deck "
                 "(identify one with bench.reduced_joint(model='network'))"
             )
+        if len(network.law.header) > 2:
+            raise ParameterError(
+                f"element '{network.name}' is a network that is held at the edge of its data; only one that is its weights everywhere can "
+                "be written so: identify it with bounded=False"
+            )
         k, width = (int(entry) for entry in network.law.header)
         parts = np.split(network.theta[2:], np.cumsum([2 * k * width, width, k * width]))
         return NetworkWeights(parts[0].reshape(width, 2 * k), parts[1], parts[2].reshape(k, width), parts[3])

@@ -94,6 +94,14 @@ def total_degree_polynomial() -> PolynomialModel:
     return fit_polynomial(data.states, data.forces, orders=5, kind="total", degree=5)
 
 
+@cache
+def held_at_edge() -> tuple[PolynomialModel, NetworkModel]:
+    """Polynomial of order 3 and the network of `models`, both held at the edge of their data with a spring and a damper beyond."""
+    data = view(*training().values())
+    polynomial = fit_polynomial(data.states, data.forces, orders=3, bounded=True)
+    return polynomial, models().network.bounded(data.forces)
+
+
 def errors(model: PolynomialModel | NetworkModel, record: Recording) -> tuple[float | None, float | None]:
     """NMSE of the axial and the torsional force on the true states of a record [%]; None for an axis at rest."""
     data = view(record)

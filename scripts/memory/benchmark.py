@@ -41,7 +41,7 @@ PROFILES = tuple(
     )
     for parts, profile in ((11, 6), (21, 12), (41, 24))
 )
-SLIDERS = (MemorySettings(slips=8, smallest=0.05, parts=7, cells=12, knots=5, substeps=1),)
+SLIDERS = (MemorySettings(form="sliders", slips=8, smallest=0.05, parts=7, cells=12, knots=5, substeps=1),)
 
 
 class Data(NamedTuple):

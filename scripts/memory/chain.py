@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from bench.demo.joint import PEAK, PEAK_TORQUE, excitation, laboratory_view
-from bench.reproduction.joint_models import LOADINGS, UNSEEN_SEEDS
+from bench.demo.joint import JOINT_SETUP, excitation, laboratory_view
+from bench.laws.coupling import INCH
+from bench.reproduction.joint_models import LOADINGS, SETUP
 from bench.rig import Element, Rig, simulate
-from bench.rig.library import INCH, chain_rig, joint_rig
+from bench.rig.library import chain_rig, joint_rig
 from memory.row import Progress, Row
 from memory.two_axes import Bench, Test, scored
 
@@ -23,7 +24,7 @@ AXES = ("axial_23", "torsional_23")
 def true_joint(axes: tuple[str, str]) -> tuple[Element, ...]:
     """The deck's joint and its friction."""
     found = [Element.of("axial_torsional_joint", *axes, name="joint")]
-    for joint, peak, unit in zip(axes, (PEAK, PEAK_TORQUE), (INCH, 1.0), strict=True):
+    for joint, peak, unit in zip(axes, (JOINT_SETUP.peak, JOINT_SETUP.peak_torque), (INCH, 1.0), strict=True):
         limit = 0.1 * peak
         found.append(
             Element.of(
@@ -47,7 +48,7 @@ def rows(progress: Progress) -> list[Row]:
         simulate(rig, excitation(*loaded), rng=np.random.default_rng(seed), sample_rate=1000.0)
         for seed, loaded in enumerate(LOADINGS.values(), start=1)
     ]
-    true, seed = true_joint(AXES), UNSEEN_SEEDS["both"]
+    true, seed = true_joint(AXES), SETUP.unseen_seeds["both"]
     drive = excitation(True, True)
     unseen = simulate(_chain(true), drive, rng=np.random.default_rng(seed), sample_rate=1000.0)
     bench = Bench(_chain, AXES, {"both": Test(drive, seed, unseen)})

@@ -10,7 +10,7 @@ import warnings
 
 import numpy as np
 
-from bench.demo.damper import TENSIONS, damper_motion, damper_record, identify_damper
+from bench.demo.damper import DAMPER_SETUP, damper_motion, damper_record, identify_damper
 from bench.errors import RangeWarning
 from bench.identification.memory import MemorySettings, fit_memory
 from bench.recording import Recording, nrmse
@@ -21,7 +21,7 @@ from memory.row import Progress, Row
 
 _RATE_INDEPENDENT = {"unequal": True, "cells": 0, "knots": 0, "substeps": 1}
 FORMS = {
-    "memory, sliders": MemorySettings(slips=8, smallest=0.02, parts=8, **_RATE_INDEPENDENT),
+    "memory, sliders": MemorySettings(form="sliders", slips=8, smallest=0.02, parts=8, **_RATE_INDEPENDENT),
     "memory, profiles": MemorySettings(form="profiles", slips=2, parts=12, **_RATE_INDEPENDENT),
 }
 
@@ -39,7 +39,7 @@ def rows(progress: Progress) -> list[Row]:
     """Rows of the task."""
     found = []
     for seen, judged in (("0.5", "1"), ("1", "0.5")):
-        for tension in TENSIONS:
+        for tension in DAMPER_SETUP.tensions:
             task = f"friction damper, {tension} lbf, judged at {judged} Hz"
             progress(task)
             record, unseen = damper_record(seen, tension), damper_record(judged, tension)

@@ -30,9 +30,9 @@ def rows(progress: Progress) -> list[Row]:
     rng = np.random.default_rng(70)
     for name, loaded in LOADINGS.items():
         drive = laboratory.drive(loaded)
-        seeds = laboratory.SEEDS[name], laboratory.UNSEEN_SEEDS[name]
+        seeds = laboratory.SETUP.seeds[name], laboratory.SETUP.unseen_seeds[name]
         seen, unseen = (
-            simulate(_rig(true), drive, rng=np.random.default_rng(seed), sample_rate=laboratory.RATE)
+            simulate(_rig(true), drive, rng=np.random.default_rng(seed), sample_rate=laboratory.SETUP.rate)
             for seed in seeds
         )
         records.append(laboratory.measured(seen, rng))

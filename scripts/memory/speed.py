@@ -39,14 +39,18 @@ def rows(progress: Progress) -> list[Row]:
     rig, rng = laboratory.rig_with_friction(), np.random.default_rng(70)
     records = [
         laboratory.measured(
-            simulate(rig, laboratory.drive(loaded), rng=np.random.default_rng(laboratory.SEEDS[name])), rng
+            simulate(rig, laboratory.drive(loaded), rng=np.random.default_rng(laboratory.SETUP.seeds[name])),
+            rng,
         )
         for name, loaded in LOADINGS.items()
     ]
     data = laboratory.view(*records)
     assert data.time is not None
     found = []
-    for label, changes in (("memory, sliders", {}), ("memory, profiles", {"form": "profiles", "slips": 2})):
+    for label, changes in (
+        ("memory, sliders", {"form": "sliders"}),
+        ("memory, profiles", {"form": "profiles"}),
+    ):
         model = fit_memory(data.states, data.forces, time=data.time, **changes)
         element = Element(model.law, laboratory.AXES, model.theta, name="joint")
         for integrator in ("RK4", "implicitfast"):

@@ -24,8 +24,8 @@ from memory.row import Progress, Row
 Array = NDArray[np.float64]
 
 FORMS: Mapping[str, MemorySettings] = {
-    "memory, sliders": MemorySettings(),
-    "memory, profiles": MemorySettings(form="profiles", slips=2),
+    "memory, sliders": MemorySettings(form="sliders"),
+    "memory, profiles": MemorySettings(form="profiles"),
 }
 """The two forms of the joint with memory."""
 
