@@ -139,7 +139,8 @@ class Diagnose:
         if self.json == PRINTED:
             emit(document)
         else:
-            for part in summary(found.verdict):
+            rig = found.case.rig
+            for part in summary(found.verdict, rig if rig.endswith(".xml") else ""):
                 Console().print(part, markup=False, highlight=False)
             for path in written:
                 print(f"written: {path}")
@@ -167,9 +168,12 @@ class Diagnose:
                     write_text(path, text)
                 if self.html is not None:
                     from bench.discrepancy import write_report
+                    from bench.discrepancy.application.first_record import in_simulator
 
+                    stage("the judging records in your simulator, with what is named")
+                    applied = in_simulator(diagnosis.verdict, diagnosis.case)
                     stage(f"writing {self.html}")
-                    write_report(diagnosis, self.html)
+                    write_report(diagnosis, self.html, applied=applied)
                 if self.rrd is not None:
                     from bench.discrepancy.report.rerun_recording import write_rerun
 

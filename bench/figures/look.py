@@ -88,11 +88,11 @@ def look(number: int) -> dict[str, Any]:
     return {"color": COLOURS[index], "linewidth": 1.1, "linestyle": SETTINGS.dashes[index]}
 
 
-def thin(x: NDArray, y: NDArray) -> tuple[NDArray, NDArray]:
-    """At most about `max_points` points, among them the extremes of y in each short window."""
-    if len(x) <= SETTINGS.max_points:
+def thin(x: NDArray, y: NDArray, points: int = SETTINGS.max_points) -> tuple[NDArray, NDArray]:
+    """At most about that many points, among them the extremes of y in each short window."""
+    if len(x) <= points:
         return x, y
-    width = math.ceil(2.0 * len(x) / SETTINGS.max_points)
+    width = math.ceil(2.0 * len(x) / points)
     whole = len(y) // width * width
     first, windows = np.arange(0, whole, width), y[:whole].reshape(-1, width)
     kept = np.unique(

@@ -1,0 +1,104 @@
+"""The first screen of a report: the answers, one picture of the judging record before and after, and what to do next."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from bench.discrepancy.judgement.validation_discrepancy import DIVERGED_GAP
+from bench.discrepancy.report.answers import answers, next_steps
+from bench.discrepancy.report.interactive import histories
+from bench.discrepancy.settings import JudgementSettings
+from bench.discrepancy.verdict import Gap, InSimulator, Verdict
+from bench.page import Page
+from bench.recording import Recording
+
+APPLIED = "applied in your simulator"
+CYCLES = 12
+"""Cycles around the largest response that a picture shows at first: more would run into a band on a telephone."""
+
+
+def opened(
+    name: str,
+    verdict: Verdict,
+    runs: Mapping[str, Recording],
+    *,
+    model: str,
+    settings: JudgementSettings,
+    applied: InSimulator | None,
+) -> Page:
+    """A page with its first screen.
+
+    Args:
+        name: Of the case.
+        verdict: The verdict.
+        runs: The first judging record by judged coordinate: measured, before, after, and applied.
+        model: File of the user's own MJCF; empty where the rig is one of the bench.
+        settings: Those that it was judged with.
+        applied: What came of it in the user's simulator.
+    """
+    page = Page(f"Diagnosis of {name}", footer=f"{verdict.seconds:.1f} s of computation")
+    section = page.section("")
+    section.facts(answers(verdict, settings=settings))
+    dof = _shown(verdict.gap, next(iter(runs.values())))
+    section.plots(
+        [histories(runs, [dof], window=window(next(iter(runs.values())), dof))],
+        f"Judging record, {dof}: no fit has seen it. Zoom by dragging; a double click shows all of it.",
+    )
+    for step in next_steps(verdict, model):
+        section.text(step.text)
+        if step.command:
+            section.code(step.command)
+    if applied is not None:
+        section.text(f"{applied.line[0].upper()}{applied.line[1:]}.")
+    words = page.section("In words")
+    words.text(verdict.explanation)
+    for warning in verdict.warnings:
+        words.text(f"Note: {warning}.")
+    for effect in (*verdict.named, *verdict.nearest):
+        place = f" ({effect.where})" if effect.where else ""
+        words.table(
+            f"{'' if verdict.named else 'Nearest: '}{effect.name}{place}: {effect.equation}",
+            ("parameter", "value", "one-sigma", "95 % interval", "unit"),
+            [
+                (
+                    key, f"{e.value:.4g}", f"{e.std:.2g}",
+                    f"{e.value - 1.96 * e.std:.4g} to {e.value + 1.96 * e.std:.4g}", e.unit,
+                )
+                for key, e in effect.parameters.items()
+            ],
+        )  # fmt: skip
+    return page
+
+
+def _shown(gap: Gap, measured: Recording) -> str:
+    return gap.dof if gap.dof in measured.names else measured.names[0]
+
+
+def with_applied(runs: Mapping[str, Recording], applied: InSimulator | None) -> dict[str, Recording]:
+    """Runs with that of the user's own simulator, where it is on the same clock and did not diverge."""
+    measured = next(iter(runs.values()))
+    own = {} if applied is None else dict(applied.record)
+    shown = {
+        name: values
+        for name, values in own.items()
+        if name in measured.names
+        and values.shape == measured.time.shape
+        and np.max(np.abs(values)) < DIVERGED_GAP * max(float(np.max(np.abs(measured[name]))), 1e-300)
+    }
+    if not shown:
+        return dict(runs)
+    units = {name: measured.channel(name).unit for name in shown}
+    return {**runs, APPLIED: Recording.from_arrays(measured.time, shown, units=units)}
+
+
+def window(measured: Recording, channel: str) -> tuple[float, float]:
+    """First and last time [s] of some cycles around the largest response."""
+    y = measured[channel] - np.mean(measured[channel])
+    crossings = max(int(np.count_nonzero(np.diff(np.signbit(y)))), 1)
+    first, last = float(measured.time[0]), float(measured.time[-1])
+    width = min((last - first) * 2.0 * CYCLES / crossings, last - first)
+    middle = float(measured.time[int(np.argmax(np.abs(y)))])
+    start = float(np.clip(middle - 0.5 * width, first, last - width))
+    return start, start + width
