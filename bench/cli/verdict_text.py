@@ -16,7 +16,7 @@ def summary(verdict: Verdict, model: str = "") -> list[Any]:
 
     Args:
         verdict: The verdict.
-        model: File of the user's own MJCF; empty where the rig is one of the bench.
+        model: Options of `jointbench apply` that name the user's own MJCF; empty where the rig is one of the bench.
     """
     from bench.discrepancy.report.answers import answers, next_steps
 

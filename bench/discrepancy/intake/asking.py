@@ -60,7 +60,8 @@ def case_from(logs: Sequence[Any], model: Any, **options: Any) -> Iterator[tuple
     """
     with tempfile.TemporaryDirectory() as folder:
         made, _ = drafted(logs, model, Path(folder), **options)
-        yield read_case(folder), made
+        case = read_case(folder)
+        yield replace(case, name=Path(case.rig).stem), made
 
 
 @dataclass(frozen=True, eq=False)

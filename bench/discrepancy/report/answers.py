@@ -7,8 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import NamedTuple
 
+from bench.discrepancy.case.case import Case
 from bench.discrepancy.judgement.shares import closed_words, interval, probability
 from bench.discrepancy.judgement.validation_discrepancy import DIVERGED_GAP
 from bench.discrepancy.settings import DEFAULT, JudgementSettings
@@ -136,19 +138,25 @@ class Step(NamedTuple):
     command: str = ""
 
 
+def model_options(case: Case) -> str:
+    """Options of `jointbench apply` that name the case and its model; empty where the rig is one of the bench."""
+    folder = Path(case.folder or ".")
+    return f"--model {folder / case.rig} --case {folder}" if case.rig.endswith(".xml") else ""
+
+
 def next_steps(verdict: Verdict, model: str = "") -> tuple[Step, ...]:
     """What to do next, the most useful first.
 
     Args:
         verdict: The verdict.
-        model: File of the user's own MJCF; empty where the rig is one of the bench.
+        model: As of `model_options`.
     """
     steps = []
     if verdict.named or verdict.nearest:
         nearest = "" if verdict.named else " --nearest"
         text = "Put it into your model" if verdict.named else "Put what comes nearest into your model"
         if model:
-            command = f"jointbench apply verdict.json --model {model} -o corrected.xml{nearest}"
+            command = f"jointbench apply verdict.json {model} -o corrected.xml{nearest}"
             steps.append(Step(f"{text} and run the judging records there:", command))
         elif verdict.named:
             steps.append(Step("Put it into your model, as the end of this page writes it."))

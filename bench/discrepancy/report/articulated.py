@@ -68,16 +68,19 @@ def _errors(diagnosis: ArticulatedDiagnosis, fit: ArticulatedFit | None) -> Arra
     ])  # fmt: skip
 
 
-def articulated_page(diagnosis: ArticulatedDiagnosis, applied: InSimulator | None = None) -> Page:
+def articulated_page(
+    diagnosis: ArticulatedDiagnosis, applied: InSimulator | None = None, model: str = ""
+) -> Page:
     """Build the report.
 
     Args:
         diagnosis: The diagnosis.
         applied: What was named in the user's own simulator, to be drawn beside it.
+        model: Options of `jointbench apply` that name the user's own MJCF.
     """
     runs = with_applied(simulated_joints(diagnosis), applied)
     out = opened(
-        diagnosis.case.name, diagnosis.verdict, runs, model=diagnosis.case.rig,
+        diagnosis.case.name, diagnosis.verdict, runs, model=model,
         settings=diagnosis.problem.settings.judgement, applied=applied,
     )  # fmt: skip
     _how_far(out, diagnosis, runs)

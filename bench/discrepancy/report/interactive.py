@@ -253,7 +253,9 @@ def share_plot(part: Split, *, units: tuple[str, str] = ("", "")) -> go.Figure:
     )
     figure.update_yaxes(title_text="share [%]")
     title = f"{part.of}{f', {part.dof}' if part.dof and part.dof != part.of else ''}"
-    return _finished(figure, 290, title={"text": title, "font": {"size": 13}, "x": 0.0, "xref": "paper"}, bargap=0.1)
+    return _finished(
+        figure, 290, title={"text": title, "font": {"size": 13}, "x": 0.0, "xref": "paper"}, bargap=0.1
+    )
 
 
 def correlation_plot(labels: Sequence[str], correlation: Array) -> go.Figure:

@@ -34,7 +34,7 @@ def opened(
         name: Of the case.
         verdict: The verdict.
         runs: The first judging record by judged coordinate: measured, before, after, and applied.
-        model: File of the user's own MJCF; empty where the rig is one of the bench.
+        model: Options of `jointbench apply` that name the user's own MJCF; empty where the rig is one of the bench.
         settings: Those that it was judged with.
         applied: What came of it in the user's simulator.
     """
