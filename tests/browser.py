@@ -6,6 +6,7 @@ import base64
 import contextlib
 import json
 import os
+import re
 import shutil
 import subprocess
 import tempfile
@@ -124,3 +125,34 @@ def too_wide(tab: Browser) -> list[str]:
       }
       return found;
     })()""")
+
+
+def shown_whole(page: Path) -> None:
+    """Assert that a page of plots is drawn without an error, and nothing of it cut, at every width and in every scheme."""
+    with browser() as tab:
+        for width in WIDTHS:
+            for scheme in SCHEMES:
+                tab.open(
+                    page.as_uri(),
+                    width=width,
+                    scheme=scheme,
+                    ready="document.documentElement.dataset.drawn > 0",
+                )
+                where = f"{width} px, {scheme}"
+                assert not tab.messages, where
+                assert not too_wide(tab), where
+                assert tab.ask("document.querySelectorAll('.plot:not(:has(.svg-container))').length") == 0, (
+                    where
+                )
+                ink, paper = tab.ask(
+                    "[getComputedStyle(document.body).color, getComputedStyle(document.body).backgroundColor]"
+                )
+                assert (brightness(ink) < brightness(paper)) == (scheme == "light"), where
+                assert tab.ask("getComputedStyle(document.querySelector('.plot .xtick text')).fill") == ink, (
+                    where
+                )
+
+
+def brightness(colour: str) -> float:
+    """Sum of the channels of a CSS colour ``rgb(r, g, b)``."""
+    return sum(float(c) for c in re.findall(r"[\d.]+", colour)[:3])
