@@ -1,6 +1,6 @@
 """Interactive figures of a diagnosis, plotly's: to be zoomed into, read off, and drawn light or dark.
 
-Measured curves have the page's own ink, the simulations the colours of `bench.figures` with a dash of their own each. A figure is as
+Measured curves are broad in the page's own ink, the simulations the colours of `bench.figures` with a dash of their own each. A figure is as
 wide as its place, one column each, so that a telephone shows it whole.
 """
 
@@ -74,7 +74,7 @@ def _finished(figure: go.Figure, height: int, **layout: Any) -> go.Figure:
 def _line(number: int) -> dict[str, Any]:
     """How the record of that number is drawn, the measured one first."""
     if number == 0:
-        return {"color": INK, "width": 3}
+        return {"color": INK, "width": 4.5}
     return {"color": COLOURS[number - 1], "width": 1.6, "dash": SETTINGS.dashes[number - 1]}
 
 
@@ -82,7 +82,7 @@ def _curve(x: Array, y: Array, name: str, number: int, *, legend: bool) -> go.Sc
     xs, ys = thin(x, y, SETTINGS.points)
     return go.Scatter(
         x=xs.astype(np.float32), y=ys.astype(np.float32), name=name, legendgroup=name, showlegend=legend,
-        mode="lines", line=_line(number), opacity=0.75 if number == 0 else 1.0,
+        mode="lines", line=_line(number), opacity=0.45 if number == 0 else 1.0,
     )  # fmt: skip
 
 
@@ -132,7 +132,7 @@ def loop(runs: Mapping[str, Recording], x: str, y: str) -> go.Figure:
         unit = {x: run.channel(x).unit, y: run.channel(y).unit}
         figure.add_scatter(
             x=run[x][::every].astype(np.float32), y=run[y][::every].astype(np.float32), name=name, mode="lines",
-            line=_line(number), opacity=0.75 if number == 0 else 1.0,
+            line=_line(number), opacity=0.45 if number == 0 else 1.0,
         )  # fmt: skip
     figure.update_xaxes(title_text=f"{x} [{unit.get(x, '')}]")
     figure.update_yaxes(title_text=f"{y} [{unit.get(y, '')}]")
