@@ -17,8 +17,8 @@ from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis
 from bench.discrepancy.articulated.fitting import ArticulatedFit
 from bench.discrepancy.judgement.shares import closed_words
 from bench.discrepancy.report.answers import level
-from bench.discrepancy.report.interactive import histories, matrix_plot, ranking_plot
-from bench.discrepancy.report.opening import opened, with_applied
+from bench.discrepancy.report.interactive import histories, matrix_plot
+from bench.discrepancy.report.opening import add_ranking, opened, with_applied
 from bench.discrepancy.verdict import InSimulator
 from bench.page import Page
 from bench.recording import Recording
@@ -133,9 +133,7 @@ def _where(out: Page, diagnosis: ArticulatedDiagnosis) -> None:
             "the screening promised too little for a fit.",
         )
     if diagnosis.verdict.ranking:
-        figure, hidden = ranking_plot(diagnosis.verdict.ranking)
-        rest = f" {hidden} more have less than 0.001." if hidden else ""
-        section.plots([figure], f"Effects by posterior probability.{rest}")
+        add_ranking(section, diagnosis.verdict)
 
 
 def _parameters(out: Page, diagnosis: ArticulatedDiagnosis) -> None:

@@ -16,10 +16,10 @@ from bench.discrepancy.diagnosis import Diagnosis
 from bench.discrepancy.judgement.shares import closed_words
 from bench.discrepancy.report.answers import level, model_options
 from bench.discrepancy.report.articulated import articulated_page
-from bench.discrepancy.report.interactive import correlation_plot, histories, ranking_plot, waterfall_plot
+from bench.discrepancy.report.interactive import correlation_plot, histories, waterfall_plot
 from bench.discrepancy.report.locations import location_section
 from bench.discrepancy.report.model_update import recipes
-from bench.discrepancy.report.opening import opened, window, with_applied
+from bench.discrepancy.report.opening import CYCLES, add_ranking, opened, window, with_applied
 from bench.discrepancy.report.simulated_records import MEASURED, NOMINAL, judged, variants
 from bench.discrepancy.verdict import InSimulator
 from bench.page import Page
@@ -100,8 +100,8 @@ def _gap_section(out: Page, diagnosis: Diagnosis, shown: Mapping[str, Recording]
     names = names or list(shown[MEASURED].names)
     if len(names) > 1:
         section.plots(
-            [histories(shown, names, window=window(shown[MEASURED], names[0]))],
-            "Every judged coordinate of the judging record, around the largest response.",
+            [histories(shown, names, window=window(shown, names[0], CYCLES))],
+            "Every judged coordinate of the judging record, where the nominal model misses the first most.",
         )
     if len(shown) > 1:
         section.plots(
@@ -115,9 +115,7 @@ def _gap_section(out: Page, diagnosis: Diagnosis, shown: Mapping[str, Recording]
 def _ranking_section(out: Page, diagnosis: Diagnosis) -> None:
     verdict = diagnosis.verdict
     section = out.section("Which effect")
-    figure, hidden = ranking_plot(verdict.ranking)
-    rest = f" {hidden} more have less than 0.001." if hidden else ""
-    section.plots([figure], f"Effects by posterior probability.{rest}")
+    add_ranking(section, verdict)
     first = diagnosis.explanations[0]
     rows = [
         (

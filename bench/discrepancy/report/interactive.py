@@ -1,7 +1,7 @@
 """Interactive figures of a diagnosis, plotly's: to be zoomed into, read off, and drawn light or dark.
 
-Measured curves are broad in the page's own ink, the simulations the colours of `bench.figures` with a dash of their own each. A figure is as
-wide as its place, one column each, so that a telephone shows it whole.
+Measured curves are broad in the page's own ink, the simulations in the colours of `bench.figures` with a dash of their own each. A
+figure is as wide as its place, so that a telephone shows it whole.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class InteractiveSettings:
     """Most effects of a ranking."""
     likely: float = 1e-3
     """Probability below which an effect is counted rather than drawn: what three decimals would round to zero."""
-    row: int = 190
+    row: int = 210
     """Height of one row of a figure [px]."""
     numbered: int = 10
     """Most rows of a map whose cells hold their numbers."""
@@ -65,7 +65,7 @@ def _finished(figure: go.Figure, height: int, **layout: Any) -> go.Figure:
     return figure.update_layout(
         height=height, margin={"l": 8, "r": 8, "t": 34, "b": 8}, paper_bgcolor="rgba(0,0,0,0)",
         plot_bgcolor="rgba(0,0,0,0)", font={"color": INK, "size": 13, "family": "system-ui, sans-serif"},
-        legend={"orientation": "h", "y": 1.0, "yanchor": "bottom", "x": 0.0},
+        legend={"font": {"size": 12}, "orientation": "h", "y": 1.0, "yanchor": "bottom", "x": 0.0},
         hoverlabel={"bgcolor": PAPER, "font": {"color": INK}},
         modebar={"bgcolor": "rgba(0,0,0,0)", "color": RULE, "activecolor": INK}, template="none", **layout,
     )  # fmt: skip

@@ -8,15 +8,15 @@ import numpy as np
 
 from bench.discrepancy.judgement.validation_discrepancy import DIVERGED_GAP
 from bench.discrepancy.report.answers import answers, next_steps
-from bench.discrepancy.report.interactive import histories
+from bench.discrepancy.report.interactive import histories, ranking_plot
 from bench.discrepancy.settings import JudgementSettings
 from bench.discrepancy.verdict import Gap, InSimulator, Verdict
-from bench.page import Page
+from bench.page import Page, Section
 from bench.recording import Recording
 
-APPLIED = "applied in your simulator"
-CYCLES = 12
-"""Cycles around the largest response that a picture shows at first: more would run into a band on a telephone."""
+APPLIED = "in your simulator"
+CYCLES = 4
+"""Cycles that the first picture shows at first: with more of them, before and after would be one line on a telephone."""
 
 
 def opened(
@@ -43,8 +43,8 @@ def opened(
     section.facts(answers(verdict, settings=settings))
     dof = _shown(verdict.gap, next(iter(runs.values())))
     section.plots(
-        [histories(runs, [dof], window=window(next(iter(runs.values())), dof))],
-        f"Judging record, {dof}: no fit has seen it. Zoom by dragging; a double click shows all of it.",
+        [histories(runs, [dof], window=window(runs, dof, CYCLES))],
+        f"Judging record, {dof}, where the nominal model misses it most; no fit has seen it. Drag to zoom; a double click shows all.",
     )
     for step in next_steps(verdict, model):
         section.text(step.text)
@@ -72,6 +72,18 @@ def opened(
     return page
 
 
+def add_ranking(section: Section, verdict: Verdict) -> None:
+    """Add the effects by posterior probability."""
+    figure, hidden = ranking_plot(verdict.ranking)
+    shared = (
+        " Those that cannot be told apart share the probability of what is named."
+        if verdict.indistinguishable
+        else ""
+    )
+    rest = f" {hidden} more have less than 0.001." if hidden else ""
+    section.plots([figure], f"Effects by posterior probability, each alone.{shared}{rest}")
+
+
 def _shown(gap: Gap, measured: Recording) -> str:
     return gap.dof if gap.dof in measured.names else measured.names[0]
 
@@ -79,7 +91,7 @@ def _shown(gap: Gap, measured: Recording) -> str:
 def with_applied(runs: Mapping[str, Recording], applied: InSimulator | None) -> dict[str, Recording]:
     """Runs with that of the user's own simulator, where it is on the same clock and did not diverge."""
     measured = next(iter(runs.values()))
-    own = {} if applied is None else dict(applied.record)
+    own = {} if applied is None else {name or measured.names[0]: y for name, y in applied.record.items()}
     shown = {
         name: values
         for name, values in own.items()
@@ -93,12 +105,20 @@ def with_applied(runs: Mapping[str, Recording], applied: InSimulator | None) -> 
     return {**runs, APPLIED: Recording.from_arrays(measured.time, shown, units=units)}
 
 
-def window(measured: Recording, channel: str) -> tuple[float, float]:
-    """First and last time [s] of some cycles around the largest response."""
+def window(runs: Mapping[str, Recording], channel: str, cycles: int) -> tuple[float, float]:
+    """First and last time [s] of some cycles around the largest error of the first simulation.
+
+    Args:
+        runs: The measured record first.
+        channel: Channel that errors and cycles are those of.
+        cycles: How many.
+    """
+    measured, *simulated = runs.values()
     y = measured[channel] - np.mean(measured[channel])
+    error = simulated[0][channel] - measured[channel] if simulated else y
     crossings = max(int(np.count_nonzero(np.diff(np.signbit(y)))), 1)
     first, last = float(measured.time[0]), float(measured.time[-1])
-    width = min((last - first) * 2.0 * CYCLES / crossings, last - first)
-    middle = float(measured.time[int(np.argmax(np.abs(y)))])
+    width = min((last - first) * 2.0 * cycles / crossings, last - first)
+    middle = float(measured.time[int(np.argmax(np.abs(error)))])
     start = float(np.clip(middle - 0.5 * width, first, last - width))
     return start, start + width

@@ -66,9 +66,9 @@ def variants(diagnosis: Diagnosis, record: CaseRecord | None = None) -> dict[str
 
 
 def judged(diagnosis: Diagnosis, runs: Mapping[str, Recording]) -> dict[str, Recording]:
-    """The judged coordinates of runs of `variants`: channels, or the difference of two."""
+    """The judged coordinates of runs of `variants`: channels, or the difference of two; one without a name has that of its channel."""
     units = {c.name: c.unit or "1" for c in diagnosis.case.channels}
-    found = coordinates(diagnosis.problem.structure)
+    found = [(name or parts[0][0], parts) for name, parts in coordinates(diagnosis.problem.structure)]
     return {
         label: Recording.from_arrays(
             run.time,
