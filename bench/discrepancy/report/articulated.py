@@ -6,6 +6,7 @@ was re-estimated.
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,11 +18,14 @@ from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis
 from bench.discrepancy.articulated.fitting import ArticulatedFit
 from bench.discrepancy.judgement.shares import closed_words
 from bench.discrepancy.report.answers import level
+from bench.discrepancy.report.ghost import with_ghost
 from bench.discrepancy.report.interactive import histories, matrix_plot
 from bench.discrepancy.report.opening import add_ranking, opened, with_applied
 from bench.discrepancy.verdict import InSimulator
+from bench.errors import ModelError
 from bench.page import Page
 from bench.recording import Recording
+from bench.rig import Rig
 
 Array = NDArray[np.float64]
 MEASURED, NOMINAL, FINAL = "measured", "nominal model", "with what is named"
@@ -154,10 +158,17 @@ def _parameters(out: Page, diagnosis: ArticulatedDiagnosis) -> None:
 
 
 def write_articulated_rerun(diagnosis: ArticulatedDiagnosis, path: str | Path) -> None:
-    """Write the first judging record, measured and simulated, as a ``.rrd`` file."""
+    """Write the first judging record, measured and simulated, as a ``.rrd`` file; the measured motion is a ghost over each simulation."""
     from bench.rerun_log import log_comparison  # noqa: PLC0415  (rerun, for pictures only)
 
+    runs = simulated_joints(diagnosis)
+    rigs: dict[str, Rig] = {}
+    with contextlib.suppress(ModelError):  # the curves are worth having without the model
+        rig = with_ghost(Path(diagnosis.case.folder or ".") / diagnosis.case.rig)
+        rigs = {label: rig for label in runs if label != MEASURED}
+    angles = {label: np.column_stack([run[name] for name in run.names]) for label, run in runs.items()}
     log_comparison(
-        path, {}, simulated_joints(diagnosis), loops=[], bands=[],
+        path, rigs, runs, loops=[], bands=[],
+        poses={label: np.hstack([angles[label], angles[MEASURED]]) for label in rigs},
         title=f"diagnosis of {diagnosis.case.name}: {diagnosis.verdict.explanation}",
     )  # fmt: skip
