@@ -21,7 +21,8 @@ from bench.discrepancy.report.interactive import (
     share_plot,
     waterfall_plot,
 )
-from bench.discrepancy.report.opening import APPLIED, opened, with_applied
+from bench.discrepancy.report.opening import opened, with_applied
+from bench.discrepancy.report.simulated_records import APPLIED
 from bench.discrepancy.settings import DEFAULT
 from bench.discrepancy.verdict import (
     Estimate,

@@ -21,6 +21,7 @@ from bench.discrepancy.report.answers import level
 from bench.discrepancy.report.ghost import with_ghost
 from bench.discrepancy.report.interactive import histories, matrix_plot
 from bench.discrepancy.report.opening import add_ranking, opened, with_applied
+from bench.discrepancy.report.simulated_records import MEASURED, NOMINAL
 from bench.discrepancy.verdict import InSimulator
 from bench.errors import ModelError
 from bench.page import Page
@@ -28,7 +29,7 @@ from bench.recording import Recording
 from bench.rig import Rig
 
 Array = NDArray[np.float64]
-MEASURED, NOMINAL, FINAL = "measured", "nominal model", "with what is named"
+FINAL = "with what is named"
 
 
 @dataclass(frozen=True)

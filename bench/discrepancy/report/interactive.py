@@ -18,6 +18,7 @@ from plotly.subplots import make_subplots
 
 from bench.discrepancy.judgement.shares import probability
 from bench.discrepancy.localisation.state_map import StateMap
+from bench.discrepancy.report.simulated_records import APPLIED, NOMINAL
 from bench.discrepancy.verdict import Gap, Ranked, Split
 from bench.figures.look import COLOURS, thin
 from bench.page import INK, PAPER, RULE
@@ -71,18 +72,19 @@ def _finished(figure: go.Figure, height: int, **layout: Any) -> go.Figure:
     )  # fmt: skip
 
 
-def _line(number: int) -> dict[str, Any]:
-    """How the record of that number is drawn, the measured one first."""
+def _look(name: str, number: int) -> dict[str, Any]:
+    """How a record is drawn: the first as measured, the others by what they are, whichever of them are there."""
     if number == 0:
-        return {"color": INK, "width": 4.5}
-    return {"color": COLOURS[number - 1], "width": 1.6, "dash": SETTINGS.dashes[number - 1]}
+        return {"line": {"color": INK, "width": 4.5}, "opacity": 0.45}
+    k = {NOMINAL: 0, APPLIED: 2}.get(name, 1)
+    return {"line": {"color": COLOURS[k], "width": 1.6, "dash": SETTINGS.dashes[k]}}
 
 
 def _curve(x: Array, y: Array, name: str, number: int, *, legend: bool) -> go.Scatter:
     xs, ys = thin(x, y, SETTINGS.points)
     return go.Scatter(
         x=xs.astype(np.float32), y=ys.astype(np.float32), name=name, legendgroup=name, showlegend=legend,
-        mode="lines", line=_line(number), opacity=0.45 if number == 0 else 1.0,
+        mode="lines", **_look(name, number),
     )  # fmt: skip
 
 
@@ -132,7 +134,7 @@ def loop(runs: Mapping[str, Recording], x: str, y: str) -> go.Figure:
         unit = {x: run.channel(x).unit, y: run.channel(y).unit}
         figure.add_scatter(
             x=run[x][::every].astype(np.float32), y=run[y][::every].astype(np.float32), name=name, mode="lines",
-            line=_line(number), opacity=0.45 if number == 0 else 1.0,
+            **_look(name, number),
         )  # fmt: skip
     figure.update_xaxes(title_text=f"{x} [{unit.get(x, '')}]")
     figure.update_yaxes(title_text=f"{y} [{unit.get(y, '')}]")

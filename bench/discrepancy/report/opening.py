@@ -9,12 +9,12 @@ import numpy as np
 from bench.discrepancy.judgement.validation_discrepancy import DIVERGED_GAP
 from bench.discrepancy.report.answers import answers, next_steps
 from bench.discrepancy.report.interactive import histories, ranking_plot
+from bench.discrepancy.report.simulated_records import APPLIED
 from bench.discrepancy.settings import JudgementSettings
 from bench.discrepancy.verdict import Gap, InSimulator, Verdict
 from bench.page import Page, Section
 from bench.recording import Recording
 
-APPLIED = "in your simulator"
 CYCLES = 4
 """Cycles that the first picture shows at first: with more of them, before and after would be one line on a telephone."""
 

@@ -21,7 +21,7 @@ from bench.recording import Recording
 if TYPE_CHECKING:
     from bench.discrepancy.diagnosis import Diagnosis
 
-MEASURED, NOMINAL = "measured", "nominal model"
+MEASURED, NOMINAL, APPLIED = "measured", "nominal model", "in your simulator"
 
 
 def final_label(diagnosis: Diagnosis) -> str:
