@@ -41,6 +41,8 @@ class InteractiveSettings:
     """Probability below which an effect is counted rather than drawn: what three decimals would round to zero."""
     row: int = 210
     """Height of one row of a figure [px]."""
+    edges: int = 6
+    """Most edges of cells that an axis names: what a telephone has room for."""
     numbered: int = 10
     """Most rows of a map whose cells hold their numbers."""
 
@@ -233,13 +235,17 @@ def share_plot(part: Split, *, units: tuple[str, str] = ("", "")) -> go.Figure:
         units: Of displacement and of force.
     """
     values = 100.0 * np.array(part.shares)
-    edges = len(part.cells) == len(values) + 1
+    places = np.arange(len(values))
     names = [str(cell) for cell in part.cells]
-    if edges:
+    ticks = {"tickvals": places, "ticktext": names}
+    if len(part.cells) == len(values) + 1:
         names = [f"{low:.3g} to {high:.3g}" for low, high in pairwise(part.cells)]
+        every = -(-len(values) // SETTINGS.edges)
+        edges = np.arange(0, len(values) + 1, every)
+        ticks = {"tickvals": edges - 0.5, "ticktext": [f"{part.cells[i]:.3g}" for i in edges]}
     figure = go.Figure(
         go.Bar(
-            x=names, y=values, hovertemplate="%{x}: %{y:.3g} %<extra></extra>",
+            x=places, y=values, customdata=names, hovertemplate="%{customdata}: %{y:.3g} %<extra></extra>",
             marker={
                 "color": [COLOURS[1] if yes else PAPER for yes in part.significant],
                 "line": {"color": COLOURS[1], "width": 1.2},
@@ -251,7 +257,7 @@ def share_plot(part: Split, *, units: tuple[str, str] = ("", "")) -> go.Figure:
     )
     label = LABELS.get(part.kind, part.kind)
     figure.update_xaxes(
-        title_text=f"{label} [{unit}]" if units[0] and unit else label, type="category", showgrid=False
+        title_text=f"{label} [{unit}]" if units[0] and unit else label, showgrid=False, **ticks
     )
     figure.update_yaxes(title_text="share [%]")
     title = f"{part.of}{f', {part.dof}' if part.dof and part.dof != part.of else ''}"
