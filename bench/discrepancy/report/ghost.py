@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import mujoco
@@ -10,7 +11,17 @@ from bench.errors import ModelError
 from bench.rig import Rig
 
 PREFIX = "measured/"
-PALE = (0.85, 0.85, 0.85, 0.35)
+
+
+@dataclass(frozen=True)
+class GhostSettings:
+    """Numbers of `bench.discrepancy.report.ghost`."""
+
+    colour: tuple[float, ...] = (0.85, 0.85, 0.85, 0.35)
+    """Red, green, blue and opacity: pale on the viewer's dark ground, and what stands behind it is seen."""
+
+
+SETTINGS = GhostSettings()
 
 
 def with_ghost(path: str | Path) -> Rig:
@@ -32,7 +43,7 @@ def with_ghost(path: str | Path) -> Rig:
         for one in (*ghost.worldbody.geoms, *ghost.lights, *ghost.cameras):
             ghost.delete(one)
         for geom in ghost.geoms:
-            geom.rgba, geom.material = PALE, ""
+            geom.rgba, geom.material = SETTINGS.colour, ""
             geom.contype = geom.conaffinity = 0
         spec.attach(ghost, prefix=PREFIX, frame=spec.worldbody.add_frame())
         for key in list(spec.keys):

@@ -19,7 +19,7 @@ from bench.discrepancy.report.articulated import articulated_page
 from bench.discrepancy.report.interactive import correlation_plot, histories, waterfall_plot
 from bench.discrepancy.report.locations import location_section
 from bench.discrepancy.report.model_update import recipes
-from bench.discrepancy.report.opening import CYCLES, add_ranking, opened, window, with_applied
+from bench.discrepancy.report.opening import add_ranking, opened, window, with_applied
 from bench.discrepancy.report.simulated_records import MEASURED, NOMINAL, judged, variants
 from bench.discrepancy.verdict import InSimulator
 from bench.page import Page
@@ -100,7 +100,7 @@ def _gap_section(out: Page, diagnosis: Diagnosis, shown: Mapping[str, Recording]
     names = names or list(shown[MEASURED].names)
     if len(names) > 1:
         section.plots(
-            [histories(shown, names, window=window(shown, names[0], CYCLES))],
+            [histories(shown, names, window=window(shown, names[0]))],
             "Every judged coordinate of the judging record, where the nominal model misses the first most.",
         )
     if len(shown) > 1:

@@ -43,13 +43,13 @@ class InteractiveSettings:
     """Height of one row of a figure [px]."""
     edges: int = 6
     """Most edges of cells that an axis names: what a telephone has room for."""
+    diverging: tuple[tuple[float, str], ...] = ((0.0, COLOURS[1]), (0.5, PAPER), (1.0, COLOURS[0]))
+    """Colours of maps: blue, the page's own, vermilion."""
     numbered: int = 10
     """Most rows of a map whose cells hold their numbers."""
 
 
 SETTINGS = InteractiveSettings()
-DIVERGING = [[0.0, COLOURS[1]], [0.5, PAPER], [1.0, COLOURS[0]]]
-"""Colours of maps: blue, the page's own, vermilion."""
 LABELS = {
     "band_hz": "frequency [Hz]",
     "time_s": "time [s]",
@@ -151,7 +151,7 @@ def state_plot(found: StateMap) -> go.Figure:
     figure = go.Figure(
         go.Heatmap(
             x=found.displacement_edges, y=found.velocity_edges, z=found.force.T, zmin=-size, zmax=size,
-            colorscale=DIVERGING, hoverongaps=False,
+            colorscale=SETTINGS.diverging, hoverongaps=False,
             colorbar={"title": {"text": f"[{place.force_unit}]"}, "thickness": 12, "outlinecolor": RULE},
             hovertemplate=f"displacement %{{x:.3g}}, velocity %{{y:.3g}}: %{{z:.3g}} {place.force_unit}<extra></extra>",
         )
@@ -271,7 +271,7 @@ def correlation_plot(labels: Sequence[str], correlation: Array) -> go.Figure:
     numbered = len(labels) <= SETTINGS.numbered
     figure = go.Figure(
         go.Heatmap(
-            x=list(labels), y=list(labels), z=np.round(correlation, 2), zmin=-1.0, zmax=1.0, colorscale=DIVERGING,
+            x=list(labels), y=list(labels), z=np.round(correlation, 2), zmin=-1.0, zmax=1.0, colorscale=SETTINGS.diverging,
             xgap=1, ygap=1, texttemplate="%{z:.2f}" if numbered else None,
             colorbar={"thickness": 12, "outlinecolor": RULE},
             hovertemplate="%{y} and %{x}: %{z:.2f}<extra></extra>",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,8 +16,16 @@ from bench.discrepancy.verdict import Gap, InSimulator, Verdict
 from bench.page import Page, Section
 from bench.recording import Recording
 
-CYCLES = 4
-"""Cycles that the first picture shows at first: with more of them, before and after would be one line on a telephone."""
+
+@dataclass(frozen=True)
+class OpeningSettings:
+    """Numbers of `bench.discrepancy.report.opening`."""
+
+    cycles: int = 4
+    """Cycles that a picture shows at first: with more of them, before and after would be one line on a telephone."""
+
+
+SETTINGS = OpeningSettings()
 
 
 def opened(
@@ -43,7 +52,7 @@ def opened(
     section.facts(answers(verdict, settings=settings))
     dof = _shown(verdict.gap, next(iter(runs.values())))
     section.plots(
-        [histories(runs, [dof], window=window(runs, dof, CYCLES))],
+        [histories(runs, [dof], window=window(runs, dof))],
         f"Judging record, {dof}, where the nominal model misses it most; no fit has seen it. Drag to zoom; a double click shows all.",
     )
     for step in next_steps(verdict, model):
@@ -105,20 +114,19 @@ def with_applied(runs: Mapping[str, Recording], applied: InSimulator | None) -> 
     return {**runs, APPLIED: Recording.from_arrays(measured.time, shown, units=units)}
 
 
-def window(runs: Mapping[str, Recording], channel: str, cycles: int) -> tuple[float, float]:
+def window(runs: Mapping[str, Recording], channel: str) -> tuple[float, float]:
     """First and last time [s] of some cycles around the largest error of the first simulation.
 
     Args:
         runs: The measured record first.
         channel: Channel that errors and cycles are those of.
-        cycles: How many.
     """
     measured, *simulated = runs.values()
     y = measured[channel] - np.mean(measured[channel])
     error = simulated[0][channel] - measured[channel] if simulated else y
     crossings = max(int(np.count_nonzero(np.diff(np.signbit(y)))), 1)
     first, last = float(measured.time[0]), float(measured.time[-1])
-    width = min((last - first) * 2.0 * cycles / crossings, last - first)
+    width = min((last - first) * 2.0 * SETTINGS.cycles / crossings, last - first)
     middle = float(measured.time[int(np.argmax(np.abs(error)))])
     start = float(np.clip(middle - 0.5 * width, first, last - width))
     return start, start + width
