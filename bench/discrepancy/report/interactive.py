@@ -122,7 +122,7 @@ def histories(
     figure.update_xaxes(title_text="time [s]", row=len(channels), col=1)
     if window is not None:
         figure.update_xaxes(range=list(window))
-    return _finished(figure, 70 + SETTINGS.row * max(len(channels), 1.2), hovermode="x unified")
+    return _finished(figure, 110 + SETTINGS.row * len(channels), hovermode="x unified")
 
 
 def loop(runs: Mapping[str, Recording], x: str, y: str) -> go.Figure:
