@@ -29,8 +29,9 @@ from bench.excitation.station import Desk
 from bench.excitation.stepping import Packed, integrate_cases
 
 from .base import options_of, setup_of
-from .benches import Options, SteppedBenches, sensed
+from .options import Options
 from .setups import Setup, made, rival_experiment
+from .stepped import SteppedBenches, sensed
 from .vector import BenchVectorEnv
 
 

@@ -13,7 +13,7 @@ from bench.errors import UnknownNameError
 from bench.excitation import Draw
 
 from .base import RENDER_MODES, action_space, info_of, make_benches, observation_space, rest_info
-from .rendering import Picture
+from .rendering import RenderedPicture
 
 
 class BenchEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
@@ -37,7 +37,7 @@ class BenchEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         }
         self.observation_space = observation_space(self.benches)
         self.action_space = action_space(self.benches)
-        self._picture: Picture | None = None
+        self._picture: RenderedPicture | None = None
 
     @property
     def truth(self) -> Draw | None:
@@ -91,7 +91,7 @@ class BenchEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             )
             return None
         if self._picture is None:
-            self._picture = Picture(self.benches.setup.rig)
+            self._picture = RenderedPicture(self.benches.setup.rig)
         positions = self.benches.positions(0)
         if self.render_mode == "human":
             self._picture.show(positions)
