@@ -3,13 +3,19 @@ BIN := .venv/bin
 # pyNastran's metadata asks for numpy < 2; the tests use its bulk-data reader, which runs with numpy 2.
 NASTRAN := pyNastran==1.4.1 cpylog docopt-ng
 
-.PHONY: demo test lint types layers wheel results docs clean
+.PHONY: demo test test-minimum lint types layers wheel results docs clean
 
 demo: .venv/core
 	$(BIN)/jointbench demo --out out/demo --force
 
 test: .venv/full lint types layers
 	$(BIN)/python -m pytest -n 2 --dist loadfile tests
+
+# A sample, a file or two for each package that is bound from below.
+MINIMUM := signals recording documents files figures reading record_formats laws rig polynomial settings campaign_plan report native
+
+test-minimum: .venv-minimum/ready
+	.venv-minimum/bin/python -m pytest $(MINIMUM:%=tests/test_%.py)
 
 lint: .venv/full
 	$(BIN)/ruff check .
@@ -44,5 +50,14 @@ results: .venv/full
 	$(BIN)/python -m pip install --quiet --no-deps $(NASTRAN)
 	touch $@ .venv/core
 
+# the oldest versions that pyproject.toml states, resolved into a file of constraints
+.venv-minimum/ready: pyproject.toml
+	$(PYTHON) -m venv .venv-minimum
+	.venv-minimum/bin/python -m pip install --quiet --upgrade pip uv
+	.venv-minimum/bin/uv pip compile --quiet --resolution lowest-direct --python .venv-minimum/bin/python \
+		--extra test --extra io --extra scale -o .venv-minimum/constraints.txt pyproject.toml
+	.venv-minimum/bin/python -m pip install --quiet -c .venv-minimum/constraints.txt -e '.[test,io,scale]'
+	touch $@
+
 clean:
-	rm -rf .venv out build dist
+	rm -rf .venv .venv-minimum out build dist

@@ -2,6 +2,7 @@
 
     python scripts/render_models.py --out out/models
     python scripts/render_models.py --models sdof joint --cameras overview
+    python scripts/render_models.py --sheet docs/pictures/rigs.png
 
 Needs EGL (Debian: `libegl1 libegl-mesa0`); set `MUJOCO_GL` to choose another way.
 """
@@ -40,6 +41,10 @@ POSES: dict[str, dict[str, float]] = {
 """Joint positions [m, rad] of the displaced picture, within each rig's working range."""
 
 
+SHEET = ("sdof", "joint", "joint_laboratory", "damper", "chain", "joint_6dof")
+"""Rigs of the picture in the documentation, row by row."""
+
+
 @dataclass(frozen=True)
 class Args:
     """Render the rigs.
@@ -51,6 +56,7 @@ class Args:
         width: Width of a picture [pixels].
         height: Height of a picture [pixels].
         displaced: Also render the displaced pose.
+        sheet: File for one picture of the rigs side by side, at rest, and nothing else.
     """
 
     out: Path = Path("out/models")
@@ -59,6 +65,7 @@ class Args:
     width: int = 1400
     height: int = 800
     displaced: bool = True
+    sheet: Path | None = None
 
 
 def pose(model: mujoco.MjModel, name: str) -> mujoco.MjData:
@@ -108,9 +115,29 @@ def render(name: str, args: Args) -> list[Path]:
     return paths
 
 
+def sheet(path: Path) -> None:
+    """Write the rigs of `SHEET` into one picture, two side by side."""
+    import mujoco
+    import numpy as np
+    from PIL import Image
+
+    pictures = []
+    for name in SHEET:
+        model = mujoco.MjModel.from_xml_path(str(model_path(name)))
+        with mujoco.Renderer(model, 352, 616) as renderer:
+            renderer.update_scene(pose(model, ""), camera="overview")
+            pictures.append(renderer.render())
+    whole = np.vstack([np.hstack(pictures[k : k + 2]) for k in range(0, len(pictures), 2)])
+    Image.fromarray(whole).quantize(256).save(path, optimize=True)
+
+
 def main(args: Args) -> None:
     """Render what was asked for and print the paths."""
     os.environ.setdefault("MUJOCO_GL", "egl")
+    if args.sheet is not None:
+        sheet(args.sheet)
+        print(args.sheet)
+        return
     args.out.mkdir(parents=True, exist_ok=True)
     try:
         for name in args.models or tuple(

@@ -8,6 +8,7 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
+from browser import CHROMIUM, shown_whole
 
 from bench.discrepancy import diagnose, read_case
 from bench.discrepancy.articulated.admission import admitted_robot
@@ -160,6 +161,8 @@ def test_a_servo_arm_without_fault_is_clean_and_everything_is_written(tmp_path):
     write_report(found, tmp_path / "report.html")
     write_rerun(found, tmp_path / "run.rrd")
     assert "shoulder" in (tmp_path / "report.html").read_text()
+    if CHROMIUM is not None:
+        shown_whole(tmp_path / "report.html")
     assert (tmp_path / "run.rrd").stat().st_size > 1000
     # a nominal number moved out of what was stated is not believed, however well it fits
     strained = found.final.vector.copy()

@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from browser import CHROMIUM, shown_whole
 
 from bench.discrepancy import (
     BlindOptions,
@@ -126,7 +127,9 @@ def test_a_component_under_prescribed_motion_is_diagnosed(tmp_path):
     text = path.read_text()
     assert "http://" not in text  # self-contained
     assert "https://" not in text
-    assert "How far the gap shrinks" in text
+    assert "How far the discrepancy shrinks" in text
+    if CHROMIUM is not None:
+        shown_whole(path)
 
 
 def test_the_blind_protocol_seals_runs_and_scores(tmp_path):

@@ -81,12 +81,14 @@ class Diagnose:
             self._of_logs([path for path in logs if path not in model], model)
         elif len(self.cases) == 1:
             from bench.discrepancy import read_case
+            from bench.discrepancy.report.answers import model_options
 
             with _stages(self.progress) as stage:
                 case = read_case(self.cases[0])
                 found = _diagnosed(self, case, stage)
-                document, written, problem = self._results(found, stage, ())
-            self._told(found, document, written, problem)
+                own = model_options(case)
+                document, written, problem = self._results(found, stage, (), own)
+            self._told(found, document, written, problem, own)
         elif self.cases and not logs:
             from bench.cli.fleet import diagnose_fleet
 
@@ -120,16 +122,21 @@ class Diagnose:
             for line in made.assumed:
                 told.print(f"assumed: {line}", markup=False, highlight=False)
             found = _diagnosed(self, case, stage)
-            document, written, problem = self._results(found, stage, made.assumed)
-        self._told(found, document, written, problem)
+            own = f"--model {models[0]}"
+            document, written, problem = self._results(found, stage, made.assumed, own)
+        self._told(found, document, written, problem, own)
 
     def _results(
-        self, found: Diagnosis | ArticulatedDiagnosis, stage: Callable[[str], None], assumed: tuple[str, ...]
+        self,
+        found: Diagnosis | ArticulatedDiagnosis,
+        stage: Callable[[str], None],
+        assumed: tuple[str, ...],
+        model: str,
     ) -> tuple[dict[str, Any], list[Path], Exception | None]:
         """The verdict as a document, and its files written."""
         document = found.verdict.to_json()
         document["warnings"] = [*document["warnings"], *(f"assumed: {line}" for line in assumed)]
-        return document, *self._written(found, document, stage)
+        return document, *self._written(found, document, stage, model)
 
     def _told(
         self,
@@ -137,11 +144,12 @@ class Diagnose:
         document: dict[str, Any],
         written: list[Path],
         problem: Exception | None,
+        model: str,
     ) -> None:
         if self.json == PRINTED:
             emit(document)
         else:
-            for part in summary(found.verdict):
+            for part in summary(found.verdict, model):
                 Console().print(part, markup=False, highlight=False)
             for path in written:
                 print(f"written: {path}")
@@ -157,6 +165,7 @@ class Diagnose:
         diagnosis: Diagnosis | ArticulatedDiagnosis,
         document: dict[str, Any],
         stage: Callable[[str], None],
+        model: str,
     ) -> tuple[list[Path], Exception | None]:
         """The files written, moved into place together; where one fails, the verdict alone, and what failed."""
         from bench.files import OutputError, together, write_text
@@ -169,9 +178,12 @@ class Diagnose:
                     write_text(path, text)
                 if self.html is not None:
                     from bench.discrepancy import write_report
+                    from bench.discrepancy.application.first_record import in_simulator
 
+                    stage("the judging records in your simulator, with what is named")
+                    applied = in_simulator(diagnosis.verdict, diagnosis.case)
                     stage(f"writing {self.html}")
-                    write_report(diagnosis, self.html)
+                    write_report(diagnosis, self.html, applied=applied, model=model)
                 if self.rrd is not None:
                     from bench.discrepancy.report.rerun_recording import write_rerun
 

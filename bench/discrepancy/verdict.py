@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from bench.files import json_values
 
@@ -236,3 +240,15 @@ class Verdict:
     def to_json(self) -> dict[str, Any]:
         """Return the verdict as JSON values; numbers that are not finite become None."""
         return json_values(asdict(self))
+
+
+class InSimulator(NamedTuple):
+    """What was named, in the user's own simulator.
+
+    Attributes:
+        line: The outcome in a line.
+        record: Judged coordinate to its motion (n,) in the first judging record.
+    """
+
+    line: str
+    record: Mapping[str, NDArray[np.float64]]

@@ -1,7 +1,7 @@
 """Figures of records, joints and diagnoses: matplotlib without state, a display or a call to pyplot.
 
 Every function returns a `matplotlib.figure.Figure` with a quantity and a unit on each axis. The first record is the
-reference: black and broad; the others are drawn thin on top in the colours of Okabe & Ito, which every colour vision
+reference: grey and broad; the others are drawn thin on top in the colours of Okabe & Ito, which every colour vision
 tells apart, and in differing dashes, which a grey print does. `save` writes a file whole or not at all; `as_svg` and
 `as_png_data_uri` embed a figure in a page.
 """

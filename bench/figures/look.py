@@ -81,18 +81,18 @@ def axes_grid(width: float, height: float, **layout: Any) -> tuple[Figure, NDArr
 
 
 def look(number: int) -> dict[str, Any]:
-    """How the record of that number is drawn: the reference (0) broad and black, the others thin in colours."""
+    """How the record of that number is drawn: the reference (0) broad and grey, to be seen on both sides of the thin coloured others."""
     if number == 0:
-        return {"color": REFERENCE_COLOUR, "linewidth": 2.2, "alpha": 0.75}
+        return {"color": REFERENCE_COLOUR, "linewidth": 3.4, "alpha": 0.45}
     index = (number - 1) % len(COLOURS)
-    return {"color": COLOURS[index], "linewidth": 1.1, "linestyle": SETTINGS.dashes[index]}
+    return {"color": COLOURS[index], "linewidth": 1.0, "linestyle": SETTINGS.dashes[index]}
 
 
-def thin(x: NDArray, y: NDArray) -> tuple[NDArray, NDArray]:
-    """At most about `max_points` points, among them the extremes of y in each short window."""
-    if len(x) <= SETTINGS.max_points:
+def thin(x: NDArray, y: NDArray, points: int = SETTINGS.max_points) -> tuple[NDArray, NDArray]:
+    """At most about that many points, among them the extremes of y in each short window."""
+    if len(x) <= points:
         return x, y
-    width = math.ceil(2.0 * len(x) / SETTINGS.max_points)
+    width = math.ceil(2.0 * len(x) / points)
     whole = len(y) // width * width
     first, windows = np.arange(0, whole, width), y[:whole].reshape(-1, width)
     kept = np.unique(

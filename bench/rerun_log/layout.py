@@ -85,10 +85,16 @@ class LogPage(NamedTuple):
             rigs,
             tuple(Loop.of(holder_of(records, x, y), x, y) for x, y in loops),
             {tab: tuple(labels) for tab, labels in groups.items()},
-            tuple(key) if len(records) > 1 else (),
+            tuple(key or _shared(records)) if len(records) > 1 else (),
             lanes,
             _window(holder_of(records, paced), paced),
         )
+
+
+def _shared(records: Mapping[str, Recording]) -> list[str]:
+    """Labels of the reference's channels that another record holds."""
+    first, *others = records.values()
+    return [label_of(first, name) for name in first.names if any(name in other.names for other in others)]
 
 
 def _distinct(records: Mapping[str, Recording], channels: Iterable[str]) -> list[str]:
@@ -166,6 +172,9 @@ def _plots(
 
 def _series(page: LogPage) -> rrb.Tabs:
     tabs: list[rrb.Container | rrb.View] = []
+    for start in range(0, len(page.errors), SETTINGS.plots_a_tab):
+        part = page.errors[start : start + SETTINGS.plots_a_tab]
+        tabs.append(rrb.Vertical(*_plots("errors", part, page, prefix="error of "), name="Errors"))
     for tab, labels in page.groups.items():
         for start in range(0, len(labels), SETTINGS.plots_a_tab):
             part = labels[start : start + SETTINGS.plots_a_tab]
@@ -173,9 +182,6 @@ def _series(page: LogPage) -> rrb.Tabs:
                 tab if len(labels) <= SETTINGS.plots_a_tab else f"{tab} {start // SETTINGS.plots_a_tab + 1}"
             )
             tabs.append(rrb.Vertical(*_plots("channels", part, page), name=name))
-    for start in range(0, len(page.errors), SETTINGS.plots_a_tab):
-        part = page.errors[start : start + SETTINGS.plots_a_tab]
-        tabs.append(rrb.Vertical(*_plots("errors", part, page, prefix="error of "), name="Errors"))
     return rrb.Tabs(*tabs, active_tab=0)
 
 

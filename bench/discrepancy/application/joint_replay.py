@@ -17,7 +17,7 @@ from scipy.interpolate import CubicSpline
 
 from bench.discrepancy.application.applying import Applied
 from bench.discrepancy.application.forces import values_of
-from bench.discrepancy.application.running import Window, controls, hook_of, run, sampled
+from bench.discrepancy.application.running import Reading, Window, controls, hook_of, run, sampled
 from bench.discrepancy.application.target import PREFIX, as_mujoco
 from bench.discrepancy.articulated_search.catalogue import CATALOGUE
 from bench.discrepancy.case.case import Case, CaseRecord
@@ -64,15 +64,15 @@ class JointReplay:
         """Prepare the replay of a case."""
         return cls(bound(case, nominal), ArticulatedModel.of(nominal, case.rig))
 
-    def errors(self, applied: Applied, effects: Sequence[NamedEffect]) -> dict[str, Array]:
-        """Measured less simulated positions over the standard deviation of the measured, by joint, all judging records in a row.
+    def readings(self, applied: Applied, effects: Sequence[NamedEffect]) -> dict[str, list[Reading]]:
+        """Position of every joint in every judging record, measured and simulated.
 
         Args:
             applied: The model they are run with.
-            effects: Logs of wrong encoders are corrected first; errors are those of the log.
+            effects: Logs of wrong encoders are corrected first; what is simulated is the log.
         """
         wrong = encoders_wrong(effects)
-        found: dict[str, list[Array]] = {joint.name: [] for joint in self.model.joints}
+        found: dict[str, list[Reading]] = {joint.name: [] for joint in self.model.joints}
         raw = [
             motion_of(self.case, self.model, record, {}, settings=DEFAULT.motion)
             for record in self.case.validation
@@ -88,18 +88,23 @@ class JointReplay:
             for record, motion, logged in zip(self.case.validation, motions, raw, strict=True):
                 error = self._error(applied, held, j, record, motion, wrong)
                 size = max(float(np.std(logged.samples[j][:, 0])), float(np.max(logged.noise[j])))
-                found[joint.name].append(
-                    np.nan_to_num(
-                        error * factor / size,
-                        nan=SETTINGS.far_off,
-                        posinf=SETTINGS.far_off,
-                        neginf=-SETTINGS.far_off,
-                    )
-                )
+                measured = logged.samples[j][:, 0]
+                found[joint.name].append(Reading(measured, measured - factor * error, size))
+        return found
+
+    def errors(self, applied: Applied, effects: Sequence[NamedEffect]) -> dict[str, Array]:
+        """Simulated less measured positions over the standard deviation of the measured, by joint, all judging records in a row."""
+        far = SETTINGS.far_off
         return {
-            name: np.clip(np.concatenate(parts), -SETTINGS.far_off, SETTINGS.far_off)
-            for name, parts in found.items()
-        }
+            name: np.clip(
+                np.nan_to_num(
+                    np.concatenate([(r.simulated - r.measured) / r.size for r in found]),
+                    nan=far, posinf=far, neginf=-far,
+                ),
+                -far, far,
+            )
+            for name, found in self.readings(applied, effects).items()
+        }  # fmt: skip
 
     def _error(
         self,

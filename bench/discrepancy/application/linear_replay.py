@@ -13,7 +13,7 @@ from scipy.optimize import least_squares
 from bench.discrepancy.application.applying import Applied, loads_of, rest_of
 from bench.discrepancy.application.drives import LOGGED
 from bench.discrepancy.application.forces import values_of
-from bench.discrepancy.application.running import Window, controls, hook_of, run, sampled
+from bench.discrepancy.application.running import Reading, Window, controls, hook_of, run, sampled
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.effects.catalogue import CATALOGUE
 from bench.discrepancy.judgement.validation_discrepancy import DIVERGED_GAP, coordinates
@@ -58,8 +58,8 @@ class LinearReplay:
         duration = max(len(record) * record.step for record in case.validation)
         return cls(case, structure, drifts(structure, structure.at(values), duration))
 
-    def errors(self, applied: Applied, effects: Sequence[NamedEffect]) -> dict[str, Array]:
-        """Simulated less measured over the standard deviation of the measured, by judged coordinate, all judging records in a row.
+    def readings(self, applied: Applied, effects: Sequence[NamedEffect]) -> dict[str, list[Reading]]:
+        """Every judged coordinate of every judging record, measured and simulated.
 
         Args:
             applied: The model they are run with.
@@ -67,12 +67,20 @@ class LinearReplay:
         """
         model = applied.compiled()
         player = _Player(self, applied, model)
-        runs = [_read(effects, player.channels(record), record) for record in self.case.validation]
+        records = self.case.validation
+        runs = [_read(effects, player.channels(record), record) for record in records]
         out = {}
         for name, channels in coordinates(self.structure):
-            measured = np.concatenate([_sum(record.values, channels) for record in self.case.validation])
-            simulated = np.concatenate([_sum(found, channels) for found in runs])
-            error = (simulated - measured) / max(float(np.std(measured)), 1e-300)
+            measured = [_sum(record.values, channels) for record in records]
+            size = max(float(np.std(np.concatenate(measured))), 1e-300)
+            out[name] = [Reading(y, _sum(run, channels), size) for y, run in zip(measured, runs, strict=True)]
+        return out
+
+    def errors(self, applied: Applied, effects: Sequence[NamedEffect]) -> dict[str, Array]:
+        """Simulated less measured over the standard deviation of the measured, by judged coordinate, all judging records in a row."""
+        out = {}
+        for name, found in self.readings(applied, effects).items():
+            error = np.concatenate([(r.simulated - r.measured) / r.size for r in found])
             out[name] = error if np.isfinite(error).all() else np.full(len(error), DIVERGED_GAP)
         return out
 

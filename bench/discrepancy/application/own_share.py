@@ -44,7 +44,7 @@ def with_simulator(verdict: Verdict, case: Case, settings: VerificationSettings 
         step, integrator = float(option.timestep), INTEGRATORS[mujoco.mjtIntegrator(option.integrator)]
         fine = Options(step / own.converged, mujoco.mjtIntegrator.mjINT_RK4, hard=True)
         runs = [
-            replay(apply(path, nothing, case=case, linear=not articulated, options=options), ())
+            replay.errors(apply(path, nothing, case=case, linear=not articulated, options=options), ())
             for options in (Options(), fine)
         ]
     except (BenchError, KeyError):

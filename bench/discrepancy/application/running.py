@@ -29,6 +29,14 @@ class Motion(NamedTuple):
     acceleration: Array
 
 
+class Reading(NamedTuple):
+    """A judged coordinate of a record: measured and simulated (n,), and what its error is held against."""
+
+    measured: Array
+    simulated: Array
+    size: float
+
+
 def hook_of(applied: Applied) -> Hook | None:
     """The very function that the snippet holds, compiled; None where there is none."""
     text = hook_text(applied)

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from bench import native
 from bench.discrepancy.application.applying import (
     INTEGRATORS,
-    Applied,
     Findings,
     Options,
     apply,
@@ -130,7 +129,7 @@ class Verification:
         }
 
 
-Replay = Callable[[Applied, Sequence[Any]], dict[str, NDArray[np.float64]]]
+Replay = JointReplay | LinearReplay
 
 
 def is_articulated(findings: Findings, case: Case | None) -> bool:
@@ -175,7 +174,9 @@ def verify(
     nothing = Findings(())
 
     def errors(what: Findings, options: Options) -> dict[str, NDArray[np.float64]]:
-        return replay(apply(path, what, case=case, linear=not articulated, options=options), what.effects)
+        return replay.errors(
+            apply(path, what, case=case, linear=not articulated, options=options), what.effects
+        )
 
     def figures(options: Options) -> tuple[Figure, ...]:
         before, after = errors(nothing, options), errors(findings, options)
@@ -250,16 +251,16 @@ def _remedied(
 
 
 def replay_of(path: str | Path, case: Case, *, articulated: bool) -> Replay:
-    """What runs the judging records of a case in a model, and gives the normalised errors by coordinate.
+    """What runs the judging records of a case in a model.
 
     Raises:
         ModelError: The case is one of a rig of the bench.
     """
     if articulated:
-        return JointReplay.of(case, specification(path).compile()).errors
+        return JointReplay.of(case, specification(path).compile())
     if not case.rig.endswith(".xml"):
         raise ModelError(
             f"the case is one of the rig '{case.rig}' of the bench; its records are run with a model of your own only where that is the rig"
         )
     case = with_starts_found(case)
-    return LinearReplay.of(case, structure_of(case)).errors
+    return LinearReplay.of(case, structure_of(case))

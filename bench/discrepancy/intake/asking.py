@@ -19,6 +19,7 @@ from bench.discrepancy.intake.assumptions import Assumptions
 from bench.discrepancy.intake.drafting import Draft, draft
 from bench.discrepancy.intake.logs import log_of
 from bench.discrepancy.intake.models import model_file
+from bench.discrepancy.report.answers import answers
 from bench.discrepancy.verdict import Verdict
 from bench.errors import MissingPackageError
 
@@ -59,7 +60,8 @@ def case_from(logs: Sequence[Any], model: Any, **options: Any) -> Iterator[tuple
     """
     with tempfile.TemporaryDirectory() as folder:
         made, _ = drafted(logs, model, Path(folder), **options)
-        yield read_case(folder), made
+        case = read_case(folder)
+        yield replace(case, name=Path(case.rig).stem), made
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,21 +115,11 @@ class Answer:
         return time_histories(runs, [n for n in names if robot or n in responses])
 
     def _repr_html_(self) -> str:
-        gaps = [
-            f"{g.before:.3g} → {g.after:.3g} (noise alone {g.noise_floor:.2g})" for g in self.verdict.gaps
-        ]
         rows = "".join(
-            f"<tr><td>{escape(e.name)}</td><td>{escape(e.where or e.channel)}</td><td>{escape(name)}</td>"
-            f"<td>{x.value:.5g} ± {x.std:.2g} {escape(x.unit)}</td></tr>"
-            for e in self.verdict.named
-            for name, x in e.parameters.items()
+            f"<tr><th>{escape(question)}</th><td>{escape(answer)}</td></tr>"
+            for question, answer in answers(self.verdict)
         )
-        table = (
-            f"<table><tr><th>effect</th><th>where</th><th>parameter</th><th>value</th></tr>{rows}</table>"
-            if rows
-            else ""
-        )
-        return f"<p>{escape(self.verdict.explanation)}</p>{table}<p>gap: {escape('; '.join(gaps))}</p>"
+        return f"<p>{escape(self.verdict.explanation)}</p><table>{rows}</table>"
 
 
 def diagnose(model: Any, records: Any, **options: Any) -> Answer:

@@ -27,7 +27,7 @@ def shrunk(
     rng: np.random.Generator,
     nearest: Explanation,
 ) -> tuple[Explanation, str, tuple[Gap, ...]]:
-    """How far the gap shrinks: the explanation behind `Gap.after`, the closure in it if any, and the gaps."""
+    """How far the discrepancy shrinks: the explanation behind `Gap.after`, the closure in it if any, and the gaps."""
     best, nothing = explanations[0], nominal_alone(explanations)
     final, closure = best, ""
     stages = [("nominal", nominal_prediction(problem)), ("parameters only", nothing.predict)]

@@ -1,4 +1,4 @@
-"""How far the gap shrinks: free runs of the judging records before, in between and after.
+"""How far the discrepancy shrinks: free runs of the judging records before, in between and after.
 
 The gap is rms(simulated - measured) / std(measured) of a position-like channel over whole judging records, simulated
 from rest with the measured loads and nothing else. On the joint it is that of the relative motion of each axis.

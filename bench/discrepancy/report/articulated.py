@@ -1,11 +1,13 @@
 """The diagnosis of an articulated model as a page and as a rerun recording.
 
-The page answers in the order of the questions: what is missing, how far the discrepancy shrinks, at which joint it lies, what was
-re-estimated, and how to put the effect into one's own MJCF.
+Below the answers the page shows how far the discrepancy shrinks joint by joint, what each effect would close at each joint, and what
+was re-estimated.
 """
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,11 +17,20 @@ from numpy.typing import NDArray
 from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis
 from bench.discrepancy.articulated.free_runs import FreeRuns
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
+from bench.discrepancy.judgement.shares import closed_words
+from bench.discrepancy.report.answers import level
+from bench.discrepancy.report.ghost import with_ghost
+from bench.discrepancy.report.interactive import histories, matrix_plot
+from bench.discrepancy.report.opening import add_ranking, opened, with_applied
+from bench.discrepancy.report.simulated_records import MEASURED, NOMINAL
+from bench.discrepancy.verdict import InSimulator
+from bench.errors import ModelError
 from bench.page import Page
 from bench.recording import Recording
+from bench.rig import Rig
 
 Array = NDArray[np.float64]
-MEASURED, NOMINAL, FINAL = "measured", "nominal model", "with what is named"
+FINAL = "with what is named"
 
 
 @dataclass(frozen=True)
@@ -63,66 +74,51 @@ def _errors(diagnosis: ArticulatedDiagnosis, fit: ArticulatedFit | None) -> Arra
     ])  # fmt: skip
 
 
-def articulated_page(diagnosis: ArticulatedDiagnosis) -> Page:
-    """Build the report."""
-    verdict = diagnosis.verdict
-    out = Page(
-        f"Diagnosis of {diagnosis.case.name}", verdict.explanation, f"{verdict.seconds:.1f} s of computation"
-    )
-    _what(out, diagnosis)
-    _how_far(out, diagnosis)
+def articulated_page(
+    diagnosis: ArticulatedDiagnosis, applied: InSimulator | None = None, model: str = ""
+) -> Page:
+    """Build the report.
+
+    Args:
+        diagnosis: The diagnosis.
+        applied: What was named in the user's own simulator, to be drawn beside it.
+        model: Options of `jointbench apply` that name the user's own MJCF.
+    """
+    runs = with_applied(simulated_joints(diagnosis), applied)
+    out = opened(
+        diagnosis.case.name, diagnosis.verdict, runs, model=model,
+        settings=diagnosis.problem.settings.judgement, applied=applied,
+    )  # fmt: skip
+    _how_far(out, diagnosis, runs)
     _where(out, diagnosis)
     _parameters(out, diagnosis)
     return out
 
 
-def _what(out: Page, diagnosis: ArticulatedDiagnosis) -> None:
-    section = out.section("What is missing")
-    for effect in diagnosis.verdict.named:
-        low, high = effect.closed_ci95
-        section.table(
-            f"{effect.name} ({effect.where}): {effect.equation}; closes {100 * effect.closed:.3g} % of the squared discrepancy "
-            f"({100 * low:.3g} to {100 * high:.3g} %)",
-            ("parameter", "value", "one-sigma", "unit"),
-            [(name, f"{e.value:.5g}", f"{e.std:.2g}", e.unit) for name, e in effect.parameters.items()],
-        )
-    for group in diagnosis.verdict.indistinguishable:
-        section.text(f"These records cannot tell apart: {', '.join(group)}.")
-    proposal = diagnosis.verdict.next_excitation
-    if proposal:
-        first, second = proposal["separates"]
-        section.text(
-            f"A test that would tell {first} from {second}: {proposal['excitation']}, for {proposal['duration_s']:.3g} s, with expected "
-            f"log odds of {proposal['expected_log_odds']:.3g} where the present records give {proposal['log_odds_now']:.3g}."
-        )
-    for warning in diagnosis.verdict.warnings:
-        section.text(f"Note: {warning}.")
-
-
-def _how_far(out: Page, diagnosis: ArticulatedDiagnosis) -> None:
-    from bench.figures import time_histories  # noqa: PLC0415  (matplotlib)
-
+def _how_far(out: Page, diagnosis: ArticulatedDiagnosis, runs: Mapping[str, Recording]) -> None:
     section = out.section("How far the discrepancy shrinks")
     section.table(
         "NRMSE of the position on the judging records: " + diagnosis.verdict.gap.metric.split("NRMSE, ")[-1],
-        ("joint", "before", "parameters only", "after", "noise alone"),
+        ("joint", "nominal model", "parameters only", "with what is named", "noise alone", "closed"),
         [
-            (g.dof, *(f"{x:.3g}" for x in (g.before, g.parameters_only, g.after, g.noise_floor)))
+            (
+                g.dof,
+                *(level(x) for x in (g.before, g.parameters_only, g.after, g.noise_floor)),
+                closed_words(g),
+            )
             for g in diagnosis.verdict.gaps
         ],
     )
-    runs = simulated_joints(diagnosis)
-    worst = sorted(diagnosis.verdict.gaps, key=lambda g: -g.before / max(g.noise_floor, 1e-12))[
-        : SETTINGS.shown_joints
-    ]
-    section.figure(
-        time_histories(runs, [g.dof for g in worst]),
-        "Judging record: measured, the nominal model, and the model with what is named; one joint free at a time.",
+    worst = sorted(diagnosis.verdict.gaps, key=lambda g: -g.before / max(g.noise_floor, 1e-12))
+    names = [g.dof for g in worst[: SETTINGS.shown_joints]]
+    section.plots(
+        [histories(runs, names), histories(runs, names, errors=True)],
+        "Judging record, one joint free at a time: the joints with most of the discrepancy, and what each simulation misses them by.",
     )
 
 
 def _where(out: Page, diagnosis: ArticulatedDiagnosis) -> None:
-    section = out.section("Where it lies")
+    section = out.section("Where the gap lies")
     section.table(
         "What the nominal model leaves beyond the noise, its parameters re-estimated",
         ("joint", "share", "band [Hz]", "time [s]"),
@@ -136,31 +132,21 @@ def _where(out: Page, diagnosis: ArticulatedDiagnosis) -> None:
             for p in diagnosis.verdict.locations
         ],
     )
-    joints = list(diagnosis.matrix)
-    effects = sorted({name for row in diagnosis.matrix.values() for name in row})
-    if effects:
-        section.table(
-            "Part of a joint's own discrepancy that one effect alone closes there (records for identification); empty where the "
-            "screening promised too little for a fit",
-            ("effect", *joints),
-            [
-                (
-                    name,
-                    *(
-                        f"{100 * diagnosis.matrix[j][name]:.3g} %" if name in diagnosis.matrix[j] else ""
-                        for j in joints
-                    ),
-                )
-                for name in effects
-            ],
+    if any(diagnosis.matrix.values()):
+        section.plots(
+            [matrix_plot(diagnosis.matrix)],
+            "Part [%] of a joint's own discrepancy that one effect alone closes there, on the records for identification; empty where "
+            "the screening promised too little for a fit.",
         )
+    if diagnosis.verdict.ranking:
+        add_ranking(section, diagnosis.verdict)
 
 
 def _parameters(out: Page, diagnosis: ArticulatedDiagnosis) -> None:
-    section = out.section("Nominal parameters")
+    section = out.section("Parameters")
     section.table(
         "Re-estimated within their stated uncertainty",
-        ("parameter", "stated", "estimate", "shift in stated sigmas"),
+        ("parameter", "stated", "estimate", "moved [stated sigma]"),
         [
             (
                 p.name,
@@ -174,10 +160,17 @@ def _parameters(out: Page, diagnosis: ArticulatedDiagnosis) -> None:
 
 
 def write_articulated_rerun(diagnosis: ArticulatedDiagnosis, path: str | Path) -> None:
-    """Write the first judging record, measured and simulated, as a ``.rrd`` file."""
+    """Write the first judging record, measured and simulated, as a ``.rrd`` file; the measured motion is a ghost over each simulation."""
     from bench.rerun_log import log_comparison  # noqa: PLC0415  (rerun, for pictures only)
 
+    runs = simulated_joints(diagnosis)
+    rigs: dict[str, Rig] = {}
+    with contextlib.suppress(ModelError):  # the curves are worth having without the model
+        rig = with_ghost(Path(diagnosis.case.folder or ".") / diagnosis.case.rig)
+        rigs = {label: rig for label in runs if label != MEASURED}
+    angles = {label: np.column_stack([run[name] for name in run.names]) for label, run in runs.items()}
     log_comparison(
-        path, {}, simulated_joints(diagnosis), loops=[], bands=[],
+        path, rigs, runs, loops=[], bands=[],
+        poses={label: np.hstack([angles[label], angles[MEASURED]]) for label in rigs},
         title=f"diagnosis of {diagnosis.case.name}: {diagnosis.verdict.explanation}",
     )  # fmt: skip

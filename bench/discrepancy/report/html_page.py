@@ -1,66 +1,52 @@
-"""The diagnosis as a page: one self-contained HTML file with the verdict, the pictures behind it, and the way back.
+"""The diagnosis as a page: one self-contained HTML file with the verdict, the figures behind it, and the way back.
 
-The page answers in the order of the questions: what is missing, how far the gap shrinks, where it lies, how sure that is,
-what to measure next, and how to put the effect into one's own model.
+The first screen answers: where, which, how far, how sure, how complete, and what to do next. Below stand the judging records, where
+the discrepancy lies, which effects were weighed, the parameters, the next test, and how to put the effect into one's own model.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis
 from bench.discrepancy.diagnosis import Diagnosis
-from bench.discrepancy.judgement.shares import closed_words, percent, probability
-from bench.discrepancy.judgement.validation_discrepancy import coordinates
-from bench.discrepancy.localisation.localise import box
-from bench.discrepancy.localisation.state_map import StateMap
+from bench.discrepancy.judgement.shares import closed_words
+from bench.discrepancy.report.answers import level, model_options
 from bench.discrepancy.report.articulated import articulated_page
+from bench.discrepancy.report.interactive import correlation_plot, histories, waterfall_plot
+from bench.discrepancy.report.locations import location_section
 from bench.discrepancy.report.model_update import recipes
-from bench.discrepancy.report.simulated_records import MEASURED, NOMINAL, variants
-from bench.discrepancy.verdict import Split
-from bench.page import Page, Section
+from bench.discrepancy.report.opening import add_ranking, opened, window, with_applied
+from bench.discrepancy.report.simulated_records import MEASURED, NOMINAL, judged, variants
+from bench.discrepancy.verdict import InSimulator
+from bench.page import Page
 from bench.recording import Recording
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
+def page(
+    diagnosis: Diagnosis | ArticulatedDiagnosis, applied: InSimulator | None = None, model: str | None = None
+) -> Page:
+    """Build the report of a diagnosis.
 
-@dataclass(frozen=True)
-class HtmlPageSettings:
-    """Numbers of `bench.discrepancy.report.html_page`."""
-
-    cycles_shown: int = 12
-    """Cycles around the largest response that the overlays show."""
-    worth_showing: float = 0.02
-    """Share of the excess below which a channel's own bands and times are not drawn."""
-
-
-SETTINGS = HtmlPageSettings()
-
-
-def simulated(diagnosis: Diagnosis) -> dict[str, Recording]:
-    """Measured, nominal and final responses of the first judging record, see `variants`."""
-    return variants(diagnosis)
-
-
-def page(diagnosis: Diagnosis | ArticulatedDiagnosis) -> Page:
-    """Build the report of a diagnosis."""
+    Args:
+        diagnosis: The diagnosis.
+        applied: What was named in the user's own simulator, to be drawn beside it.
+        model: Options of `jointbench apply` that name the user's own MJCF; those of the case folder where None.
+    """
+    model = model_options(diagnosis.case) if model is None else model
     if isinstance(diagnosis, ArticulatedDiagnosis):
-        return articulated_page(diagnosis)
-    verdict = diagnosis.verdict
-    out = Page(
-        f"Diagnosis of {diagnosis.case.name}", verdict.explanation, f"{verdict.seconds:.1f} s of computation"
-    )
+        return articulated_page(diagnosis, applied, model)
+    verdict, case = diagnosis.verdict, diagnosis.case
     runs = variants(diagnosis)
-    _verdict_section(out, diagnosis)
-    _gap_section(out, diagnosis, runs)
-    _location_section(out, diagnosis, runs)
+    shown = with_applied(judged(diagnosis, runs), applied)
+    out = opened(
+        case.name, verdict, shown, model=model, settings=diagnosis.problem.settings.judgement, applied=applied
+    )
+    _gap_section(out, diagnosis, shown)
+    location_section(out, diagnosis, runs)
     if verdict.ranking:
         _ranking_section(out, diagnosis)
     _parameter_section(out, diagnosis)
@@ -70,230 +56,72 @@ def page(diagnosis: Diagnosis | ArticulatedDiagnosis) -> Page:
     return out
 
 
-def write_report(diagnosis: Diagnosis | ArticulatedDiagnosis, path: str | Path) -> None:
-    """Write the report of a diagnosis as one HTML file."""
-    page(diagnosis).write(path)
+def write_report(
+    diagnosis: Diagnosis | ArticulatedDiagnosis,
+    path: str | Path,
+    *,
+    applied: InSimulator | None = None,
+    model: str | None = None,
+) -> None:
+    """Write the report of a diagnosis as one HTML file.
+
+    Args:
+        diagnosis: The diagnosis.
+        path: The file, written whole or not at all.
+        applied: As of `page`.
+        model: As of `page`.
+
+    Raises:
+        OutputError: The file cannot be written.
+    """
+    page(diagnosis, applied, model).write(path)
 
 
-def _draw(section: Section, make: Callable[[], Figure], caption: str) -> None:
-    """Add a picture; one that cannot be drawn (all numbers NaN, nothing in range) is a sentence instead of the end of the page."""
-    try:
-        section.figure(make(), caption)
-    except Exception as error:  # whatever matplotlib makes of numbers that are not finite, the verdict is worth more than a picture
-        section.text(f"Not drawn ({error or type(error).__name__}): {caption}")
-
-
-def _verdict_section(out: Page, diagnosis: Diagnosis) -> None:
-    verdict = diagnosis.verdict
-    section = out.section("Verdict")
-    section.table(
-        "Probabilities",
-        ("verdict", "probability"),
-        [(k, probability(p)) for k, p in verdict.probabilities.items()],
-    )
-    for effect in (*verdict.named, *verdict.nearest):
-        where = f" ({effect.where})" if effect.where else ""
-        rows = [
-            (
-                name, f"{e.value:.5g}", f"{e.std:.2g}",
-                f"{e.value - 1.96 * e.std:.5g} to {e.value + 1.96 * e.std:.5g}", e.unit,
-            )
-            for name, e in effect.parameters.items()
-        ]  # fmt: skip
-        section.table(
-            f"{'' if verdict.named else 'Nearest: '}{effect.name}{where}, probability {probability(effect.probability)}, closes "
-            f"{percent(effect.closed)} of what is missing without it: {effect.equation}",
-            ("parameter", "value", "one-sigma", "95 % interval", "unit"),
-            rows,
-        )
-    for group in verdict.indistinguishable:
-        section.text(f"These records cannot tell apart: {', '.join(group)}.")
-    if verdict.left:
-        section.text(verdict.left)
-    for warning in verdict.warnings:
-        section.text(f"Note: {warning}.")
-
-
-def _window(diagnosis: Diagnosis, reference: Recording) -> tuple[float, float]:
-    """Some cycles around the largest response."""
-    channels = [name for _, names in coordinates(diagnosis.problem.structure) for name, _ in names]
-    y = reference[channels[0]] - np.mean(reference[channels[0]])
-    crossings = max(int(np.count_nonzero(np.diff(np.signbit(y)))), 1)
-    first, last = float(reference.time[0]), float(reference.time[-1])
-    width = min((last - first) * 2.0 * SETTINGS.cycles_shown / crossings, last - first)
-    middle = float(reference.time[int(np.argmax(np.abs(y)))])
-    start = float(np.clip(middle - 0.5 * width, first, last - width))
-    return start, start + width
-
-
-def _gap_section(out: Page, diagnosis: Diagnosis, runs: Mapping[str, Recording]) -> None:
-    from bench.figures import error_histories, time_histories, waterfall  # noqa: PLC0415  (matplotlib)
-
-    section = out.section("How far the gap shrinks")
+def _gap_section(out: Page, diagnosis: Diagnosis, shown: Mapping[str, Recording]) -> None:
+    section = out.section("How far the discrepancy shrinks")
+    settings = diagnosis.problem.settings.judgement
     for gap in diagnosis.verdict.gaps:
-        closed = closed_words(gap, settings=diagnosis.problem.settings.judgement)
         section.table(
-            f"{gap.metric}{' (' + gap.dof + ')' if gap.dof else ''}; closed, with its 95 % interval: {closed}",
-            ("stage", "NRMSE", "closed"),
+            f"{gap.metric}{' (' + gap.dof + ')' if gap.dof else ''}; closed, with its 95 % interval: "
+            f"{closed_words(gap, settings=settings)}",
+            ("model", "NRMSE", "closed"),
             [
                 *(
-                    (
-                        label,
-                        f"{value:.4f}",
-                        ""
-                        if i == 0
-                        else closed_words(gap, value, settings=diagnosis.problem.settings.judgement),
-                    )
+                    (label, level(value), "" if i == 0 else closed_words(gap, value, settings=settings))
                     for i, (label, value) in enumerate(gap.steps)
                 ),
-                ("noise floor", f"{gap.noise_floor:.4f}", ""),
+                ("noise alone", level(gap.noise_floor), ""),
             ],
         )
     gap = diagnosis.verdict.gap
-    values = [value for _, value in gap.steps]
-    if np.all(np.isfinite(values)):
-        labels = [label.replace(" + ", "\n+ ") for label, _ in gap.steps[1:]]
-        _draw(
-            section,
-            lambda: waterfall(labels, values, floor=gap.noise_floor, axis="NRMSE [1]"),
-            "The gap after each step, and the floor that the noise sets.",
+    if all(level(value) != "diverges" for _, value in gap.steps):
+        section.plots([waterfall_plot(gap)], "The gap after each step, and the floor that the noise sets.")
+    names = [g.dof for g in diagnosis.verdict.gaps if g.dof in shown[MEASURED].names]
+    names = names or list(shown[MEASURED].names)
+    if len(names) > 1:
+        section.plots(
+            [histories(shown, names, window=window(shown, names[0]))],
+            "Every judged coordinate of the judging record, where the nominal model misses the first most.",
         )
-    channels = [name for _, names in coordinates(diagnosis.problem.structure) for name, _ in names]
-    window = _window(diagnosis, runs[MEASURED])
-    before = {label: run for label, run in runs.items() if label in {MEASURED, NOMINAL}}
-    after = {label: run for label, run in runs.items() if label != NOMINAL}
-    for shown, caption in (
-        (before, "Judging record, before: measured and nominal model, around the largest response."),
-        (after, "The same after: measured and final model."),
-    ):
-        if len(shown) > 1:
-            _draw(section, partial(time_histories, shown, channels, window=window), caption)
-    if len(runs) > 1:
-        _draw(
-            section,
-            lambda: error_histories(runs, channels),
+    if len(shown) > 1:
+        section.plots(
+            [histories(shown, names, errors=True)],
             "What is left: simulated less measured, over the whole record.",
         )
-    if NOMINAL not in runs:
+    if NOMINAL not in shown:
         section.text("The nominal model diverges on the judging record; it is not drawn.")
 
 
-def _location_section(out: Page, diagnosis: Diagnosis, runs: Mapping[str, Recording]) -> None:
-    section = out.section("Where the gap lies")
-    where, verdict = diagnosis.where, diagnosis.verdict
-    rows = []
-    for location in verdict.locations:
-        band = f"{location.band_hz[0]:.3g} to {location.band_hz[1]:.3g}"
-        span = f"{location.time_s[0]:.3g} to {location.time_s[1]:.3g}"
-        share = f"{100 * location.share:.1f} %"
-        rows.append(
-            (location.channel, location.dof, share, band, span, location.kind, f"{location.p_value:.1g}")
-        )
-    if rows:
-        header = ("channel", "degree of freedom", "share", "band [Hz]", "time [s]", "cause in", "p-value")
-        section.table("Residuals of the nominal model's free run, parameters re-estimated", header, rows)
-    for found in where.contradictions:
-        section.text(_contradiction_text(found))
-    for found in where.maps:
-        _map(section, found, runs, verdict.splits, found.place.name or diagnosis.problem.structure.dofs[0])
-        for region in where.acting.get(found.place.name, ()):
-            fitted = "As named" if verdict.verdict == "effect" else "As the closure has it"
-            actor = f"{fitted}, {region['effect']}" if "effect" in region else "By free runs, what is missing"
-            section.text(
-                f"{actor} acts at {_limits(region, found.place.position_unit)}: {region['force']:+.3g} "
-                f"{found.place.force_unit} on average, {100 * region['share']:.0f} % of its square."
-            )
-    main = {location.channel for location in verdict.locations if location.share > SETTINGS.worth_showing}
-    residual = [s for s in verdict.splits if s.kind in {"band_hz", "time_s"} and s.of in main]
-    if residual:
-        from bench.discrepancy.report.figures import shares  # noqa: PLC0415  (matplotlib)
-
-        _draw(
-            section,
-            lambda: shares(residual),
-            "Excess power of the free run's residuals by frequency and by time; filled parts are significant, false discoveries "
-            "held at 5 %.",
-        )
-
-
-def _contradiction_text(found) -> str:
-    low, high = found.channels
-    if not found.found:
-        return (
-            f"{low} and {high} agree with each other (power of their contradiction {found.ratio:.2f} times the noise's): "
-            "a force is missing rather than a sensor at fault, as far as they can tell."
-        )
-    blame = f" The nominal model contradicts {found.suspect}." if found.suspect else ""
-    return (
-        f"{low} and {high} contradict each other whatever force acts (power {found.ratio:.3g} times the noise's over windows of "
-        f"{found.window_s:.2g} s, p = {found.p_value:.1g}): a sensor or its clock is at fault.{blame}"
-    )
-
-
-def _map(
-    section: Section, found: StateMap, runs: Mapping[str, Recording], splits: Sequence[Split], name: str
-) -> None:
-    from bench.discrepancy.report.figures import force_loops, shares, state_figure  # noqa: PLC0415  (matplotlib)
-
-    place = found.place
-    title = f" ({place.name})" if place.name else ""
-    section.text(f"Missing force{title}: {region_words(found)}")
-    _draw(
-        section,
-        lambda: state_figure(found),
-        f"Force that the nominal model lacks along the measured motion{title}. Outlined cells differ from zero significantly; "
-        "grey: never visited twice.",
-    )
-    _draw(
-        section,
-        lambda: force_loops(runs, place.name),
-        f"The same force on the judging record{title}, beside that of the simulations, all through the same estimator.",
-    )
-    own = [s for s in splits if s.of == "missing force" and s.dof == name]
-    if own:
-        _draw(
-            section,
-            lambda: shares(own, units=(place.position_unit, place.force_unit)),
-            f"Shares of the squared missing force{title}; filled parts are significant.",
-        )
-
-
-def region_words(found: StateMap) -> str:
-    """The regions of a map in words."""
-    unit = found.place.position_unit
-    if not found.regions:
-        return "no region of the state space stands out."
-    parts = []
-    for region in found.regions[:4]:
-        parts.append(
-            f"{_limits(box(region), unit)}: {region.force:+.3g} {found.place.force_unit} on average, "
-            f"{100 * region.share:.0f} % of its square"
-        )
-    return "; ".join(parts) + "."
-
-
-def _limits(region: Mapping[str, Any], unit: str) -> str:
-    """The limits of a region in words."""
-    units = {"displacement": unit, "velocity": f"{unit}/s"}
-    limits = [
-        f"{name} {region[name][0]:.3g} to {region[name][1]:.3g} {units[name]}"
-        for name in units
-        if name in region
-    ]
-    return " and ".join(limits) or "all states"
-
-
 def _ranking_section(out: Page, diagnosis: Diagnosis) -> None:
-    from bench.discrepancy.report.figures import ranking_bars  # noqa: PLC0415  (matplotlib)
-
     verdict = diagnosis.verdict
     section = out.section("Which effect")
-    _draw(section, lambda: ranking_bars(verdict.ranking), "Effects by posterior probability.")
+    add_ranking(section, verdict)
+    first = diagnosis.explanations[0]
     rows = [
         (
             " + ".join(f"{p.effect.name}{f' ({p.place.name})' if p.place.name else ''}" for p in e.hypothesis)
             or "nothing",
-            f"{e.log_posterior - diagnosis.explanations[0].log_posterior:.1f}",
+            f"{e.log_posterior - first.log_posterior:.1f}",
             f"{e.reduced:.4g}",
             f"{e.reduced_on(diagnosis.case.validation[0]):.4g}",
         )
@@ -307,8 +135,6 @@ def _ranking_section(out: Page, diagnosis: Diagnosis) -> None:
 
 
 def _parameter_section(out: Page, diagnosis: Diagnosis) -> None:
-    from bench.discrepancy.report.figures import correlation_map  # noqa: PLC0415  (matplotlib)
-
     section = out.section("Parameters")
     for problem, fitted in diagnosis.explanations[0].parts:
         deviations = np.sqrt(np.diag(fitted.covariance))
@@ -335,11 +161,11 @@ def _parameter_section(out: Page, diagnosis: Diagnosis) -> None:
             *problem.structure.parameters,
             *(f"{p.effect.name}: {q.name}" for p in fitted.hypothesis for q in p.effect.parameters),
         ]
-        _draw(
-            section,
-            partial(correlation_map, [labels[i] for i in free], correlation),
-            "Correlations of the estimates; a pair near one in magnitude is known as a combination only.",
-        )
+        if len(free) > 1:
+            section.plots(
+                [correlation_plot([labels[i] for i in free], correlation)],
+                "Correlations of the estimates; a pair near one in magnitude is known as a combination only.",
+            )
 
 
 def _next_section(out: Page, proposal: Mapping) -> None:

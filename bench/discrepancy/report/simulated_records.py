@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bench.discrepancy.case.case import CaseRecord
-from bench.discrepancy.judgement.validation_discrepancy import nominal_prediction
+from bench.discrepancy.judgement.validation_discrepancy import coordinates, nominal_prediction
 from bench.discrepancy.likelihood.problem import Array
 from bench.discrepancy.localisation.force_smoother import observers
 from bench.discrepancy.localisation.localise import known_parameters
@@ -21,7 +21,7 @@ from bench.recording import Recording
 if TYPE_CHECKING:
     from bench.discrepancy.diagnosis import Diagnosis
 
-MEASURED, NOMINAL = "measured", "nominal model"
+MEASURED, NOMINAL, APPLIED = "measured", "nominal model", "in your simulator"
 
 
 def final_label(diagnosis: Diagnosis) -> str:
@@ -63,6 +63,20 @@ def variants(diagnosis: Diagnosis, record: CaseRecord | None = None) -> dict[str
             roles={name: role for name, role in roles.items() if name in shown},
         )
     return out
+
+
+def judged(diagnosis: Diagnosis, runs: Mapping[str, Recording]) -> dict[str, Recording]:
+    """The judged coordinates of runs of `variants`: channels, or the difference of two; one without a name has that of its channel."""
+    units = {c.name: c.unit or "1" for c in diagnosis.case.channels}
+    found = [(name or parts[0][0], parts) for name, parts in coordinates(diagnosis.problem.structure)]
+    return {
+        label: Recording.from_arrays(
+            run.time,
+            {name: np.sum([sign * run[c] for c, sign in channels], axis=0) for name, channels in found},
+            units={name: units[channels[0][0]] for name, channels in found},
+        )
+        for label, run in runs.items()
+    }
 
 
 def place_channels(place: str) -> tuple[str, str, str]:

@@ -1,0 +1,177 @@
+"""The verdict in short answers: where, which, how far, how sure, how complete, and what to do next.
+
+Page and console say the same words with the same numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+from bench.discrepancy.case.case import Case
+from bench.discrepancy.judgement.shares import closed_words, interval, probability
+from bench.discrepancy.judgement.validation_discrepancy import DIVERGED_GAP
+from bench.discrepancy.settings import DEFAULT, JudgementSettings
+from bench.discrepancy.verdict import Location, NamedEffect, Verdict
+
+
+@dataclass(frozen=True)
+class AnswersSettings:
+    """Numbers of `bench.discrepancy.report.answers`."""
+
+    worth_naming: float = 0.1
+    """Share of the excess from which a place is named beside the first, where no effect says where it is."""
+    places: int = 3
+    """Most places that are named."""
+
+
+SETTINGS = AnswersSettings()
+
+
+class Answer(NamedTuple):
+    """A question, and its answer in a line."""
+
+    question: str
+    answer: str
+
+
+def answers(verdict: Verdict, *, settings: JudgementSettings = DEFAULT.judgement) -> tuple[Answer, ...]:
+    """Answer the five questions of a diagnosis.
+
+    Args:
+        verdict: The verdict.
+        settings: Those that it was judged with.
+    """
+    return (
+        Answer("Where", _where(verdict)),
+        Answer("Which", _which(verdict)),
+        Answer("How far", _how_far(verdict, settings)),
+        Answer("How sure", _how_sure(verdict)),
+        Answer("How complete", _how_complete(verdict)),
+    )
+
+
+def level(value: float) -> str:
+    """A discrepancy (NRMSE) as it is written everywhere."""
+    return "diverges" if value >= DIVERGED_GAP else f"{value:.3g}"
+
+
+def estimates(effect: NamedEffect) -> str:
+    """The parameters of an effect with their standard deviations and units."""
+    return ", ".join(
+        f"{name} {e.value:.4g} ± {e.std:.2g}{'' if e.unit in ('', '1') else ' ' + e.unit}"
+        for name, e in effect.parameters.items()
+    )
+
+
+def _places(effect: NamedEffect) -> str:
+    return ", ".join(_distinct((effect.where, effect.channel)))
+
+
+def _distinct(texts: Iterable[str]) -> list[str]:
+    return list(dict.fromkeys(text for text in texts if text))
+
+
+def _where(verdict: Verdict) -> str:
+    gathered = [p for p in verdict.locations if p.kind != "simulator"]
+    places = _distinct(_places(effect) for effect in verdict.named)
+    if not places and verdict.verdict == "none":
+        return "nowhere: noise explains the residuals once the parameters are re-estimated"
+    if not places:
+        main = [p for i, p in enumerate(gathered) if i == 0 or p.share >= SETTINGS.worth_naming]
+        places = [_place(p) for p in main[: SETTINGS.places]]
+    own = next((p for p in verdict.locations if p.kind == "simulator"), None)
+    if own is not None:
+        places.append(f"the simulator itself ({100.0 * own.share:.0f} % of the discrepancy)")
+    return "; ".join(places) or "the model as a whole"
+
+
+def _place(location: Location) -> str:
+    names = ", ".join(_distinct((location.dof, location.channel)))
+    low, high = location.band_hz
+    return f"{names} ({100.0 * location.share:.0f} %, {low:.3g} to {high:.3g} Hz)"
+
+
+def _which(verdict: Verdict) -> str:
+    if verdict.named:
+        own = "; ".join(f"{e.name}: {estimates(e)}" if e.parameters else e.name for e in verdict.named)
+    elif verdict.verdict == "none":
+        own = "no effect is missing"
+    else:
+        nearest = "; ".join(f"{e.name} ({_places(e)})" if _places(e) else e.name for e in verdict.nearest)
+        own = f"none of the catalogue; nearest: {nearest}" if nearest else "none of the catalogue"
+    return "; ".join(
+        (own, *(f"cannot be told apart: {', '.join(group)}" for group in verdict.indistinguishable))
+    )
+
+
+def _how_far(verdict: Verdict, settings: JudgementSettings) -> str:
+    gap = verdict.gap
+    place = f" of {gap.dof}" if gap.dof else ""
+    return (
+        f"{level(gap.before)} → {level(gap.after)} (NRMSE{place}; noise alone {level(gap.noise_floor)}); "
+        f"closed: {closed_words(gap, settings=settings)}"
+    )
+
+
+def _how_sure(verdict: Verdict) -> str:
+    own = f"probability of “{verdict.verdict}” {probability(verdict.probabilities.get(verdict.verdict))}"
+    parts = [
+        f"{e.name} {probability(e.probability)}, without it {interval(e.closed, e.closed_ci95)} comes back"
+        for e in verdict.named
+    ]
+    return "; ".join((own, *parts))
+
+
+def _how_complete(verdict: Verdict) -> str:
+    if verdict.complete:
+        return "complete: nothing but noise is left"
+    return f"not complete. {verdict.left}" if verdict.left else "not complete"
+
+
+class Step(NamedTuple):
+    """Something to do next, in words, with a command where there is one."""
+
+    text: str
+    command: str = ""
+
+
+def model_options(case: Case) -> str:
+    """Options of `jointbench apply` that name the case and its model; empty where the rig is one of the bench."""
+    folder = Path(case.folder or ".")
+    return f"--model {folder / case.rig} --case {folder}" if case.rig.endswith(".xml") else ""
+
+
+def next_steps(verdict: Verdict, model: str = "") -> tuple[Step, ...]:
+    """What to do next, the most useful first.
+
+    Args:
+        verdict: The verdict.
+        model: As of `model_options`.
+    """
+    steps = []
+    if verdict.named or verdict.nearest:
+        nearest = "" if verdict.named else " --nearest"
+        text = "Put it into your model" if verdict.named else "Put what comes nearest into your model"
+        if model:
+            command = f"jointbench apply verdict.json {model} -o corrected.xml{nearest}"
+            steps.append(Step(f"{text} and run the judging records there:", command))
+        elif verdict.named:
+            steps.append(Step("Put it into your model, as the end of this page writes it."))
+    if any(p.kind == "simulator" for p in verdict.locations):
+        steps.append(Step("Simulate with a smaller step, RK4 or a harder solreffriction."))
+    proposal = verdict.next_excitation
+    if proposal.get("separates") and proposal.get("excitation"):
+        steps.append(
+            Step(
+                f"Measure again, to separate {' from '.join(proposal['separates'])}: {proposal['excitation']}, peak load "
+                f"{proposal['peak_load']:.3g}, {proposal['duration_s']:.3g} s; power {100.0 * proposal['power']:.0f} %."
+            )
+        )
+    elif proposal.get("reason"):
+        steps.append(Step(str(proposal["reason"])))
+    if verdict.verdict == "none" and verdict.gap.before > verdict.gap.parameters_only:
+        steps.append(Step("Take the re-estimated parameters over."))
+    return tuple(steps)

@@ -1,0 +1,132 @@
+"""The first screen of a report: the answers, one picture of the judging record before and after, and what to do next."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from bench.discrepancy.judgement.validation_discrepancy import DIVERGED_GAP
+from bench.discrepancy.report.answers import answers, next_steps
+from bench.discrepancy.report.interactive import histories, ranking_plot
+from bench.discrepancy.report.simulated_records import APPLIED
+from bench.discrepancy.settings import JudgementSettings
+from bench.discrepancy.verdict import Gap, InSimulator, Verdict
+from bench.page import Page, Section
+from bench.recording import Recording
+
+
+@dataclass(frozen=True)
+class OpeningSettings:
+    """Numbers of `bench.discrepancy.report.opening`."""
+
+    cycles: int = 4
+    """Cycles that a picture shows at first: with more of them, before and after would be one line on a telephone."""
+
+
+SETTINGS = OpeningSettings()
+
+
+def opened(
+    name: str,
+    verdict: Verdict,
+    runs: Mapping[str, Recording],
+    *,
+    model: str,
+    settings: JudgementSettings,
+    applied: InSimulator | None,
+) -> Page:
+    """A page with its first screen.
+
+    Args:
+        name: Of the case.
+        verdict: The verdict.
+        runs: The first judging record by judged coordinate: measured, before, after, and applied.
+        model: Options of `jointbench apply` that name the user's own MJCF; empty where the rig is one of the bench.
+        settings: Those that it was judged with.
+        applied: What came of it in the user's simulator.
+    """
+    page = Page(f"Diagnosis of {name}", footer=f"{verdict.seconds:.1f} s of computation")
+    section = page.section("")
+    section.facts(answers(verdict, settings=settings))
+    dof = _shown(verdict.gap, next(iter(runs.values())))
+    section.plots(
+        [histories(runs, [dof], window=window(runs, dof))],
+        f"Judging record, {dof}, where the nominal model misses it most; no fit has seen it. Drag to zoom; a double click shows all.",
+    )
+    for step in next_steps(verdict, model):
+        section.text(step.text)
+        if step.command:
+            section.code(step.command)
+    if applied is not None:
+        section.text(f"{applied.line[0].upper()}{applied.line[1:]}.")
+    words = page.section("In words")
+    words.text(verdict.explanation)
+    for warning in verdict.warnings:
+        words.text(f"Note: {warning}.")
+    for effect in (*verdict.named, *verdict.nearest):
+        place = f" ({effect.where})" if effect.where else ""
+        words.table(
+            f"{'' if verdict.named else 'Nearest: '}{effect.name}{place}: {effect.equation}",
+            ("parameter", "value", "one-sigma", "95 % interval", "unit"),
+            [
+                (
+                    key, f"{e.value:.4g}", f"{e.std:.2g}",
+                    f"{e.value - 1.96 * e.std:.4g} to {e.value + 1.96 * e.std:.4g}", e.unit,
+                )
+                for key, e in effect.parameters.items()
+            ],
+        )  # fmt: skip
+    return page
+
+
+def add_ranking(section: Section, verdict: Verdict) -> None:
+    """Add the effects by posterior probability."""
+    figure, hidden = ranking_plot(verdict.ranking)
+    shared = (
+        " Those that cannot be told apart share the probability of what is named."
+        if verdict.indistinguishable
+        else ""
+    )
+    rest = f" {hidden} more have less than 0.001." if hidden else ""
+    section.plots([figure], f"Effects by posterior probability, each alone.{shared}{rest}")
+
+
+def _shown(gap: Gap, measured: Recording) -> str:
+    return gap.dof if gap.dof in measured.names else measured.names[0]
+
+
+def with_applied(runs: Mapping[str, Recording], applied: InSimulator | None) -> dict[str, Recording]:
+    """Runs with that of the user's own simulator, where it is on the same clock and did not diverge."""
+    measured = next(iter(runs.values()))
+    own = {} if applied is None else {name or measured.names[0]: y for name, y in applied.record.items()}
+    shown = {
+        name: values
+        for name, values in own.items()
+        if name in measured.names
+        and values.shape == measured.time.shape
+        and np.max(np.abs(values)) < DIVERGED_GAP * max(float(np.max(np.abs(measured[name]))), 1e-300)
+    }
+    if not shown:
+        return dict(runs)
+    units = {name: measured.channel(name).unit for name in shown}
+    return {**runs, APPLIED: Recording.from_arrays(measured.time, shown, units=units)}
+
+
+def window(runs: Mapping[str, Recording], channel: str) -> tuple[float, float]:
+    """First and last time [s] of some cycles around the largest error of the first simulation.
+
+    Args:
+        runs: The measured record first.
+        channel: Channel that errors and cycles are those of.
+    """
+    measured, *simulated = runs.values()
+    y = measured[channel] - np.mean(measured[channel])
+    error = simulated[0][channel] - measured[channel] if simulated else y
+    crossings = max(int(np.count_nonzero(np.diff(np.signbit(y)))), 1)
+    first, last = float(measured.time[0]), float(measured.time[-1])
+    width = min((last - first) * 2.0 * SETTINGS.cycles / crossings, last - first)
+    middle = float(measured.time[int(np.argmax(np.abs(error)))])
+    start = float(np.clip(middle - 0.5 * width, first, last - width))
+    return start, start + width
