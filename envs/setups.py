@@ -110,7 +110,7 @@ def made(name: str, arguments: tuple) -> Setup:
 
 
 class Place:
-    """A laboratory: its rig, its sensors, and where a joint's effects act."""
+    """A laboratory: its rig, its sensors, where a joint's effects act, and each joint's actuator, stroke and velocity (`driven`)."""
 
     def __init__(self, name: str) -> None:
         self.name = name
@@ -120,6 +120,7 @@ class Place:
             self.scale = {"displacement": 0.04, "velocity": 0.6, "acceleration_x": 10.0}
             self.band, self.window, self.duration = (0.5, 5.0), 0.04, 8.0
             self.joint = "carriage"
+            self.driven = {"carriage": ("shaker", "displacement", "velocity")}
         else:
             self.noise = {
                 "axial": 2e-4, "torsional": 8e-3, "axial_velocity": 8e-3, "torsional_velocity": 0.3,
@@ -134,6 +135,10 @@ class Place:
             self.scale = {**self.limits.watched, "displacement_1": 0.015, "rotation_1": 0.6}
             self.band, self.window, self.duration = (1.5, 12.0), 0.02, 4.0
             self.joint = "axial"
+            self.driven = {
+                "axial": ("force", "axial", "axial_velocity"),
+                "torsional": ("torque", "torsional", "torsional_velocity"),
+            }
 
     def rig(self, *elements: Element) -> Rig:
         """The rig with some elements."""

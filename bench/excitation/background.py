@@ -2,14 +2,14 @@
 
 A real rig is never one of the hypotheses. Its spring is not quite straight, its damper not quite linear; an excitation that lives on
 what no real rig repeats, as on motions that part exponentially, tells much of a model and nothing of the rig. To first order the least
-squares estimate of the parameters, with their standardised prior, is off by ``(I + F)^-1 (x + J' e + B b)``: x the parameters, e
-the noise, b the background's standardised coordinates, F the information in the parameters and B that between parameters and
-background. Noise and prior leave ``(I + F)^-1``, the background leaves ``G G'`` with ``G = (I + F)^-1 B``, and the second does not
-shrink as the record gets longer.
+squares estimate of the parameters, with their standardised prior, is off by ``(I + F)^-1 (J' (e + d) - x)``: F the information in
+the parameters x, J the whitened derivatives at the rig without its background, e the noise and d what the background does to the
+record. Noise and prior leave the covariance ``(I + F)^-1``, and the record of the background leaves a bias that does not shrink as the
+record gets longer.
 
 References:
     Box, Draper 1959, J. American Statistical Association 54(287) (variance and bias of designs where the model is wrong);
-    Ljung 1999, "System Identification", section 13.3 (the same for records).
+    Ljung 1999, "System Identification", chapter 13 (the same for records).
 """
 
 from __future__ import annotations
@@ -81,14 +81,16 @@ def with_background(hypothesis: Hypothesis, terms: tuple[BackgroundTerm, ...]) -
     return Hypothesis(hypothesis.name, rig, parameters, hypothesis.weight)
 
 
-def expected_error(information: NDArray[np.float64], p: int) -> NDArray[np.float64]:
+def expected_error(information: NDArray[np.float64], score: NDArray[np.float64]) -> NDArray[np.float64]:
     """Error that an identification is expected to leave, root mean square over the parameters [prior standard deviations] ``(…)``.
 
     Args:
-        information: ``J'J`` of parameters and background together ``(…, p + b, p + b)``.
-        p: Number of parameters, which come first.
+        information: ``F = J'J`` ``(…, p, p)``.
+        score: ``J'd`` ``(…, p)``, d the whitened difference between the noiseless records of the rig and of the rig without
+            its background; `bench.excitation.information.accumulate` sums both.
     """
-    covariance = np.linalg.inv(np.eye(p) + information[..., :p, :p])
-    bias = covariance @ information[..., :p, p:]
-    square = np.trace(covariance, axis1=-2, axis2=-1) + np.sum(bias**2, axis=(-2, -1))
+    p = score.shape[-1]
+    covariance = np.linalg.inv(np.eye(p) + information)
+    bias = np.einsum("...ij,...j->...i", covariance, score)
+    square = np.trace(covariance, axis1=-2, axis2=-1) + np.sum(bias**2, axis=-1)
     return np.sqrt(square / p)

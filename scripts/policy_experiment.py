@@ -1,0 +1,122 @@
+"""Experiments with excitation policies, each by one command.
+
+    python scripts/policy_experiment.py rewards sdof --json out/rewards.json --figure out/rewards.svg
+
+`rewards` runs some 200 records of drawn rigs under many excitations, without and with a background, identifies each, and tells how
+well each reward ranks the error that is left: Spearman's rank correlation, 1 where the reward follows identification.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import tyro
+from rich.console import Console
+from rich.table import Table
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+from bench.errors import BenchError
+from bench.files import write_text
+from envs.setups import Setup, joint_setup, sdof_setup
+
+SETUPS = {"sdof": sdof_setup, "joint": joint_setup}
+
+
+@dataclass
+class Rewards:
+    """Rank identification error by rewards.
+
+    Attributes:
+        task: sdof or joint.
+        records: Records at least, each of rigs without and with a background.
+        seed: Seed of rigs, noise and searches.
+        json: File for the figures; "-" prints them.
+        rows: File for what was measured of each record (JSON).
+        figure: File for a figure (.svg, .png or .pdf).
+    """
+
+    task: tyro.conf.Positional[str] = "sdof"
+    records: int = 200
+    seed: int = 0
+    json: Path | None = None
+    rows: Path | None = None
+    figure: Path | None = None
+
+    def __call__(self) -> None:
+        """Run the study."""
+        from policies.figure import rewards_figure
+        from policies.rewards import REWARDS, ranking, study
+
+        console = Console(stderr=True)
+        with console.status("") as status:
+            rows = study(
+                setup_of(self.task), self.task, records=self.records, seed=self.seed, tell=status.update
+            )
+        numbers = {"task": self.task, "seed": self.seed, "rewards": REWARDS, **ranking(rows)}
+        if self.rows is not None:
+            write_text(self.rows, json.dumps(rows))
+        if self.figure is not None:
+            rewards_figure(rows, self.figure)
+        if _written(numbers, self.json):
+            return
+        for where in ("without background", "with background", "both"):
+            _tell_rewards(
+                f"{self.task}, rigs {where}" if where != "both" else f"{self.task}, all rigs", numbers[where]
+            )
+
+
+def setup_of(task: str) -> Setup:
+    """The laboratory of a task.
+
+    Raises:
+        BenchError: There is no such task.
+    """
+    if task not in SETUPS:
+        raise BenchError(f"no task '{task}'; known: {', '.join(SETUPS)}")
+    return SETUPS[task]()
+
+
+def _written(numbers: dict[str, Any], path: Path | None) -> bool:
+    """Write the figures; whether they were printed."""
+    text = json.dumps(numbers, indent=1)
+    if path == Path("-"):
+        print(text)
+        return True
+    if path is not None:
+        write_text(path, text)
+    return False
+
+
+def _tell_rewards(title: str, rows: dict[str, Any]) -> None:
+    table = Table("reward", "Spearman", "95 %", "one measurement", "within a rig", "by kind", title=title)
+    for name, row in rows.items():
+        low, high = row["interval"]
+        table.add_row(
+            name,
+            f"{row['spearman']:.2f}",
+            f"{low:.2f} … {high:.2f}",
+            f"{row['one measurement']:.2f}",
+            f"{row['within a rig']:.2f}",
+            ", ".join(f"{kind} {value:.2f}" for kind, value in row["by kind"].items()),
+        )
+    Console(width=140).print(table)
+
+
+def main() -> int:
+    """Run one of the experiments."""
+    command = tyro.extras.subcommand_cli_from_dict({"rewards": Rewards}, description=__doc__)
+    try:
+        command()
+    except BenchError as error:
+        print(f"policy_experiment: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
