@@ -35,6 +35,7 @@ from .setups import Setup
 
 ENFORCEMENTS = ("terminate", "cost")
 AVERAGES = ("prior", "posterior")
+REWARDS = ("merit", "error")
 
 
 @dataclass(frozen=True)
@@ -66,6 +67,7 @@ class Options:
     enforcement: str = "terminate"
     penalty: float = 10.0
     average: str = "prior"
+    reward: str = "merit"
     terminate_when_certain: bool = False
 
     def __post_init__(self) -> None:
@@ -73,6 +75,7 @@ class Options:
             ("shaping of actions", self.shaping, SHAPINGS),
             ("enforcement of limits", self.enforcement, ENFORCEMENTS),
             ("average of rewards", self.average, AVERAGES),
+            ("reward", self.reward, REWARDS),
         ):
             if name not in known:
                 raise UnknownNameError(kind, str(name), known)

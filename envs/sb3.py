@@ -13,7 +13,7 @@ from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvStepReturn
 
 from . import IDS
-from .practice import PracticeVectorEnv
+from .practice_vector import PracticeVectorEnv
 from .vector import BenchVectorEnv
 
 KINDS: dict[str, str] = dict(zip(IDS, PracticeVectorEnv.KINDS, strict=True))

@@ -172,6 +172,12 @@ class SDOFExcitationEnv(BenchEnv):
     the record leaves open add nothing. It is averaged over a fixed set of prior draws, never taken at the hidden rig:
     with `average="prior"` with the prior's weights; with "posterior" with weights that follow from the measurements so far.
 
+    With `reward="error"` the merit is minus the logarithm of the error that an identification of the hidden rig is expected to have,
+    root mean square over its parameters in prior standard deviations. The hidden rig then has a background, of which
+    the identification knows nothing: quadratic and cubic stiffness and quadratic damping beside its joint, each with a force at the
+    limit of 0.2 N (standard deviation). This reward knows the hidden rig, as a teacher may; observations do not. Rigs are compiled
+    ones in place of MuJoCo's, equal to rounding, and are not rendered; `average` and `n_draws` mean nothing.
+
     | Limit | Value | What happens |
     |---|---|---|
     | force | 2 N | cannot be exceeded: actions are fractions of it |
@@ -205,6 +211,7 @@ class SDOFExcitationEnv(BenchEnv):
     | `enforcement` | "terminate" | or "cost": what passing the stroke limit does |
     | `penalty` | 10 nat | size of the cost |
     | `average` | "prior" | or "posterior": weights of the draws in the reward |
+    | `reward` | "merit" | or "error": expected error at the hidden rig |
     | `n_draws` | two a law | prior draws in the reward |
     | `render_mode` | None | "rgb_array" or "human" |
 
@@ -281,6 +288,7 @@ class JointExcitationEnv(BenchEnv):
 
     As in `SDOFExcitationEnv`, with the limits: force 800 N, torque 16 N m (by construction); energy 8e5 N² s and 320 (N m)² s (scaled
     down; the episode ends when both are used up); stroke of the joint 0.015 m and 0.6 rad; velocity of the joint 0.6 m/s and 24 rad/s.
+    With `reward="error"` the background acts on both joints, with 80 N and 1.6 N m at the limits (standard deviation).
 
     ## Starting State
 
@@ -378,7 +386,7 @@ class DiscriminationEnv(BenchEnv):
 
     ## Arguments
 
-    Those of the other environments but `laws`, and:
+    Those of the other environments but `laws`; `reward` is "merit". And:
 
     | Argument | Default | Meaning |
     |---|---|---|

@@ -18,6 +18,7 @@ SDOF, JOINT, DISCRIMINATION = envs.IDS
 VARIANTS: list[tuple[str, dict[str, Any]]] = [
     (SDOF, {"duration": 0.4}),
     (SDOF, {"duration": 0.3, "average": "posterior", "shaping": "amplitude_frequency"}),
+    (SDOF, {"duration": 0.3, "reward": "error"}),
     (JOINT, {"duration": 0.14, "n_draws": 2}),
     (
         DISCRIMINATION,

@@ -16,7 +16,7 @@ from bench.excitation.information import INFORMATION_LIMITS
 from envs.practice import PRACTICE_SETTINGS
 from envs.setups import Setup
 
-from .trials import Trial, tested
+from .trials import Trial, trials_of
 
 Array = NDArray[np.float64]
 SCALES = tuple(3.0**-k for k in range(1, 7))
@@ -124,7 +124,7 @@ def study(
     """
     weigh = Weigher(setup, seed)
     rows = []
-    for trial in tested(setup, task, records, seed, tell):
+    for trial in trials_of(setup, task, records, seed, tell):
         said, errors = weigh(trial), trial.errors
         for i in range(errors.shape[1]):
             rows.append(

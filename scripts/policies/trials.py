@@ -122,7 +122,7 @@ def open_loop(setup: Setup, rng: np.random.Generator) -> dict[str, Array]:
     }
 
 
-def tested(
+def trials_of(
     setup: Setup, task: str, records: int, seed: int, tell: Callable[[str], None] = lambda text: None
 ) -> Iterator[Trial]:
     """At least so many records each of rigs without and with their background."""
