@@ -31,6 +31,7 @@ from bench.excitation.windows import Window, advance, advance_prior, advance_riv
 from bench.limits import READING_LIMITS, size_text
 
 from .laboratory import Laboratories
+from .places import StationSetup
 from .setups import Setup
 
 ENFORCEMENTS = ("terminate", "cost")
@@ -161,7 +162,7 @@ class SteppedBenches(ABC):
     question: NDArray[np.int64]
     _values: NDArray[np.float64]  # worth of the records so far, by bench (and draw, or pair of rivals) [nat]
 
-    def __init__(self, setup: Setup, options: Options, n: int) -> None:
+    def __init__(self, setup: StationSetup, options: Options, n: int) -> None:
         """Set up the books; each bench must be `reset` before it is stepped.
 
         Raises:
@@ -169,7 +170,7 @@ class SteppedBenches(ABC):
                 parts of whole steps.
         """
         self.setup, self.options, self.n = setup, options, n
-        self.timestep = setup.rig.timestep
+        self.timestep = setup.timestep
         self.n_steps = round((options.window or setup.window) / self.timestep)
         self.n_windows = (
             round((options.duration or setup.duration) / (self.n_steps * self.timestep))
@@ -351,6 +352,7 @@ class Benches(SteppedBenches):
     def __init__(self, setup: Setup, options: Options, n: int, threads: int = 1) -> None:
         """Set up benches; each must be `reset` before it is stepped."""
         super().__init__(setup, options, n)
+        self.setup: Setup = setup
         self.threads = threads
         self.channels, self.actuators = self.station.channels, self.station.actuators
         hypotheses = [

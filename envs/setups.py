@@ -16,10 +16,11 @@ import numpy as np
 
 from bench.errors import UnknownNameError
 from bench.excitation import Experiment, Hypothesis, Limits, RigPrior, Rivals, Uncertain, paired_experiment
-from bench.excitation.station import Station
 from bench.laws import find_law
 from bench.rig import Element, Rig
 from bench.rig.library import joint_rig, sdof_rig
+
+from .places import StationSetup
 
 
 @dataclass(frozen=True)
@@ -35,66 +36,21 @@ SETTINGS = SetupsSettings()
 
 
 @dataclass(frozen=True, eq=False)
-class Setup:
+class Setup(StationSetup):
     """A laboratory and the questions asked in it.
 
     Attributes:
-        questions: One prior, or rivals of which each episode asks one.
         experiments: The questions on their fixed draws, in the same order.
-        noise: Standard deviation of each measured channel's noise.
-        limits: Limits.
-        scale: What 1 stands for in observations, by channel, in the channel's unit.
-        band: Frequencies excited [Hz].
-        window: Default duration of a window [s].
-        duration: Default duration of an episode [s].
         recipe: Function of this module and its arguments that make this setup; it travels in place of the setup.
         place: What rigs are made of there.
     """
 
-    questions: tuple[RigPrior, ...] | tuple[Rivals, ...]
     experiments: tuple[Experiment, ...]
-    noise: Mapping[str, float]
-    limits: Limits
-    scale: Mapping[str, float]
-    band: tuple[float, float]
-    window: float
-    duration: float
     recipe: tuple[str, tuple]
     place: Place
 
     def __reduce__(self) -> tuple:
         return (made, self.recipe)
-
-    def station(
-        self,
-        n_steps: int | None = None,
-        n_windows: int | None = None,
-        *,
-        shaping: str = "knots",
-        n_knots: int = 1,
-    ) -> Station:
-        """The experimenter's place, by default with windows and a duration as the environments have them.
-
-        Args:
-            n_steps: Steps a window.
-            n_windows: Windows of a test.
-            shaping: How actions become commands.
-            n_knots: Knots a window.
-        """
-        timestep = self.rig.timestep
-        steps = n_steps or round(self.window / timestep)
-        return Station(
-            self.noise,
-            self.scale,
-            self.limits,
-            timestep,
-            steps,
-            n_windows or round(self.duration / (steps * timestep)),
-            self.band,
-            shaping,
-            n_knots,
-            tuple(question.name for question in self.questions if isinstance(question, Rivals)),
-        )
 
     @property
     def rig(self) -> Rig:
@@ -234,13 +190,13 @@ def _setup(
 ) -> Setup:
     return Setup(
         questions,
-        experiments,
         MappingProxyType(dict(place.noise)),
         place.limits,
         MappingProxyType(dict(place.scale)),
         place.band,
         place.window,
         place.duration,
+        experiments,
         recipe,
         place,
     )

@@ -13,6 +13,7 @@ from bench.errors import UnknownNameError
 from bench.excitation import Draw
 
 from .base import RENDER_MODES, action_space, info_of, make_benches, observation_space, rest_info
+from .benches import SteppedBenches
 from .rendering import Picture
 
 
@@ -30,7 +31,7 @@ class BenchEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         if render_mode is not None and render_mode not in RENDER_MODES:
             raise UnknownNameError("render mode", render_mode, RENDER_MODES)
         self.render_mode = render_mode
-        self.benches = make_benches(self.kind, 1, 1, arguments)
+        self.benches: Any = self._make(arguments)
         self.metadata = {
             **type(self).metadata,
             "render_fps": round(1.0 / (self.benches.n_steps * self.benches.timestep)),
@@ -38,6 +39,10 @@ class BenchEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.observation_space = observation_space(self.benches)
         self.action_space = action_space(self.benches)
         self._picture: Picture | None = None
+
+    def _make(self, arguments: dict[str, Any]) -> SteppedBenches:
+        """The bench behind it."""
+        return make_benches(self.kind, 1, 1, arguments)
 
     @property
     def truth(self) -> Draw | None:

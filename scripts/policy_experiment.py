@@ -1,18 +1,19 @@
 """Experiments with excitation policies, each by one command.
 
     python scripts/policy_experiment.py rewards sdof --json out/rewards.json --figure out/rewards.svg
+    python scripts/policy_experiment.py targets examples/arm/arm.xml -o targets.csv
 
 `rewards` runs some 200 records of drawn rigs under many excitations, without and with a background, identifies each, and tells how
-well each reward ranks the error that is left: Spearman's rank correlation, 1 where the reward follows identification.
+well each reward ranks the error that is left: Spearman's rank correlation, 1 where the reward follows identification. `targets` designs joint targets for a model of your own.
 """
 
 from __future__ import annotations
 
 import json
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import tyro
 from rich.console import Console
@@ -70,6 +71,57 @@ class Rewards:
             )
 
 
+@dataclass
+class Targets:
+    """Design joint targets from which friction, damping and inertia of an arm of your own can be told, as CSV.
+
+    Attributes:
+        model: MJCF of hinges and slides with a servo or motor each.
+        out: The file (.csv).
+        duration: Of the test [s].
+        velocity: Largest velocity of every joint [rad/s or m/s]; by default its range within a second.
+        torque: Largest torque of every joint [N m or N]; by default the drive's own.
+        seed: Seed of drawn arms and candidates.
+        json: Print JSON.
+    """
+
+    model: tyro.conf.Positional[Path]
+    out: Annotated[Path, tyro.conf.arg(aliases=["-o"])] = Path("targets.csv")
+    duration: float = 10.0
+    velocity: float | None = None
+    torque: float | None = None
+    seed: int = 0
+    json: bool = False
+
+    def __call__(self) -> None:
+        """Design and write."""
+        from envs.arm_design import design_targets
+        from envs.arms import ArmArguments, arm_setup
+
+        plain = arm_setup(ArmArguments(str(self.model), {}, {}, {}, {}))
+        names = [axis.joint.name for axis in plain.axes]
+        limits = [dict.fromkeys(names, value) if value else {} for value in (self.velocity, self.torque)]
+        setup = replace(arm_setup(ArmArguments(str(self.model), {}, {}, *limits)), duration=self.duration)
+        with Console(stderr=True).status("") as status:
+            made = design_targets(
+                setup,
+                seed=self.seed,
+                tell=lambda i, error: status.update(f"candidate {i}: error {error:.3g}"),
+            )
+        made.write(self.out)
+        told = {
+            "file": str(self.out), "unknown": list(setup.hypothesis.names), "expected_error": made.error,
+            "reached_range": made.reached[0], "reached_velocity_or_torque": made.reached[1],
+        }  # fmt: skip
+        if self.json:
+            print(json.dumps(told))
+            return
+        print(
+            f"{self.out}: expected error {made.error:.3g} prior standard deviations of {', '.join(told['unknown'])}; "
+            f"{100.0 * made.reached[0]:.0f} % of the ranges, {100.0 * made.reached[1]:.0f} % of velocities and torques reached"
+        )
+
+
 def setup_of(task: str) -> Setup:
     """The laboratory of a task.
 
@@ -109,7 +161,9 @@ def _tell_rewards(title: str, rows: dict[str, Any]) -> None:
 
 def main() -> int:
     """Run one of the experiments."""
-    command = tyro.extras.subcommand_cli_from_dict({"rewards": Rewards}, description=__doc__)
+    command = tyro.extras.subcommand_cli_from_dict(
+        {"rewards": Rewards, "targets": Targets}, description=__doc__
+    )
     try:
         command()
     except BenchError as error:
