@@ -247,8 +247,10 @@ class ModelExcitationEnv(BenchEnv):
 
     | Unknown | Smallest | Largest | Distribution |
     |---|---|---|---|
-    | damping, frictionloss and armature of every driven joint, where the model has them | half of the model's | twice the model's | log-uniform |
-    | or what `uncertain` names: damping, frictionloss, armature or stiffness of a joint, mass of a body | as given | as given | log-uniform |
+    | damping, frictionloss, armature of driven joints, where there are any | half of the model's | twice the model's | log-uniform |
+    | or what `uncertain` names | as given | as given | log-uniform |
+
+    `uncertain` takes damping, frictionloss, armature and stiffness of joints, and the mass of bodies, their inertia as it is.
 
     ## Action Space
 
@@ -277,7 +279,7 @@ class ModelExcitationEnv(BenchEnv):
     |---|---|---|
     | input | 90 % of its range | cannot be exceeded: actions are fractions of it |
     | range | 90 % of the joint's | "terminate": the episode ends, cost `penalty`; "cost": as velocity |
-    | velocity | the joint's range within a second, or `velocity` | cost `penalty` times the excess over the limit, as a fraction of it, at most 1 |
+    | velocity | the joint's range within a second, or `velocity` | cost `penalty` times the share above the limit, at most 1 |
     | torque | the drive's `forcerange`, or `torque` | as velocity |
 
     ## Starting State

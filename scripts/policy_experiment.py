@@ -1,10 +1,13 @@
 """Experiments with excitation policies, each by one command.
 
     python scripts/policy_experiment.py rewards sdof --json out/rewards.json --figure out/rewards.svg
+    python scripts/policy_experiment.py train sdof --rewards practice error --json out/train.json
     python scripts/policy_experiment.py targets examples/arm/arm.xml -o targets.csv
 
 `rewards` runs some 200 records of drawn rigs under many excitations, without and with a background, identifies each, and tells how
-well each reward ranks the error that is left: Spearman's rank correlation, 1 where the reward follows identification. `targets` designs joint targets for a model of your own.
+well each reward ranks the error that is left: Spearman's rank correlation, 1 where the reward follows identification. `train` trains
+policies for different rewards and holds them against the planner and open-loop designs on held-out rigs; stopped, the same command goes
+on. `targets` designs joint targets for a model of your own.
 """
 
 from __future__ import annotations
@@ -69,6 +72,51 @@ class Rewards:
             _tell_rewards(
                 f"{self.task}, rigs {where}" if where != "both" else f"{self.task}, all rigs", numbers[where]
             )
+
+
+@dataclass
+class Train:
+    """Train policies for different rewards, and hold them against the planner and open-loop designs.
+
+    Attributes:
+        task: sdof or joint.
+        rewards: Rewards: practice, error, prior or posterior, see scripts/train_excitation.py.
+        seeds: Seeds of training, for each reward.
+        steps: Windows of each training.
+        rig_seeds: Seeds of held-out rigs.
+        rigs: Held-out rigs a seed, each without and with a background.
+        out: Folder of checkpoints.
+        json: File for the figures; "-" prints them.
+        figure: File for a figure (.svg, .png or .pdf).
+    """
+
+    task: tyro.conf.Positional[str] = "sdof"
+    rewards: tuple[str, ...] = ("practice", "error")
+    seeds: int = 3
+    steps: int = 4_000_000
+    rig_seeds: int = 10
+    rigs: int = 50
+    out: Annotated[Path, tyro.conf.arg(aliases=["-o"])] = Path("out/policy_experiment")
+    json: Path | None = None
+    figure: Path | None = None
+
+    def __call__(self) -> None:
+        """Train and compare."""
+        from policies.contest import contest, summary, trained
+        from policies.figure import contest_figure
+
+        setup = setup_of(self.task)
+        with Console(stderr=True).status("") as status:
+            policies = trained(self.task, self.rewards, self.seeds, self.steps, self.out, status.update)
+            rows = contest(setup, policies, seeds=self.rig_seeds, rigs=self.rigs, tell=status.update)
+        numbers = {"task": self.task, "steps": self.steps, **summary(rows)}
+        if self.figure is not None:
+            contest_figure(numbers, self.figure)
+        if _written(numbers, self.json):
+            return
+        for where in ("without background", "with background"):
+            for kind, group in numbers[where].items():
+                _tell_contest(f"{self.task}, {kind}, rigs {where}", group)
 
 
 @dataclass
@@ -159,10 +207,24 @@ def _tell_rewards(title: str, rows: dict[str, Any]) -> None:
     Console(width=140).print(table)
 
 
+def _tell_contest(title: str, rows: dict[str, Any]) -> None:
+    table = Table("method", "error", "95 %", "of the best open-loop", "violations %", title=title)
+    for name, row in rows.items():
+        (low, high), (least, most) = row["interval"], row["ratio_interval"]
+        table.add_row(
+            name,
+            f"{row['error']:.3g}",
+            f"{low:.3g} … {high:.3g}",
+            f"{row['ratio']:.2f} ({least:.2f} … {most:.2f}) of {row['best_open_loop']}",
+            f"{row['violations_percent']:.2f}",
+        )
+    Console(width=120).print(table)
+
+
 def main() -> int:
     """Run one of the experiments."""
     command = tyro.extras.subcommand_cli_from_dict(
-        {"rewards": Rewards, "targets": Targets}, description=__doc__
+        {"rewards": Rewards, "train": Train, "targets": Targets}, description=__doc__
     )
     try:
         command()

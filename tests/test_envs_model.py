@@ -176,5 +176,5 @@ def test_models_and_arguments_are_checked(
 
 
 def test_a_model_has_to_be_named() -> None:
-    with pytest.raises(TypeError, match="model='arm.xml'"):
+    with pytest.raises(TypeError, match="takes the path of an MJCF"):
         ModelExcitationEnv()

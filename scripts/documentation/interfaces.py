@@ -15,7 +15,6 @@ import envs
 from bench.cli import COMMANDS, main
 from bench.cli.schema import KINDS, generated
 
-
 WIDTH = "100"
 """Columns of the help texts."""
 

@@ -35,3 +35,25 @@ def rewards_figure(rows: list[dict[str, Any]], path: Path) -> None:
             axis.set_xlabel("error [prior standard deviations]")
         axes[0, 0].legend()
         save(figure, path)
+
+
+def contest_figure(numbers: dict[str, Any], path: Path) -> None:
+    """Errors of all methods as shares of the best open-loop one's, with 95 % intervals; a panel without and one with a background."""
+    with style():
+        figure = Figure(figsize=(9.0, 3.6), layout="constrained")
+        axes = figure.subplots(1, 2, sharey=True)
+        for axis, where in zip(axes, ("without background", "with background"), strict=True):
+            for k, (kind, group) in enumerate(numbers[where].items()):
+                ratio = np.array([row["ratio"] for row in group.values()])
+                ends = np.array([row["ratio_interval"] for row in group.values()])
+                reach = np.abs(ends.T - ratio)
+                place = np.arange(len(ratio)) + 0.15 * (k - 1.5)
+                axis.errorbar(ratio, place, xerr=reach, fmt=".", color=COLOURS[k % len(COLOURS)], label=kind)
+            axis.set_yticks(np.arange(len(ratio)), list(group))
+            axis.set_xscale("log")
+            axis.axvline(1.0, color="#1a1a1a", linewidth=0.8)
+            axis.set_xlabel("error, of the best open-loop method [1]")
+            axis.set_title(where)
+        axes[0].invert_yaxis()
+        axes[0].legend()
+        save(figure, path)
