@@ -17,15 +17,15 @@ class BackgroundSettings:
     """Standard deviation of each term's force at the limit of stroke or velocity, as a share of the largest force of the drive: on
     the SDOF rig a fiftieth of the spring's force and a tenth of the damper's, which no inspection would find."""
 
+    laws: tuple[tuple[str, str, int, bool], ...] = (
+        ("quadratic_stiffness", "k2", 2, False),
+        ("cubic_stiffness", "k3", 3, False),
+        ("quadratic_damping", "c2", 2, True),
+    )
+    """Law, parameter, power of the motion, and whether that is the velocity."""
+
 
 SETTINGS = BackgroundSettings()
-
-_LAWS = (
-    ("quadratic_stiffness", "k2", 2, False),
-    ("cubic_stiffness", "k3", 3, False),
-    ("quadratic_damping", "c2", 2, True),
-)
-"""Law, parameter, power of the motion, and whether that is the velocity."""
 
 
 def background_of(setup: Setup) -> tuple[BackgroundTerm, ...]:
@@ -41,5 +41,5 @@ def background_of(setup: Setup) -> tuple[BackgroundTerm, ...]:
             / (limits.velocity[velocity] if moving else limits.stroke[stroke]) ** power,
         )
         for joint, (actuator, stroke, velocity) in setup.place.driven.items()
-        for law, parameter, power, moving in _LAWS
+        for law, parameter, power, moving in SETTINGS.laws
     )
