@@ -10,17 +10,17 @@ files are those of nonlinearbenchmark.org.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bench.errors import FileFormatError, UnknownNameError
 from bench.limits import MissingFileError
 from bench.record_files import read_recording
+from bench.record_files.arrays import read_mat
 from bench.recording import Recording
 
 FRICTION_DAMPER_FOLDER = Path(__file__).resolve().parent / "_data" / "friction_damper"
@@ -91,11 +91,11 @@ def emps(folder: str | Path, *, pulses: bool = False) -> Recording:
     path = Path(folder) / ("DATA_EMPS_PULSES.mat" if pulses else "DATA_EMPS.mat")
     table = _mat(path, "qm", "qg", "vir", "gtau", "t")
     arrays = {
-        "force": float(table["gtau"].item()) * table["vir"].ravel(),
-        "displacement": table["qm"].ravel(),
-        "reference": table["qg"].ravel(),
+        "force": float(table["gtau"].item()) * table["vir"],
+        "displacement": table["qm"],
+        "reference": table["qg"],
     }
-    time = table["t"].ravel()
+    time = table["t"]
     rate = (len(time) - 1) / float(time[-1] - time[0])
     units = {"force": "N", "displacement": "m", "reference": "m"}
     return Recording.from_arrays(
@@ -115,7 +115,7 @@ def silverbox(folder: str | Path) -> Recording:
     """
     path = Path(folder) / "SNLS80mV.mat"
     table = _mat(path, "V1", "V2")
-    arrays = {"input": table["V1"].ravel(), "output": table["V2"].ravel()}
+    arrays = {"input": table["V1"], "output": table["V2"]}
     return Recording.from_arrays(
         None,
         arrays,
@@ -145,8 +145,7 @@ def bouc_wen_benchmark(folder: str | Path) -> dict[str, Recording]:
     pairs = {"train": tuple(train[name].values[:, 0] for name in wanted)}
     for test, name in (("multisine", "multisine"), ("sweep", "sinesweep")):
         pairs[test] = tuple(
-            _mat(own / f"{kind}val_{name}.mat", f"{kind}val_{name}")[f"{kind}val_{name}"].ravel()
-            for kind in "uy"
+            _mat(own / f"{kind}val_{name}.mat", f"{kind}val_{name}")[f"{kind}val_{name}"] for kind in "uy"
         )
     return {
         name: Recording.from_arrays(
@@ -159,20 +158,14 @@ def bouc_wen_benchmark(folder: str | Path) -> dict[str, Recording]:
     }
 
 
-def _mat(path: Path, *names: str) -> Mapping[str, Any]:
-    """Arrays of a MAT-file."""
-    from scipy.io import loadmat  # noqa: PLC0415
-    from scipy.io.matlab import MatReadError  # noqa: PLC0415
-
+def _mat(path: Path, *names: str) -> dict[str, NDArray[np.float64]]:
+    """Arrays of a MAT-file, flat, by name."""
     if not path.is_file():
         raise MissingFileError(f"no file '{path}'; fetch the data set into '{path.parent}'")
-    try:
-        table = loadmat(path)
-    except (MatReadError, ValueError, OSError, NotImplementedError) as error:
-        raise FileFormatError(f"'{path}' cannot be read as a MAT-file: {error}") from None
-    lacking = [name for name in names if not isinstance(table.get(name), np.ndarray)]
+    table = read_mat(path)
+    lacking = [name for name in names if name not in table or not table[name].values.size]
     if lacking:
         raise FileFormatError(
             f"'{path}' has no array {', '.join(repr(name) for name in lacking)}; is it the right file?"
         )
-    return table
+    return {name: np.ravel(table[name].values) for name in names}

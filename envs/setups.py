@@ -46,7 +46,7 @@ class Setup(StationSetup):
 
     experiments: tuple[Experiment, ...]
     recipe: tuple[str, tuple]
-    place: Place
+    place: Laboratory
 
     def __reduce__(self) -> tuple:
         return (made, self.recipe)
@@ -64,7 +64,7 @@ def made(name: str, arguments: tuple) -> Setup:
     )
 
 
-class Place:
+class Laboratory:
     """A laboratory: its rig, its sensors, where a joint's effects act, and each joint's actuator, stroke and velocity (`driven`)."""
 
     def __init__(self, name: str) -> None:
@@ -121,7 +121,7 @@ PAIRS = ("gap_cubic", "presliding_bouc_wen", "coulomb_stribeck", "axial_gap_coup
 RIGS = ("sdof", "joint")
 
 
-def _sdof_hypothesis(place: Place, law: str) -> Hypothesis:
+def _sdof_hypothesis(place: Laboratory, law: str) -> Hypothesis:
     own = {
         "gap": (
             Uncertain("gap.stiffness", 300.0, 1500.0),
@@ -149,7 +149,7 @@ def sdof_setup(laws: tuple[str, ...] = SDOF_LAWS, n_draws: int = 6) -> Setup:
     for law in laws:
         if law not in SDOF_LAWS:
             raise UnknownNameError("joint of the SDOF environment", law, SDOF_LAWS)
-    place = Place("sdof")
+    place = Laboratory("sdof")
     prior = RigPrior(tuple(_sdof_hypothesis(place, law) for law in laws))
     return _identification(place, prior, n_draws, ("sdof", (laws, n_draws)))
 
@@ -160,7 +160,7 @@ def joint_setup(n_draws: int = 4) -> Setup:
 
     Its springs and dampers at rest are taken as known, from a linear test at a low level.
     """
-    place = Place("joint")
+    place = Laboratory("joint")
     law = "axial_torsional_joint"
     parameters = (
         Uncertain(f"{law}.k_gap_axial", 5e4, 3e5),
@@ -176,13 +176,13 @@ def joint_setup(n_draws: int = 4) -> Setup:
     )
 
 
-def _identification(place: Place, prior: RigPrior, n_draws: int, recipe: tuple[str, tuple]) -> Setup:
+def _identification(place: Laboratory, prior: RigPrior, n_draws: int, recipe: tuple[str, tuple]) -> Setup:
     draws = prior.draws(n_draws, np.random.default_rng(SETTINGS.draws_seed))
     return _setup(place, (prior,), (Experiment(prior, place.noise, place.limits, draws),), recipe)
 
 
 def _setup(
-    place: Place,
+    place: Laboratory,
     questions: tuple[RigPrior, ...] | tuple[Rivals, ...],
     experiments: tuple[Experiment, ...],
     recipe: tuple[str, tuple],
@@ -216,13 +216,13 @@ def discrimination_setup(rig: str = "joint", pairs: tuple[str, ...] = PAIRS, n_d
     for pair in pairs:
         if pair not in known:
             raise UnknownNameError(f"pair of effects on rig '{rig}'", pair, known)
-    place = Place(rig)
+    place = Laboratory(rig)
     questions = tuple(_rivals(place, pair) for pair in pairs)
     experiments = tuple(rival_experiment(place, item, n_draws) for item in questions)
     return _setup(place, questions, experiments, ("discrimination", (rig, pairs, n_draws)))
 
 
-def rival_experiment(place: Place, rivals: Rivals, n_draws: int) -> Experiment:
+def rival_experiment(place: Laboratory, rivals: Rivals, n_draws: int) -> Experiment:
     """A question on pairs of draws that imitate each other, always the same."""
     return paired_experiment(
         rivals,
@@ -243,12 +243,12 @@ _RIVALS = {
 }
 
 
-def _rivals(place: Place, pair: str) -> Rivals:
+def _rivals(place: Laboratory, pair: str) -> Rivals:
     first, second = (_effect(place, law) for law in _RIVALS[pair])
     return Rivals(pair, first, second)
 
 
-def _effect(place: Place, law: str) -> Hypothesis:
+def _effect(place: Laboratory, law: str) -> Hypothesis:
     """One effect beside the spring and damper of a rig."""
     # Forces and lengths of the joint rig stand to those of the SDOF rig as its axial contact to the other's.
     force, length = (1.0, 1.0) if place.name == "sdof" else (250.0, 0.25)

@@ -8,7 +8,9 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow.dataset as ds
@@ -19,6 +21,7 @@ from campaign_plan import document
 from bench.campaign import CampaignError, Progress, means, plan_from_dict, read_plan, run_campaign, verify
 from bench.campaign.execution import generator_of, payload_of
 from bench.campaign.generation import Generator
+from bench.campaign.journal import Journal
 from bench.campaign.store import Store
 from bench.campaign.versions import versions
 from bench.errors import FileFormatError, ParameterError
@@ -233,6 +236,29 @@ def test_resumes_after_a_stop_without_loss_or_repetition(reference: Path, tmp_pa
     assert hashes(folder) == hashes(reference)
     assert {path: path.stat().st_mtime_ns for path in before} == before
     assert run_campaign(document(), folder).resumed == 24
+
+
+@pytest.mark.parametrize("lasting", [False, True])
+def test_a_stop_before_a_part_is_noted_leaves_no_part_unnoted(
+    lasting: bool, reference: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    noted, calls = Journal.note, iter(range(100))
+
+    def note(journal: Journal, plan_sha256: str, entry: Mapping[str, Any]) -> None:
+        call = next(calls)
+        if call == 2 or (lasting and call > 2):
+            raise KeyboardInterrupt
+        noted(journal, plan_sha256, entry)
+
+    folder = tmp_path / "stopped"
+    monkeypatch.setattr(Journal, "note", note)
+    with pytest.raises(KeyboardInterrupt):
+        run_campaign(document(), folder, threads=2)
+    monkeypatch.undo()
+    assert json.loads((folder / "manifest.json").read_text())["status"] == "stopped"
+    assert verify(folder) == []
+    run_campaign(document(), folder)
+    assert hashes(folder) == hashes(reference)
 
 
 def test_what_a_crash_can_leave_behind_is_cleared(reference: Path, tmp_path: Path) -> None:

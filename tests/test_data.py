@@ -84,7 +84,7 @@ def test_public_records_are_read_from_a_folder(tmp_path):
     with pytest.raises(FileFormatError, match="'qg', 'vir', 'gtau', 't'"):
         emps(tmp_path)
     (tmp_path / "SNLS80mV.mat").write_bytes(b"nothing")
-    with pytest.raises(FileFormatError, match="cannot be read"):
+    with pytest.raises(FileFormatError, match="MATLAB"):
         silverbox(tmp_path)
 
 

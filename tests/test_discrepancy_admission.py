@@ -14,10 +14,11 @@ from planted_cases import motion_with, planted_case
 from bench.discrepancy import Case, read_case
 from bench.discrepancy.case.rig_units import in_coherent_units
 from bench.discrepancy.checks.admission import admitted
-from bench.discrepancy.checks.scales import Bands, common_factor, suspicions
+from bench.discrepancy.checks.bands import Bands, common_factor
+from bench.discrepancy.checks.load_limits import clipped_load
+from bench.discrepancy.checks.scales import suspicions
 from bench.discrepancy.judgement.shares import closed_words, percent, probability
 from bench.discrepancy.likelihood.problem import Problem
-from bench.discrepancy.model.mjcf_loads import clipped_load
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.verdict import Gap
 from bench.errors import BenchError, ModelError, UnitError

@@ -19,11 +19,8 @@ from bench.discrepancy.blind.drawing import (
 from bench.discrepancy.blind.proportions import calibration_error, calibration_scatter
 from bench.discrepancy.blind.score_report import tables
 from bench.discrepancy.truth.background_settings import STATED, BackgroundSettings
-from bench.discrepancy.truth.rigs import (
-    RIGS_SETTINGS,
-    BlindOptions,
-    draw_bench,
-)
+from bench.discrepancy.truth.loads import RIGS_SETTINGS
+from bench.discrepancy.truth.rigs import BlindOptions, draw_bench
 from bench.errors import ParameterError
 
 RIGS = {"sdof": (1.0, 0.0, 0.0), "damper": (0.0, 1.0, 0.0), "joint": (0.0, 0.0, 1.0)}

@@ -25,15 +25,17 @@ from bench.discrepancy.effects import friction_limits as limits
 from bench.discrepancy.effects.catalogue import CATALOGUE
 from bench.discrepancy.simulation.stick_slip import Elements, LinearStructure, free_run
 from bench.discrepancy.truth import out_of_catalogue as foreign
-from bench.discrepancy.truth.ground_truth import ROWS, Placed, Truth, motion_of, played, sensed
-from bench.discrepancy.truth.moreau_time_stepping import Acting, Matrices, Stop, march
-from bench.discrepancy.truth.rigs import SIGNALS, BlindOptions, Plan, draw_bench, load, reach_of
-from bench.discrepancy.truth.withheld_effects import RECIPES, Reach, recipe_named
+from bench.discrepancy.truth.ground_truth import ROWS, Truth, WithheldEffect, motion_of, played, sensed
+from bench.discrepancy.truth.loads import SIGNALS, load
+from bench.discrepancy.truth.moreau_time_stepping import Acting, RigMatrices, Stop, march
+from bench.discrepancy.truth.recipe import Reach
+from bench.discrepancy.truth.rigs import BlindOptions, CasePlan, draw_bench, reach_of
+from bench.discrepancy.truth.withheld_effects import RECIPES, recipe_named
 from bench.errors import FileFormatError, ParameterError, UnknownNameError
 from bench.laws import LAWS
 from bench.laws.coulomb import COULOMB
 
-SDOF = Matrices(np.array([[2.0]]), np.array([[3.0]]), np.array([[800.0]]), np.ones((1, 1)))
+SDOF = RigMatrices(np.array([[2.0]]), np.array([[3.0]]), np.array([[800.0]]), np.ones((1, 1)))
 REACH = Reach(10.0, 0.01, 0.2, 800.0, 20.0, 8.0, 0.5, 0.05, 1.0, 20.0)
 SHORT = {"duration": 4.0, "sample_rate": 400.0, "detectability": False}
 TRUTH = {"mass": 2.0, "stiffness": 800.0, "damping": 3.0}
@@ -54,7 +56,7 @@ def relative(a, b) -> float:
 def test_time_stepping_agrees_with_mujoco(name):
     rng = np.random.default_rng(1)
     recipe = recipe_named(name)
-    effects = [Placed(recipe, "", recipe.draw(rng, REACH)(0.4))]
+    effects = [WithheldEffect(recipe, "", recipe.draw(rng, REACH)(0.4))]
     loads = 10.0 * load("random", 3.0, 1200, 400.0, rng)[:, None]
     engine = motion_of(Truth("sdof", TRUTH, 400.0), effects, loads)
     laws = [Acting(recipe.law, np.asarray(effects[0].drawn.theta), np.ones((1, 1)))]
@@ -66,9 +68,11 @@ def test_time_stepping_agrees_with_mujoco(name):
 
 def test_time_stepping_agrees_with_mujoco_on_the_joint():
     rng = np.random.default_rng(2)
-    plan = Plan("single", "joint", (recipe_named("gap_coupling"),), ("joint",), "both", False, 0.1, 0.01)
+    plan = CasePlan("single", "joint", (recipe_named("gap_coupling"),), ("joint",), "both", False, 0.1, 0.01)
     bench = draw_bench(plan, rng, BlindOptions(**SHORT | {"duration": 2.0}))
-    effects = [Placed(plan.recipes[0], "joint", plan.recipes[0].draw(rng, reach_of(bench, "joint"))(0.5))]
+    effects = [
+        WithheldEffect(plan.recipes[0], "joint", plan.recipes[0].draw(rng, reach_of(bench, "joint"))(0.5))
+    ]
     loads = bench.loads[2]
     engine = motion_of(bench.truth, effects, loads)
     laws = [Acting(plan.recipes[0].law, np.asarray(effects[0].drawn.theta), ROWS["joint"]["joint"])]
@@ -109,7 +113,7 @@ def test_friction_holds_what_is_below_its_limit_and_lets_go_above():
 
 
 def test_a_rigid_stop_throws_back_with_its_restitution():
-    free = Matrices(np.array([[1.0]]), np.zeros((1, 1)), np.zeros((1, 1)), np.ones((1, 1)))
+    free = RigMatrices(np.array([[1.0]]), np.zeros((1, 1)), np.zeros((1, 1)), np.ones((1, 1)))
     stop = Stop(np.ones(1), 0.01, 1.0, 0.6)
     motion = march(free, [], loads=np.full((1200, 1), 2.0), step=1e-3, stop=stop)
     v = motion.velocity[:, 0]
@@ -162,7 +166,7 @@ def test_loads_and_sensors_do_what_their_effects_say():
 
     def drawn(name, strength=0.2):
         recipe = recipe_named(name)
-        return Placed(recipe, "", recipe.draw(np.random.default_rng(0), REACH)(strength))
+        return WithheldEffect(recipe, "", recipe.draw(np.random.default_rng(0), REACH)(strength))
 
     late = drawn("displacement_delay")
     tau = late.drawn.values["delay"]

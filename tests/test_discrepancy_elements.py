@@ -10,7 +10,7 @@ import pytest
 from planted_cases import MASS, motion_with, planted_case
 
 from bench.discrepancy import Case, CaseChannel, NominalParameter, diagnose, read_case, record_from_arrays
-from bench.discrepancy.case.case import without_load
+from bench.discrepancy.case.free_decay import with_no_load
 from bench.discrepancy.case.schema import check_units
 from bench.discrepancy.effects.catalogue import effect_named
 from bench.discrepancy.fitting.map_fit import fit
@@ -148,7 +148,7 @@ def test_a_free_decay_needs_no_load_and_responses_alone_are_refused_in_words():
     case = Case("decay", "sdof", parameters, channels, (records[0],), (records[1],))
     with pytest.raises(FileFormatError, match="responses alone"):
         structure_of(case)
-    free = without_load(case)
+    free = with_no_load(case)
     problem = Problem(free, structure_of(free), free.identification)
     fitted = fit(problem, (), start=np.zeros(len(problem.nominal)), iterations=40)
     assert fitted.reduced < 1.1

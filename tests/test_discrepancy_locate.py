@@ -19,7 +19,7 @@ from bench.discrepancy.localisation.state_map import CELLS, state_maps
 from bench.discrepancy.localisation.state_splits import force_splits
 from bench.discrepancy.model.placements import placements
 from bench.discrepancy.model.rigs import structure_of
-from bench.discrepancy.search.explain import Explanation
+from bench.discrepancy.search.explanation import Explanation
 from bench.discrepancy.search.forward_selection import attribute
 
 MASS, DAMPING, STIFFNESS = 2.0, 4.0, 1500.0

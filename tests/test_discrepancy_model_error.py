@@ -10,6 +10,7 @@ from planted_cases import MASS, NOISE, STIFFNESS, linear_motion, motion_with, pl
 
 from bench.discrepancy import diagnose
 from bench.discrepancy.effects.catalogue import effect_named
+from bench.discrepancy.fitting.goodness_of_fit import complexity
 from bench.discrepancy.fitting.map_fit import fit
 from bench.discrepancy.judgement.coarse import outside
 from bench.discrepancy.judgement.held_out import HeldOut, held_out, shares
@@ -24,8 +25,7 @@ from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.localisation.remainder import free_force
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.model.rigs import structure_of
-from bench.discrepancy.search.explain import Explanation
-from bench.discrepancy.search.fits import complexity
+from bench.discrepancy.search.explanation import Explanation
 
 FEW = [
     effect_named(name)

@@ -11,17 +11,13 @@ from bench.discrepancy.fitting.map_fit import fit
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.model.rigs import structure_of
-from bench.discrepancy.next_test.discriminating_excitation import (
-    Rival,
-    outlook,
-    propose,
-    separate,
-    told_apart,
-)
+from bench.discrepancy.next_test.belief import Belief
+from bench.discrepancy.next_test.discriminating_excitation import propose, separate, told_apart
 from bench.discrepancy.next_test.distinguishability import why_none
 from bench.discrepancy.next_test.feasible_excitations import limits_of
+from bench.discrepancy.next_test.outlook import outlook
 from bench.discrepancy.report.model_update import element_code, element_toml
-from bench.discrepancy.search.explain import Explanation
+from bench.discrepancy.search.explanation import Explanation
 
 RATE, N = 500.0, 3000
 NOISE = 0.02
@@ -86,7 +82,7 @@ def test_the_proposal_keeps_the_limits_of_the_rig_and_beats_repeating_the_record
         assert peak <= limits.load[name] * (1 + 1e-9)
     for name, reached in proposal.motion.items():
         assert reached <= limits.motion[name] * (1 + 1e-9)
-    again = outlook(problem, Rival.of(gap), Rival.of(cubic), problem.records[0])
+    again = outlook(problem, Belief.of(gap), Belief.of(cubic), problem.records[0])
     assert again is not None
     assert look.log_odds > again.log_odds
     assert 0.0 <= look.power <= 1.0
@@ -121,7 +117,7 @@ def test_the_predicted_power_is_the_rate_at_which_the_true_rival_wins():
     assert found is not None
     proposal, look = found
     rng = np.random.default_rng(5)
-    rivals = (Rival.of(gap), Rival.of(cubic))
+    rivals = (Belief.of(gap), Belief.of(cubic))
     level = problem.noise[0]
     wins = 0
     draws = 12

@@ -16,7 +16,6 @@ from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.likelihood.whitening import whitened
 from bench.discrepancy.localisation.force_smoother import observers
 from bench.discrepancy.model.rigs import structure_of
-from bench.discrepancy.response.driving_loads import with_load_noise
 from bench.discrepancy.simulation.stick_slip import Elements
 from bench.errors import ModelError
 
@@ -235,7 +234,7 @@ def test_noise_of_the_load_is_white_where_a_change_of_stiffness_shows(tmp_path):
         direction /= np.linalg.norm(direction)
         found = []
         for _ in range(80):
-            noisy = problem.forgetful().simulate(*model, with_load_noise(problem, data.record, rng))
+            noisy = problem.forgetful().simulate(*model, problem.with_load_noise(data.record, rng))
             own = problem.noise * rng.standard_normal(clean.shape)
             found.append(float(direction @ whitened(noisy - clean + own, told)))
         spread[name] = float(np.std(found))

@@ -11,12 +11,12 @@ from bench.discrepancy.case.case import Case, CaseChannel, NominalParameter, rec
 from bench.discrepancy.checks.data_quality import notes
 from bench.discrepancy.diagnosis import diagnose
 from bench.discrepancy.effects.catalogue import effect_named
+from bench.discrepancy.fitting.goodness_of_fit import consistent
 from bench.discrepancy.fitting.map_fit import fit
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.motion.prescribed import decided, held, prescribed_motion, remembering
-from bench.discrepancy.search.fits import consistent
 from bench.errors import RecordingError
 
 STEP = 0.002

@@ -15,7 +15,8 @@ from bench.cli import main
 from bench.discrepancy import Case, diagnose, read_case, record_from_arrays
 from bench.discrepancy.blind.protocol import write_case
 from bench.discrepancy.case.schema import check_units
-from bench.discrepancy.checks.data_quality import compare, notes, refuse, unit_factor
+from bench.discrepancy.checks.channel_comparison import compare, unit_factor
+from bench.discrepancy.checks.data_quality import notes, refuse
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.rigs import structure_of
 from bench.errors import BenchError, IdentificationError, RecordingError, UnitError

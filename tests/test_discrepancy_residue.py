@@ -13,19 +13,20 @@ from bench.discrepancy import diagnose
 from bench.discrepancy.effects.catalogue import CATALOGUE, effect_named
 from bench.discrepancy.effects.channel_operators import delay, sensor_delay
 from bench.discrepancy.effects.nonparametric import CLOSURES
+from bench.discrepancy.fitting.goodness_of_fit import consistent
 from bench.discrepancy.fitting.map_fit import fit
 from bench.discrepancy.judgement.predictive_check import contradicted
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.likelihood.whitening import timed
 from bench.discrepancy.model.placements import placements
 from bench.discrepancy.model.rigs import structure_of
-from bench.discrepancy.response.driving_loads import driving_loads
-from bench.discrepancy.screening.candidates import followed
+from bench.discrepancy.screening.candidates import tells_motion
 from bench.discrepancy.screening.linear_amplitudes import Point
 from bench.discrepancy.screening.score_test import LackOfFit, lack_of_fit
 from bench.discrepancy.screening.screen import Screen
-from bench.discrepancy.search.explain import Explanation, close
-from bench.discrepancy.search.fits import Search, consistent, integrate_finer
+from bench.discrepancy.search.closures import close
+from bench.discrepancy.search.explanation import Explanation
+from bench.discrepancy.search.fits import Search, integrate_finer
 from bench.discrepancy.search.forward_selection import attribute
 from bench.discrepancy.search.rivals import challenge
 from bench.discrepancy.settings import DEFAULT
@@ -78,11 +79,11 @@ def test_one_more_effect_is_screened_along_a_free_run_that_follows_the_motion_an
     case = planted_case(lambda f: motion_with(f, one_relaxation, 1))
     problem, relaxing = fitted(case, "viscoelastic_relaxation", [-2.2, -3.0])
     friction = placements(case, problem.structure, [effect_named("coulomb_friction")])
-    assert followed(replace(relaxing, chi2=1.5 * relaxing.n_residuals), problem)
-    assert not followed(replace(relaxing, chi2=2.5 * relaxing.n_residuals), problem)
+    assert tells_motion(replace(relaxing, chi2=1.5 * relaxing.n_residuals), problem)
+    assert not tells_motion(replace(relaxing, chi2=2.5 * relaxing.n_residuals), problem)
     sticking = replace(relaxing, hypothesis=tuple(friction))
-    assert not followed(replace(sticking, chi2=1.5 * relaxing.n_residuals), problem)
-    assert followed(replace(sticking, chi2=relaxing.n_residuals), problem)
+    assert not tells_motion(replace(sticking, chi2=1.5 * relaxing.n_residuals), problem)
+    assert tells_motion(replace(sticking, chi2=relaxing.n_residuals), problem)
 
 
 def test_several_effects_are_doubted_sooner_than_one():
@@ -296,7 +297,7 @@ def test_the_corners_of_a_delayed_load_move_with_it():
     eta = np.array([late.effect.parameters[0].mean + 0.3])
     tau = late.effect.values(eta, problem.scales_of(late))[0]
     assert 0.1 < tau / record.step % 1.0 < 0.9
-    loads, rows = driving_loads(problem, ((late,), [eta]), record, 1)
+    loads, rows = problem.driving_loads((late,), [eta], record, 1)
     clock = np.arange(len(record)) * record.step
     fine = np.arange(len(loads)) * record.step / rows
     chords = np.interp(fine - tau, clock, record.values["force"], left=0.0)
@@ -310,7 +311,7 @@ def test_a_delayed_load_is_that_of_a_delay_on_samples_where_it_is_held():
     case = replace(planted_case(role="command"), options={"load_interpolation": "zero_order_hold"})
     problem = Problem(case, structure_of(case), case.identification)
     late = placements(case, problem.structure, [effect_named("actuator_delay")])[0]
-    loads, rows = driving_loads(problem, ((late,), [np.zeros(1)]), case.identification[0], 1)
+    loads, rows = problem.driving_loads((late,), [np.zeros(1)], case.identification[0], 1)
     assert (rows, len(loads)) == (0, len(case.identification[0]))
 
 

@@ -30,7 +30,7 @@ from bench.discrepancy.blind.schema import AnswerDocument
 from bench.discrepancy.case.schema import NominalDocument
 from bench.discrepancy.verdict import Estimate, Gap, Location, NamedEffect, Ranked, Split, Verdict
 from bench.discrepancy.verdict_schema import ResultDocument, VerdictDocument
-from bench.documents import Document, Limits, checked, load_document
+from bench.documents import Document, DocumentLimits, checked, load_document
 from bench.errors import (
     BenchError,
     DocumentError,
@@ -185,7 +185,7 @@ def test_only_regular_files_of_a_sane_size_are_read(tmp_path):
     with pytest.raises(FileFormatError, match="byte 9 is no UTF-8 text"):
         load_document(tmp_path / "latin.json")
     with pytest.raises(FileFormatError, match="at most 10"):
-        load_document(tmp_path / "mark.json", limits=Limits(json_bytes=10))
+        load_document(tmp_path / "mark.json", limits=DocumentLimits(json_bytes=10))
 
 
 def test_errors_are_of_the_kinds_that_programs_catch():

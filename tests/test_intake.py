@@ -149,7 +149,6 @@ def test_in_python_from_arrays_and_a_spec_and_the_simulator_is_named_before_phys
     answer = bench.diagnose(mujoco.MjSpec.from_string(STAGE), runs, most=1)
     assert answer.verdict.verdict == "none"
     assert all(place.kind != "simulator" for place in answer.verdict.locations)
-    pytest.importorskip("pandas")
     assert {"mass:table", "stiffness:guide"} <= set(answer.to_pandas()["parameter"])
     assert answer._repr_html_().startswith("<p>")
     assert answer.plot().axes

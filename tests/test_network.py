@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bench.errors import FileFormatError, IdentificationError, ParameterError
-from bench.identification.levenberg_marquardt import NormalEquations, minimise
+from bench.identification.levenberg_marquardt import NormalEquations, minimise_regularised
 from bench.identification.network import HiddenLayerProblem, NetworkModel, fit_network
 from bench.laws.network import (
     INCH,
@@ -117,7 +117,7 @@ class Line:
 class TestMinimise:
     def test_linear_problem(self, rng):
         X, y = rng.standard_normal((60, 4)) * [1.0, 1e3, 1e-3, 1.0], rng.standard_normal(60)
-        minimum = minimise(Line(X, y), np.zeros(4), regularise=False)
+        minimum = minimise_regularised(Line(X, y), np.zeros(4), regularise=False)
         exact = np.linalg.lstsq(X, y, rcond=None)[0]
         # Each step shrinks the error by the damping, which falls below 1e-8 in 14 steps whatever the scales are.
         np.testing.assert_allclose(minimum.weights, exact, rtol=1e-6)
@@ -127,7 +127,7 @@ class TestMinimise:
         """For a linear model gamma is sum(s² / (s² + ratio)), and the fixed point is MacKay's."""
         X = rng.standard_normal((200, 30))
         y = X[:, :3] @ [2.0, -1.0, 0.5] + rng.standard_normal(200)
-        minimum = minimise(Line(X, y), np.zeros(30), decay=1e-3, max_iterations=400)
+        minimum = minimise_regularised(Line(X, y), np.zeros(30), decay=1e-3, max_iterations=400)
         ratio = minimum.alpha / minimum.beta
         singular = np.linalg.svd(X, compute_uv=False)
         gamma = np.sum(singular**2 / (singular**2 + ratio))
@@ -139,11 +139,11 @@ class TestMinimise:
 
     def test_target_and_deadline_stop(self, rng):
         line = Line(rng.standard_normal((60, 4)), rng.standard_normal(60))
-        assert minimise(line, np.zeros(4), target=1e9).stopped == "target"
-        timed = minimise(line, np.zeros(4), deadline=-1.0)
+        assert minimise_regularised(line, np.zeros(4), target=1e9).stopped == "target"
+        timed = minimise_regularised(line, np.zeros(4), deadline=-1.0)
         assert (timed.stopped, timed.iterations) == ("time", 0)
         with pytest.raises(IdentificationError, match="not finite"):
-            minimise(line, np.full(4, np.nan))
+            minimise_regularised(line, np.full(4, np.nan))
 
 
 class TestLaw:

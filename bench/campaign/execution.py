@@ -160,6 +160,7 @@ def run_campaign(
             if status == "stopped":  # between the note of a part and its tally, a signal may have come
                 noted = store.journal.read(plan.sha256).entries
                 entries.update({part: entry for part, entry in noted.items() if part not in entries})
+                store.discard(part for part in left if part not in entries)
             store.write_manifest(plan, channels, entries, status=status)
     made = _result(store, status, tally, seconds=time.perf_counter() - start, means=means)
     return replace(made, found=tuple(found))
@@ -240,10 +241,11 @@ def _run(
                 part = queue.popleft()
                 pending[submit(part)] = part
             for future in wait(pending, return_when=FIRST_COMPLETED).done:
-                part = pending.pop(future)
+                part = pending[future]
                 try:
                     entry = future.result()
                 except BrokenProcessPool as error:
+                    del pending[future]
                     # every part in flight breaks together; which one was the cause shows when it comes again
                     crashes[part] += 1
                     if crashes[part] > SETTINGS.crashes_allowed:
@@ -255,6 +257,7 @@ def _run(
                     queue.appendleft(part)
                     continue
                 store.note(tally.sha256, entry)
+                del pending[future]  # until here a signal finds it among those to be noted
                 tally.add(entry)
     except BaseException:
         _note_running(list(pending), store, tally)

@@ -19,10 +19,10 @@ from bench.documents import (
     AS_WHOLE,
     Count,
     Document,
+    DocumentLimits,
     Entry,
     Flag,
     Label,
-    Limits,
     Listed,
     Name,
     NotNegative,
@@ -39,7 +39,7 @@ from bench.mjcf import IntegratorName, StructureName
 from bench.signals import Signal
 from bench.signals.schema import varied_type
 
-MANIFEST_LIMITS = Limits()
+MANIFEST_LIMITS = DocumentLimits()
 """A manifest of as many parts as `PlanLimits` allows stays within these."""
 
 

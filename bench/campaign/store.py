@@ -11,21 +11,24 @@
 
 A part is finished when the journal notes it and its files are those that were noted (`bench.campaign.parts`). Files are
 written elsewhere, flushed to the disk and moved into place, then noted. Whatever is killed when, a resumed campaign keeps
-what is finished and makes the rest again. What is not of the campaign is moved to ``.set_aside``, never removed.
+what is finished and makes the rest again. What is not of the campaign is moved to ``.set_aside``, never removed; only the
+files of parts that were not noted are.
 """
 
 from __future__ import annotations
 
 import contextlib
+import itertools
 import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from bench.campaign.journal import Journal, journal_faults
 from bench.campaign.lock import CampaignError, locked
 from bench.campaign.parts import (
+    FOLDERS,
     Layout,
     any_part,
     entry_of,
@@ -190,10 +193,16 @@ class Store:
         self._clear_partial()
 
     def _clear_partial(self) -> None:
-        """Remove the files that a stopped run was writing; nothing else of the campaign is ever removed."""
+        """Remove the files that a stopped run was writing."""
         for torn in (self.folder / ".partial").iterdir():
             with contextlib.suppress(OSError):
                 torn.unlink()
+
+    def discard(self, parts: Iterable[int]) -> None:
+        """Remove the files of parts that a run put in place and, told to stop, did not come to note: they are made again."""
+        for part, kind in itertools.product(parts, FOLDERS):
+            with contextlib.suppress(OSError):
+                self.path(kind, part).unlink()
 
     def _write_answers(self, plan: Plan) -> None:
         path = self.folder / "answers" / "answers.json"

@@ -59,9 +59,7 @@ class BlindMake:
         from bench.discrepancy import BlindOptions, make_blind
         from bench.discrepancy.blind.protocol import SEAL
         from bench.discrepancy.truth.background_settings import BackgroundSettings
-        from bench.discrepancy.truth.rigs import (
-            RIGS_SETTINGS,
-        )
+        from bench.discrepancy.truth.loads import RIGS_SETTINGS
         from bench.targets import check_folder
 
         begun = next(self.folder.glob(f"*/{SEAL}"), None) is not None  # by the same command, which goes on

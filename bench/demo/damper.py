@@ -11,7 +11,7 @@ import numpy as np
 from bench.data import friction_damper
 from bench.errors import RangeWarning
 from bench.identification.network import fit_network
-from bench.identification.parametric import Motion, fit_law
+from bench.identification.parametric import ComponentRecord, fit_law
 from bench.identification.polynomial import fit_polynomial
 from bench.laws import find_law
 from bench.recording import Recording, nrmse
@@ -41,9 +41,9 @@ class DamperTest(NamedTuple):
     outside: dict[str, float]  # by model, share of samples outside the range of its data
 
 
-def damper_motion(recording: Recording) -> Motion:
+def damper_motion(recording: Recording) -> ComponentRecord:
     """A damper record in SI units as motion and force."""
-    return Motion(
+    return ComponentRecord(
         recording.time,
         recording["displacement"][:, None],
         np.gradient(recording["displacement"], 1.0 / recording.sample_rate)[:, None],
@@ -64,7 +64,7 @@ def identify_damper(record: Recording, rng: np.random.Generator) -> dict[str, El
     limits = {"limit_positive": (0.5 * peak, 1.5 * peak), "limit_negative": (0.5 * peak, 1.5 * peak)}
     parametric = fit_law(
         law,
-        [Motion(*(column[::4] for column in motion))],
+        [ComponentRecord(*(column[::4] for column in motion))],
         start={
             "stiffness": 20.0 * peak / stroke,
             "soft_stiffness": 2.0 * peak / stroke,

@@ -13,7 +13,7 @@ import time
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -33,25 +33,23 @@ from bench.discrepancy.checks.data_quality import notes
 from bench.discrepancy.checks.quantisation import recorded
 from bench.discrepancy.effects.catalogue import CATALOGUE
 from bench.discrepancy.effects.effect import Effect
-from bench.discrepancy.effects.nonparametric import CLOSURES
+from bench.discrepancy.fitting.goodness_of_fit import names
 from bench.discrepancy.fitting.initial_state_fit import start_warnings
 from bench.discrepancy.judgement import posterior as evidence
 from bench.discrepancy.judgement.closing import complete, nominal_estimates, with_closed
-from bench.discrepancy.judgement.nonparametric_rival import Rival
+from bench.discrepancy.judgement.finding import Finding
+from bench.discrepancy.judgement.stages import shrunk
 from bench.discrepancy.judgement.two_regimes import How, Progress, found_of
-from bench.discrepancy.judgement.validation_discrepancy import gaps, nominal_prediction
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.localisation.localise import Whereabouts, locate
 from bench.discrepancy.localisation.remainder import remainder
-from bench.discrepancy.model.placement import Hypothesis
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.next_test.discriminating_excitation import separate, told_apart
 from bench.discrepancy.numerics.deadline import Deadline
-from bench.discrepancy.search.explain import Explanation, close, nominal_alone
-from bench.discrepancy.search.fits import names
+from bench.discrepancy.search.explanation import Explanation, nominal_alone
 from bench.discrepancy.search.load_interpolation import reading_notes
 from bench.discrepancy.settings import DEFAULT, DiagnosisSettings, changed
-from bench.discrepancy.verdict import Gap, Kind, NamedEffect, Ranked, Verdict
+from bench.discrepancy.verdict import Kind, NamedEffect, Ranked, Verdict
 from bench.errors import BenchError, UnknownNameError
 
 Placed = TypeVar("Placed", NamedEffect, Ranked)
@@ -126,39 +124,48 @@ def diagnose(
         if name not in known and name not in {effect.name for effect in ARTICULATED}:
             raise UnknownNameError("effect", name, known)
     chosen = [effect for effect in catalogue if effect.name not in exclude]
+    how = How(chosen, most, progress, Deadline(budget), settings)
     # fits run in threads of their own; threads of BLAS within them would only get in each other's way
     with threadpool_limits(1, user_api="blas"):
-        deadline = Deadline(budget)
-        found = _diagnose(case, How(chosen, most, progress, deadline, settings), rng, anyway)
-        asked = "effects of drives and encoders"
-        if (
-            found.verdict.verdict != "none"
-            and not found.verdict.complete
-            and drives_only(case)
-            and deadline.allows(asked)
-        ):
-            # what no force on the joint explains to the noise may sit in its drive
-            progress(asked)
-            try:
-                other = diagnose_articulated(
-                    case,
-                    exclude=exclude,
-                    most=most,
-                    anyway=anyway,
-                    rng=rng,
-                    settings=settings,
-                    progress=progress,
-                )
-            except (
-                BenchError
-            ):  # admitted as a linear structure, with parts that the equations of drives leave out
-                return found
-            left, theirs = found.verdict.gap, other.verdict.gap
-            # free runs of one kind in both: parts of what each began with are compared
-            nearer = theirs.after * left.before < settings.judgement.coarse.most * left.after * theirs.before
-            if other.verdict.verdict == "effect" and (other.verdict.complete or nearer):
-                return other
-        return found
+        found = _diagnose(case, how, rng, anyway)
+        return _by_drives(found, case, how, exclude=exclude, anyway=anyway, rng=rng) or found
+
+
+def _by_drives(
+    found: Diagnosis,
+    case: Case,
+    how: How,
+    *,
+    exclude: Collection[str],
+    anyway: bool,
+    rng: np.random.Generator,
+) -> ArticulatedDiagnosis | None:
+    """Diagnosis by the equations of drives and encoders, where no force on the joint explains the records and one of these does."""
+    asked = "effects of drives and encoders"
+    if (
+        found.verdict.verdict == "none"
+        or found.verdict.complete
+        or not drives_only(case)
+        or not how.deadline.allows(asked)
+    ):
+        return None
+    how.progress(asked)
+    try:
+        other = diagnose_articulated(
+            case,
+            exclude=exclude,
+            most=how.most,
+            anyway=anyway,
+            rng=rng,
+            settings=how.settings,
+            progress=how.progress,
+        )
+    except BenchError:  # admitted as a linear structure, with parts that the equations of drives leave out
+        return None
+    left, theirs = found.verdict.gap, other.verdict.gap
+    # free runs of one kind in both: parts of what each began with are compared
+    nearer = theirs.after * left.before < how.settings.judgement.coarse.most * left.after * theirs.before
+    return other if other.verdict.verdict == "effect" and (other.verdict.complete or nearer) else None
 
 
 def _diagnose(case: Case, how: How, rng: np.random.Generator, anyway: bool) -> Diagnosis:
@@ -170,22 +177,19 @@ def _diagnose(case: Case, how: How, rng: np.random.Generator, anyway: bool) -> D
     problem = Problem(
         case, structure_of(case, settings=how.settings), case.identification, settings=how.settings
     )
-    explanations, kind, rival = finding.explanations, finding.kind, finding.rival
-    best, probabilities, words = explanations[0], finding.probabilities, finding.words
-    seen, fitted = recorded(problem, catalogue), kind
-    if seen and kind == "none":
-        kind = "effect"
-        probabilities = probabilities | {"effect": 1.0 - probabilities["unknown"], "none": 0.0}
+    explanations, rival, words = finding.explanations, finding.rival, finding.words
+    seen = recorded(problem, catalogue)
+    kind, probabilities = _kind(finding, seen)
     progress("gap on the judging records")
     closest = finding.closest or evidence.nearest(explanations)
-    final, closure, found = _shrunk(case, problem, explanations, kind, rival, rng, closest)
+    final, closure, found = shrunk(case, problem, explanations, kind, rival, rng, closest)
     widest = max(found, key=lambda gap: gap.before / max(gap.noise_floor, 1e-12))
     if kind == "unknown" and not finding.doubt:
         words += evidence.closes(names(closest.hypothesis), widest, settings=how.settings.judgement)
     where = locate(
         problem,
         nominal_alone(explanations),
-        rival.explanation if rival else best,
+        rival.explanation if rival else explanations[0],
         borne_out=rival is not None or kind == "effect",
         unknown=kind == "unknown",
     )
@@ -194,6 +198,7 @@ def _diagnose(case: Case, how: How, rng: np.random.Generator, anyway: bool) -> D
     if finding.closest is not None:
         nearest = with_closed(case, problem, nearest, (finding.closest, *explanations), rng)
     ranked = (*(Ranked(e.name, e.where, e.probability) for e in seen), *finding.ranking)
+    stated, sharp = problem.noise_stated, not finding.coarse
     verdict = Verdict(
         verdict=kind,
         named=_somewhere(problem, (*named, *seen)) if kind == "effect" else (),
@@ -204,28 +209,13 @@ def _diagnose(case: Case, how: How, rng: np.random.Generator, anyway: bool) -> D
         gaps=found,
         probabilities=probabilities,
         explanation=_told(words, seen),
-        warnings=(
-            *admission,
-            *_untried(how.deadline),
-            *finding.notes,
-            *notes(case, problem),
-            *idle_notes(told, quiet),
-            *reading_notes(quiet, case),
-            *start_warnings(problem, (*case.identification, *case.validation)),
-        ),
+        warnings=(*admission, *_untried(how.deadline), *finding.notes, *_warnings(problem, told, quiet)),
         closure=closure,
-        next_excitation=(
-            separate(problem, explanations) if fitted == "effect" else told_apart(problem, fitted, catalogue)
-        ),
+        next_excitation=_next_excitation(problem, finding, catalogue),
         splits=where.splits,
         seconds=time.perf_counter() - began,
         complete=kind != "unknown"
-        and complete(
-            found,
-            sharp=not finding.coarse,
-            stated=problem.noise_stated,
-            settings=how.settings.judgement,
-        ),
+        and complete(found, sharp=sharp, stated=stated, settings=how.settings.judgement),
         remainder=remainder(problem, final, widest),
         nominal=nominal_estimates(final),
         nearest=nearest,
@@ -234,66 +224,36 @@ def _diagnose(case: Case, how: How, rng: np.random.Generator, anyway: bool) -> D
     return Diagnosis(case, problem, tuple(explanations), verdict, final, where)
 
 
+def _kind(finding: Finding, seen: Sequence[NamedEffect]) -> tuple[Kind, Mapping[str, float]]:
+    """Kind of the verdict and the probabilities of all kinds, with effects that were read off the samples."""
+    if not seen or finding.kind != "none":
+        return finding.kind, finding.probabilities
+    return "effect", finding.probabilities | {"effect": 1.0 - finding.probabilities["unknown"], "none": 0.0}
+
+
+def _warnings(problem: Problem, told: Case, quiet: Case) -> tuple[str, ...]:
+    """What the reader should know about the records: as told, without the noise of idle loads, and as they were read in the end."""
+    case = problem.case
+    return (
+        *notes(case, problem),
+        *idle_notes(told, quiet),
+        *reading_notes(quiet, case),
+        *start_warnings(problem, (*case.identification, *case.validation)),
+    )
+
+
+def _next_excitation(problem: Problem, finding: Finding, catalogue: Sequence[Effect]) -> dict[str, Any]:
+    """The next test: one that separates rivals, or what the records could have shown where they call for nothing."""
+    if finding.kind == "effect":
+        return separate(problem, finding.explanations)
+    return told_apart(problem, finding.kind, catalogue)
+
+
 def _untried(deadline: Deadline) -> tuple[str, ...]:
     """What there was no time for, in words."""
     if not deadline.skipped:
         return ()
     return (f"there was no time for {'; '.join(deadline.skipped)}: a larger --budget may change the verdict",)
-
-
-def _shrunk(
-    case: Case,
-    problem: Problem,
-    explanations: Sequence[Explanation],
-    kind: Kind,
-    rival: Rival | None,
-    rng: np.random.Generator,
-    nearest: Explanation,
-) -> tuple[Explanation, str, tuple[Gap, ...]]:
-    """How far the gap shrinks: the explanation behind `Gap.after`, the closure in it if any, and the gaps."""
-    best, nothing = explanations[0], nominal_alone(explanations)
-    final, closure = best, ""
-    stages = [("nominal", nominal_prediction(problem)), ("parameters only", nothing.predict)]
-    stages += [(label, e.predict) for label, e in _path(explanations)]
-    if kind == "unknown":
-        final, closure = _closed(best, nothing, rival)
-        label = names(nearest.hypothesis)
-        tells = label not in dict(stages) and all(_finite(nearest.predict(r)) for r in case.validation)
-        stages += [(label, nearest.predict)] if tells else []
-    stages.append((names(final.hypothesis), final.predict))
-    found = gaps(case, problem, stages=stages, rng=rng, final=_model(final))
-    if kind == "unknown" and any(
-        gap.after > problem.settings.judgement.closure_worse * gap.parameters_only for gap in found
-    ):
-        # what imitates an unknown force on some records can be worse than nothing on others: nobody should build that in
-        final, closure = nothing, ""
-        stages[-1] = ("no closure helps", nothing.predict)
-        found = gaps(case, problem, stages=stages, rng=rng, final=_model(final))
-    return final, closure, found
-
-
-def _finite(run: Mapping[str, np.ndarray]) -> bool:
-    return all(np.isfinite(samples).all() for samples in run.values())
-
-
-def _closed(best: Explanation, nothing: Explanation, rival: Rival | None) -> tuple[Explanation, str]:
-    """What a free model makes of an unknown gap: alone where that explains the records, else the likelier of alone and on top."""
-    if rival is not None and rival.explanation.consistent:
-        return rival
-    closed = close(best, nothing, CLOSURES)
-    if rival is None or rival.explanation.log_posterior < closed[0].log_posterior:
-        return closed
-    return (
-        rival
-        if rival.explanation.reduced - 1.0 < best.settings.search.stalled * (best.reduced - 1.0)
-        else closed
-    )
-
-
-def _model(explanation: Explanation) -> tuple[Hypothesis, np.ndarray] | None:
-    """Effects and vector of an explanation in one part; None where it has several."""
-    fits = [fitted for _, fitted in explanation.parts]
-    return (fits[0].hypothesis, fits[0].vector) if len(fits) == 1 else None
 
 
 def _somewhere(problem: Problem, found: Sequence[Placed]) -> tuple[Placed, ...]:
@@ -315,18 +275,3 @@ def _told(words: str, seen: Sequence[NamedEffect]) -> str:
 def diagnose_folder(folder: str | Path, **options) -> Diagnosis | ArticulatedDiagnosis:
     """Diagnose the case in a folder; the options are those of `diagnose`."""
     return diagnose(read_case(folder), **options)
-
-
-def _path(explanations: Sequence[Explanation]) -> list[tuple[str, Explanation]]:
-    """Explanations that lead to the best one by adding its effects one by one, best first effect first."""
-    target = {p.key for p in explanations[0].hypothesis}
-    steps: list[tuple[str, Explanation]] = []
-    reached: set[tuple[str, str, str]] = set()
-    for size in range(1, len(target)):
-        for e in explanations:
-            keys = {p.key for p in e.hypothesis}
-            if len(keys) == size and reached < keys < target:
-                steps.append((names(e.hypothesis), e))
-                reached = keys
-                break
-    return steps

@@ -24,7 +24,7 @@ from bench.documents.kinds import (
     Whole,
     any_of,
 )
-from bench.documents.loading import LIMITS, Limits, load_document, parse_json, read_text
+from bench.documents.loading import LIMITS, DocumentLimits, load_document, parse_json, read_text
 from bench.documents.model import (
     Document,
     Entry,
@@ -43,11 +43,11 @@ __all__ = [
     "LIMITS",
     "Count",
     "Document",
+    "DocumentLimits",
     "Entry",
     "Flag",
     "Label",
     "Limit",
-    "Limits",
     "Listed",
     "Name",
     "NotNegative",

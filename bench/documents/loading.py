@@ -19,7 +19,7 @@ from bench.errors import DocumentError, FileFormatError, shortened
 
 
 @dataclass(frozen=True)
-class Limits:
+class DocumentLimits:
     """What a document may cost.
 
     Attributes:
@@ -41,7 +41,7 @@ class Limits:
     finite: bool = True
 
 
-LIMITS = Limits()
+LIMITS = DocumentLimits()
 
 
 class _LongInteger(NamedTuple):
@@ -56,7 +56,7 @@ class _Doubled(dict[str, Any]):
     key = ""
 
 
-def load_document(path: str | Path, *, limits: Limits = LIMITS) -> dict[str, Any]:
+def load_document(path: str | Path, *, limits: DocumentLimits = LIMITS) -> dict[str, Any]:
     """Read a JSON (``.json``) or TOML document.
 
     Args:
@@ -102,7 +102,7 @@ def read_text(path: str | Path, most: int) -> str:
         raise FileFormatError(f"cannot read {shortened(str(file), 200)[1:-1]}: {reason}") from error
 
 
-def parse_json(text: str, where: str, *, limits: Limits = LIMITS) -> dict[str, Any]:
+def parse_json(text: str, where: str, *, limits: DocumentLimits = LIMITS) -> dict[str, Any]:
     """The table of entries that a JSON text holds.
 
     Args:
@@ -145,7 +145,7 @@ def _table(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return doubled
 
 
-def _parse_toml(text: str, where: str, limits: Limits) -> dict[str, Any]:
+def _parse_toml(text: str, where: str, limits: DocumentLimits) -> dict[str, Any]:
     for number, line in enumerate(text.splitlines(), 1):
         if len(line) > limits.toml_line:
             raise FileFormatError(
@@ -166,11 +166,11 @@ def _parse_toml(text: str, where: str, limits: Limits) -> dict[str, Any]:
     return _checked(document, where, limits, finite=False)
 
 
-def _too_deep(limits: Limits) -> str:
+def _too_deep(limits: DocumentLimits) -> str:
     return f"it is nested too deeply; at most {limits.depth} levels are expected"
 
 
-def _checked(document: Any, where: str, limits: Limits, *, finite: bool) -> dict[str, Any]:
+def _checked(document: Any, where: str, limits: DocumentLimits, *, finite: bool) -> dict[str, Any]:
     """The document, once nothing in it is what none may hold."""
     if not isinstance(document, dict):
         raise DocumentError(f"{where} holds {_came(document)}; a table of entries is expected")

@@ -18,7 +18,7 @@ from typing import Any, ClassVar, NoReturn, ParamSpec, Self, TypeVar
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
-from bench.documents.loading import LIMITS, Limits, load_document, spelt
+from bench.documents.loading import LIMITS, DocumentLimits, load_document, spelt
 from bench.errors import (
     BenchError,
     DocumentError,
@@ -88,7 +88,7 @@ class Document(Entry):
     """Address or path of the JSON Schema, for editors; not looked at."""
 
     @classmethod
-    def read(cls, path: str | Path, *, limits: Limits = LIMITS) -> Self:
+    def read(cls, path: str | Path, *, limits: DocumentLimits = LIMITS) -> Self:
         """Read a file.
 
         Raises:

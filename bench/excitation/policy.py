@@ -176,8 +176,12 @@ class Policy:
         Raises:
             FileFormatError: The file is no policy, or of another format.
         """
-        from bench.documents import Limits as DocumentLimits  # noqa: PLC0415  (pydantic, for those who read documents)
-        from bench.documents import checked, naming, parse_json  # noqa: PLC0415
+        from bench.documents import (  # noqa: PLC0415
+            DocumentLimits,
+            checked,
+            naming,
+            parse_json,
+        )
         from bench.excitation.schema import PolicyHeader  # noqa: PLC0415
 
         try:

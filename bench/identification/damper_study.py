@@ -159,7 +159,7 @@ class TableRow(NamedTuple):
         return (self.mean - self.printed_mean) / self.printed_std
 
 
-class Campaign(NamedTuple):
+class HarmonicCampaign(NamedTuple):
     """The harmonic campaign.
 
     Attributes:
@@ -350,7 +350,7 @@ def _draw_test(rng: np.random.Generator) -> tuple[float, float, float, float]:
     return coefficient, exponent, math.exp(rng.uniform(math.log(lowest), math.log(highest))), amplitude
 
 
-def harmonic_campaign(rng: np.random.Generator, *, n_tests: int = 202) -> Campaign:
+def harmonic_campaign(rng: np.random.Generator, *, n_tests: int = 202) -> HarmonicCampaign:
     """Run the harmonic campaign and identify the design model from every test, off line and on line.
 
     Args:
@@ -405,7 +405,7 @@ def harmonic_campaign(rng: np.random.Generator, *, n_tests: int = 202) -> Campai
         )
         for key, values in columns.items()
     )
-    return Campaign(
+    return HarmonicCampaign(
         tuple(tests),
         table,
         float(np.median([test.settled for test in tests])),

@@ -66,7 +66,7 @@ class NormalEquations(NamedTuple):
 
 
 class LeastSquaresProblem(Protocol):
-    """What `minimise` needs to know of residuals ``r(w)``."""
+    """What `minimise_regularised` needs to know of residuals ``r(w)``."""
 
     @property
     def n_residuals(self) -> int:
@@ -89,7 +89,7 @@ class LeastSquaresProblem(Protocol):
 
 
 @dataclass(frozen=True)
-class Minimum:
+class RegularisedMinimum:
     """Where a minimisation ended.
 
     Attributes:
@@ -112,7 +112,7 @@ class Minimum:
     stopped: str
 
 
-def minimise(
+def minimise_regularised(
     problem: LeastSquaresProblem,
     start: NDArray[np.float64],
     *,
@@ -122,7 +122,7 @@ def minimise(
     decay: float = 1e-6,
     deadline: float = math.inf,
     on_iteration: Callable[[int, float], None] | None = None,
-) -> Minimum:
+) -> RegularisedMinimum:
     """Minimise a sum of squares from one start.
 
     Args:
@@ -179,7 +179,7 @@ def minimise(
             break
     prior.settles(weights, model)
     beta = prior.residual_precision(model)
-    return Minimum(
+    return RegularisedMinimum(
         weights, model.sum_of_squares, prior.ratio * beta, beta, prior.effective, iteration, stopped
     )
 
@@ -283,7 +283,7 @@ def _evidence(
 
 
 class HiddenLayerProblem:
-    """Residuals of a network on normalised data, as `minimise` takes them.
+    """Residuals of a network on normalised data, as `minimise_regularised` takes them.
 
     Weights are laid out as ``A`` (n_inputs + 1, n_hidden) with the biases as last row, then ``B`` (n_outputs,
     n_hidden + 1) with the biases as last column.

@@ -30,7 +30,11 @@ from numpy.typing import ArrayLike, NDArray
 from threadpoolctl import threadpool_limits
 
 from bench.errors import FileFormatError, IdentificationError, ParameterError
-from bench.identification.levenberg_marquardt import HiddenLayerProblem, Minimum, minimise
+from bench.identification.levenberg_marquardt import (
+    HiddenLayerProblem,
+    RegularisedMinimum,
+    minimise_regularised,
+)
 from bench.identification.polynomial import (
     ValidityRange,
     centre_and_scale,
@@ -199,7 +203,7 @@ class _Training(NamedTuple):
 class _Start:
     number: int
     weights: NDArray[np.float64]
-    minimum: Minimum | None = None
+    minimum: RegularisedMinimum | None = None
     error: float = math.inf
     iterations: int = 0
 
@@ -366,7 +370,7 @@ def _train(
         remaining = clock + training.time_limit * 0.5 ** (last - stage) - time.monotonic()
         for turn, start in enumerate(starts):
             label = f"stage {stage + 1}/{last + 1}, start {start.number + 1}/{training.n_starts}"
-            start.minimum = minimise(
+            start.minimum = minimise_regularised(
                 problem,
                 start.weights,
                 max_iterations=training.max_iterations

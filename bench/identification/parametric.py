@@ -20,7 +20,7 @@ from bench.laws.base import ForceLaw
 from bench.laws.evaluate import evaluate
 
 
-class Motion(NamedTuple):
+class ComponentRecord(NamedTuple):
     """A record of a component: motion and force of its coordinates."""
 
     time: NDArray[np.float64]  # [s] (n,)
@@ -58,7 +58,9 @@ class ParametricModel:
 class _Residual:
     """Scaled force residuals of all records as a function of the free parameters."""
 
-    def __init__(self, law: ForceLaw, motions: Sequence[Motion], base: NDArray, free: NDArray) -> None:
+    def __init__(
+        self, law: ForceLaw, motions: Sequence[ComponentRecord], base: NDArray, free: NDArray
+    ) -> None:
         self.law, self.motions, self.base, self.free = law, motions, base, free
         self.weights = _weights(motions)
         self.evaluations = 0
@@ -79,7 +81,7 @@ class _Residual:
         return np.nan_to_num(np.concatenate(parts), nan=1e6, posinf=1e6, neginf=-1e6)
 
 
-def _weights(motions: Sequence[Motion]) -> list[float]:
+def _weights(motions: Sequence[ComponentRecord]) -> list[float]:
     """Weight of each record's residuals, so that every record counts alike and their squares add up to one."""
     if not motions:
         raise IdentificationError("no records came; at least one record of motion and force is expected")
@@ -91,7 +93,7 @@ def _weights(motions: Sequence[Motion]) -> list[float]:
 
 def fit_law(
     law: ForceLaw,
-    motions: Sequence[Motion],
+    motions: Sequence[ComponentRecord],
     *,
     start: dict[str, float],
     search: dict[str, tuple[float, float]] | None = None,

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.errors import IdentificationError, ParameterError, UnknownNameError
-from bench.identification.parametric import Motion
+from bench.identification.parametric import ComponentRecord
 from bench.identification.restoring_force import Body, joint_data
 from bench.recording import Recording
 
@@ -43,7 +43,7 @@ class Columns:
     body: Body = "second"
 
 
-def joint_motions(records: Sequence[Recording], columns: Columns) -> tuple[list[Motion], Columns]:
+def joint_motions(records: Sequence[Recording], columns: Columns) -> tuple[list[ComponentRecord], Columns]:
     """Motions and restoring forces of a joint, one of each record, and the channels they were taken from.
 
     Args:
@@ -122,7 +122,7 @@ def _checked(columns: Columns) -> Columns:
     return columns
 
 
-def _motion(record: Recording, columns: Columns) -> Motion:
+def _motion(record: Recording, columns: Columns) -> ComponentRecord:
     settled = record.scored
     x = np.stack([record[name] for name in columns.displacement], axis=1)
     if columns.velocity:
@@ -138,4 +138,4 @@ def _motion(record: Recording, columns: Columns) -> Motion:
             whole, displacements=columns.displacement, velocities=columns.velocity or columns.displacement,
             applied=columns.applied, accelerations=columns.acceleration, mass=mass, body=columns.body,
         ).forces  # fmt: skip
-    return Motion(record.time[settled], x[settled], v[settled], r[settled])
+    return ComponentRecord(record.time[settled], x[settled], v[settled], r[settled])

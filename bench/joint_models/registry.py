@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from bench.errors import IdentificationError, UnknownNameError
 from bench.identification.memory import fit_memory
 from bench.identification.network import fit_network
-from bench.identification.parametric import Motion, fit_law
+from bench.identification.parametric import ComponentRecord, fit_law
 from bench.identification.polynomial import ValidityRange, fit_polynomial, nmse_percent
 from bench.joint_models.scales import starts_of
 from bench.laws.base import ForceLaw
@@ -67,7 +67,7 @@ class Fitted:
     report: Mapping[str, Any] = field(default_factory=dict)
 
 
-Fit = Callable[[Sequence[Motion], Settings, np.random.Generator], Fitted]
+Fit = Callable[[Sequence[ComponentRecord], Settings, np.random.Generator], Fitted]
 
 
 @dataclass(frozen=True)
@@ -85,13 +85,13 @@ class JointKind:
     memory: bool = False
 
 
-def stacked(motions: Sequence[Motion]) -> tuple[Array, Array]:
+def stacked(motions: Sequence[ComponentRecord]) -> tuple[Array, Array]:
     """States (n, 2 k) and forces (n, k) of all records, one after the other."""
     states = [np.concatenate([m.displacement, m.velocity], axis=1) for m in motions]
     return np.concatenate(states), np.concatenate([m.force for m in motions])
 
 
-def _polynomial(motions: Sequence[Motion], settings: Settings, _: np.random.Generator) -> Fitted:
+def _polynomial(motions: Sequence[ComponentRecord], settings: Settings, _: np.random.Generator) -> Fitted:
     model = fit_polynomial(*stacked(motions), orders=settings.order)
     report = {
         "terms": model.report.n_terms,
@@ -101,7 +101,7 @@ def _polynomial(motions: Sequence[Motion], settings: Settings, _: np.random.Gene
     return Fitted(model.law, model.theta, model.range, report)
 
 
-def _network(motions: Sequence[Motion], settings: Settings, rng: np.random.Generator) -> Fitted:
+def _network(motions: Sequence[ComponentRecord], settings: Settings, rng: np.random.Generator) -> Fitted:
     model = fit_network(*stacked(motions), n_hidden=settings.hidden, n_restarts=settings.starts, rng=rng)
     report = {
         "weights": model.report.n_weights,
@@ -111,7 +111,7 @@ def _network(motions: Sequence[Motion], settings: Settings, rng: np.random.Gener
     return Fitted(model.law, model.theta, model.range, report)
 
 
-def _law(motions: Sequence[Motion], settings: Settings, rng: np.random.Generator) -> Fitted:
+def _law(motions: Sequence[ComponentRecord], settings: Settings, rng: np.random.Generator) -> Fitted:
     k = motions[0].force.shape[1]
     suited = [name for name, law in LAWS.items() if law.n_coordinates == k and not law.n_inputs]
     if not settings.laws:
@@ -131,7 +131,7 @@ def _law(motions: Sequence[Motion], settings: Settings, rng: np.random.Generator
     return best[1]
 
 
-def _memory(motions: Sequence[Motion], _: Settings, __: np.random.Generator) -> Fitted:
+def _memory(motions: Sequence[ComponentRecord], _: Settings, __: np.random.Generator) -> Fitted:
     time = np.concatenate([m.time - m.time[0] for m in motions])
     model = fit_memory(*stacked(motions), time=time)
     return Fitted(model.law, model.theta, model.range, asdict(model.report))
@@ -152,7 +152,7 @@ KINDS: Mapping[str, JointKind] = MappingProxyType(
 """Every kind by its name."""
 
 
-def identify(kind: str, motions: Sequence[Motion], settings: Settings | None = None) -> Fitted:
+def identify(kind: str, motions: Sequence[ComponentRecord], settings: Settings | None = None) -> Fitted:
     """Identify a joint.
 
     Args:
@@ -173,7 +173,7 @@ def identify(kind: str, motions: Sequence[Motion], settings: Settings | None = N
 
 
 def scores(
-    fitted: Fitted, motions: Sequence[Motion], where: Sequence[NDArray[np.bool_]] | None = None
+    fitted: Fitted, motions: Sequence[ComponentRecord], where: Sequence[NDArray[np.bool_]] | None = None
 ) -> tuple[float, ...]:
     """NMSE of the forces of a joint along records, each coordinate [%].
 
@@ -188,7 +188,7 @@ def scores(
     return nmse_percent(true, np.concatenate([f[mask] for f, mask in zip(predicted, chosen, strict=True)]))
 
 
-def held_out(kind: str, motions: Sequence[Motion], settings: Settings) -> list[NDArray[np.bool_]]:
+def held_out(kind: str, motions: Sequence[ComponentRecord], settings: Settings) -> list[NDArray[np.bool_]]:
     """Samples of every record that are left for judging: the end of each of five stretches, or of the whole with a memory.
 
     Stretches, since a sweep ends at frequencies that its beginning never had; with a memory a record is not cut, since its state would
@@ -203,8 +203,9 @@ def held_out(kind: str, motions: Sequence[Motion], settings: Settings) -> list[N
     return masks
 
 
-def without(motions: Sequence[Motion], masks: Sequence[NDArray[np.bool_]]) -> list[Motion]:
+def without(motions: Sequence[ComponentRecord], masks: Sequence[NDArray[np.bool_]]) -> list[ComponentRecord]:
     """Records without the samples of the masks."""
     return [
-        Motion(*(column[~mask] for column in motion)) for motion, mask in zip(motions, masks, strict=True)
+        ComponentRecord(*(column[~mask] for column in motion))
+        for motion, mask in zip(motions, masks, strict=True)
     ]

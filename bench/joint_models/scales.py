@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.identification.parametric import Motion
+from bench.identification.parametric import ComponentRecord
 from bench.laws.base import ForceLaw, Parameter
 from bench.recording.units import dimensions
 
@@ -32,7 +32,7 @@ class SearchRanges:
 
 
 def starts_of(
-    law: ForceLaw, motions: Sequence[Motion], ranges: SearchRanges | None = None
+    law: ForceLaw, motions: Sequence[ComponentRecord], ranges: SearchRanges | None = None
 ) -> tuple[dict[str, float], dict[str, tuple[float, float]]]:
     """First start and ranges of the further starts of a law's parameters, for `fit_law`.
 

@@ -22,7 +22,7 @@ from typing import Literal, TypeVar, get_args
 from bench.errors import FileFormatError, UnknownNameError
 from bench.files import write_text
 from bench.limits import READING_LIMITS, ReadingLimits, regular_file, size_text
-from bench.nastran.cards import Card, Field, Place, RawCard
+from bench.nastran.cards import Card, DeckPlace, Field, RawCard
 from bench.nastran.interpretation import interpret
 from bench.nastran.numbers import integer_text, real_text
 
@@ -79,7 +79,7 @@ def parse_deck(text: str, *, source: str = "deck") -> Deck:
     return _deck(_Reader(None, READING_LIMITS).numbered(text, source, ()))
 
 
-def _deck(lines: Iterable[tuple[Place, str]]) -> Deck:
+def _deck(lines: Iterable[tuple[DeckPlace, str]]) -> Deck:
     return Deck(tuple(interpret(raw) for raw in raw_cards(lines)))
 
 
@@ -90,7 +90,7 @@ class _Reader:
         self.home, self.limits = home, limits
         self.files, self.bytes = 0, 0
 
-    def lines(self, path: Path, chain: tuple[Path, ...]) -> Iterator[tuple[Place, str]]:
+    def lines(self, path: Path, chain: tuple[Path, ...]) -> Iterator[tuple[DeckPlace, str]]:
         """Lines of a file; `chain` are the files that led to it."""
         try:
             content = regular_file(path, self.limits.model_bytes).read_bytes()
@@ -104,13 +104,13 @@ class _Reader:
             )
         return self.numbered(content.decode("utf-8", errors="replace"), path.name, (*chain, path.resolve()))
 
-    def numbered(self, text: str, source: str, chain: tuple[Path, ...]) -> Iterator[tuple[Place, str]]:
+    def numbered(self, text: str, source: str, chain: tuple[Path, ...]) -> Iterator[tuple[DeckPlace, str]]:
         """Lines of a text without comments, each with its place; includes followed."""
         lines = text.splitlines()
         upper = [" ".join(line.split("$")[0].upper().split()) for line in lines]
         start = upper.index("BEGIN BULK") + 1 if "BEGIN BULK" in upper else 0
         for number in range(start, len(lines)):
-            place = Place(source, number + 1)
+            place = DeckPlace(source, number + 1)
             line = lines[number].split("$")[0].expandtabs(8).rstrip()
             if upper[number].startswith("ENDDATA"):
                 return
@@ -121,7 +121,7 @@ class _Reader:
             name = line.strip()[len("INCLUDE") :].strip().strip(_QUOTES)
             yield from self.lines(self._included(name, place, chain), chain)
 
-    def _included(self, name: str, place: Place, chain: tuple[Path, ...]) -> Path:
+    def _included(self, name: str, place: DeckPlace, chain: tuple[Path, ...]) -> Path:
         """Path of an included file.
 
         Raises:
@@ -147,7 +147,7 @@ class _Reader:
         return path
 
 
-def raw_cards(lines: Iterable[tuple[Place, str]]) -> Iterator[RawCard]:
+def raw_cards(lines: Iterable[tuple[DeckPlace, str]]) -> Iterator[RawCard]:
     """Join continuation lines and split cards into fields.
 
     Args:
@@ -156,9 +156,9 @@ def raw_cards(lines: Iterable[tuple[Place, str]]) -> Iterator[RawCard]:
     Raises:
         FileFormatError: A continuation without a card, or under another name than its card's field 10.
     """
-    card: tuple[str, Place] | None = None
+    card: tuple[str, DeckPlace] | None = None
     fields: list[str] = []
-    places: list[Place] = []
+    places: list[DeckPlace] = []
     tag = ""
     for place, line in lines:
         first, data, next_tag = _split(line, place)
@@ -186,7 +186,7 @@ def raw_cards(lines: Iterable[tuple[Place, str]]) -> Iterator[RawCard]:
         yield RawCard(card[0], tuple(fields), tuple(places), card[1])
 
 
-def _split(line: str, place: Place) -> tuple[str, list[str], str]:
+def _split(line: str, place: DeckPlace) -> tuple[str, list[str], str]:
     """First field, data fields (4 or 8) and last field of a line."""
     if "," in line:
         items = [item.strip() for item in line.split(",")]

@@ -23,7 +23,7 @@ Field = int | float | str | None
 T = TypeVar("T")
 
 
-class Place(NamedTuple):
+class DeckPlace(NamedTuple):
     """Where a piece of a deck stands."""
 
     source: str
@@ -39,9 +39,9 @@ class RawCard(NamedTuple):
     name: str
     fields: tuple[str, ...]
     """Data fields in order, 8 to a line of small fields; blank ones are empty."""
-    places: tuple[Place, ...]
+    places: tuple[DeckPlace, ...]
     """Where each field stands."""
-    place: Place
+    place: DeckPlace
 
     def integer(self, i: int, what: str, default: int | None = None) -> int:
         """Data field i (from 0) as an integer; `default` where it is blank."""

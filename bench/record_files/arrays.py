@@ -107,8 +107,7 @@ def read_mat(path: Path, *, limits: ReadingLimits = READING_LIMITS) -> dict[str,
         raise
     except NotImplementedError:  # scipy raises it for version 7.3 and for nothing else
         raise FileFormatError(
-            f"'{path}' is a MATLAB file of version 7.3, which is HDF5: save it with '-v7', or give a copy the suffix .h5 and "
-            "name the lines of its arrays transposed ('data[2, :]' for MATLAB's data(:, 3))"
+            f"'{path}' is a MATLAB file of version 7.3, HDF5 within, which arrays are not read from here: save it again with '-v7'"
         ) from None
     # scipy's reader is compiled and raises whatever its state leads to (UnboundLocalError, MemoryError, struct.error, …)
     except Exception as error:

@@ -21,8 +21,8 @@ from bench.identification.damper import (
     fit_design_model_online,
 )
 from bench.identification.damper_study import (
-    Campaign,
     DamperRecord,
+    HarmonicCampaign,
     harmonic_campaign,
     harmonic_record,
 )
@@ -54,7 +54,7 @@ class DamperDesignSetup:
 SETUP = DamperDesignSetup()
 
 
-def _table_rows(campaign: Campaign) -> list[Row]:
+def _table_rows(campaign: HarmonicCampaign) -> list[Row]:
     rows = []
     for entry in campaign.table:
         unit = "kN (s/m)^n" if entry.parameter == "C" else "1"
@@ -100,7 +100,7 @@ def _table_rows(campaign: Campaign) -> list[Row]:
     return rows
 
 
-def _nearly_the_same(campaign: Campaign) -> Row:
+def _nearly_the_same(campaign: HarmonicCampaign) -> Row:
     """Whether on-line and off-line means are nearly the same, as the text says of its own."""
     by = {(entry.method, entry.parameter): entry for entry in campaign.table}
     online, fitted = by["on line", "C"], by["least squares", "C"]
@@ -117,7 +117,7 @@ def _nearly_the_same(campaign: Campaign) -> Row:
     )
 
 
-def histograms(campaign: Campaign) -> Figure:
+def histograms(campaign: HarmonicCampaign) -> Figure:
     """Densities of C and n over the tests, with the normal densities of ours and of the printed statistics (Fig 3.4)."""
     samples = {
         ("on line", "C"): [1e-3 * test.online_coefficient for test in campaign.tests],
@@ -165,7 +165,7 @@ def _slow_test(rng: np.random.Generator) -> _SlowTest:
     )
 
 
-def _rows(campaign: Campaign, slow: _SlowTest) -> tuple[Row, ...]:
+def _rows(campaign: HarmonicCampaign, slow: _SlowTest) -> tuple[Row, ...]:
     late = slow.online.time > 4.0  # the first period
     c, n = slow.online.coefficients[late], slow.online.exponents[late]
     near = [
@@ -245,7 +245,7 @@ def _rows(campaign: Campaign, slow: _SlowTest) -> tuple[Row, ...]:
     )
 
 
-def _pictures(campaign: Campaign, slow: _SlowTest) -> tuple[Picture, ...]:
+def _pictures(campaign: HarmonicCampaign, slow: _SlowTest) -> tuple[Picture, ...]:
     online, offline = slow.online, slow.offline
     forces = {"design model": design_force(slow.record.velocity, online.coefficient, online.exponent)}
     drawn = {

@@ -29,7 +29,7 @@ from bench.reproduction.verdict import (
 )
 
 
-class Motion(NamedTuple):
+class RandomMotion(NamedTuple):
     """A kind of random motion: band [Hz] and peak [m]."""
 
     name: str
@@ -43,9 +43,9 @@ class Motion(NamedTuple):
         return math.sqrt((low**2 + low * high + high**2) / 3.0)
 
 
-NARROW = Motion("0.2 to 0.3 Hz, ±25.4 mm", (0.2, 0.3), INCH)
-POLYNOMIAL = Motion("0.1 to 1 Hz, ±25.4 mm", (0.1, 1.0), INCH)
-WIDE = Motion("0.1 to 3 Hz, ±12.7 mm", (0.1, 3.0), 0.5 * INCH)
+NARROW = RandomMotion("0.2 to 0.3 Hz, ±25.4 mm", (0.2, 0.3), INCH)
+POLYNOMIAL = RandomMotion("0.1 to 1 Hz, ±25.4 mm", (0.1, 1.0), INCH)
+WIDE = RandomMotion("0.1 to 3 Hz, ±12.7 mm", (0.1, 3.0), 0.5 * INCH)
 
 
 class Tracked(NamedTuple):
@@ -70,7 +70,7 @@ class Tracked(NamedTuple):
     offline: tuple[float, float]
 
 
-def track(motion: Motion, seed: int) -> Tracked:
+def track(motion: RandomMotion, seed: int) -> Tracked:
     """Run the design model on line along one record of a kind of motion."""
     record = random_record(np.random.default_rng(seed), peak=motion.peak, band=motion.band)
     online = fit_design_model_online(record.time, record.velocity, record.force, frequency=motion.frequency)

@@ -78,7 +78,7 @@ class Buildable(Protocol):
         ...
 
 
-class Placed(NamedTuple):
+class PlacedElement(NamedTuple):
     """An element in a compiled model."""
 
     element: Element
@@ -91,7 +91,7 @@ class Built(NamedTuple):
     """A compiled rig."""
 
     model: mujoco.MjModel
-    placed: tuple[Placed, ...]
+    placed: tuple[PlacedElement, ...]
     actuators: tuple[str, ...]  # the rig's own, without those that carry hidden states
 
 
@@ -223,7 +223,7 @@ def _build(rig: Buildable, drawings: bool) -> Built:
         if not element.exact:
             act = native.claim_states(model, element.name) if element.law.states else -1
             theta = native.write_row(model, element.name, element.law, coordinates, element.theta, act)
-        placed.append(Placed(element, coordinates, act, theta))
+        placed.append(PlacedElement(element, coordinates, act, theta))
     for kind, name, value in rig.structure:
         _set_structure(model, kind, name, value)
     if rig.structure:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import mujoco
 
 from bench.recording import Channel
-from bench.rig.building import Built, Placed
+from bench.rig.building import Built, PlacedElement
 
 _VECTOR_UNITS = {
     mujoco.mjtSensor.mjSENS_ACCELEROMETER: ("acceleration", "m/s^2"),
@@ -106,7 +106,7 @@ def channels_of(built: Built) -> list[Channel]:
     return channels
 
 
-def _element_channels(model: mujoco.MjModel, item: Placed) -> list[Channel]:
+def _element_channels(model: mujoco.MjModel, item: PlacedElement) -> list[Channel]:
     element = item.element
     moving = [coordinate for coordinate in item.coordinates if not coordinate.is_input]
     suffixes = [""] if len(moving) == 1 else [f"_{i + 1}" for i in range(len(moving))]

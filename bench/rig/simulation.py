@@ -17,7 +17,7 @@ from bench.errors import ModelError, ParameterError, RangeWarning, SimulationErr
 from bench.laws.along import force_along
 from bench.provenance import provenance
 from bench.recording import Recording
-from bench.rig.building import Placed
+from bench.rig.building import PlacedElement
 from bench.rig.description import Rig
 from bench.rig.element import Element
 from bench.signals import Excitation
@@ -316,7 +316,7 @@ def _check_finite(rig: Rig, states: NDArray, controls: NDArray) -> None:
 
 
 def _along(
-    item: Placed, states: NDArray, controls: NDArray, model: mujoco.MjModel
+    item: PlacedElement, states: NDArray, controls: NDArray, model: mujoco.MjModel
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
     """Displacement, velocity, force ``(n, n_coordinates)`` and hidden states ``(n, n_states)`` of an element."""
     nq, nv = model.nq, model.nv

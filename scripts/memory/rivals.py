@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.identification.memory import runs
-from bench.identification.parametric import Motion, fit_law
+from bench.identification.parametric import ComponentRecord, fit_law
 from bench.laws.bouc_wen_variants import GENERALISED_BOUC_WEN
 from bench.rig import Element
 
@@ -31,7 +31,7 @@ def bouc_wen(states: Array, forces: Array, time: Array, joints: tuple[str, ...])
             part = slice(a, b, 3)
             if np.ptp(states[a:b, i]) > 0.0:
                 columns = (states[part, i, None], states[part, k + i, None], forces[part, i, None])
-                motions.append(Motion(time[part], *columns))
+                motions.append(ComponentRecord(time[part], *columns))
         q, v, f = (np.concatenate([m[j] for m in motions]).ravel() for j in (1, 2, 3))
         stiffness, damping = np.linalg.lstsq(np.stack([q, v], 1), f, rcond=None)[0]
         span = float(np.max(np.abs(q)))

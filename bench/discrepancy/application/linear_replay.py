@@ -17,8 +17,9 @@ from bench.discrepancy.application.running import Window, controls, hook_of, run
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.effects.catalogue import CATALOGUE
 from bench.discrepancy.judgement.validation_discrepancy import DIVERGED_GAP, coordinates
-from bench.discrepancy.likelihood.window_whitening import cut, drifts, in_motion
 from bench.discrepancy.model.structure import Structure
+from bench.discrepancy.response.initial_states import in_motion
+from bench.discrepancy.response.windows import cut, drifts
 from bench.discrepancy.verdict import NamedEffect
 
 Array = NDArray[np.float64]

@@ -19,21 +19,13 @@ from numpy.typing import NDArray
 from bench import native
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.case.unit_conversion import converted
+from bench.discrepancy.checks.bands import bands_between, common_factor, compare_channels, spectra
 from bench.discrepancy.checks.like_mujoco import ITEMS
-from bench.discrepancy.checks.scales import (
-    bands_between,
-    common_factor,
-    compare_channels,
-    grossly_apart,
-    model_words,
-    pair_words,
-    shown_noise,
-    spectra,
-    suggestion,
-)
+from bench.discrepancy.checks.load_limits import clipped_case
+from bench.discrepancy.checks.nominal_values import value_notes
+from bench.discrepancy.checks.scales import grossly_apart, model_words, pair_words, shown_noise, suggestion
 from bench.discrepancy.model.mjcf_file import rig_of
 from bench.discrepancy.model.mjcf_units import expected_units
-from bench.discrepancy.model.mjcf_values import value_notes
 from bench.discrepancy.multibody.channels import bound
 from bench.discrepancy.multibody.model import ArticulatedModel, Joint, with_nominal_values
 from bench.discrepancy.multibody.records import Motion, encoders_of, input_of, motion_of
@@ -147,29 +139,9 @@ def _within_ranges(case: Case, model: ArticulatedModel) -> tuple[Case, tuple[str
     for joint in model.joints:
         channel = input_of(case, joint)
         if joint.drive is not None and channel.role != "measured":
-            ranges[channel.name] = (joint.drive.lowest, joint.drive.highest, joint.drive.name)
-    said: list[str] = []
-
-    def clipped(record: CaseRecord) -> CaseRecord:
-        values = dict(record.values)
-        for name, (low, high, actuator) in ranges.items():
-            samples = record.values[name]
-            if samples.min() >= low and samples.max() <= high:
-                continue
-            values[name] = np.clip(samples, low, high)
-            values[name].setflags(write=False)
-            said.append(
-                f"'{name}' runs from {samples.min():.4g} to {samples.max():.4g} in '{record.name}'; the ctrlrange of actuator "
-                f"'{actuator}' clips it to {low:.4g} … {high:.4g}, and so does the nominal model here"
-            )
-        return replace(record, values=values)
-
-    out = replace(
-        case,
-        identification=tuple(clipped(record) for record in case.identification),
-        validation=tuple(clipped(record) for record in case.validation),
-    )
-    return (out, tuple(said)) if said else (case, ())
+            low, high = joint.drive.lowest, joint.drive.highest
+            ranges[channel.name] = (low, high, f"ctrlrange of actuator '{joint.drive.name}'")
+    return clipped_case(case, ranges)
 
 
 def _suspicions(

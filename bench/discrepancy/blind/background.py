@@ -17,14 +17,12 @@ from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
 from bench.discrepancy.truth.background_settings import STATED, BackgroundSettings
-from bench.discrepancy.truth.ground_truth import Placed
-from bench.discrepancy.truth.out_of_catalogue import (
-    HIDDEN_RESONATOR,
-    MODULATED_STIFFNESS,
-    POSITION_DEPENDENT_FRICTION,
-)
+from bench.discrepancy.truth.foreign_memory import HIDDEN_RESONATOR
+from bench.discrepancy.truth.foreign_shapes import modulated, resonator, wavy
+from bench.discrepancy.truth.ground_truth import WithheldEffect
+from bench.discrepancy.truth.out_of_catalogue import MODULATED_STIFFNESS, POSITION_DEPENDENT_FRICTION
+from bench.discrepancy.truth.recipe import Recipe, Shape, between
 from bench.discrepancy.truth.rigs import Bench, reach_of
-from bench.discrepancy.truth.withheld_effects import Drawn, Reach, Recipe, Shape
 
 Array = NDArray[np.float64]
 Records = Sequence[dict[str, Array]]
@@ -42,7 +40,7 @@ class Background:
         settings: What it was drawn from.
     """
 
-    acting: tuple[Placed, ...] = ()
+    acting: tuple[WithheldEffect, ...] = ()
     recorded: Mapping[str, float] = field(default_factory=dict)
     share: float = 0.0
     stated: str = "true"
@@ -110,51 +108,19 @@ def _coloured(n: int, rng: np.random.Generator) -> Array:
     return np.asarray(samples / np.std(samples), dtype=np.float64)
 
 
-def _between(rng: np.random.Generator, low: float, high: float) -> float:
-    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
-
-
-def _resonator(rng: np.random.Generator, r: Reach) -> Shape:
-    omega, damping = _between(rng, 1.5, 6.0) * r.omega, _between(rng, 0.02, 0.1)
-
-    def shape(a: float) -> Drawn:
-        stiffness = a * r.stiffness
-        mass = stiffness / omega**2
-        values = {"stiffness": stiffness, "mass": mass, "damping": 2.0 * damping * mass * omega}
-        return Drawn(values, tuple(values.values()))
-
-    return shape
-
-
-def _along_the_stroke(rng: np.random.Generator, r: Reach) -> Shape:
-    depth, width = rng.uniform(0.7, 1.0), rng.uniform(0.1, 0.4) * r.position
-    phase = rng.uniform(0.0, 2.0 * np.pi)
-
-    def shape(a: float) -> Drawn:
-        values = {"friction_force": a * r.force, "depth": depth, "width": width, "phase": phase}
-        return Drawn(values, (*values.values(), 0.02 * r.velocity))
-
-    return shape
-
-
-def _slow(rng: np.random.Generator, r: Reach) -> Shape:
-    frequency, phase = rng.uniform(0.3, 1.0) / r.duration, rng.uniform(0.0, 2.0 * np.pi)
-
-    def shape(a: float) -> Drawn:
-        values = {"stiffness": a * r.stiffness, "frequency": frequency, "phase": phase}
-        return Drawn(values, tuple(values.values()))
-
-    return shape
-
-
 ACTING = (
-    Recipe("hidden_resonator", "joint", _resonator, law=HIDDEN_RESONATOR),
-    Recipe("stroke_friction", "joint", _along_the_stroke, law=POSITION_DEPENDENT_FRICTION),
-    Recipe("slow_stiffness", "joint", _slow, law=MODULATED_STIFFNESS),
+    Recipe("hidden_resonator", "joint", resonator((1.5, 6.0), (0.02, 0.1)), law=HIDDEN_RESONATOR),
+    Recipe("stroke_friction", "joint", wavy(0.7), law=POSITION_DEPENDENT_FRICTION),
+    Recipe(
+        "slow_stiffness",
+        "joint",
+        modulated(lambda rng, r: rng.uniform(0.3, 1.0) / r.duration),
+        law=MODULATED_STIFFNESS,
+    ),
 )
 RECORDED = ("hum", "coloured_noise", "jitter")
 PLACES = {"sdof": ("",), "damper": ("",), "joint": ("axial", "torsional")}
-GapOf = Callable[[Sequence[Placed]], float]
+GapOf = Callable[[Sequence[WithheldEffect]], float]
 
 
 def draw_background(
@@ -172,13 +138,13 @@ def draw_background(
     if rng.random() < settings.bare:
         return Background(stated="no", settings=settings)
     stated = str(rng.choice(STATED, p=settings.noise))
-    share = _between(rng, *settings.share)
+    share = between(rng, *settings.share)
     count = int(rng.integers(settings.pieces[0], settings.pieces[1] + 1))
     chosen = rng.permutation([*(recipe.name for recipe in ACTING), *RECORDED])[:count]
     sizes = rng.uniform(0.5, 1.0, count)
     parts = dict(zip(chosen, share * bench.plan.gap * sizes / np.linalg.norm(sizes), strict=True))
 
-    def gap(acting: Sequence[Placed]) -> float:
+    def gap(acting: Sequence[WithheldEffect]) -> float:
         return max(bench.gaps(bench.responses(acting, quick=True, judging=False), bare))
 
     acting = []
@@ -196,10 +162,12 @@ def draw_background(
     return Background(tuple(acting), recorded, share, stated, settings)
 
 
-def _sized(recipe: Recipe, where: str, shape: Shape, gap: GapOf, wanted: float, bisections: int) -> Placed:
+def _sized(
+    recipe: Recipe, where: str, shape: Shape, gap: GapOf, wanted: float, bisections: int
+) -> WithheldEffect:
     low, high = -9.0, 2.0
     for _ in range(bisections):
         middle = 0.5 * (low + high)
-        smaller = gap([Placed(recipe, where, shape(math.exp(middle)))]) < wanted
+        smaller = gap([WithheldEffect(recipe, where, shape(math.exp(middle)))]) < wanted
         low, high = (middle, high) if smaller else (low, middle)
-    return Placed(recipe, where, shape(math.exp(0.5 * (low + high))))
+    return WithheldEffect(recipe, where, shape(math.exp(0.5 * (low + high))))

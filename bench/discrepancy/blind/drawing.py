@@ -26,10 +26,11 @@ from bench.discrepancy.blind.handed_over import (
     measured,
 )
 from bench.discrepancy.case.case import Case
-from bench.discrepancy.truth.ground_truth import ROWS, Placed
+from bench.discrepancy.truth.ground_truth import ROWS, WithheldEffect
 from bench.discrepancy.truth.moreau_time_stepping import TrueMotion
-from bench.discrepancy.truth.rigs import Bench, BlindOptions, Plan, draw_bench, reach_of
-from bench.discrepancy.truth.withheld_effects import RECIPES, Drawn, Recipe, Shape
+from bench.discrepancy.truth.recipe import Drawn, Recipe, Shape
+from bench.discrepancy.truth.rigs import Bench, BlindOptions, CasePlan, draw_bench, reach_of
+from bench.discrepancy.truth.withheld_effects import RECIPES
 from bench.errors import ParameterError, SimulationError
 
 Array = NDArray[np.float64]
@@ -93,7 +94,7 @@ def draw_case(name: str, rng: np.random.Generator, options: BlindOptions) -> tup
     )
 
 
-def draw_plan(rng: np.random.Generator, options: BlindOptions) -> Plan:
+def draw_plan(rng: np.random.Generator, options: BlindOptions) -> CasePlan:
     """Draw the kind of a case, its rig, effects, sensors, gap and noise.
 
     Raises:
@@ -127,7 +128,7 @@ def draw_plan(rng: np.random.Generator, options: BlindOptions) -> Plan:
         if not _apart(recipes, places):
             continue
         commanded = any(r.site == "actuator" for r in recipes) or (rig == "sdof" and rng.random() < 0.1)
-        return Plan(
+        return CasePlan(
             kind, rig, recipes, places, "" if rig == "damper" else str(rng.choice(sets)), commanded,
             float(np.exp(rng.uniform(*np.log(options.gap)))), float(np.exp(rng.uniform(*np.log(options.noise)))),
         )  # fmt: skip
@@ -150,7 +151,7 @@ def _apart(recipes: Sequence[Recipe], places: Sequence[str]) -> bool:
 
 
 def _attempt(
-    name: str, plan: Plan, rng: np.random.Generator, options: BlindOptions
+    name: str, plan: CasePlan, rng: np.random.Generator, options: BlindOptions
 ) -> tuple[Case, dict[str, Any]] | None:
     bench = draw_bench(plan, rng, options)
     bare = bench.responses((), quick=True)
@@ -186,7 +187,7 @@ def _attempt(
     return case, answer | (background.answer() if background is not None else {})
 
 
-def _stated(rig: str, placed: Placed) -> bool:
+def _stated(rig: str, placed: WithheldEffect) -> bool:
     """Whether an effect is an error of a nominal parameter that its stated uncertainty already allows for."""
     if placed.recipe.site != "inertia":
         return False
@@ -212,17 +213,17 @@ def _acts(bench: Bench, real: Sequence[Mapping[str, Array]], bare: Sequence[Mapp
 
 def _strengths(
     bench: Bench, shapes: Sequence[Shape], bare: list[dict[str, Array]], rng: np.random.Generator
-) -> list[Placed] | None:
+) -> list[WithheldEffect] | None:
     """Effects at the strength that gives the wanted gap; None where they cannot reach it."""
     plan = bench.plan
 
-    def placed(drawn: Sequence[Drawn]) -> list[Placed]:
-        return [Placed(r, w, d) for r, w, d in zip(plan.recipes, plan.places, drawn, strict=True)]
+    def placed(drawn: Sequence[Drawn]) -> list[WithheldEffect]:
+        return [WithheldEffect(r, w, d) for r, w, d in zip(plan.recipes, plan.places, drawn, strict=True)]
 
-    def gap(effects: Sequence[Placed]) -> float:
+    def gap(effects: Sequence[WithheldEffect]) -> float:
         return max(bench.gaps(bench.responses(effects, quick=True, judging=False), bare))
 
-    def search(make: Callable[[float], Sequence[Placed]], wanted: float) -> float:
+    def search(make: Callable[[float], Sequence[WithheldEffect]], wanted: float) -> float:
         low, high = -7.0, 3.0
         for _ in range(DRAWING_SETTINGS.bisections):
             middle = 0.5 * (low + high)
@@ -251,7 +252,7 @@ def _strengths(
 
 def _answer(
     bench: Bench,
-    effects: Sequence[Placed],
+    effects: Sequence[WithheldEffect],
     runs: Sequence[tuple[Mapping[str, Array], TrueMotion]],
     gaps: tuple[list[float], list[float]],
     options: BlindOptions,

@@ -9,10 +9,10 @@ from pydantic import ConfigDict, Field, Strict, model_validator
 from bench.documents import (
     AS_NUMBER,
     Document,
+    DocumentLimits,
     Entry,
     Flag,
     Label,
-    Limits,
     Listed,
     Name,
     Pair,
@@ -24,7 +24,7 @@ from bench.documents import (
 AnyNumber = Annotated[float, Strict(), AS_NUMBER]
 """A number that may be infinite: log odds may."""
 Numbers = Annotated[Listed[AnyNumber], Field(min_length=1)]
-ANSWER_LIMITS = Limits(finite=False)
+ANSWER_LIMITS = DocumentLimits(finite=False)
 
 
 class ProtocolDocument(Document):

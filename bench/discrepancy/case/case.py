@@ -14,7 +14,7 @@ first two, what is not stated is looked for in the records (`search.load_interpo
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -25,9 +25,6 @@ from bench.errors import RecordingError, UnknownNameError
 from bench.record_files.reading import Noted, on_one_clock
 from bench.recording.outliers import bridged, outliers
 
-NO_LOAD = "no load"
-"""Channel of a load that is zero throughout, of a model of the user's own that nothing drives."""
-
 
 @dataclass(frozen=True)
 class CaseSettings:
@@ -35,6 +32,8 @@ class CaseSettings:
 
     min_samples: int = 200
     """Shortest record that is accepted; below it no spectrum, and so no statement about noise, is possible."""
+    largest: float = 1e100
+    """Largest value of a sample: its square over a power of the step is still a number."""
 
 
 SETTINGS = CaseSettings()
@@ -202,6 +201,7 @@ def record_from_arrays(
         raise RecordingError(
             f"record '{name}' has {clock.size} samples; at least {SETTINGS.min_samples} are needed: give a longer record"
         )
+    _refuse_damaged(name, values)
     try:
         noted = on_one_clock(clock, {channel: np.asarray(v, dtype=float) for channel, v in values.items()})
     except RecordingError as error:
@@ -232,6 +232,17 @@ def record_from_arrays(
     )
 
 
+def _refuse_damaged(name: str, values: Mapping[str, ArrayLike]) -> None:
+    for channel, samples in values.items():
+        size = np.abs(np.asarray(samples, dtype=float))
+        size[~np.isfinite(size)] = 0.0  # missing samples, which the clock deals with
+        if size.max(initial=0.0) > SETTINGS.largest:
+            raise RecordingError(
+                f"record '{name}': '{channel}' holds {size.max():.3g} at sample {int(np.argmax(size))}, which no sensor reads: the file is "
+                "damaged, or its columns are not those that nominal.json names"
+            )
+
+
 def _missing(clock: NDArray[np.float64], values: Mapping[str, ArrayLike], noted: Noted) -> list[int]:
     """Samples of the uniform clock that no sample of the record stands at, or one with a value that is not finite."""
     finite = np.all([np.isfinite(np.asarray(v, dtype=float)) for v in values.values()], axis=0)
@@ -239,28 +250,3 @@ def _missing(clock: NDArray[np.float64], values: Mapping[str, ArrayLike], noted:
     there = np.zeros(len(noted.time), dtype=bool)
     there[np.clip(places, 0, len(there) - 1)] = True
     return [int(k) for k in np.flatnonzero(~there)]
-
-
-def without_load(case: Case) -> Case:
-    """A case with a load that is zero throughout, where it has none and starts in motion: a free decay."""
-    own = {"sdof": "force"}.get(case.rig, NO_LOAD)
-    driven = any(
-        c.role in {"measured", "command", "prescribed"} or c.target.startswith("actuator:")
-        for c in case.channels
-    )
-    records = (*case.identification, *case.validation)
-    if driven or case.rig in {"damper", "joint"} or any(record.at_rest for record in records):
-        return case
-
-    def still(record: CaseRecord) -> CaseRecord:
-        zeros = np.zeros(len(record))
-        zeros.setflags(write=False)
-        return replace(record, values={**record.values, own: zeros})
-
-    channel = CaseChannel(own, "" if own == NO_LOAD else "N", "measured", 0.0)
-    identification, validation = (
-        tuple(map(still, group)) for group in (case.identification, case.validation)
-    )
-    return replace(
-        case, channels=(*case.channels, channel), identification=identification, validation=validation
-    )

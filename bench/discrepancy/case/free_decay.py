@@ -14,6 +14,8 @@ NO_LOAD = "no load"
 
 def is_free_decay(case: Case) -> bool:
     """Whether a case has neither a load nor a prescribed motion."""
+    if case.rig in {"damper", "joint"}:
+        return False
     loads = {"force", "torque"} if not case.rig.endswith(".xml") else set()
     return not any(
         c.role != "response" or c.target.startswith("actuator:") or c.name in loads for c in case.channels

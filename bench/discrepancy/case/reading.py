@@ -20,9 +20,9 @@ from bench.discrepancy.case.case import (
     CaseRecord,
     NominalParameter,
     record_from_arrays,
-    without_load,
 )
 from bench.discrepancy.case.elements import declared_parameters
+from bench.discrepancy.case.free_decay import is_free_decay, with_no_load
 from bench.discrepancy.case.schema import NominalDocument
 from bench.errors import BenchError, FileFormatError, RecordingError, UnitError, UnknownNameError
 from bench.record_files.column_map import ColumnMap
@@ -82,14 +82,7 @@ def read_case(folder: str | Path) -> Case:
     )
     declared = declared_parameters(nominal.elements, path)
     parameters += tuple(NominalParameter(name, *entry) for name, entry in declared.items())
-    channels = tuple(
-        CaseChannel(
-            name, entry.unit, nominal.role_of(name), entry.noise_std, entry.filter(), entry.target, entry.quantity or "",
-            entry.side or "", entry.resolution,
-        )
-        for name, entry in nominal.channels.items()
-        if name != "time"
-    )  # fmt: skip
+    channels = _channels_of(nominal)
     time = nominal.channels.get("time")
     known = _Channels(channels, time.unit if time is not None else "", nominal.sample_rate_hz or 0.0)
     moving = nominal.starts_in_motion
@@ -116,7 +109,19 @@ def read_case(folder: str | Path) -> Case:
         folder.name, nominal.rig, parameters, channels,
         records["identification"], records["validation"], folder, nominal.options,
     )  # fmt: skip
-    return without_load(case)
+    in_motion = not any(record.at_rest for group in records.values() for record in group)
+    return with_no_load(case) if in_motion and is_free_decay(case) else case
+
+
+def _channels_of(nominal: NominalDocument) -> tuple[CaseChannel, ...]:
+    return tuple(
+        CaseChannel(
+            name, entry.unit, nominal.role_of(name), entry.noise_std, entry.filter(), entry.target, entry.quantity or "",
+            entry.side or "", entry.resolution,
+        )
+        for name, entry in nominal.channels.items()
+        if name != "time"
+    )  # fmt: skip
 
 
 def _record_files(folder: Path) -> dict[str, dict[str, Path]]:

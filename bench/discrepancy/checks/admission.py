@@ -9,17 +9,18 @@ from bench.discrepancy.case.case import Case
 from bench.discrepancy.case.free_decay import is_free_decay, with_no_load
 from bench.discrepancy.case.rig_units import in_coherent_units
 from bench.discrepancy.case.unit_conversion import converted
+from bench.discrepancy.checks.counting import counted_from_rest
 from bench.discrepancy.checks.data_quality import refuse
 from bench.discrepancy.checks.initial_motion import with_starts_found
 from bench.discrepancy.checks.like_mujoco import unlike_mujoco
+from bench.discrepancy.checks.load_limits import within_limits
+from bench.discrepancy.checks.nominal_values import value_notes
+from bench.discrepancy.checks.prescribed_loads import with_accelerations
+from bench.discrepancy.checks.reference import actuators_of, reference_of
 from bench.discrepancy.checks.scales import suspicions
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.mjcf_file import rig_of
-from bench.discrepancy.model.mjcf_loads import within_limits
-from bench.discrepancy.model.mjcf_reference import actuators_of, reference_of
-from bench.discrepancy.model.mjcf_rest import counted_from_rest
 from bench.discrepancy.model.mjcf_units import expected_units
-from bench.discrepancy.model.mjcf_values import value_notes
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.settings import DEFAULT, DiagnosisSettings
 from bench.errors import ModelError, UnitError
@@ -60,12 +61,13 @@ def admitted(declared: Case, *, anyway: bool = False, settings: DiagnosisSetting
     if own:
         rig = rig_of(declared)
         case, said = converted(declared, *expected_units(declared, rig))
+        case, driven = with_accelerations(case, rig, settings=settings.motion)
         case, limited = within_limits(
             case, rig, actuators_of(case, rig, settings=settings.model), settings=settings.model
         )
         reference = reference_of(case, rig, settings=settings.model)
         case, shifted = counted_from_rest(case, reference)
-        said = (*said, *limited, *shifted, *value_notes(case, rig, settings=settings.model))
+        said = (*said, *driven, *limited, *shifted, *value_notes(case, rig, settings=settings.model))
     case = with_starts_found(case, settings=settings)
     problem = Problem(case, structure_of(case, settings=settings), case.identification, settings=settings)
     refuse(problem)

@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.case.channel_noise import noise_floor
-from bench.discrepancy.likelihood.window_whitening import channels_of, drifts
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.model.structure import Structure
+from bench.discrepancy.response.windows import channels_of, drifts
 from bench.discrepancy.settings import DEFAULT, ChecksSettings, DiagnosisSettings
 from bench.discrepancy.simulation.linear_response import linear_run
 from bench.discrepancy.simulation.stick_slip import LinearStructure

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from bench import native
 from bench.discrepancy.case.case import CaseRecord
+from bench.discrepancy.checks.reference import Reference
 from bench.discrepancy.likelihood.problem import Problem
-from bench.discrepancy.model.mjcf_reference import Reference
 from bench.discrepancy.settings import LikenessSettings
 
 Array = NDArray[np.float64]
@@ -192,7 +192,7 @@ def simulated(
     )  # the middle of each step: held loads are else late by half of one
     control = np.tile(reference.control, (len(at), 1))
     for channel, (index, factor) in reference.loads.items():
-        control[:, index] = factor * np.interp(at, np.arange(len(record)), record.values[channel])
+        control[:, index] += factor * np.interp(at, np.arange(len(record)), record.values[channel])
     data = mujoco.MjData(variant)
     data.qpos[:] = reference.rest
     size = mujoco.mj_stateSize(variant, int(mujoco.mjtState.mjSTATE_FULLPHYSICS))

@@ -4,9 +4,6 @@ Position, velocity and acceleration of one coordinate are derivatives of one ano
 gross factor or a sign is one of the recording. Against the nominal model the bands of the spectrum decide: a wrong or missing force
 changes the ratio of measured to predicted response from band to band, a unit changes it by one and the same factor in all of them; and
 a resonance in the wrong place turns the sign only between the two places, a turned sensor turns it everywhere.
-
-References:
-    J. S. Bendat, A. G. Piersol, Random Data, 4th ed. 2010, chapter 6 (coherence, gain and phase from cross-spectra).
 """
 
 from __future__ import annotations
@@ -16,28 +13,26 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import signal
 
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.case.channel_noise import noise_floor
 from bench.discrepancy.case.single_axis import motion_channels
+from bench.discrepancy.checks.bands import (
+    SUSPECTS,
+    Bands,
+    Pair,
+    bands_between,
+    common_factor,
+    compare_channels,
+    spectra,
+)
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.nominal_elements import own_force
-from bench.discrepancy.settings import DEFAULT, ChecksSettings, ScaleSettings
+from bench.discrepancy.settings import ChecksSettings, ScaleSettings
 from bench.errors import UnitError
 from bench.recording.units import conversion, read_as, si_unit
 
 Array = NDArray[np.float64]
-
-
-class Spectra(NamedTuple):
-    """Averaged spectra of two signals at frequencies [Hz], and which of these count."""
-
-    frequency: Array
-    first: Array
-    second: Array
-    cross: NDArray[np.complex128]
-    counts: NDArray[np.bool_]
 
 
 class Observed(NamedTuple):
@@ -47,29 +42,6 @@ class Observed(NamedTuple):
     order: int
     row: Array
     noise: float
-
-
-class Pair(NamedTuple):
-    """Two channels of one motion: the second over the first, derivatives taken into account, and how sure that is."""
-
-    factor: float
-    sign: float
-
-
-class Bands(NamedTuple):
-    """Measured over predicted in bands of a third of an octave: log ratios, correlations, middle frequencies [Hz]."""
-
-    ratios: Array
-    correlations: Array
-    frequencies: Array
-
-
-SUSPECTS = {
-    "m": ("mm", "cm", "um", "in", "ft"), "rad": ("deg", "rev", "mrad"), "m/s": ("mm/s", "cm/s", "in/s", "km/h"),
-    "rad/s": ("deg/s", "rpm"), "m/s^2": ("g", "mm/s^2", "cm/s^2", "in/s^2", "mg"), "rad/s^2": ("deg/s^2",),
-    "N": ("kN", "mN", "lbf", "kgf", "gf"), "N m": ("N mm", "N cm", "mN m", "kN m", "lbf in", "lbf ft", "kgf cm", "ozf in"),
-}  # fmt: skip
-"""SI units, and those that a column labelled with them may really be in."""
 
 
 def suspicions(declared: Case, problem: Problem, settings: ScaleSettings | None = None) -> tuple[str, ...]:
@@ -85,65 +57,6 @@ def suspicions(declared: Case, problem: Problem, settings: ScaleSettings | None 
     if between or problem.driven:
         return between
     return tuple(dict.fromkeys(_against_model(declared, problem, chosen)))
-
-
-def spectra(
-    first: Array, second: Array, step: float, noise: tuple[float, float], settings: ScaleSettings
-) -> Spectra:
-    """Averaged spectra of two signals (n,).
-
-    Args:
-        first: (n,).
-        second: (n,).
-        step: Time between samples [s].
-        noise: Standard deviations of their white noise.
-        settings: What counts.
-    """
-    # longer where the motion is so slow that its strongest frequency would drown in the mean
-    peak = max(int(np.argmax(np.abs(np.fft.rfft(signal.detrend(x)))[1:])) + 1 for x in (first, second))
-    length = max(
-        min(settings.cycles * len(first) // peak, len(first) // 2), len(first) // settings.segments, 64
-    )
-
-    def density(x: Array, y: Array):
-        return signal.csd(x, y, 1.0 / step, "hann", length, detrend="linear")
-
-    frequency, own = density(first, first)
-    other, cross = density(second, second)[1], density(first, second)[1]
-    own, other, cross = np.real(own), np.real(other), np.asarray(cross, dtype=np.complex128)
-    counts = np.ones(len(frequency), dtype=bool)
-    for power, level in ((own, noise[0]), (other, noise[1])):
-        counts &= (power > settings.strong * 2.0 * level**2 * step) & (power > settings.leak * power.max())
-    counts[:2] = False  # the mean, and what the window makes of it
-    return Spectra(frequency, own, other, cross, counts)
-
-
-def compare_channels(
-    first: Array, second: Array, *, orders: tuple[int, int], noise: tuple[float, float], step: float,
-    settings: ScaleSettings = DEFAULT.checks.scales,
-) -> Pair | None:  # fmt: skip
-    """The factor and sign between two channels of one motion; None where they have no frequency in common.
-
-    Args:
-        first: (n,) samples.
-        second: (n,) samples.
-        orders: Derivative that each measures.
-        noise: Their noise.
-        step: Time between samples [s].
-        settings: When a factor counts.
-    """
-    found = spectra(first, second, step, noise, settings)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        coherence = np.abs(found.cross) ** 2 / (found.first * found.second)
-    use = found.counts & (coherence > settings.coherence)
-    if np.count_nonzero(use) < 3:
-        return None
-    derivative = (2j * np.pi * found.frequency[use]) ** (orders[1] - orders[0])
-    gain = found.cross[use] / found.first[use] / derivative
-    # a delay turns the phase with frequency, so that the lowest ones tell the sign
-    lowest = gain[: max(3, len(gain) // 4)]
-    factor = np.sqrt(np.sum(found.second[use]) / np.sum(found.first[use] * np.abs(derivative) ** 2))
-    return Pair(float(factor), float(np.median(np.cos(np.angle(lowest)))))
 
 
 def observed(problem: Problem) -> list[Observed]:
@@ -242,9 +155,12 @@ def pair_words(
         record: Where.
         settings: `ChecksSettings` of the diagnosis.
     """
-    kin = {1: "the derivative", 2: "the second derivative", -1: "the integral", -2: "the double integral"}[
-        orders
-    ]
+    derived = {
+        1: "the derivative",
+        2: "the second derivative",
+        -1: "the integral",
+        -2: "the double integral",
+    }[orders]
     if pair.sign < -0.5 and abs(np.log(pair.factor)) < np.log(3.0):
         return (
             f"'{name}' and '{other}' have opposite signs in '{record.name}': turn one of the columns round (times -1), or its sensor "
@@ -254,10 +170,10 @@ def pair_words(
     for power, unit in ((1e3, "ms"), (1e6, "us"), (1e9, "ns")):
         if abs(np.log(clock * power)) < np.log(1.25) or abs(np.log(clock / power)) < np.log(1.25):
             return (
-                f"'{name}' is {pair.factor:.4g} times {kin} of '{other}' in '{record.name}', as with times in {unit}: give the column "
+                f"'{name}' is {pair.factor:.4g} times {derived} of '{other}' in '{record.name}', as with times in {unit}: give the column "
                 "'time' in seconds, or correct the units of the two channels"
             )
-    wrong = f"'{name}' is {_times(pair.factor)} {kin} of '{other}' in '{record.name}'"
+    wrong = f"'{name}' is {_times(pair.factor)} {derived} of '{other}' in '{record.name}'"
     hints = [
         hint
         for who, factor in ((name, pair.factor), (other, 1.0 / pair.factor))
@@ -337,36 +253,6 @@ def _typical(found: Sequence[tuple[float, float]]) -> tuple[float, float]:
     ) else 1.0
 
 
-def common_factor(bands: Bands, settings: ScaleSettings = DEFAULT.checks.scales) -> tuple[float, float]:
-    """The factor and the sign that all bands have in common; (1, 1) where they have none.
-
-    Args:
-        bands: Measured over predicted.
-        settings: When a factor counts.
-    """
-    ratios = bands.ratios
-    if len(ratios) < 3:
-        return 1.0, 1.0
-    middle = float(np.median(ratios))
-    describes = settings.better * float(np.sum((ratios - middle) ** 2)) < float(np.sum(ratios**2))
-    wide = bands.frequencies[-1] >= 2.0**settings.octaves * bands.frequencies[0]
-    turned = wide and bool(np.all(bands.correlations < 0.0)) and float(np.median(bands.correlations)) < -0.5
-    agrees = float(np.median(np.abs(bands.correlations))) > settings.coherence
-    gross = abs(middle) > np.log(settings.any_factor) or (
-        agrees and abs(middle) > np.log(settings.gross) and _is_of_a_unit(middle, settings)
-    )
-    return (float(np.exp(middle)) if describes and gross else 1.0), (-1.0 if turned else 1.0)
-
-
-def _is_of_a_unit(log_factor: float, settings: ScaleSettings) -> bool:
-    known = {
-        abs(float(np.log(conversion(*read_as(unit, (si,)))[0])))
-        for si, units in SUSPECTS.items()
-        for unit in units
-    }
-    return any(abs(abs(log_factor) - one) < np.log(settings.unit) for one in known)
-
-
 def _measured_over_predicted(
     problem: Problem, record: CaseRecord, settings: ScaleSettings
 ) -> Mapping[str, Bands]:
@@ -404,21 +290,6 @@ def _implied_loads(problem: Problem, record: CaseRecord, settings: ScaleSettings
     load = record.values[structure.loads[0]]
     bands = bands_between(spectra(load, implied, record.step, (float(problem.load_noise[0]), 0.0), settings))
     return {} if bands is None else dict.fromkeys(structure.channels[:1], bands)
-
-
-def bands_between(found: Spectra) -> Bands | None:
-    """The second signal over the first, in bands of a third of an octave."""
-    if np.count_nonzero(found.counts) < 3:
-        return None
-    frequency = found.frequency[found.counts]
-    number = np.floor(3.0 * np.log2(frequency / frequency[0])).astype(int)
-    rows = []
-    for band in np.unique(number):
-        use = np.flatnonzero(found.counts)[number == band]
-        first, second = found.first[use].sum(), found.second[use].sum()
-        correlation = float(np.real(found.cross[use].sum()) / np.sqrt(first * second))
-        rows.append((0.5 * np.log(second / first), correlation, float(np.mean(found.frequency[use]))))
-    return Bands(*(np.array(column) for column in zip(*rows, strict=True)))
 
 
 def model_words(

@@ -177,7 +177,7 @@ class Effect:
         variant: What tells it from the effect of the same name in the catalogue; empty for that one.
         creeps: Its friction creeps at rest, so that `limit` writes how (`friction_limits`).
         of_record: Parameter values and the name of a record to the theta of `law` in that record; the same in all where None.
-        schedule: Parameter values and a record to the schedule of its force there (`stick_slip.scale_at`); none where None.
+        schedule: Parameter values and a record to the schedule of its force there (`equations_of_motion.scale_at`); none where None.
         in_place: It takes the place of the nominal model's own dry friction along its coordinate.
     """
 

@@ -9,11 +9,9 @@ from numpy.typing import NDArray
 
 from bench.discrepancy.case.case import CaseRecord
 from bench.discrepancy.likelihood.problem import Problem
-from bench.discrepancy.likelihood.window_whitening import (
-    cut,
-    in_motion,
-)
 from bench.discrepancy.model.placement import Hypothesis
+from bench.discrepancy.response.initial_states import in_motion
+from bench.discrepancy.response.windows import cut
 
 Array = NDArray[np.float64]
 
@@ -36,10 +34,8 @@ def predict(problem: Problem, hypothesis: Hypothesis, vector: Array, record: Cas
     if problem.driven or (not problem.windowed and (fitted or not in_motion(record))):
         return problem.simulate(hypothesis, vector, record)
     firsts = problem.firsts(record)
-    responses = np.column_stack([record.values[name] for name in problem.structure.channels])
-    motion = problem.motion_of(record)
-    spread = np.concatenate([np.std(motion.position, axis=0), np.std(motion.velocity, axis=0)])
-    steps = settings.likelihood.start_difference * np.where(spread > 0.0, spread, 1.0)
+    responses = problem.responses_of(record)
+    steps = problem.start_differences(record)
     starts = problem.starts_of(record, problem.nominal)
     damping = np.ones(len(firsts))
     channels = problem.simulate(hypothesis, vector, record, starts=starts)
@@ -80,7 +76,7 @@ def _costs(residual: Array, firsts: NDArray[np.int64]) -> Array:
 
 
 def run_kind(problem: Problem, records: Sequence[CaseRecord]) -> str:
-    """How the judging records are simulated, for the name of the metric."""
+    """How the validation records are simulated, for the name of the metric."""
     if problem.driven:
         return "prescribed motion"
     if problem.windowed:

@@ -12,11 +12,11 @@ from dataclasses import replace
 import numpy as np
 
 from bench.discrepancy.case.case import Case
+from bench.discrepancy.fitting.goodness_of_fit import key_of
 from bench.discrepancy.judgement.coarse import without
 from bench.discrepancy.judgement.validation_discrepancy import gaps
 from bench.discrepancy.likelihood.problem import Problem
-from bench.discrepancy.search.explain import Explanation, nominal_alone
-from bench.discrepancy.search.fits import key_of
+from bench.discrepancy.search.explanation import Explanation, nominal_alone
 from bench.discrepancy.settings import JudgementSettings
 from bench.discrepancy.verdict import Gap, NamedEffect, NominalEstimate
 

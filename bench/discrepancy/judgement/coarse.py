@@ -16,17 +16,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bench.discrepancy.case.case import Case
+from bench.discrepancy.fitting.goodness_of_fit import complexity, key_of, log_prior_of
 from bench.discrepancy.fitting.map_fit import fit
 from bench.discrepancy.judgement.held_out import HeldOut, held_out, shares
 from bench.discrepancy.judgement.steady import diverges, steadied
 from bench.discrepancy.judgement.validation_discrepancy import discrepancies, noise_floors
 from bench.discrepancy.likelihood.problem import Array, Problem
-from bench.discrepancy.search.explain import Explanation, nominal_alone
-from bench.discrepancy.search.fits import (
-    complexity,
-    key_of,
-    log_prior_of,
-)
+from bench.discrepancy.search.explanation import Explanation, nominal_alone
 from bench.discrepancy.settings import DEFAULT, CoarseSettings
 
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from bench.discrepancy.case.case import Case
+from bench.discrepancy.fitting.goodness_of_fit import names
 from bench.discrepancy.judgement import posterior as evidence
 from bench.discrepancy.judgement.coarse import Judged, judge
 from bench.discrepancy.judgement.finding import Finding
@@ -14,8 +15,7 @@ from bench.discrepancy.likelihood.model_error import ModelError, crude_error, er
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.numerics.deadline import NEVER, Deadline
-from bench.discrepancy.search.explain import Explanation
-from bench.discrepancy.search.fits import names
+from bench.discrepancy.search.explanation import Explanation
 from bench.discrepancy.settings import DiagnosisSettings
 from bench.discrepancy.verdict import Kind, Ranked
 

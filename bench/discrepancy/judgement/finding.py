@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from bench.discrepancy.judgement.nonparametric_rival import Rival
-from bench.discrepancy.search.explain import Explanation
+from bench.discrepancy.search.explanation import Explanation
 from bench.discrepancy.verdict import Kind, NamedEffect, Ranked
 
 

@@ -31,7 +31,7 @@ from bench.discrepancy.likelihood.whitening import fast_length
 from bench.discrepancy.numerics.least_squares import (
     differences,
 )
-from bench.discrepancy.search.explain import Explanation
+from bench.discrepancy.search.explanation import Explanation
 from bench.discrepancy.settings import DEFAULT
 
 Array = NDArray[np.float64]

@@ -32,18 +32,16 @@ from bench.discrepancy.effects.nonparametric import (
     smoothing,
     smoothing_both,
 )
+from bench.discrepancy.fitting.goodness_of_fit import consistent, posterior
 from bench.discrepancy.fitting.map_fit import Fit, fit
 from bench.discrepancy.likelihood.problem import Array, Problem
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.model.placements import placements
 from bench.discrepancy.screening.candidates import along
 from bench.discrepancy.screening.linear_amplitudes import Node, products
-from bench.discrepancy.screening.screen import Ground, Screen
-from bench.discrepancy.search.explain import Explanation
-from bench.discrepancy.search.fits import (
-    consistent,
-    posterior,
-)
+from bench.discrepancy.screening.projection import Ground
+from bench.discrepancy.screening.screen import Screen
+from bench.discrepancy.search.explanation import Explanation
 from bench.discrepancy.settings import JudgementSettings
 
 CONTACTS = ("one_sided_stop", "gap")

@@ -15,15 +15,12 @@ from dataclasses import replace
 import numpy as np
 
 from bench.discrepancy.case.case import Case, CaseRecord
+from bench.discrepancy.fitting.goodness_of_fit import consistent
 from bench.discrepancy.fitting.map_fit import Fit, fit
 from bench.discrepancy.judgement.validation_discrepancy import coordinates, noise_level
 from bench.discrepancy.likelihood.problem import Array, Problem
-from bench.discrepancy.likelihood.window_whitening import in_motion
-from bench.discrepancy.response.driving_loads import with_load_noise
-from bench.discrepancy.search.explain import Explanation
-from bench.discrepancy.search.fits import (
-    consistent,
-)
+from bench.discrepancy.response.initial_states import in_motion
+from bench.discrepancy.search.explanation import Explanation
 
 
 def contradicted(case: Case, problem: Problem, best: Explanation, rng: np.random.Generator) -> bool:
@@ -62,7 +59,7 @@ def fails(case: Case, problem: Problem, best: Explanation, rng: np.random.Genera
             continue
         if not drawn:
             others = [_drawn(best, rng) for _ in range(settings.check_draws)]
-            drawn = [[other.predict(with_load_noise(problem, r, rng)) for r in records] for other in others]
+            drawn = [[other.predict(problem.with_load_noise(r, rng)) for r in records] for other in others]
         spread = _rms(np.concatenate([judged(other) - simulated for other in drawn]))
         if error > settings.contradicted * np.hypot(floor, spread):
             return True

@@ -15,7 +15,7 @@ import numpy as np
 from bench.discrepancy.case.case import CaseRecord
 from bench.discrepancy.fitting.map_fit import Fit, free_entries
 from bench.discrepancy.likelihood.problem import Array, Problem
-from bench.discrepancy.search.explain import Explanation
+from bench.discrepancy.search.explanation import Explanation
 
 
 def diverges(explanation: Explanation, records: Sequence[CaseRecord]) -> bool:

@@ -16,6 +16,7 @@ import numpy as np
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.checks.initial_motion import with_starts_found
 from bench.discrepancy.effects.effect import Effect
+from bench.discrepancy.fitting.goodness_of_fit import names
 from bench.discrepancy.judgement import posterior as evidence
 from bench.discrepancy.judgement.coarse_finding import (
     coarse_explanations,
@@ -28,8 +29,8 @@ from bench.discrepancy.likelihood.model_error import ModelError
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.numerics.deadline import NEVER, Deadline
-from bench.discrepancy.search.explain import Explanation, explain
-from bench.discrepancy.search.fits import names
+from bench.discrepancy.search.explain import explain
+from bench.discrepancy.search.explanation import Explanation
 from bench.discrepancy.search.load_interpolation import promising_readings
 from bench.discrepancy.settings import DEFAULT, DiagnosisSettings
 

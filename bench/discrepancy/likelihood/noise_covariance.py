@@ -7,26 +7,22 @@ with the velocity, or a sensor of a wrong gain, is unknown before it is found, a
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
 from bench.discrepancy.case.case import CaseRecord
 from bench.discrepancy.likelihood.whitening import fast_length, masked
+from bench.discrepancy.model.placement import Hypothesis
+from bench.discrepancy.response.simulator import Simulator
 from bench.discrepancy.settings import LikelihoodSettings
 from bench.discrepancy.simulation.stick_slip import Motion
-
-if TYPE_CHECKING:
-    from bench.discrepancy.likelihood.problem import Problem
-    from bench.discrepancy.model.placement import Hypothesis
 
 Array = NDArray[np.float64]
 
 
 def whitening_behind(
-    problem: Problem,
+    simulator: Simulator,
     record: CaseRecord,
     n_bins: int,
     model: tuple[Hypothesis, Array],
@@ -35,64 +31,63 @@ def whitening_behind(
     """Matrices (n_bins, n_channels, n_channels) that whiten the spectrum of the residuals of a record.
 
     Args:
-        problem: Structure and noise.
+        simulator: Structure and noise.
         record: The record.
         n_bins: Number of frequency bins in its band.
-        model: Effects and vector, see `Problem.simulate`, that the noise of a prescribed motion passes. The noise of
+        model: Effects and vector, see `Simulator.simulate`, that the noise of a prescribed motion passes. The noise of
             loads passes the linear structure at that vector, and the sensors.
         compared: (n,) ones and zeros: samples that are compared; None for all.
     """
-    own = np.diag(problem.noise**2).astype(complex)
+    own = np.diag(simulator.noise**2).astype(complex)
     noise = np.broadcast_to(own, (n_bins, *own.shape))
-    if problem.driven:
+    if simulator.driven:
         noise = (
             noise
-            + _power(forces_of_noise(problem, record, model), compared, settings=problem.settings.likelihood)[
-                :n_bins, None, None
-            ]
+            + _power(
+                forces_of_noise(simulator, record, model), compared, settings=simulator.settings.likelihood
+            )[:n_bins, None, None]
         )
-    elif np.any(load_noise := problem.load_noise_of(record)):
+    elif np.any(load_noise := simulator.load_noise_of(record)):
         omega = 2.0 * np.pi * np.arange(n_bins) / (fast_length(len(record)) * record.step)
-        linear = problem.structure.at(problem.split(*model)[0])
-        scaled = problem.structure.transfer(linear, np.asarray(omega, dtype=np.float64)) * load_noise
-        scaled = scaled * sensor_gains(problem, record, model)[:, None]
+        linear = simulator.structure.at(simulator.split(*model)[0])
+        scaled = simulator.structure.transfer(linear, np.asarray(omega, dtype=np.float64)) * load_noise
+        scaled = scaled * sensor_gains(simulator, record, model)[:, None]
         noise = noise + scaled @ np.conj(np.swapaxes(scaled, 1, 2))
     return np.asarray(np.linalg.inv(np.linalg.cholesky(noise)), dtype=np.complex128)
 
 
-def sensor_gains(problem: Problem, record: CaseRecord, model: tuple[Hypothesis, Array]) -> Array:
+def sensor_gains(simulator: Simulator, record: CaseRecord, model: tuple[Hypothesis, Array]) -> Array:
     """How many times what moves a channel is recorded (n_channels,), behind the sensor effects of a model."""
     hypothesis, vector = model
-    _, etas = problem.split(hypothesis, vector)
+    _, etas = simulator.split(hypothesis, vector)
     own = [
         (placed, eta) for placed, eta in zip(hypothesis, etas, strict=True) if placed.effect.site == "sensor"
     ]
-    moved = np.column_stack([record.values[name] for name in problem.structure.channels])
+    moved = simulator.responses_of(record)
     if not own:
         return np.ones(moved.shape[1])
     sensors = tuple(placed for placed, _ in own), [eta for _, eta in own]
-    still = problem.sensed(*sensors, np.zeros_like(moved), record.step)
-    recorded = problem.sensed(*sensors, moved.copy(), record.step) - still
+    still = simulator.sensed(*sensors, np.zeros_like(moved), record.step)
+    recorded = simulator.sensed(*sensors, moved.copy(), record.step) - still
     return np.std(recorded, axis=0) / np.maximum(np.std(moved, axis=0), 1e-300)
 
 
-def forces_of_noise(problem: Problem, record: CaseRecord, model: tuple[Hypothesis, Array]) -> Array:
+def forces_of_noise(simulator: Simulator, record: CaseRecord, model: tuple[Hypothesis, Array]) -> Array:
     """Forces (n_draws, n) that the stated noise of a prescribed motion makes in a component; zero where none is stated.
 
     Args:
-        problem: Component.
+        simulator: Component.
         record: Record of its motion.
-        model: Effects and vector of the component, see `Problem.simulate`.
+        model: Effects and vector of the component, see `Simulator.simulate`.
     """
-    if not np.any(problem.load_noise):
+    if not np.any(simulator.load_noise):
         return np.zeros((1, len(record)))
 
     def force(motion: Motion) -> Array:
-        moved = problem.forgetful()
-        moved.motions[record.name] = motion
+        moved = simulator.forgetful().moving({record.name: motion})
         return moved.simulate(*model, record)[:, 0]
 
-    prescribed = problem.prescribed(record)
+    prescribed = simulator.prescribed(record)
     return np.stack([force(motion) for motion in prescribed.noisy]) - force(prescribed.motion)
 
 

@@ -13,7 +13,7 @@ References:
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numba
 import numpy as np
@@ -22,22 +22,21 @@ from scipy.linalg import cholesky, solve_triangular
 
 from bench.discrepancy.case.case import CaseRecord
 from bench.discrepancy.likelihood.whitening import fast_length
-from bench.discrepancy.motion.observer import ACCELERATION
+from bench.discrepancy.model.structure import Structure
+from bench.discrepancy.motion.observer import ACCELERATION, Observer
+from bench.discrepancy.response.simulator import Simulator
 from bench.discrepancy.settings import LikelihoodSettings
-
-if TYPE_CHECKING:
-    from bench.discrepancy.likelihood.problem import Problem
 
 Array = NDArray[np.float64]
 
 
 def whitening_together(
-    problem: Problem, record: CaseRecord, n_bins: int, values: Array, gains: Array
+    simulator: Simulator, record: CaseRecord, n_bins: int, values: Array, gains: Array
 ) -> Array | None:
     """Matrix (k, k) that whitens the lower bins of the spectrum of a record's residuals together; None where bins can stand alone.
 
     Args:
-        problem: Structure and noise.
+        simulator: Structure and noise.
         record: The record, whose measured motion decides the stiffness of the moment.
         n_bins: Number of frequency bins in its band.
         values: Values (n_parameters,) of the nominal parameters.
@@ -46,8 +45,8 @@ def whitening_together(
     Returns:
         Lower triangular; rows and columns are the real parts of the bins, channel by channel within each, then the imaginary ones.
     """
-    settings = problem.settings.likelihood
-    structure, load_noise = problem.structure, problem.load_noise_of(record)
+    settings = simulator.settings.likelihood
+    structure, load_noise = simulator.structure, simulator.load_noise_of(record)
     if not structure.springs or not np.any(load_noise):
         return None
     linear = structure.at(values)
@@ -64,14 +63,14 @@ def whitening_together(
     )
     omega = 2.0 * np.pi * np.arange(count) / (length * step)
     inverse = np.linalg.inv(linear.mass)
-    rate = _rates(problem, record, values)
+    rate = _rates(structure, values, simulator.motion_of(record).position)
     inputs = np.vstack([np.zeros((n_dof, len(load_noise))), inverse @ linear.inputs * load_noise])
-    discrete = _discrete(rate, inputs, step, settings=problem.settings.likelihood)
+    discrete = _discrete(rate, inputs, step, settings=simulator.settings.likelihood)
     n_channels = len(structure.observers)
-    own = np.repeat(np.tile(problem.noise**2, count)[None], 2, axis=0)
+    own = np.repeat(np.tile(simulator.noise**2, count)[None], 2, axis=0)
     own[0, :n_channels] *= 2.0  # the mean is all real
     covariance = np.diag(own.ravel())
-    seen, direct = _seen(problem, rate, inputs)
+    seen, direct = _seen(structure.observers, rate, inputs)
     later = np.zeros((n_channels, 2 * n_dof, count), dtype=np.complex128)
     for end in range(len(record), 0, -settings.together_block):
         begin = max(end - settings.together_block, 0)
@@ -85,9 +84,9 @@ def whitening_together(
     return np.asarray(solve_triangular(lower, np.eye(len(lower)), lower=True), dtype=np.float64)
 
 
-def _seen(problem: Problem, rate: Array, inputs: Array) -> tuple[Array, Array]:
+def _seen(observers: Sequence[Observer], rate: Array, inputs: Array) -> tuple[Array, Array]:
     """Channels of a state (n_channels, n, 2 n_dof) at every sample, and of a load at once (n_channels, n_loads)."""
-    n_dof, observers = rate.shape[1] // 2, problem.structure.observers
+    n_dof = rate.shape[1] // 2
     seen, direct = (
         np.zeros((len(observers), len(rate), 2 * n_dof)),
         np.zeros((len(observers), inputs.shape[1])),
@@ -101,13 +100,12 @@ def _seen(problem: Problem, rate: Array, inputs: Array) -> tuple[Array, Array]:
     return seen, direct
 
 
-def _rates(problem: Problem, record: CaseRecord, values: Array) -> Array:
-    """Rate of the state about the measured motion (n, 2 n_dof, 2 n_dof), at every sample."""
-    structure = problem.structure
-    linear, position = structure.at(values), problem.motion_of(record).position
+def _rates(structure: Structure, values: Array, position: Array) -> Array:
+    """Rate of the state about a motion (n, n_dof), at every sample (n, 2 n_dof, 2 n_dof)."""
+    linear = structure.at(values)
     n_dof = len(linear.mass)
     inverse = np.linalg.inv(linear.mass)
-    rate = np.zeros((len(record), 2 * n_dof, 2 * n_dof))
+    rate = np.zeros((len(position), 2 * n_dof, 2 * n_dof))
     rate[:, :n_dof, n_dof:] = np.eye(n_dof)
     rate[:, n_dof:, :n_dof] = -inverse @ linear.stiffness
     rate[:, n_dof:, n_dof:] = -inverse @ linear.damping

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from bench.discrepancy.case.case import CaseRecord
-from bench.discrepancy.likelihood.window_whitening import Windows, orthonormal
+from bench.discrepancy.likelihood.window_whitening import RestartWindows, orthonormal
 from bench.discrepancy.numerics.spectral_product import whiten
 from bench.discrepancy.settings import DEFAULT, LikelihoodSettings
 
@@ -37,7 +37,7 @@ class RecordData(NamedTuple):
     responses: Array
     n_bins: int
     whitening: NDArray[np.complex128]
-    windows: Windows | None = None
+    windows: RestartWindows | None = None
     compared: Array | None = None
     together: Array | None = None
 

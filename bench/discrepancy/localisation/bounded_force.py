@@ -24,8 +24,9 @@ from bench.discrepancy.likelihood.problem import Array
 from bench.discrepancy.model.structure import Place
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.screening.candidates import along
-from bench.discrepancy.screening.screen import Ground, Screen
-from bench.discrepancy.search.explain import Explanation
+from bench.discrepancy.screening.projection import Ground
+from bench.discrepancy.screening.screen import Screen
+from bench.discrepancy.search.explanation import Explanation
 from bench.discrepancy.settings import LocalisationSettings
 
 

@@ -12,8 +12,8 @@ import numpy as np
 
 from bench.discrepancy.likelihood.problem import Array, Problem
 from bench.discrepancy.model.placement import Placed
-from bench.discrepancy.screening.screen import force_along
-from bench.discrepancy.search.explain import Explanation
+from bench.discrepancy.screening.motion_response import force_along
+from bench.discrepancy.search.explanation import Explanation
 from bench.discrepancy.settings import LocalisationSettings
 
 

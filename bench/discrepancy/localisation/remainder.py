@@ -8,7 +8,7 @@ import numpy as np
 
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.localisation.localise import left_by
-from bench.discrepancy.search.explain import Explanation
+from bench.discrepancy.search.explanation import Explanation
 from bench.discrepancy.verdict import Gap
 
 KINDS = {"product": "displacement and velocity", "any": "displacement, velocity and memory"}

@@ -4,9 +4,7 @@ The plane of displacement and velocity of a place is cut into cells. The mean mi
 standard error over separate visits, moderated by the error that noise alone leaves in that very cell, and the false
 discovery rate is controlled over the cells of all places. Regions are sets of touching cells with a force of one sign.
 
-A wrong nominal stiffness also leaves a force, a weak one, all over the plane. Where most of the record needs no further
-force at all with nominal parameters a little different, those parameters are taken: a robust regression on the deviations
-within their uncertainty, whose outliers are the region.
+A wrong nominal stiffness also leaves a force, a weak one, all over the plane (`freed_parameters`).
 
 References:
     Y. Benjamini, Y. Hochberg, Journal of the Royal Statistical Society B 57 (1995) 289-300.
@@ -22,34 +20,18 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage, stats
+from scipy import stats
 
 from bench.discrepancy.case.case import CaseRecord
 from bench.discrepancy.likelihood.problem import Array, Problem
-from bench.discrepancy.localisation.force_smoother import ForceObserver, observers
+from bench.discrepancy.localisation.force_smoother import observers
+from bench.discrepancy.localisation.freed_parameters import FreedParameters, freed
+from bench.discrepancy.localisation.regions import Region, joined, regions_of
 from bench.discrepancy.model.structure import Place
 from bench.discrepancy.settings import LocalisationSettings
 
 CELLS = 12
 """Cells a coordinate of the state space is cut into; even, so that zero is an edge."""
-
-
-class Region(NamedTuple):
-    """A set of touching cells with a missing force of one sign.
-
-    Attributes:
-        displacement: Smallest and largest displacement; None where it does not depend on the displacement.
-        velocity: Likewise.
-        force: Mean missing force.
-        share: Part of the squared missing force of all cells of the place.
-        p_value: Smallest of its cells, after correction for the number of cells.
-    """
-
-    displacement: tuple[float, float] | None
-    velocity: tuple[float, float] | None
-    force: float
-    share: float
-    p_value: float
 
 
 class Track(NamedTuple):
@@ -129,11 +111,11 @@ def tracks(
     """
     out = []
     for observer in observers(problem):
-        fitted = _Fitted(
+        fitted = FreedParameters(
             observer.nominal(known), np.zeros((0, sum(len(r) for r in records), len(observer.places)))
         )
         if known is None:
-            fitted = _freed(observer, records, fitted.values)
+            fitted = freed(observer, records, fitted.values)
         estimates = [
             observer.estimate(r, fitted.values, noise=problem.settings.localisation.passes) for r in records
         ]
@@ -152,88 +134,6 @@ def tracks(
             full = next(p for p in problem.structure.places if p.name == place.name)
             out.append((full, track))
     return out
-
-
-class _Fitted(NamedTuple):
-    """Nominal parameters that leave most samples free of a missing force, and what their uncertainty still does to it."""
-
-    values: Array
-    doubt: Array  # (n_doubts, n, n_places)
-
-
-def _freed(observer: ForceObserver, records: Sequence[CaseRecord], nominal: Array) -> _Fitted:
-    """Move the nominal parameters within their uncertainty so that most samples need no further force.
-
-    Where no such parameters are found they stay, and all of their uncertainty remains as doubt.
-    """
-    settings = observer.problem.settings.localisation
-    spread = observer.spread()
-    free = [i for i in range(len(spread)) if spread[i] > 0.0]
-
-    def force_at(values: Array) -> Array:
-        return np.concatenate([observer.estimate(r, values).force for r in records])
-
-    force = force_at(nominal)
-    if not free:
-        return _Fitted(nominal, np.zeros((0, *force.shape)))
-    columns = np.array([force_at(nominal + spread * (np.arange(len(spread)) == i)) - force for i in free])
-    noise = np.concatenate([observer.estimate(r, nominal, noise=1).noise[0] for r in records])
-    stride = max(1, len(force) // settings.robust_samples)
-    count = len(force[::stride]) * force.shape[1]
-    # Samples of one swing say the same thing: about as many are independent as there are swings, times a few.
-    weight = min(1.0, 400.0 / count)
-    deviation, values = np.zeros(len(free)), nominal
-    for _ in range(settings.robust_rounds):
-        # linear about the values reached, and as exact as the force that is left there
-        error = np.sqrt(np.mean(noise**2, axis=0) + (settings.map_floor * np.abs(force).max(axis=0)) ** 2)
-        matrix = np.column_stack([(c / error)[::stride].ravel() for c in columns])
-        y = (force / error)[::stride].ravel() - matrix @ deviation
-        starts = [
-            deviation,
-            _ridge(matrix, y, np.full(len(y), weight), settings=observer.problem.settings.localisation),
-        ]
-        candidates = [
-            _robust(matrix, y, weight, start, settings=observer.problem.settings.localisation)
-            for start in starts
-        ]
-        deviation = min(candidates, key=lambda d: _robust_cost(matrix, y, weight, d))
-        values = nominal.copy()
-        values[free] += spread[free] * deviation
-        force = force_at(values)
-    error = np.sqrt(np.mean(noise**2, axis=0) + (settings.map_floor * np.abs(force).max(axis=0)) ** 2)
-    matrix = np.column_stack([(c / error)[::stride].ravel() for c in columns])
-    rest = (force / error)[::stride].ravel()
-    if np.mean(np.abs(rest) < settings.free_of_force) < settings.sparse:
-        return _Fitted(nominal, columns)
-    normal = matrix.T @ ((weight / (1.0 + rest**2) ** 2)[:, None] * matrix) + np.eye(len(free))
-    root = np.linalg.cholesky(np.linalg.inv(normal))
-    return _Fitted(values, np.asarray(np.tensordot(root.T, columns, 1), dtype=np.float64))
-
-
-def _ridge(matrix: Array, y: Array, weight: Array, *, settings: LocalisationSettings) -> Array:
-    normal = matrix.T @ (weight[:, None] * matrix) + np.eye(matrix.shape[1])
-    minimum = np.asarray(-np.linalg.solve(normal, matrix.T @ (weight * y)), dtype=np.float64)
-    return np.clip(minimum, -settings.most_sigmas, settings.most_sigmas)
-
-
-def _robust(
-    matrix: Array, y: Array, weight: float, deviation: Array, *, settings: LocalisationSettings
-) -> Array:
-    """Iteratively reweighted least squares of Geman and McClure's bounded misfit, its width narrowed step by step."""
-    for width in settings.robust_widths:
-        for _ in range(15):
-            rest = (y + matrix @ deviation) / width
-            new = _ridge(matrix, y, weight / (1.0 + rest**2) ** 2, settings=settings)
-            settled = np.abs(new - deviation).max() < 1e-4
-            deviation = new
-            if settled:
-                break
-    return deviation
-
-
-def _robust_cost(matrix: Array, y: Array, weight: float, deviation: Array) -> float:
-    square = (y + matrix @ deviation) ** 2
-    return float(weight * np.sum(square / (1.0 + square)) + deviation @ deviation)
 
 
 def state_maps(
@@ -261,14 +161,14 @@ def state_maps(
         at += int(visited.sum())
         largest = unit_size[place.force_unit]
         strong = np.abs(np.nan_to_num(mean)) > settings.weak * largest
-        significant = _joined((corrected < settings.false_discoveries) & strong, mean)
+        significant = joined((corrected < settings.false_discoveries) & strong, mean)
         own_p = time_adjusted[time_at : time_at + len(p)]
         in_time = own_p < settings.false_discoveries
         time_at += len(p)
         in_time &= power > settings.weak**2 * power.max(initial=0.0)
         out.append(
             StateMap(
-                place, *edges, mean, error, p_value, significant, _regions(edges, mean, corrected, significant, settings=settings),
+                place, *edges, mean, error, p_value, significant, regions_of(edges, mean, corrected, significant, settings=settings),
                 tuple(
                     r.start + r.step * np.linspace(0, len(r), settings.intervals + 1) for r in records
                 ),
@@ -279,23 +179,6 @@ def state_maps(
             )
         )  # fmt: skip
     return tuple(out)
-
-
-def _joined(significant: np.ndarray, mean: Array) -> np.ndarray:
-    """Significant cells that touch another one with a force of the same sign: no force acts in one cell alone."""
-    out = np.zeros_like(significant)
-    for sign in (1.0, -1.0):
-        labels = _touching(significant & (sign * np.nan_to_num(mean) > 0.0))
-        sizes = np.bincount(labels.ravel())
-        out |= (labels > 0) & (sizes[labels] > 1)
-    return out
-
-
-def _touching(cells: np.ndarray) -> NDArray[np.intp]:
-    """Number of the set of touching cells that each cell belongs to, from 1 on; 0 for cells that are not chosen."""
-    labels = np.zeros(cells.shape, dtype=np.intp)
-    ndimage.label(cells, output=labels)
-    return labels
 
 
 def _adjusted(p_values: Array) -> Array:
@@ -415,38 +298,3 @@ def independent(noise: Array) -> float:
         return float(n)
     total = 1.0 + 2.0 * np.sum((correlation[1:] / correlation[0]) ** 2)
     return max(2.0, n / total)
-
-
-def _regions(
-    edges: tuple[Array, Array],
-    mean: Array,
-    p_value: Array,
-    significant: np.ndarray,
-    *,
-    settings: LocalisationSettings,
-) -> tuple[Region, ...]:
-    visited = np.isfinite(mean)
-    square = np.nan_to_num(mean) ** 2
-    total = float(square.sum()) or 1.0
-    out = []
-    for sign in (1.0, -1.0):
-        labels = _touching(significant & (sign * np.nan_to_num(mean) > 0.0))
-        for k in range(1, int(labels.max()) + 1):
-            own = labels == k
-            share = float(square[own].sum()) / total
-            if share < settings.small:
-                continue
-            limits = []
-            for axis in (0, 1):
-                along = np.flatnonzero(own.any(axis=1 - axis))
-                rows = np.flatnonzero(own.any(axis=axis))
-                # the cells that the motion visited at these values of the other coordinate
-                reachable = np.take(visited, rows, axis=1 - axis)
-                filled = np.take(own, rows, axis=1 - axis)
-                whole = filled.sum() >= settings.whole * reachable.sum()
-                limits.append(
-                    None if whole else (float(edges[axis][along[0]]), float(edges[axis][along[-1] + 1]))
-                )
-            force = float(np.mean(mean[own]))
-            out.append(Region(limits[0], limits[1], force, share, float(p_value[own].min())))
-    return tuple(sorted(out, key=lambda region: -region.share))

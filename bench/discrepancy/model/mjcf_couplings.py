@@ -153,6 +153,7 @@ def constrained(structure: Structure, constraints: Array, dependent: Sequence[st
         fixed=None if structure.fixed is None else square(structure.fixed),
         frictions=tuple(replace(f, row=f.row @ motion) for f in structure.frictions),
         springs=tuple(replace(s, row=s.row @ motion) for s in structure.springs),
+        prescribed=tuple(replace(o, row=o.row @ motion) for o in structure.prescribed),
     )  # fmt: skip
 
 

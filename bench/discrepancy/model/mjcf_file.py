@@ -2,23 +2,47 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import mujoco
+import numpy as np
 
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.case.free_decay import NO_LOAD
+from bench.discrepancy.model.mjcf_prescribed import prescribed_channels, with_prescribed_joints
+from bench.errors import ModelError
 from bench.rig import Rig
 from bench.rig.building import parse
 
 
+@dataclass(frozen=True)
+class MjcfFileSettings:
+    """Numbers of `bench.discrepancy.model.mjcf_file`."""
+
+    largest: float = 1e30
+    """Largest number of a model [SI units]: the mass of the sun; squares of products of such still are numbers."""
+
+
+SETTINGS = MjcfFileSettings()
+SIZES = (
+    "body_mass", "body_inertia", "body_ipos", "body_pos", "jnt_pos", "jnt_stiffness", "dof_damping", "dof_armature",
+    "dof_frictionloss", "actuator_gear", "actuator_gainprm", "actuator_biasprm",
+)  # fmt: skip
+"""What a model's forces are made of."""
+
+
 def rig_of(case: Case) -> Rig:
-    """The user's model; where a case has no load, with an actuator that exerts none.
+    """The user's model; where a case has no load, with an actuator that exerts none, and with motors that prescribe motions.
 
     Raises:
-        ModelError: The file cannot be read.
+        ModelError: The file cannot be read, or holds a number that no force can be computed with.
+        UnknownNameError: A prescribed motion is that of nothing in the model.
+        FileFormatError: A prescribed motion is not that of one joint.
     """
     rig = Rig.from_file(Path(case.folder or ".") / case.rig)
+    _refuse_beyond_numbers(rig)
+    rig = with_prescribed_joints(rig, {entry.joint for entry in prescribed_channels(case, rig)})
     if not case.has(NO_LOAD) or NO_LOAD in rig.actuators:
         return rig
     spec = parse(rig.mjcf, rig.folder, rig.name)
@@ -27,6 +51,16 @@ def rig_of(case: Case) -> Rig:
         actuator = spec.add_actuator(name=NO_LOAD, target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
         actuator.set_to_motor()
     return Rig(rig.name, spec.to_xml(), timestep=rig.timestep, folder=rig.folder)
+
+
+def _refuse_beyond_numbers(rig: Rig) -> None:
+    for name in SIZES:
+        largest = float(np.abs(getattr(rig.model, name)).max(initial=0.0))
+        if largest > SETTINGS.largest:
+            raise ModelError(
+                f"the MJCF '{rig.name}' holds {largest:.3g} (MuJoCo's {name}); "
+                f"numbers up to {SETTINGS.largest:g} are expected: correct the model"
+            )
 
 
 def _measured_joint(case: Case, rig: Rig) -> str:

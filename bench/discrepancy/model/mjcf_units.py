@@ -11,9 +11,9 @@ import mujoco
 
 from bench.discrepancy.case.case import Case, CaseChannel
 from bench.discrepancy.case.unit_conversion import Expectation
+from bench.discrepancy.motion.observer import ORDERS
 from bench.rig import Rig
 
-ORDERS = ("position", "velocity", "acceleration")
 TURNS = {
     "position": ("rad",), "velocity": ("rad/s",), "acceleration": ("rad/s^2",), "load": ("N m",),
     "inertia": ("kg m^2", "kg m^2/rad", "kg m^2/rad^2"), "stiffness": ("N m/rad", "N m"), "damping": ("N m s/rad", "N m s"),

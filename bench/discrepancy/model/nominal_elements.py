@@ -14,7 +14,8 @@ from bench.discrepancy.model.nominal_forces import (
 )
 from bench.discrepancy.model.structure import Structure
 from bench.discrepancy.numerics.cubic_spline import cubic
-from bench.discrepancy.simulation.stick_slip import ROW, SCALE, THETA, Elements, Motion, full
+from bench.discrepancy.simulation.equations_of_motion import ROW, SCALE, THETA
+from bench.discrepancy.simulation.stick_slip import Elements, Motion, full
 from bench.laws.base import kernel
 
 Array = NDArray[np.float64]

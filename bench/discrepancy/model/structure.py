@@ -68,6 +68,7 @@ class Structure:
         frictions: Dry friction of the nominal model.
         springs: What its restoring forces are beyond their tangents.
         elements: Laws of the bench that it holds besides.
+        prescribed: Channels that measure prescribed motions: they tell the motion, and are held against nothing.
     """
 
     dofs: tuple[str, ...]
@@ -83,6 +84,13 @@ class Structure:
     frictions: tuple[NominalFriction, ...] = ()
     springs: tuple[NominalSpring, ...] = ()
     elements: tuple[NominalElement, ...] = ()
+    prescribed: tuple[Observer, ...] = ()
+
+    @cached_property
+    def free(self) -> NDArray[np.intp]:
+        """Degrees of freedom that no prescribed motion moves."""
+        moved = np.sum([np.abs(o.row) for o in self.prescribed], axis=0) if self.prescribed else 0.0
+        return np.flatnonzero(np.zeros(len(self.dofs)) + moved == 0.0)
 
     @property
     def has_own_forces(self) -> bool:
@@ -182,4 +190,5 @@ class Structure:
             tuple(f.restricted(keep) for f in self.frictions if np.any(f.row[keep])),
             tuple(s.restricted(keep, active) for s in self.springs if np.any(s.row[keep])),
             tuple(e.restricted(keep) for e in self.elements if np.any(e.row[keep])),
+            tuple(Observer(o.channel, o.order, o.row[keep]) for o in self.prescribed if np.any(o.row[keep])),
         )

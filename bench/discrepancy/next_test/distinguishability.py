@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from bench.discrepancy.effects.effect import unit_of
+from bench.discrepancy.fitting.goodness_of_fit import names
 from bench.discrepancy.likelihood.problem import Array, Problem
 from bench.discrepancy.model.placement import Placed
-from bench.discrepancy.search.explain import Explanation
-from bench.discrepancy.search.fits import names
+from bench.discrepancy.search.explanation import Explanation
 
 LIMITS = {"clearance": "gap", "position": "stop"}
 

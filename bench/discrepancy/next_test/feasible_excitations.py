@@ -19,7 +19,7 @@ from bench.signals import BandLimitedNoise, Harmonic, ImpulseTrain, Multisine, S
 Simulate = Callable[[CaseRecord], Array]
 
 
-class Limits(NamedTuple):
+class RigLimits(NamedTuple):
     """What the rig can do.
 
     Attributes:
@@ -47,7 +47,7 @@ class Proposal(NamedTuple):
     motion: dict[str, float]
 
 
-def limits_of(problem: Problem) -> Limits:
+def limits_of(problem: Problem) -> RigLimits:
     """Limits of the rig: those stated in ``nominal.json``, those of the records where none are."""
     records = (*problem.case.identification, *problem.case.validation)
     stated = problem.case.options.get("limits", {})
@@ -66,7 +66,7 @@ def limits_of(problem: Problem) -> Limits:
         )
         for o in problem.structure.observers
     }
-    return Limits(load, motion)
+    return RigLimits(load, motion)
 
 
 def resonance(problem: Problem, load: int) -> float:
@@ -144,7 +144,7 @@ def candidates(problem: Problem, loads: Sequence[int], samples: int) -> list[tup
 
 
 def feasible(
-    problem: Problem, label: str, columns: Array, limits: Limits, simulate: Sequence[Simulate]
+    problem: Problem, label: str, columns: Array, limits: RigLimits, simulate: Sequence[Simulate]
 ) -> tuple[Proposal, list[Array]] | None:
     """Scale loads of unit peak to the limits of the rig under every rival.
 

@@ -188,8 +188,8 @@ def _descend(task: _Task, state: _State, difference: float, steps: range) -> _De
         normal, gradient = _without(task.blocked(state.vector, gradient), normal, gradient)
         # least squares: far off, columns of very unequal size leave a normal matrix singular to working precision
         promise = float(gradient @ np.linalg.lstsq(normal, gradient, rcond=None)[0])
-        trifle = max(task.tolerance, task.settings.coarse * task.excess(state))
-        ended = fresh and promise < trifle
+        negligible = max(task.tolerance, task.settings.coarse * task.excess(state))
+        ended = fresh and promise < negligible
         hopeless = (
             step >= task.settings.patience and state.cost - task.settings.optimism * promise > task.limit
         )
@@ -213,10 +213,10 @@ def _descend(task: _Task, state: _State, difference: float, steps: range) -> _De
         predicted = -2.0 * gradient @ move - move @ normal @ move
         surprise = moved.residual - state.residual - jacobian @ move
         state = moved
-        if fresh and gained < trifle:
+        if fresh and gained < negligible:
             return _Descent(state, jacobian, fresh, True, progressed, step + 1)
-        progressed = progressed or gained >= trifle
-        if gained < max(task.settings.faithful * predicted, trifle):
+        progressed = progressed or gained >= negligible
+        if gained < max(task.settings.faithful * predicted, negligible):
             jacobian = None
         else:
             jacobian, fresh = jacobian + np.outer(surprise, move / (move @ move)), False

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from bench.discrepancy.articulated.admission import admitted_robot
 from bench.discrepancy.case.case import Case, CaseRecord
-from bench.discrepancy.checks.data_quality import compare
+from bench.discrepancy.checks.channel_comparison import compare
 from bench.discrepancy.multibody.channels import bound
 from bench.discrepancy.multibody.encoders import encoders_of, input_of
 from bench.discrepancy.multibody.model import ArticulatedModel, compiled_model

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from bench.discrepancy.checks.data_quality import compare
+from bench.discrepancy.checks.channel_comparison import compare
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.precheck.settings import CheckSettings
 

@@ -5,20 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from bench.discrepancy.effects.effect import Effect
+from bench.discrepancy.fitting.goodness_of_fit import consistent, near, sticks
 from bench.discrepancy.fitting.map_fit import Fit
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.screening.linear_amplitudes import Point
-from bench.discrepancy.screening.screen import Ground, Screen
-from bench.discrepancy.search.fits import (
-    consistent,
-    near,
-    sticks,
-)
+from bench.discrepancy.screening.projection import Ground
+from bench.discrepancy.screening.screen import Screen
 from bench.discrepancy.settings import DiagnosisSettings
 
 
-def _at_ease(fitted: Fit, problem: Problem) -> bool:
+def _within_priors(fitted: Fit, problem: Problem) -> bool:
     """Whether a hypothesis explains the records without nominal parameters far off their values."""
     return (
         consistent(fitted)
@@ -26,14 +23,14 @@ def _at_ease(fitted: Fit, problem: Problem) -> bool:
     )
 
 
-def followed(base: Fit, problem: Problem) -> bool:
+def tells_motion(base: Fit, problem: Problem) -> bool:
     """Whether one more effect is best screened along the free run of a base, since that tells the motion better than the records.
 
     Where friction sticks it is not, unless all is explained: a small force more moves the stops, which no linear response does.
-    The nominal model alone is asked whether it is at ease with what it leaves.
+    The nominal model alone is asked whether it explains the records within its priors.
     """
     if not base.hypothesis:
-        return _at_ease(base, problem)
+        return _within_priors(base, problem)
     return consistent(base) or (near(base) and not sticks(base))
 
 
@@ -49,7 +46,7 @@ def along(screen: Screen, fitted: Fit) -> Screen:
     Not where a sensor is part of it; what the sensor told instead would be no residual of another force.
     """
     spoilt = any(placed.effect.site == "sensor" for placed in fitted.hypothesis)
-    told = fitted.hypothesis and followed(fitted, screen.problem) and not spoilt
+    told = fitted.hypothesis and tells_motion(fitted, screen.problem) and not spoilt
     return screen.beside(fitted, simulated=True) if told else screen
 
 

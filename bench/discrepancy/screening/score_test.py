@@ -29,8 +29,8 @@ from bench.discrepancy.likelihood.problem import Array, Problem
 from bench.discrepancy.likelihood.whitening import whitened
 from bench.discrepancy.model.structure import Place
 from bench.discrepancy.numerics.threads import in_threads
-from bench.discrepancy.response.driving_loads import with_load_noise
-from bench.discrepancy.screening.screen import Ground, Screen
+from bench.discrepancy.screening.projection import Ground
+from bench.discrepancy.screening.screen import Screen
 from bench.discrepancy.settings import DEFAULT, ScreeningSettings
 
 PRODUCTS = ((1, 1), (2, 1), (1, 2))
@@ -163,7 +163,7 @@ def _expected(problem: Problem, fitted: Fit, free: _Free) -> dict[str, float]:
         drawn = problem.forgetful()
         passed: tuple[list[Array], list[Array]] = [], []
         for data, runs in zip(problem.data, clean, strict=True):
-            record = with_load_noise(problem, data.record, rng)
+            record = problem.with_load_noise(data.record, rng)
             own = problem.noise * rng.standard_normal(data.responses.shape)
             noisy = (
                 drawn.simulate(fitted.hypothesis, fitted.vector, record),

@@ -1,9 +1,7 @@
 """Screening: every effect on a grid of its shape parameters, by one linear least-squares problem a grid point.
 
-Along the true motion the equation ``M a + C v + K q + f = B u`` holds exactly, so the response is that of the *linear*
-structure to ``B u - f(q, v)``. With the measured motion, smoothed, in place of the true one, the unknown force
-becomes an input, and effect amplitudes and nominal deviations enter the response linearly. Residuals are those of the
-free run, whitened as in the fits: screened improvements of chi-squared are nearly those that a fit would find, at the
+Effect amplitudes and nominal deviations enter the response along the measured motion linearly (`motion_response`). Residuals are
+those of the free run, whitened as in the fits: screened improvements of chi-squared are nearly those that a fit would find, at the
 price of one linear simulation a grid point, and there is no start from which it could fail to converge.
 
 Effects of actuators and sensors spoil the measured motion itself. They are screened by what they change in the
@@ -12,20 +10,12 @@ simulated channels instead.
 
 from __future__ import annotations
 
-import copy
-from collections.abc import Callable, Sequence
-from dataclasses import replace
-from typing import NamedTuple
+from collections.abc import Sequence
 
 import numpy as np
 
-from bench.discrepancy.case.case import CaseRecord
-from bench.discrepancy.effects.channel_operators import quantise
 from bench.discrepancy.fitting.map_fit import Fit
 from bench.discrepancy.likelihood.problem import Array, Problem
-from bench.discrepancy.likelihood.whitening import whitened
-from bench.discrepancy.likelihood.window_whitening import channels_of, in_motion
-from bench.discrepancy.model.nominal_elements import own_change, own_force, own_friction
 from bench.discrepancy.model.placement import Hypothesis, Placed
 from bench.discrepancy.numerics.least_squares import Prior, minimise
 from bench.discrepancy.numerics.threads import in_threads
@@ -36,56 +26,12 @@ from bench.discrepancy.screening.linear_amplitudes import (
     read,
     spanning,
 )
-from bench.discrepancy.simulation.linear_response import linear_run
-from bench.discrepancy.simulation.prescribed_response import driven_force
-from bench.discrepancy.simulation.step_size import steps
-from bench.discrepancy.simulation.stick_slip import Elements, LinearStructure
+from bench.discrepancy.screening.motion_response import About, MotionResponse
+from bench.discrepancy.screening.projection import Ground
+from bench.discrepancy.screening.run_columns import signal_nodes, simulated_columns
 
 
-class Ground(NamedTuple):
-    """What the effects of a base and the nominal parameters leave to be explained, and what they can imitate.
-
-    Attributes:
-        residual: (n,) whitened residual of the base.
-        prior: (k_prior,) residual of the nominal parameters' priors where the base has them.
-        head: (n, k) orthonormal basis of the base's columns, together with `tail`.
-        tail: (k_prior, k) the same basis in the rows of the priors.
-        nominal: (n, n_nominal) the base's columns of the nominal parameters.
-        triangle: (k, k) what makes the base's columns of their basis.
-    """
-
-    residual: Array
-    prior: Array
-    head: Array
-    tail: Array
-    nominal: Array
-    triangle: Array
-
-    def moves(self, response: Array) -> Array:
-        """Changes of the base's parameters (k,) that go with a response (n,) being explained by something else."""
-        seen = self.head.T @ (self.residual - response) + self.tail.T @ self.prior
-        return np.asarray(np.linalg.lstsq(self.triangle, seen, rcond=1e-12)[0], dtype=np.float64)
-
-    @property
-    def left(self) -> Array:
-        """What the base leaves (n + k_prior,), its parameters free to first order."""
-        imitated = self.head.T @ self.residual + self.tail.T @ self.prior
-        return np.concatenate([self.residual - self.head @ imitated, self.prior - self.tail @ imitated])
-
-    def project(self, response: Array) -> Array:
-        """Part of a response (n,) that the base cannot imitate, the price of its priors appended."""
-        imitated = self.head.T @ response
-        return np.concatenate([response - self.head @ imitated, -self.tail @ imitated])
-
-
-class About(NamedTuple):
-    """What a screening is about, see `Screen.beside`."""
-
-    base: Fit
-    simulated: bool
-
-
-class Screen:
+class Screen(MotionResponse):
     """Whitened responses to all joint effects along the measured motion, ready to be conditioned on a base.
 
     Args:
@@ -101,31 +47,9 @@ class Screen:
         *,
         about: About | None = None,
     ) -> None:
+        super().__init__(problem, about=about)
         self.candidates: list[Placed] = []
         self._beside: tuple[bytes, Screen] | None = None
-        n = len(problem.nominal)
-        values, self.sensors = problem.nominal, []
-        if about is not None:
-            values, etas = problem.split(about.base.hypothesis, about.base.vector)
-            own = zip(about.base.hypothesis, etas, strict=True)
-            self.sensors = [(p, eta) for p, eta in own if p.effect.site == "sensor"]
-            self._unspoilt = [_unspoilt(problem, about.base, record) for record in problem.records]
-            # windows restart from the measured motion, so that a free run of them has no motion of its own
-            if not problem.driven and not problem.windowed and (self.sensors or about.simulated):
-                problem = _moving(problem, about, self._unspoilt)
-        self.problem = problem
-        linear = problem.structure.at(values)
-        self.linear = LinearStructure(linear.mass, linear.damping, linear.stiffness, np.eye(len(linear.mass)))
-        for i in range(len(problem.records)):
-            problem.motion(i)
-        spread = np.where(problem.spread > 0.0, problem.spread, 1.0)
-        self.deviations = (values - problem.nominal) / spread
-        self.zero = problem.residual((), self.deviations)
-        if problem.structure.has_own_forces and not problem.driven:
-            self.zero = self._without_own_forces() - self.response(
-                lambda i: -own_force(problem.structure, values, problem.motion(i), problem.records[i].step)
-            )
-        self.nominal = np.column_stack(in_threads(self._nominal_response, range(n)))
         self.inertia: list[Placed] = []
         self.signals: list[Placed] = []
         self.nodes: list[Node] = []
@@ -160,84 +84,6 @@ class Screen:
             self._beside = None  # a screening is large
             self._beside = key, Screen(self.problem, self.candidates, about=about)
         return self._beside[1]
-
-    def _sensed(self, channels: Array, index: int) -> Array:
-        """Change of the channels (n, n_channels) of a record behind the sensor effects that this screening is about."""
-        if not self.sensors:
-            return channels
-        # steps pass changes on average, and their noise is in the residual already
-        smooth = [(p, eta) for p, eta in self.sensors if p.effect.signal is not quantise]
-        placed, etas = tuple(p for p, _ in smooth), [eta for _, eta in smooth]
-        step, free = self.problem.records[index].step, self._unspoilt[index]
-        # a unit of an effect may be many times the motion: a sensor that clips would clip all of it
-        peaks, changes = np.abs(free).max(axis=0), np.abs(channels).max(axis=0)
-        moved = changes > 0.0
-        small = self.problem.settings.screening.small_change * np.min(
-            peaks[moved] / changes[moved], initial=np.inf
-        )
-        if not np.isfinite(small) or small == 0.0:
-            return channels
-        with_change = self.problem.sensed(placed, etas, free + small * channels, step)
-        return (with_change - self.problem.sensed(placed, etas, free.copy(), step)) / small
-
-    def _nominal_response(self, parameter: int) -> Array:
-        """Whitened response of all records to a deviation of one nominal parameter, or initial state, by its uncertainty."""
-        if parameter >= self.problem.n_physical:
-            return self._start_response(parameter)
-        return self.response(lambda i: self._deviation(i, parameter))
-
-    def _deviation(self, index: int, parameter: int) -> Array:
-        """Force that a deviation of one nominal parameter by its uncertainty takes from the structure."""
-        motion, s = self.problem.motion(index), self.problem.structure
-        force = own_change(s, parameter, motion, self.problem.nominal, self.problem.records[index].step)
-        force += motion.acceleration @ s.mass[parameter].T + motion.velocity @ s.damping[parameter].T
-        return -self.problem.spread[parameter] * (force + motion.position @ s.stiffness[parameter].T)
-
-    def _without_own_forces(self) -> Array:
-        """Whitened residuals of the nominal model without its own dry friction and bending springs."""
-        problem = self.problem
-        parts = [
-            whitened(d.responses - problem.simulate((), self.deviations, d.record, own_forces=False), d)
-            for d in problem.data
-        ]
-        return np.concatenate(parts)
-
-    def _start_response(self, parameter: int) -> Array:
-        """Whitened response of all records to a deviation of one initial state by its uncertainty."""
-        problem = self.problem
-        values = np.zeros(len(problem.nominal))
-        values[parameter] = problem.spread[parameter]
-        parts = []
-        for data in problem.data:
-            record, n_dof = data.record, len(problem.structure.dofs)
-            start = problem.starts_of(record, values)[0] if in_motion(record) else np.zeros(2 * n_dof)
-            motion = linear_run(
-                self.linear, loads=np.zeros((len(record), n_dof)), step=record.step, start=start
-            )
-            parts.append(whitened(problem.acquired(channels_of(problem.structure, motion), record), data))
-        return np.concatenate(parts)
-
-    def response(self, force_on_dofs: Callable[[int], Array]) -> Array:
-        """Whitened response of all records to forces on the degrees of freedom, given by record index."""
-        with np.errstate(over="ignore", invalid="ignore"):  # forces that diverge: their nodes are left out
-            return np.concatenate(
-                [self._responses(force_on_dofs(i), i) for i in range(len(self.problem.data))]
-            )
-
-    def _responses(self, force: Array, index: int) -> Array:
-        data = self.problem.data[index]
-        if self.problem.driven:
-            return whitened(self._sensed(-force, index), data)
-        lead = self.problem.lead_in(data.record)
-        firsts = self.problem.firsts(data.record)[1:]
-        loads = np.vstack([force] * (1 + lead // len(force)))
-        motion = linear_run(self.linear, loads=loads, step=data.record.step, restarts=firsts)
-        channels = self._sensed(channels_of(self.problem.structure, motion)[lead:], index)
-        return whitened(self.problem.acquired(channels, data.record), data)
-
-    def effect_response(self, placed: Placed, eta: Array) -> Array:
-        """Whitened response to an effect along the measured motion."""
-        return self.response(lambda i: -force_along(self.problem, placed, eta, i))
 
     def _node(self, placed: Placed, eta: Array) -> Node | None:
         # hundreds of grid points are kept, and a free force has dozens of columns: seven digits are enough
@@ -313,7 +159,7 @@ class Screen:
         own = {placed.key for placed in hypothesis}
         rest = ground.left[: len(ground.residual)]
         nodes = [node for node in self.nodes if node.placed.key not in own]
-        nodes += self._signal_nodes(hypothesis, vector)
+        nodes += signal_nodes(self.problem, self.signals, hypothesis, vector)
 
         def solved(node: Node) -> Point | None:
             inner = products(ground.head, node.columns)
@@ -376,7 +222,7 @@ class Screen:
             residual = self.problem.residual(hypothesis, vector)
             # what is left of an explanation without one of its effects may diverge, and tells nothing then
             if np.isfinite(residual).all():
-                columns = self._simulated_columns(hypothesis, vector, residual)
+                columns = simulated_columns(self.problem, hypothesis, vector, residual)
                 return residual, columns, vector[: len(self.problem.nominal)]
         residual = self.zero.copy()
         columns = [self.nominal]
@@ -402,100 +248,3 @@ class Screen:
         response, *moved = in_threads(lambda point: self.effect_response(placed, point), points)
         changes = [(m - response) / (p[k] - eta[k]) for m, p, k in zip(moved, points[1:], free, strict=True)]
         return response, np.array(changes).reshape(-1, len(response)).T
-
-    def _simulated_columns(self, hypothesis: Hypothesis, vector: Array, residual: Array) -> Array:
-        """Responses (n, k) of a free run to the nominal parameters and to the free ones of its effects."""
-        _, std, _, high = self.problem.prior(hypothesis)
-        shapes = [p.fixed for placed in hypothesis for p in placed.effect.parameters]
-        held = [False] * len(self.problem.nominal) + shapes
-        return np.column_stack(
-            in_threads(
-                lambda i: self._simulated_column(
-                    hypothesis,
-                    vector,
-                    residual,
-                    i,
-                    self.problem.settings.screening.run_step * std[i],
-                    high[i],
-                ),
-                np.flatnonzero(~np.array(held)).tolist(),
-            )
-        )
-
-    def _simulated_column(
-        self, hypothesis: Hypothesis, vector: Array, residual: Array, entry: int, step: float, high: float
-    ) -> Array:
-        """Response (n,) of a free run to one entry of its vector; zero where a step either way lets the run diverge."""
-        for change in (step, -step):
-            moved = vector.copy()
-            moved[entry] += change
-            if moved[entry] > high:
-                continue
-            away = self.problem.residual(hypothesis, moved)
-            if away.shape == residual.shape:
-                return np.asarray((residual - away) / change, dtype=np.float64)
-        return np.zeros_like(residual)
-
-    def _signal_nodes(self, hypothesis: Hypothesis, vector: Array) -> list[Node]:
-        """Changes that actuator and sensor effects make to the simulated channels of a base."""
-        own = {placed.key for placed in hypothesis}
-        base = self.problem.residual(hypothesis, vector)
-
-        def node(task: tuple[Placed, Array]) -> Node | None:
-            placed, eta = task
-            point = eta.copy()
-            if placed.effect.parameters[0].signed:
-                point[0] = self.problem.settings.screening.signal_step
-            changed = self.problem.residual((*hypothesis, placed), np.concatenate([vector, point]))
-            if changed.shape != base.shape or not np.any(changed != base):
-                return None
-            column = (base - changed)[:, None]
-            return Node(placed, point, column, column.T @ column)
-
-        tasks = [(p, eta) for p in self.signals if p.key not in own for eta in p.effect.grid()]
-        return [found for found in in_threads(node, tasks) if found is not None]
-
-
-def _unspoilt(problem: Problem, base: Fit, record: CaseRecord) -> Array:
-    """Channels (n, n_channels) of the free run of a base without its sensor effects."""
-    _, etas = problem.split(base.hypothesis, base.vector)
-    kept = [(p, eta) for p, eta in zip(base.hypothesis, etas, strict=True) if p.effect.site != "sensor"]
-    vector = np.concatenate([base.vector[: len(problem.nominal)], *(eta for _, eta in kept)])
-    return problem.simulate(tuple(p for p, _ in kept), vector, record)
-
-
-def _moving(problem: Problem, about: About, unspoilt: Sequence[Array]) -> Problem:
-    """A problem whose motion is that of a base's free run, or the measured one less what its sensor effects change."""
-    hypothesis, vector = about.base.hypothesis, about.base.vector
-    motions = {}
-    for record, free in zip(problem.records, unspoilt, strict=True):
-        if about.simulated:
-            motions[record.name] = problem.free_motion(hypothesis, vector, record)
-            continue
-        measured = np.column_stack([record.values[name] for name in problem.structure.channels])
-        channels = measured - problem.simulate(hypothesis, vector, record) + free
-        values = dict(zip(problem.structure.channels, channels.T, strict=True))
-        motions[record.name] = problem.smoothed(replace(record, values={**record.values, **values}))
-    moving = copy.copy(problem)
-    moving.motions = motions
-    return moving
-
-
-def force_along(problem: Problem, placed: Placed, eta: Array, index: int) -> Array:
-    """Force of an effect on the degrees of freedom (n, n_dof) along the measured motion of record `index`."""
-    motion = problem.motion(index)
-    record = problem.records[index]
-    rows = placed.place.rows
-    elements, rates = problem.elements((placed,), [eta], record)
-    local = Elements(elements.table, rows, elements.theta, elements.start)
-    force = driven_force(
-        local,
-        position=motion.position @ rows.T,
-        velocity=motion.velocity @ rows.T,
-        step=record.step,
-        substeps=steps(record.step * rates, settings=problem.settings.simulation),
-        start_time=record.start,
-    )
-    if placed.effect.in_place:
-        force[:, 0] -= own_friction(problem.structure, problem.nominal, motion, rows[0], record.step)
-    return force @ rows

@@ -7,26 +7,22 @@ from collections.abc import Callable, Collection, Sequence
 import numpy as np
 
 from bench.discrepancy.effects.effect import Effect
+from bench.discrepancy.fitting.goodness_of_fit import names
 from bench.discrepancy.fitting.map_fit import Fit
 from bench.discrepancy.model.placements import placements
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.screening.candidates import (
     about,
-    followed,
     leading,
     passed_over,
     refined,
+    tells_motion,
 )
 from bench.discrepancy.screening.linear_amplitudes import Point, fainter
-from bench.discrepancy.screening.screen import Ground, Screen
-from bench.discrepancy.search.fits import (
-    Search,
-    converge,
-    names,
-)
-from bench.discrepancy.search.forward_selection import (
-    first_fit,
-)
+from bench.discrepancy.screening.projection import Ground
+from bench.discrepancy.screening.screen import Screen
+from bench.discrepancy.search.extension import first_fit
+from bench.discrepancy.search.fits import Search, converge
 from bench.discrepancy.search.rivals import reduce_best
 
 Keys = Collection[tuple[str, str, str]]
@@ -123,7 +119,7 @@ def _ground(screen: Screen, base: Fit) -> tuple[bool, Screen, Ground]:
 
     A free run that misses the noise by far still tells the motion better than accelerations, twice integrated, if it leaves less.
     """
-    if not followed(base, screen.problem):
+    if not tells_motion(base, screen.problem):
         local = about(screen, base, explained=False)
         ground = local.ground(base)
         if float(np.sum(ground.left**2)) < base.chi2:

@@ -9,143 +9,30 @@ noise, or a force. Chi-squared and evidence add over groups, so all explanations
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import cached_property
 from itertools import product
 
 import numpy as np
 
-from bench.discrepancy.case.case import Case, CaseRecord
+from bench.discrepancy.case.case import Case
 from bench.discrepancy.effects.effect import Effect
-from bench.discrepancy.fitting.initial_state_fit import predict
-from bench.discrepancy.fitting.map_fit import Fit, fit
+from bench.discrepancy.fitting.goodness_of_fit import consistent, key_of, names, near
+from bench.discrepancy.fitting.map_fit import Fit
 from bench.discrepancy.likelihood.model_error import ModelError
-from bench.discrepancy.likelihood.problem import Array, Problem, band_bins
-from bench.discrepancy.likelihood.whitening import whitened
-from bench.discrepancy.model.placement import Hypothesis, Placed
+from bench.discrepancy.likelihood.problem import Problem, band_bins
+from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.model.placements import placements
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.model.structure import Structure
 from bench.discrepancy.numerics.deadline import NEVER, Deadline
-from bench.discrepancy.screening.candidates import leading
-from bench.discrepancy.screening.score_test import LackOfFit, lack_of_fit
-from bench.discrepancy.screening.screen import Screen
 from bench.discrepancy.search.coupled_effects import coupled_fits
-from bench.discrepancy.search.fits import (
-    Search,
-    Task,
-    consistent,
-    converge,
-    key_of,
-    names,
-    near,
-    posterior,
-)
+from bench.discrepancy.search.explanation import Explanation, leaves_nothing, nothing_left_first, parsimonious
+from bench.discrepancy.search.fits import Search, Task, converge
 from bench.discrepancy.search.forward_selection import (
     Prepared,
     attribute,
     prepare,
 )
 from bench.discrepancy.settings import DiagnosisSettings
-
-
-@dataclass(frozen=True, eq=False)
-class Explanation:
-    """A hypothesis for the whole rig, fitted.
-
-    Attributes:
-        parts: One (problem, fit) for every group of degrees of freedom.
-    """
-
-    parts: tuple[tuple[Problem, Fit], ...]
-
-    @property
-    def hypothesis(self) -> Hypothesis:
-        """All effects."""
-        return tuple(placed for _, fitted in self.parts for placed in fitted.hypothesis)
-
-    @property
-    def settings(self) -> DiagnosisSettings:
-        """Thresholds of the problems it explains."""
-        return self.parts[0][0].settings
-
-    @property
-    def n_free(self) -> int:
-        """Number of free parameters of all effects."""
-        return sum(not p.fixed for placed in self.hypothesis for p in placed.effect.parameters)
-
-    @property
-    def log_posterior(self) -> float:
-        """Log posterior up to a constant common to all explanations of a case."""
-        return sum(posterior(fitted) for _, fitted in self.parts)
-
-    @property
-    def consistent(self) -> bool:
-        """Whether every group's residuals are down to the noise."""
-        return all(consistent(fitted) for _, fitted in self.parts)
-
-    @cached_property
-    def lacks(self) -> tuple[LackOfFit, ...]:
-        """What free models still find in each group."""
-        return tuple(lack_of_fit(problem, fitted) for problem, fitted in self.parts)
-
-    def lacking(self, nothing: Explanation) -> tuple[bool, ...]:
-        """Whether something is left in each group although chi-squared is down to the noise; beside the nominal model alone.
-
-        Not asked of windows: their motion is known as measured only, and its noise is that of the residuals.
-        """
-        if not self.consistent or any(problem.windowed or problem.error for problem, _ in self.parts):
-            return (False,) * len(self.parts)
-        explained = nothing.chi2 - self.chi2
-        return tuple(
-            lack.significant(explained, effects=len(fitted.hypothesis))
-            for lack, (_, fitted) in zip(self.lacks, self.parts, strict=True)
-        )
-
-    @property
-    def noise_stated(self) -> bool:
-        """Whether the noise of every response channel is stated, so that chi-squared has an absolute meaning."""
-        return all(problem.noise_stated for problem, _ in self.parts)
-
-    @property
-    def scaled(self) -> bool:
-        """Whether chi-squared has an absolute meaning, by the noise or by the error of the model."""
-        return all(problem.scaled for problem, _ in self.parts)
-
-    @property
-    def coarse(self) -> bool:
-        """Whether residuals are weighed by the error of the model, not by their noise alone."""
-        return any(problem.error is not None for problem, _ in self.parts)
-
-    @property
-    def chi2(self) -> float:
-        """Chi-squared of all groups."""
-        return sum(f.chi2 for _, f in self.parts)
-
-    @property
-    def reduced(self) -> float:
-        """Chi-squared of all groups over its expectation."""
-        return self.chi2 / sum(f.n_residuals for _, f in self.parts)
-
-    def predict(self, record: CaseRecord) -> dict[str, Array]:
-        """Free run of a record: response channel to samples (n,)."""
-        out: dict[str, Array] = {}
-        for problem, fitted in self.parts:
-            samples = predict(problem, fitted.hypothesis, fitted.vector, record)
-            out.update({name: samples[:, c] for c, name in enumerate(problem.structure.channels)})
-        return out
-
-    def reduced_on(self, record: CaseRecord) -> float:
-        """Chi-squared over its expectation on a record that the fit has not seen."""
-        chi2 = count = 0.0
-        for problem, fitted in self.parts:
-            data = problem.prepare(record, (fitted.hypothesis, fitted.vector))
-            residual = whitened(
-                data.responses - predict(problem, fitted.hypothesis, fitted.vector, record), data
-            )
-            chi2 += float(residual @ residual)
-            count += len(residual)
-        return chi2 / count
 
 
 def explain(
@@ -173,24 +60,43 @@ def explain(
     """
     structure = structure_of(case, settings=settings)
     groups = structure.groups()
-    if len(groups) == 1:
-        search = _attributed(
-            Problem(case, structure, case.identification, error=error, settings=settings),
-            placements(case, structure, catalogue),
-            most=most,
-            progress=progress,
-            deadline=deadline,
-        )
-        problem = search.problem
-        converge(search, _again(search, seeds))
-        found = [Explanation(((problem, fitted),)) for fitted in search.ranked()]
-        return _nothing_left_first(found) if problem.scaled else _parsimonious(found)
+    if len(groups) > 1:
+        parts = [structure.restricted(group) for group in groups]
+        return _in_groups(
+            case, catalogue, structure, parts,
+            most=most, progress=progress, error=error, deadline=deadline, settings=settings,
+        )  # fmt: skip
+    search = _attributed(
+        Problem(case, structure, case.identification, error=error, settings=settings),
+        placements(case, structure, catalogue),
+        most=most,
+        progress=progress,
+        deadline=deadline,
+    )
+    problem = search.problem
+    converge(search, _again(search, seeds))
+    found = [Explanation(((problem, fitted),)) for fitted in search.ranked()]
+    return nothing_left_first(found) if problem.scaled else parsimonious(found)
+
+
+def _in_groups(
+    case: Case,
+    catalogue: Sequence[Effect],
+    structure: Structure,
+    parts: Sequence[Structure],
+    *,
+    most: int,
+    progress: Callable[[str], None],
+    error: ModelError | None,
+    deadline: Deadline,
+    settings: DiagnosisSettings,
+) -> list[Explanation]:
+    """Explanations of a rig that falls apart into groups of degrees of freedom, and of effects that couple them."""
     bins = _common_bins(case, structure, settings=settings)
-    whole = Problem(case, structure, case.identification, bins, error=error, settings=settings)
+    whole = Problem(case, structure, case.identification, bins=bins, error=error, settings=settings)
     prepared = []
-    for group in groups:
-        part = structure.restricted(group)
-        problem = Problem(case, part, case.identification, bins, error=error, settings=settings)
+    for part in parts:
+        problem = Problem(case, part, case.identification, bins=bins, error=error, settings=settings)
         progress(f"screening of {', '.join(part.dofs)}")
         prepared.append(prepare(problem, placements(case, part, catalogue)))
     odd = [entry for entry in prepared if not consistent(entry[0].ranked(0)[0])]
@@ -203,28 +109,40 @@ def explain(
         )
         settled = deep and consistent(coupled.ranked()[0])
     if not settled:
-        hopeless = False
-        for entry in prepared:
-            problem = entry[0].problem
-            progress(f"degrees of freedom {', '.join(problem.structure.dofs)}")
-            chosen = placements(case, problem.structure, catalogue)
-            search = attribute(
-                problem,
-                chosen,
-                most=1 if hopeless else 2,
-                progress=progress,
-                prepared=entry,
-                deadline=deadline,
-            )
-            hopeless = hopeless or search.ranked()[0].reduced > settings.search.hopeless_group
-    found = _nothing_left_first(_combined([entry[0] for entry in prepared]))
-    missing = odd and not deep and not _leaves_nothing(found)
+        _group_by_group(case, catalogue, prepared, progress=progress, deadline=deadline)
+    found = nothing_left_first(_combined([entry[0] for entry in prepared]))
+    missing = odd and not deep and not leaves_nothing(found)
     if missing and deadline.allows("effects that couple the degrees of freedom"):
         coupled_fits(coupled, catalogue, most, progress)
     # what falls apart is doubted better group by group
     known = {key_of(e.hypothesis) for e in found}
     found += [Explanation(((whole, f),)) for f in coupled.ranked() if key_of(f.hypothesis) not in known]
-    return _nothing_left_first(sorted(found, key=lambda e: -e.log_posterior))
+    return nothing_left_first(sorted(found, key=lambda e: -e.log_posterior))
+
+
+def _group_by_group(
+    case: Case,
+    catalogue: Sequence[Effect],
+    prepared: Sequence[Prepared],
+    *,
+    progress: Callable[[str], None],
+    deadline: Deadline,
+) -> None:
+    """Search each group on its own, two effects in each; once one is far from explained, one in the others."""
+    hopeless = False
+    for entry in prepared:
+        problem = entry[0].problem
+        progress(f"degrees of freedom {', '.join(problem.structure.dofs)}")
+        chosen = placements(case, problem.structure, catalogue)
+        search = attribute(
+            problem,
+            chosen,
+            most=1 if hopeless else 2,
+            progress=progress,
+            prepared=entry,
+            deadline=deadline,
+        )
+        hopeless = hopeless or search.ranked()[0].reduced > problem.settings.search.hopeless_group
 
 
 def _again(search: Search, seeds: Sequence[Explanation]) -> list[Task]:
@@ -285,57 +203,6 @@ def _beyond(coupled: Fit, prepared: Sequence[Prepared]) -> bool:
     return sum(_promised(entry) for entry in prepared) > coupled.chi2 + coupled.settings.search.sight
 
 
-def _nothing_left_first(found: list[Explanation]) -> list[Explanation]:
-    """Put an explanation that leaves nothing before a likelier one in which free models find a force.
-
-    The toll that an effect pays for the inaccuracy of the diagnosis may else let a law win that the records refute.
-    """
-    if not found[0].consistent or _leaves_nothing(found):
-        return found
-    nothing = nominal_alone(found)
-    near = [
-        e
-        for e in found[1:]
-        if e.log_posterior > found[0].log_posterior - found[0].settings.search.within_reach and e.consistent
-    ]
-    for other in near[: found[0].settings.search.reconsidered]:
-        if not any(other.lacking(nothing)):
-            return [other, *(e for e in found if e is not other)]
-    return found
-
-
-def nominal_alone(explanations: Sequence[Explanation]) -> Explanation:
-    """The explanation without any effect."""
-    return next(e for e in explanations if not e.hypothesis)
-
-
-def _leaves_nothing(found: Sequence[Explanation]) -> bool:
-    """Whether the first explanation is down to the noise, and free models find nothing in what it leaves."""
-    nothing = nominal_alone(found)
-    return found[0].consistent and not any(found[0].lacking(nothing))
-
-
-def _parsimonious(found: list[Explanation]) -> list[Explanation]:
-    """Put the plainest explanation first."""
-    chosen = plainest(found)
-    return [chosen, *(e for e in found if e is not chosen)]
-
-
-def plainest(found: Sequence[Explanation]) -> Explanation:
-    """The explanation of fewest parameters that no larger one improves much.
-
-    Where chi-squared has no absolute scale, or all explanations are far from the noise, residuals of a measured component are mostly
-    model error, far from independent: differences in evidence then say little about one more effect. Parameters are counted,
-    not effects, since a law of seven would else be preferred to two of one each.
-    """
-    ordered = sorted(found, key=lambda e: (e.n_free, e.reduced))
-    chosen = ordered[0]
-    for larger in ordered[1:]:
-        if larger.reduced < found[0].settings.search.stalled * chosen.reduced:
-            chosen = larger
-    return chosen
-
-
 def _common_bins(case: Case, structure: Structure, *, settings: DiagnosisSettings) -> dict[str, int]:
     whole = Problem(case, structure, case.identification, settings=settings)
     bins = {d.record.name: d.n_bins for d in whole.data}
@@ -357,55 +224,3 @@ def _combined(searches: Sequence[Search]) -> list[Explanation]:
     ]
     found = [Explanation(tuple(parts)) for parts in product(*ranked)]
     return sorted(found, key=lambda e: -e.log_posterior)
-
-
-def close(best: Explanation, nothing: Explanation, closures: Sequence[Effect]) -> tuple[Explanation, str]:
-    """Add nonparametric closures to an explanation while they pay.
-
-    Args:
-        best: The best catalogued explanation.
-        nothing: The nominal model alone.
-        closures: Free models of a missing force.
-
-    Returns:
-        The closed explanation, and the names of the closures used.
-    """
-    settings = best.settings.search
-    parts, used = [], []
-    for (problem, fitted), lacks in zip(best.parts, best.lacking(nothing), strict=True):
-        current = fitted
-        if lacks or not consistent(fitted) or problem.error is not None:
-            candidates = placements(problem.case, problem.structure, closures)
-            screen = Screen(problem, candidates)
-            current = fit(problem, (), start=np.zeros(len(problem.nominal)), iterations=settings.thorough)
-            if fitted.reduced - 1.0 < settings.helpful * (current.reduced - 1.0):
-                current = fitted
-            for _ in range(settings.closures):
-                closed = _closed(problem, screen, current)
-                if closed is None:
-                    break
-                current = closed
-                used.append(closed.hypothesis[-1].effect.name)
-                if consistent(current) and not lacks:
-                    break
-        parts.append((problem, current))
-    return Explanation(tuple(parts)), " + ".join(dict.fromkeys(used))
-
-
-def _closed(problem: Problem, screen: Screen, current: Fit) -> Fit | None:
-    """One more closure on top of a fit: of those that the screening likes best the first that pays; None where none does."""
-    settings = problem.settings.search
-    own = {placed.key for placed in current.hypothesis}
-    for point in leading(
-        [p for p in screen.ranked(current) if p.placed.key not in own],
-        settings.closures_tried,
-        0.0,
-        starts=1,
-        settings=problem.settings,
-    ):
-        start = np.concatenate([current.vector, point.eta])
-        closed = fit(problem, (*current.hypothesis, point.placed), start=start, iterations=12)
-        idle = not consistent(current) and closed.reduced - 1.0 > settings.stalled * (current.reduced - 1.0)
-        if not idle and closed.log_evidence > current.log_evidence:
-            return closed
-    return None

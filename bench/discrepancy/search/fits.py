@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.discrepancy.fitting.goodness_of_fit import consistent, key_of, near, posterior, sticks
 from bench.discrepancy.fitting.map_fit import Fit, fit, free_entries, laplace
 from bench.discrepancy.likelihood.problem import Array, Problem
 from bench.discrepancy.model.placement import Hypothesis
@@ -16,7 +17,6 @@ from bench.discrepancy.numerics.least_squares import (
 )
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.screening.linear_amplitudes import Point
-from bench.discrepancy.settings import DEFAULT, SearchSettings
 
 Task = tuple[Hypothesis, np.ndarray]
 """Effects, and the vector or vectors that a fit of them starts from."""
@@ -60,55 +60,6 @@ class Search:
         """Fits by decreasing posterior, of one number of effects or of all."""
         chosen = [f for f in self.fits.values() if size is None or len(f.hypothesis) == size]
         return sorted(chosen, key=lambda f: -posterior(f))
-
-
-def key_of(hypothesis: Hypothesis) -> frozenset:
-    """Key of a hypothesis, regardless of the order of its effects."""
-    return frozenset(placed.key for placed in hypothesis)
-
-
-def posterior(fitted: Fit) -> float:
-    """Log posterior of a hypothesis up to a constant."""
-    settings = fitted.settings.search
-    # the inaccuracy of one effect may be made good by any other
-    exact = all(placed.effect.exact for placed in fitted.hypothesis)
-    tolerance = 0.0 if exact else 0.5 * settings.immaterial * fitted.n_residuals
-    return fitted.log_evidence + (settings.log_prior_effect - tolerance) * len(fitted.hypothesis)
-
-
-def log_prior_of(hypothesis: Hypothesis, *, settings: SearchSettings) -> float:
-    """Log prior odds of a hypothesis against the nominal model alone."""
-    return sum(settings.log_prior_effect + placed.effect.log_prior for placed in hypothesis)
-
-
-def complexity(hypothesis: Hypothesis, *, settings: SearchSettings = DEFAULT.search) -> float:
-    """How much a hypothesis takes to be described, in units of log prior.
-
-    A parameter counts as one, which is what it gains on average where nothing is to be gained. A law of seven parameters is larger so
-    than two of one each, and what holds a law at the limit of its parameters is better told by the two.
-    """
-    free = sum(not p.fixed for placed in hypothesis for p in placed.effect.parameters)
-    return free - log_prior_of(hypothesis, settings=settings)
-
-
-def consistent(fitted: Fit) -> bool:
-    """Whether the residuals of a fit are as small as the stated noise lets them be."""
-    settings = fitted.settings.search
-    spread = np.sqrt(2.0 / fitted.n_residuals)
-    return fitted.reduced < 1.0 + settings.significant * spread + settings.model_error
-
-
-def near(fitted: Fit) -> bool:
-    """Whether the free run of a fit is off by less than the noise."""
-    return fitted.reduced < fitted.settings.search.near
-
-
-def names(hypothesis: Hypothesis) -> str:
-    """Readable names of a hypothesis."""
-    return (
-        " + ".join(p.effect.name + (f" ({p.place.name})" if p.place.name else "") for p in hypothesis)
-        or "nothing"
-    )
 
 
 def carry_on(search: Search, size: int, *, most: int) -> None:
@@ -188,11 +139,11 @@ def limit_of(search: Search, size: int) -> float:
     return best + search.problem.settings.search.sight + max(best - search.problem.n_residuals, 0.0)
 
 
-def shake(search: Search) -> None:
-    """Fit hypotheses near the best again, from draws about where they ended, if friction sticks in them.
+def multistart(search: Search) -> None:
+    """Fit hypotheses near the best again, from draws about where they ended, if friction sticks in them (multistart).
 
-    Whether a slider stops at a reversal hangs on trifles, so the cost is rough: a descent ends in the first of many dents, some
-    tens above the deepest one, and which of two laws has found the deeper dent says nothing of the laws.
+    Whether a slider stops at a reversal is ill-conditioned, so the cost has many local minima: a descent ends in the first of them,
+    some tens above the deepest one, and which of two laws has found the deeper one says nothing of the laws.
 
     Args:
         search: Fits so far; better ones take their places.
@@ -200,18 +151,18 @@ def shake(search: Search) -> None:
     settings = search.problem.settings.search
     best = search.ranked()[0]
     if not consistent(best) and best.chi2 - best.n_residuals > 2.0 * settings.restarts.begun_again:
-        return  # no dent is that deep: whatever explains the records is not among these
+        return  # no local minimum is that deep: whatever explains the records is not among these
     both_stick = sticks(best)
     reach = settings.restarts.reach if both_stick else settings.within_reach
     for fitted in [f for f in search.ranked() if near(f) and sticks(f)][: settings.restarts.restarted]:
         begun = _beside_the_best(search, fitted) if both_stick else fitted
         behind = posterior(search.ranked()[0]) - posterior(begun)
         if behind < reach:
-            _shaken(search, begun, 2.0 * behind)
+            _from_posterior(search, begun, 2.0 * behind)
 
 
 def _beside_the_best(search: Search, fitted: Fit) -> Fit:
-    """The better of a fit and the same begun with the nominal parameters of the best one, which may have got over its dents."""
+    """The better of a fit and the same begun with the nominal parameters of the best one, which may have left local minima behind."""
     settings = search.problem.settings.search
     best, n = search.ranked()[0], len(search.problem.nominal)
     if fitted is best or posterior(best) - posterior(fitted) > settings.restarts.begun_again:
@@ -222,13 +173,8 @@ def _beside_the_best(search: Search, fitted: Fit) -> Fit:
     return min(fitted, again, key=lambda f: f.cost)
 
 
-def sticks(fitted: Fit) -> bool:
-    """Whether a hypothesis holds friction that is set-valued at rest."""
-    return any(placed.effect.sticks for placed in fitted.hypothesis)
-
-
-def _shaken(search: Search, fitted: Fit, behind: float) -> None:
-    """Shake one fit, while rounds like the last one could make up the cost by which it is `behind`."""
+def _from_posterior(search: Search, fitted: Fit, behind: float) -> None:
+    """Fit one hypothesis from draws of its posterior, while rounds like the last one could make up the cost by which it is `behind`."""
     settings = search.problem.settings.search
     problem, hypothesis = search.problem, fitted.hypothesis
     mean, std, low, high = problem.prior(hypothesis)
@@ -242,9 +188,9 @@ def _shaken(search: Search, fitted: Fit, behind: float) -> None:
     def again_from(start: Array) -> Fit:
         return fit(problem, hypothesis, start=start, iterations=settings.thorough)
 
-    in_vain = 0
+    idle = 0
     for further in reversed(range(settings.restarts.rounds)):
-        fitted = _overlooking_dents(fitted, problem, free)
+        fitted = _past_local_minima(fitted, problem, free)
         spread = np.linalg.cholesky(fitted.covariance[np.ix_(free, free)])
         draws = np.repeat(fitted.vector[None], settings.restarts.draws, axis=0)
         draws[:, free] += (
@@ -256,16 +202,16 @@ def _shaken(search: Search, fitted: Fit, behind: float) -> None:
         best = draws[np.argsort(in_threads(cost, draws))[: settings.restarts.followed]]
         again = min(in_threads(again_from, best), key=lambda f: f.cost)
         gained = fitted.cost - again.cost
-        in_vain = in_vain + 1 if gained < settings.restarts.gain else 0
+        idle = idle + 1 if gained < settings.restarts.gain else 0
         fitted = min(fitted, again, key=lambda f: f.cost)
         behind -= max(gained, 0.0)
-        if in_vain == settings.restarts.in_vain or behind > further * max(gained, settings.restarts.gain):
+        if idle == settings.restarts.in_vain or behind > further * max(gained, settings.restarts.gain):
             break
-    search.fits[key_of(hypothesis)] = _overlooking_dents(fitted, problem, free)
+    search.fits[key_of(hypothesis)] = _past_local_minima(fitted, problem, free)
 
 
-def _overlooking_dents(fitted: Fit, problem: Problem, free: NDArray[np.int64]) -> Fit:
-    """A fit whose precision and evidence are those of the landscape, not of the dent it lies in: by coarse differences."""
+def _past_local_minima(fitted: Fit, problem: Problem, free: NDArray[np.int64]) -> Fit:
+    """A fit whose precision and evidence are not those of the local minimum that it lies in: by coarse differences."""
     settings = fitted.settings.numerics
     _, std, _, high = problem.prior(fitted.hypothesis)
     changes = differences(

@@ -10,42 +10,25 @@ starts, so that no flexible law wins because a simpler one was fitted carelessly
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from bench.discrepancy.effects.effect import Effect
 from bench.discrepancy.effects.read_off import TIMED
+from bench.discrepancy.fitting.goodness_of_fit import complexity, consistent, names, near
 from bench.discrepancy.fitting.map_fit import Fit, fit
 from bench.discrepancy.likelihood.problem import Problem
-from bench.discrepancy.model.placement import Hypothesis, Placed
+from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.numerics.deadline import NEVER, Deadline
-from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.screening.candidates import (
     about,
-    followed,
-    leading,
-    passed_over,
-    refined,
+    tells_motion,
 )
 from bench.discrepancy.screening.linear_amplitudes import Point
 from bench.discrepancy.screening.score_test import lack_of_fit
 from bench.discrepancy.screening.screen import Screen
-from bench.discrepancy.search.fits import (
-    Search,
-    Task,
-    carry_on,
-    complexity,
-    consistent,
-    converge,
-    integrate_finer,
-    key_of,
-    limit_of,
-    names,
-    near,
-    shake,
-)
+from bench.discrepancy.search.extension import contacts, extend
+from bench.discrepancy.search.fits import Search, integrate_finer, multistart
 from bench.discrepancy.search.rivals import challenge, reduce_best, simplify
 from bench.discrepancy.search.scheduled import with_schedules
 from bench.discrepancy.search.soft_friction import soften, stand_in
@@ -81,7 +64,7 @@ def attribute(
     search, screen, points = prepared or prepare(problem, candidates)
     nothing = search.ranked(0)[0]
     progress(f"nominal model: chi-squared {nothing.reduced:.3g} of its expectation")
-    if followed(nothing, problem):
+    if tells_motion(nothing, problem):
         points = about(screen, nothing, explained=True).ranked()
         if not points or points[0].gain < settings.noticeable:
             return search
@@ -95,27 +78,10 @@ def attribute(
         progress(
             f"{len(best.hypothesis)} effect(s): {names(best.hypothesis)}, chi-squared {best.reduced:.3g}"
         )
-        if consistent(best):
-            if len(best.hypothesis) != size:
-                break
-            # what is down to the noise and lacks a force all the same may be neither of two effects
-            lacks = not (problem.windowed or problem.error) and lack_of_fit(problem, best).significant(
-                nothing.chi2 - best.chi2, effects=settings.several
-            )
-            plain = _plain_bases(search, best)
-            if not lacks and not plain and not _promising(screen, best):
-                break
-            bases = worth_extending(search, screen, size, 4 - size) if lacks else plain or [best]
-            _extend(search, screen, bases, count=4)
-            soften(search, size + 1)
-            reduce_best(search)
-            continue
-        ranked = search.ranked(size)
-        if not ranked or ranked[0].reduced - 1.0 > settings.stalled * (
-            search.ranked(size - 1)[0].reduced - 1.0
-        ):
+        bases = _bases(search, screen, size, best=best, nothing=nothing)
+        if not bases:
             break
-        _extend(search, screen, worth_extending(search, screen, size, 4 - size), count=6 - size)
+        extend(search, screen, bases, count=4 if consistent(best) else 6 - size)
         soften(search, size + 1)
         reduce_best(search)
     best = search.ranked()[0]
@@ -130,7 +96,7 @@ def attribute(
         challenge(search, screen, rounds=3 if problem.error is None else 1)
         soften(search, len(search.ranked()[0].hypothesis))
         if problem.error is None:
-            shake(search)
+            multistart(search)
     return search
 
 
@@ -143,21 +109,42 @@ def _single(
 ) -> None:
     """Fit single effects: the common ones, then the rarer ones and those that no screening holds where these leave something."""
     nothing = search.ranked(0)[0]
-    _extend(search, screen, [nothing], count=8)
+    extend(search, screen, [nothing], count=8)
     soften(search, 1)
     if not consistent(search.ranked()[0]) and all(o.order > 0 for o in search.problem.structure.observers):
-        _simulated(search, candidates)
+        contacts(search, candidates)
     rare = [p for p in candidates if p.effect.rare]
     if rare and not consistent(search.ranked()[0]) and deadline.allows("rarer effects"):
         progress("rarer effects")
         screen.add(rare)
-        _extend(search, screen, [nothing], count=6, among={p.key for p in rare})
+        extend(search, screen, [nothing], count=6, among={p.key for p in rare})
     stand_in(search)
     if deadline.allows("forces from outside and friction that follows a channel"):
         asked = {p.effect.name for p in candidates if p.effect.site == "read off"}
         if TIMED in asked:
             with_timed_force(search)
         with_schedules(search, asked)
+
+
+def _bases(search: Search, screen: Screen, size: int, *, best: Fit, nothing: Fit) -> list[Fit]:
+    """Hypotheses of `size` effects beside which one more is searched; none where it would tell no more than `best` does."""
+    problem, settings = search.problem, search.problem.settings.search
+    if not consistent(best):
+        ranked = search.ranked(size)
+        excess = search.ranked(size - 1)[0].reduced - 1.0
+        if not ranked or ranked[0].reduced - 1.0 > settings.stalled * excess:
+            return []
+        return worth_extending(search, screen, size, 4 - size)
+    if len(best.hypothesis) != size:
+        return []
+    # what is down to the noise and lacks a force all the same may be neither of two effects
+    lacks = not (problem.windowed or problem.error) and lack_of_fit(problem, best).significant(
+        nothing.chi2 - best.chi2, effects=settings.several
+    )
+    plain = _plain_bases(search, best)
+    if not lacks and not plain and not _promising(screen, best):
+        return []
+    return worth_extending(search, screen, size, 4 - size) if lacks else plain or [best]
 
 
 def _worth_challenging(best: Fit, problem: Problem) -> bool:
@@ -191,7 +178,7 @@ def worth_extending(search: Search, screen: Screen, size: int, most: int) -> lis
         points = screen.ranked(base, ground)[:1]
         return float(np.sum(ground.left**2)) - sum(point.gain for point in points)
 
-    far = [f for f in ranked[: settings.considered] if np.isfinite(f.cost) and not followed(f, problem)]
+    far = [f for f in ranked[: settings.considered] if np.isfinite(f.cost) and not tells_motion(f, problem)]
     chosen = ranked[:most] + sorted(far, key=promised)[: settings.promised]
     return [f for f in ranked if any(f is own for own in chosen)]
 
@@ -242,158 +229,3 @@ def prepare(problem: Problem, candidates: Sequence[Placed]) -> Prepared:
     )
     screen = Screen(problem, [p for p in candidates if not p.effect.rare])
     return search, screen, screen.ranked()
-
-
-class _Offers(NamedTuple):
-    """What a screening offers beside a base; the screening itself is large, and let go.
-
-    Attributes:
-        base: Fitted hypothesis.
-        tasks: Fits of what promises most.
-        spare: Further starts and their fits, for the case that those do not keep what they promise.
-    """
-
-    base: Fit
-    tasks: list[Task]
-    spare: list[tuple[Point, Task]]
-
-
-def _extend(
-    search: Search,
-    screen: Screen,
-    bases: Sequence[Fit],
-    *,
-    count: int,
-    among: Collection[tuple[str, str, str]] = (),
-) -> None:
-    """Add one effect to every base, of those `among` where some are given: screen, refine, fit quickly, carry the best on."""
-    size = len(bases[0].hypothesis) + 1
-    offers = [_offers(search, screen, base, count=count, among=among) for base in bases]
-    limit = limit_of(search, size)
-
-    def fit_all(tasks: Iterable[Task]) -> None:
-        for fitted in in_threads(lambda task: first_fit(search.problem, *task, limit=limit), tasks):
-            search.add(fitted)
-
-    fit_all(task for found in offers for task in found.tasks)
-    for base, _, spare in offers:
-        kept = _kept(search, base)
-        fit_all(task for p, task in spare if p.gain > kept and search.start(base.hypothesis, p))
-    carry_on(search, size, most=4)
-
-
-def _offers(
-    search: Search,
-    screen: Screen,
-    base: Fit,
-    *,
-    count: int,
-    among: Collection[tuple[str, str, str]],
-) -> _Offers:
-    """Screen one more effect beside a base, of those `among` where some are given."""
-    settings = search.problem.settings
-    problem = search.problem
-    named = base if base.hypothesis else None
-    along = followed(base, problem)
-    local = about(screen, base, explained=along)
-    ground = local.ground(named, simulated=named is not None and along)
-    solved = [p for p in local.ranked(named, ground) if not among or p.placed.key in among]
-    points = refined(local, ground, solved)
-    if not named:
-        search.first = sorted([*search.first, *points] if among else points, key=lambda p: -p.gain)
-    inertia = [] if among else local.inertia_points(base, ground)
-    most = max((p.gain for p in [*points, *inertia]), default=0.0)
-    excess = base.chi2 - base.n_residuals
-    if named and problem.scaled and not consistent(base) and most < settings.search.unpromising * excess:
-        return _Offers(base, [], [])
-
-    def task(point: Point) -> Task:
-        return (*base.hypothesis, point.placed), local.starts(point, ground, named)
-
-    # a screening can promise more than there is
-    most = min(most, max(excess, settings.screening.worth_a_fit))
-    short = (settings.screening.trusted if named and along else settings.screening.short) * most
-    chosen = leading(points, count, short, settings=search.problem.settings)
-    if not among:
-        chosen += passed_over(
-            solved, chosen, count, settings.screening.worth_a_fit, settings=search.problem.settings
-        )
-    begun = {point.placed.key for point in chosen}
-    rest = [p for p in points if p.placed.key not in begun] if named and along else []
-    spare = [
-        (p, task(p))
-        for p in leading(
-            rest, count, settings.screening.worth_a_fit, starts=1, settings=search.problem.settings
-        )
-    ]
-    tasks = [task(p) for p in chosen if search.start(base.hypothesis, p)]
-    least = min(short, settings.screening.worth_a_fit) if consistent(base) else short
-    tasks += [
-        ((*base.hypothesis, p.placed), np.append(base.vector, p.eta)) for p in inertia if p.gain > least
-    ]
-    return _Offers(base, tasks, spare)
-
-
-def _kept(search: Search, base: Fit) -> float:
-    """How much one more effect has taken from the cost of a base so far: what was promised may not have been kept."""
-    own = key_of(base.hypothesis)
-    size = len(base.hypothesis) + 1
-    best = min(
-        (f.cost for key, f in search.fits.items() if len(key) == size and own < key), default=base.cost
-    )
-    return base.cost - best
-
-
-def first_fit(problem: Problem, hypothesis: Hypothesis, start: np.ndarray, *, limit: float = np.inf) -> Fit:
-    """A few iterations with one more effect, the last one; of channels and inertia, which the screening begins farther off, more.
-
-    Args:
-        problem: Records and priors.
-        hypothesis: Effects.
-        start: Start vector (n,), or several (k, n).
-        limit: Cost that has to be within sight, see `minimise`.
-    """
-    settings = problem.settings.search
-    iterations = settings.quick if hypothesis[-1].effect.site == "joint" else 2 * settings.quick
-    return fit(problem, hypothesis, start=start, iterations=iterations, exact=False, limit=limit)
-
-
-def _simulated(search: Search, candidates: Sequence[Placed]) -> None:
-    """Fit contacts from the best of their grid by free runs.
-
-    Where only velocities or accelerations are measured, the middle of the motion is unknown, and a stop that shifts it is screened
-    at the wrong place. Contacts have few shapes and cost little to simulate.
-    """
-    settings = search.problem.settings.search
-    problem = search.problem
-    still = np.zeros(len(problem.nominal))
-    tasks: list[Task] = []
-    for placed in candidates:
-        effect = placed.effect
-        if effect.rare or effect.site != "joint" or not _contact(effect):
-            continue
-        size = effect.parameters[0]
-        starts = [
-            np.concatenate([still, [size.mean + level * size.std], eta[1:]])
-            for eta in effect.grid()
-            for level in settings.contact_levels
-        ]
-
-        def cost(start: np.ndarray, placed: Placed = placed) -> float:
-            residual = problem.residual((placed,), start)
-            return float(residual @ residual)
-
-        costs = np.array(in_threads(cost, starts))
-        tasks += [
-            ((placed,), starts[i])
-            for i in np.argsort(costs)[: settings.contact_starts]
-            if np.isfinite(costs[i])
-        ]
-    converge(search, tasks)
-
-
-def _contact(effect: Effect) -> bool:
-    """Whether an effect is a force of the displacement with a position to be found."""
-    return (
-        effect.family == "stiffness" and any(p.grid for p in effect.parameters) and effect.rate_bound is None
-    )

@@ -17,7 +17,7 @@ from bench.discrepancy.case.acquisition import INTERPOLATIONS
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.fitting.map_fit import fit
 from bench.discrepancy.likelihood.problem import Problem
-from bench.discrepancy.search.explain import Explanation
+from bench.discrepancy.search.explanation import Explanation
 
 STATED = "load_interpolation"
 """Option of a case that says it; where it is given, nothing is looked for."""
@@ -38,15 +38,15 @@ def promising_readings(case: Case, explanations: Sequence[Explanation]) -> Itera
     best = explanations[0]
     if STATED in case.options or best.parts[0][0].driven:
         return
-    ladder = list(_ladder(explanations))
+    nested = list(_nested(explanations))
     for reading in INTERPOLATIONS:
         if reading != case.load_interpolation:
             read = replace(case, options={**case.options, STATED: reading})
-            if any(_promises(read, rung, best) for rung in ladder):
+            if any(_promises(read, smaller, best) for smaller in nested):
                 yield read
 
 
-def _ladder(explanations: Sequence[Explanation]) -> Iterator[Explanation]:
+def _nested(explanations: Sequence[Explanation]) -> Iterator[Explanation]:
     """The likeliest explanations of fewer effects than the best one, those of fewest first, and the best one if it leaves something."""
     best = explanations[0]
     for size in range(len(best.hypothesis)):
@@ -57,14 +57,14 @@ def _ladder(explanations: Sequence[Explanation]) -> Iterator[Explanation]:
         yield best
 
 
-def _promises(read: Case, rung: Explanation, best: Explanation) -> bool:
+def _promises(read: Case, smaller: Explanation, best: Explanation) -> bool:
     """Whether the effects of an explanation, fitted in another reading, leave little enough for a search in it."""
-    settings = rung.settings.search
+    settings = smaller.settings.search
     noise = sum(fitted.n_residuals for _, fitted in best.parts) if best.scaled else 0
-    limit = rung.chi2 - settings.readings.instead * (rung.chi2 - best.chi2)
-    if rung is best:
+    limit = smaller.chi2 - settings.readings.instead * (smaller.chi2 - best.chi2)
+    if smaller is best:
         limit = noise + settings.readings.better * (best.chi2 - noise)
-    parts = [(_read(read, problem), problem, fitted) for problem, fitted in rung.parts]
+    parts = [(_read(read, problem), problem, fitted) for problem, fitted in smaller.parts]
     able = 0.0
     for problem, before, fitted in parts:
         residual, changed = (p.residual(fitted.hypothesis, fitted.vector) for p in (before, problem))
@@ -72,7 +72,7 @@ def _promises(read: Case, rung: Explanation, best: Explanation) -> bool:
             return False
         # at the optimum the residual is orthogonal to all that parameters could do about the change
         able += 2.0 * float(residual @ (residual - changed))
-    if able < settings.readings.likely * (rung.chi2 - limit):
+    if able < settings.readings.likely * (smaller.chi2 - limit):
         return False
     fits = (
         fit(problem, f.hypothesis, start=f.vector, iterations=settings.thorough, limit=limit, exact=False)
@@ -85,7 +85,7 @@ def _read(case: Case, problem: Problem) -> Problem:
     """A problem of the same records and structure whose loads are read as a case says."""
     bins = {data.record.name: data.n_bins for data in problem.data}
     return Problem(
-        case, problem.structure, problem.records, bins, error=problem.error, settings=problem.settings
+        case, problem.structure, problem.records, bins=bins, error=problem.error, settings=problem.settings
     )
 
 

@@ -8,24 +8,18 @@ from dataclasses import replace
 import numpy as np
 
 from bench.discrepancy.effects.effect import Effect
+from bench.discrepancy.fitting.goodness_of_fit import consistent, key_of
 from bench.discrepancy.fitting.map_fit import Fit
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Hypothesis, Placed
 from bench.discrepancy.screening.candidates import (
     about,
-    followed,
     leading,
     refined,
+    tells_motion,
 )
 from bench.discrepancy.screening.screen import Screen
-from bench.discrepancy.search.fits import (
-    Search,
-    Task,
-    carry_on,
-    consistent,
-    converge,
-    key_of,
-)
+from bench.discrepancy.search.fits import Search, Task, carry_on, converge
 
 PLAINER = {"hysteresis": "friction", "damping": "friction"}
 """Families whose laws become those of another one at the limits of their parameters."""
@@ -35,7 +29,7 @@ def challenge(search: Search, screen: Screen, *, rounds: int = 3) -> None:
     """Fit the rivals of every effect of the best hypothesis, and that effect itself, from several starts.
 
     The rivals are screened along the free run of that hypothesis where it follows the motion: a run driven through accelerations
-    alone knows its middle, which no record told. What a rival makes superfluous is struck.
+    alone knows its middle, which no record told. What a rival makes superfluous is eliminated.
 
     Args:
         search: Fits so far; the new ones are added.
@@ -51,7 +45,7 @@ def challenge(search: Search, screen: Screen, *, rounds: int = 3) -> None:
         if known or (challenged and not consistent(best)):
             return
         challenged.add(key_of(best.hypothesis))
-        along = followed(best, search.problem)
+        along = tells_motion(best, search.problem)
         tasks = []
         for i, placed in enumerate(best.hypothesis):
             rest, vector = _without(i, best, search.problem)

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from bench.discrepancy.case.case import Case, CaseChannel, CaseRecord
 from bench.discrepancy.case.schema import RIGS
-from bench.discrepancy.effects.catalogue import FRICTION, effect_named
+from bench.discrepancy.effects.catalogue import effect_named
 from bench.discrepancy.effects.effect import (
     EFFECT_SETTINGS,
     Effect,
@@ -31,12 +31,14 @@ from bench.discrepancy.effects.effect import (
     Scales,
     Values,
 )
+from bench.discrepancy.effects.force_priors import FRICTION
 from bench.discrepancy.effects.read_off import DIFFERS, FOLLOWED, SENSITIVITY, schedulable
+from bench.discrepancy.fitting.goodness_of_fit import consistent, key_of
 from bench.discrepancy.fitting.map_fit import Fit
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.model.structure import Place
-from bench.discrepancy.search.fits import Search, Task, consistent, converge, key_of
+from bench.discrepancy.search.fits import Search, Task, converge
 from bench.discrepancy.search.soft_friction import IDEAL, RUBBING, frictional, nominal_level
 
 Array = NDArray[np.float64]
@@ -107,7 +109,7 @@ def _followed(problem: Problem, placed: Placed, start: Array, channel: CaseChann
     """Fits of an effect whose force follows a channel: added to the nominal model, and in the place of its friction."""
     values, (eta,) = problem.split((placed,), start)
     n = len(problem.nominal)
-    effect = followed(placed.effect, channel, problem)
+    effect = scheduled_by(placed.effect, channel, problem)
     reference = _reference(problem, channel)
     shapes = [np.append(eta, [kappa, reference]) for kappa in (0.5, 1.0)]
     new = Placed(effect, placed.place, channel.name)
@@ -132,7 +134,7 @@ def _followed(problem: Problem, placed: Placed, start: Array, channel: CaseChann
     return tasks
 
 
-def followed(effect: Effect, channel: CaseChannel, problem: Problem) -> Effect:
+def scheduled_by(effect: Effect, channel: CaseChannel, problem: Problem) -> Effect:
     """An effect whose force follows a channel."""
     count = len(effect.parameters)
     theta, bound, name = effect.theta, effect.rate_bound, channel.name

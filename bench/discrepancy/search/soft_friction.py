@@ -19,12 +19,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.discrepancy.effects import friction_limits as limits
-from bench.discrepancy.effects.catalogue import FRICTION, effect_named
+from bench.discrepancy.effects.catalogue import effect_named
 from bench.discrepancy.effects.effect import Effect, FreeParameter, Scales, Values
+from bench.discrepancy.effects.force_priors import FRICTION
+from bench.discrepancy.fitting.goodness_of_fit import consistent
 from bench.discrepancy.fitting.map_fit import Fit
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Placed
-from bench.discrepancy.search.fits import Search, Task, consistent, converge
+from bench.discrepancy.search.fits import Search, Task, converge
 from bench.laws.coulomb import COULOMB
 from bench.laws.soft_friction import SOFT_COULOMB
 

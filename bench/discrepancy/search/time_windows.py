@@ -24,7 +24,7 @@ from bench.discrepancy.simulation.stick_slip import Motion
 Array = NDArray[np.float64]
 
 
-class Windows(NamedTuple):
+class TimeWindows(NamedTuple):
     """Windows of one record.
 
     Attributes:
@@ -45,7 +45,7 @@ class Windows(NamedTuple):
         return out
 
 
-def windows_of(time: Array, force: Array, *, settings: SearchSettings = DEFAULT.search) -> Windows | None:
+def windows_of(time: Array, force: Array, *, settings: SearchSettings = DEFAULT.search) -> TimeWindows | None:
     """Windows in a missing force.
 
     Args:
@@ -92,7 +92,7 @@ def _partition(means, price, shortest, cuts):
 
 def _standing_out(
     time: Array, force: Array, edges: list[int], factor: int, *, settings: SearchSettings
-) -> Windows | None:
+) -> TimeWindows | None:
     """The pieces between edges whose level stands out, their edges refined; None where there are none or they explain little."""
     edges, levels, opened = _merged(force, edges, settings=settings)
     if not np.any(opened) or np.all(opened) or not _sudden(force, edges, levels, settings=settings):
@@ -104,7 +104,7 @@ def _standing_out(
         start = _edge(time, force, edges[i], before, levels[i], factor)
         stop = _edge(time, force, edges[i + 1], levels[i], after, factor)
         found.append((start, stop - start, levels[i]))
-    windows = Windows(*(np.array(column) for column in zip(*found, strict=True)))
+    windows = TimeWindows(*(np.array(column) for column in zip(*found, strict=True)))
     left = float(np.sum((force - windows.inside(time)) ** 2))
     return windows if left < (1.0 - settings.timed.share) * float(np.sum(force**2)) else None
 
@@ -162,7 +162,7 @@ def _edge(time: Array, force: Array, edge: int, before: float, after: float, fac
 
 
 def follows_motion(
-    windows: Windows, time: Array, motion: Motion, row: Array, *, settings: SearchSettings
+    windows: TimeWindows, time: Array, motion: Motion, row: Array, *, settings: SearchSettings
 ) -> bool:
     """Whether windows open and close with the motion along a coordinate (n_dof,), so that they are no matter of time."""
     inside = windows.inside(time)

@@ -4,7 +4,7 @@ No grid can hold windows: they are read off the missing force along the measured
 them, with one force for all and a common shift to be fitted, competes with those of the catalogue. Each window costs the
 logarithm of what could have been chosen instead, so that a force of the motion, whose windows would be many, stays one of the motion.
 
-When the windows are open is a property of a record, not of the rig: those of the judging records are read off these, as initial
+When the windows are open is a property of a record, not of the rig: those of the validation records are read off these, as initial
 states are. Their force is not; it is what the records for identification say.
 """
 
@@ -26,15 +26,16 @@ from bench.discrepancy.effects.effect import (
     Values,
 )
 from bench.discrepancy.effects.read_off import FORCE, TIMED
+from bench.discrepancy.fitting.goodness_of_fit import consistent, key_of
 from bench.discrepancy.fitting.map_fit import Fit
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.nominal_elements import own_force
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.model.structure import Place
 from bench.discrepancy.numerics.threads import in_threads
-from bench.discrepancy.search.fits import Search, consistent, converge, key_of
+from bench.discrepancy.search.fits import Search, converge
 from bench.discrepancy.search.time_windows import (
-    Windows,
+    TimeWindows,
     follows_motion,
     windows_of,
 )
@@ -49,7 +50,7 @@ class _Found(NamedTuple):
     """Windows at a place: by record, the reference force, and the share of the missing force that they are."""
 
     place: Place
-    windows: Mapping[str, Windows]
+    windows: Mapping[str, TimeWindows]
     reference: float
     share: float
 
@@ -83,7 +84,7 @@ def with_timed_force(search: Search) -> None:
         converge(search, [((placed,), start)])
 
 
-def _sharpened(problem: Problem, fitted: Fit, found: _Found) -> dict[str, Windows]:
+def _sharpened(problem: Problem, fitted: Fit, found: _Found) -> dict[str, TimeWindows]:
     """Windows of every record, their edges moved to where the free run of a fit misses least, each by a sample or so."""
     (placed,), vector = fitted.hypothesis, fitted.vector
     out = {}
@@ -96,7 +97,7 @@ def _sharpened(problem: Problem, fitted: Fit, found: _Found) -> dict[str, Window
 
         def residual(edges: Array, own=own, data=data) -> Array | None:
             first, last = np.split(edges, 2)
-            moved = found._replace(windows={data.record.name: Windows(first, last - first, own.level)})
+            moved = found._replace(windows={data.record.name: TimeWindows(first, last - first, own.level)})
             hypothesis = (Placed(_effect(problem, moved), placed.place),)
             return problem.residual_of(data, hypothesis, vector, lenient=False)
 
@@ -104,7 +105,7 @@ def _sharpened(problem: Problem, fitted: Fit, found: _Found) -> dict[str, Window
         edges = _moved(residual, edges, record.step, settings=problem.settings.search)
         first, last = np.split(edges, 2)
         if np.all(last > first):
-            out[record.name] = Windows(first, last - first, own.level)
+            out[record.name] = TimeWindows(first, last - first, own.level)
     return out
 
 
@@ -153,7 +154,7 @@ def missing_force(problem: Problem, record: CaseRecord, place: Place) -> Array:
 
 def _at(problem: Problem, place: Place) -> _Found | None:
     """Windows at a place in the records for identification and those for judging; None where the former have none."""
-    windows: dict[str, Windows] = {}
+    windows: dict[str, TimeWindows] = {}
     power = left = 0.0
     for record in problem.records:
         lacking = missing_force(problem, record, place)
@@ -233,7 +234,7 @@ TOLD = (("start", "s"), ("duration", "s"), ("windows", "1"), ("period", "s"))
 """What is told of the windows besides their force; the fits hold it."""
 
 
-def _table(windows: Windows, reference: float, *, settings: SearchSettings) -> Array:
+def _table(windows: TimeWindows, reference: float, *, settings: SearchSettings) -> Array:
     """Start, duration and relative force (k, 3); windows of like force have the same."""
     relative = windows.level / reference
     relative[np.abs(relative - 1.0) < settings.timed.alike] = 1.0

@@ -56,11 +56,13 @@ class ArticulatedJudgementSettings:
 
     blocks: int = setting(
         24,
-        "Blocks of a judging record, over which an improvement has to be sure.",
+        "Blocks of a validation record, over which an improvement has to be sure.",
         "Some periods of the motion each.",
     )
     sure: float = setting(
-        2.0, "Standard errors by which a further effect has to improve on the judging records.", "Convention."
+        2.0,
+        "Standard errors by which a further effect has to improve on the validation records.",
+        "Convention.",
     )
     noise_known: float = setting(
         0.05,

@@ -32,7 +32,7 @@ class CoarseSettings:
     )
     pays: float = setting(
         0.7,
-        "Part of the discrepancy of the judging records that a named explanation may leave at most.",
+        "Part of the discrepancy of the validation records that a named explanation may leave at most.",
         "Half of its power.",
     )
     most: float = setting(
@@ -169,7 +169,7 @@ class JudgementSettings:
     )
     contradicted: float = setting(
         2.0,
-        "Error on the judging records over what noise and parameters explain from which an explanation is contradicted.",
+        "Error on the validation records over what noise and parameters explain from which an explanation is contradicted.",
         "Four times the power.",
     )
     steady_draws: int = setting(
@@ -184,7 +184,7 @@ class JudgementSettings:
     )
     blocks: int = setting(
         24,
-        "Blocks of a judging record for the bootstrap.",
+        "Blocks of a validation record for the bootstrap.",
         "Some periods each, so that blocks are nearly independent.",
     )
     closure_worse: float = setting(

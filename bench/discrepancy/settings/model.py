@@ -46,6 +46,11 @@ class ModelSettings:
         "Parts that the way between two samples is cut into where a load meets a limit on it.",
         "A corner is misplaced by less than a hundredth of a sample.",
     )
+    large_mass: float = setting(
+        1e6,
+        "Mass behind a prescribed motion over all that moves with it.",
+        "What it carries moves it by a millionth; nine digits are left above rounding.",
+    )
     newton_steps: int = setting(
         20, "Steps of Newton's method towards the position of rest.", "Quadratic convergence needs five."
     )

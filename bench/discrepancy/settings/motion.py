@@ -64,4 +64,9 @@ class MotionSettings:
     edge_width: int = setting(
         9, "Samples over which it is averaged.", "A window of the smoother.", unit="samples"
     )
+    tracking: float = setting(
+        3.0,
+        "Cycles a record of the loop that holds the acceleration behind a prescribed position to this position.",
+        "What an integral drifts by lies below them; a motion worth diagnosing goes through many more.",
+    )
     memory: MemorySettings = field(default_factory=MemorySettings)

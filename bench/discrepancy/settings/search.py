@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from bench.discrepancy.settings.describing import setting
 from bench.discrepancy.settings.search_parts import (
     CoupledSettings,
+    LoadReadingSettings,
     PlainSettings,
-    ReadingSettings,
     RestartSettings,
     SoftFrictionSettings,
     TimedForceSettings,
@@ -42,7 +42,7 @@ class SearchSettings:
         "Relative improvement of chi-squared that one more effect has to pay for.",
         (
             "Smoothing of stick-slip and interpolation of loads are only as good as that; records of extreme signal-to-noise "
-            "ratio would else name trifles."
+            "ratio would else name spurious terms."
         ),
     )
     hopeless: float = setting(
@@ -178,6 +178,6 @@ class SearchSettings:
     plain: PlainSettings = field(default_factory=PlainSettings)
     restarts: RestartSettings = field(default_factory=RestartSettings)
     coupled: CoupledSettings = field(default_factory=CoupledSettings)
-    readings: ReadingSettings = field(default_factory=ReadingSettings)
+    readings: LoadReadingSettings = field(default_factory=LoadReadingSettings)
     soft: SoftFrictionSettings = field(default_factory=SoftFrictionSettings)
     timed: TimedForceSettings = field(default_factory=TimedForceSettings)

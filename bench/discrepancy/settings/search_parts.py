@@ -35,7 +35,9 @@ class RestartSettings:
         unit="log odds",
     )
     rounds: int = setting(6, "Rounds of restarts.", "A cost cut-off.")
-    in_vain: int = setting(2, "Rounds in vain after which there is no further one.", "A cost cut-off.")
+    in_vain: int = setting(
+        2, "Rounds without improvement after which there is no further one.", "A cost cut-off."
+    )
     draws: int = setting(48, "Draws of a round.", "A cost cut-off.")
     followed: int = setting(2, "Draws of a round that are followed to their minima.", "A cost cut-off.")
     scales: tuple[float, ...] = setting(
@@ -45,7 +47,10 @@ class RestartSettings:
         unit="sigmas",
     )
     gain: float = setting(
-        1.0, "Decrease of the cost below which a round was in vain.", "Odds of less than two.", unit="chi2"
+        1.0,
+        "Decrease of the cost below which a round brought no improvement.",
+        "Odds of less than two.",
+        unit="chi2",
     )
 
 
@@ -81,7 +86,7 @@ class CoupledSettings:
 
 
 @dataclass(frozen=True)
-class ReadingSettings:
+class LoadReadingSettings:
     """Other readings of the loads between their samples."""
 
     instead: float = setting(

@@ -16,11 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from bench.discrepancy.simulation.stick_slip import (
-    STICK_SLIP_LIMITS,
-    LinearStructure,
-    Motion,
-)
+from bench.discrepancy.simulation.equations_of_motion import STICK_SLIP_LIMITS
+from bench.discrepancy.simulation.stick_slip import LinearStructure, Motion
 
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)

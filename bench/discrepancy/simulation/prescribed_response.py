@@ -10,7 +10,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.discrepancy.simulation.stick_slip import (
+from bench.discrepancy.simulation.equations_of_motion import (
     FORCE,
     LIMIT,
     N_ROWS,
@@ -21,11 +21,9 @@ from bench.discrepancy.simulation.stick_slip import (
     STATE,
     STICK_SLIP_LIMITS,
     THETA,
-    Elements,
-    full,
     scale_at,
-    steps_of_each,
 )
+from bench.discrepancy.simulation.stick_slip import Elements, full, steps_of_each
 from bench.laws.calling import advance, call_kernel, pointer_at
 
 

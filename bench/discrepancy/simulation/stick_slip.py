@@ -10,32 +10,34 @@ While it slides the force is ``mode * limit(t, q, v)``; while it sticks the forc
 acceleration zero; the instants of reversal and of breaking loose are found inside the step by the secant rule. The
 fits therefore see a response that depends smoothly on the parameters as long as the order of events stays the same.
 
-Friction that creeps, as MuJoCo's does, has a third mode: ``f = limit sat((v + tau a) / vc)``, saturated at one either way, with a
-creep velocity vc and a lead time tau (`bench.laws.soft_friction`). The acceleration holds the force itself, so that with a0, the
-acceleration without it, and the compliance A of its coordinate ``f = (v + tau a0) / (vc / limit + tau A)`` until it saturates.
+Friction that creeps rather than sticks, as MuJoCo's does, has a third mode and no events (`simulation.equations_of_motion`).
 
 References:
-    E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 1993 (RK4, section II.1; event
-    location on discontinuities, section II.6).
+    E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 1993 (event location on
+    discontinuities, section II.6).
 """
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.laws.calling import advance, call_kernel, load_int, pointer_at
-
-FORCE, RATE, LIMIT, N_ROWS, ROW, THETA, STATE, N_STATES, SCALE = range(9)
-"""Columns of the element table passed to the compiled loop."""
-
-
-COLUMNS = 9
-"""Their number."""
-
+from bench.discrepancy.simulation.equations_of_motion import (
+    COLUMNS,
+    LIMIT,
+    ROW,
+    STICK_SLIP_LIMITS,
+    THETA,
+    Workspace,
+    derivative,
+    entry,
+    relative_velocity,
+    rk4,
+)
+from bench.laws.calling import advance, call_kernel, pointer_at
 
 _jit = numba.njit(cache=True, error_model="numpy", nogil=True)
 _inline = numba.njit(cache=True, error_model="numpy", nogil=True, forceinline=True)
@@ -93,238 +95,18 @@ NO_ELEMENTS = Elements(np.zeros((0, 8), dtype=np.int64), np.zeros((0, 1)), np.ze
 """No force law: the linear structure alone."""
 
 
-class StickSlipLimits(NamedTuple):
-    """Numbers of `bench.discrepancy.simulation.stick_slip` that compiled code holds."""
-
-    max_events: int = 12
-    """Most friction events resolved within one step; beyond it the step is completed with the mode it has."""
-    diverged: float = 1e12
-    """Position beyond which a simulation counts as diverged."""
-    max_rows: int = 16
-    """Most coordinates of an element; `grips` further scratch entries hold what a friction limit writes."""
-    grips: int = 3
-    """A friction limit, its creep velocity and its lead time, see `friction_limits`."""
-    soft: float = 2.0
-    """Mode of friction that creeps rather than sticks; it has no events."""
-    sweeps: int = 12
-    """Gauss-Seidel sweeps over several friction forces that creep at once; one alone is solved exactly by the first."""
-
-
-STICK_SLIP_LIMITS = StickSlipLimits()
-
-
-class _Plan(NamedTuple):
-    """What the compiled functions share: sizes, matrices, element table, and one workspace with its address.
-
-    The workspace holds, one after the other: the state, a trial state, a stage state, four slopes, the coordinates,
-    velocities and forces of the element at hand, and the loads at the start, middle and end of a step. One array
-    with integer offsets instead of many small ones: creating array views and their pointers inside the
-    derivative took two thirds of the time.
-    """
-
-    n_dof: int
-    n: int
-    n_inputs: int
-    n_elements: int
-    n_rows: int
-    load_factor: int
-    matrices: Any
-    table: int
-    rows: Any
-    spread: Any
-    mode: Any
-    grip: Any
-    theta: Any
-    work: Any
-
-
-@_inline
-def _entry(p, e, column):
-    """Integer of the element table."""
-    return load_int(p.table + 8 * (COLUMNS * e + column))
-
-
-@_inline
-def scale_at(schedule, t):
-    """Factor of a force at a time: (time of the first sample, samples a second, their number, samples), linear between them."""
-    x = (t - schedule[0]) * schedule[1]
-    n = int(schedule[2])
-    whole = min(max(int(x), 0), n - 2)
-    share = min(max(x - whole, 0.0), 1.0)
-    return schedule[3 + whole] + share * (schedule[4 + whole] - schedule[3 + whole])
-
-
-@_inline
-def _derivative(p, t, y, slope, load):  # noqa: PLR0912, PLR0915  (one compiled loop)
-    """Write dy/dt at workspace offset `slope` for the state at offset `y` and the loads at offset `load`.
-
-    The holding force and the limit of every friction element go into `grip` (2, n_elements).
-    """
-    n_dof = p.n_dof
-    work = p.work
-    n_inputs = p.n_inputs
-    width = 2 * n_dof + n_inputs
-    for i in range(n_dof):
-        work[slope + i] = work[y + n_dof + i]
-        total = 0.0
-        for j in range(n_inputs):
-            total += p.matrices[i * width + 2 * n_dof + j] * work[load + j]
-        for j in range(n_dof):
-            total -= (
-                p.matrices[i * width + j] * work[y + j]
-                + p.matrices[i * width + n_dof + j] * work[y + n_dof + j]
-            )
-        work[slope + n_dof + i] = total
-    q = 7 * p.n
-    v = q + STICK_SLIP_LIMITS.max_rows
-    f = v + STICK_SLIP_LIMITS.max_rows
-    held = False
-    creeping = 0
-    for e in range(p.n_elements):
-        first = _entry(p, e, ROW)
-        n_rows = _entry(p, e, N_ROWS)
-        for r in range(n_rows):
-            coordinate = 0.0
-            rate = 0.0
-            for j in range(n_dof):
-                coordinate += p.rows[(first + r) * p.n_dof + j] * work[y + j]
-                rate += p.rows[(first + r) * p.n_dof + j] * work[y + n_dof + j]
-            work[q + r] = coordinate
-            work[v + r] = rate
-            work[f + r] = 0.0
-        z = advance(p.work, (y + 2 * n_dof + _entry(p, e, STATE)))
-        theta = advance(p.theta, _entry(p, e, THETA))
-        q_pointer = advance(p.work, q)
-        v_pointer = advance(p.work, v)
-        if _entry(p, e, FORCE) != 0:
-            call_kernel(_entry(p, e, FORCE), t, q_pointer, v_pointer, z, theta, advance(p.work, f))
-        scale = 1.0
-        if _entry(p, e, SCALE) != 0:
-            scale = scale_at(advance(p.theta, _entry(p, e, SCALE) - 1), t)
-            for r in range(n_rows):
-                work[f + r] *= scale
-        if _entry(p, e, LIMIT) != 0:
-            for i in range(STICK_SLIP_LIMITS.grips):
-                work[f + STICK_SLIP_LIMITS.max_rows + i] = 0.0
-            call_kernel(
-                _entry(p, e, LIMIT),
-                t,
-                q_pointer,
-                v_pointer,
-                z,
-                theta,
-                advance(p.work, (f + STICK_SLIP_LIMITS.max_rows)),
-            )
-            p.grip[p.n_elements + e] = max(scale * work[f + STICK_SLIP_LIMITS.max_rows], 0.0)
-            if p.mode[e] == STICK_SLIP_LIMITS.soft:
-                p.grip[2 * p.n_elements + e] = work[f + STICK_SLIP_LIMITS.max_rows + 1]
-                p.grip[3 * p.n_elements + e] = work[f + STICK_SLIP_LIMITS.max_rows + 2]
-                creeping += 1
-            else:
-                work[f] += p.mode[e] * p.grip[p.n_elements + e]
-            held = held or p.mode[e] == 0.0
-        for r in range(n_rows):
-            for i in range(n_dof):
-                work[slope + n_dof + i] -= p.spread[i * p.n_rows + first + r] * work[f + r]
-        if _entry(p, e, RATE) != 0:
-            zdot = advance(p.work, (slope + 2 * n_dof + _entry(p, e, STATE)))
-            call_kernel(_entry(p, e, RATE), t, q_pointer, v_pointer, z, theta, zdot)
-    if creeping > 0:
-        _creep(p, y, slope, STICK_SLIP_LIMITS.sweeps if creeping > 1 else 1)
-    if held:
-        _hold(p, slope)
-
-
-@_inline
-def _creep(p, y, slope, sweeps):
-    """Add the forces of the elements that creep: each the one that goes with the acceleration that it leaves."""
-    for e in range(p.n_elements):
-        p.grip[e] = p.grip[e] if p.mode[e] != STICK_SLIP_LIMITS.soft else 0.0
-    for _ in range(sweeps):
-        for e in range(p.n_elements):
-            if _entry(p, e, LIMIT) == 0 or p.mode[e] != STICK_SLIP_LIMITS.soft:
-                continue
-            row = _entry(p, e, ROW)
-            relative = 0.0
-            rate = 0.0
-            compliance = 0.0
-            for i in range(p.n_dof):
-                share = p.rows[row * p.n_dof + i]
-                relative += share * p.work[slope + p.n_dof + i]
-                rate += share * p.work[y + p.n_dof + i]
-                compliance += share * p.spread[i * p.n_rows + row]
-            limit = p.grip[p.n_elements + e]
-            lead = p.grip[3 * p.n_elements + e]
-            relative += compliance * p.grip[e]
-            wanted = 0.0
-            if limit > 0.0:
-                wanted = (rate + lead * relative) / (p.grip[2 * p.n_elements + e] / limit + lead * compliance)
-            wanted = min(max(wanted, -limit), limit)
-            for i in range(p.n_dof):
-                p.work[slope + p.n_dof + i] -= p.spread[i * p.n_rows + row] * (wanted - p.grip[e])
-            p.grip[e] = wanted
-
-
-@_inline
-def _hold(p, slope):
-    """Add the forces of the sticking elements, which make their relative acceleration zero."""
-    for e in range(p.n_elements):
-        if _entry(p, e, LIMIT) != 0 and p.mode[e] == 0.0:
-            row = _entry(p, e, ROW)
-            relative = 0.0
-            compliance = 0.0
-            for i in range(p.n_dof):
-                relative += p.rows[row * p.n_dof + i] * p.work[slope + p.n_dof + i]
-                compliance += p.rows[row * p.n_dof + i] * p.spread[i * p.n_rows + row]
-            p.grip[e] = relative / compliance
-            for i in range(p.n_dof):
-                p.work[slope + p.n_dof + i] -= p.spread[i * p.n_rows + row] * p.grip[e]
-
-
-@_inline
-def _rk4(p, t, dt, known):
-    """One classical Runge-Kutta step from the state into the trial state; `known`: the first slope is there already."""
-    n = p.n
-    work = p.work
-    load = 7 * n + 3 * STICK_SLIP_LIMITS.max_rows + STICK_SLIP_LIMITS.grips
-    n_inputs = p.n_inputs
-    if not known:
-        _derivative(p, t, 0, 3 * n, load)
-    for i in range(n):
-        work[2 * n + i] = work[i] + 0.5 * dt * work[3 * n + i]
-    _derivative(p, t + 0.5 * dt, 2 * n, 4 * n, load + n_inputs)
-    for i in range(n):
-        work[2 * n + i] = work[i] + 0.5 * dt * work[4 * n + i]
-    _derivative(p, t + 0.5 * dt, 2 * n, 5 * n, load + n_inputs)
-    for i in range(n):
-        work[2 * n + i] = work[i] + dt * work[5 * n + i]
-    _derivative(p, t + dt, 2 * n, 6 * n, load + 2 * n_inputs)
-    for i in range(n):
-        work[n + i] = work[i] + dt / 6.0 * (
-            work[3 * n + i] + 2.0 * (work[4 * n + i] + work[5 * n + i]) + work[6 * n + i]
-        )
-
-
-@_inline
-def _relative_velocity(p, y, row):
-    total = 0.0
-    for j in range(p.n_dof):
-        total += p.rows[row * p.n_dof + j] * p.work[y + p.n_dof + j]
-    return total
-
-
 @_jit
 def _settle(p, e, t, load):
     """Bring friction element `e` to relative rest and choose its mode: hold, or slide the way it is pushed."""
-    row = _entry(p, e, ROW)
-    velocity = _relative_velocity(p, 0, row)
+    row = entry(p, e, ROW)
+    velocity = relative_velocity(p, 0, row)
     compliance = 0.0
     for i in range(p.n_dof):
         compliance += p.rows[row * p.n_dof + i] * p.spread[i * p.n_rows + row]
     for i in range(p.n_dof):
         p.work[p.n_dof + i] -= p.spread[i * p.n_rows + row] * velocity / compliance
     p.mode[e] = 0.0
-    _derivative(p, t, 0, 3 * p.n, load)
+    derivative(p, t, 0, 3 * p.n, load)
     if abs(p.grip[e]) > p.grip[p.n_elements + e]:
         p.mode[e] = 1.0 if p.grip[e] > 0.0 else -1.0
 
@@ -337,8 +119,8 @@ def _creeps(p, e, t):
         p.work[i] = 0.0
     first = 7 * p.n
     call_kernel(
-        _entry(p, e, LIMIT), t, advance(p.work, first), advance(p.work, first), advance(p.work, first),
-        advance(p.theta, _entry(p, e, THETA)), advance(p.work, limit),
+        entry(p, e, LIMIT), t, advance(p.work, first), advance(p.work, first), advance(p.work, first),
+        advance(p.theta, entry(p, e, THETA)), advance(p.work, limit),
     )  # fmt: skip
     return p.work[limit + 1] > 0.0 or p.work[limit + 2] > 0.0
 
@@ -367,22 +149,22 @@ def _first_event(p, t, dt, rest):
     first = rest
     load = 7 * p.n + 3 * STICK_SLIP_LIMITS.max_rows + STICK_SLIP_LIMITS.grips
     for e in range(p.n_elements):
-        if _entry(p, e, LIMIT) == 0 or p.mode[e] == STICK_SLIP_LIMITS.soft:
+        if entry(p, e, LIMIT) == 0 or p.mode[e] == STICK_SLIP_LIMITS.soft:
             continue
         if p.mode[e] == 0.0:
             # grip holds the values of the last stage, that is of the end of the step, until it is asked for the start
             excess = abs(p.grip[e]) - p.grip[p.n_elements + e]
             if excess <= 0.0:
                 continue
-            _derivative(p, t, 0, 3 * p.n, load)
+            derivative(p, t, 0, 3 * p.n, load)
             before = min(abs(p.grip[e]) - p.grip[p.n_elements + e], 0.0)
-            _derivative(p, t + dt, p.n, 3 * p.n, load + 2 * p.n_inputs)
+            derivative(p, t + dt, p.n, 3 * p.n, load + 2 * p.n_inputs)
             crossing = rest * before / (before - excess)
         else:
-            end = p.mode[e] * _relative_velocity(p, p.n, _entry(p, e, ROW))
+            end = p.mode[e] * relative_velocity(p, p.n, entry(p, e, ROW))
             if end >= 0.0:
                 continue
-            before = max(p.mode[e] * _relative_velocity(p, 0, _entry(p, e, ROW)), 0.0)
+            before = max(p.mode[e] * relative_velocity(p, 0, entry(p, e, ROW)), 0.0)
             crossing = rest * before / (before - end)
         if crossing < first or event < 0:
             event = e
@@ -394,14 +176,14 @@ def _first_event(p, t, dt, rest):
 def _pass_event(p, u, k, t, dt, event, fraction, first, rest):
     """Step to the event, refine its instant once, and change the mode; return the share of the sample used."""
     sliding = p.mode[event] != 0.0
-    row = _entry(p, event, ROW)
+    row = entry(p, event, ROW)
     for _ in range(2 if sliding else 1):
         _fill_loads(p, u, k, fraction, first)
-        _rk4(p, t, first * dt, False)
+        rk4(p, t, first * dt, False)
         if not sliding:
             break
-        before = p.mode[event] * _relative_velocity(p, 0, row)
-        end = p.mode[event] * _relative_velocity(p, p.n, row)
+        before = p.mode[event] * relative_velocity(p, 0, row)
+        end = p.mode[event] * relative_velocity(p, p.n, row)
         if not (before > end and abs(end) > 1e-9 * before):
             break
         first = min(max(first * before / (before - end), 0.0), rest)
@@ -434,7 +216,7 @@ def _free_run(clock, u, start, scratch, n_dof, matrices, table, rows, spread, th
     mode = scratch[:n_elements]
     position, velocity, acceleration = out
     base = pointer_at(scratch.ctypes.data)
-    p = _Plan(
+    p = Workspace(
         n_dof, n, u.shape[1], n_elements, rows.shape[0], load_factor, pointer_at(matrices.ctypes.data), table.ctypes.data,
         pointer_at(rows.ctypes.data), pointer_at(spread.ctypes.data), base, advance(base, n_elements),
         pointer_at(theta.ctypes.data), advance(base, 5 * n_elements),
@@ -445,11 +227,11 @@ def _free_run(clock, u, start, scratch, n_dof, matrices, table, rows, spread, th
     for j in range(u.shape[1]):
         work[load + j] = u[0, j]
     for e in range(n_elements):
-        if _entry(p, e, LIMIT) != 0 and _creeps(p, e, t0):
+        if entry(p, e, LIMIT) != 0 and _creeps(p, e, t0):
             mode[e] = STICK_SLIP_LIMITS.soft
-        elif _entry(p, e, LIMIT) != 0:
+        elif entry(p, e, LIMIT) != 0:
             frictional = True
-            rate = _relative_velocity(p, 0, _entry(p, e, ROW))
+            rate = relative_velocity(p, 0, entry(p, e, ROW))
             if rate != 0.0:
                 mode[e] = 1.0 if rate > 0.0 else -1.0
             else:
@@ -460,7 +242,7 @@ def _free_run(clock, u, start, scratch, n_dof, matrices, table, rows, spread, th
         share = 1.0 / substeps[k]
         for j in range(u.shape[1]):
             work[load + j] = u[k * max(load_factor, 1), j]
-        _derivative(p, t, 0, 3 * n, load)
+        derivative(p, t, 0, 3 * n, load)
         for i in range(n_dof):
             position[k, i] = work[i]
             velocity[k, i] = work[n_dof + i]
@@ -476,7 +258,7 @@ def _free_run(clock, u, start, scratch, n_dof, matrices, table, rows, spread, th
             events = 0
             while True:
                 _fill_loads(p, u, k, fraction, rest)
-                _rk4(p, t + fraction * dt, rest * dt, s == 0 and events == 0)
+                rk4(p, t + fraction * dt, rest * dt, s == 0 and events == 0)
                 event = -1
                 first = rest
                 if frictional and events < STICK_SLIP_LIMITS.max_events:

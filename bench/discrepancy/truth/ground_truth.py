@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
-from bench.discrepancy.truth.moreau_time_stepping import Acting, Matrices, Stop, TrueMotion, follow, march
-from bench.discrepancy.truth.withheld_effects import Drawn, Recipe
+from bench.discrepancy.truth.moreau_time_stepping import Acting, RigMatrices, Stop, TrueMotion, follow, march
+from bench.discrepancy.truth.recipe import Drawn, Recipe
 
 Array = NDArray[np.float64]
 
@@ -53,7 +53,7 @@ JOINTS = {
 
 
 @dataclass(frozen=True)
-class Placed:
+class WithheldEffect:
     """A withheld effect at its place.
 
     Attributes:
@@ -81,7 +81,7 @@ class Truth:
     values: Mapping[str, float]
     rate: float
 
-    def matrices(self, effects: Sequence[Placed] = ()) -> Matrices:
+    def matrices(self, effects: Sequence[WithheldEffect] = ()) -> RigMatrices:
         """The linear structure, wrong masses included."""
         value = dict(self.values)
         for e in effects:
@@ -89,7 +89,7 @@ class Truth:
                 value[_mass_name(self.rig, e.where)] *= 1.0 + e.drawn.values["relative_error"]
         if self.rig != "joint":
             one = np.ones((1, 1))
-            return Matrices(
+            return RigMatrices(
                 value.get("mass", 0.0) * one, value["damping"] * one, value["stiffness"] * one, one
             )
         blocks: dict[str, list[Array]] = {"mass": [], "damping": [], "stiffness": []}
@@ -102,14 +102,16 @@ class Truth:
         zero = np.zeros((2, 2))
         inputs = np.zeros((4, 2))
         inputs[0, 0] = inputs[2, 1] = 1.0
-        return Matrices(*(np.block([[a, zero], [zero, b]]) for a, b in blocks.values()), inputs)  # pyright: ignore[reportCallIssue]
+        return RigMatrices(*(np.block([[a, zero], [zero, b]]) for a, b in blocks.values()), inputs)  # pyright: ignore[reportCallIssue]
 
 
 def _mass_name(rig: str, where: str) -> str:
     return {"axial": "mass_1", "torsional": "inertia_1"}[where] if rig == "joint" else "mass"
 
 
-def motion_of(truth: Truth, effects: Sequence[Placed], loads: Array, *, quick: bool = False) -> TrueMotion:
+def motion_of(
+    truth: Truth, effects: Sequence[WithheldEffect], loads: Array, *, quick: bool = False
+) -> TrueMotion:
     """Motion from rest at the samples of the loads.
 
     Args:
@@ -149,7 +151,7 @@ def motion_of(truth: Truth, effects: Sequence[Placed], loads: Array, *, quick: b
     return TrueMotion(*(m[::each] for m in motion))
 
 
-def played(effects: Sequence[Placed], loads: Array, step: float) -> tuple[Array, int]:
+def played(effects: Sequence[WithheldEffect], loads: Array, step: float) -> tuple[Array, int]:
     """Loads that act, after what the actuator does to the commands, and their samples a sample of the record."""
     out = loads.copy()
     for e in effects:
@@ -178,7 +180,7 @@ def played(effects: Sequence[Placed], loads: Array, step: float) -> tuple[Array,
     ), GROUND_TRUTH_SETTINGS.steps
 
 
-def _in_mujoco(truth: Truth, effects: Sequence[Placed], loads: Array) -> TrueMotion:
+def _in_mujoco(truth: Truth, effects: Sequence[WithheldEffect], loads: Array) -> TrueMotion:
     from bench.rig import Element, simulate  # noqa: PLC0415  (MuJoCo, which a diagnosis does not need)
     from bench.rig.library import joint_rig, sdof_rig  # noqa: PLC0415
 
@@ -229,7 +231,7 @@ def _in_mujoco(truth: Truth, effects: Sequence[Placed], loads: Array) -> TrueMot
     return TrueMotion(position, velocity, total @ np.linalg.inv(matrices.mass).T)
 
 
-def force_under(truth: Truth, effects: Sequence[Placed], position: Array, velocity: Array) -> Array:
+def force_under(truth: Truth, effects: Sequence[WithheldEffect], position: Array, velocity: Array) -> Array:
     """Force (n,) of a component along its prescribed motion, given finely (n * STEPS,)."""
     laws = [
         Acting(e.recipe.law, np.asarray(e.drawn.theta), ROWS[truth.rig][e.where], e.recipe.limit)
@@ -244,7 +246,7 @@ def force_under(truth: Truth, effects: Sequence[Placed], position: Array, veloci
     return force[:: GROUND_TRUTH_SETTINGS.steps]
 
 
-def sensed(effects: Sequence[Placed], name: str, samples: Array, step: float) -> Array:
+def sensed(effects: Sequence[WithheldEffect], name: str, samples: Array, step: float) -> Array:
     """A channel after what its sensor does to it."""
     out = samples.copy()
     for e in effects:

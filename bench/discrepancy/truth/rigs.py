@@ -6,42 +6,24 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.signal import bessel, chirp, fftconvolve, sosfilt
 
 from bench.discrepancy.truth.background_settings import BackgroundSettings
 from bench.discrepancy.truth.ground_truth import (
     GROUND_TRUTH_SETTINGS,
     ROWS,
-    Placed,
     Truth,
+    WithheldEffect,
     force_under,
     motion_of,
     sensed,
 )
+from bench.discrepancy.truth.loads import RIGS_SETTINGS, SIGNALS, Array, load, machine_motion
 from bench.discrepancy.truth.moreau_time_stepping import TrueMotion
-from bench.discrepancy.truth.withheld_effects import Reach, Recipe, recipe_named
+from bench.discrepancy.truth.recipe import Reach, Recipe
+from bench.discrepancy.truth.withheld_effects import recipe_named
 from bench.errors import ParameterError
 
-Array = NDArray[np.float64]
-
 SENSORS = ("both", "position", "acceleration")
-SIGNALS = ("random", "sweep", "multisine", "stepped", "decaying")
-
-
-@dataclass(frozen=True)
-class RigsSettings:
-    """Numbers of `bench.discrepancy.truth.rigs`."""
-
-    machine: float = 6.0
-    """Bandwidth of the machine that prescribes a motion, as a multiple of the signal's central frequency."""
-    ramp: float = 0.3
-    """Seconds over which loads and motions set in [s]."""
-    background_shares: tuple[float, ...] = (0.25, 0.75, 0.0, 0.0)
-    """Probabilities of none, single, double and foreign cases that have a background."""
-
-
-RIGS_SETTINGS = RigsSettings()
 
 
 @dataclass(frozen=True)
@@ -96,7 +78,7 @@ class BlindOptions:
 
 
 @dataclass(frozen=True)
-class Plan:
+class CasePlan:
     """What a case is to be, before its numbers are drawn."""
 
     kind: str
@@ -121,27 +103,27 @@ class Bench:
         loads: (n, n_loads) each; for a prescribed motion the displacement, sampled finely (n * STEPS, 1).
     """
 
-    plan: Plan
+    plan: CasePlan
     truth: Truth
     names: tuple[str, ...]
     signals: tuple[str, ...]
     loads: tuple[Array, ...]
 
     def responses(
-        self, effects: Sequence[Placed], *, quick: bool = False, judging: bool = True
+        self, effects: Sequence[WithheldEffect], *, quick: bool = False, judging: bool = True
     ) -> list[dict[str, Array]]:
         """Response channels of every record without noise; see `run`."""
         return [r for r, _ in self.run(effects, quick=quick, judging=judging)]
 
     def run(
-        self, effects: Sequence[Placed], *, quick: bool = False, judging: bool = True
+        self, effects: Sequence[WithheldEffect], *, quick: bool = False, judging: bool = True
     ) -> list[tuple[dict[str, Array], TrueMotion]]:
         """Response channels and motion of every record.
 
         Args:
             effects: What is withheld.
             quick: Coarse, for a search.
-            judging: The judging record as well.
+            judging: The validation record as well.
         """
         step = 1.0 / self.truth.rate
         out = []
@@ -200,7 +182,7 @@ class Bench:
         return [{f"{quantity}_2": 1.0, f"{quantity}_1": -1.0} for quantity in pairs]
 
 
-def _channels(plan: Plan) -> list[tuple[str, int, int]]:
+def _channels(plan: CasePlan) -> list[tuple[str, int, int]]:
     """(channel, order of the derivative, column of the motion) of the response channels."""
     position, acceleration = plan.sensors != "acceleration", plan.sensors != "position"
     if plan.rig == "sdof":
@@ -251,7 +233,7 @@ def reach_of(bench: Bench, where: str) -> Reach:
     )  # fmt: skip
 
 
-def draw_bench(plan: Plan, rng: np.random.Generator, options: BlindOptions) -> Bench:
+def draw_bench(plan: CasePlan, rng: np.random.Generator, options: BlindOptions) -> Bench:
     """Draw the rig's true parameters and its loads."""
     rate = options.sample_rate
     n = round(options.duration * rate)
@@ -281,7 +263,7 @@ def draw_bench(plan: Plan, rng: np.random.Generator, options: BlindOptions) -> B
         fine = rate * GROUND_TRUTH_SETTINGS.steps
         loads = tuple(
             stroke
-            * followed(load(s, frequency, n * GROUND_TRUTH_SETTINGS.steps, fine, rng), frequency, fine)[
+            * machine_motion(load(s, frequency, n * GROUND_TRUTH_SETTINGS.steps, fine, rng), frequency, fine)[
                 :, None
             ]
             for s in signals
@@ -296,13 +278,6 @@ def draw_bench(plan: Plan, rng: np.random.Generator, options: BlindOptions) -> B
     loads = tuple(level * rng.uniform(0.8, 1.25) * load(s, frequency, n, rate, rng)[:, None] for s in signals)
     values = {"mass": mass, "stiffness": stiffness, "damping": damping}
     return Bench(plan, Truth("sdof", values, rate), names, signals, loads)
-
-
-def followed(signal: Array, frequency: float, rate: float) -> Array:
-    """Motion (n,) of a machine that is asked for a signal: no actuator jumps, nor does it turn a corner."""
-    return np.asarray(
-        sosfilt(bessel(4, RIGS_SETTINGS.machine * frequency, fs=rate, output="sos"), signal), dtype=np.float64
-    )
 
 
 def _joint_values(rng: np.random.Generator) -> tuple[dict[str, float], float, tuple[float, float]]:
@@ -327,34 +302,3 @@ def _joint_values(rng: np.random.Generator) -> tuple[dict[str, float], float, tu
         values[f"joint_damping_{axis}"] = 2.0 * float(rng.uniform(0.02, 0.05)) * float(np.sqrt(k * high))
         levels.append(amplitude * stiffest * float(rng.uniform(0.1, 0.3)))
     return values, frequency, (levels[0], levels[1])
-
-
-def load(kind: str, frequency: float, n: int, rate: float, rng: np.random.Generator) -> Array:
-    """Unit-RMS signal (n,) around a resonance at `frequency` [Hz], starting smoothly from zero."""
-    t = np.arange(n) / rate
-    duration = n / rate
-    if kind == "sweep":
-        out = chirp(t, 0.3 * frequency, duration, 2.5 * frequency, phi=int(rng.integers(360)))
-    elif kind == "stepped":
-        steps = np.array_split(np.arange(n), 6)
-        cycles = np.zeros(n)
-        level = np.zeros(n)
-        for own, f in zip(steps, rng.permutation(np.linspace(0.5, 1.7, 6)) * frequency, strict=True):
-            cycles[own] = f / rate
-            level[own] = rng.uniform(0.4, 1.0)
-        # levels pass into one another over some periods, so that no step of the amplitude rings
-        width = max(round(rate / frequency), 1)
-        level = fftconvolve(np.pad(level, width, mode="edge"), np.hanning(2 * width + 1), mode="valid")
-        out = level * np.sin(2.0 * np.pi * np.cumsum(cycles))
-    else:
-        f = np.fft.rfftfreq(n, 1.0 / rate)
-        inside = (f > 0.2 * frequency) & (f < 2.7 * frequency)
-        amplitude = np.ones(len(f)) if kind == "multisine" else np.abs(rng.standard_normal(len(f)))
-        # the phases of the bins outside the band are not drawn: the signal does not depend on the rate then
-        phase = np.zeros(len(f))
-        phase[inside] = 2.0 * np.pi * rng.random(int(inside.sum()))
-        out = np.fft.irfft(np.where(inside, amplitude * np.exp(1j * phase), 0.0), n)
-        if kind == "decaying":
-            out = out * np.exp(-3.0 * (t % (duration / 3.0)) / (duration / 3.0))
-    out = out * np.sin(0.5 * np.pi * np.minimum(t / RIGS_SETTINGS.ramp, 1.0)) ** 2
-    return np.asarray(out / np.sqrt(np.mean(out**2)), dtype=np.float64)

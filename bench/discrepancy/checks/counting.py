@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from bench.discrepancy.case.case import Case, CaseRecord
-from bench.discrepancy.model.mjcf_reference import Reference
+from bench.discrepancy.checks.reference import Reference
 
 
 def counted_from_rest(case: Case, reference: Reference) -> tuple[Case, tuple[str, ...]]:

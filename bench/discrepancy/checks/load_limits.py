@@ -6,6 +6,7 @@ them is the nominal model without them under clipped loads.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import mujoco
@@ -38,6 +39,26 @@ def within_limits(
             low, high, what = found
             ends = sorted(end * (_gain(rig.model, name) if read else 1.0) for end in (low, high))
             limits[channel] = (ends[0], ends[1], what)
+    straight = case.load_interpolation == "linear"
+    return clipped_case(
+        case,
+        limits,
+        lambda samples, low, high: clipped_load(samples, low, high, straight=straight, settings=settings),
+    )
+
+
+def clipped_case(
+    case: Case,
+    limits: Mapping[str, tuple[float, float, str]],
+    clip: Callable[[Array, float, float], Array] = np.clip,
+) -> tuple[Case, tuple[str, ...]]:
+    """A case whose loads stay within limits, and where that made a difference, in words.
+
+    Args:
+        case: The case.
+        limits: Load channel to least value, largest value, and what in the model says so.
+        clip: From samples (n,) and the two values to samples within them.
+    """
     said: list[str] = []
 
     def clipped(record: CaseRecord) -> CaseRecord:
@@ -46,9 +67,7 @@ def within_limits(
             samples = record.values[channel]
             if samples.min() >= low and samples.max() <= high:
                 continue
-            values[channel] = clipped_load(
-                samples, low, high, straight=case.load_interpolation == "linear", settings=settings
-            )
+            values[channel] = clip(samples, low, high)
             values[channel].setflags(write=False)
             said.append(
                 f"'{channel}' runs from {samples.min():.4g} to {samples.max():.4g} in '{record.name}'; the model limits it to {low:.4g} … "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -10,7 +11,14 @@ from numpy.typing import NDArray
 
 from bench import native
 from bench.discrepancy.case.case import Case, CaseChannel
-from bench.discrepancy.model.mjcf import loads_and_responses, plain_rig
+from bench.discrepancy.model.mjcf import plain_rig
+from bench.discrepancy.model.mjcf_channels import loads_and_responses
+from bench.discrepancy.model.mjcf_prescribed import (
+    MOTION,
+    PrescribedChannel,
+    loads_of_motion,
+    prescribed_channels,
+)
 from bench.discrepancy.settings import ModelSettings
 from bench.rig import Rig
 from bench.rig.building import parse
@@ -28,7 +36,7 @@ class Reference:
         model: The model at the nominal values.
         loads: Load channel to (index in ctrl, command for a unit of the channel).
         responses: Response channel to its place in sensordata; those that refer to a joint are left out.
-        control: (n_u,) commands of actuators that no channel drives.
+        control: (n_u,) commands at rest: what holds joints whose motion is prescribed, and zeros.
         rest: (n_q,) positions at rest.
         offsets: (n_responses,) readings there.
         unsteady: Whether there is no state of rest.
@@ -72,6 +80,10 @@ def reference_of(case: Case, rig: Rig, *, settings: ModelSettings) -> Reference:
         if colon:  # others are of laws beside the model
             values.setdefault(kind, {})[name] = parameter.value
     model = probed.with_structure(**values).model
+    moved = loads_of_motion(prescribed_channels(case, rig))
+    held = np.array([int(model.joint(joint).dofadr[0]) for joint in moved], dtype=np.intp)
+    rest, unsteady, fastest = _at_rest(model, held, settings=settings)
+    control, large = _prescribed(model, rest, moved, settings=settings)
     loads, responses = loads_and_responses(case, plain_rig(case, rig)[0], settings=settings)
     columns = [channel.name for channel in probed.channels[len(probed.actuators) :]]
     places = {
@@ -86,13 +98,28 @@ def reference_of(case: Case, rig: Rig, *, settings: ModelSettings) -> Reference:
         index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name)
         # a force sensor reads what the actuator's gain makes of a command
         gain = float(model.actuator_gainprm[index, 0]) if channel.target.startswith("sensor:") else 1.0
-        inputs[channel.name] = (int(model.actuator_ctrladr[index]), 1.0 / gain if gain else 1.0)
-    rest, unsteady, fastest = _at_rest(model, settings=settings)
+        command = large.get(channel.name, 1.0 / gain if gain else 1.0)
+        inputs[channel.name] = (int(model.actuator_ctrladr[index]), command)
     data = mujoco.MjData(model)
     data.qpos[:] = rest
     mujoco.mj_forward(model, data)
     offsets = data.sensordata[list(places.values())].copy()
-    return Reference(model, inputs, places, np.zeros(model.nu), rest, offsets, unsteady, fastest)
+    return Reference(model, inputs, places, control, rest, offsets, unsteady, fastest)
+
+
+def _prescribed(
+    model: mujoco.MjModel, rest: Array, moved: dict[str, PrescribedChannel], *, settings: ModelSettings
+) -> tuple[Array, dict[str, float]]:
+    """Puts large masses at joints whose motion is prescribed; commands (n_u,) that hold them at rest, and by load channel the command for
+    a unit of it."""
+    control, commands, state = np.zeros(model.nu), {}, _at(model, rest)
+    for joint, load in moved.items():
+        dof = int(model.joint(joint).dofadr[0])
+        large = settings.large_mass * state.mass[dof, dof]
+        model.dof_armature[dof] += large
+        control[model.actuator(MOTION + joint).id] = -state.force[dof]
+        commands[load.channel] = large / load.gain
+    return control, commands
 
 
 def _probe(channel: CaseChannel) -> str:
@@ -117,37 +144,52 @@ def _probed(case: Case, rig: Rig) -> Rig:
     return Rig(rig.name, spec.to_xml(), timestep=rig.timestep, folder=rig.folder)
 
 
+class _State(NamedTuple):
+    """Forces (n_v,) without commands, and the mass matrix (n_v, n_v)."""
+
+    force: Array
+    mass: Array
+
+
 @native.quiet()
-def _at_rest(model: mujoco.MjModel, *, settings: ModelSettings) -> tuple[Array, bool, float]:
+def _at(model: mujoco.MjModel, position: Array, velocity: Array | float = 0.0) -> _State:
+    """What springs, gravity and drives exert on the joints of a state."""
+    data, mass = mujoco.MjData(model), np.zeros((model.nv, model.nv))
+    data.qpos[:], data.qvel[:] = position, velocity
+    mujoco.mj_fwdPosition(model, data)
+    mujoco.mj_fwdVelocity(model, data)
+    mujoco.mj_fwdActuation(model, data)
+    mujoco.mj_fullM(model, data, mass)
+    return _State(data.qfrc_passive - data.qfrc_bias + data.qfrc_actuator, mass)
+
+
+def _at_rest(
+    model: mujoco.MjModel, held: NDArray[np.intp], *, settings: ModelSettings
+) -> tuple[Array, bool, float]:
     """Positions at which springs and gravity balance, by Newton steps from the reference positions; whether there are none; and the
-    rate of the fastest motion there [1/s]."""
-    data = mujoco.MjData(model)
+    rate of the fastest motion there [1/s]. Degrees of freedom that are `held` stay where they are."""
     q = model.qpos0.copy()
-
-    def force(position: Array, velocity: Array | float = 0.0) -> Array:
-        mujoco.mj_resetData(model, data)
-        data.qpos[:], data.qvel[:] = position, velocity
-        mujoco.mj_fwdPosition(model, data)
-        mujoco.mj_fwdVelocity(model, data)
-        mujoco.mj_fwdActuation(model, data)
-        return data.qfrc_passive - data.qfrc_bias + data.qfrc_actuator
-
     if model.nq != model.nv:
         return q, True, 0.0
+    free = np.setdiff1d(np.arange(model.nv), held)
+    eye = np.eye(model.nv)[free]
+
+    def force(position: Array, velocity: Array | float = 0.0) -> Array:
+        return _at(model, position, velocity).force[free]
+
     scale = max(float(np.abs(force(q)).max(initial=0.0)), 1e-300)
     for _ in range(settings.newton_steps):
         here = force(q)
         if np.abs(here).max(initial=0.0) <= 1e-9 * scale:
             break
-        jacobian = np.column_stack([(force(q + 1e-6 * row) - here) / 1e-6 for row in np.eye(model.nv)])
-        q = q - np.linalg.pinv(jacobian, rcond=1e-9) @ here
-    here, eye = force(q), np.eye(model.nv)
-    mass = np.zeros((model.nv, model.nv))
-    mujoco.mj_fullM(model, data, mass)
+        jacobian = np.column_stack([(force(q + 1e-6 * row) - here) / 1e-6 for row in eye])
+        q[free] -= np.linalg.pinv(jacobian, rcond=1e-9) @ here
+    here, still = force(q), np.eye(len(free))
     slopes = np.column_stack(
         [(force(q + 1e-6 * row) - here) / 1e-6 for row in eye]
         + [(force(q, 1e-6 * row) - here) / 1e-6 for row in eye]
     )
-    state = np.vstack([np.hstack([np.zeros_like(eye), eye]), np.linalg.solve(mass, slopes)])
+    mass = _at(model, q).mass[np.ix_(free, free)]
+    state = np.vstack([np.hstack([np.zeros_like(still), still]), np.linalg.solve(mass, slopes)])
     left = float(np.abs(here).max(initial=0.0))
     return q, left > 1e-6 * scale and left > 1e-12, float(np.abs(np.linalg.eigvals(state)).max(initial=0.0))

@@ -1,0 +1,180 @@
+"""One more effect beside a hypothesis: screened, refined along the motion, fitted in a few iterations, the best carried on."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from bench.discrepancy.effects.effect import Effect
+from bench.discrepancy.fitting.goodness_of_fit import consistent, key_of
+from bench.discrepancy.fitting.map_fit import Fit, fit
+from bench.discrepancy.likelihood.problem import Problem
+from bench.discrepancy.model.placement import Hypothesis, Placed
+from bench.discrepancy.numerics.threads import in_threads
+from bench.discrepancy.screening.candidates import (
+    about,
+    leading,
+    passed_over,
+    refined,
+    tells_motion,
+)
+from bench.discrepancy.screening.linear_amplitudes import Point
+from bench.discrepancy.screening.screen import Screen
+from bench.discrepancy.search.fits import Search, Task, carry_on, converge, limit_of
+
+
+class _Offers(NamedTuple):
+    """What a screening offers beside a base; the screening itself is large, and let go.
+
+    Attributes:
+        base: Fitted hypothesis.
+        tasks: Fits of what promises most.
+        spare: Further starts and their fits, for the case that those do not keep what they promise.
+    """
+
+    base: Fit
+    tasks: list[Task]
+    spare: list[tuple[Point, Task]]
+
+
+def extend(
+    search: Search,
+    screen: Screen,
+    bases: Sequence[Fit],
+    *,
+    count: int,
+    among: Collection[tuple[str, str, str]] = (),
+) -> None:
+    """Add one effect to every base, of those `among` where some are given: screen, refine, fit quickly, carry the best on."""
+    size = len(bases[0].hypothesis) + 1
+    offers = [_offers(search, screen, base, count=count, among=among) for base in bases]
+    limit = limit_of(search, size)
+
+    def fit_all(tasks: Iterable[Task]) -> None:
+        for fitted in in_threads(lambda task: first_fit(search.problem, *task, limit=limit), tasks):
+            search.add(fitted)
+
+    fit_all(task for found in offers for task in found.tasks)
+    for base, _, spare in offers:
+        kept = _kept(search, base)
+        fit_all(task for p, task in spare if p.gain > kept and search.start(base.hypothesis, p))
+    carry_on(search, size, most=4)
+
+
+def _offers(
+    search: Search,
+    screen: Screen,
+    base: Fit,
+    *,
+    count: int,
+    among: Collection[tuple[str, str, str]],
+) -> _Offers:
+    """Screen one more effect beside a base, of those `among` where some are given."""
+    settings = search.problem.settings
+    problem = search.problem
+    named = base if base.hypothesis else None
+    along = tells_motion(base, problem)
+    local = about(screen, base, explained=along)
+    ground = local.ground(named, simulated=named is not None and along)
+    solved = [p for p in local.ranked(named, ground) if not among or p.placed.key in among]
+    points = refined(local, ground, solved)
+    if not named:
+        search.first = sorted([*search.first, *points] if among else points, key=lambda p: -p.gain)
+    inertia = [] if among else local.inertia_points(base, ground)
+    most = max((p.gain for p in [*points, *inertia]), default=0.0)
+    excess = base.chi2 - base.n_residuals
+    if named and problem.scaled and not consistent(base) and most < settings.search.unpromising * excess:
+        return _Offers(base, [], [])
+
+    def task(point: Point) -> Task:
+        return (*base.hypothesis, point.placed), local.starts(point, ground, named)
+
+    # a screening can promise more than there is
+    most = min(most, max(excess, settings.screening.worth_a_fit))
+    short = (settings.screening.trusted if named and along else settings.screening.short) * most
+    chosen = leading(points, count, short, settings=search.problem.settings)
+    if not among:
+        chosen += passed_over(
+            solved, chosen, count, settings.screening.worth_a_fit, settings=search.problem.settings
+        )
+    begun = {point.placed.key for point in chosen}
+    rest = [p for p in points if p.placed.key not in begun] if named and along else []
+    spare = [
+        (p, task(p))
+        for p in leading(
+            rest, count, settings.screening.worth_a_fit, starts=1, settings=search.problem.settings
+        )
+    ]
+    tasks = [task(p) for p in chosen if search.start(base.hypothesis, p)]
+    least = min(short, settings.screening.worth_a_fit) if consistent(base) else short
+    tasks += [
+        ((*base.hypothesis, p.placed), np.append(base.vector, p.eta)) for p in inertia if p.gain > least
+    ]
+    return _Offers(base, tasks, spare)
+
+
+def _kept(search: Search, base: Fit) -> float:
+    """How much one more effect has taken from the cost of a base so far: what was promised may not have been kept."""
+    own = key_of(base.hypothesis)
+    size = len(base.hypothesis) + 1
+    best = min(
+        (f.cost for key, f in search.fits.items() if len(key) == size and own < key), default=base.cost
+    )
+    return base.cost - best
+
+
+def first_fit(problem: Problem, hypothesis: Hypothesis, start: np.ndarray, *, limit: float = np.inf) -> Fit:
+    """A few iterations with one more effect, the last one; of channels and inertia, which the screening begins farther off, more.
+
+    Args:
+        problem: Records and priors.
+        hypothesis: Effects.
+        start: Start vector (n,), or several (k, n).
+        limit: Cost that has to be within sight, see `minimise`.
+    """
+    settings = problem.settings.search
+    iterations = settings.quick if hypothesis[-1].effect.site == "joint" else 2 * settings.quick
+    return fit(problem, hypothesis, start=start, iterations=iterations, exact=False, limit=limit)
+
+
+def contacts(search: Search, candidates: Sequence[Placed]) -> None:
+    """Fit contacts from the best of their grid by free runs.
+
+    Where only velocities or accelerations are measured, the middle of the motion is unknown, and a stop that shifts it is screened
+    at the wrong place. Contacts have few shapes and cost little to simulate.
+    """
+    settings = search.problem.settings.search
+    problem = search.problem
+    still = np.zeros(len(problem.nominal))
+    tasks: list[Task] = []
+    for placed in candidates:
+        effect = placed.effect
+        if effect.rare or effect.site != "joint" or not _contact(effect):
+            continue
+        size = effect.parameters[0]
+        starts = [
+            np.concatenate([still, [size.mean + level * size.std], eta[1:]])
+            for eta in effect.grid()
+            for level in settings.contact_levels
+        ]
+
+        def cost(start: np.ndarray, placed: Placed = placed) -> float:
+            residual = problem.residual((placed,), start)
+            return float(residual @ residual)
+
+        costs = np.array(in_threads(cost, starts))
+        tasks += [
+            ((placed,), starts[i])
+            for i in np.argsort(costs)[: settings.contact_starts]
+            if np.isfinite(costs[i])
+        ]
+    converge(search, tasks)
+
+
+def _contact(effect: Effect) -> bool:
+    """Whether an effect is a force of the displacement with a position to be found."""
+    return (
+        effect.family == "stiffness" and any(p.grid for p in effect.parameters) and effect.rate_bound is None
+    )
