@@ -118,7 +118,7 @@ def _within(
 def _run(benches: ModelBenches, actions: NDArray[np.float64], seed: int) -> NDArray[np.float64]:
     """Run a test on all drawn arms, always the same; what each reaches of its limits ``(n, 2)``."""
     places = np.arange(benches.n)
-    benches.reset(places, [np.random.default_rng([seed, place]) for place in places])
+    benches.reset(places, [np.random.default_rng([seed, place]) for place in range(benches.n)])
     for action in actions:
         benches.step(places, np.broadcast_to(action, (benches.n, len(action))))
     return benches.desk.peak

@@ -114,8 +114,9 @@ class ModelBenches(SteppedBenches):
         parts = [array[places] for array in self._sums]
         counts, values = np.full((len(places), 1), self._p), np.zeros((len(places), 1))
         ideal = outputs[:, 0].copy()
+        fisher, score, square = parts
         accumulate(
-            0, len(places), outputs, counts, ERROR_SETTINGS.step, 1.0 / self.desk.noise, None, *parts, values
+            0, len(places), outputs, counts, ERROR_SETTINGS.step, 1.0 / self.desk.noise, None, fisher, score, square, values
         )  # fmt: skip
         for array, part in zip(self._sums, parts, strict=True):
             array[places] = part

@@ -138,13 +138,14 @@ class _Priors:
         ideal = self._shown(outputs, places, commands, clock)
         parts = [array[places] for array in self._sums]
         counts, values = np.full((len(places), 1), self.fan.p), np.zeros((len(places), 1))
+        fisher, score, square = parts
         accumulate(
-            0, len(places), outputs, counts, self.step, self._weights, ideal.copy(), *parts, values
+            0, len(places), outputs, counts, self.step, self._weights, ideal.copy(), fisher, score, square, values
         )  # fmt: skip
         for array, part in zip(self._sums, parts, strict=True):
             array[places] = part
-        fisher, score = (np.where(np.isfinite(part[:, 0]), part[:, 0], 0.0) for part in parts[:2])
-        return ideal, self._value(fisher, score)
+        known, bias = (np.where(np.isfinite(part[:, 0]), part[:, 0], 0.0) for part in (fisher, score))
+        return ideal, self._value(known, bias)
 
     def _shown(
         self, outputs: NDArray, places: NDArray[np.int64], commands: NDArray, clock: NDArray

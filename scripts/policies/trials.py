@@ -75,12 +75,12 @@ def kinds_of(setup: Setup, rigs: int, rng: np.random.Generator) -> list[Kind]:
     kinds = []
     for k, hypothesis in enumerate(prior.hypotheses):
         n = rigs // len(prior.hypotheses) + (k < rigs % len(prior.hypotheses))
-        families = [
+        alone, real = (
             Family(h, station.channels, station.actuators)
             for h in (hypothesis, with_background(hypothesis, terms))
-        ]
-        x = rng.uniform(-bound, bound, (n, families[0].n_parameters))
-        kinds.append(Kind(*families, x, rng.uniform(-bound, bound, (n, len(terms)))))
+        )
+        x = rng.uniform(-bound, bound, (n, alone.n_parameters))
+        kinds.append(Kind(alone, real, x, rng.uniform(-bound, bound, (n, len(terms)))))
     return kinds
 
 
