@@ -24,7 +24,7 @@ from envs.benches import FLOATS, Options
 from envs.laboratory import Laboratories, combined
 from envs.setups import PAIRS, SDOF_LAWS, discrimination_setup, joint_setup, sdof_setup
 
-SDOF, JOINT, DISCRIMINATION = envs.IDS
+SDOF, JOINT, DISCRIMINATION = envs.IDS[:3]
 QUICK: dict[str, Any] = {"rig": "sdof", "pairs": ("gap_cubic", "coulomb_stribeck"), "n_draws": 2}
 VARIANTS: list[tuple[str, dict[str, Any]]] = [
     (SDOF, {}),
@@ -403,6 +403,8 @@ def test_documentation_states_every_argument_and_limit() -> None:
         (SDOF, {"shaping": "knot"}, "Did you mean 'knots'"),
         (SDOF, {"enforcement": "stop"}, "terminate"),
         (SDOF, {"average": "mean"}, "posterior"),
+        (SDOF, {"reward": "eror"}, "Did you mean 'error'"),
+        (DISCRIMINATION, {**QUICK, "reward": "error"}, "rivals have not"),
         (SDOF, {"window": 1e-4}, "at least one step"),
         (SDOF, {"n_knots": 0}, "at least one"),
         (SDOF, {"n_draws": 1}, "at least one each"),
