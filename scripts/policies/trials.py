@@ -134,10 +134,10 @@ def trials_of(
         for method, controls in excitations(setup, task, kind, opened, rng):
             tell(f"{kind.family.hypothesis.name}, {method}")
             for real in (False, True):
-                yield _test(setup, kind, method, controls, real, rng)
+                yield _trial(setup, kind, method, controls, real, rng)
 
 
-def _test(
+def _trial(
     setup: Setup, kind: Kind, method: str, controls: Array, real: bool, rng: np.random.Generator
 ) -> Trial:
     station, n = setup.station(), len(kind.coordinates)
