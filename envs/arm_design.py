@@ -14,8 +14,8 @@ from bench.errors import ParameterError
 from bench.signals import Multisine
 
 from .arms import ArmSetup
-from .benches import Options
 from .model import ModelBenches
+from .options import Options
 
 
 @dataclass(frozen=True)

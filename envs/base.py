@@ -10,9 +10,11 @@ from gymnasium import spaces
 
 from bench.errors import ParameterError
 
-from .benches import FLOATS, Benches, Options, SteppedBenches, require_count
+from .benches import Benches
+from .options import Options, require_count
 from .practice import PracticeBenches
 from .setups import PAIRS, SDOF_LAWS, Setup, discrimination_setup, joint_setup, sdof_setup
+from .stepped import FLOATS, SteppedBenches
 
 
 @dataclass(frozen=True)

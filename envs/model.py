@@ -19,8 +19,9 @@ from bench.files import replacing
 
 from .arms import ArmArguments, ArmSetup, arm_setup
 from .base import options_of
-from .benches import Options, SteppedBenches, sensed
+from .options import Options
 from .single import BenchEnv
+from .stepped import SteppedBenches, sensed
 from .vector import BenchVectorEnv
 
 

@@ -36,8 +36,9 @@ from bench.excitation.station import Desk
 from bench.excitation.stepping import Packed, integrate_cases
 
 from .background import background_of
-from .benches import Options, SteppedBenches, sensed
+from .options import Options
 from .setups import Setup, made, rival_experiment
+from .stepped import SteppedBenches, sensed
 
 
 @dataclass(frozen=True)

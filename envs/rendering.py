@@ -27,7 +27,7 @@ SETTINGS = RenderingSettings()
 CAMERA = "overview"
 
 
-class Picture:
+class RenderedPicture:
     """Renderer of one bench.
 
     Attributes:

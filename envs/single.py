@@ -13,8 +13,8 @@ from bench.errors import UnknownNameError
 from bench.excitation import Draw
 
 from .base import RENDER_MODES, action_space, info_of, make_benches, observation_space, rest_info
-from .benches import SteppedBenches
-from .rendering import Picture
+from .rendering import RenderedPicture
+from .stepped import SteppedBenches
 
 
 class BenchEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
@@ -38,7 +38,7 @@ class BenchEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         }
         self.observation_space = observation_space(self.benches)
         self.action_space = action_space(self.benches)
-        self._picture: Picture | None = None
+        self._picture: RenderedPicture | None = None
 
     def _make(self, arguments: dict[str, Any]) -> SteppedBenches:
         """The bench behind it."""
@@ -96,7 +96,7 @@ class BenchEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             )
             return None
         if self._picture is None:
-            self._picture = Picture(self.benches.setup.rig)
+            self._picture = RenderedPicture(self.benches.setup.rig)
         positions = self.benches.positions(0)
         if self.render_mode == "human":
             self._picture.show(positions)

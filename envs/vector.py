@@ -14,8 +14,8 @@ from bench.errors import ParameterError, UnknownNameError
 from bench.excitation.ensemble import available_threads
 
 from .base import action_space, make_benches, observation_space, rest_info
-from .benches import require_count
-from .rendering import Picture
+from .options import require_count
+from .rendering import RenderedPicture
 
 
 class BenchVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any]]):
@@ -70,7 +70,7 @@ class BenchVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray
         self._all = np.arange(num_envs)
         self._ended = np.zeros(num_envs, dtype=bool)
         self._observation = np.zeros((num_envs, self.benches.n_observations), dtype=np.float32)
-        self._picture: Picture | None = None
+        self._picture: RenderedPicture | None = None
 
     def _make(self, n: int, threads: int, arguments: dict[str, Any]) -> Any:
         """The benches behind it."""
@@ -188,7 +188,7 @@ class BenchVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray
         if self.render_mode is None:
             return None
         if self._picture is None:
-            self._picture = Picture(self.benches.setup.rig)
+            self._picture = RenderedPicture(self.benches.setup.rig)
         return tuple(self._picture.array(self.benches.positions(i)).copy() for i in range(self.num_envs))
 
     def close_extras(self, **_: Any) -> None:

@@ -81,7 +81,8 @@ def _tell(console: Console, score: BackgroundScore) -> None:
             highlight=False,
         )
     console.print(
-        f"expected calibration error of names: {score.calibration:.3f}; {score.scatter:.3f} if every probability were exact"
+        f"expected calibration error of names: {score.calibration:.3f} ({score.interval[0]:.3f} to {score.interval[1]:.3f}); "
+        f"{score.scatter:.3f} if every probability were exact"
     )
     for stated, right, n in score.reliability:
         console.print(f"  stated {stated:.2f}, right {right:.2f}, of {n}")

@@ -20,7 +20,7 @@ import tyro
 
 from bench.files import json_values, write_text
 from bench.monitoring import MonitorSettings
-from bench.monitoring.study import Line, Run, line, service_run, switched_run
+from bench.monitoring.study import Line, StudyRun, line, service_run, switched_run
 
 FINE = MonitorSettings(change=0.1)
 HEADING = "# False alarms and delays of the damper monitor\n\nMade by `python scripts/monitor_damper.py --docs docs`.\n\n"
@@ -28,9 +28,9 @@ MAIN = 3
 """Kinds for which all runs are made: a fifth of C lost under each kind of motion."""
 
 
-def kinds() -> list[tuple[str, Callable[[int], Run]]]:
+def kinds() -> list[tuple[str, Callable[[int], StudyRun]]]:
     """Name, and what makes a run."""
-    found: list[tuple[str, Callable[[int], Run]]] = [
+    found: list[tuple[str, Callable[[int], StudyRun]]] = [
         (f"synthetic damper, {motion} motion, C less 20 %", partial(service_run, motion, 0.2))
         for motion in ("harmonic", "wandering", "random")
     ]

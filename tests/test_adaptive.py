@@ -14,7 +14,8 @@ from scipy.integrate import solve_ivp
 
 from bench.errors import IdentificationError, ParameterError, RecordingError
 from bench.identification import layout
-from bench.identification.adaptive import AdaptiveLeastSquares, Sample
+from bench.identification.adaptive import AdaptiveLeastSquares
+from bench.identification.adaptive_history import Sample
 from bench.identification.regressors import (
     Reference,
     bouc_wen_model,

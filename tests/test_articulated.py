@@ -10,10 +10,16 @@ import numpy as np
 import pytest
 
 from bench.discrepancy import diagnose, read_case
-from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis, applies
-from bench.discrepancy.articulated.effects import CATALOGUE
+from bench.discrepancy.articulated.admission import admitted_robot
+from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis
+from bench.discrepancy.articulated.free_runs import FreeRuns
 from bench.discrepancy.articulated.judgement import JudgementSettings, complete
-from bench.discrepancy.articulated.problem import ArticulatedProblem, placements
+from bench.discrepancy.articulated.next_test import propose
+from bench.discrepancy.articulated.recognition import applies
+from bench.discrepancy.articulated_search.catalogue import CATALOGUE
+from bench.discrepancy.articulated_search.fitting import ArticulatedFit, fit, refitted
+from bench.discrepancy.articulated_search.problem import ArticulatedProblem, placements
+from bench.discrepancy.articulated_search.search import without_idle
 from bench.discrepancy.multibody.channels import bound
 from bench.discrepancy.multibody.encoders import weight_of_readings
 from bench.discrepancy.multibody.model import ArticulatedModel, compiled_model
@@ -180,6 +186,83 @@ def test_models_that_it_cannot_take_are_refused_in_one_line(tmp_path, says):
     assert "\n" not in str(error.value)
 
 
+def test_a_joint_that_was_held_is_welded_where_it_was(tmp_path):
+    folder = write_case(tmp_path, mjcf(servo=True), servo=True)
+    document = json.loads((folder / "nominal.json").read_text())
+    for name in ("elbow_in", "elbow_q"):
+        del document["channels"][name]
+    for name in (
+        "mass:fore",
+        "damping:elbow",
+        "kp:elbow_drive",
+    ):
+        del document["parameters"][name]
+    document["joints"] = {"elbow": 0.4}
+    (folder / "nominal.json").write_text(json.dumps(document))
+    admitted = admitted_robot(read_case(folder), anyway=True)
+    welded, free = admitted.compiled, compiled_model(folder / "model.xml")
+    assert [welded.joint(i).name for i in range(welded.njnt)] == ["shoulder"]
+    torques = []
+    for model in (welded, free):
+        data = mujoco.MjData(model)
+        data.qpos[0] = 0.3
+        data.qpos[1:] = 0.4
+        mujoco.mj_forward(model, data)
+        torques.append(data.qfrc_bias[0])
+    assert torques[0] == pytest.approx(torques[1], rel=1e-6)
+    document["joints"] = {"elbwo": "hold"}
+    (folder / "nominal.json").write_text(json.dumps(document))
+    with pytest.raises(BenchError, match="elbwo"):
+        admitted_robot(read_case(folder))
+
+
+def test_the_next_test_tells_two_explanations_apart_within_what_the_arm_has_shown(tmp_path):
+    folder = write_case(tmp_path, mjcf(servo=True), servo=True)
+    case, compiled, _ = admitted_robot(read_case(folder))
+    problem = ArticulatedProblem.of(case, ArticulatedModel.of(compiled), case.identification)
+    fits = []
+    for name, eta in (("coulomb_friction", [-3.0]), ("quadratic_damping", [-3.0])):
+        placed = next(p for p in placements(problem, CATALOGUE) if p.key == (name, "elbow"))
+        vector = np.concatenate([np.zeros(len(problem.nominal)), eta])
+        fits.append(ArticulatedFit.at(problem, (placed,), vector))
+    told, trajectory = propose(problem, compiled, *fits) or pytest.fail("no test")
+    assert told["expected_log_odds"] > 0.0
+    assert 0.0 <= told["power"] <= 1.0
+    shown = problem.records[0].motion
+    speed = np.diff(trajectory.position, axis=0) * RATE
+    assert (
+        np.abs(trajectory.position[200:]).max(axis=0) < 1.01 * np.abs(shown.position).max(axis=0) + 1e-3
+    ).all()
+    assert (np.abs(speed[200:]).max(axis=0) < 1.05 * np.abs(shown.velocity).max(axis=0)).all()
+    lines = trajectory.as_csv(list(KP)).splitlines()
+    assert lines[0] == "time,shoulder,elbow"
+    assert len(lines) == len(trajectory.time) + 1
+
+
+def test_what_a_later_effect_makes_superfluous_is_dropped_and_refits_gain(tmp_path):
+    folder = write_case(tmp_path, mjcf(servo=True, friction=LIMIT), servo=True)
+    case, compiled, _ = admitted_robot(read_case(folder), anyway=True)
+    problem = ArticulatedProblem.of(case, ArticulatedModel.of(compiled), case.identification)
+    places = {p.key: p for p in placements(problem, CATALOGUE)}
+    friction, offset = places["coulomb_friction", "elbow"], places["force_offset", "shoulder"]
+    starts = np.concatenate([np.zeros(len(problem.nominal)), [0.1, -2.0]])
+    scale = ArticulatedFit.at(problem, (offset, friction), starts).scale
+    assert scale.max() > 3.0  # far from the truth: a joint is believed little
+    once = fit(problem, (offset, friction), starts, scale=scale, iterations=20)
+    again = refitted(problem, (offset, friction), starts, scale=scale)
+    assert np.sum(again.chi2) <= np.sum(once.chi2)
+    # what it is known to, and so its evidence, is that of the noise and no more that of where it started
+    assert np.trace(again.covariance) < 0.5 * np.trace(once.covariance)
+    assert again.scale.max() < 1.1
+    kept, tried = without_idle(problem, again, problem.settings.articulated.search)
+    assert [placed.key for placed in kept.hypothesis] == [friction.key]
+    assert tried
+    whole, _ = without_idle(problem, refitted(problem, (friction, offset), again.vector, scale=again.scale), replace(
+        problem.settings.articulated.search, worth=-1e9, sight=1e9
+    ))  # fmt: skip
+    assert [placed.key for placed in whole.hypothesis] == [friction.key, offset.key]
+
+
 def test_a_joint_that_nothing_measures_is_refused_with_what_to_do(tmp_path):
     folder = write_case(tmp_path, mjcf(servo=True), servo=True)
     document = json.loads((folder / "nominal.json").read_text())
@@ -234,6 +317,7 @@ def test_a_free_run_behind_a_late_encoder_starts_on_the_clock_of_its_log(tmp_pat
     vector[-1] = np.log(late / RATE)
     assert placed.effect.values(vector[-1:], placed.scales)["delay_s"] == pytest.approx(late / RATE)
     (motion,) = problem.motions((placed,), vector)
+    runs = FreeRuns(problem)
     for j in range(2):
-        left = np.sqrt(np.mean(problem.free_run(j, (placed,), vector, motion) ** 2))
-        assert left < 1.6 * problem.free_run_noise(j, (placed,), vector, 0)
+        left = np.sqrt(np.mean(runs.errors(j, (placed,), vector, motion) ** 2))
+        assert left < 1.6 * runs.noise(j, (placed,), vector, 0)

@@ -10,7 +10,7 @@ from test_articulated import KP, mjcf, write_case
 
 from bench.discrepancy import diagnose, read_case
 from bench.discrepancy.articulated.admission import admitted_robot
-from bench.discrepancy.articulated.diagnosis import applies
+from bench.discrepancy.articulated.recognition import applies
 from bench.errors import BenchError, ModelError, RecordingError, UnitError
 
 DEGREES = 180.0 / np.pi

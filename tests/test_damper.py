@@ -11,21 +11,17 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from bench.errors import IdentificationError, ParameterError, RecordingError
-from bench.identification.damper import (
-    check_design_model,
-    design_force,
-    fit_design_model,
-    fit_design_model_online,
-)
+from bench.identification.damper import design_force, fit_design_model, fit_design_model_online
 from bench.identification.damper_study import (
     DAMPER_STUDY_SETTINGS,
     INCH,
     VISCOUS_DAMPER,
-    harmonic_campaign,
     harmonic_record,
     polynomial_experiment,
     random_record,
 )
+from bench.identification.damper_trust import check_design_model
+from bench.identification.harmonic_tests import harmonic_campaign
 from bench.identification.order_study import order_study
 from bench.laws.evaluate import evaluate
 

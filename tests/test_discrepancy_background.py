@@ -19,9 +19,11 @@ from bench.discrepancy.blind.drawing import (
 from bench.discrepancy.blind.proportions import calibration_error, calibration_scatter
 from bench.discrepancy.blind.score_report import tables
 from bench.discrepancy.truth.background_settings import STATED, BackgroundSettings
+from bench.discrepancy.truth.foreign_memory import HIDDEN_RESONATOR
 from bench.discrepancy.truth.loads import RIGS_SETTINGS
 from bench.discrepancy.truth.rigs import BlindOptions, draw_bench
 from bench.errors import ParameterError
+from bench.laws.base_flexibility import BASE_FLEXIBILITY
 
 RIGS = {"sdof": (1.0, 0.0, 0.0), "damper": (0.0, 1.0, 0.0), "joint": (0.0, 0.0, 1.0)}
 SHORT = {
@@ -150,6 +152,9 @@ MAIN = "main effect named or in a declared set"
         (result("unknown", []), answer(["gap"], ["hum"]), {MAIN, "and first"}),
         (result("none", []), answer(["gap"], ["hum"]), {MAIN, "and first", "not none"}),
         (result("effect", [("gap", 0.95)]), answer([], ["hum"]), set()),  # it pays
+        (result("none", []) | {"seconds": float("nan")}, answer([], ["hum"]), {"every number is finite"}),
+        (result("effect", [("gap", 0.9)]) | {"named": [{"name": "gap", "probability": 0.9, "parameters": {}, "closed": -0.1}]},
+         answer([], ["hum"]), {"none of them makes it larger"}),
         (result("effect", [("gap", 0.95)], after=0.39), answer([], ["hum"]),
          {"background: no certain name that does not pay on the judging record", "names shrink the judged discrepancy"}),
         (result("effect", [("gap", 0.95)]), answer([], [], stated="no"),
@@ -158,6 +163,21 @@ MAIN = "main effect named or in a declared set"
 )  # fmt: skip
 def test_what_counts_as_right_beside_a_background(said, truth, missed):
     assert {what for what, hit in background_scored(truth, said) if not hit} == missed
+
+
+@pytest.mark.parametrize(("rate", "held"), [(7.2, True), (6.0, False), (70.0, False)])
+def test_an_interval_is_held_against_the_parameter_that_the_law_has(rate, held):
+    drift = {
+        "name": "stiffness_drift", "where": "", "probability": 0.9, "law": "stiffness_drift", "theta": [7.0, 0.0],
+        "parameters": {"stiffness_change": {"value": 70.0, "std": 4.0, "unit": "N/m"}},
+    }  # fmt: skip
+    truth = answer(["stiffness_drift"], ["hum"])
+    truth["effects"][0] |= {"names": ["rate"], "parameters": [rate]}
+    said = result("effect", []) | {"named": [drift]}
+    assert (
+        dict(background_scored(truth, said))["95 % intervals of the main effect's parameters hold the truth"]
+        is held
+    )
 
 
 def test_both_worlds_have_figures_of_their_own(tmp_path):
@@ -183,13 +203,40 @@ def test_both_worlds_have_figures_of_their_own(tmp_path):
     assert score.background.wrong == (
         "b: ['gap'] -> unknown []; not: main effect named or in a declared set, and first",
     )
-    drift = result("effect", [("stiffness_drift", 0.9), ("gap", 0.5)])
-    for background, error in ((["slow_stiffness"], 0.3), (["hum"], 0.7)):
-        told = background_summary([("a", answer([], background), drift)])
-        # 0.9 and 0.5, of which the drift is so in the first case only
+    base = result("effect", [("base_flexibility", 0.9), ("gap", 0.5)])
+    for background, error in ((["hidden_resonator"], 0.3), (["slow_stiffness"], 0.7)):
+        told = background_summary([("a", answer([], background), base)])
+        # 0.9 and 0.5, of which the base is so in the first case only
         assert told.calibration == pytest.approx(error)
+        assert told.interval[0] <= told.calibration <= told.interval[1]
     assert "With a background" in [table.caption for table in tables(score)]
     assert score.to_json()["background"]["shares"][MAIN]
+
+
+def test_a_hidden_resonator_pulls_as_a_base_flexibility_beside_a_spring_and_a_damper():
+    k, m, c = 120.0, 0.05, 0.4
+    omega = np.sqrt(k / m)
+    resonator, base = np.array([k, m, c]), np.array([k, omega / (2.0 * np.pi), 0.5 * omega * c / k, c / k])
+
+    def force(law, theta, q, v, z):
+        out = np.zeros(1)
+        law.force(0.0, np.array([q]), np.array([v]), z, theta, out)
+        return out[0]
+
+    def rate(law, theta, q, v, z):
+        out = np.zeros(2)
+        law.rate(0.0, np.array([q]), np.array([v]), z, theta, out)
+        return out
+
+    rng = np.random.default_rng(5)
+    for q, v, y, w in rng.standard_normal((20, 4)):
+        z = np.array([y, w])
+        # one state equation, hence one state from rest on, and forces that differ by a spring and a damper
+        np.testing.assert_allclose(
+            rate(BASE_FLEXIBILITY, base, q, v, z), rate(HIDDEN_RESONATOR, resonator, q, v, z)
+        )
+        beside = k * q + c * v + force(BASE_FLEXIBILITY, base, q, v, z)
+        assert force(HIDDEN_RESONATOR, resonator, q, v, z) == pytest.approx(beside)
 
 
 def test_exact_probabilities_of_few_names_have_a_calibration_error_all_the_same():

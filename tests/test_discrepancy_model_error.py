@@ -12,9 +12,11 @@ from bench.discrepancy import diagnose
 from bench.discrepancy.effects.catalogue import effect_named
 from bench.discrepancy.fitting.goodness_of_fit import complexity
 from bench.discrepancy.fitting.map_fit import fit
-from bench.discrepancy.judgement.coarse import outside
+from bench.discrepancy.judgement.coarse import Judged, judge, outside
+from bench.discrepancy.judgement.discrepancies import Discrepancies
 from bench.discrepancy.judgement.held_out import HeldOut, held_out, shares
 from bench.discrepancy.likelihood.model_error import (
+    ModelError,
     band_weights,
     crude_error,
     error_left,
@@ -127,6 +129,75 @@ def test_weights_average_over_what_blocks_say():
     steady = [HeldOut(Explanation(()), np.zeros(12)), HeldOut(Explanation(()), np.full(12, 40.0 / 12))]
     # what a single block decides is less certain than what all of them say
     assert shares(lucky, np.zeros(2), rng)[1] > 1e3 * shares(steady, np.zeros(2), rng)[1]
+
+
+def test_blocks_of_judging_records_weigh_as_much_as_those_left_out():
+    left_out, judged = np.array([np.zeros(12), np.ones(12)]), np.array([np.ones(12), np.zeros(12)])
+    found = [HeldOut(Explanation(()), scores) for scores in left_out]
+    rng = np.random.default_rng(0)
+    assert shares(found, np.zeros(2), rng)[0] > 0.98
+    assert shares(found, np.zeros(2), rng, judged=judged)[0] == pytest.approx(0.5, abs=0.05)
+
+
+def test_records_in_windows_count_as_many_samples_as_whole_ones():
+    error = crude_error(case := planted_case(n=1500), structure_of(case))
+    for n in (2000, 8000):
+        assert n * error.window_weight(n) == pytest.approx(80.0)
+    slide = replace(
+        case,
+        parameters=tuple(
+            replace(p, value=0.0, std=0.0) if p.name == "stiffness" else p for p in case.parameters
+        ),
+    )
+    problem = problem_of(slide, ModelError({}, scale=4.0))
+    assert problem.windowed
+    assert problem.n_residuals == pytest.approx(80.0)
+
+
+def placed(problem, *names):
+    return tuple(Placed(effect_named(name), problem.structure.places[0]) for name in names)
+
+
+def explanation(problem, *names):
+    hypothesis = placed(problem, *names)
+    start = np.concatenate([np.zeros(3), *([p.mean for p in e.effect.parameters] for e in hypothesis)])
+    return Explanation(((problem, fit(problem, hypothesis, start=start)),))
+
+
+def test_an_effect_that_makes_the_judging_records_worse_goes():
+    def pushed(offset):
+        return planted_case(
+            lambda f: motion_with(f, lambda x, v, z: (12.0 * v * abs(v) + offset, [])), n=1500
+        )
+
+    push = 1e-3 * STIFFNESS  # about a tenth of the motion
+    found, judged = pushed(push), pushed(-push)
+    case = replace(found, validation=judged.validation)
+    problem = problem_of(case, crude_error(case, structure_of(case)))
+    explanations = [explanation(problem, *names) for names in (("quadratic_damping", "force_offset"), ())]
+    known = Discrepancies(case, problem)
+    rest = explanation(problem, "quadratic_damping")
+    assert known.harm(explanations[0], rest) > 1.0 > known.harm(rest, explanations[1])
+    named = judge(case, problem, explanations, np.random.default_rng(0)).chosen.explanation.hypothesis
+    assert [p.effect.name for p in named] == ["quadratic_damping"]
+
+
+def test_a_family_is_as_likely_as_what_has_an_effect_of_it():
+    problem = problem_of(planted_case(n=600))
+    rivals = (
+        ("cubic_stiffness",),
+        ("gap",),
+        ("coulomb_friction",),
+        ("coulomb_friction", "quadratic_damping"),
+        (),
+    )
+    found = tuple(HeldOut(explanation(problem, *names), np.ones(12)) for names in rivals)
+    weights = np.array([0.2, 0.25, 0.3, 0.15, 0.1])
+    for chosen, agreed in ((0, 0.45), (2, 0.45), (3, 0.45), (4, 0.0)):
+        told = Judged(
+            found[chosen], found, weights, found, found, False, 1.0, 0.0, problem.settings.judgement.coarse
+        )
+        assert told.agreed == pytest.approx(agreed)
 
 
 def test_what_a_free_force_would_still_take_is_told():

@@ -20,9 +20,10 @@ from bench.errors import BenchError, ModelError
 from bench.excitation import Hypothesis, Uncertain
 from bench.excitation.shaping import SHAPINGS, Shaping
 from envs import rendering, single
-from envs.benches import FLOATS, Options
 from envs.laboratory import Laboratories, combined
+from envs.options import Options
 from envs.setups import PAIRS, SDOF_LAWS, discrimination_setup, joint_setup, sdof_setup
+from envs.stepped import FLOATS
 
 SDOF, JOINT, DISCRIMINATION = envs.IDS[:3]
 QUICK: dict[str, Any] = {"rig": "sdof", "pairs": ("gap_cubic", "coulomb_stribeck"), "n_draws": 2}

@@ -37,7 +37,7 @@ from bench.excitation.information import (
     INFORMATION_LIMITS,
 )
 from bench.signals import Excitation
-from envs.benches import Options
+from envs.options import Options
 from envs.practice import (
     PRACTICE_SETTINGS,
     PracticeBenches,

@@ -14,7 +14,7 @@ from bench.excitation.background import SETTINGS, expected_error, with_backgroun
 from bench.excitation.closed_loop import disturbances, run_commands
 from bench.excitation.contrastive import contrastive_bound, local_contrasts
 from envs.background import background_of
-from envs.benches import Options
+from envs.options import Options
 from envs.practice import PracticeBenches
 from envs.setups import discrimination_setup, joint_setup, sdof_setup
 

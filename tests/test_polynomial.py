@@ -12,8 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bench.errors import FileFormatError, IdentificationError, ParameterError, RangeWarning, UnknownNameError
-from bench.identification.polynomial import PolynomialModel, ValidityRange, fit_polynomial
+from bench.identification.polynomial import PolynomialModel, fit_polynomial
 from bench.identification.restoring_force import Body, joint_data, joint_forces, unknown_mass_data
+from bench.identification.validity_range import ValidityRange
 from bench.laws.polynomial import polynomial_exponents, polynomial_law, polynomial_law_of
 
 

@@ -9,7 +9,7 @@ from planted_cases import SAMPLE_RATE, planted_case
 from bench.discrepancy import record_from_arrays
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.rigs import structure_of
-from bench.recording.outliers import Run, bridged, outliers
+from bench.recording.outliers import OutlierRun, bridged, outliers
 
 N = 3000
 TIME = np.arange(N) / SAMPLE_RATE
@@ -64,7 +64,7 @@ def test_what_two_channels_show_at_once_or_one_over_and_over_belongs_to_the_reco
 def test_a_dropout_in_all_channels_at_once_is_one():
     values = motion()
     values[1200:1203] = 0.0
-    assert outliers(values) == [[Run(1200, 1202)], [Run(1200, 1202)]]
+    assert outliers(values) == [[OutlierRun(1200, 1202)], [OutlierRun(1200, 1202)]]
 
 
 def test_made_up_samples_are_told_and_held_against_no_model():

@@ -20,7 +20,7 @@ JOURNAL_FORMAT = 1
 """Version of the header line."""
 
 
-class Noted(NamedTuple):
+class JournalNote(NamedTuple):
     """What a journal holds.
 
     Attributes:
@@ -51,7 +51,7 @@ class Journal:
         """Whether there is one."""
         return self.path.is_file()
 
-    def read(self, plan_sha256: str) -> Noted:
+    def read(self, plan_sha256: str) -> JournalNote:
         """Read the lines that a campaign of this plan wrote, and tell the others.
 
         Args:
@@ -61,7 +61,7 @@ class Journal:
         try:
             text = self.path.read_text(encoding="utf-8", errors="replace")
         except OSError:
-            return Noted(None, {}, [], [])
+            return JournalNote(None, {}, [], [])
         for number, line in enumerate(text.split("\n"), start=1):
             found = _parsed(line)
             if number == 1 and found is not None and _is_header(found):
@@ -72,7 +72,7 @@ class Journal:
                 entries[found["part"]] = found
             else:
                 damaged.append(number)
-        return Noted(header, entries, damaged, torn)
+        return JournalNote(header, entries, damaged, torn)
 
     def write(
         self, plan_sha256: str, versions: Mapping[str, str], entries: Iterable[Mapping[str, Any]]
@@ -88,7 +88,13 @@ class Journal:
 
 
 def journal_faults(
-    journal: Journal, noted: Noted, layout: Layout, told: Mapping[int, Any], *, status: str, any_part: bool
+    journal: Journal,
+    noted: JournalNote,
+    layout: Layout,
+    told: Mapping[int, Any],
+    *,
+    status: str,
+    any_part: bool,
 ) -> list[str]:
     """What is wrong with a journal, given the entries of the manifest.
 

@@ -51,6 +51,8 @@ class Diagnose:
     """File for the report, a self-contained HTML page."""
     rrd: Path | None = None
     """File for a rerun recording: measured and simulated channels, and where the gap lies."""
+    next_test: Path | None = None
+    """Of an arm: file (CSV) for joint trajectories that would tell what is named from its closest rival; written where there is one."""
     exclude: tuple[str, ...] = ()
     """Effects to leave out of the catalogue."""
     most: int = 3
@@ -175,6 +177,11 @@ class Diagnose:
 
                     stage(f"writing {self.rrd}")
                     write_rerun(diagnosis, self.rrd)
+                planned = getattr(diagnosis, "next_test", None)
+                if self.next_test is not None and planned is not None:
+                    write_text(
+                        self.next_test, planned.as_csv([joint.name for joint in diagnosis.problem.joints])
+                    )
         except Exception as error:  # whatever a figure ran into: the verdict is told and kept
             problem = OutputError(f"the report of this verdict cannot be written: {error}")
             with contextlib.suppress(OutputError):
@@ -182,7 +189,8 @@ class Diagnose:
                     write_text(path, text)
                 return saved, problem
             return [], problem
-        return [path for path in (*saved, self.html, self.rrd) if path is not None], None
+        following = self.next_test if planned is not None else None
+        return [path for path in (*saved, self.html, self.rrd, following) if path is not None], None
 
     def _check_places(self) -> None:
         """Refuse places that cannot be written to before a minute is spent on the diagnosis."""
@@ -193,7 +201,7 @@ class Diagnose:
             raise ParameterError(f"--most is {self.most}; at least one effect has to be allowed")
         if not self.budget > 0.0:
             raise ParameterError(f"--budget is {self.budget:g} s; give more than zero")
-        check_targets(self.json, self.html, self.rrd, force=self.force)
+        check_targets(self.json, self.html, self.rrd, self.next_test, force=self.force)
 
 
 PRINTED = Path("-")

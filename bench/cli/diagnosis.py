@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import tyro
 from rich.console import Console
@@ -32,8 +32,8 @@ class BlindMake:
     """Smallest and largest noise, as a part of a channel's standard deviation."""
     shares: tuple[float, float, float, float] = (0.15, 0.55, 0.15, 0.15)
     """Shares of clean, single, double and foreign cases."""
-    rigs: tuple[float, float, float] = (0.65, 0.15, 0.2)
-    """Shares of the rigs sdof, damper and joint."""
+    rigs: tuple[float, float, float] | tuple[Literal["arm", "leg", "servo"], ...] = (0.65, 0.15, 0.2)
+    """Shares of the rigs sdof, damper and joint; or kinds of robots instead of them: arm, leg, servo."""
     effects: tuple[str, ...] = ()
     """Effects to draw from; all where none is named."""
     duration: float = 10.0
@@ -66,6 +66,8 @@ class BlindMake:
         for folder in (self.folder, self.answers):
             check_folder(folder, force=self.force or begun)
         chosen = {key: value for key, value in vars(self).items() if key in BlindOptions.__dataclass_fields__}
+        if isinstance(self.rigs[0], str):
+            chosen["robots"] = chosen.pop("rigs")
         chosen["background"] = BackgroundSettings() if self.background else None
         if self.background and self.shares == BlindOptions().shares:
             chosen["shares"] = RIGS_SETTINGS.background_shares

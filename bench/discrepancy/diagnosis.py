@@ -18,13 +18,9 @@ from typing import Any, TypeVar
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from bench.discrepancy.articulated.diagnosis import (
-    ArticulatedDiagnosis,
-    applies,
-    diagnose_articulated,
-    drives_only,
-)
-from bench.discrepancy.articulated.effects import CATALOGUE as ARTICULATED
+from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis, diagnose_articulated
+from bench.discrepancy.articulated.recognition import applies, drives_only
+from bench.discrepancy.articulated_search.catalogue import CATALOGUE as ARTICULATED
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.case.idle_loads import idle_notes, without_idle_noise
 from bench.discrepancy.case.reading import read_case

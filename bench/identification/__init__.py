@@ -12,15 +12,15 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from bench.identification.adaptive import AdaptiveHistory, AdaptiveLeastSquares, Sample
+    from bench.identification.adaptive import AdaptiveLeastSquares
+    from bench.identification.adaptive_history import AdaptiveHistory, Sample
     from bench.identification.damper import (
         DesignFit,
         OnlineDesignFit,
-        TrustReport,
-        check_design_model,
         fit_design_model,
         fit_design_model_online,
     )
+    from bench.identification.damper_trust import TrustReport, check_design_model
     from bench.identification.linear_rig import LinearRig
     from bench.identification.memory import MemoryModel, MemoryReport, fit_memory
     from bench.identification.memory_settings import MemorySettings
@@ -28,12 +28,7 @@ if TYPE_CHECKING:
     from bench.identification.order_study import ForceRecord, OrderStudy
     from bench.identification.output_error import OutputErrorModel, fit_output_error
     from bench.identification.parametric import ParametricModel, fit_law
-    from bench.identification.polynomial import (
-        PolynomialModel,
-        PolynomialReport,
-        ValidityRange,
-        fit_polynomial,
-    )
+    from bench.identification.polynomial import PolynomialModel, PolynomialReport, fit_polynomial
     from bench.identification.regressors import (
         RegressorModel,
         bouc_wen_model,
@@ -44,9 +39,10 @@ if TYPE_CHECKING:
     )
     from bench.identification.restoring_force import JointData, joint_data, joint_forces, unknown_mass_data
     from bench.identification.surface import RestoringSurface, coverage, fit_surface
+    from bench.identification.validity_range import ValidityRange
 
 _HOMES = {
-    "AdaptiveHistory": "adaptive",
+    "AdaptiveHistory": "adaptive_history",
     "AdaptiveLeastSquares": "adaptive",
     "DesignFit": "damper",
     "ForceRecord": "order_study",
@@ -65,11 +61,11 @@ _HOMES = {
     "PolynomialReport": "polynomial",
     "RegressorModel": "regressors",
     "RestoringSurface": "surface",
-    "Sample": "adaptive",
-    "TrustReport": "damper",
-    "ValidityRange": "polynomial",
+    "Sample": "adaptive_history",
+    "TrustReport": "damper_trust",
+    "ValidityRange": "validity_range",
     "bouc_wen_model": "regressors",
-    "check_design_model": "damper",
+    "check_design_model": "damper_trust",
     "coverage": "surface",
     "damper_model": "regressors",
     "fit_design_model": "damper",

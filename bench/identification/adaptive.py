@@ -12,13 +12,13 @@ import math
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bench.errors import IdentificationError, ParameterError, RecordingError
 from bench.identification import layout, stream
+from bench.identification.adaptive_history import AdaptiveHistory, Sample
 from bench.identification.persistence import EVENT_KINDS, Event, PersistenceHistory, PersistenceReport
 from bench.identification.regressors import CHANNELS, KINDS, RegressorModel
 
@@ -35,63 +35,6 @@ class AdaptiveSettings:
 SETTINGS = AdaptiveSettings()
 _TROUBLE = ~(layout.REPORTED | layout.EXCITATION_BACK | layout.MOVING)
 _KINDS = tuple(EVENT_KINDS)
-
-
-class Sample(NamedTuple):
-    """One instant of a test; channels the model does not read may be NaN or left out.
-
-    Attributes:
-        time: Time stamp [s].
-        force: Applied force F.
-        displacement: x.
-        velocity: x'.
-        acceleration: x''.
-    """
-
-    time: float
-    force: float
-    displacement: float = math.nan
-    velocity: float = math.nan
-    acceleration: float = math.nan
-
-
-class AdaptiveHistory(NamedTuple):
-    """Course of an estimation.
-
-    Attributes:
-        time: Time of the rows kept (m,) [s].
-        theta: Estimates after each of these samples (m, n), in physical units.
-        measured: z (m,); NaN where a sample was not learnt from.
-        predicted: ``theta^T phi`` with the estimate before the sample (m,).
-        regressors: phi (m, n), physical; (0, n) unless asked for.
-        flags: What each sample raised (n_samples,), bits of `bench.identification.layout`.
-        persistence: Reports of the monitor.
-        events: Events of the record.
-    """
-
-    time: NDArray[np.float64]
-    theta: NDArray[np.float64]
-    measured: NDArray[np.float64]
-    predicted: NDArray[np.float64]
-    regressors: NDArray[np.float64]
-    flags: NDArray[np.int16]
-    persistence: PersistenceHistory
-    events: tuple[Event, ...]
-
-    def contributions(self, theta: ArrayLike | None = None) -> NDArray[np.float64]:
-        """Contribution of each term, ``theta_i phi_i`` (m, n), in the unit of z.
-
-        Args:
-            theta: Estimates to use (n,); those of each instant where None.
-
-        Raises:
-            IdentificationError: The regressors were not kept.
-        """
-        if self.regressors.shape[0] == 0:
-            raise IdentificationError(
-                "the history holds no regressors; run the estimator with keep_regressors=True"
-            )
-        return self.regressors * (self.theta if theta is None else np.asarray(theta, dtype=float))
 
 
 def _setting(name: str, value: float, low: float, expected: str, *, strict: bool = False) -> float:
@@ -211,24 +154,32 @@ class AdaptiveLeastSquares:
         state[list(settings)] = list(settings.values())
         state[layout.USES_F : layout.USES_A + 1] = model.uses
         state[layout.LAST_VALUE : layout.LAST_VALUE + 4] = math.nan
-        views = layout.split(state)
-        self._header, self._theta, self._d, self._phi = views[:4]
-        views[6][:] = 1.0 / np.array(model.scale)
-        self._level, self._peak = views[7:9]
-        self._u, self._start, self._pull = views[10], views[12], views[13]
-        self._pull[:] = math.inf
+        self._look_into(state)
         self._report_time = math.nan
         self._last_seen: dict[str, int] = {}
         self._events_made = 0
         self.reset_covariance()
         if theta0 is not None:
-            start = np.asarray(theta0, dtype=float)
-            if start.shape != (n,) or not np.all(np.isfinite(start)):
-                raise ParameterError(
-                    f"theta0 of shape {start.shape} came; {n} finite values are expected: {', '.join(model.names)}"
-                )
-            self._theta[:] = start / model.to_physical
-            self._start[:] = self._theta
+            self._begin_at(np.asarray(theta0, dtype=float))
+
+    def _look_into(self, state: NDArray[np.float64]) -> None:
+        """Keep views of the parts of the state."""
+        views = layout.split(state)
+        self._header, self._theta, self._d, self._phi = views[:4]
+        views[6][:] = 1.0 / np.array(self.model.scale)
+        self._level, self._peak = views[7:9]
+        self._u, self._start, self._pull = views[10], views[12], views[13]
+        self._pull[:] = math.inf
+
+    def _begin_at(self, start: NDArray[np.float64]) -> None:
+        """Begin with an estimate (n,) in physical units."""
+        n = self.model.n_parameters
+        if start.shape != (n,) or not np.all(np.isfinite(start)):
+            raise ParameterError(
+                f"theta0 of shape {start.shape} came; {n} finite values are expected: {', '.join(self.model.names)}"
+            )
+        self._theta[:] = start / self.model.to_physical
+        self._start[:] = self._theta
 
     def update(self, sample: Sample | Sequence[float]) -> bool:
         """Take one sample.

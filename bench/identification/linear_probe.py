@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from bench import native
 from bench.errors import ModelError
-from bench.identification.parameter_address import Address
+from bench.identification.parameter_address import ParameterAddress
 from bench.rig import Rig
 
 Array = NDArray[np.float64]
@@ -123,7 +123,7 @@ class Probe:
         return ""
 
 
-def value_of(model: mujoco.MjModel, entry: Address) -> float:
+def value_of(model: mujoco.MjModel, entry: ParameterAddress) -> float:
     """Value of a parameter in a model."""
     return float(np.ravel(getattr(model, entry.field)[entry.index])[0])
 
@@ -155,7 +155,9 @@ def refuse(rig: Rig, model: mujoco.MjModel) -> None:
             )
 
 
-def moved(model: mujoco.MjModel, entries: Sequence[Address], values: Sequence[float]) -> mujoco.MjModel:
+def moved(
+    model: mujoco.MjModel, entries: Sequence[ParameterAddress], values: Sequence[float]
+) -> mujoco.MjModel:
     """A copy of a model with other values of some parameters."""
     changed = copy.copy(model)
     for entry, value in zip(entries, values, strict=True):
@@ -164,7 +166,7 @@ def moved(model: mujoco.MjModel, entries: Sequence[Address], values: Sequence[fl
     return changed
 
 
-def slope_of(model: mujoco.MjModel, base: Matrices, entry: Address, value: float) -> Matrices:
+def slope_of(model: mujoco.MjModel, base: Matrices, entry: ParameterAddress, value: float) -> Matrices:
     """Change of the matrices with a unit of a structural quantity, which they are affine in."""
     change = value if value != 0.0 else 1.0
     away = Probe(moved(model, [entry], [value + change])).matrices()
@@ -174,7 +176,7 @@ def slope_of(model: mujoco.MjModel, base: Matrices, entry: Address, value: float
 def matrices_at(
     model: mujoco.MjModel,
     base: Matrices,
-    addresses: Sequence[Address],
+    addresses: Sequence[ParameterAddress],
     start: Array,
     slopes: Sequence[Matrices | None],
     factor: float,

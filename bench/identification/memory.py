@@ -28,10 +28,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bench.errors import FileFormatError, IdentificationError
+from bench.identification.fit_data import checked_data, nmse_percent, read_only
 from bench.identification.memory_refinement import refined
 from bench.identification.memory_settings import MemorySettings, dictionary
-from bench.identification.memory_terms import JointRecord, Terms, fold, smoothness, solve
-from bench.identification.polynomial import ValidityRange, checked_data, frozen, nmse_percent
+from bench.identification.memory_terms import MemoryRecord, MemoryTerms, fold, smoothness, solve
+from bench.identification.validity_range import ValidityRange
 from bench.laws.base import ForceLaw
 from bench.laws.evaluate import evaluate
 from bench.laws.memory import memory_law
@@ -92,7 +93,7 @@ class MemoryModel:
     @cached_property
     def theta(self) -> Array:
         """Header and parameters, as an element takes them."""
-        return frozen(self.law.theta(self.parameters))
+        return read_only(self.law.theta(self.parameters))
 
     def predict(self, states: ArrayLike, *, time: ArrayLike, substeps: int = 4) -> Array:
         """Restoring forces (n, k) [N, N m] along a motion that begins at rest in the joint's virgin state.
@@ -141,10 +142,10 @@ class MemoryModel:
             report = {f.name: values["report"][f.name] for f in fields(MemoryReport)}
             report["nmse"] = tuple(report["nmse"])
             parameters = memory_law(layout).theta(values["parameters"])[len(values["header"]) :]
-            mass = None if values["mass"] is None else frozen(values["mass"])
+            mass = None if values["mass"] is None else read_only(values["mass"])
             return cls(
                 layout,
-                frozen(parameters),
+                read_only(parameters),
                 ValidityRange.from_dict(values["range"]),
                 MemoryReport(**report),
                 mass,
@@ -216,8 +217,8 @@ def fit_memory(
     if chosen.refine and terms.layout.slips + terms.layout.maxwells:
         terms, steps = refined(terms, records, spreads, strength, chosen.refine)
         terms, weights = _pruned(terms, records, spreads, chosen, strength)
-    parameters = frozen(terms.parameters(weights))
-    mass = frozen(weights[len(weights) - k :]) if a.shape[1] else None
+    parameters = read_only(terms.parameters(weights))
+    mass = read_only(weights[len(weights) - k :]) if a.shape[1] else None
     report = MemoryReport(
         (), held_out, n_weights, len(parameters), len(memory_law(terms.layout).states), strength, steps, 0.0
     )
@@ -228,7 +229,7 @@ def fit_memory(
     return replace(model, report=report)
 
 
-def _records(t: Array, s: Array, f: Array, a: Array, settle: float, most: int) -> list[JointRecord]:
+def _records(t: Array, s: Array, f: Array, a: Array, settle: float, most: int) -> list[MemoryRecord]:
     """The records, with evenly spread samples to be fitted."""
     k = f.shape[1]
     pieces = runs(t)
@@ -237,7 +238,7 @@ def _records(t: Array, s: Array, f: Array, a: Array, settle: float, most: int) -
     for i, j in pieces:
         used = np.arange(0, j - i, stride)
         used = used[t[i:j][used] - t[i] >= settle]
-        found.append(JointRecord(t[i:j], s[i:j, :k], s[i:j, k:], f[i:j], a[i:j], used))
+        found.append(MemoryRecord(t[i:j], s[i:j, :k], s[i:j, k:], f[i:j], a[i:j], used))
     if not sum(len(record.used) for record in found):
         raise IdentificationError(f"no sample is left after a settling time of {settle:g} s; shorten it")
     return found
@@ -255,7 +256,7 @@ SETTINGS = MemoryModuleSettings()
 
 
 def _strength(
-    terms: Terms, records: Sequence[JointRecord], spreads: Array, settings: MemorySettings
+    terms: MemoryTerms, records: Sequence[MemoryRecord], spreads: Array, settings: MemorySettings
 ) -> tuple[float, float]:
     """Strength of smoothing that predicts segments held out best, and the NMSE there [%]."""
     fitted, held = [], []
@@ -272,8 +273,12 @@ def _strength(
 
 
 def _pruned(
-    terms: Terms, records: Sequence[JointRecord], spreads: Array, settings: MemorySettings, strength: float
-) -> tuple[Terms, Array]:
+    terms: MemoryTerms,
+    records: Sequence[MemoryRecord],
+    spreads: Array,
+    settings: MemorySettings,
+    strength: float,
+) -> tuple[MemoryTerms, Array]:
     """The terms without those that add nothing, and their weights."""
     factor = fold(terms, records, spreads)
     weights = solve(factor, smoothness(terms, factor, strength))

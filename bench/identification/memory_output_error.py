@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
+from bench.identification.fit_data import read_only
 from bench.identification.memory import MemoryModel
 from bench.identification.output_error import OutputErrorModel, fit_output_error
-from bench.identification.polynomial import frozen
 from bench.recording import Recording
 from bench.rig import Rig
 
@@ -55,5 +55,5 @@ def refine_in_rig(
         f"{element}/{name}" for name in model.law.parameter_names if not name.startswith(("phi", "r", "tau"))
     ]
     fit = fit_output_error(rig, records, free=[*structure, *free], **settings)
-    parameters = frozen(fit.rig.element(element).theta[n_fixed:])
+    parameters = read_only(fit.rig.element(element).theta[n_fixed:])
     return RefinedInRig(replace(model, parameters=parameters), fit)

@@ -19,7 +19,15 @@ from numpy.typing import NDArray
 from scipy.linalg import qr
 from threadpoolctl import threadpool_limits
 
-from bench.identification.memory_terms import JointRecord, Terms, fold, rows_of, smoothness, solve, triangular
+from bench.identification.memory_terms import (
+    MemoryRecord,
+    MemoryTerms,
+    fold,
+    rows_of,
+    smoothness,
+    solve,
+    triangular,
+)
 
 Array = NDArray[np.float64]
 
@@ -38,15 +46,15 @@ SETTINGS = MemoryRefinementSettings()
 
 
 class _Point(NamedTuple):
-    terms: Terms
+    terms: MemoryTerms
     matrix: Array  # columns and forces at the samples (n_rows, n_weights + 1)
     weights: Array
     loss: float
 
 
 def refined(
-    terms: Terms, records: Sequence[JointRecord], spreads: Array, strength: float, steps: int
-) -> tuple[Terms, int]:
+    terms: MemoryTerms, records: Sequence[MemoryRecord], spreads: Array, strength: float, steps: int
+) -> tuple[MemoryTerms, int]:
     """The terms with better shapes, and the number of trials."""
     stride = max(1, sum(len(record.used) for record in records) // SETTINGS.samples)
     thinned = [record._replace(used=record.used[::stride]) for record in records]
@@ -78,7 +86,7 @@ def refined(
     return at.terms, trials
 
 
-def _evaluate(terms: Terms, records: Sequence[JointRecord], spreads: Array, penalty: Array) -> _Point:
+def _evaluate(terms: MemoryTerms, records: Sequence[MemoryRecord], spreads: Array, penalty: Array) -> _Point:
     blocks = [rows_of(terms, r, terms.states(r), r.used, spreads) for r in records]
     matrix = np.vstack(blocks)
     factor = triangular(matrix)
@@ -86,12 +94,12 @@ def _evaluate(terms: Terms, records: Sequence[JointRecord], spreads: Array, pena
     return _Point(terms, matrix, weights, factor.loss(weights) + float(np.sum((penalty @ weights) ** 2)))
 
 
-def _shapes(terms: Terms) -> tuple[int, int, int]:
+def _shapes(terms: MemoryTerms) -> tuple[int, int, int]:
     """Numbers of ranges, of inner knots of all profiles and of relaxation times."""
     return len(terms.ranges), terms.profiles.size, len(terms.relaxation)
 
 
-def _moved(terms: Terms, move: Array) -> Terms:
+def _moved(terms: MemoryTerms, move: Array) -> MemoryTerms:
     """The terms after a move of the logarithms of ranges and times, and of the knots of profiles; no shape more than doubles."""
     n, g, _ = _shapes(terms)
     limited = np.clip(move, -np.log(2.0), np.log(2.0))
@@ -104,7 +112,7 @@ def _moved(terms: Terms, move: Array) -> Terms:
     )
 
 
-def _jacobian(at: _Point, records: Sequence[JointRecord], spreads: Array) -> Array:
+def _jacobian(at: _Point, records: Sequence[MemoryRecord], spreads: Array) -> Array:
     """Change of the force with every shape, less what the weights above zero make up for (n_rows, n_shapes)."""
     terms = at.terms
     n, g, m = _shapes(terms)

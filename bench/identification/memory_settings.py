@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.errors import ParameterError
-from bench.identification.memory_terms import Terms
+from bench.identification.memory_terms import MemoryTerms
 from bench.laws.memory_layout import Direction, MemoryLayout
 
 Array = NDArray[np.float64]
@@ -93,7 +93,7 @@ def _directions(settings: MemorySettings, s: Array) -> tuple[Direction, ...]:
     return tuple(found)
 
 
-def dictionary(settings: MemorySettings, s: Array, t: Array, n_masses: int) -> Terms:
+def dictionary(settings: MemorySettings, s: Array, t: Array, n_masses: int) -> MemoryTerms:
     """The terms that a fit begins with, for states (n, 2 k) and their clock (n,)."""
     directions = _directions(settings, s)
     every = range(len(directions))
@@ -129,4 +129,4 @@ def dictionary(settings: MemorySettings, s: Array, t: Array, n_masses: int) -> T
         8.0 * float(np.median(np.diff(t))), 0.25 * float(np.ptp(t)), max(settings.maxwells, 1)
     )
     relaxation = np.concatenate([times[: settings.maxwells] for _ in every])
-    return Terms(layout, ranges, profiles, relaxation, settings.unequal, n_masses, settings.substeps)
+    return MemoryTerms(layout, ranges, profiles, relaxation, settings.unequal, n_masses, settings.substeps)

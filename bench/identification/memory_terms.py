@@ -38,7 +38,7 @@ class MemoryTermsSettings:
 SETTINGS = MemoryTermsSettings()
 
 
-class JointRecord(NamedTuple):
+class MemoryRecord(NamedTuple):
     """One record of a joint: what it is fitted to."""
 
     time: Array  # [s] (n,)
@@ -50,7 +50,7 @@ class JointRecord(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Terms:
+class MemoryTerms:
     """A layout with what its force is not linear in, and whether the limits of its slip elements may differ.
 
     Attributes:
@@ -81,7 +81,7 @@ class Terms:
         maxwells = [np.array([stiffness, tau]) for tau in self.relaxation]
         return np.concatenate([np.full(layout.slip_start, stiffness), *slips, *maxwells])
 
-    def states(self, record: JointRecord) -> Array:
+    def states(self, record: MemoryRecord) -> Array:
         """Hidden states along a record (n, n_states), from rest."""
         law = memory_law(self.layout)
         if law.rate is None:
@@ -89,7 +89,9 @@ class Terms:
         motion = (record.time, record.displacement, record.velocity)
         return evaluate(law, self.theta(), *motion, substeps=self.substeps).states
 
-    def columns(self, record: JointRecord, states: Array, rows: NDArray[np.int64]) -> list[tuple[int, Array]]:
+    def columns(
+        self, record: MemoryRecord, states: Array, rows: NDArray[np.int64]
+    ) -> list[tuple[int, Array]]:
         """Direction and force along it of a unit of every weight, at some samples: (direction, (n_rows,)).
 
         Masses come last, with the direction -1 - i for coordinate i.
@@ -144,7 +146,7 @@ class Terms:
             at += 1
         return np.concatenate(theta)
 
-    def without(self, negligible: NDArray[np.bool_]) -> Terms:
+    def without(self, negligible: NDArray[np.bool_]) -> MemoryTerms:
         """The terms without those all of whose weights are negligible (n_weights,); directions stay."""
         layout, at = self.layout, 0
 
@@ -199,7 +201,7 @@ class Factor(NamedTuple):
         return float(np.sum((self.R @ weights - self.b) ** 2) + self.rest)
 
 
-def fold(terms: Terms, records: Sequence[JointRecord], spreads: Array) -> Factor:
+def fold(terms: MemoryTerms, records: Sequence[MemoryRecord], spreads: Array) -> Factor:
     """Fold the samples of records, each output over its spread (k,), into a triangular factor."""
     n_weights = terms.n_weights()
     factor = np.zeros((0, n_weights + 1))
@@ -228,7 +230,7 @@ def _factor(triangle: Array, total: float) -> Factor:
 
 
 def rows_of(
-    terms: Terms, record: JointRecord, states: Array, rows: NDArray[np.int64], spreads: Array
+    terms: MemoryTerms, record: MemoryRecord, states: Array, rows: NDArray[np.int64], spreads: Array
 ) -> Array:
     """Columns of all weights, then the forces, at some samples, over the spreads of the outputs: (k n_rows, n_weights + 1)."""
     vectors = [np.array(d.vector) for d in terms.layout.directions]
@@ -260,7 +262,7 @@ def solve(factor: Factor, penalty: Array | None = None) -> Array:
     return nnls(matrix, right, maxiter=50 * matrix.shape[1])[0] * inverse
 
 
-def smoothness(terms: Terms, factor: Factor, strength: float) -> Array:
+def smoothness(terms: MemoryTerms, factor: Factor, strength: float) -> Array:
     """Rows that penalise differences of neighbouring weights of a potential, a damping or a slip element.
 
     A difference counts as much as that share `strength` of what the term's largest column gives: relative to the data, so that no

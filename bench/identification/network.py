@@ -14,12 +14,11 @@ random starts, the scaling folded into the weights at the end (appendix A). What
 
 from __future__ import annotations
 
-import itertools
 import json
 import math
 import os
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -30,35 +29,21 @@ from numpy.typing import ArrayLike, NDArray
 from threadpoolctl import threadpool_limits
 
 from bench.errors import FileFormatError, IdentificationError, ParameterError
-from bench.identification.levenberg_marquardt import (
-    HiddenLayerProblem,
-    RegularisedMinimum,
-    minimise_regularised,
+from bench.identification.fit_data import centre_and_scale, checked_data, nmse_percent, read_only
+from bench.identification.hidden_layer import HiddenLayerProblem
+from bench.identification.network_training import (
+    Progress,
+    Start,
+    Training,
+    TrainingData,
+    held_out_split,
+    spread_order,
 )
-from bench.identification.polynomial import (
-    ValidityRange,
-    centre_and_scale,
-    checked_data,
-    frozen,
-    nmse_percent,
-)
+from bench.identification.validity_range import ValidityRange
 from bench.laws.base import ForceLaw
 from bench.laws.network import NetworkWeights, fold_scaling, network_law, published_network
 
 __all__ = ["NetworkModel", "NetworkReport", "Progress", "fit_network", "published_network"]
-
-Progress = Callable[[str, int, float], None]
-"""Called with the stage ("stage 1/3, start 2/4"), the iteration and the normalised mean-square error [%]."""
-
-
-@dataclass(frozen=True)
-class NetworkSettings:
-    """Numbers of `bench.identification.network`."""
-
-    cells: int = 12
-
-
-SETTINGS = NetworkSettings()
 
 
 @dataclass(frozen=True)
@@ -115,7 +100,7 @@ class NetworkModel:
     def joint(self) -> NetworkWeights:
         """Weights on the states alone: the network at zero acceleration."""
         W1, b1, W2, b2 = self.weights
-        return NetworkWeights(frozen(W1[:, : 2 * len(b2)]), b1, W2, b2)
+        return NetworkWeights(read_only(W1[:, : 2 * len(b2)]), b1, W2, b2)
 
     @cached_property
     def law(self) -> ForceLaw:
@@ -125,7 +110,7 @@ class NetworkModel:
     @cached_property
     def theta(self) -> NDArray[np.float64]:
         """Header and weights, as an element takes them."""
-        return frozen(self.law.theta(self.joint.flat()))
+        return read_only(self.law.theta(self.joint.flat()))
 
     def predict(self, states: ArrayLike) -> NDArray[np.float64]:
         """Restoring forces (n, k) [N, N m] at states (n, 2 k) [m, rad, m/s, rad/s]."""
@@ -154,10 +139,12 @@ class NetworkModel:
             values = json.loads(text)
             if values["type"] != "network":
                 raise FileFormatError(f"a model of type '{values['type']}' came; 'network' is expected")
-            weights = NetworkWeights(*(frozen(values["weights"][name]) for name in NetworkWeights._fields))
+            weights = NetworkWeights(*(read_only(values["weights"][name]) for name in NetworkWeights._fields))
             report = values["report"]
             lists = {name: tuple(report[name]) for name in ("nmse", "nmse_validation", "starts")}
-            masses = [None if values[name] is None else frozen(values[name]) for name in ("mass", "mass_std")]
+            masses = [
+                None if values[name] is None else read_only(values[name]) for name in ("mass", "mass_std")
+            ]
             return cls(
                 weights,
                 ValidityRange.from_dict(values["range"]),
@@ -170,15 +157,6 @@ class NetworkModel:
             raise FileFormatError(f"this is no network model written by `to_json`: {error}") from error
 
 
-class _Data(NamedTuple):
-    inputs: NDArray[np.float64]  # normalised (n, n_inputs)
-    outputs: NDArray[np.float64]  # normalised (n, n_outputs)
-    order: NDArray[
-        np.int64
-    ]  # samples to train on, the first n of which are spread over the states for every n
-    held_out: NDArray[np.int64]  # samples to choose between starts; all of them where none was held out
-
-
 class _Scaling(NamedTuple):
     """Centre and half-range of the inputs (n_inputs,) and the outputs (n_outputs,), in physical units."""
 
@@ -186,26 +164,6 @@ class _Scaling(NamedTuple):
     input_scale: NDArray[np.float64]
     output_centre: NDArray[np.float64]
     output_scale: NDArray[np.float64]
-
-
-class _Training(NamedTuple):
-    n_hidden: int
-    n_starts: int
-    sizes: tuple[int, ...]  # samples of each stage
-    tolerance: float  # of the last stage [%]
-    max_iterations: int
-    regularise: bool
-    time_limit: float
-    progress: Progress | None
-
-
-@dataclass
-class _Start:
-    number: int
-    weights: NDArray[np.float64]
-    minimum: RegularisedMinimum | None = None
-    error: float = math.inf
-    iterations: int = 0
 
 
 def fit_network(
@@ -268,18 +226,18 @@ def fit_network(
     _check(s, f, counts, validation_fraction)
     raw = np.hstack([s, a])
     scaling = _Scaling(*centre_and_scale(raw), *centre_and_scale(f))
-    train, held_out = _split(len(s), validation_fraction, rng)
+    train, held_out = held_out_split(len(s), validation_fraction, rng)
     inputs = (raw - scaling.input_centre) / scaling.input_scale
-    order = _spread(inputs, train, rng)
-    data = _Data(inputs, (f - scaling.output_centre) / scaling.output_scale, order, held_out)
+    order = spread_order(inputs, train, rng)
+    data = TrainingData(inputs, (f - scaling.output_centre) / scaling.output_scale, order, held_out)
     most = len(order) if max_samples is None else min(max_samples, len(order))
     sizes = tuple(max(most >> (n_stages - 1 - stage), min(100, most)) for stage in range(n_stages))
     limit = math.inf if time_limit is None else time_limit
-    training = _Training(n_hidden, n_restarts, sizes, tolerance, max_iterations, regularise, limit, progress)
+    training = Training(n_hidden, n_restarts, sizes, tolerance, max_iterations, regularise, limit, progress)
     # One BLAS thread each: OpenBLAS' own threads gain nothing at this size and spin when another process is busy,
     # which made an iteration ten times slower.
     with threadpool_limits(1, user_api="blas"), ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
-        starts = _train(data, training, rng, pool.map)
+        starts = train(data, training, rng, pool.map)
     weights = _in_physical_units(starts[0].weights, data, n_hidden, scaling)
     judged = held_out if len(train) < len(s) else None
     report = _report(starts, f, weights(raw), judged, n_samples=sizes[-1], seconds=time.monotonic() - begun)
@@ -308,7 +266,7 @@ def _check(
 
 
 def _in_physical_units(
-    flat: NDArray[np.float64], data: _Data, n_hidden: int, scaling: _Scaling
+    flat: NDArray[np.float64], data: TrainingData, n_hidden: int, scaling: _Scaling
 ) -> NetworkWeights:
     """Weights on physical units, from those on normalised data as a minimisation leaves them."""
     A, B = HiddenLayerProblem(data.inputs[:1], data.outputs[:1], n_hidden).unpack(flat)
@@ -319,11 +277,11 @@ def _in_physical_units(
         output_centre=scaling.output_centre,
         output_scale=scaling.output_scale,
     )
-    return NetworkWeights(*(frozen(part) for part in folded))
+    return NetworkWeights(*(read_only(part) for part in folded))
 
 
 def _report(
-    starts: list[_Start],
+    starts: list[Start],
     forces: NDArray[np.float64],
     estimated: NDArray[np.float64],
     held_out: NDArray[np.int64] | None,
@@ -349,97 +307,6 @@ def _report(
     )
 
 
-def _train(
-    data: _Data, training: _Training, rng: np.random.Generator, run: Callable[..., Iterable]
-) -> list[_Start]:
-    """All stages; the starts with the best first."""
-    clock = time.monotonic()
-    variance = float(np.sum(np.var(data.outputs, axis=0)))
-    judge = HiddenLayerProblem(
-        data.inputs[data.held_out], data.outputs[data.held_out], training.n_hidden, run=run
-    )
-    last = len(training.sizes) - 1
-    starts: list[_Start] = []
-    retired: list[_Start] = []
-    for stage, size in enumerate(training.sizes):
-        chosen = data.order[:size]
-        problem = HiddenLayerProblem(data.inputs[chosen], data.outputs[chosen], training.n_hidden, run=run)
-        if stage == 0:
-            starts = [_Start(i, problem.random_weights(rng)) for i in range(training.n_starts)]
-        percent = 100.0 / (size * variance)
-        remaining = clock + training.time_limit * 0.5 ** (last - stage) - time.monotonic()
-        for turn, start in enumerate(starts):
-            label = f"stage {stage + 1}/{last + 1}, start {start.number + 1}/{training.n_starts}"
-            start.minimum = minimise_regularised(
-                problem,
-                start.weights,
-                max_iterations=training.max_iterations
-                if stage == last
-                else max(training.max_iterations // 2, 1),
-                target=training.tolerance * 2.0 ** (last - stage) / percent,
-                regularise=training.regularise,
-                decay=1e-6 if start.minimum is None else start.minimum.alpha / start.minimum.beta,
-                deadline=time.monotonic() + remaining / (len(starts) - turn)
-                if math.isfinite(remaining)
-                else math.inf,
-                on_iteration=_reporter(training.progress, label, percent),
-            )
-            remaining = clock + training.time_limit * 0.5 ** (last - stage) - time.monotonic()
-            start.weights = start.minimum.weights
-            start.iterations += start.minimum.iterations
-            start.error = 100.0 * judge.sum_of_squares(start.weights) / (len(data.held_out) * variance)
-        starts.sort(key=lambda start: start.error)
-        kept = len(starts) if stage == last else (1 if stage == last - 1 else math.ceil(len(starts) / 2))
-        retired = starts[kept:] + retired
-        starts = starts[:kept]
-    return starts + retired
-
-
-def _reporter(progress: Progress | None, label: str, percent: float) -> Callable[[int, float], None] | None:
-    if progress is None:
-        return None
-    return lambda iteration, squares: progress(label, iteration, percent * squares)
-
-
-def _split(n: int, fraction: float, rng: np.random.Generator) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Samples to train on, and those held out: one stretch at a random place in each of twenty segments.
-
-    Stretches, because neighbouring samples of a record are nearly the same sample.
-    """
-    everything = np.arange(n)
-    if fraction == 0.0:
-        return everything, everything
-    held_out = np.zeros(n, dtype=bool)
-    edges = np.linspace(0, n, 21).astype(int)
-    for first, end in itertools.pairwise(edges):
-        length = max(round(fraction * (end - first)), 1)
-        begin = first + int(rng.integers(end - first - length + 1))
-        held_out[begin : begin + length] = True
-    return everything[~held_out], everything[held_out]
-
-
-def _spread(
-    inputs: NDArray[np.float64], samples: NDArray[np.int64], rng: np.random.Generator
-) -> NDArray[np.int64]:
-    """The samples in an order whose every beginning covers the states: extremes first, then a weighted shuffle.
-
-    A sample's weight is the inverse square root of the number of samples in its cell, half-way between evenly in time
-    and evenly over the cells; the latter (and its neighbourhood) trained slower and was no safer.
-    """
-    points = inputs[samples]
-    n_inputs = points.shape[1]
-    cells = max(min(SETTINGS.cells, int(2.0 ** (62.0 / n_inputs))), 1)
-    index = np.clip(((points + 1.0) * 0.5 * cells).astype(np.int64), 0, cells - 1)
-    _, member, count = np.unique(
-        index @ (cells ** np.arange(n_inputs)), return_inverse=True, return_counts=True
-    )
-    key = np.log(rng.random(len(points))) * np.sqrt(
-        count[member]
-    )  # Efraimidis and Spirakis 2006, in logarithms
-    key[np.concatenate([points.argmin(axis=0), points.argmax(axis=0)])] = 0.0
-    return samples[np.argsort(-key, kind="stable")]
-
-
 def _mass(
     weights: NetworkWeights, inputs: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -447,4 +314,4 @@ def _mass(
     k = len(weights.b2)
     slope = 1.0 - np.tanh(inputs @ weights.W1.T + weights.b1) ** 2
     derivative = np.einsum("oj,nj,ja->noa", weights.W2, slope, weights.W1[:, 2 * k :], optimize=True)
-    return frozen(derivative.mean(axis=0)), frozen(derivative.std(axis=0))
+    return read_only(derivative.mean(axis=0)), read_only(derivative.std(axis=0))

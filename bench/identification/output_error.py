@@ -10,8 +10,6 @@ linear structure, and `mujoco.batch` for all others.
 
 References:
     Ljung 1999, System Identification, section 7.4 (output-error structure).
-    More 1978, The Levenberg-Marquardt algorithm, Lecture Notes in Mathematics 630.
-    Transtrum and Sethna 2012, arXiv:1201.5885 (geodesic acceleration).
 """
 
 from __future__ import annotations
@@ -21,18 +19,17 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bench.errors import IdentificationError, ParameterError, UnknownNameError
+from bench.identification.geodesic_steps import FittedPoint, descend
 from bench.identification.linear_rig import current
+from bench.identification.output_error_problem import SETTINGS, OutputErrorProblem
 from bench.identification.rig_response import (
     EngineName,
     Initial,
-    LinearEngine,
-    MujocoEngine,
     RigRecord,
     engine_for,
     moving_sensors,
@@ -45,16 +42,6 @@ from bench.rig import Rig
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class OutputErrorSettings:
-    """Numbers of `bench.identification.output_error`."""
-
-    difference: float = 1e-6
-    ahead: float = 0.1
-    dampings: tuple[float, float, float] = (10.0, 1.0, 0.1)
-
-
-SETTINGS = OutputErrorSettings()
 _POSITIVE = ("mass", "inertia")
 
 
@@ -90,86 +77,6 @@ class OutputErrorModel:
     evaluations: int
     stopped: str
     engine: str
-
-
-class _Problem:
-    """Residuals of all records, whitened, and the priors, as a function of the scaled parameters."""
-
-    def __init__(
-        self,
-        engine: LinearEngine | MujocoEngine,
-        records: Sequence[RigRecord],
-        weights: Array,
-        scale: Array,
-        prior: tuple[Array, Array],
-    ) -> None:
-        self.engine, self.records, self.weights, self.scale = engine, records, weights, scale
-        self.prior_mean, self.prior_precision = prior  # of the scaled parameters; precision 0 for none
-        self.evaluations = 0
-        self.n_residuals = sum(len(r.measured[r.scored]) for r in records) * len(weights)
-
-    def residuals(self, record: RigRecord, points: Array) -> Array:
-        """Simulated less measured over standard deviation ``(n_points, n)``."""
-        self.evaluations += len(points)
-        simulated = self.engine.simulate(record, points * self.scale)
-        with np.errstate(invalid="ignore", over="ignore"):
-            difference = (simulated - record.measured)[:, record.scored] * self.weights
-        return difference.reshape(len(points), -1)
-
-    def costs(self, points: Array) -> Array:
-        """Half the sums of squares ``(n_points,)``; infinite where a simulation diverged."""
-        total = np.zeros(len(points))
-        for record in self.records:
-            part = self.residuals(record, points)
-            with np.errstate(invalid="ignore", over="ignore"):
-                total += 0.5 * np.einsum("ij,ij->i", part, part)
-        total += 0.5 * ((points - self.prior_mean) ** 2 @ self.prior_precision)
-        return np.where(np.isfinite(total), total, np.inf)
-
-    def linearise(self, point: Array, high: Array) -> _Linearisation:
-        """Residuals and Jacobians by forward differences, backwards at an upper bound."""
-        steps = np.where(point + SETTINGS.difference > high, -SETTINGS.difference, SETTINGS.difference)
-        points = np.vstack([point, point + np.diag(steps)])
-        curvature = np.diag(self.prior_precision)
-        gradient = self.prior_precision * (point - self.prior_mean)
-        residuals, jacobians = [], []
-        for record in self.records:
-            residual, *shifted = self.residuals(record, points)
-            jacobian = (np.stack(shifted) - residual) / steps[:, None]
-            # diverged: leave that parameter where it is
-            jacobian[~np.all(np.isfinite(jacobian), axis=1)] = 0.0
-            curvature = curvature + jacobian @ jacobian.T
-            gradient = gradient + jacobian @ residual
-            residuals.append(residual)
-            jacobians.append(jacobian)
-        return _Linearisation(point, curvature, gradient, residuals, jacobians)
-
-    def bending(self, at: _Linearisation, moves: Array) -> Array:
-        """``J' r''`` along each move ``(n_moves, n_parameters)``, r'' the second directional derivative of the residuals."""
-        total = np.zeros_like(moves)
-        for record, residual, jacobian in zip(self.records, at.residuals, at.jacobians, strict=True):
-            ahead = self.residuals(record, at.point + SETTINGS.ahead * moves)
-            with np.errstate(invalid="ignore", over="ignore"):
-                second = 2.0 / SETTINGS.ahead * ((ahead - residual) / SETTINGS.ahead - moves @ jacobian)
-            total += second @ jacobian.T
-        return total
-
-
-class _Linearisation(NamedTuple):
-    point: Array
-    curvature: Array  # J'J, priors included
-    gradient: Array
-    residuals: list[Array]  # by record (n,)
-    jacobians: list[Array]  # by record (n_parameters, n)
-
-
-class _Minimum(NamedTuple):
-    point: Array
-    cost: float
-    curvature: Array
-    held: NDArray[np.bool_]
-    iterations: int
-    stopped: str
 
 
 def fit_output_error(
@@ -238,9 +145,9 @@ def fit_output_error(
     workers = threads or os.cpu_count() or 1
     with ThreadPoolExecutor(workers) as pool:
         simulator = engine_for(engine, rig, chosen, names, (pool, workers))
-        problem = _Problem(simulator, prepared, weights, scale, prior)
+        problem = OutputErrorProblem(simulator, prepared, weights, scale, prior)
         points = _starts(problem, names, start / scale, (low, high), search or {}, starts, rng)
-        minima = [_minimise(problem, p, (low, high), max_iterations, tolerance, progress) for p in points]
+        minima = [descend(problem, p, (low, high), max_iterations, tolerance, progress) for p in points]
         best = min(minima, key=lambda minimum: minimum.cost)
         if not math.isfinite(best.cost):
             raise IdentificationError(
@@ -275,8 +182,8 @@ def _report(
     rig: Rig,
     names: tuple[str, ...],
     channels: tuple[str, ...],
-    problem: _Problem,
-    best: _Minimum,
+    problem: OutputErrorProblem,
+    best: FittedPoint,
     data: tuple[Sequence[RigRecord], tuple[Array, ...], bool],
 ) -> OutputErrorModel:
     prepared, residuals, known = data
@@ -303,7 +210,7 @@ def _report(
     )
 
 
-def _spread(best: _Minimum) -> tuple[Array, Array]:
+def _spread(best: FittedPoint) -> tuple[Array, Array]:
     """Standard deviations for residuals of unit variance, and correlations, from the curvature at the optimum."""
     n = len(best.point)
     std, correlation = np.zeros(n), np.eye(n)
@@ -328,74 +235,8 @@ def _spread(best: _Minimum) -> tuple[Array, Array]:
     return std, correlation
 
 
-def _minimise(
-    problem: _Problem,
-    point: Array,
-    box: tuple[Array, Array],
-    max_iterations: int,
-    tolerance: float,
-    progress: Callable[[int, float], None] | None,
-) -> _Minimum:
-    """Levenberg-Marquardt with geodesic acceleration, within bounds; each iteration tries several dampings at once."""
-    low, high = box
-    cost = float(problem.costs(point[None, :])[0])
-    damping, iterations, stopped = 1e-3, 0, "iterations"
-    held = np.zeros(len(point), dtype=bool)
-    if not math.isfinite(cost):
-        return _Minimum(point, cost, np.zeros((len(point), len(point))), held, 0, "diverged")
-    while True:
-        at = problem.linearise(point, high)
-        held = ((point <= low) & (at.gradient > 0.0)) | ((point >= high) & (at.gradient < 0.0))
-        if iterations == max_iterations or stopped == "tolerance":
-            break
-        if np.all(np.abs(at.gradient[~held]) <= 1e-14 * (1.0 + cost)):
-            stopped = "gradient"
-            break
-        fall = -1.0
-        while damping < 1e12 and fall <= 0.0:
-            dampings = damping * np.array(SETTINGS.dampings)
-            trials = np.clip(point + _moves(problem, at, held, dampings), low, high)
-            costs = problem.costs(trials)
-            chosen = int(np.argmin(costs))
-            fall = cost - float(costs[chosen])
-            damping = dampings[chosen % len(dampings)] if fall > 0.0 else 1e3 * damping
-        if fall <= 0.0:
-            stopped = "stall"
-            break
-        point, cost, iterations = trials[chosen], float(costs[chosen]), iterations + 1
-        damping = max(damping, 1e-12)
-        if progress is not None:
-            progress(iterations, cost)
-        if fall <= tolerance * cost:
-            stopped = "tolerance"  # the curvature at the end is still wanted
-    return _Minimum(point, cost, at.curvature, held, iterations, stopped)
-
-
-def _moves(problem: _Problem, at: _Linearisation, held: NDArray[np.bool_], dampings: Array) -> Array:
-    """Moves for each damping, straight and then bent along the valley ``(2 n_dampings, n_parameters)``.
-
-    Bouc-Wen parameters, among others, lie in narrow curved valleys that straight steps follow in hundreds of small ones.
-    A bent move whose correction is no longer small is left straight.
-    """
-    moving = np.flatnonzero(~held)
-    curvature = at.curvature[np.ix_(moving, moving)]
-    diagonal = np.where(np.diag(curvature) > 0.0, np.diag(curvature), 1.0)
-    damped = [curvature + np.diag(damping * diagonal) for damping in dampings]
-    straight = np.zeros((len(dampings), len(held)))
-    for row, matrix in zip(straight, damped, strict=True):
-        row[moving] = -np.linalg.lstsq(matrix, at.gradient[moving], rcond=None)[0]
-    bent = straight.copy()
-    for row, matrix, right in zip(bent, damped, problem.bending(at, straight), strict=True):
-        if not np.all(np.isfinite(right)):
-            continue
-        correction = -0.5 * np.linalg.lstsq(matrix, right[moving], rcond=None)[0]
-        if correction @ (diagonal * correction) <= 0.75**2 * (row[moving] @ (diagonal * row[moving])):
-            row[moving] += correction
-    return np.vstack([straight, bent])
-
-
 def _starts(
-    problem: _Problem,
+    problem: OutputErrorProblem,
     names: tuple[str, ...],
     start: Array,
     box: tuple[Array, Array],

@@ -11,14 +11,14 @@ from bench.rig import Rig
 from bench.rig.building import STRUCTURE
 
 
-class Address(NamedTuple):
+class ParameterAddress(NamedTuple):
     """Where a free parameter stands in a compiled model: ``getattr(model, field)[index]``."""
 
     field: str
     index: int
 
 
-def address(rig: Rig, name: str) -> Address:
+def address(rig: Rig, name: str) -> ParameterAddress:
     """Find a free parameter in the compiled model.
 
     Args:
@@ -40,10 +40,10 @@ def address(rig: Rig, name: str) -> Address:
         raise UnknownNameError(f"parameter of element '{label}'", parameter, element.law.parameter_names)
     item = next(item for item in rig.built.placed if item.element.name == label)
     place = len(element.law.header) + element.law.parameter_names.index(parameter)
-    return Address("numeric_data", item.theta + place)
+    return ParameterAddress("numeric_data", item.theta + place)
 
 
-def _structural(model: mujoco.MjModel, kind: str, name: str) -> Address:
+def _structural(model: mujoco.MjModel, kind: str, name: str) -> ParameterAddress:
     kinds = mujoco.mjtObj
     if kind not in STRUCTURE or kind == "frictionloss":
         raise UnknownNameError(
@@ -53,16 +53,16 @@ def _structural(model: mujoco.MjModel, kind: str, name: str) -> Address:
         body = mujoco.mj_name2id(model, kinds.mjOBJ_BODY, name)
         if body < 0:
             raise UnknownNameError("body", name, [model.body(i).name for i in range(1, model.nbody)])
-        return Address(f"body_{kind}", body)
+        return ParameterAddress(f"body_{kind}", body)
     joint = mujoco.mj_name2id(model, kinds.mjOBJ_JOINT, name)
     if joint >= 0:
         if kind == "stiffness":
-            return Address("jnt_stiffness", joint)
-        return Address(f"dof_{kind}", int(model.jnt_dofadr[joint]))
+            return ParameterAddress("jnt_stiffness", joint)
+        return ParameterAddress(f"dof_{kind}", int(model.jnt_dofadr[joint]))
     tendon = mujoco.mj_name2id(model, kinds.mjOBJ_TENDON, name)
     if tendon < 0:
         joints = [model.joint(i).name for i in range(model.njnt)]
         raise UnknownNameError(
             "joint or tendon", name, joints + [model.tendon(i).name for i in range(model.ntendon)]
         )
-    return Address(f"tendon_{kind}", tendon)
+    return ParameterAddress(f"tendon_{kind}", tendon)

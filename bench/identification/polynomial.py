@@ -15,18 +15,18 @@ from __future__ import annotations
 
 import json
 import time
-import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg.lapack import dgeqrf
 from threadpoolctl import threadpool_limits
 
-from bench.errors import FileFormatError, IdentificationError, ParameterError, RangeWarning
+from bench.errors import FileFormatError, IdentificationError, ParameterError
+from bench.identification.fit_data import centre_and_scale, checked_data, nmse_percent, read_only
+from bench.identification.validity_range import ValidityRange
 from bench.laws.base import ForceLaw
 from bench.laws.polynomial import Basis, Kind, polynomial_exponents, polynomial_law
 
@@ -39,185 +39,6 @@ class PolynomialSettings:
 
 
 SETTINGS = PolynomialSettings()
-
-
-def frozen(values: ArrayLike) -> NDArray[np.float64]:
-    """A read-only float copy of `values`."""
-    array = np.array(values, dtype=float)
-    array.flags.writeable = False
-    return array
-
-
-def centre_and_scale(columns: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Centre and half-range of each column ``(n_columns,)`` each; a half-range of 1 where a column does not vary."""
-    low, high = columns.min(axis=0), columns.max(axis=0)
-    return 0.5 * (low + high), np.where(high > low, 0.5 * (high - low), 1.0)
-
-
-@dataclass(frozen=True)
-class ValidityRange:
-    """The region of states a model was identified from: a box, and an ellipsoid inside it.
-
-    The ellipsoid (Mahalanobis distance up to the largest one met) cuts the corners of the box, which records of
-    separately excited joints never reach and where a model is pure extrapolation. Both are convex; a hole inside the
-    data is not seen.
-
-    Attributes:
-        names: Names of the states, for messages.
-        minimum: Smallest value of each state (n_states,) [m, rad, m/s, rad/s].
-        maximum: Largest value of each state (n_states,) [m, rad, m/s, rad/s].
-        mean: Mean of each state (n_states,) [m, rad, m/s, rad/s].
-        precision: Inverse covariance of the states, pseudo-inverse where a state did not move (n_states, n_states).
-        radius: Largest Mahalanobis distance met [1].
-    """
-
-    names: tuple[str, ...]
-    minimum: NDArray[np.float64]
-    maximum: NDArray[np.float64]
-    mean: NDArray[np.float64] = field(repr=False)
-    precision: NDArray[np.float64] = field(repr=False)
-    radius: float
-
-    @classmethod
-    def of(cls, states: ArrayLike, names: Sequence[str] = ()) -> ValidityRange:
-        """The range of `states` (n, n_states)."""
-        data = np.asarray(states, dtype=float)
-        mean, deviation = data.mean(axis=0), data.std(axis=0)
-        unit = np.where(deviation > 0.0, deviation, 1.0)
-        correlation = ((data - mean) / unit).T @ ((data - mean) / unit) / len(data)
-        precision = np.linalg.pinv(correlation, rcond=1e-10, hermitian=True) / np.outer(unit, unit)
-        centred = data - mean
-        distance = np.einsum("ni,ij,nj->n", centred, precision, centred, optimize=True)
-        return cls(
-            tuple(names) or state_names(data.shape[1] // 2),
-            frozen(data.min(axis=0)),
-            frozen(data.max(axis=0)),
-            frozen(mean),
-            frozen(precision),
-            float(np.sqrt(distance.max())),
-        )
-
-    def outside(self, states: ArrayLike, *, margin: float = 0.0) -> NDArray[np.bool_]:
-        """Which states lie outside.
-
-        Args:
-            states: ``(n, n_states)`` [m, rad, m/s, rad/s].
-            margin: Widening of box and ellipsoid, as a fraction of their size [1].
-
-        Returns:
-            Mask (n,).
-        """
-        data = np.atleast_2d(np.asarray(states, dtype=float))
-        slack = margin * 0.5 * (self.maximum - self.minimum)
-        box = np.any((data < self.minimum - slack) | (data > self.maximum + slack), axis=1)
-        centred = data - self.mean
-        distance = np.sqrt(
-            np.maximum(np.einsum("ni,ij,nj->n", centred, self.precision, centred, optimize=True), 0.0)
-        )
-        # 1e-9: the farthest sample itself must count as inside whatever the order of summation.
-        return box | (distance > self.radius * (1.0 + margin + 1e-9))
-
-    def fraction_outside(self, states: ArrayLike, *, margin: float = 0.0) -> float:
-        """Fraction of `states` (n, n_states) outside [1]."""
-        return float(np.mean(self.outside(states, margin=margin)))
-
-    def warn(self, states: ArrayLike, *, margin: float = 0.0) -> float:
-        """Issue a `RangeWarning` where states leave the range.
-
-        Args:
-            states: ``(n, n_states)`` [m, rad, m/s, rad/s].
-            margin: As in `outside`.
-
-        Returns:
-            Fraction of states outside [1].
-        """
-        fraction = self.fraction_outside(states, margin=margin)
-        if fraction > 0.0:
-            data = np.atleast_2d(np.asarray(states, dtype=float))
-            half = np.where(self.maximum > self.minimum, 0.5 * (self.maximum - self.minimum), 1.0)
-            excess = np.maximum(data - self.maximum, self.minimum - data).max(axis=0) / half
-            worst = int(np.argmax(excess))
-            where = (
-                f"'{self.names[worst]}' leaves [{self.minimum[worst]:.3g}, {self.maximum[worst]:.3g}] "
-                f"by {100 * excess[worst]:.1f} % of its half-width"
-                if excess[worst] > 0.0
-                else "the states meet in combinations that were not met in identification"
-            )
-            warnings.warn(
-                f"{100 * fraction:.2g} % of the samples lie outside the range the model was identified from: {where}",
-                RangeWarning,
-                stacklevel=2,
-            )
-        return fraction
-
-    def to_dict(self) -> dict[str, Any]:
-        """JSON values of the range."""
-        return {
-            "names": list(self.names),
-            "minimum": self.minimum.tolist(),
-            "maximum": self.maximum.tolist(),
-            "mean": self.mean.tolist(),
-            "precision": self.precision.tolist(),
-            "radius": self.radius,
-        }
-
-    @classmethod
-    def from_dict(cls, values: dict[str, Any]) -> ValidityRange:
-        """The range from the values of `to_dict`."""
-        return cls(
-            names=tuple(values["names"]),
-            minimum=frozen(values["minimum"]),
-            maximum=frozen(values["maximum"]),
-            mean=frozen(values["mean"]),
-            precision=frozen(values["precision"]),
-            radius=float(values["radius"]),
-        )
-
-
-def state_names(n_joints: int) -> tuple[str, ...]:
-    """Names ``q1 … qn, v1 … vn`` of the relative states of n joints."""
-    return tuple(f"{letter}{i + 1}" for letter in "qv" for i in range(n_joints))
-
-
-def checked_data(
-    states: ArrayLike, forces: ArrayLike, accelerations: ArrayLike | None
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """States (n, 2 k), forces (n, k) and accelerations (n, k or 0) as arrays that fit together.
-
-    Raises:
-        IdentificationError: Shapes do not fit, or a value is NaN or inf.
-    """
-    s = np.asarray(states, dtype=float)
-    f = np.asarray(forces, dtype=float)
-    f = f[:, None] if f.ndim == 1 else f
-    a = np.zeros((len(s), 0)) if accelerations is None else np.asarray(accelerations, dtype=float)
-    a = a[:, None] if a.ndim == 1 else a
-    if s.ndim != 2 or f.ndim != 2 or s.shape != (len(f), 2 * f.shape[1]):
-        raise IdentificationError(
-            f"states of shape {s.shape} came with forces of shape {f.shape}; (n, 2 k) and (n, k) are expected, "
-            "the displacements of the k joints before their velocities"
-        )
-    if accelerations is not None and a.shape != f.shape:
-        raise IdentificationError(
-            f"accelerations of shape {a.shape} came; the shape of the forces {f.shape} is expected"
-        )
-    for name, array in (("states", s), ("forces", f), ("accelerations", a)):
-        if not np.all(np.isfinite(array)):
-            row, column = np.argwhere(~np.isfinite(array))[0]
-            raise IdentificationError(
-                f"{name} hold a value that is not finite at sample {row}, column {column}; cut the gap out of the record first"
-            )
-    return s, f, a
-
-
-def nmse_percent(measured: NDArray[np.float64], estimated: NDArray[np.float64]) -> tuple[float, ...]:
-    """``100 / (N var(y)) sum((y - yhat)²)`` of each column [%]; inf for a column that does not vary but is missed."""
-    error = np.mean((measured - estimated) ** 2, axis=0)
-    variance = np.var(measured, axis=0)
-    return tuple(
-        float(100.0 * e / v) if v > 0.0 else (0.0 if e == 0.0 else float("inf"))
-        for e, v in zip(error, variance, strict=True)
-    )
 
 
 @dataclass(frozen=True)
@@ -294,7 +115,7 @@ class PolynomialModel:
     def theta(self) -> NDArray[np.float64]:
         """Header and coefficients, as an element takes them."""
         beyond = () if self.beyond is None else self.beyond.ravel()
-        return frozen(self.law.theta(np.concatenate([self.coefficients.ravel(), beyond])))
+        return read_only(self.law.theta(np.concatenate([self.coefficients.ravel(), beyond])))
 
     def predict(self, states: ArrayLike) -> NDArray[np.float64]:
         """Restoring forces (n, k) [N, N m] at states (n, 2 k) [m, rad, m/s, rad/s]."""
@@ -345,13 +166,13 @@ class PolynomialModel:
                 kind=values["kind"],
                 degree=values["degree"],
                 basis=values["basis"],
-                centre=frozen(values["centre"]),
-                scale=frozen(values["scale"]),
-                coefficients=frozen(values["coefficients"]),
+                centre=read_only(values["centre"]),
+                scale=read_only(values["scale"]),
+                coefficients=read_only(values["coefficients"]),
                 range=ValidityRange.from_dict(values["range"]),
                 report=report,
-                mass=None if values["mass"] is None else frozen(values["mass"]),
-                beyond=None if values.get("beyond") is None else frozen(values["beyond"]),
+                mass=None if values["mass"] is None else read_only(values["mass"]),
+                beyond=None if values.get("beyond") is None else read_only(values["beyond"]),
             )
         except (KeyError, TypeError, ValueError) as error:
             if isinstance(error, FileFormatError):
@@ -407,16 +228,7 @@ def fit_polynomial(
     begun = time.perf_counter()
     s, f, a = checked_data(states, forces, accelerations)
     powers = _orders_of(orders, s.shape[1])
-    if basis == "chebyshev" and not normalise:
-        raise ParameterError(
-            "a Chebyshev basis came with normalise=False; it needs states scaled to [-1, 1], use basis='power'"
-        )
-    if bounded and not normalise:
-        raise ParameterError(
-            "a bounded polynomial came with normalise=False; its range is that of the normalised states"
-        )
-    if ridge < 0.0:
-        raise ParameterError(f"ridge is {ridge:g}; 0 or more is expected")
+    _check(basis, normalise=normalise, bounded=bounded, ridge=ridge)
     centre, scale = centre_and_scale(s) if normalise else (np.zeros(s.shape[1]), np.ones(s.shape[1]))
     exponents = polynomial_exponents(powers, kind, degree=degree)
     n_terms = len(exponents)
@@ -430,8 +242,8 @@ def fit_polynomial(
         for parts in zip(_regressors(s, exponents, basis, centre, scale), _blocks(a), strict=True)
     )
     solution, singular, rank = _solve(blocks, f, unknowns, ridge, rcond)
-    coefficients = frozen(solution[:n_terms].T)
-    mass = frozen(solution[n_terms:].T) if a.shape[1] else None
+    coefficients = read_only(solution[:n_terms].T)
+    mass = read_only(solution[n_terms:].T) if a.shape[1] else None
     condition = float(singular[0] / singular[-1]) if singular[-1] > 0.0 else float("inf")
     pending = PolynomialReport((), condition, rank, n_terms, len(s), 0.0)
     model = PolynomialModel(
@@ -439,8 +251,8 @@ def fit_polynomial(
         kind=kind,
         degree=(max(powers) if degree is None else degree) if kind == "total" else None,
         basis=basis,
-        centre=frozen(centre),
-        scale=frozen(scale),
+        centre=read_only(centre),
+        scale=read_only(scale),
         coefficients=coefficients,
         range=ValidityRange.of(s),
         report=pending,
@@ -453,10 +265,24 @@ def fit_polynomial(
     )
 
 
+def _check(basis: Basis, *, normalise: bool, bounded: bool, ridge: float) -> None:
+    """Raise a `ParameterError` for settings of a fit that do not go together."""
+    if basis == "chebyshev" and not normalise:
+        raise ParameterError(
+            "a Chebyshev basis came with normalise=False; it needs states scaled to [-1, 1], use basis='power'"
+        )
+    if bounded and not normalise:
+        raise ParameterError(
+            "a bounded polynomial came with normalise=False; its range is that of the normalised states"
+        )
+    if ridge < 0.0:
+        raise ParameterError(f"ridge is {ridge:g}; 0 or more is expected")
+
+
 def _beyond(forces: NDArray[np.float64], scale: NDArray[np.float64]) -> NDArray[np.float64]:
     """Stiffness and damping (2, k) that outweigh the largest force met one half-range beyond the edge of the range."""
     largest = np.max(np.abs(forces), axis=0)
-    return frozen(largest / scale.reshape(2, -1))
+    return read_only(largest / scale.reshape(2, -1))
 
 
 def _orders_of(orders: int | Sequence[int], n_states: int) -> tuple[int, ...]:

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from bench import native
 from bench.errors import IdentificationError, ModelError, UnknownNameError
-from bench.identification.linear_rig import LinearRig, address, sensor_columns
+from bench.identification.linear_rig import LinearRig, address
+from bench.identification.linear_rig_elements import sensor_columns
 from bench.recording import Recording
 from bench.rig import Rig, controls_of
 

@@ -12,7 +12,7 @@ from bench.documents import Document, Label, Listed, Name, Number
 from bench.documents.loading import load_document
 from bench.errors import FileFormatError
 from bench.files import json_values, write_text
-from bench.identification.polynomial import ValidityRange
+from bench.identification.validity_range import ValidityRange
 from bench.laws.registry import find_law
 from bench.rig.element import Element
 

@@ -15,10 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.errors import IdentificationError, UnknownNameError
+from bench.identification.fit_data import nmse_percent
 from bench.identification.memory import fit_memory
 from bench.identification.network import fit_network
 from bench.identification.parametric import ComponentRecord, fit_law
-from bench.identification.polynomial import ValidityRange, fit_polynomial, nmse_percent
+from bench.identification.polynomial import fit_polynomial
+from bench.identification.validity_range import ValidityRange
 from bench.joint_models.scales import starts_of
 from bench.laws.base import ForceLaw
 from bench.laws.evaluate import evaluate

@@ -42,7 +42,7 @@ STUDY_SETTINGS = StudySettings()
 MOTIONS = ("harmonic", "wandering", "random")
 
 
-class Run(NamedTuple):
+class StudyRun(NamedTuple):
     """One run of the monitor.
 
     Attributes:
@@ -140,7 +140,7 @@ def service_run(
     noise: float = 0.01,
     gradual: float = 0.0,
     settings: MonitorSettings | None = None,
-) -> Run:
+) -> StudyRun:
     """Watch one synthetic damper that loses a share of C in service.
 
     Args:
@@ -176,7 +176,7 @@ def service_run(
     return _counted(monitor, change, energies[1] / energies[0])
 
 
-def _counted(monitor: DamperMonitor, change: float, true_share: float) -> Run:
+def _counted(monitor: DamperMonitor, change: float, true_share: float) -> StudyRun:
     healthy = [period for period in monitor.judged if period.end <= change]
     false = [alarm for alarm in monitor.alarms if alarm.time <= change]
     true = [alarm for alarm in monitor.alarms if alarm.time > change]
@@ -186,10 +186,10 @@ def _counted(monitor: DamperMonitor, change: float, true_share: float) -> Run:
         delay = float(true[0].number - (healthy[-1].number if healthy else 0))
         share = true[0].share
     outside = sum(not period.inside for period in monitor.judged)
-    return Run(sum(period.inside for period in healthy), len(false), delay, share, true_share, outside)
+    return StudyRun(sum(period.inside for period in healthy), len(false), delay, share, true_share, outside)
 
 
-def line(name: str, run: Callable[[int], Run], seeds: Sequence[int]) -> Line:
+def line(name: str, run: Callable[[int], StudyRun], seeds: Sequence[int]) -> Line:
     """Count runs of one kind over seeds.
 
     Args:
@@ -241,7 +241,7 @@ def measured_cycles(tension: int) -> list[NDArray[np.float64]]:
     return cycles
 
 
-def switched_run(before: int, after: int, seed: int, settings: MonitorSettings | None = None) -> Run:
+def switched_run(before: int, after: int, seed: int, settings: MonitorSettings | None = None) -> StudyRun:
     """Watch the measured friction damper while its band tension is switched.
 
     Args:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from bench.errors import RecordingError, RecordWarning, UnitError
 from bench.limits import READING_LIMITS, ReadingLimits
 from bench.record_files.column_map import ColumnMap
-from bench.record_files.columns import READABLE, read_columns
+from bench.record_files.columns import READABLE, Columns, read_columns
 from bench.recording import Recording
 from bench.recording.channel import channels_from
 from bench.recording.clock import (
@@ -150,28 +150,8 @@ def read_recording(
     try:
         if gaps not in ("raise", "interpolate"):
             raise RecordingError(f"gaps is {gaps!r}; 'raise' or 'interpolate' is expected")
-        clock = contents.clock
-        if clock is None and not (math.isfinite(layout.sample_rate) and layout.sample_rate > 0.0):
-            raise RecordingError("without a time, sample_rate is needed: a finite number > 0 [Hz]")
-        n = len(next(iter(contents.arrays.values())))
-        seconds = grid(0.0, layout.sample_rate, n) if clock is None else clock.seconds
-        noted = on_one_clock(
-            seconds,
-            contents.arrays,
-            sample_rate=layout.sample_rate,
-            bridge=gaps == "interpolate",
-            jitter=jitter,
-        )
-        source = {"file": path.name, "sha256": _digest(path)}
-        if clock is not None and clock.start:
-            source["start"] = clock.start
-        doubts = (clock.doubt,) if clock is not None and clock.doubt else ()
-        notes = tuple(f"'{path}': {note}" for note in (*contents.notes, *doubts, *noted.notes))
-        told: dict[str, Any] = {"source": source}
-        if noted.report:
-            told["repaired"] = noted.report
-        if notes:
-            told["warnings"] = notes
+        noted = _on_its_clock(contents, layout, bridge=gaps == "interpolate", jitter=jitter)
+        told, notes = _provenance(path, contents, noted)
         channels = channels_from(
             list(contents.arrays),
             units=contents.units | dict(layout.units),
@@ -192,6 +172,34 @@ def read_recording(
     for note in notes:
         warnings.warn(note, RecordWarning, stacklevel=2)
     return recording
+
+
+def _on_its_clock(contents: Columns, layout: ColumnMap, *, bridge: bool, jitter: float) -> Noted:
+    """Columns of a file on the uniform clock that it tells, or on that of the sample rate given."""
+    clock = contents.clock
+    if clock is None and not (math.isfinite(layout.sample_rate) and layout.sample_rate > 0.0):
+        raise RecordingError("without a time, sample_rate is needed: a finite number > 0 [Hz]")
+    n = len(next(iter(contents.arrays.values())))
+    seconds = grid(0.0, layout.sample_rate, n) if clock is None else clock.seconds
+    return on_one_clock(
+        seconds, contents.arrays, sample_rate=layout.sample_rate, bridge=bridge, jitter=jitter
+    )
+
+
+def _provenance(path: Path, contents: Columns, noted: Noted) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """What ``meta`` tells of a file and its repairs, and the notes in it."""
+    clock = contents.clock
+    source = {"file": path.name, "sha256": _digest(path)}
+    if clock is not None and clock.start:
+        source["start"] = clock.start
+    doubts = (clock.doubt,) if clock is not None and clock.doubt else ()
+    notes = tuple(f"'{path}': {note}" for note in (*contents.notes, *doubts, *noted.notes))
+    told: dict[str, Any] = {"source": source}
+    if noted.report:
+        told["repaired"] = noted.report
+    if notes:
+        told["warnings"] = notes
+    return told, notes
 
 
 def _layout(

@@ -49,14 +49,14 @@ class OutlierSettings:
 SETTINGS = OutlierSettings()
 
 
-class Run(NamedTuple):
+class OutlierRun(NamedTuple):
     """Successive samples, the last one included."""
 
     first: int
     last: int
 
 
-def outliers(values: Array, settings: OutlierSettings = SETTINGS) -> list[list[Run]]:
+def outliers(values: Array, settings: OutlierSettings = SETTINGS) -> list[list[OutlierRun]]:
     """Runs of samples of each channel that were never measured.
 
     Args:
@@ -71,7 +71,7 @@ def outliers(values: Array, settings: OutlierSettings = SETTINGS) -> list[list[R
         return [[] for _ in range(count)]
     size = [_departure(column, settings) for column in values.T]
     found = [_runs(column, own, settings) for column, own in zip(values.T, size, strict=True)]
-    alone: list[list[Run]] = []
+    alone: list[list[OutlierRun]] = []
     for c, runs in enumerate(found):
         others = [size[k] for k in range(count) if k != c]
         kept = [run for run in runs if _held(values[:, c], run) or not _shared(run, others, settings)]
@@ -79,7 +79,7 @@ def outliers(values: Array, settings: OutlierSettings = SETTINGS) -> list[list[R
     return alone
 
 
-def bridged(column: Array, runs: Sequence[Run]) -> Array:
+def bridged(column: Array, runs: Sequence[OutlierRun]) -> Array:
     """A channel (n,) with some runs of samples interpolated from their neighbours by cubics."""
     out = column.copy()
     for run in runs:
@@ -105,7 +105,7 @@ def _departure(column: Array, settings: OutlierSettings) -> Array:
     return off / np.maximum(np.maximum(least, settings.large * spread), 1e-300)
 
 
-def _runs(column: Array, size: Array, settings: OutlierSettings) -> list[Run]:
+def _runs(column: Array, size: Array, settings: OutlierSettings) -> list[OutlierRun]:
     """Runs of one channel that heal once they are taken out."""
     at = np.flatnonzero(size > 1.0)
     if len(at) == 0:
@@ -115,7 +115,7 @@ def _runs(column: Array, size: Array, settings: OutlierSettings) -> list[Run]:
     for cluster in np.split(at, np.flatnonzero(np.diff(at) > settings.longest_hold + 3) + 1):
         low, high = int(cluster[0]), int(cluster[-1])
         tried = [
-            Run(k, k + length - 1)
+            OutlierRun(k, k + length - 1)
             for length in range(1, settings.longest + 1)
             for k in range(low, high + 2 - length)
         ]
@@ -133,17 +133,17 @@ def _smooth(column: Array) -> Array:
     return out
 
 
-def _heals(column: Array, run: Run, limit: float, settings: OutlierSettings) -> bool:
+def _heals(column: Array, run: OutlierRun, limit: float, settings: OutlierSettings) -> bool:
     """Whether a channel goes on as if nothing had been without a run."""
     low, high = run.first - 6, run.last + 7
     if low < 0 or high > len(column):
         return False
     part = column[low:high].copy()
-    _bridge(part, Run(run.first - low, run.last - low))
+    _bridge(part, OutlierRun(run.first - low, run.last - low))
     return bool(np.max(np.abs(part[2:-2] - _expected(part))) < settings.healed * limit)
 
 
-def _bridge(column: Array, run: Run) -> None:
+def _bridge(column: Array, run: OutlierRun) -> None:
     """Replace a run by the cubic through two samples on either side, in place."""
     known = np.array([run.first - 2, run.first - 1, run.last + 1, run.last + 2])
     inside = np.arange(run.first, run.last + 1)
@@ -154,13 +154,13 @@ def _bridge(column: Array, run: Run) -> None:
     column[inside] = np.polyval(np.polyfit(known - middle, column[known], 3), inside - middle)
 
 
-def _held(column: Array, run: Run) -> bool:
+def _held(column: Array, run: OutlierRun) -> bool:
     """Whether all samples of a run are the same, or one that is exactly zero."""
     samples = column[run.first : run.last + 1]
     return bool(np.all(samples == samples[0]) and (len(samples) > 1 or samples[0] == 0.0))
 
 
-def _hold_within(column: Array, low: int, high: int, reach: int) -> Run | None:
+def _hold_within(column: Array, low: int, high: int, reach: int) -> OutlierRun | None:
     """The longest run of equal samples about a cluster."""
     first, last = max(low - reach, 1), min(high + reach + 1, len(column) - 1)
     best = None
@@ -170,12 +170,12 @@ def _hold_within(column: Array, low: int, high: int, reach: int) -> Run | None:
         while end + 1 < last and column[end + 1] == column[k]:
             end += 1
         if end > k and (best is None or end - k > best.last - best.first):
-            best = Run(k, end)
+            best = OutlierRun(k, end)
         k = end + 1
     return best
 
 
-def _shared(run: Run, others: Sequence[Array], settings: OutlierSettings) -> bool:
+def _shared(run: OutlierRun, others: Sequence[Array], settings: OutlierSettings) -> bool:
     """Whether another channel departs from its neighbours at the same moment."""
     part = slice(max(run.first - 1, 0), run.last + 2)
     return any(float(np.max(size[part])) > settings.healed for size in others)

@@ -63,7 +63,7 @@ class ChainJointSetup:
 SETUP = ChainJointSetup()
 
 
-class Outcome(NamedTuple):
+class ChainOutcome(NamedTuple):
     """The chain with one reduced-order joint under one excitation."""
 
     record: Recording | None  # None where it diverged
@@ -88,22 +88,22 @@ def respond(rig: Rig, seed: int) -> Recording:
     return simulate(rig, excitation(True, True), rng=np.random.default_rng(seed))
 
 
-def outcome(rig: Rig, element: Element, true: Recording, seed: int) -> Outcome:
+def outcome(rig: Rig, element: Element, true: Recording, seed: int) -> ChainOutcome:
     """Put a joint into the chain and compare."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RangeWarning)  # told in `outside`
         try:
             record = respond(rig.with_element(element), seed)
         except SimulationError as error:
-            return Outcome(None, {}, 1.0, f"diverged after {error.time:.1f} s")
+            return ChainOutcome(None, {}, 1.0, f"diverged after {error.time:.1f} s")
     states = np.stack(
         [record[f"joint/{kind}_{i}"] for kind in ("displacement", "velocity") for i in (1, 2)], axis=1
     )
     outside = 0.0 if element.validity is None else float(np.mean(element.validity.outside(states)))
-    return Outcome(record, channel_nmse(true, record), outside, "")
+    return ChainOutcome(record, channel_nmse(true, record), outside, "")
 
 
-def _why(others: list[Outcome]) -> str:
+def _why(others: list[ChainOutcome]) -> str:
     """What became of a joint over the further seeds."""
     gone = sum(other.record is None for other in others)
     left = sum(other.record is not None and other.outside > 0.0 for other in others)
@@ -113,7 +113,9 @@ def _why(others: list[Outcome]) -> str:
     )
 
 
-def _rows(outcomes: dict[str, dict[str, Outcome]], further: dict[str, list[Outcome]]) -> tuple[Row, ...]:
+def _rows(
+    outcomes: dict[str, dict[str, ChainOutcome]], further: dict[str, list[ChainOutcome]]
+) -> tuple[Row, ...]:
     rows = []
     for excited, by_label in outcomes.items():
         number, page = ("5.8", "p. 132") if excited == "training" else ("5.9", "p. 132")
@@ -163,7 +165,7 @@ def run(progress: Progress) -> Item:
         excited: {label: outcome(rig, element, true[excited], seed) for label, element in candidates.items()}
         for excited, seed in SETUP.seeds.items()
     }
-    further: dict[str, list[Outcome]] = {label: [] for label in candidates}
+    further: dict[str, list[ChainOutcome]] = {label: [] for label in candidates}
     for number in VERDICT_SETUP.seeds:
         progress(f"seed {number}", 0.75 + 0.014 * number)
         reference = respond(rig, SETUP.last_seed + number)

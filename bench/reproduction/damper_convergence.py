@@ -45,7 +45,7 @@ SETUP = DamperConvergenceSetup()
 CHOSEN = "P(0) = 20, for the printed errors and their order"
 
 
-class Outcome(NamedTuple):
+class ConvergenceOutcome(NamedTuple):
     """One run of the experiment."""
 
     online: float
@@ -57,7 +57,7 @@ class Outcome(NamedTuple):
     cancel: float  # correlation of the contributions of v^3 and v^5
 
 
-def outcome(experiment: PolynomialExperiment) -> Outcome:
+def outcome(experiment: PolynomialExperiment) -> ConvergenceOutcome:
     """What is judged of a run."""
     away = np.abs(experiment.theta / experiment.theta_batch - 1.0) > SETUP.near
     late = experiment.time >= SETUP.few_cycles
@@ -65,7 +65,7 @@ def outcome(experiment: PolynomialExperiment) -> Outcome:
     largest = np.abs(experiment.contributions).max(axis=0) / peak
     names = list(experiment.names)
     third, fifth = (experiment.contributions[:, names.index(name)] for name in ("a03", "a05"))
-    return Outcome(
+    return ConvergenceOutcome(
         experiment.online,
         experiment.half_amplitude,
         experiment.other_segment,
@@ -79,13 +79,13 @@ def outcome(experiment: PolynomialExperiment) -> Outcome:
 class Study(NamedTuple):
     """Outcomes over all seeds, by start covariance, and the errors within one record of half the amplitude."""
 
-    by_covariance: dict[float, list[Outcome]]
+    by_covariance: dict[float, list[ConvergenceOutcome]]
     within_half: list[float]
 
 
 def study(progress: Progress) -> Study:
     """Run the experiment for each start covariance and seed."""
-    found: dict[float, list[Outcome]] = {}
+    found: dict[float, list[ConvergenceOutcome]] = {}
     within = []
     for number, covariance in enumerate(SETUP.covariances):
         progress(f"P(0) = {covariance:g}", number / len(SETUP.covariances))
@@ -111,7 +111,7 @@ def rows(shown: PolynomialExperiment, found: Study) -> list[Row]:
     ]
 
 
-def _error_rows(ours: Outcome, found: Study) -> list[Row]:
+def _error_rows(ours: ConvergenceOutcome, found: Study) -> list[Row]:
     first = found.by_covariance[SETUP.covariances[0]]
     drawn = {
         "on line": ("3.5", "p. 51", ours.online, [run.online for run in first]),
@@ -154,8 +154,8 @@ def _error_rows(ours: Outcome, found: Study) -> list[Row]:
     return made
 
 
-def _order_row(ours: Outcome, first: list[Outcome]) -> Row:
-    def ordered(run: Outcome) -> bool:
+def _order_row(ours: ConvergenceOutcome, first: list[ConvergenceOutcome]) -> Row:
+    def ordered(run: ConvergenceOutcome) -> bool:
         return run.segment < run.online < run.half
 
     held = sum(ordered(run) for run in first)
@@ -175,7 +175,7 @@ def _order_row(ours: Outcome, first: list[Outcome]) -> Row:
 
 def _covariance_rows(found: Study) -> list[Row]:
     made = []
-    measures: dict[str, tuple[str, Callable[[Outcome], float]]] = {
+    measures: dict[str, tuple[str, Callable[[ConvergenceOutcome], float]]] = {
         "on line": ("3.5", lambda run: run.online),
         "half amplitude": ("3.8", lambda run: run.half),
         "other segment": ("3.9", lambda run: run.segment),
@@ -203,7 +203,7 @@ def _covariance_rows(found: Study) -> list[Row]:
     return made
 
 
-def _convergence_rows(ours: Outcome, found: Study) -> list[Row]:
+def _convergence_rows(ours: ConvergenceOutcome, found: Study) -> list[Row]:
     made = []
     for covariance in SETUP.covariances:
         runs = found.by_covariance[covariance]

@@ -14,18 +14,13 @@ from bench.figures.look import axes_grid
 from bench.identification.damper import (
     DesignFit,
     OnlineDesignFit,
-    TrustReport,
-    check_design_model,
     design_force,
     fit_design_model,
     fit_design_model_online,
 )
-from bench.identification.damper_study import (
-    DamperRecord,
-    HarmonicCampaign,
-    harmonic_campaign,
-    harmonic_record,
-)
+from bench.identification.damper_study import DamperRecord, harmonic_record
+from bench.identification.damper_trust import TrustReport, check_design_model
+from bench.identification.harmonic_tests import HarmonicCampaign, harmonic_campaign
 from bench.reproduction import damper_random
 from bench.reproduction.damper_records import LOOPS, beside
 from bench.reproduction.estimates import (

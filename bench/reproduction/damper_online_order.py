@@ -40,7 +40,7 @@ FOLLOWED = {"m": "x''", "a10": "x", "a01": "x'", "a30": "x³", "a03": "x'³"}
 """Estimates drawn in Fig 3.12 a to e, and their terms."""
 
 
-class Point(NamedTuple):
+class OrderPoint(NamedTuple):
     """One run: its error, start included [%], and the asymptotic values of `FOLLOWED`, NaN where the order has no such term."""
 
     error: float
@@ -57,13 +57,13 @@ class OnlineStudy(NamedTuple):
         surface: Error over `map_orders` in x (rows) and v [%].
     """
 
-    diagonal: dict[float, list[Point]]
+    diagonal: dict[float, list[OrderPoint]]
     over_x: NDArray[np.float64]
     over_v: NDArray[np.float64]
     surface: NDArray[np.float64]
 
 
-def identify(record: DamperRecord, order_x: int, order_v: int, covariance: float) -> Point:
+def identify(record: DamperRecord, order_x: int, order_v: int, covariance: float) -> OrderPoint:
     """Run the estimator over a record."""
     part = record.part(slice(None, None, DAMPER_ONLINE_ORDER_SETUP.every))
     peaks = [float(np.abs(channel).max()) for channel in part[1:]]
@@ -82,7 +82,7 @@ def identify(record: DamperRecord, order_x: int, order_v: int, covariance: float
     # orders of two digits are written apart: "a1,0" for "a10"
     end = dict(zip((name.replace(",", "") for name in model.names), history.theta[-1], strict=True))
     values = np.array([end.get(name, np.nan) for name in FOLLOWED])
-    return Point(nmse(history.measured[learnt], history.predicted[learnt]), values)
+    return OrderPoint(nmse(history.measured[learnt], history.predicted[learnt]), values)
 
 
 def online_study(record: DamperRecord, highest: int) -> OnlineStudy:

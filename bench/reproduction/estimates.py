@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from bench.figures import style
 from bench.figures.look import axes_grid, thin
-from bench.identification.adaptive import AdaptiveHistory
+from bench.identification.adaptive_history import AdaptiveHistory
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,8 @@ from scipy.integrate import solve_ivp
 
 from bench.figures import loops, style, time_histories
 from bench.figures.look import axes_grid, thin
-from bench.identification.adaptive import AdaptiveHistory, AdaptiveLeastSquares
+from bench.identification.adaptive import AdaptiveLeastSquares
+from bench.identification.adaptive_history import AdaptiveHistory
 from bench.identification.regressors import Reference, sdof_model
 from bench.laws.coupling import INCH, POUND_FORCE
 from bench.recording import Recording, nmse

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.figures import loops, time_histories
-from bench.identification.adaptive import AdaptiveHistory, AdaptiveLeastSquares
+from bench.identification.adaptive import AdaptiveLeastSquares
+from bench.identification.adaptive_history import AdaptiveHistory
 from bench.identification.regressors import bouc_wen_model
 from bench.laws.coupling import INCH, POUND_FORCE
 from bench.recording import Recording

@@ -20,7 +20,7 @@ from bench.files import OutputError, replacing
 from bench.recording import Recording, nmse
 from bench.rerun_log.bands import Band, bands_of, changes
 from bench.rerun_log.kinematics import body_poses, joint_positions
-from bench.rerun_log.layout import Loop, Page, blueprint, holder_of, label_of
+from bench.rerun_log.layout import LogPage, Loop, blueprint, holder_of, label_of
 from bench.rerun_log.scene import eye_of, log_scene
 from bench.rerun_log.traces import frame_of, log_frame, log_loop, log_series, style
 from bench.rig import Rig
@@ -107,7 +107,7 @@ def log_comparison(
     own = [band for element in (first_rig.elements if first_rig else ()) for band in bands_of(element)]
     lanes = _lanes([*own, *bands], records)
     scenes = {key: variant for variant, key in _keys(records).items() if variant in rigs}
-    page = Page.of(records, scenes, pairs, lanes=len(lanes))
+    page = LogPage.of(records, scenes, pairs, lanes=len(lanes))
     if first_rig is not None:
         page = page._replace(eye=eye_of(first_rig.scene, camera))
 

@@ -48,7 +48,7 @@ class Loop(NamedTuple):
         return cls(f"{y} over {x}", label_of(recording, x), label_of(recording, y))
 
 
-class Page(NamedTuple):
+class LogPage(NamedTuple):
     """What is to be laid out."""
 
     rigs: Mapping[str, str]  # entity -> name
@@ -67,7 +67,7 @@ class Page(NamedTuple):
         loops: Sequence[tuple[str, str]],
         *,
         lanes: int,
-    ) -> Page:
+    ) -> LogPage:
         """The page for records, the first of which is the reference."""
         groups: dict[str, list[str]] = {}
         for recording in records.values():
@@ -149,7 +149,9 @@ def _around(window: float) -> rrb.archetypes.TimeAxis:
     )
 
 
-def _plots(folder: str, labels: Sequence[str], page: Page, *, prefix: str = "") -> list[rrb.TimeSeriesView]:
+def _plots(
+    folder: str, labels: Sequence[str], page: LogPage, *, prefix: str = ""
+) -> list[rrb.TimeSeriesView]:
     """One plot a channel; the first carries the legend, since the colours are the same everywhere."""
     return [
         rrb.TimeSeriesView(
@@ -162,7 +164,7 @@ def _plots(folder: str, labels: Sequence[str], page: Page, *, prefix: str = "") 
     ]
 
 
-def _series(page: Page) -> rrb.Tabs:
+def _series(page: LogPage) -> rrb.Tabs:
     tabs: list[rrb.Container | rrb.View] = []
     for tab, labels in page.groups.items():
         for start in range(0, len(labels), SETTINGS.plots_a_tab):
@@ -192,7 +194,7 @@ def _loop_view(loop: Loop, window: float) -> rrb.Spatial2DView:
     )
 
 
-def _scenes(page: Page) -> list[rrb.Container | rrb.View]:
+def _scenes(page: LogPage) -> list[rrb.Container | rrb.View]:
     controls = None
     if page.eye is not None:
         controls = rrb.EyeControls3D(
@@ -210,7 +212,7 @@ def _scenes(page: Page) -> list[rrb.Container | rrb.View]:
     ]
 
 
-def _loop_sheets(page: Page) -> rrb.Container | rrb.View:
+def _loop_sheets(page: LogPage) -> rrb.Container | rrb.View:
     views = [_loop_view(loop, page.window) for loop in page.loops]
     if len(views) <= SETTINGS.loops_a_sheet:
         return rrb.Grid(*views, grid_columns=1 if len(views) <= 2 else 2)
@@ -221,7 +223,7 @@ def _loop_sheets(page: Page) -> rrb.Container | rrb.View:
     )
 
 
-def blueprint(page: Page) -> rrb.Blueprint:
+def blueprint(page: LogPage) -> rrb.Blueprint:
     """Rigs on the left, channels and bands in the middle, loops and scores on the right; playing, in a loop.
 
     A rig is long and flat, so a scene takes a third of a column; the scores stand where that leaves room.

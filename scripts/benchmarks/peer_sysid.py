@@ -112,7 +112,7 @@ class _Coordinates:
 class Candidate:
     """A nominal model with one effect, or none, as `mujoco.sysid` fits it.
 
-    The vector is that of `Problem.simulate`: nominal deviations in units of their uncertainty, then the effect's etas.
+    The vector is that of `Simulator.simulate`: nominal deviations in units of their uncertainty, then the effect's etas.
     """
 
     def __init__(self, problem: Problem, placed: Placed | None) -> None:

@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.identification.adaptive import AdaptiveHistory, AdaptiveLeastSquares
+from bench.identification.adaptive import AdaptiveLeastSquares
+from bench.identification.adaptive_history import AdaptiveHistory
 from bench.identification.regressors import (
     Reference,
     RegressorModel,

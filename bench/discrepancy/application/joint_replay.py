@@ -19,15 +19,13 @@ from bench.discrepancy.application.applying import Applied
 from bench.discrepancy.application.forces import values_of
 from bench.discrepancy.application.running import Window, controls, hook_of, run, sampled
 from bench.discrepancy.application.target import PREFIX, as_mujoco
-from bench.discrepancy.articulated.effects import CATALOGUE
+from bench.discrepancy.articulated_search.catalogue import CATALOGUE
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.multibody.channels import bound
 from bench.discrepancy.multibody.encoders import Encoder, input_of
 from bench.discrepancy.multibody.model import ArticulatedModel, Joint
 from bench.discrepancy.multibody.motion import Motion, motion_of
-from bench.discrepancy.multibody.records import (
-    RECORDS_SETTINGS,
-)
+from bench.discrepancy.multibody.records import RECORDS_SETTINGS
 from bench.discrepancy.settings import DEFAULT
 from bench.discrepancy.verdict import NamedEffect
 

@@ -22,8 +22,8 @@ from bench.discrepancy.application.applying import (
 )
 from bench.discrepancy.application.joint_replay import JointReplay
 from bench.discrepancy.application.linear_replay import LinearReplay
-from bench.discrepancy.articulated.diagnosis import applies
-from bench.discrepancy.articulated.effects import CATALOGUE as ARTICULATED
+from bench.discrepancy.articulated.recognition import applies
+from bench.discrepancy.articulated_search.catalogue import CATALOGUE as ARTICULATED
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.checks.initial_motion import with_starts_found
 from bench.discrepancy.effects.catalogue import CATALOGUE as LINEAR

@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.discrepancy.articulated.fitting import ArticulatedFit
-from bench.discrepancy.articulated.problem import ArticulatedProblem
+from bench.discrepancy.articulated.free_runs import FreeRuns
+from bench.discrepancy.articulated_search.fitting import ArticulatedFit
+from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.settings import ArticulatedJudgementSettings as JudgementSettings
 
@@ -54,9 +55,9 @@ def believed(problem: ArticulatedProblem, found: ArticulatedFit, settings: Judge
 def noise_floor(problem: ArticulatedProblem, found: ArticulatedFit, settings: JudgementSettings) -> Array:
     """NRMSE (n_joints,) that noise alone leaves in free runs, were the model of a fit right."""
     vector = believed(problem, found, settings)
-    elastic = problem.settled(found.hypothesis, vector)
+    runs = FreeRuns(problem.settled(found.hypothesis, vector))
     jobs = [(j, r) for r in range(len(problem.records)) for j in range(len(problem.joints))]
-    left = in_threads(lambda job: elastic.free_run_noise(job[0], found.hypothesis, vector, job[1]), jobs)
+    left = in_threads(lambda job: runs.noise(job[0], found.hypothesis, vector, job[1]), jobs)
     sizes = [size_of(problem, r, j) for j, r in jobs]
     table = np.reshape(np.array(left) / np.array(sizes), (len(problem.records), -1))
     return np.asarray(np.sqrt(np.mean(table**2, axis=0)), dtype=np.float64)
@@ -74,10 +75,10 @@ def predict(
     """Free runs of a problem's records with a fit's model, with the nominal model as it is where None; `floor` as of `noise_floor`."""
     hypothesis = found.hypothesis if found else ()
     vector = believed(problem, found, settings) if found else np.zeros(len(problem.nominal))
-    elastic = problem.settled(hypothesis, vector)
+    runs = FreeRuns(problem.settled(hypothesis, vector))
     jobs = [(j, r) for r in range(len(problem.records)) for j in range(len(problem.joints))]
-    motions = elastic.motions(hypothesis, vector)
-    errors = in_threads(lambda job: elastic.free_run(job[0], hypothesis, vector, motions[job[1]]), jobs)
+    motions = runs.problem.motions(hypothesis, vector)
+    errors = in_threads(lambda job: runs.errors(job[0], hypothesis, vector, motions[job[1]]), jobs)
     rows = []
     for r in range(len(problem.records)):
         columns = []
@@ -108,14 +109,16 @@ def kept(
     """How many effects of a ladder the judging records bear out, and the predictions of every rung.
 
     Effects are kept up to the last that improves on what was kept before it by more than the standard error allows for, and that takes
-    away more than it leaves. Nothing is added to what is complete, and nothing small where even then something is left: it stands in
-    for a little of the form of the law that is not right.
+    away more than it leaves. What is complete gets no more but what is certain, and nothing small is added where even then something
+    is left: it stands in for a little of the form of the law that is not right.
     """
     floor = noise_floor(problem, rungs[-1], settings)
     predictions = [predict(problem, rung, floor, settings) for rung in rungs]
     last = 0
     for k in range(1, len(rungs)):
-        if complete(problem, rungs[last], settings):
+        # of what is complete to the accuracy of the stated noise, records may still tell more than that accuracy
+        likelier = rungs[k].log_posterior - rungs[last].log_posterior
+        if complete(problem, rungs[last], settings) and likelier < settings.certain:
             break
         difference = predictions[last].excess - predictions[k].excess
         error = float(np.std(difference, ddof=1)) / np.sqrt(len(difference))

@@ -64,6 +64,24 @@ def calibration_error(hits: Sequence[tuple[float, bool]], bins: int = 10) -> flo
     return float(sum(abs(stated - true) * n for stated, true, n in reliability(hits, bins)) / len(hits))
 
 
+def calibration_interval(
+    hits: Sequence[tuple[float, bool]], bins: int = 10, draws: int = 1000
+) -> tuple[float, float]:
+    """95 % interval of the expected calibration error: percentiles over names drawn with replacement.
+
+    Args:
+        hits: Stated probabilities, and whether they came true.
+        bins: Bins.
+        draws: Draws.
+    """
+    if not hits:
+        return math.nan, math.nan
+    picks = np.random.default_rng(0).integers(len(hits), size=(draws, len(hits)))
+    errors = [calibration_error([hits[i] for i in row], bins) for row in picks]
+    low, high = np.percentile(errors, [2.5, 97.5])
+    return float(low), float(high)
+
+
 def calibration_scatter(
     stated: Sequence[float] | NDArray[np.float64], bins: int = 10, draws: int = 400
 ) -> float:

@@ -28,8 +28,9 @@ from typing import Any
 import numpy as np
 
 from bench.discrepancy.blind.drawing import BlindOptions, draw_case
+from bench.discrepancy.blind.robot_cases import draw_robot_case
 from bench.discrepancy.blind.schema import ANSWER_LIMITS, ProtocolDocument
-from bench.discrepancy.case.case import Case
+from bench.discrepancy.case.case import Case, CaseChannel
 from bench.documents import parse_json
 from bench.errors import BenchError, FileFormatError, ParameterError
 from bench.files import together, write_bytes, write_text
@@ -96,7 +97,7 @@ def _make_one(task: tuple[str, Path, Path, int, int, BlindOptions]) -> str:
         raise FileFormatError(
             f"'{folder / name}' is a case of another seed, or was changed; give an empty folder, or remove it"
         )
-    case, answer = draw_case(name, rng, options)
+    case, answer = (draw_robot_case if options.robots else draw_case)(name, rng, options)
     text = json.dumps(answer | {"salt": salt}, indent=1)
     with together():  # no case without its answer
         if options.leave_one_out:
@@ -147,11 +148,31 @@ def write_case(case: Case, folder: str | Path) -> None:
         "parameters": {p.name: {"value": p.value, "std": p.std, "unit": p.unit} for p in case.parameters},
         "channels": {
             "time": {"unit": "s"},
-            **{c.name: {"unit": c.unit, "role": c.role, "noise_std": c.noise_std} for c in case.channels},
+            **{c.name: _entry_of(c) for c in case.channels},
         },
+        **case.options,
     }
+    if case.folder is not None:  # a model of its own
+        write_bytes(folder / case.rig, (case.folder / case.rig).read_bytes())
     # last, since it is what makes a folder a case
     write_text(folder / "nominal.json", json.dumps(nominal, indent=1))
+
+
+def _entry_of(channel: CaseChannel) -> dict[str, Any]:
+    """The entry of a channel in ``nominal.json``."""
+    kind, _, target = channel.target.partition(":")
+    more = {
+        kind: target,
+        "quantity": channel.quantity,
+        "side": channel.side,
+        "resolution": channel.resolution,
+    }
+    return {
+        "unit": channel.unit,
+        "role": channel.role,
+        "noise_std": channel.noise_std,
+        **{key: value for key, value in more.items() if key and value},
+    }
 
 
 def run_blind(

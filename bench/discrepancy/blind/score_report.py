@@ -123,7 +123,9 @@ def _with_background(score: BackgroundScore) -> list[Table]:
         (what, _percent(share), str(share.n), BACKGROUND_REQUIRED.get(what, "≥ 95 %"))
         for what, share in score.shares.items()
     ]
-    rows.append(("expected calibration error, named effects", f"{score.calibration:.3f}", "", "≤ 0.05"))
+    low, high = score.interval
+    error = f"{score.calibration:.3f} ({low:.3f} to {high:.3f})"
+    rows.append(("expected calibration error, named effects", error, "", "≤ 0.05"))
     rows.append(("the same if every probability were exact", f"{score.scatter:.3f}", "", ""))
     out = [Table("With a background", ("figure", "value (95 % interval)", "cases", "must hold"), tuple(rows))]
     if score.reliability:

@@ -194,6 +194,8 @@ class NominalDocument(Document):
     """Laws of the bench that the model holds besides, see `case.elements`."""
     limits: Table[Positive] = Field(default_factory=dict)
     """Largest magnitude of a channel that the next test may reach; those of the records by default."""
+    joints: Table[Literal["hold"] | Number] = Field(default_factory=dict)
+    """Joints of an MJCF that were held: "hold" where its own zero was, or the coordinate at which they were."""
     window_s: Positive | None = None
     """Length of the windows that records of a rig that nothing holds are cut into [s]."""
 

@@ -8,15 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.discrepancy.case.case import CaseRecord
-from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Hypothesis
 from bench.discrepancy.response.initial_states import in_motion
+from bench.discrepancy.response.simulator import Simulator
 from bench.discrepancy.response.windows import cut
 
 Array = NDArray[np.float64]
 
 
-def predict(problem: Problem, hypothesis: Hypothesis, vector: Array, record: CaseRecord) -> Array:
+def predict(simulator: Simulator, hypothesis: Hypothesis, vector: Array, record: CaseRecord) -> Array:
     """Free run (n, n_channels) of a record, from estimated initial states where rest is not the start.
 
     Initial states are those that leave the smallest residual, weighted by the noise, in the window that follows each: two
@@ -24,26 +24,27 @@ def predict(problem: Problem, hypothesis: Hypothesis, vector: Array, record: Cas
     too; the gap it leaves is then due to what it lacks and not to a start that was measured poorly.
 
     Args:
-        problem: Records and nominal model.
+        simulator: Records and nominal model.
         hypothesis: Effects.
-        vector: See `Problem.simulate`.
+        vector: See `Simulator.simulate`.
         record: Any record of the case.
     """
-    settings = problem.settings
-    fitted = record.name in {r.name for r in problem.records}
-    if problem.driven or (not problem.windowed and (fitted or not in_motion(record))):
-        return problem.simulate(hypothesis, vector, record)
-    firsts = problem.firsts(record)
-    responses = problem.responses_of(record)
-    steps = problem.start_differences(record)
-    starts = problem.starts_of(record, problem.nominal)
+    settings = simulator.settings
+    fitted = record.name in {r.name for r in simulator.records}
+    if simulator.driven or (not simulator.windowed and (fitted or not in_motion(record))):
+        return simulator.simulate(hypothesis, vector, record)
+    firsts = simulator.firsts(record)
+    responses = simulator.responses_of(record)
+    steps = simulator.start_differences(record)
+    starts = simulator.starts_of(record, simulator.nominal)
     damping = np.ones(len(firsts))
-    channels = problem.simulate(hypothesis, vector, record, starts=starts)
-    residual = (responses - channels) / problem.noise
+    channels = simulator.simulate(hypothesis, vector, record, starts=starts)
+    residual = (responses - channels) / simulator.noise
     costs = _costs(residual, firsts)
     for _ in range(settings.fitting.state_rounds):
         columns = [
-            (problem.simulate(hypothesis, vector, record, starts=starts + step) - channels) / problem.noise
+            (simulator.simulate(hypothesis, vector, record, starts=starts + step) - channels)
+            / simulator.noise
             for step in np.diag(steps)
         ]
         trial = starts.copy()
@@ -54,8 +55,8 @@ def predict(problem: Problem, hypothesis: Hypothesis, vector: Array, record: Cas
                     matrix, residual[first:end].ravel(), rcond=settings.fitting.state_singular
                 )[0]
                 trial[w] += damping[w] * move * steps
-        tried = problem.simulate(hypothesis, vector, record, starts=trial)
-        tried_residual = (responses - tried) / problem.noise
+        tried = simulator.simulate(hypothesis, vector, record, starts=trial)
+        tried_residual = (responses - tried) / simulator.noise
         tried_costs = _costs(tried_residual, firsts)
         better = tried_costs < costs
         settled = np.all(np.abs(costs - tried_costs) <= 1e-6 * costs)
@@ -75,13 +76,13 @@ def _costs(residual: Array, firsts: NDArray[np.int64]) -> Array:
     return np.where(np.isfinite(squares), squares, np.inf)
 
 
-def run_kind(problem: Problem, records: Sequence[CaseRecord]) -> str:
+def run_kind(simulator: Simulator, records: Sequence[CaseRecord]) -> str:
     """How the validation records are simulated, for the name of the metric."""
-    if problem.driven:
+    if simulator.driven:
         return "prescribed motion"
-    if problem.windowed:
+    if simulator.windowed:
         length = (
-            cut(problem.case, records[0], len(problem.noise), settings=problem.settings.likelihood)[1]
+            cut(simulator.case, records[0], len(simulator.noise), settings=simulator.settings.likelihood)[1]
             * records[0].step
         )
         return f"windows of {length:.3g} s restarted from the estimated state"
@@ -90,13 +91,13 @@ def run_kind(problem: Problem, records: Sequence[CaseRecord]) -> str:
     return "free run"
 
 
-def start_warnings(problem: Problem, records: Sequence[CaseRecord]) -> list[str]:
+def start_warnings(simulator: Simulator, records: Sequence[CaseRecord]) -> list[str]:
     """What the reader of a verdict should know about the starts."""
-    if problem.driven:
+    if simulator.driven:
         return []
-    if problem.windowed:
+    if simulator.windowed:
         lengths = [
-            cut(problem.case, r, len(problem.noise), settings=problem.settings.likelihood)[1] * r.step
+            cut(simulator.case, r, len(simulator.noise), settings=simulator.settings.likelihood)[1] * r.step
             for r in records
         ]
         return [

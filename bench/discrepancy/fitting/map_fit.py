@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Hypothesis
 from bench.discrepancy.numerics.least_squares import Prior, minimise
+from bench.discrepancy.response.simulator import Simulator
 from bench.discrepancy.settings import DEFAULT, DiagnosisSettings
 
 Array = NDArray[np.float64]
@@ -30,7 +31,7 @@ class Fit:
 
     Attributes:
         hypothesis: Its effects.
-        vector: MAP parameters, see `Problem.simulate`.
+        vector: MAP parameters, see `Simulator.simulate`.
         chi2: Sum of squared whitened residuals.
         cost: chi2 plus the prior's misfit.
         n_residuals: Number of residuals.
@@ -61,16 +62,18 @@ class Fit:
         return np.asarray(np.linalg.inv(self.precision), dtype=np.float64)
 
 
-def start_vector(problem: Problem, etas: Sequence[Array], deviations: Array | None = None) -> Array:
+def start_vector(simulator: Simulator, etas: Sequence[Array], deviations: Array | None = None) -> Array:
     """Join nominal deviations (zero where None) and the etas of the effects."""
-    head = np.zeros(len(problem.nominal)) if deviations is None else deviations
+    head = np.zeros(len(simulator.nominal)) if deviations is None else deviations
     return np.concatenate([head, *etas])
 
 
-def free_entries(problem: Problem, hypothesis: Hypothesis, fixed: Array | None = None) -> NDArray[np.int64]:
+def free_entries(
+    simulator: Simulator, hypothesis: Hypothesis, fixed: Array | None = None
+) -> NDArray[np.int64]:
     """Indices of the entries of a vector that move, but for those `fixed` (n,) besides."""
     shapes = [p.fixed for placed in hypothesis for p in placed.effect.parameters]
-    held = np.append(problem.spread == 0, np.array(shapes, dtype=bool))
+    held = np.append(simulator.spread == 0, np.array(shapes, dtype=bool))
     return np.flatnonzero(np.logical_not(held if fixed is None else held | fixed))
 
 

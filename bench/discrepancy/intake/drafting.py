@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.discrepancy.articulated.diagnosis import applies
+from bench.discrepancy.articulated.recognition import applies
 from bench.discrepancy.case.case import Case, NominalParameter
 from bench.discrepancy.intake.assumptions import Assumptions, assumed_parameters, is_servo
 from bench.discrepancy.intake.logs import Log

@@ -18,9 +18,9 @@ import numpy as np
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.fitting.goodness_of_fit import complexity, key_of, log_prior_of
 from bench.discrepancy.fitting.map_fit import fit
+from bench.discrepancy.judgement.discrepancies import Discrepancies
 from bench.discrepancy.judgement.held_out import HeldOut, held_out, shares
 from bench.discrepancy.judgement.steady import diverges, steadied
-from bench.discrepancy.judgement.validation_discrepancy import discrepancies, noise_floors
 from bench.discrepancy.likelihood.problem import Array, Problem
 from bench.discrepancy.search.explanation import Explanation, nominal_alone
 from bench.discrepancy.settings import DEFAULT, CoarseSettings
@@ -56,6 +56,20 @@ class Judged:
         """Probability that no effect of the catalogue is the cause, by what is left; see `outside`."""
         return outside(self.left, self.settings)
 
+    @property
+    def agreed(self) -> float:
+        """Probability of the likeliest family among those of what was chosen, as if one of the explanations were true."""
+        own = {p.effect.family for p in self.chosen.explanation.hypothesis}
+        weights = [
+            sum(
+                float(weight)
+                for weight, entry in zip(self.weights, self.found, strict=True)
+                if family in {p.effect.family for p in entry.explanation.hypothesis}
+            )
+            for family in own
+        ]
+        return max(weights, default=0.0)
+
 
 def outside(left: float, settings: CoarseSettings = DEFAULT.judgement.coarse) -> float:
     """Probability that something outside the catalogue is the cause of a discrepancy of which an explanation leaves a part.
@@ -89,7 +103,44 @@ def judge(
         rng: For the bootstrap over blocks.
         trusted: Whether the noise is stated, and nothing contradicts it: what is named has to close most of the discrepancy then.
     """
-    settings = problem.settings.judgement.coarse
+    judgement = problem.settings.judgement
+    settings, known = judgement.coarse, Discrepancies(case, problem)
+    found = _finalists(explanations, known, settings)
+    base, nothing = found[0], next(e for e in found if not e.explanation.hypothesis)
+    within = alike = tuple(entry for entry in found if _as_good(entry, base, settings))
+    part = settings.most if trusted else settings.pays
+    chosen, vetoed = nothing, False
+    for own in sorted(within, key=_plainness):
+        entry = _borne_out(_steady(own, case, rng), found, known)
+        if not entry.explanation.hypothesis or known.pays(entry.explanation, nothing.explanation, part):
+            found, chosen = _with(entry, own, found), entry
+            alike = tuple(
+                other
+                for other in found
+                if known.prefers(other.explanation, entry.explanation)
+                or _as_good(other, base, settings, judgement.coarse_alike)
+            )
+            break
+        vetoed = True
+    judged = known.scores([entry.explanation for entry in found], nothing.explanation)
+    return Judged(
+        chosen,
+        tuple(found),
+        shares(found, _log_priors(found), rng, judgement.held_out.draws, judged),
+        within,
+        alike,
+        vetoed,
+        float(np.max(known.of(nothing.explanation, judging=True))),
+        known.left(chosen.explanation, nothing.explanation),
+        settings,
+    )
+
+
+def _finalists(
+    explanations: Sequence[Explanation], known: Discrepancies, settings: CoarseSettings
+) -> list[HeldOut]:
+    """What is near the likeliest on held-out blocks, the best first, without effects that close nothing material; the nominal model
+    alone among them."""
     nothing = bounded(nominal_alone(explanations), settings.within)
     with_effects = [e for e in explanations if e.hypothesis][: 2 * settings.finalists]
     ranked = sorted((bounded(e, settings.within) for e in with_effects), key=lambda e: -e.log_posterior)
@@ -97,39 +148,16 @@ def judge(
     found = [held_out(e) for e in [*near[: settings.finalists], nothing]]
     tolls = np.array([_log_prior(entry.explanation) for entry in found])
     best = found[int(np.argmin([entry.total - 2.0 * toll for entry, toll in zip(found, tolls, strict=True)]))]
-    known = Discrepancies(case, problem)
     base = _pruned(best, found, known, settings)
     # what is larger than what is material has been weighed already
-    found = [e for e in found if e is not base and _no_larger(e.explanation, base.explanation)]
-    found = [base, *found]
-    weights = shares(found, _log_priors(found), rng, problem.settings.judgement.held_out.draws)
-    within = tuple(entry for entry in found if _as_good(entry, base, settings))
-    worst = float(np.max(known.of(nothing, judging=True)))
-    vetoed, part = False, settings.most if trusted else settings.pays
-    for own in sorted(within, key=_plainness):
-        entry = _steady(own, case, rng)
-        e = entry.explanation
-        if not e.hypothesis or known.pays(e, nothing, part):
-            found = [entry if other is own else other for other in found]
-            preferred = [other for other in found if known.prefers(other.explanation, e)]
-            alike = tuple(
-                o
-                for o in found
-                if o in preferred or _as_good(o, base, settings, problem.settings.judgement.coarse_alike)
-            )
-            weights = _undecided(weights, found, [entry, *preferred])
-            return Judged(
-                entry, tuple(found), weights, within, alike, vetoed, worst, known.left(e, nothing), settings
-            )
-        vetoed = True
-    return Judged(found[-1], tuple(found), weights, within, within, True, worst, 1.0, settings)
+    return [base, *(e for e in found if e is not base and _no_larger(e.explanation, base.explanation))]
 
 
-def _undecided(weights: Array, found: Sequence[HeldOut], among: Sequence[HeldOut]) -> Array:
-    """Weights (n,) of which some explanations have equal parts: the records for finding speak for one of them, those for judging for
-    others, and neither is to be believed more."""
-    own = np.array([entry in among for entry in found])
-    return np.where(own, float(weights[own].mean()), weights)
+def _with(entry: HeldOut, own: HeldOut, found: Sequence[HeldOut]) -> list[HeldOut]:
+    """Finalists with one of them as it is named: moved, or without effects that are not borne out, which may be a finalist as well."""
+    if entry in found:
+        return [other for other in found if other is entry or other is not own]
+    return [entry if other is own else other for other in found]
 
 
 def _steady(entry: HeldOut, case: Case, rng: np.random.Generator) -> HeldOut:
@@ -193,60 +221,6 @@ def _no_larger(explanation: Explanation, other: Explanation) -> bool:
     )
 
 
-class Discrepancies:
-    """NRMSE of explanations, on the judged coordinate where the nominal model is farthest off; kept by explanation."""
-
-    def __init__(self, case: Case, problem: Problem) -> None:
-        self.case, self.problem = case, problem
-        self._floor = noise_floors(problem, case.validation)
-        self._kept: dict[tuple[int, bool], Array] = {}
-
-    def of(self, explanation: Explanation, *, judging: bool) -> Array:
-        """NRMSE (n_coordinates,) of an explanation, on the judging records or on those for identification."""
-        key = id(explanation), judging
-        if key not in self._kept:
-            records = self.case.validation if judging else self.case.identification
-            self._kept[key] = discrepancies(self.problem, records, explanation.predict)
-        return self._kept[key]
-
-    def closed(self, explanation: Explanation, without: Explanation, nothing: Explanation) -> float:
-        """Part of the discrepancy of `nothing`, on the records for identification, that goes with what one has and the other lacks."""
-        before, left, right = (self.of(e, judging=False) for e in (nothing, without, explanation))
-        return float(np.max((left - right) / np.maximum(before, 1e-300)))
-
-    def pays(self, explanation: Explanation, nothing: Explanation, part: float) -> bool:
-        """Whether an explanation leaves at most a part of the judging records' discrepancy, beyond noise, on some coordinate and no
-        more than all of it on any."""
-        settings = explanation.settings.judgement
-        before, after = self._judged(nothing, explanation)
-        shrinks = self._beyond(after) <= part * self._beyond(before)
-        worse = after > np.maximum(before, settings.about_noise * self._floor) * settings.unchanged
-        return bool(np.isfinite(after).all() and np.any(shrinks) and not np.any(worse))
-
-    def left(self, explanation: Explanation, nothing: Explanation) -> float:
-        """Part of the power of the judging records' discrepancy, beyond noise, that an explanation leaves where it is largest."""
-        before, after = (self._beyond(x) for x in self._judged(nothing, explanation))
-        widest = int(np.argmax(before))
-        return float(min((after[widest] / max(before[widest], 1e-300)) ** 2, 1.0))
-
-    def prefers(self, rival: Explanation, explanation: Explanation) -> bool:
-        """Whether the judging records prefer a rival of other names: it leaves less beyond noise where an explanation leaves most."""
-        names, others = ({(p.effect.name, p.place.name) for p in e.hypothesis} for e in (rival, explanation))
-        if not names or names == others:
-            return False
-        theirs, own = (self._beyond(x) for x in self._judged(rival, explanation))
-        widest = int(np.argmax(own))
-        return bool(
-            np.isfinite(theirs).all() and theirs[widest] * rival.settings.judgement.unchanged < own[widest]
-        )
-
-    def _judged(self, nothing: Explanation, explanation: Explanation) -> tuple[Array, Array]:
-        return self.of(nothing, judging=True), self.of(explanation, judging=True)
-
-    def _beyond(self, found: Array) -> Array:
-        return np.sqrt(np.maximum(found**2 - self._floor**2, 0.0))
-
-
 def _pruned(
     entry: HeldOut, found: Sequence[HeldOut], known: Discrepancies, settings: CoarseSettings
 ) -> HeldOut:
@@ -260,10 +234,26 @@ def _pruned(
         least = int(np.argmin(closed))
         if closed[least] >= settings.material:
             return entry
-        rest = smaller[least][1]
-        known_already = {key_of(e.explanation.hypothesis): e for e in found}
-        entry = known_already.get(key_of(rest.hypothesis)) or held_out(rest)
+        entry = _held_out_as(smaller[least][1], found)
     return entry
+
+
+def _borne_out(entry: HeldOut, found: Sequence[HeldOut], known: Discrepancies) -> HeldOut:
+    """An explanation without the effects that make the judging records worse than the others alone do, worst first."""
+    while len(entry.explanation.hypothesis) > 1:
+        smaller = [without(entry.explanation, i) for i in range(len(entry.explanation.hypothesis))]
+        harm = [known.harm(entry.explanation, rest) for rest in smaller]
+        worst = int(np.argmax(harm))
+        if harm[worst] <= 1.0:
+            return entry
+        entry = _held_out_as(smaller[worst], found)
+    return entry
+
+
+def _held_out_as(explanation: Explanation, found: Sequence[HeldOut]) -> HeldOut:
+    """An explanation on held-out blocks, the finalist of the same effects where there is one."""
+    known = {key_of(e.explanation.hypothesis): e for e in found}
+    return known.get(key_of(explanation.hypothesis)) or held_out(explanation)
 
 
 def without(explanation: Explanation, index: int) -> Explanation:

@@ -92,20 +92,17 @@ def coarse_finding(
     judged = judge(case, problem, explanations, rng, trusted=problem.noise_stated and not understated)
     chosen, nearest = judged.chosen.explanation, _nearest(judged)
     probabilities = _marginal(judged)
-    # without stated noise a nominal model is as right as a model can be within two standard deviations of what sensors are
-    # calibrated to; noise that is stated and is not all that is left is something that is missing, whatever it be
-    unexplained = problem.noise_stated or (
-        judged.vetoed and judged.nominal > 2.0 * problem.settings.likelihood.error.least
-    )
-    kind: Kind = "effect" if chosen.hypothesis else ("unknown" if unexplained else "none")
-    others = [entry.explanation for entry in judged.found if entry is not judged.chosen]
-    order = np.argsort(
-        [-w for w, e in zip(judged.weights, judged.found, strict=True) if e is not judged.chosen]
+    kind = _kind(problem, judged)
+    nothing = next(entry for entry in judged.found if not entry.explanation.hypothesis)
+    first = judged.chosen if kind == "effect" else nothing
+    rest = sorted(
+        (pair for pair in zip(judged.weights, judged.found, strict=True) if pair[1] is not first),
+        key=lambda pair: -pair[0],
     )
     return Finding(
         kind=kind,
         probabilities=_probabilities(kind, judged),
-        explanations=(chosen, *(others[i] for i in order)),
+        explanations=(first.explanation, *(entry.explanation for _, entry in rest)),
         named=evidence.effects_of(chosen, probabilities) if kind == "effect" else (),
         ranking=tuple(Ranked(*key, p) for key, p in sorted(probabilities.items(), key=lambda item: -item[1])),
         indistinguishable=_sets(judged),
@@ -115,6 +112,17 @@ def coarse_finding(
         notes=understated,
         coarse=True,
     )
+
+
+def _kind(problem: Problem, judged: Judged) -> Kind:
+    """The verdict."""
+    if judged.chosen.explanation.hypothesis:
+        # that which rivals of other families explain as well is something, and nobody can say what kind of thing
+        return "effect" if judged.agreed >= judged.settings.kind else "unknown"
+    # without stated noise a nominal model is as right as a model can be within two standard deviations of what sensors are
+    # calibrated to; noise that is stated and is not all that is left is something that is missing, whatever it be
+    material = judged.nominal > 2.0 * problem.settings.likelihood.error.least
+    return "unknown" if problem.noise_stated or (judged.vetoed and material) else "none"
 
 
 def _probabilities(kind: Kind, judged: Judged) -> dict[str, float]:
@@ -184,26 +192,29 @@ def _sets(judged: Judged) -> tuple[tuple[str, ...], ...]:
     return tuple(tuple(sorted(entry)) for entry in sets.values())
 
 
-def _other_kinds(judged: Judged) -> str:
-    """A sentence on explanations of other families that do as well; empty where there is none."""
+def _other_kinds(judged: Judged) -> list[str]:
+    """Explanations of other families that do as well, in words."""
     own = {p.effect.family for p in judged.chosen.explanation.hypothesis}
     others = [
         names(entry.explanation.hypothesis)
         for entry in judged.alike
         if entry.explanation.hypothesis and {p.effect.family for p in entry.explanation.hypothesis} != own
     ]
-    if not others:
-        return ""
-    return f" What kind of thing it is stays open: {', or '.join(dict.fromkeys(others))} would do as well."
+    return list(dict.fromkeys(others))
 
 
 def _words(kind: Kind, judged: Judged, nearest: Explanation) -> str:
     chosen = judged.chosen.explanation
+    others = _other_kinds(judged)
     if kind == "effect":
         return (
             f"Missing from the model: {names(chosen.hypothesis)}. What is left is more than the stated noise, or no noise is stated: "
             "the model stays wrong in small ways, and explanations were weighed by what they predict of blocks that they did not see."
-            + _other_kinds(judged)
+            + (
+                f" What kind of thing it is stays open: {', or '.join(others)} would do as well."
+                if others
+                else ""
+            )
         )
     if kind == "none":
         return "No effect of the catalogue predicts the records better than the nominal model does with its parameters re-estimated."
@@ -211,6 +222,11 @@ def _words(kind: Kind, judged: Judged, nearest: Explanation) -> str:
         return (
             "The nominal model leaves more than the stated noise, and no effect of the catalogue predicts the records better than it does "
             "with its parameters re-estimated."
+        )
+    if chosen.hypothesis:
+        return (
+            "Something is missing from the model, and what kind of thing it is stays open: no family of effects is likelier than all "
+            f"others together. Nearest come {', and '.join([names(chosen.hypothesis), *others])}."
         )
     fate = (
         "but does not shrink the discrepancy of the judging records"

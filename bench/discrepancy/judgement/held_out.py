@@ -166,6 +166,7 @@ def shares(
     priors: Array,
     rng: np.random.Generator,
     draws: int = DEFAULT.judgement.held_out.draws,
+    judged: Array | None = None,
 ) -> Array:
     """Weights (n,) of explanations by what they predict, averaged over a Bayesian bootstrap of the blocks.
 
@@ -174,8 +175,11 @@ def shares(
         priors: (n,) log prior of each.
         rng: For the bootstrap.
         draws: How many.
+        judged: (n, k) scores on further blocks that no fit has seen, those of the judging records; none where None.
     """
     table = np.array([entry.scores for entry in found])
+    if judged is not None:
+        table = np.column_stack([table, judged])
     times = rng.dirichlet(np.ones(table.shape[1]), size=draws) * table.shape[1]
     logs = -0.5 * times @ table.T + priors
     weights = np.exp(logs - logs.max(axis=1, keepdims=True))

@@ -108,18 +108,28 @@ def gaps(
     return tuple(out)
 
 
-def discrepancies(problem: Problem, records: Sequence[CaseRecord], predict: Prediction) -> Array:
-    """NRMSE (n_coordinates,) of a prediction on every judged coordinate of some records."""
+def errors_by_block(
+    problem: Problem, records: Sequence[CaseRecord], predict: Prediction, blocks: int
+) -> Array:
+    """Squared error (n_coordinates, n_records * blocks) of a prediction: what every block of some records adds to the square of the NRMSE.
+
+    Args:
+        problem: Problem on all degrees of freedom.
+        records: What is predicted.
+        predict: The prediction.
+        blocks: Blocks of each record.
+    """
     runs = [predict(record) for record in records]
-    return np.array(
-        [
-            nrmse(
-                np.concatenate([_combine(record.values, channels) for record in records]),
-                np.concatenate([_combine(run, channels) for run in runs]),
-            )
-            for _, channels in coordinates(problem.structure)
-        ]
-    )
+    out = []
+    for _, channels in coordinates(problem.structure):
+        measured = [_combine(record.values, channels) for record in records]
+        errors = [_combine(run, channels) - own for run, own in zip(runs, measured, strict=True)]
+        whole = np.concatenate(measured)
+        power = max(float(np.sum((whole - whole.mean()) ** 2)), 1e-300)
+        parts = [block for error in errors for block in np.array_split(error, blocks)]
+        out.append([float(np.sum(part**2)) / power for part in parts])
+    table = np.array(out)
+    return np.where(np.isfinite(table), table, DIVERGED_GAP**2)
 
 
 def noise_floors(problem: Problem, records: Sequence[CaseRecord]) -> Array:

@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bench.discrepancy.case.case import CaseRecord
-from bench.discrepancy.likelihood.problem import Array, Problem
+from bench.discrepancy.likelihood.problem import Array
 from bench.discrepancy.localisation.augmented_filter import (
     AugmentedModel,
     exponential,
@@ -33,6 +33,7 @@ from bench.discrepancy.localisation.augmented_filter import (
 )
 from bench.discrepancy.model.nominal_elements import own_force
 from bench.discrepancy.model.structure import Place, Structure
+from bench.discrepancy.response.simulator import Simulator
 from bench.discrepancy.simulation.stick_slip import LinearStructure, Motion
 
 
@@ -57,13 +58,13 @@ class ForceObserver:
     """Estimates missing forces on a set of degrees of freedom that the linear structure couples.
 
     Attributes:
-        problem: Records and priors.
+        simulator: Records and nominal model.
         structure: The structure on these degrees of freedom.
-        dofs: Their indices in the structure of the problem.
+        dofs: Their indices in the structure of the simulator.
         places: Places with one coordinate; a force is estimated at each.
     """
 
-    problem: Problem
+    simulator: Simulator
     structure: Structure
     dofs: tuple[int, ...]
     places: tuple[Place, ...] = field(init=False)
@@ -75,19 +76,19 @@ class ForceObserver:
 
     def nominal(self, table: Mapping[str, float] | None = None) -> Array:
         """Values (n_parameters,) of the structure's parameters: those given by name, the nominal ones otherwise."""
-        own = dict(zip(self.problem.structure.parameters, self.problem.nominal, strict=True)) | dict(
+        own = dict(zip(self.simulator.structure.parameters, self.simulator.nominal, strict=True)) | dict(
             table or {}
         )
         return np.array([own[name] for name in self.structure.parameters])
 
     def spread(self) -> Array:
         """Uncertainties (n_parameters,) of the structure's parameters."""
-        own = dict(zip(self.problem.structure.parameters, self.problem.spread, strict=True))
+        own = dict(zip(self.simulator.structure.parameters, self.simulator.spread, strict=True))
         return np.array([own[name] for name in self.structure.parameters])
 
     def _noise(self) -> tuple[Array, Array]:
-        channels = dict(zip(self.problem.structure.channels, self.problem.noise, strict=True))
-        loads = dict(zip(self.problem.structure.loads, self.problem.load_noise, strict=True))
+        channels = dict(zip(self.simulator.structure.channels, self.simulator.noise, strict=True))
+        loads = dict(zip(self.simulator.structure.loads, self.simulator.load_noise, strict=True))
         own = np.zeros(len(self.dofs) if self.structure.has_own_forces else 0)
         return (
             np.array([channels[name] for name in self.structure.channels]),
@@ -119,10 +120,10 @@ class ForceObserver:
             values: Parameter values (n_parameters,).
             noise: Number of passes of noise alone.
         """
-        if self.problem.driven:
+        if self.simulator.driven:
             return self._driven(record, values, noise)
         own = list(self.dofs)
-        motion = Motion(*(samples[:, own] for samples in self.problem.motion_of(record)))
+        motion = Motion(*(samples[:, own] for samples in self.simulator.motion_of(record)))
         position, velocity = motion.position, motion.velocity
         reach = np.maximum(np.std(position, axis=0), 1e-12)
         model = self._model(values, record.step, reach)
@@ -132,7 +133,7 @@ class ForceObserver:
         if record.name not in self._intensity:
             guess = self._guess(loads, position, velocity)
             self._intensity[record.name] = tuned(
-                model, samples, loads, start, guess, settings=self.problem.settings.localisation
+                model, samples, loads, start, guess, settings=self.simulator.settings.localisation
             )
         gains = gains_of(model, self._intensity[record.name])
         states = smoothed(model, gains, samples, loads, start)
@@ -154,7 +155,7 @@ class ForceObserver:
         return (level or 1.0) * np.sqrt(np.maximum(rate, 1e-3))
 
     def _model(self, values: Array, step: float, reach: Array) -> AugmentedModel:
-        settings = self.problem.settings.localisation
+        settings = self.simulator.settings.localisation
         linear = self.structure.at(values)
         inputs = self._inputs(linear)
         n, p, u = len(linear.mass), len(self.places), inputs.shape[1]
@@ -228,14 +229,14 @@ class ForceObserver:
             result = exponential(joint * step)
             walks.append(result[d:, d:].T @ result[:d, d:])
         change = whole[:d, d + u :]
-        if self.problem.case.load_interpolation == "zero_order_hold":
+        if self.simulator.case.load_interpolation == "zero_order_hold":
             change = np.zeros_like(change)
         self._steps[key] = whole[:d, :d], whole[:d, d : d + u], change, np.array(walks)
         return self._steps[key]
 
     def _driven(self, record: CaseRecord, values: Array, noise: int) -> ForceEstimate:
         linear = self.structure.at(values)
-        motion = self.problem.motion_of(record)
+        motion = self.simulator.motion_of(record)
         model = motion.position @ linear.stiffness + motion.velocity @ linear.damping
         if self.structure.has_own_forces:
             model = model + own_force(self.structure, values, motion, record.step)
@@ -247,12 +248,12 @@ class ForceObserver:
         return ForceEstimate(motion.position, motion.velocity, measured - model, passes)
 
 
-def observers(problem: Problem) -> tuple[ForceObserver, ...]:
+def observers(simulator: Simulator) -> tuple[ForceObserver, ...]:
     """Return one observer for every group of coupled degrees of freedom that holds a place."""
     out = []
-    for group in problem.structure.groups():
-        part = problem.structure.restricted(group)
-        observer = ForceObserver(problem, part, tuple(group))
+    for group in simulator.structure.groups():
+        part = simulator.structure.restricted(group)
+        observer = ForceObserver(simulator, part, tuple(group))
         if observer.places and part.observers:
             out.append(observer)
     return tuple(out)

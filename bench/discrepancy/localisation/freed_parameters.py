@@ -34,7 +34,7 @@ def freed(observer: ForceObserver, records: Sequence[CaseRecord], nominal: Array
 
     Where no such parameters are found they stay, and all of their uncertainty remains as doubt.
     """
-    settings = observer.problem.settings.localisation
+    settings = observer.simulator.settings.localisation
     spread = observer.spread()
     free = [i for i in range(len(spread)) if spread[i] > 0.0]
 
@@ -58,12 +58,9 @@ def freed(observer: ForceObserver, records: Sequence[CaseRecord], nominal: Array
         y = (force / error)[::stride].ravel() - matrix @ deviation
         starts = [
             deviation,
-            _ridge(matrix, y, np.full(len(y), weight), settings=observer.problem.settings.localisation),
+            _ridge(matrix, y, np.full(len(y), weight), settings=settings),
         ]
-        candidates = [
-            _robust(matrix, y, weight, start, settings=observer.problem.settings.localisation)
-            for start in starts
-        ]
+        candidates = [_robust(matrix, y, weight, start, settings=settings) for start in starts]
         deviation = min(candidates, key=lambda d: _robust_cost(matrix, y, weight, d))
         values = nominal.copy()
         values[free] += spread[free] * deviation

@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from bench.discrepancy.likelihood.problem import Array, Problem
+from bench.discrepancy.likelihood.problem import Array
 from bench.discrepancy.model.placement import Placed
+from bench.discrepancy.response.simulator import Simulator
 from bench.discrepancy.screening.motion_response import force_along
 from bench.discrepancy.search.explanation import Explanation
 from bench.discrepancy.settings import LocalisationSettings
@@ -40,19 +41,19 @@ def acting_regions(best: Explanation) -> dict[str, tuple[dict[str, Any], ...]]:
     return {name: tuple(sorted(found, key=lambda r: -r["share"])) for name, found in out.items() if found}
 
 
-def _regions(problem: Problem, placed: Placed, eta: Array) -> list[dict[str, Any]]:
+def _regions(simulator: Simulator, placed: Placed, eta: Array) -> list[dict[str, Any]]:
     """Regions of one effect along the measured motion; none where it acts everywhere."""
     row = placed.place.rows[0]
     states, forces = [], []
-    for i in range(len(problem.records)):
-        motion = problem.motion(i)
+    for i in range(len(simulator.records)):
+        motion = simulator.motion(i)
         states.append(np.column_stack([motion.position @ row, motion.velocity @ row]))
-        forces.append(force_along(problem, placed, eta, i) @ row / (row @ row))
+        forces.append(force_along(simulator, placed, eta, i) @ row / (row @ row))
     state, force = np.concatenate(states), np.concatenate(forces)
-    acts = np.abs(force) > problem.settings.localisation.acts * np.abs(force).max()
+    acts = np.abs(force) > simulator.settings.localisation.acts * np.abs(force).max()
     total = float(np.sum(force**2))
     limits = {
-        name: _intervals(state[:, i], acts, settings=problem.settings.localisation)
+        name: _intervals(state[:, i], acts, settings=simulator.settings.localisation)
         for i, name in enumerate(("displacement", "velocity"))
     }
     limited = {name: intervals for name, intervals in limits.items() if intervals}

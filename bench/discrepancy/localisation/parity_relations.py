@@ -20,6 +20,7 @@ from scipy import stats
 
 from bench.discrepancy.likelihood.problem import Array, Problem
 from bench.discrepancy.likelihood.whitening import fast_length
+from bench.discrepancy.response.simulator import Simulator
 
 WINDOW = Polynomial([1.0, 0.0, -1.0]) ** 4
 """``(1 - s^2)^4``: its first three derivatives vanish at the ends, so that sums over samples are as good as integrals."""
@@ -80,12 +81,12 @@ def contradictions(problem: Problem) -> tuple[Contradiction, ...]:
     return tuple(out)
 
 
-def _tests(problem: Problem, a: int, b: int) -> list[tuple[float, float, float]]:
+def _tests(simulator: Simulator, a: int, b: int) -> list[tuple[float, float, float]]:
     """(p-value, power ratio, window [s]) for windows of several lengths, all records together."""
-    settings = problem.settings.localisation
-    low, high = (problem.structure.observers[i] for i in (a, b))
+    settings = simulator.settings.localisation
+    low, high = (simulator.structure.observers[i] for i in (a, b))
     steps = high.order - low.order
-    shortest = min(len(r) for r in problem.records)
+    shortest = min(len(r) for r in simulator.records)
     lengths = np.unique(
         np.geomspace(
             settings.parity_shortest,
@@ -97,8 +98,8 @@ def _tests(problem: Problem, a: int, b: int) -> list[tuple[float, float, float]]
     for length in lengths:
         s = (np.arange(length) + 0.5) / length * 2.0 - 1.0
         squares, count = 0.0, 0
-        step = problem.records[0].step
-        for record in problem.records:
+        step = simulator.records[0].step
+        for record in simulator.records:
             step = record.step
             kernel = WINDOW(s)
             derived = WINDOW.deriv(steps)(s) * (2.0 / (length * step)) ** steps * (-1.0) ** steps
@@ -106,8 +107,8 @@ def _tests(problem: Problem, a: int, b: int) -> list[tuple[float, float, float]]
             n = len(x) // length
             parts = [v[: n * length].reshape(n, length) for v in (x, y)]
             difference = parts[1] @ kernel - parts[0] @ derived
-            noise = problem.noise[b] ** 2 + _sampling(y, problem.noise[b])
-            variance = noise * np.sum(kernel**2) + problem.noise[a] ** 2 * np.sum(derived**2)
+            noise = simulator.noise[b] ** 2 + _sampling(y, simulator.noise[b])
+            variance = noise * np.sum(kernel**2) + simulator.noise[a] ** 2 * np.sum(derived**2)
             squares += float(np.sum(difference**2) / variance)
             count += n
         if count >= settings.parity_windows:

@@ -10,6 +10,7 @@ from scipy import stats
 
 from bench.discrepancy.likelihood.problem import Array, Problem
 from bench.discrepancy.likelihood.whitening import fast_length, whitened_spectrum
+from bench.discrepancy.response.simulator import Simulator
 from bench.discrepancy.search.explanation import Explanation
 from bench.discrepancy.settings import LocalisationSettings
 from bench.discrepancy.verdict import Split
@@ -75,13 +76,14 @@ def _joined(entries: list[Excess]) -> Excess:
     )
 
 
-def residual_splits(problem: Problem, excess: dict[str, Excess]) -> list[Split]:
+def residual_splits(simulator: Simulator, excess: dict[str, Excess]) -> list[Split]:
     """Splits of the free run's residual by channel, and of every channel's by band and by time."""
-    settings = problem.settings.localisation
+    settings = simulator.settings.localisation
     if not excess:
         return []
     dofs = {
-        o.channel: problem.structure.dofs[int(np.argmax(np.abs(o.row)))] for o in problem.structure.observers
+        o.channel: simulator.structure.dofs[int(np.argmax(np.abs(o.row)))]
+        for o in simulator.structure.observers
     }
     chi2 = np.array([e.chi2 for e in excess.values()])
     count = np.array([float(e.count) for e in excess.values()])

@@ -23,11 +23,12 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from bench.discrepancy.case.case import CaseRecord
-from bench.discrepancy.likelihood.problem import Array, Problem
+from bench.discrepancy.likelihood.problem import Array
 from bench.discrepancy.localisation.force_smoother import observers
 from bench.discrepancy.localisation.freed_parameters import FreedParameters, freed
 from bench.discrepancy.localisation.regions import Region, joined, regions_of
 from bench.discrepancy.model.structure import Place
+from bench.discrepancy.response.simulator import Simulator
 from bench.discrepancy.settings import LocalisationSettings
 
 CELLS = 12
@@ -96,7 +97,7 @@ class StateMap:
 
 
 def tracks(
-    problem: Problem,
+    simulator: Simulator,
     records: Sequence[CaseRecord],
     *,
     known: dict[str, float] | None = None,
@@ -104,20 +105,20 @@ def tracks(
     """Missing force along records at every place with one coordinate.
 
     Args:
-        problem: Records and priors.
+        simulator: Records and priors.
         records: Records to look at.
         known: Values of nominal parameters, where they are known better than the case states; None leaves them to the
             robust regression.
     """
     out = []
-    for observer in observers(problem):
+    for observer in observers(simulator):
         fitted = FreedParameters(
             observer.nominal(known), np.zeros((0, sum(len(r) for r in records), len(observer.places)))
         )
         if known is None:
             fitted = freed(observer, records, fitted.values)
         estimates = [
-            observer.estimate(r, fitted.values, noise=problem.settings.localisation.passes) for r in records
+            observer.estimate(r, fitted.values, noise=simulator.settings.localisation.passes) for r in records
         ]
         force = np.concatenate([e.force for e in estimates])
         noise = np.concatenate([e.noise for e in estimates], axis=1)
@@ -131,22 +132,22 @@ def tracks(
                 fitted.doubt[:, :, j],
                 tuple(len(r) for r in records),
             )
-            full = next(p for p in problem.structure.places if p.name == place.name)
+            full = next(p for p in simulator.structure.places if p.name == place.name)
             out.append((full, track))
     return out
 
 
 def state_maps(
-    problem: Problem,
+    simulator: Simulator,
     records: Sequence[CaseRecord],
     *,
     known: dict[str, float] | None = None,
 ) -> tuple[StateMap, ...]:
     """Map the missing force at every place with one coordinate; the arguments are those of `tracks`."""
-    settings = problem.settings.localisation
-    found = tracks(problem, records, known=known)
-    cells = [_cells(track, settings=problem.settings.localisation) for _, track in found]
-    intervals = [_intervals(track, settings=problem.settings.localisation) for _, track in found]
+    settings = simulator.settings.localisation
+    found = tracks(simulator, records, known=known)
+    cells = [_cells(track, settings=simulator.settings.localisation) for _, track in found]
+    intervals = [_intervals(track, settings=simulator.settings.localisation) for _, track in found]
     p_values = np.concatenate([c[3][np.isfinite(c[1])] for c in cells]) if cells else np.zeros(0)
     time_p = np.concatenate([p for _, p in intervals]) if intervals else np.zeros(0)
     adjusted, time_adjusted = _adjusted(p_values), _adjusted(time_p)

@@ -8,37 +8,38 @@ import numpy as np
 from scipy import stats
 
 from bench.discrepancy.case.case import CaseRecord
-from bench.discrepancy.likelihood.problem import Array, Problem
+from bench.discrepancy.likelihood.problem import Array
 from bench.discrepancy.localisation.state_map import (
     StateMap,
     Track,
     independent,
 )
+from bench.discrepancy.response.simulator import Simulator
 from bench.discrepancy.settings import LocalisationSettings
 from bench.discrepancy.verdict import Split
 
 
 def force_splits(
-    problem: Problem, records: Sequence[CaseRecord], maps: Sequence[StateMap]
+    simulator: Simulator, records: Sequence[CaseRecord], maps: Sequence[StateMap]
 ) -> tuple[Split, ...]:
     """Split the missing force of every place.
 
     Args:
-        problem: Records and structure.
+        simulator: Records and structure.
         records: The records behind the maps.
         maps: Maps of the missing force.
     """
     out = []
     for found in maps:
-        name = found.place.name or problem.structure.dofs[0]
+        name = found.place.name or simulator.structure.dofs[0]
         out += [
-            _marginal("displacement", name, found, axis=0, settings=problem.settings.localisation),
-            _marginal("velocity", name, found, axis=1, settings=problem.settings.localisation),
-            _after_reversal(name, found.track, settings=problem.settings.localisation),
-            _bands(name, found.track, records[0].step, settings=problem.settings.localisation),
-            _times(name, found, settings=problem.settings.localisation),
+            _marginal("displacement", name, found, axis=0, settings=simulator.settings.localisation),
+            _marginal("velocity", name, found, axis=1, settings=simulator.settings.localisation),
+            _after_reversal(name, found.track, settings=simulator.settings.localisation),
+            _bands(name, found.track, records[0].step, settings=simulator.settings.localisation),
+            _times(name, found, settings=simulator.settings.localisation),
         ]
-        contact = _contact(name, found, settings=problem.settings.localisation)
+        contact = _contact(name, found, settings=simulator.settings.localisation)
         if contact is not None:
             out.append(contact)
     return tuple(out)

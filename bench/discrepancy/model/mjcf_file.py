@@ -14,6 +14,7 @@ from bench.discrepancy.model.mjcf_prescribed import prescribed_channels, with_pr
 from bench.errors import ModelError
 from bench.rig import Rig
 from bench.rig.building import parse
+from bench.rig.held_joints import with_held_joints
 
 
 @dataclass(frozen=True)
@@ -33,15 +34,16 @@ SIZES = (
 
 
 def rig_of(case: Case) -> Rig:
-    """The user's model; where a case has no load, with an actuator that exerts none, and with motors that prescribe motions.
+    """The user's model, held joints welded; with an actuator that exerts nothing for a case without load, and motors for motions.
 
     Raises:
-        ModelError: The file cannot be read, or holds a number that no force can be computed with.
-        UnknownNameError: A prescribed motion is that of nothing in the model.
+        ModelError: The file cannot be read, holds a number that no force can be computed with, or a joint that cannot be held.
+        UnknownNameError: A prescribed motion, or a joint that was held, is that of nothing in the model.
         FileFormatError: A prescribed motion is not that of one joint.
     """
     rig = Rig.from_file(Path(case.folder or ".") / case.rig)
     _refuse_beyond_numbers(rig)
+    rig = with_held_joints(rig, case.options.get("joints", {}))
     rig = with_prescribed_joints(rig, {entry.joint for entry in prescribed_channels(case, rig)})
     if not case.has(NO_LOAD) or NO_LOAD in rig.actuators:
         return rig

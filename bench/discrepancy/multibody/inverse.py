@@ -22,7 +22,7 @@ intrinsic: Any = _numba_intrinsic
 
 
 @intrinsic
-def _call(typingctx, function, model, data):
+def call(typingctx, function, model, data):
     """Call the C function ``void(const mjModel*, mjData*)`` at integer `function`."""
     signature = types.void(types.int64, types.int64, types.int64)
 
@@ -42,14 +42,15 @@ def _along(function, model, data, motion, state, found, diagonal, torque, inerti
     for k in range(q.shape[0]):
         for j in range(q.shape[1]):
             qpos[j], qvel[j], qacc[j] = q[k, j], v[k, j], a[k, j]
-        _call(function, model, data)
+        call(function, model, data)
         for j in range(q.shape[1]):
             torque[k, j] = force[j]
             inertia[k, j] = matrix[diagonal[j]]
 
 
 @cache
-def _inverse() -> int:
+def inverse_address() -> int:
+    """Address of ``mj_inverse``, for `call`."""
     return ctypes.cast(library().mj_inverse, ctypes.c_void_p).value or 0
 
 
@@ -62,7 +63,7 @@ def along(model: mujoco.MjModel, q: Array, v: Array, a: Array) -> tuple[Array, A
     diagonal = np.array(model.M_rowadr, dtype=np.int64) + np.array(model.M_rownnz) - 1
     motion = tuple(np.ascontiguousarray(part, dtype=np.float64) for part in (q, v, a))
     _along(
-        _inverse(), model._address, data._address, motion, (data.qpos, data.qvel, data.qacc), (data.qfrc_inverse, data.M),
+        inverse_address(), model._address, data._address, motion, (data.qpos, data.qvel, data.qacc), (data.qfrc_inverse, data.M),
         diagonal, torque, inertia,
     )  # fmt: skip
     return torque, inertia

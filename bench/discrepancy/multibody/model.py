@@ -8,7 +8,7 @@ apart, since runs of single joints carry them themselves.
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
@@ -17,7 +17,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.discrepancy.case.case import NominalParameter
+from bench.discrepancy.multibody.drives import Drive, drive_of, is_driven
 from bench.discrepancy.multibody.inverse import along
 from bench.errors import ModelError, UnknownNameError
 from bench.rig import Rig
@@ -25,12 +25,6 @@ from bench.rig import Rig
 Array = NDArray[np.float64]
 MOVING = {int(mujoco.mjtJoint.mjJNT_HINGE): "rad", int(mujoco.mjtJoint.mjJNT_SLIDE): "m"}
 """Types of joint that a model may have, with the unit of their coordinate."""
-INERTIAL = ("mass", "inertia")
-"""Parameters of bodies."""
-LOCAL = ("damping", "frictionloss", "armature", "stiffness")
-"""Parameters of joints."""
-DRIVES = ("kp", "kv", "gear")
-"""Parameters of actuators."""
 
 
 @dataclass(frozen=True)
@@ -42,32 +36,6 @@ class ModelSettings:
 
 
 SETTINGS = ModelSettings()
-
-
-class Drive(NamedTuple):
-    """The actuator of a joint.
-
-    Attributes:
-        name: Its name in the model.
-        servo: Whether its input is a position target; otherwise a force.
-        gear: Joint torque over actuator force.
-        kp: Position gain of a servo, or gain of the input.
-        kv: Velocity gain of a servo.
-        low, high: Limits of the actuator's force.
-        lowest, highest: Limits of its input.
-        lag: Time constant of a first-order filter before it [s]; zero where there is none.
-    """
-
-    name: str
-    servo: bool
-    gear: float
-    kp: float
-    kv: float
-    low: float
-    high: float
-    lowest: float
-    highest: float
-    lag: float
 
 
 class Joint(NamedTuple):
@@ -217,48 +185,6 @@ def compiled_model(path: str | Path) -> mujoco.MjModel:
     return Rig.from_file(path).model
 
 
-def with_nominal_values(rig: Rig, parameters: Iterable[NominalParameter]) -> mujoco.MjModel:
-    """The compiled model of a rig with the values of nominal parameters in the place of its own.
-
-    Args:
-        rig: The user's model.
-        parameters: ``mass:BODY``, ``damping:JOINT``, ``kp:ACTUATOR``, …; in the units of the model.
-
-    Raises:
-        UnknownNameError: A parameter is of no kind that a model has, or names nothing in it.
-    """
-    structure: dict[str, dict[str, float]] = {}
-    drives: list[tuple[str, str, float]] = []
-    for parameter in parameters:
-        kind, _, target = parameter.name.partition(":")
-        if kind in DRIVES:
-            drives.append((kind, target, parameter.value))
-        elif kind in ("mass", *LOCAL):
-            structure.setdefault(kind, {})[target] = parameter.value
-        else:
-            raise UnknownNameError(
-                "parameter", parameter.name, [f"{k}:NAME" for k in ("mass", *LOCAL, *DRIVES)]
-            )
-    model = copy.copy(rig.with_structure(**structure).model)
-    actuators = [model.actuator(u).name for u in range(model.nu)]
-    for kind, name, value in drives:
-        if name not in actuators:
-            raise UnknownNameError(f"target of parameter '{kind}:{name}'", name, actuators)
-        _set_drive(model, actuators.index(name), kind, value)
-    return model
-
-
-def _set_drive(model: mujoco.MjModel, u: int, kind: str, value: float) -> None:
-    if kind == "gear":
-        model.actuator_gear[u, 0] = value
-    elif kind == "kv":
-        model.actuator_biasprm[u, 2] = -value
-    else:
-        if model.actuator_biasprm[u, 1] != 0.0:  # a servo's input and its position have one gain
-            model.actuator_biasprm[u, 1] = -value
-        model.actuator_gainprm[u, 0] = value
-
-
 def _refuse(model: mujoco.MjModel, name: str) -> None:
     for i in range(model.njnt):
         if int(model.jnt_type[i]) not in MOVING:
@@ -272,7 +198,7 @@ def _refuse(model: mujoco.MjModel, name: str) -> None:
 def _joint(model: mujoco.MjModel, i: int) -> Joint:
     dof = int(model.jnt_dofadr[i])
     limited = bool(model.jnt_limited[i])
-    drives = [_drive(model, u) for u in range(model.nu) if _drives(model, u, i)]
+    drives = [drive_of(model, u) for u in range(model.nu) if is_driven(model, u, i)]
     if len(drives) > 1:
         raise ModelError(
             f"joint '{model.joint(i).name}' has {len(drives)} actuators ({', '.join(d.name for d in drives)}); one a joint is expected: "
@@ -291,45 +217,6 @@ def _joint(model: mujoco.MjModel, i: int) -> Joint:
         (float(model.jnt_range[i, 0]), float(model.jnt_range[i, 1])) if limited else (-np.inf, np.inf),
         drives[0] if drives else None,
     )
-
-
-def _drives(model: mujoco.MjModel, u: int, joint: int) -> bool:
-    kinds = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
-    return int(model.actuator_trntype[u]) in kinds and int(model.actuator_trnid[u, 0]) == joint
-
-
-def _drive(model: mujoco.MjModel, u: int) -> Drive:
-    name = model.actuator(u).name
-    gain, bias = model.actuator_gainprm[u], model.actuator_biasprm[u]
-    affine = int(model.actuator_biastype[u]) == int(mujoco.mjtBias.mjBIAS_AFFINE)
-    if int(model.actuator_gaintype[u]) != int(mujoco.mjtGain.mjGAIN_FIXED) or (
-        not affine and int(model.actuator_biastype[u]) != int(mujoco.mjtBias.mjBIAS_NONE)
-    ):
-        raise ModelError(
-            f"actuator '{name}' has a gain or bias that is neither fixed nor affine; a motor, position or velocity actuator is expected"
-        )
-    servo = affine and bias[1] != 0.0
-    lag = 0.0
-    if int(model.actuator_dyntype[u]) in (
-        int(mujoco.mjtDyn.mjDYN_FILTER),
-        int(mujoco.mjtDyn.mjDYN_FILTEREXACT),
-    ):
-        lag = float(model.actuator_dynprm[u, 0])
-    elif int(model.actuator_dyntype[u]) != int(mujoco.mjtDyn.mjDYN_NONE):
-        raise ModelError(
-            f"actuator '{name}' has an activation that is no first-order filter; none or 'filter' is expected"
-        )
-    forces = model.actuator_forcerange[u] if model.actuator_forcelimited[u] else (-np.inf, np.inf)
-    inputs = model.actuator_ctrlrange[u] if model.actuator_ctrllimited[u] else (-np.inf, np.inf)
-    joint = int(model.actuator_trnid[u, 0])
-    if model.jnt_actfrclimited[joint]:
-        gear = float(model.actuator_gear[u, 0])
-        own = np.sort(np.array(model.jnt_actfrcrange[joint]) / gear)
-        forces = (max(forces[0], own[0]), min(forces[1], own[1]))
-    return Drive(
-        name, servo, float(model.actuator_gear[u, 0]), float(gain[0]), float(-bias[2]) if affine else 0.0,
-        float(forces[0]), float(forces[1]), float(inputs[0]), float(inputs[1]), lag,
-    )  # fmt: skip
 
 
 def _bare(model: mujoco.MjModel) -> mujoco.MjModel:

@@ -70,6 +70,10 @@ def motion_of(
     return Motion(out[0], out[1], out[2], tuple(samples), tuple(smoothers), tuple(noises))
 
 
+Moving = tuple[CaseRecord, Motion]
+"""A record and its motion."""
+
+
 class Clock(NamedTuple):
     """Samples of a record, and the middles of the integration steps between them."""
 

@@ -8,8 +8,9 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from bench.discrepancy.case.case import CaseRecord
-from bench.discrepancy.likelihood.problem import Array, Problem
+from bench.discrepancy.likelihood.problem import Array
 from bench.discrepancy.likelihood.whitening import RecordData, whitened
+from bench.discrepancy.response.simulator import Simulator
 from bench.discrepancy.search.explanation import Explanation
 
 
@@ -35,17 +36,17 @@ class Belief(NamedTuple):
         root = vectors / np.sqrt(np.maximum(values, 1e-8 * values.max()))
         return cls(explanation, np.concatenate([f.vector for _, f in explanation.parts]), root)
 
-    def respond(self, problem: Problem, record: CaseRecord, vector: Array | None = None) -> Array:
+    def respond(self, simulator: Simulator, record: CaseRecord, vector: Array | None = None) -> Array:
         """Responses (n, n_channels) to a record's loads, in the order of the channels of `problem`."""
         chosen = self.vector if vector is None else vector
-        out = np.zeros((len(record), len(problem.structure.channels)))
+        out = np.zeros((len(record), len(simulator.structure.channels)))
         at = 0
         for part, fitted in self.explanation.parts:
             own = chosen[at : at + len(fitted.vector)]
             at += len(fitted.vector)
             samples = part.simulate(fitted.hypothesis, own, record)
             for c, name in enumerate(part.structure.channels):
-                out[:, problem.structure.channels.index(name)] = samples[:, c]
+                out[:, simulator.structure.channels.index(name)] = samples[:, c]
         return out
 
     def within(self, vector: Array) -> Array:
@@ -57,7 +58,7 @@ class Belief(NamedTuple):
             high.append(upper)
         return np.clip(vector, np.concatenate(low), np.concatenate(high))
 
-    def sensitivity(self, problem: Problem, data: RecordData, base: Array) -> Array:
+    def sensitivity(self, simulator: Simulator, data: RecordData, base: Array) -> Array:
         """Derivative (n_residuals, n) of the whitened response along the columns of `root`."""
         columns = []
         for column in self.root.T:
@@ -69,6 +70,6 @@ class Belief(NamedTuple):
             if abs(share) < 1e-6:
                 columns.append(np.zeros(len(base)))
                 continue
-            changed = whitened(self.respond(problem, data.record, moved), data)
+            changed = whitened(self.respond(simulator, data.record, moved), data)
             columns.append((changed - base) / share if np.isfinite(changed).all() else np.zeros(len(base)))
         return np.column_stack(columns)

@@ -31,6 +31,7 @@ from bench.discrepancy.next_test.feasible_excitations import (
 )
 from bench.discrepancy.next_test.outlook import Outlook, outlook
 from bench.discrepancy.numerics.threads import in_threads
+from bench.discrepancy.response.simulator import Simulator
 from bench.discrepancy.search.explanation import Explanation
 
 SPOKEN_OF = ("coulomb_friction", "gap", "cubic_stiffness", "quadratic_damping")
@@ -123,18 +124,20 @@ def _is_rival(best: Explanation, other: Explanation) -> bool:
     return not own <= theirs
 
 
-def _noise_scale(problem: Problem, best: Explanation) -> float:
+def _noise_scale(simulator: Simulator, best: Explanation) -> float:
     """Noise in units of the stated one: what the best explanation leaves, where that is more."""
-    return float(np.sqrt(max(best.reduced, 1.0))) if not problem.noise_stated or not best.consistent else 1.0
+    return (
+        float(np.sqrt(max(best.reduced, 1.0))) if not simulator.noise_stated or not best.consistent else 1.0
+    )
 
 
-def _finalists(problem: Problem, first: Belief, second: Belief) -> list[Proposal]:
+def _finalists(simulator: Simulator, first: Belief, second: Belief) -> list[Proposal]:
     """Feasible excitations by the whitened difference of the rivals' responses, the largest first."""
-    settings = problem.settings.next_test
-    limits = limits_of(problem)
-    longest = max(len(r) for r in problem.records)
-    samples = min(longest, settings.samples // max(1, len(problem.structure.dofs) // 2))
-    loads = _loads(problem, (*first.explanation.hypothesis, *second.explanation.hypothesis))
+    settings = simulator.settings.next_test
+    limits = limits_of(simulator)
+    longest = max(len(r) for r in simulator.records)
+    samples = min(longest, settings.samples // max(1, len(simulator.structure.dofs) // 2))
+    loads = _loads(simulator, (*first.explanation.hypothesis, *second.explanation.hypothesis))
 
     def weigh(entry: tuple[str, Array]) -> list[tuple[float, Proposal]]:
         out = []
@@ -146,22 +149,22 @@ def _finalists(problem: Problem, first: Belief, second: Belief) -> list[Proposal
                 motion={k: level * v for k, v in limits.motion.items()},
             )
             found = feasible(
-                problem, shown, columns, at_level,
-                [lambda record, rival=rival: rival.respond(problem, record) for rival in (first, second)],
+                simulator, shown, columns, at_level,
+                [lambda record, rival=rival: rival.respond(simulator, record) for rival in (first, second)],
             )  # fmt: skip
             if found is not None:
                 proposal, (a, b) = found
-                out.append((float(np.sum(((a - b) / problem.noise) ** 2)), proposal))
+                out.append((float(np.sum(((a - b) / simulator.noise) ** 2)), proposal))
         return out
 
-    weighed = [x for part in in_threads(weigh, candidates(problem, loads, samples)) for x in part]
+    weighed = [x for part in in_threads(weigh, candidates(simulator, loads, samples)) for x in part]
     weighed.sort(key=lambda entry: -entry[0])
     return [proposal for _, proposal in weighed[: settings.finalists]]
 
 
-def _loads(problem: Problem, effects: Sequence[Placed]) -> list[int]:
+def _loads(simulator: Simulator, effects: Sequence[Placed]) -> list[int]:
     """Loads that move the places of some effects."""
-    structure = problem.structure
+    structure = simulator.structure
     groups = structure.groups()
     out = []
     for j in range(len(structure.loads)):
@@ -172,7 +175,7 @@ def _loads(problem: Problem, effects: Sequence[Placed]) -> list[int]:
     return out or list(range(len(structure.loads)))
 
 
-def _described(problem: Problem, proposal: Proposal, look: Outlook) -> dict[str, Any]:
+def _described(simulator: Simulator, proposal: Proposal, look: Outlook) -> dict[str, Any]:
     record = proposal.record
     peak = max(proposal.peaks.values())
     return {

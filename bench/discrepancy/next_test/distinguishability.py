@@ -8,12 +8,13 @@ from bench.discrepancy.effects.effect import unit_of
 from bench.discrepancy.fitting.goodness_of_fit import names
 from bench.discrepancy.likelihood.problem import Array, Problem
 from bench.discrepancy.model.placement import Placed
+from bench.discrepancy.response.simulator import Simulator
 from bench.discrepancy.search.explanation import Explanation
 
 LIMITS = {"clearance": "gap", "position": "stop"}
 
 
-def why_alike(problem: Problem, first: Explanation, second: Explanation) -> str:
+def why_alike(simulator: Simulator, first: Explanation, second: Explanation) -> str:
     """Say why the records of a problem do not tell two explanations apart."""
     parts = [
         f"With these records {names(first.hypothesis)} and {names(second.hypothesis)} predict nearly the same."
@@ -22,14 +23,14 @@ def why_alike(problem: Problem, first: Explanation, second: Explanation) -> str:
         for part, fitted in explanation.parts:
             _, etas = part.split(fitted.hypothesis, fitted.vector)
             for placed, eta in zip(fitted.hypothesis, etas, strict=True):
-                said = _reached(problem, part, placed, eta)
+                said = _reached(simulator, part, placed, eta)
                 if said and said not in parts:
                     parts.append(said)
-    parts.append(_difference(problem, first, second))
+    parts.append(_difference(simulator, first, second))
     return " ".join(part for part in parts if part)
 
 
-def _reached(problem: Problem, part: Problem, placed: Placed, eta: Array) -> str:
+def _reached(simulator: Simulator, part: Problem, placed: Placed, eta: Array) -> str:
     """What the motion reached of an effect with a threshold; empty where it went well beyond."""
     if placed.effect.site != "joint" or len(placed.place.rows) != 1:
         return ""
@@ -43,10 +44,10 @@ def _reached(problem: Problem, part: Problem, placed: Placed, eta: Array) -> str
         if name not in values:
             continue
         limit, largest = abs(values[name]), scales.position
-        share = _beyond(problem, placed, limit)
+        share = _beyond(simulator, placed, limit)
         if limit > largest:
             return f"The motion never left the {what} of the {title}: its largest displacement is {largest:.3g} {unit}."
-        if limit > problem.settings.next_test.barely * largest:
+        if limit > simulator.settings.next_test.barely * largest:
             return (
                 f"The motion hardly left the {what} of the {title}: largest displacement {largest:.3g} {unit}, "
                 f"{what} at {limit:.3g} {unit}, {100 * share:.2g} % of the time beyond it."
@@ -65,31 +66,31 @@ def _reached(problem: Problem, part: Problem, placed: Placed, eta: Array) -> str
     return ""
 
 
-def _beyond(problem: Problem, placed: Placed, limit: float) -> float:
+def _beyond(simulator: Simulator, placed: Placed, limit: float) -> float:
     """Part of the time that the motion of a place spends beyond a displacement."""
-    samples = [problem.motion(i).position @ _row(problem, placed) for i in range(len(problem.records))]
+    samples = [simulator.motion(i).position @ _row(simulator, placed) for i in range(len(simulator.records))]
     return float(np.mean(np.abs(np.concatenate(samples)) > limit))
 
 
-def _row(problem: Problem, placed: Placed) -> Array:
-    return next(p for p in problem.structure.places if p.name == placed.place.name).rows[0]
+def _row(simulator: Simulator, placed: Placed) -> Array:
+    return next(p for p in simulator.structure.places if p.name == placed.place.name).rows[0]
 
 
-def _difference(problem: Problem, first: Explanation, second: Explanation) -> str:
+def _difference(simulator: Simulator, first: Explanation, second: Explanation) -> str:
     """The largest difference of two explanations' responses, held against the noise."""
     worst: tuple[float, str, float] | None = None
-    for record in problem.records:
+    for record in simulator.records:
         a, b = first.predict(record), second.predict(record)
-        for c, name in enumerate(problem.structure.channels):
+        for c, name in enumerate(simulator.structure.channels):
             if not (np.isfinite(a[name]).all() and np.isfinite(b[name]).all()):
                 continue
             difference = float(np.sqrt(np.mean((a[name] - b[name]) ** 2)))
-            entry = (difference / problem.noise[c], name, difference)
+            entry = (difference / simulator.noise[c], name, difference)
             worst = entry if worst is None or entry > worst else worst
     if worst is None:
         return ""
     ratio, name, difference = worst
-    unit = problem.case.channel(name).unit
+    unit = simulator.case.channel(name).unit
     return f"Their responses differ most in {name}, by {difference:.3g} {unit} rms, {ratio:.2g} times the noise of a sample."
 
 

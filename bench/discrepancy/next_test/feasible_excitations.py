@@ -13,7 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from bench.discrepancy.case.case import CaseRecord, record_from_arrays
-from bench.discrepancy.likelihood.problem import Array, Problem
+from bench.discrepancy.likelihood.problem import Array
+from bench.discrepancy.response.simulator import Simulator
 from bench.signals import BandLimitedNoise, Harmonic, ImpulseTrain, Multisine, Signal, Sweep, Tapered
 
 Simulate = Callable[[CaseRecord], Array]
@@ -47,38 +48,39 @@ class Proposal(NamedTuple):
     motion: dict[str, float]
 
 
-def limits_of(problem: Problem) -> RigLimits:
+def limits_of(simulator: Simulator) -> RigLimits:
     """Limits of the rig: those stated in ``nominal.json``, those of the records where none are."""
-    records = (*problem.case.identification, *problem.case.validation)
-    stated = problem.case.options.get("limits", {})
+    records = (*simulator.case.identification, *simulator.case.validation)
+    stated = simulator.case.options.get("limits", {})
     given = {k: float(v) for k, v in stated.items()} if isinstance(stated, Mapping) else {}
     load = {
         name: given.get(name, max(float(np.abs(r.values[name]).max()) for r in records))
-        for name in problem.structure.loads
+        for name in simulator.structure.loads
     }
     motion = {
         o.channel: given.get(
             o.channel,
             # an acceleration is limited by the load already, and friction makes its peaks erratic
-            problem.settings.next_test.reach * max(float(np.abs(r.values[o.channel]).max()) for r in records)
+            simulator.settings.next_test.reach
+            * max(float(np.abs(r.values[o.channel]).max()) for r in records)
             if o.order < 2
             else np.inf,
         )
-        for o in problem.structure.observers
+        for o in simulator.structure.observers
     }
     return RigLimits(load, motion)
 
 
-def resonance(problem: Problem, load: int) -> float:
+def resonance(simulator: Simulator, load: int) -> float:
     """Frequency [Hz] at which a load moves the places of the rig most; that of the measured motion where nothing resonates."""
-    step = problem.records[0].step
-    duration = max(len(r) for r in problem.records) * step
-    if problem.driven:
-        motion = problem.motion(0)
+    step = simulator.records[0].step
+    duration = max(len(r) for r in simulator.records) * step
+    if simulator.driven:
+        motion = simulator.motion(0)
         return float(np.std(motion.velocity) / np.std(motion.position) / (2.0 * np.pi))
     frequency = np.geomspace(2.0 / duration, 0.1 / step, 400)
-    rows = np.vstack([p.rows for p in problem.structure.places])
-    linear = problem.structure.at(problem.nominal)
+    rows = np.vstack([p.rows for p in simulator.structure.places])
+    linear = simulator.structure.at(simulator.nominal)
     omega = 2.0 * np.pi * frequency
     dynamic = (
         linear.stiffness[None]
@@ -90,7 +92,7 @@ def resonance(problem: Problem, load: int) -> float:
     peak = int(np.argmax(response))
     if 0 < peak < len(frequency) - 1:
         return float(frequency[peak])
-    motion = problem.motion(0)
+    motion = simulator.motion(0)
     rate = np.std(motion.velocity @ rows.T, axis=0) / np.maximum(
         np.std(motion.position @ rows.T, axis=0), 1e-300
     )
@@ -120,16 +122,16 @@ def shapes(centre: float, duration: float) -> list[tuple[str, Signal]]:
     ]
 
 
-def candidates(problem: Problem, loads: Sequence[int], samples: int) -> list[tuple[str, Array]]:
+def candidates(simulator: Simulator, loads: Sequence[int], samples: int) -> list[tuple[str, Array]]:
     """Unit-peak loads (samples, n_loads) over single loads and over all of them, with what they are in words."""
-    step = problem.records[0].step
-    names = problem.structure.loads
+    step = simulator.records[0].step
+    names = simulator.structure.loads
     sets = [
         s for size in range(1, len(loads) + 1) for s in combinations(loads, size) if size in {1, len(loads)}
     ]
     out = []
     for chosen in sets:
-        lists = [shapes(resonance(problem, j), samples * step) for j in chosen]
+        lists = [shapes(resonance(simulator, j), samples * step) for j in chosen]
         for entries in zip(*lists, strict=True):
             columns = np.zeros((samples, len(names)))
             for i, (j, (_, signal)) in enumerate(zip(chosen, entries, strict=True)):
@@ -144,12 +146,12 @@ def candidates(problem: Problem, loads: Sequence[int], samples: int) -> list[tup
 
 
 def feasible(
-    problem: Problem, label: str, columns: Array, limits: RigLimits, simulate: Sequence[Simulate]
+    simulator: Simulator, label: str, columns: Array, limits: RigLimits, simulate: Sequence[Simulate]
 ) -> tuple[Proposal, list[Array]] | None:
     """Scale loads of unit peak to the limits of the rig under every rival.
 
     Args:
-        problem: Records and structure.
+        simulator: Records and structure.
         label: What it is in words.
         columns: (n, n_loads) of unit peak.
         limits: The limits.
@@ -158,13 +160,13 @@ def feasible(
     Returns:
         The proposal and the rivals' responses; None where a rival diverges or cannot be kept within the limits.
     """
-    settings = problem.settings.next_test
-    names = problem.structure.loads
-    bounds = np.array([limits.motion[name] for name in problem.structure.channels])
+    settings = simulator.settings.next_test
+    names = simulator.structure.loads
+    bounds = np.array([limits.motion[name] for name in simulator.structure.channels])
     full = columns * np.array([limits.load[name] for name in names])
-    step = problem.records[0].step
+    step = simulator.records[0].step
     time = step * np.arange(len(columns))
-    zeros = dict.fromkeys(problem.structure.channels, np.zeros(len(columns)))
+    zeros = dict.fromkeys(simulator.structure.channels, np.zeros(len(columns)))
     scale = 1.0
     for _ in range(settings.scalings):
         loads = {name: scale * full[:, j] for j, name in enumerate(names)}
@@ -177,7 +179,7 @@ def feasible(
         ratio = float(np.max(largest / bounds))
         if ratio <= 1.0:
             peaks = {name: float(np.abs(loads[name]).max()) for name in names}
-            motion = dict(zip(problem.structure.channels, (float(x) for x in largest), strict=True))
+            motion = dict(zip(simulator.structure.channels, (float(x) for x in largest), strict=True))
             return Proposal(label, record, peaks, motion), responses
         scale *= float(np.clip(settings.margin / ratio, 0.2, settings.margin))
     return None

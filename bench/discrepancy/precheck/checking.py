@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
-from bench.discrepancy.articulated.diagnosis import applies
+from bench.discrepancy.articulated.recognition import applies
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.case.reading import read_case
 from bench.discrepancy.checks.admission import admitted

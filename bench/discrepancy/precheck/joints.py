@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +11,10 @@ from numpy.typing import NDArray
 from bench.discrepancy.articulated.admission import admitted_robot
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.checks.channel_comparison import compare
+from bench.discrepancy.model.mjcf_file import rig_of
 from bench.discrepancy.multibody.channels import bound
 from bench.discrepancy.multibody.encoders import encoders_of, input_of
-from bench.discrepancy.multibody.model import ArticulatedModel, compiled_model
+from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.errors import BenchError
 
 Array = NDArray[np.float64]
@@ -49,7 +49,7 @@ def joint_doubts(case: Case) -> list[str]:
             BenchError
         ) as error:  # the first thing that is refused; what else is doubtful is told all the same
             found.append(str(error))
-            compiled = compiled_model(Path(case.folder or ".") / case.rig)
+            compiled = rig_of(case).model
             own = bound(case, compiled)
         model = ArticulatedModel.of(compiled)
     except BenchError as error:

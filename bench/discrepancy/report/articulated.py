@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis
-from bench.discrepancy.articulated.fitting import ArticulatedFit
+from bench.discrepancy.articulated.free_runs import FreeRuns
+from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.page import Page
 from bench.recording import Recording
 
@@ -54,11 +55,11 @@ def _errors(diagnosis: ArticulatedDiagnosis, fit: ArticulatedFit | None) -> Arra
     judging = diagnosis.judging
     hypothesis = fit.hypothesis if fit else ()
     vector = fit.vector if fit else np.zeros(len(judging.nominal))
-    problem = judging.settled(hypothesis, vector)
-    prepared = problem.motions(hypothesis, vector)[0]
+    runs = FreeRuns(judging.settled(hypothesis, vector))
+    prepared = runs.problem.motions(hypothesis, vector)[0]
     factors = [1.0 + record.encoder.gain for record in prepared.joints]
     return np.column_stack([
-        factors[j] * problem.free_run(j, hypothesis, vector, prepared) for j in range(len(problem.joints))
+        factors[j] * runs.errors(j, hypothesis, vector, prepared) for j in range(len(judging.joints))
     ])  # fmt: skip
 
 

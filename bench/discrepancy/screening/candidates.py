@@ -7,30 +7,30 @@ from collections.abc import Sequence
 from bench.discrepancy.effects.effect import Effect
 from bench.discrepancy.fitting.goodness_of_fit import consistent, near, sticks
 from bench.discrepancy.fitting.map_fit import Fit
-from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.numerics.threads import in_threads
+from bench.discrepancy.response.simulator import Simulator
 from bench.discrepancy.screening.linear_amplitudes import Point
 from bench.discrepancy.screening.projection import Ground
 from bench.discrepancy.screening.screen import Screen
 from bench.discrepancy.settings import DiagnosisSettings
 
 
-def _within_priors(fitted: Fit, problem: Problem) -> bool:
+def _within_priors(fitted: Fit, simulator: Simulator) -> bool:
     """Whether a hypothesis explains the records without nominal parameters far off their values."""
     return (
         consistent(fitted)
-        and fitted.cost - fitted.chi2 < len(problem.nominal) + fitted.settings.screening.worth_a_fit / 2
+        and fitted.cost - fitted.chi2 < len(simulator.nominal) + fitted.settings.screening.worth_a_fit / 2
     )
 
 
-def tells_motion(base: Fit, problem: Problem) -> bool:
+def tells_motion(base: Fit, simulator: Simulator) -> bool:
     """Whether one more effect is best screened along the free run of a base, since that tells the motion better than the records.
 
     Where friction sticks it is not, unless all is explained: a small force more moves the stops, which no linear response does.
     The nominal model alone is asked whether it explains the records within its priors.
     """
     if not base.hypothesis:
-        return _within_priors(base, problem)
+        return _within_priors(base, simulator)
     return consistent(base) or (near(base) and not sticks(base))
 
 

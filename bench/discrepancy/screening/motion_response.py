@@ -22,6 +22,7 @@ from bench.discrepancy.model.nominal_elements import own_change, own_force, own_
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.response.initial_states import in_motion
+from bench.discrepancy.response.simulator import Simulator
 from bench.discrepancy.response.windows import channels_of
 from bench.discrepancy.simulation.linear_response import linear_run
 from bench.discrepancy.simulation.prescribed_response import driven_force
@@ -149,12 +150,12 @@ class MotionResponse:
         return self.response(lambda i: -force_along(self.problem, placed, eta, i))
 
 
-def _unspoilt(problem: Problem, base: Fit, record: CaseRecord) -> Array:
+def _unspoilt(simulator: Simulator, base: Fit, record: CaseRecord) -> Array:
     """Channels (n, n_channels) of the free run of a base without its sensor effects."""
-    _, etas = problem.split(base.hypothesis, base.vector)
+    _, etas = simulator.split(base.hypothesis, base.vector)
     kept = [(p, eta) for p, eta in zip(base.hypothesis, etas, strict=True) if p.effect.site != "sensor"]
-    vector = np.concatenate([base.vector[: len(problem.nominal)], *(eta for _, eta in kept)])
-    return problem.simulate(tuple(p for p, _ in kept), vector, record)
+    vector = np.concatenate([base.vector[: len(simulator.nominal)], *(eta for _, eta in kept)])
+    return simulator.simulate(tuple(p for p, _ in kept), vector, record)
 
 
 def _moving(problem: Problem, about: About, unspoilt: Sequence[Array]) -> Problem:
@@ -172,21 +173,21 @@ def _moving(problem: Problem, about: About, unspoilt: Sequence[Array]) -> Proble
     return problem.moving(motions)
 
 
-def force_along(problem: Problem, placed: Placed, eta: Array, index: int) -> Array:
+def force_along(simulator: Simulator, placed: Placed, eta: Array, index: int) -> Array:
     """Force of an effect on the degrees of freedom (n, n_dof) along the measured motion of record `index`."""
-    motion = problem.motion(index)
-    record = problem.records[index]
+    motion = simulator.motion(index)
+    record = simulator.records[index]
     rows = placed.place.rows
-    elements, rates = problem.elements((placed,), [eta], record)
+    elements, rates = simulator.elements((placed,), [eta], record)
     local = Elements(elements.table, rows, elements.theta, elements.start)
     force = driven_force(
         local,
         position=motion.position @ rows.T,
         velocity=motion.velocity @ rows.T,
         step=record.step,
-        substeps=steps(record.step * rates, settings=problem.settings.simulation),
+        substeps=steps(record.step * rates, settings=simulator.settings.simulation),
         start_time=record.start,
     )
     if placed.effect.in_place:
-        force[:, 0] -= own_friction(problem.structure, problem.nominal, motion, rows[0], record.step)
+        force[:, 0] -= own_friction(simulator.structure, simulator.nominal, motion, rows[0], record.step)
     return force @ rows

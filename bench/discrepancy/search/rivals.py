@@ -10,8 +10,8 @@ import numpy as np
 from bench.discrepancy.effects.effect import Effect
 from bench.discrepancy.fitting.goodness_of_fit import consistent, key_of
 from bench.discrepancy.fitting.map_fit import Fit
-from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Hypothesis, Placed
+from bench.discrepancy.response.simulator import Simulator
 from bench.discrepancy.screening.candidates import (
     about,
     leading,
@@ -141,8 +141,8 @@ def reduce_best(search: Search) -> None:
     converge(search, tasks, limit=best.cost + search.problem.settings.search.sight)
 
 
-def _without(i: int, best: Fit, problem: Problem) -> tuple[Hypothesis, np.ndarray]:
+def _without(i: int, best: Fit, simulator: Simulator) -> tuple[Hypothesis, np.ndarray]:
     """A hypothesis without its effect i, and the vector (n,) of what stays."""
-    _, etas = problem.split(best.hypothesis, best.vector)
+    _, etas = simulator.split(best.hypothesis, best.vector)
     rest = best.hypothesis[:i] + best.hypothesis[i + 1 :]
-    return rest, np.concatenate([best.vector[: len(problem.nominal)], *etas[:i], *etas[i + 1 :]])
+    return rest, np.concatenate([best.vector[: len(simulator.nominal)], *etas[:i], *etas[i + 1 :]])

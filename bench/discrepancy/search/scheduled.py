@@ -35,9 +35,9 @@ from bench.discrepancy.effects.force_priors import FRICTION
 from bench.discrepancy.effects.read_off import DIFFERS, FOLLOWED, SENSITIVITY, schedulable
 from bench.discrepancy.fitting.goodness_of_fit import consistent, key_of
 from bench.discrepancy.fitting.map_fit import Fit
-from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.model.structure import Place
+from bench.discrepancy.response.simulator import Simulator
 from bench.discrepancy.search.fits import Search, Task, converge
 from bench.discrepancy.search.soft_friction import IDEAL, RUBBING, frictional, nominal_level
 
@@ -105,23 +105,23 @@ def _schedulable(fitted: Fit) -> bool:
     return schedulable(effect) and plain and bool(np.isfinite(fitted.cost))
 
 
-def _followed(problem: Problem, placed: Placed, start: Array, channel: CaseChannel) -> list[Task]:
+def _followed(simulator: Simulator, placed: Placed, start: Array, channel: CaseChannel) -> list[Task]:
     """Fits of an effect whose force follows a channel: added to the nominal model, and in the place of its friction."""
-    values, (eta,) = problem.split((placed,), start)
-    n = len(problem.nominal)
-    effect = scheduled_by(placed.effect, channel, problem)
-    reference = _reference(problem, channel)
+    values, (eta,) = simulator.split((placed,), start)
+    n = len(simulator.nominal)
+    effect = scheduled_by(placed.effect, channel, simulator)
+    reference = _reference(simulator, channel)
     shapes = [np.append(eta, [kappa, reference]) for kappa in (0.5, 1.0)]
     new = Placed(effect, placed.place, channel.name)
     tasks: list[Task] = [((new,), np.array([np.append(start[:n], shape) for shape in shapes]))]
-    loss = nominal_level(problem, placed, values)
+    loss = nominal_level(simulator, placed, values)
     if loss is not None and placed.effect.family in RUBBING:
-        scales = problem.scales_of(placed)
+        scales = simulator.scales_of(placed)
         first = placed.effect.parameters[0]
         whole = eta.copy()
         if first.name == FRICTION.name:
             whole[0] = first.eta(first.value(eta[0], scales) + loss, scales)
-        still = np.where(frictional(problem), 0.0, start[:n])
+        still = np.where(frictional(simulator), 0.0, start[:n])
         starts = [
             np.concatenate([still, own, [kappa, reference]]) for kappa in (0.5, 1.0) for own in (whole, eta)
         ]
@@ -134,7 +134,7 @@ def _followed(problem: Problem, placed: Placed, start: Array, channel: CaseChann
     return tasks
 
 
-def scheduled_by(effect: Effect, channel: CaseChannel, problem: Problem) -> Effect:
+def scheduled_by(effect: Effect, channel: CaseChannel, simulator: Simulator) -> Effect:
     """An effect whose force follows a channel."""
     count = len(effect.parameters)
     theta, bound, name = effect.theta, effect.rate_bound, channel.name
@@ -158,8 +158,8 @@ def scheduled_by(effect: Effect, channel: CaseChannel, problem: Problem) -> Effe
     )  # fmt: skip
 
 
-def _reference(problem: Problem, channel: CaseChannel) -> float:
-    power = [float(np.mean(record.values[channel.name] ** 2)) for record in problem.records]
+def _reference(simulator: Simulator, channel: CaseChannel) -> float:
+    power = [float(np.mean(record.values[channel.name] ** 2)) for record in simulator.records]
     return math.sqrt(float(np.mean(power))) or 1.0
 
 

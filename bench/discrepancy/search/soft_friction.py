@@ -24,8 +24,8 @@ from bench.discrepancy.effects.effect import Effect, FreeParameter, Scales, Valu
 from bench.discrepancy.effects.force_priors import FRICTION
 from bench.discrepancy.fitting.goodness_of_fit import consistent
 from bench.discrepancy.fitting.map_fit import Fit
-from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Placed
+from bench.discrepancy.response.simulator import Simulator
 from bench.discrepancy.search.fits import Search, Task, converge
 from bench.laws.coulomb import COULOMB
 from bench.laws.soft_friction import SOFT_COULOMB
@@ -142,22 +142,22 @@ def _ideal_at(fitted: Fit) -> int | None:
     return None
 
 
-def _softened(problem: Problem, fitted: Fit) -> Iterator[Task]:
+def _softened(simulator: Simulator, fitted: Fit) -> Iterator[Task]:
     """A fit of every variant that can take the place of the friction in a hypothesis."""
-    settings = problem.settings.search
+    settings = simulator.settings.search
     i = _ideal_at(fitted)
     assert i is not None
     placed = fitted.hypothesis[i]
-    values, etas = problem.split(fitted.hypothesis, fitted.vector)
-    scales, ideal = problem.scales_of(placed), effect_named(IDEAL)
+    values, etas = simulator.split(fitted.hypothesis, fitted.vector)
+    scales, ideal = simulator.scales_of(placed), effect_named(IDEAL)
     level = float(ideal.values(etas[i], scales)[0])
-    loss = nominal_level(problem, placed, values)
+    loss = nominal_level(simulator, placed, values)
     variants = [(ROUNDED, level), (SOFT, level)]
-    n = len(problem.nominal)
+    n = len(simulator.nominal)
     still = fitted.vector[:n].copy()
     if loss is not None:
         variants = [(_in_place(effect), level + loss) for effect in (ideal, ROUNDED, SOFT)]
-        still = np.where(frictional(problem), 0.0, still)
+        still = np.where(frictional(simulator), 0.0, still)
     for effect, limit in variants:
         head = [FRICTION.eta(limit, scales)]
         if effect.law is COULOMB and not effect.limit:
@@ -175,21 +175,23 @@ def _softened(problem: Problem, fitted: Fit) -> Iterator[Task]:
         yield hypothesis, np.array(starts)
 
 
-def nominal_level(problem: Problem, placed: Placed, values: Array) -> float | None:
+def nominal_level(simulator: Simulator, placed: Placed, values: Array) -> float | None:
     """Limit of the nominal model's own friction along a place; None where it has none."""
-    names = problem.structure.parameters
-    own = [*problem.structure.frictions, *(e for e in problem.structure.elements if e.rubs)]
+    names = simulator.structure.parameters
+    own = [*simulator.structure.frictions, *(e for e in simulator.structure.elements if e.rubs)]
     levels = [f.level(names, values) for f in own if f.acts_along(placed.place.rows[0])]
     return sum(levels) if levels else None
 
 
-def frictional(problem: Problem) -> NDArray[np.bool_]:
+def frictional(simulator: Simulator) -> NDArray[np.bool_]:
     """Which entries (n_nominal,) of a vector are limits of the nominal model's own friction."""
-    names = {friction.parameter for friction in problem.structure.frictions}
-    names |= {name for e in problem.structure.elements if e.rubs for name in e.parameters}
+    names = {friction.parameter for friction in simulator.structure.frictions}
+    names |= {name for e in simulator.structure.elements if e.rubs for name in e.parameters}
     names.discard("")
-    out = np.zeros(len(problem.nominal), dtype=bool)
-    out[: problem.n_physical] = [name in names for name in problem.structure.parameters[: problem.n_physical]]
+    out = np.zeros(len(simulator.nominal), dtype=bool)
+    out[: simulator.n_physical] = [
+        name in names for name in simulator.structure.parameters[: simulator.n_physical]
+    ]
     return out
 
 

@@ -33,6 +33,7 @@ from bench.discrepancy.model.nominal_elements import own_force
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.model.structure import Place
 from bench.discrepancy.numerics.threads import in_threads
+from bench.discrepancy.response.simulator import Simulator
 from bench.discrepancy.search.fits import Search, converge
 from bench.discrepancy.search.time_windows import (
     TimeWindows,
@@ -140,32 +141,36 @@ def _moved(
     return edges
 
 
-def missing_force(problem: Problem, record: CaseRecord, place: Place) -> Array:
+def missing_force(simulator: Simulator, record: CaseRecord, place: Place) -> Array:
     """External force (n,) along a coordinate that the nominal model lacks along the measured motion of a record."""
-    motion, linear = problem.motion_of(record), problem.structure.at(problem.nominal)
+    motion, linear = simulator.motion_of(record), simulator.structure.at(simulator.nominal)
     held = motion.position @ linear.stiffness.T + motion.velocity @ linear.damping.T
-    held = held + own_force(problem.structure, problem.nominal, motion, record.step)
-    if problem.driven:
-        return held[:, 0] - record.values[problem.structure.channels[0]]
-    loads = np.column_stack([record.values[name] for name in problem.structure.loads])
-    left = motion.acceleration @ linear.mass.T + held - loads @ problem.structure.inputs.T
+    held = held + own_force(simulator.structure, simulator.nominal, motion, record.step)
+    if simulator.driven:
+        return held[:, 0] - record.values[simulator.structure.channels[0]]
+    loads = np.column_stack([record.values[name] for name in simulator.structure.loads])
+    left = motion.acceleration @ linear.mass.T + held - loads @ simulator.structure.inputs.T
     return np.asarray(np.linalg.lstsq(place.rows.T, left.T, rcond=None)[0][0], dtype=np.float64)
 
 
-def _at(problem: Problem, place: Place) -> _Found | None:
+def _at(simulator: Simulator, place: Place) -> _Found | None:
     """Windows at a place in the records for identification and those for judging; None where the former have none."""
     windows: dict[str, TimeWindows] = {}
     power = left = 0.0
-    for record in problem.records:
-        lacking = missing_force(problem, record, place)
+    for record in simulator.records:
+        lacking = missing_force(simulator, record, place)
         power += float(np.sum(lacking**2))
-        own = windows_of(record.time, lacking, settings=problem.settings.search)
+        own = windows_of(record.time, lacking, settings=simulator.settings.search)
         if own is None:
             left += float(np.sum(lacking**2))
             continue
         if (
             follows_motion(
-                own, record.time, problem.motion_of(record), place.rows[0], settings=problem.settings.search
+                own,
+                record.time,
+                simulator.motion_of(record),
+                place.rows[0],
+                settings=simulator.settings.search,
             )
             or len(own.start) > MAX_WINDOWS
         ):
@@ -176,19 +181,21 @@ def _at(problem: Problem, place: Place) -> _Found | None:
         return None
     levels = np.concatenate([own.level for own in windows.values()])
     reference = float(np.median(np.abs(levels))) * (1.0 if np.median(levels) >= 0.0 else -1.0)
-    for record in problem.case.validation:
-        own = windows_of(record.time, missing_force(problem, record, place), settings=problem.settings.search)
+    for record in simulator.case.validation:
+        own = windows_of(
+            record.time, missing_force(simulator, record, place), settings=simulator.settings.search
+        )
         if own is not None and len(own.start) <= MAX_WINDOWS:
             windows[record.name] = own
     return _Found(place, windows, reference, 1.0 - left / power)
 
 
-def _start(placed: Placed, found: _Found, problem: Problem) -> Array:
-    scales = problem.scales_of(placed)
+def _start(placed: Placed, found: _Found, simulator: Simulator) -> Array:
+    scales = simulator.scales_of(placed)
     told = [
         p.eta(v, scales)
         for p, v in zip(
-            placed.effect.parameters[2:], _told(found, settings=problem.settings.search), strict=True
+            placed.effect.parameters[2:], _told(found, settings=simulator.settings.search), strict=True
         )
     ]
     return np.array([placed.effect.parameters[0].eta(found.reference, scales), 0.0, *told])
@@ -205,15 +212,15 @@ def _told(found: _Found, *, settings: SearchSettings) -> list[float]:
     ]  # fmt: skip
 
 
-def _effect(problem: Problem, found: _Found) -> Effect:
+def _effect(simulator: Simulator, found: _Found) -> Effect:
     """The effect with the windows that were found."""
-    step = problem.records[0].step
+    step = simulator.records[0].step
     tables = {
-        name: _table(windows, found.reference, settings=problem.settings.search)
+        name: _table(windows, found.reference, settings=simulator.settings.search)
         for name, windows in found.windows.items()
     }
     first = next(iter(tables.values()))
-    count = sum(len(found.windows[r.name].start) for r in problem.records if r.name in found.windows)
+    count = sum(len(found.windows[r.name].start) for r in simulator.records if r.name in found.windows)
 
     def theta(values: Values, scales: Scales) -> Values:
         return _theta(values, step, first)
@@ -226,7 +233,7 @@ def _effect(problem: Problem, found: _Found) -> Effect:
         TIMED, "external", "joint",
         (FORCE, SHIFT, *held),
         "f = -F in windows of time", law=timed_force_law(len(first)), theta=theta, of_record=of_record,
-        log_prior=EFFECT_SETTINGS.rare - 2.0 * math.log(problem.settings.search.timed.blocks) * count,
+        log_prior=EFFECT_SETTINGS.rare - 2.0 * math.log(simulator.settings.search.timed.blocks) * count,
     )  # fmt: skip
 
 

@@ -2,6 +2,7 @@
 
 from bench.discrepancy.settings.articulated import (
     ArticulatedJudgementSettings,
+    ArticulatedNextTestSettings,
     ArticulatedSearchSettings,
     ArticulatedSettings,
 )
@@ -27,6 +28,7 @@ from bench.discrepancy.settings.simulation import SimulationSettings
 __all__ = [
     "DEFAULT",
     "ArticulatedJudgementSettings",
+    "ArticulatedNextTestSettings",
     "ArticulatedSearchSettings",
     "ArticulatedSettings",
     "CaseSettings",

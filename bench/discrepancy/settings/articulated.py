@@ -22,7 +22,14 @@ class ArticulatedSearchSettings:
     starts: int = setting(2, "Grid points from which one effect is fitted.", "Convention.")
     iterations: int = setting(20, "Steps of a fit.", "Convention.")
     refits: int = setting(
-        3, "Fits of the nominal model alone, each with the scales that the last one left.", "Convention."
+        6,
+        "Fits of one hypothesis, each with the scales that the last one left, at most.",
+        "Each gains; most end after two or three.",
+    )
+    rescaled: float = setting(
+        0.02,
+        "Relative change of a scale from which a fit is repeated with it.",
+        "Of twenty parameters the evidence is then known to half a nat.",
     )
     worth: float = setting(
         4.6,
@@ -41,6 +48,11 @@ class ArticulatedSearchSettings:
         3.0,
         "Deviation of a nominal parameter, in its stated standard uncertainties, from which it counts as a finding.",
         "Convention.",
+    )
+    sight: float = setting(
+        50.0,
+        "Log posterior that an explanation may have lost without one of its effects for that effect to be tried as superfluous.",
+        "A cost cut-off; ten times what an effect has to add.",
     )
     finalists: int = setting(5, "Effects that are fitted again without it.", "Convention.")
     rise: float = setting(
@@ -68,6 +80,11 @@ class ArticulatedJudgementSettings:
         0.05,
         "Relative accuracy to which the stated noise is taken to be known.",
         "What leaves no more than this beyond it is complete.",
+    )
+    certain: float = setting(
+        13.8,
+        "Log posterior (odds of a million) that a further effect has to add to what is complete within the accuracy of the noise.",
+        "A clean model is offered a few hundred effects, and the noise is not quite what its model says.",
     )
     material: float = setting(
         0.5,
@@ -100,6 +117,34 @@ class ArticulatedJudgementSettings:
         ),
         "Convention.",
     )
+
+
+@dataclass(frozen=True)
+class ArticulatedNextTestSettings:
+    """The next test of an arm."""
+
+    duration: float = setting(10.0, "Length of the test.", "Some periods of its slowest motion.", unit="s")
+    ramp: float = setting(0.8, "Time over which a motion begins.", "A joint starts at rest.", unit="s")
+    parts: tuple[float, ...] = setting(
+        (0.8, 0.25),
+        "Amplitudes that are tried, as parts of the reach that the records show.",
+        "Wide and small.",
+    )
+    speeds: tuple[float, ...] = setting(
+        (0.8, 0.3, 0.08),
+        "Speeds that are tried, as parts of the largest that the records show.",
+        "Fast to creeping.",
+    )
+    highest: float = setting(
+        3.0,
+        "Highest frequency of a motion.",
+        "What arms follow; beyond it their own flexibility answers.",
+        unit="Hz",
+    )
+    poses: int = setting(
+        100, "Postures on the way that are looked at for collisions.", "One a tenth of a second."
+    )
+    decided: float = setting(4.6, "Log odds (of a hundred to one) from which a test decides.", "Convention.")
 
 
 @dataclass(frozen=True)
@@ -164,3 +209,4 @@ class ArticulatedSettings:
     )
     search: ArticulatedSearchSettings = field(default_factory=ArticulatedSearchSettings)
     judgement: ArticulatedJudgementSettings = field(default_factory=ArticulatedJudgementSettings)
+    next_test: ArticulatedNextTestSettings = field(default_factory=ArticulatedNextTestSettings)

@@ -49,14 +49,19 @@ class CoarseSettings:
         0.03,
         "The same among what is named and leaves next to nothing, at least.",
         (
-            "Of thirty cases of the background's maker in which an effect was named and no other came near, it was the right "
-            "one in all, and one more may not be (Laplace's rule of succession)."
+            "Of 67 cases with a background in which an effect was named and no other came near, it was not the right one in one; "
+            "Laplace's rule of succession gives 2 in 69."
         ),
     )
     background: float = setting(
         0.1,
         "Part of the discrepancy's power that small things leave on average.",
         "Backgrounds of 30 % leave 9 % of it.",
+    )
+    kind: float = setting(
+        0.5,
+        "Probability of a family of effects from which one of it is named.",
+        "Likelier than not.",
     )
     telling: float = setting(
         4.0,

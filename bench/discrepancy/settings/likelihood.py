@@ -25,6 +25,11 @@ class ErrorSettings:
             "quarters of the record."
         ),
     )
+    record_octaves: float = setting(
+        10.0,
+        "Octaves of a record that is compared in windows.",
+        "Some thousand samples, from one period of the record to the Nyquist frequency.",
+    )
     least: float = setting(
         0.01,
         "Model error that no rig goes below, as a part of the spectrum of a response.",

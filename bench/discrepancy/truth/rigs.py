@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -39,6 +40,7 @@ class BlindOptions:
         sample_rate: [Hz].
         shares: Probabilities of none, single, double and foreign cases.
         rigs: Probabilities of sdof, damper and joint.
+        robots: Kinds of robots to draw from instead of rigs: "arm", "leg", "servo".
         effects: Names of effects to draw from, foreign ones included; all where empty.
         leave_one_out: Strike the true effect from the catalogue that the diagnosis may use; single cases only.
         detectability: Compute how well the records of a case can tell its effect (a second or two a case).
@@ -53,14 +55,19 @@ class BlindOptions:
     sample_rate: float = 500.0
     shares: tuple[float, float, float, float] = (0.15, 0.55, 0.15, 0.15)
     rigs: tuple[float, float, float] = (0.65, 0.15, 0.2)
+    robots: tuple[Literal["arm", "leg", "servo"], ...] = ()
     effects: tuple[str, ...] = ()
     leave_one_out: bool = False
     detectability: bool = True
     background: BackgroundSettings | None = None
 
     def __post_init__(self) -> None:
-        for name in self.effects:
+        for name in self.effects if not self.robots else ():
             recipe_named(name)
+        if self.robots and (self.background is not None or self.leave_one_out):
+            raise ParameterError(
+                "cases of robots have no background and strike nothing; leave both out, or make cases of other rigs"
+            )
         if self.background is not None and any(self.shares[2:]):
             raise ParameterError(
                 "a background is put beside one effect or none: give shares (clean, single, double, foreign) whose last two are zero, as "

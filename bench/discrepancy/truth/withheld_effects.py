@@ -60,7 +60,7 @@ RECIPES: tuple[Recipe, ...] = (
     ),
     Recipe(
         "stiffness_drift", "joint",
-        shapes.one("stiffness_rate", lambda r: r.stiffness / r.duration, lambda r: 0.0, signed=True), law=STIFFNESS_DRIFT,
+        shapes.one("rate", lambda r: r.stiffness / r.duration, lambda r: 0.0, signed=True), law=STIFFNESS_DRIFT,
     ),
     Recipe("mass_error", "inertia", shapes.relative, rigs=FREE),
     Recipe("actuator_delay", "actuator", shapes.delay, rigs=DRIVEN_BY_FORCE),

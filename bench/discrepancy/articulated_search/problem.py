@@ -10,80 +10,32 @@ noise as its lower bound: minus twice the profiled log-likelihood of a joint wit
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from threading import Lock
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
-from bench.discrepancy.articulated.effects import ArticulatedEffect, JointScales
-from bench.discrepancy.case.case import Case, CaseRecord
-from bench.discrepancy.multibody.encoders import Encoder, input_of
-from bench.discrepancy.multibody.joint_run import SLOTS, Slot, predict
-from bench.discrepancy.multibody.model import ArticulatedModel, Joint
-from bench.discrepancy.multibody.motion import clock_of
-from bench.discrepancy.multibody.noise import NoiseDraw, NoiseSettings, draw
-from bench.discrepancy.multibody.records import (
-    JointRecord,
-    PreparedRecord,
-    corrected,
-    prepare,
-    relinked,
+from bench.discrepancy.articulated_search.effect import ArticulatedEffect, JointScales
+from bench.discrepancy.articulated_search.hypothesis import (
+    LOCAL_SLOTS,
+    Hypothesis,
+    Nominal,
+    Placed,
+    base_slots,
+    nominal_parameters,
+    placed_values,
 )
+from bench.discrepancy.case.case import Case, CaseRecord
+from bench.discrepancy.multibody.encoders import Encoder
+from bench.discrepancy.multibody.joint_run import Slot, predict
+from bench.discrepancy.multibody.model import ArticulatedModel, Joint
+from bench.discrepancy.multibody.records import JointRecord, PreparedRecord, corrected, prepare, relinked
 from bench.discrepancy.settings import DEFAULT, DiagnosisSettings
-from bench.errors import UnknownNameError
 
 Array = NDArray[np.float64]
-LOCAL_SLOTS = {
-    "damping": Slot.DAMPING,
-    "armature": Slot.INERTIA,
-    "frictionloss": Slot.LIMIT,
-    "stiffness": Slot.STIFFNESS,
-    "kp": Slot.KP,
-    "kv": Slot.KV,
-    "gear": Slot.GEAR,
-}
-"""Entries of a joint's parameter vector that nominal parameters set."""
-
-
-@dataclass(frozen=True)
-class Placed:
-    """An effect at a place: a joint, a body or an actuator.
-
-    Attributes:
-        effect: The effect.
-        where: Name of the joint, body or actuator.
-        joint: Index of the joint whose runs it changes, or whose encoder it is; of the joint that carries the body.
-        scales: Scales of that joint.
-    """
-
-    effect: ArticulatedEffect
-    where: str
-    joint: int
-    scales: JointScales
-
-    @property
-    def key(self) -> tuple[str, str]:
-        """Name and place."""
-        return self.effect.name, self.where
-
-
-Hypothesis = tuple[Placed, ...]
-
-
-@dataclass(frozen=True)
-class Nominal:
-    """A nominal parameter: what it sets, its value and standard uncertainty."""
-
-    name: str
-    kind: str
-    target: str
-    joint: int
-    value: float
-    std: float
 
 
 @dataclass(eq=False)
@@ -240,71 +192,10 @@ class ArticulatedProblem:
     ) -> tuple[Array, Array]:
         """Innovations (n, n_measured) and states (n, 4), see `joint_run.run`, of joint `j` in a record; NaN where it diverged."""
         record = prepared.joints[j]
-        out, states = self._run(j, hypothesis, vector, record, record.gain, record.start, None)
+        out, states = self.run(j, hypothesis, vector, record, record.gain, record.start, None)
         return out[:, : record.n_measured], states
 
-    def free_run(self, j: int, hypothesis: Hypothesis, vector: Array, prepared: PreparedRecord) -> Array:
-        """Measured less predicted positions (n,) of joint `j`, run without corrections from the measured states of its windows.
-
-        What no encoder tells at the start of a window, the winding of an elastic drive, is taken from the run that is corrected. The
-        first of several windows is left out: at the end of a record its velocity is told from one side alone, several times worse.
-        """
-        record, motion = prepared.joints[j], prepared.motion
-        every = record.window or len(record.position)
-        states = np.column_stack([motion.position[:, j], motion.velocity[:, j]])
-        if record.encoder.delay:  # the run keeps the clock of the log, which shows what the joint did before
-            samples = np.arange(len(states)) * record.sample
-            late = np.maximum(samples - record.encoder.delay, 0.0)
-            states = CubicSpline(samples, states, axis=0)(late)
-        starts = states[::every]
-        if any(placed.effect.train and placed.joint == j for placed in hypothesis):
-            _, states = self.innovations(j, hypothesis, vector, prepared)
-            starts = np.hstack([starts, states[::every, 2:] - states[::every, :2]])
-        out, _ = self._run(j, hypothesis, vector, record, np.zeros((2, 2)), starts, every)
-        return out[every if len(starts) > 1 else 0 :, 0]
-
-    @cached_property
-    def draws(self) -> tuple[tuple[NoiseDraw, ...], ...]:
-        """Draws of the noise of every record."""
-        settings = NoiseSettings()
-        rng = np.random.default_rng(settings.seed)
-        return tuple(
-            tuple(
-                draw(
-                    self.model,
-                    prepared.motion,
-                    clock_of(prepared.record, settings=self.settings.articulated),
-                    rng,
-                )
-                for _ in range(settings.draws)
-            )
-            for prepared in self.records
-        )
-
-    def free_run_noise(self, j: int, hypothesis: Hypothesis, vector: Array, r: int) -> float:
-        """RMS error of the position that noise alone leaves in a free run of joint `j` in record `r`, were the hypothesis true."""
-        prepared = self.motions(hypothesis, vector)[r]
-        record, rng = prepared.joints[j], np.random.default_rng(NoiseSettings().seed + 1 + j)
-        drive = record.joint.drive
-        channel = input_of(self.case, record.joint)
-        stated = 0.0 if drive is None or drive.servo else channel.noise_std or 0.0
-        quiet = self.free_run(j, hypothesis, vector, prepared)
-        total = []
-        for one in self.draws[r]:
-            kicks = np.repeat(stated * rng.standard_normal(len(record.position) - 1), record.n_sub)
-            noisy = replace(
-                record, bias=record.bias + one.bias[j], reference=record.reference + one.reference[j], command=record.command + kicks,
-            )  # fmt: skip
-            motion = prepared.motion._replace(
-                position=prepared.motion.position + one.motion[0],
-                velocity=prepared.motion.velocity + one.motion[1],
-            )
-            joints = (*prepared.joints[:j], noisy, *prepared.joints[j + 1 :])
-            loud = self.free_run(j, hypothesis, vector, replace(prepared, joints=joints, motion=motion))
-            total.append(np.mean((loud - quiet) ** 2))
-        return float(np.sqrt(np.mean(total) + record.noise[0] ** 2))
-
-    def _run(
+    def run(
         self,
         j: int,
         hypothesis: Hypothesis,
@@ -314,6 +205,7 @@ class ArticulatedProblem:
         starts: Array,
         every: int | None,
     ) -> tuple[Array, Array]:
+        """Innovations (n, 2) and states (n, 4) of joint `j` from `starts`, set anew after `every` samples, see `joint_run.predict`."""
         bias, inertia = self._coefficients(record, hypothesis, vector)
         p = self.slots(j, hypothesis, vector, on_link=record.on_link)
         p[Slot.RATIO] = record.servo_ratio
@@ -416,56 +308,6 @@ def misfit_of(chi2: float, count: float) -> float:
     return count * (mean if mean <= 1.0 else 1.0 + float(np.log(mean)))
 
 
-def base_slots(joint: Joint, on_link: bool) -> Array:
-    """Parameter vector (SLOTS,) of a joint's nominal model."""
-    p = np.zeros(SLOTS)
-    drive = joint.drive
-    assert drive is not None
-    p[Slot.GEAR], p[Slot.SERVO] = drive.gear, float(drive.servo)
-    p[Slot.KP], p[Slot.KV] = drive.kp, drive.kv
-    p[Slot.LOW], p[Slot.HIGH], p[Slot.LAG] = drive.low, drive.high, drive.lag
-    p[Slot.DAMPING], p[Slot.LIMIT] = joint.damping, joint.friction
-    p[Slot.STIFFNESS], p[Slot.REFERENCE] = joint.stiffness, joint.reference
-    p[Slot.MOTOR], p[Slot.ENCODER], p[Slot.STRIBECK], p[Slot.RATIO] = joint.armature, float(on_link), 1.0, 1.0
-    return p
-
-
-def placed_values(placed: Placed, eta: Array) -> dict[str, float]:
-    """Physical values of an effect at its place; a stop's position is counted from the zero of the joint."""
-    values = placed.effect.values(eta, placed.scales)
-    if placed.effect.name == "one_sided_stop":
-        values["position"] += placed.scales.middle
-    return values
-
-
-def nominal_parameters(case: Case, model: ArticulatedModel) -> tuple[Nominal, ...]:
-    """The uncertain parameters of ``nominal.json``: masses first, then joint by joint.
-
-    Raises:
-        UnknownNameError: A parameter names nothing in the model.
-    """
-    joints = {joint.name: j for j, joint in enumerate(model.joints)}
-    drives = {joint.drive.name: j for j, joint in enumerate(model.joints) if joint.drive is not None}
-    bodies = {body: i for i, body in enumerate(model.bodies)}
-    masses, others = [], []
-    for parameter in case.parameters:
-        kind, _, target = parameter.name.partition(":")
-        if kind == "mass":
-            known: Mapping[str, int] = bodies
-        elif kind in ("kp", "kv", "gear"):
-            known = drives
-        elif kind in LOCAL_SLOTS:
-            known = joints
-        else:
-            raise UnknownNameError("parameter", parameter.name, [f"{k}:NAME" for k in ("mass", *LOCAL_SLOTS)])
-        if target not in known:
-            raise UnknownNameError(f"target of parameter '{parameter.name}'", target, list(known))
-        if parameter.std > 0.0:
-            entry = Nominal(parameter.name, kind, target, known[target], parameter.value, parameter.std)
-            (masses if kind == "mass" else others).append(entry)
-    return (*masses, *sorted(others, key=lambda p: p.joint))
-
-
 def placements(problem: ArticulatedProblem, catalogue: Sequence[ArticulatedEffect]) -> list[Placed]:
     """Every effect at every place where it may sit."""
     out = []
@@ -484,14 +326,3 @@ def placements(problem: ArticulatedProblem, catalogue: Sequence[ArticulatedEffec
             ]
             out.append(Placed(effect, where, j, scales))
     return out
-
-
-__all__ = [
-    "ArticulatedProblem",
-    "Hypothesis",
-    "Nominal",
-    "Placed",
-    "misfit_of",
-    "nominal_parameters",
-    "placements",
-]

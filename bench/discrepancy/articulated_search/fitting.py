@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.discrepancy.articulated.problem import ArticulatedProblem, Hypothesis, misfit_of
+from bench.discrepancy.articulated_search.hypothesis import Hypothesis
+from bench.discrepancy.articulated_search.problem import ArticulatedProblem, misfit_of
 from bench.discrepancy.numerics.least_squares import Prior, minimise
 from bench.discrepancy.numerics.threads import in_threads
 
@@ -81,7 +82,7 @@ class Others:
         masses = list(problem.masses)
 
         def eliminated(j: int) -> tuple[Array, Array]:
-            own = [*problem.locals(j), *_own_effects(problem, base.hypothesis, j)]
+            own = own_entries(problem, base.hypothesis, j)
             columns = own + masses
             jacobian, residual = linearised(problem, base, j, columns)
             _, std, _, _ = problem.prior(base.hypothesis)
@@ -99,9 +100,9 @@ class Others:
         return cls(base, tuple(f for f, _ in found), tuple(t for _, t in found))
 
 
-def _own_effects(problem: ArticulatedProblem, hypothesis: Hypothesis, j: int) -> list[int]:
-    """Entries of a vector that belong to free parameters of effects at joint `j` alone."""
-    out, at = [], len(problem.nominal)
+def own_entries(problem: ArticulatedProblem, hypothesis: Hypothesis, j: int) -> list[int]:
+    """Entries of a vector that belong to joint `j` alone: its nominal parameters, and the free ones of effects there."""
+    out, at = list(problem.locals(j)), len(problem.nominal)
     for placed in hypothesis:
         for p in placed.effect.parameters:
             if problem.reached((placed,)) == (j,) and not p.fixed:
@@ -175,7 +176,43 @@ def fit(
     found = minimise(
         residual_at, starts, prior=Prior(mean, std, low, high), free=free, reach=reach, iterations=iterations, limit=limit,
     settings=problem.settings.numerics)  # fmt: skip
-    return _summary(problem, hypothesis, found.vector, found.curvature, free, scale, active, others)
+    return _summary(problem, hypothesis, found.vector, found.curvature, free, active, others)
+
+
+def refitted(
+    problem: ArticulatedProblem,
+    hypothesis: Hypothesis,
+    start: Array,
+    *,
+    scale: Array,
+    others: Others | None = None,
+) -> ArticulatedFit:
+    """Fit a hypothesis again and again, each time with the scale that the last fit left, until it leaves the scale that it was given.
+
+    The log-likelihood with its scales profiled out is concave in the squares, so that every such fit is a step of a majorisation and
+    none loses. One fit alone may stop where a joint that it has spoilt is believed no more, and what its parameters are known to, which
+    weighs it against others, is that of the scale at the start.
+
+    Args:
+        problem: Records and priors.
+        hypothesis: Effects.
+        start: Vector to start from, or several (k, n).
+        scale: (n_joints,) of the residuals at the start.
+        others: As of `fit`.
+
+    References:
+        D. R. Hunter and K. Lange, A tutorial on MM algorithms, The American Statistician 58 (2004) 30-37.
+    """
+    settings = problem.settings.articulated.search
+    found = fit(problem, hypothesis, start, scale=scale, iterations=settings.iterations, others=others)
+    for _ in range(settings.refits - 1):
+        if np.allclose(found.scale, scale, rtol=settings.rescaled):
+            break
+        scale = found.scale
+        found = fit(
+            problem, hypothesis, found.vector, scale=scale, iterations=settings.iterations, others=others
+        )
+    return found
 
 
 def free_entries(
@@ -201,7 +238,6 @@ def _summary(
     vector: Array,
     curvature: Array,
     free: NDArray[np.int64],
-    scale: Array,
     active: Sequence[int],
     others: Others | None,
 ) -> ArticulatedFit:
@@ -217,7 +253,7 @@ def _summary(
             base = others.base
             now = others.factors[j] @ vector[masses] - others.targets[j]
             then = others.factors[j] @ base.vector[masses] - others.targets[j]
-            chi2[j] = base.chi2[j] + scale[j] ** 2 * float(now @ now - then @ then)
+            chi2[j] = base.chi2[j] + base.scale[j] ** 2 * float(now @ now - then @ then)
     total = sum(misfit_of(c, n) for c, n in zip(chi2, count, strict=True))
     mean, std, _, _ = problem.prior(hypothesis)
     covariance = np.zeros((len(vector), len(vector)))

@@ -1,0 +1,94 @@
+"""Runs that no encoder corrects, and how far noise alone leaves them from the log.
+
+They judge: an explanation predicts the judging records from their commands or torques, window by window where no servo holds the joint.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from bench.discrepancy.articulated_search.hypothesis import Hypothesis
+from bench.discrepancy.articulated_search.problem import ArticulatedProblem
+from bench.discrepancy.multibody.encoders import input_of
+from bench.discrepancy.multibody.motion import clock_of
+from bench.discrepancy.multibody.noise import NoiseDraw, NoiseSettings, draw
+from bench.discrepancy.multibody.records import PreparedRecord
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class FreeRuns:
+    """Free runs of the joints of a problem.
+
+    Attributes:
+        problem: Its records and their motion.
+    """
+
+    problem: ArticulatedProblem
+
+    def errors(self, j: int, hypothesis: Hypothesis, vector: Array, prepared: PreparedRecord) -> Array:
+        """Measured less predicted positions (n,) of joint `j`, run without corrections from the measured states of its windows.
+
+        What no encoder tells at the start of a window, the winding of an elastic drive, is taken from the run that is corrected. The
+        first of several windows is left out: at the end of a record its velocity is told from one side alone, several times worse.
+        """
+        record, motion = prepared.joints[j], prepared.motion
+        every = record.window or len(record.position)
+        states = np.column_stack([motion.position[:, j], motion.velocity[:, j]])
+        if record.encoder.delay:  # the run keeps the clock of the log, which shows what the joint did before
+            samples = np.arange(len(states)) * record.sample
+            late = np.maximum(samples - record.encoder.delay, 0.0)
+            states = CubicSpline(samples, states, axis=0)(late)
+        starts = states[::every]
+        if any(placed.effect.train and placed.joint == j for placed in hypothesis):
+            _, states = self.problem.innovations(j, hypothesis, vector, prepared)
+            starts = np.hstack([starts, states[::every, 2:] - states[::every, :2]])
+        out, _ = self.problem.run(j, hypothesis, vector, record, np.zeros((2, 2)), starts, every)
+        return out[every if len(starts) > 1 else 0 :, 0]
+
+    @cached_property
+    def draws(self) -> tuple[tuple[NoiseDraw, ...], ...]:
+        """Draws of the noise of every record."""
+        settings = NoiseSettings()
+        rng = np.random.default_rng(settings.seed)
+        return tuple(
+            tuple(
+                draw(
+                    self.problem.model,
+                    prepared.motion,
+                    clock_of(prepared.record, settings=self.problem.settings.articulated),
+                    rng,
+                )
+                for _ in range(settings.draws)
+            )
+            for prepared in self.problem.records
+        )
+
+    def noise(self, j: int, hypothesis: Hypothesis, vector: Array, r: int) -> float:
+        """RMS error of the position that noise alone leaves in a free run of joint `j` in record `r`, were the hypothesis true."""
+        prepared = self.problem.motions(hypothesis, vector)[r]
+        record, rng = prepared.joints[j], np.random.default_rng(NoiseSettings().seed + 1 + j)
+        drive = record.joint.drive
+        channel = input_of(self.problem.case, record.joint)
+        stated = 0.0 if drive is None or drive.servo else channel.noise_std or 0.0
+        quiet = self.errors(j, hypothesis, vector, prepared)
+        total = []
+        for one in self.draws[r]:
+            kicks = np.repeat(stated * rng.standard_normal(len(record.position) - 1), record.n_sub)
+            noisy = replace(
+                record, bias=record.bias + one.bias[j], reference=record.reference + one.reference[j], command=record.command + kicks,
+            )  # fmt: skip
+            motion = prepared.motion._replace(
+                position=prepared.motion.position + one.motion[0],
+                velocity=prepared.motion.velocity + one.motion[1],
+            )
+            joints = (*prepared.joints[:j], noisy, *prepared.joints[j + 1 :])
+            loud = self.errors(j, hypothesis, vector, replace(prepared, joints=joints, motion=motion))
+            total.append(np.mean((loud - quiet) ** 2))
+        return float(np.sqrt(np.mean(total) + record.noise[0] ** 2))

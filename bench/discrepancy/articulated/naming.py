@@ -1,0 +1,220 @@
+"""The verdict on an articulated model: names with parameters and shares, rivals, probabilities, and the sentences that say it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from bench.discrepancy.articulated.judgement import Prediction, closed, complete
+from bench.discrepancy.articulated.places import gaps_of, locations_of, remainder_of
+from bench.discrepancy.articulated_search.fitting import ArticulatedFit
+from bench.discrepancy.articulated_search.hypothesis import placed_values
+from bench.discrepancy.articulated_search.problem import ArticulatedProblem
+from bench.discrepancy.settings import ArticulatedJudgementSettings as JudgementSettings
+from bench.discrepancy.verdict import Estimate, Kind, NamedEffect, NominalEstimate, Ranked, Verdict
+
+
+def verdict_of(
+    problem: ArticulatedProblem,
+    fits: Sequence[ArticulatedFit],
+    rungs: Sequence[ArticulatedFit],
+    last: int,
+    untouched: Prediction,
+    predictions: Sequence[Prediction],
+    settings: JudgementSettings,
+    rng: np.random.Generator,
+    *,
+    stated: bool,
+) -> Verdict:
+    """The verdict.
+
+    Args:
+        problem: Records for identification.
+        fits: All fitted hypotheses, the likeliest first.
+        rungs: The best with its predecessors, the nominal model alone first.
+        last: The rung that the judging records bear out.
+        untouched: What the nominal model as stated predicts of them.
+        predictions: What every rung does.
+        settings: Thresholds.
+        rng: For the bootstrap intervals.
+        stated: Whether the noise of the responses is stated.
+    """
+    final, base = rungs[last], rungs[0]
+    whole = stated and complete(problem, final, settings)
+    explained, _ = closed(predictions[0], predictions[last], predictions[0], rng)
+    kind: Kind = "effect" if last else "none"
+    if not whole and (not last or explained < settings.material):
+        kind = "unknown"
+    shares = [closed(predictions[k - 1], predictions[k], predictions[0], rng) for k in range(1, last + 1)]
+    probabilities = _probabilities(fits, final, kind, settings)
+    effects = tuple(
+        _named(problem, final, k, shares[k], probabilities, settings) for k in range(len(final.hypothesis))
+    )
+    effects = tuple(sorted(effects, key=lambda e: -e.closed))
+    gaps = gaps_of(problem, rungs[: last + 1], untouched, predictions[: last + 1], rng)
+    widest = max(gaps, key=lambda gap: gap.before / max(gap.noise_floor, 1e-12))
+    return Verdict(
+        verdict=kind,
+        named=effects if kind == "effect" else (),
+        ranking=_ranking(fits, final, settings),
+        indistinguishable=_sets(fits, final, settings) if kind == "effect" else (),
+        locations=locations_of(problem, base),
+        gap=widest,
+        gaps=gaps,
+        probabilities=probabilities,
+        explanation=_words(kind, effects, whole, explained, final, problem),
+        warnings=(),
+        complete=whole,
+        remainder=remainder_of(problem, final, predictions[last], untouched),
+        nominal=_nominal(problem, final),
+    )
+
+
+def _words(
+    kind: Kind,
+    effects: Sequence[NamedEffect],
+    whole: bool,
+    explained: float,
+    final: ArticulatedFit,
+    problem: ArticulatedProblem,
+) -> str:
+    names = " and ".join(f"{e.name} ({e.where})" for e in effects)
+    left = "" if whole else f" {_left(problem, final)}"
+    if kind == "none":
+        return (
+            "The stated uncertainties and the noise explain the records; nothing is missing from the model."
+        )
+    if kind == "effect":
+        return (
+            f"Missing from the model: {names}. With it the records are explained to within their noise."
+            if whole
+            else (
+                f"Missing from the model: {names}, which closes {100.0 * explained:.3g} % of the discrepancy on the judging records.{left}"
+            )
+        )
+    if effects:
+        return (
+            f"Something is missing from the model, and no effect of the catalogue closes most of it; the nearest is {names}, "
+            f"with {100.0 * explained:.3g} %.{left}"
+        )
+    return f"Something is missing from the model, and no effect of the catalogue improves on the judging records.{left}"
+
+
+def _left(problem: ArticulatedProblem, final: ArticulatedFit) -> str:
+    j = int(np.argmax(final.reduced))
+    return (
+        f"Joint '{problem.joints[j].name}' still leaves {np.sqrt(final.reduced[j]):.3g} times its noise: "
+        "something more is missing, or the noise is larger than stated."
+    )
+
+
+def _probabilities(
+    fits: Sequence[ArticulatedFit], final: ArticulatedFit, kind: Kind, settings: JudgementSettings
+) -> dict[str, float]:
+    known = 1.0 - settings.outside
+    if kind == "unknown":
+        return {"effect": settings.outside, "none": 0.0, "unknown": known}
+    logs = np.array([f.log_posterior for f in fits if len(f.hypothesis) <= len(final.hypothesis)])
+    empty = np.array([not f.hypothesis for f in fits if len(f.hypothesis) <= len(final.hypothesis)])
+    shares = np.exp(logs - logs.max())
+    none = float(shares[empty].sum() / shares.sum())
+    if kind == "none":  # what the search would add is not borne out
+        none = max(none, 0.95)
+    return {"effect": known * (1.0 - none), "none": known * none, "unknown": settings.outside}
+
+
+def _rivals(
+    fits: Sequence[ArticulatedFit], final: ArticulatedFit, settings: JudgementSettings
+) -> list[tuple[ArticulatedFit, float]]:
+    """Explanations of as many effects, by what they are less likely than the final one."""
+    out: dict[frozenset[tuple[str, str]], tuple[ArticulatedFit, float]] = {}
+    for f in fits:
+        if len(f.hypothesis) == len(final.hypothesis):
+            key = frozenset(placed.key for placed in f.hypothesis)
+            out.setdefault(key, (f, max(final.log_posterior - f.log_posterior, 0.0)))
+    out[frozenset(placed.key for placed in final.hypothesis)] = (final, 0.0)
+    return list(out.values())
+
+
+def _ranking(
+    fits: Sequence[ArticulatedFit], final: ArticulatedFit, settings: JudgementSettings
+) -> tuple[Ranked, ...]:
+    rivals = _rivals(fits, final, settings)
+    weights = np.exp([-behind for _, behind in rivals])
+    weights = (1.0 - settings.outside) * weights / weights.sum()
+    total: dict[tuple[str, str], float] = {}
+    for (f, _), weight in zip(rivals, weights, strict=True):
+        for placed in f.hypothesis:
+            total[placed.key] = total.get(placed.key, 0.0) + float(weight)
+    ordered = sorted(total.items(), key=lambda item: -item[1])
+    return tuple(Ranked(name, where, probability) for (name, where), probability in ordered)
+
+
+def closest_rival(
+    fits: Sequence[ArticulatedFit], final: ArticulatedFit, settings: JudgementSettings
+) -> ArticulatedFit | None:
+    """The likeliest other explanation of as many effects that the records cannot tell from the final one; None where they can."""
+    near = [
+        (f, behind)
+        for f, behind in _rivals(fits, final, settings)
+        if f is not final and behind <= settings.rival
+    ]
+    return min(near, key=lambda entry: entry[1])[0] if near else None
+
+
+def _sets(
+    fits: Sequence[ArticulatedFit], final: ArticulatedFit, settings: JudgementSettings
+) -> tuple[tuple[str, ...], ...]:
+    own = {placed.key for placed in final.hypothesis}
+    sets: dict[str, set[str]] = {}
+    for f, behind in _rivals(fits, final, settings):
+        theirs = {placed.key for placed in f.hypothesis}
+        lost, gained = own - theirs, theirs - own
+        if behind <= settings.rival and len(lost) == 1 and len(gained) == 1:
+            (mine,), (other,) = lost, gained
+            if mine[0] != other[0]:
+                sets.setdefault(mine[0], {mine[0]}).add(other[0])
+    return tuple(tuple(sorted(entry)) for entry in sets.values())
+
+
+def _named(
+    problem: ArticulatedProblem,
+    final: ArticulatedFit,
+    k: int,
+    share: tuple[float, tuple[float, float]],
+    probabilities: dict[str, float],
+    settings: JudgementSettings,
+) -> NamedEffect:
+    placed = final.hypothesis[k]
+    at = len(problem.nominal) + sum(len(p.effect.parameters) for p in final.hypothesis[:k])
+    eta = final.vector[at : at + len(placed.effect.parameters)]
+    std = np.sqrt(np.maximum(np.diag(final.covariance)[at : at + len(eta)], 0.0))
+    values = placed_values(placed, eta)
+    joint = problem.joints[placed.joint]
+    estimates = {
+        p.name: Estimate(
+            float(values[p.name]),
+            float(abs(p.slope(float(e), placed.scales)) * s),
+            placed.effect.unit(p, joint.unit),
+        )
+        for p, e, s in zip(placed.effect.parameters, eta, std, strict=True)
+    }
+    return NamedEffect(
+        name=placed.effect.name,
+        where=placed.where,
+        probability=probabilities["effect"],
+        parameters=estimates,
+        channel=joint.name,
+        equation=placed.effect.equation,
+        closed=share[0],
+        closed_ci95=share[1],
+    )
+
+
+def _nominal(problem: ArticulatedProblem, final: ArticulatedFit) -> tuple[NominalEstimate, ...]:
+    deviations = np.sqrt(np.maximum(np.diag(final.covariance), 0.0))
+    return tuple(
+        NominalEstimate(p.name, p.value + p.std * float(x), p.std * float(s), p.value, p.std, float(x))
+        for p, x, s in zip(problem.nominal, final.vector, deviations, strict=False)
+    )

@@ -1,0 +1,138 @@
+"""Where the discrepancy of an articulated model lies: joint by joint, in which band and interval, and what each effect closes there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.discrepancy.articulated.judgement import Prediction, closed
+from bench.discrepancy.articulated_search.fitting import ArticulatedFit
+from bench.discrepancy.articulated_search.problem import ArticulatedProblem
+from bench.discrepancy.settings import ArticulatedSettings
+from bench.discrepancy.verdict import Gap, Location
+
+Array = NDArray[np.float64]
+
+
+def gaps_of(
+    problem: ArticulatedProblem,
+    rungs: Sequence[ArticulatedFit],
+    untouched: Prediction,
+    predictions: Sequence[Prediction],
+    rng: np.random.Generator,
+) -> tuple[Gap, ...]:
+    """NRMSE of the free runs of every joint, as stated, then rung by rung; arguments as of `verdict_of`."""
+    out = []
+    for j, joint in enumerate(problem.joints):
+        record = problem.records[0].joints[j]
+        run = f"free runs of {record.window * record.sample:.3g} s" if record.window else "free run"
+        first, after = untouched, predictions[-1]
+        floor = float(after.floor[j])
+        one = [Prediction(p.power[:, j : j + 1], p.floor[j : j + 1]) for p in (first, after)]
+        share, interval = closed(one[0], one[1], one[0], rng)
+        steps = [
+            ("nominal", float(first.discrepancy[j])),
+            ("parameters only", float(predictions[0].discrepancy[j])),
+        ]
+        steps += [
+            (" + ".join(str(p) for p in rung.hypothesis), float(p.discrepancy[j]))
+            for rung, p in zip(rungs[1:], predictions[1:], strict=True)
+        ]
+        out.append(
+            Gap(
+                f"validation {joint.name} position NRMSE, {run}, other joints as measured", float(first.discrepancy[j]),
+                float(predictions[0].discrepancy[j]), float(after.discrepancy[j]), floor, share, interval, tuple(steps),
+                joint.name,
+            )
+        )  # fmt: skip
+    return tuple(out)
+
+
+def locations_of(problem: ArticulatedProblem, base: ArticulatedFit) -> tuple[Location, ...]:
+    """Joints by their share of what the nominal model leaves beyond the noise, its parameters re-estimated."""
+    excess = np.maximum(base.chi2 - base.count, 0.0)
+    total = float(excess.sum())
+    out = []
+    for j in np.argsort(-excess):
+        share = float(excess[j] / total) if total > 0.0 else 0.0
+        if share < problem.settings.articulated.shown:
+            continue
+        joint = problem.joints[int(j)]
+        prepared = problem.records[0]
+        channel = next(
+            c.name
+            for c in problem.case.channels
+            if c.target == f"joint:{joint.name}" and c.quantity == "position"
+        )
+        innovation, _ = problem.innovations(int(j), (), base.vector, prepared)
+        band, span = _gathered(
+            innovation[:, 0],
+            prepared.record.step,
+            prepared.record.start,
+            settings=problem.settings.articulated,
+        )
+        q, v = prepared.motion.position[:, j], prepared.motion.velocity[:, j]
+        region = {
+            "displacement": (float(q.min()), float(q.max())),
+            "velocity": (float(v.min()), float(v.max())),
+        }
+        out.append(Location(channel, joint.name, share, band, span, region, kind="undetermined"))
+    return tuple(out)
+
+
+def _gathered(
+    residual: Array, step: float, start: float, *, settings: ArticulatedSettings
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Band [Hz] and interval [s] that hold nine tenths of the power of a residual."""
+    residual = np.nan_to_num(residual)
+    power = np.abs(np.fft.rfft(residual)) ** 2
+    frequency = np.asarray(np.fft.rfftfreq(len(residual), step), dtype=np.float64)
+    time = np.asarray(start + step * np.arange(len(residual)), dtype=np.float64)
+
+    def between(weights: Array, axis: Array) -> tuple[float, float]:
+        total = np.cumsum(weights)
+        low, high = np.searchsorted(total, np.array(settings.holds) * total[-1])
+        return float(axis[min(low, len(axis) - 1)]), float(axis[min(high, len(axis) - 1)])
+
+    return between(power, frequency), between(residual**2, time)
+
+
+def remainder_of(
+    problem: ArticulatedProblem, final: ArticulatedFit, left: Prediction, untouched: Prediction
+) -> dict[str, object]:
+    """What remains at the joint that keeps most over its noise, with its band and interval."""
+    j = int(np.argmax(final.reduced))
+    innovation, _ = problem.innovations(
+        j, final.hypothesis, final.vector, problem.motions(final.hypothesis, final.vector)[0]
+    )
+    band, span = _gathered(
+        innovation[:, 0],
+        problem.records[0].record.step,
+        problem.records[0].record.start,
+        settings=problem.settings.articulated,
+    )
+    return {
+        "nrmse": float(left.discrepancy[j]),
+        "over_noise": float(np.sqrt(final.reduced[j])),
+        "of_before": float(left.discrepancy[j] / max(float(untouched.discrepancy[j]), 1e-12)),
+        "channel": problem.joints[j].name,
+        "band_hz": band,
+        "time_s": span,
+    }
+
+
+def matrix_of(problem: ArticulatedProblem, fits: Sequence[ArticulatedFit]) -> dict[str, dict[str, float]]:
+    """Joint to effect to the part of that joint's discrepancy that the effect alone closes, where it was fitted."""
+    base = next(f for f in fits if not f.hypothesis)
+    out: dict[str, dict[str, float]] = {joint.name: {} for joint in problem.joints}
+    for f in fits:
+        if len(f.hypothesis) == 1:
+            placed = f.hypothesis[0]
+            before = float(np.maximum(base.chi2 - base.count, 1e-9)[placed.joint])
+            after = float((f.chi2 - f.count)[placed.joint])
+            share = float(np.clip(1.0 - after / before, 0.0, 1.0))
+            mine = out[problem.joints[placed.joint].name]
+            mine[placed.effect.name] = max(share, mine.get(placed.effect.name, 0.0))
+    return out

@@ -1,0 +1,183 @@
+"""Effects of what drives a joint: elastic trains, play, cogging, and the actuator itself."""
+
+from __future__ import annotations
+
+import math
+
+from bench.discrepancy.articulated_search.effect import ArticulatedEffect
+from bench.discrepancy.articulated_search.slot_setters import (
+    cogging,
+    saturated,
+    scaled,
+    train,
+    written,
+)
+from bench.discrepancy.effects.effect import FreeParameter, log_grid
+from bench.discrepancy.multibody.joint_run import Slot
+
+TEETH = tuple(float(n) for n in range(2, 121))
+"""Periods of cogging in a turn that are tried: slots, poles and teeth are whole numbers."""
+MOTOR_SHARE = FreeParameter(
+    "motor_share", mean=0.0, std=0.5, bounds=(-4.0, -1e-3), grid=(-1e-2, math.log(0.4)), unit="1"
+)
+"""Part of the armature that sits on the motor's side of an elastic train; what is left of it moves with the link."""
+ON_LINK = FreeParameter("encoder_on_link", fixed=True, signed=True, grid=(0.0, 1.0), unit="1")
+"""Side of the encoder; tried where the channel does not state its ``"side"``."""
+RELATIVE = FreeParameter("relative_error", signed=True, mean=0.0, std=0.3, bounds=(-0.95, 20.0), unit="1")
+
+DRIVE_EFFECTS: tuple[ArticulatedEffect, ...] = (
+    ArticulatedEffect(
+        "joint_compliance",
+        "drive",
+        "joint",
+        (
+            FreeParameter(
+                "stiffness",
+                "force/position",
+                mean=math.log(10.0),
+                std=1.5,
+                bounds=(-2.0, 9.0),
+                grid=log_grid(1.0, 3.0, 10.0, 30.0, 100.0),
+            ),
+            FreeParameter(
+                "damping",
+                "force/velocity",
+                mean=math.log(0.1),
+                std=1.5,
+                bounds=(-9.0, 3.0),
+                grid=log_grid(0.05),
+            ),
+            MOTOR_SHARE,
+            ON_LINK,
+        ),
+        "T = k (q_motor - q_link) + c (v_motor - v_link)",
+        train,
+    ),
+    ArticulatedEffect(
+        "backlash",
+        "drive",
+        "joint",
+        (
+            FreeParameter(
+                "half_clearance",
+                "position",
+                mean=math.log(0.02),
+                std=1.3,
+                bounds=(-9.0, 0.0),
+                grid=log_grid(0.003, 0.01, 0.03, 0.1),
+            ),
+            FreeParameter(
+                "stiffness",
+                "force/position",
+                mean=math.log(300.0),
+                std=1.5,
+                bounds=(2.0, 11.0),
+                grid=log_grid(300.0),
+            ),
+            FreeParameter(
+                "damping",
+                "force/velocity",
+                mean=math.log(0.3),
+                std=1.5,
+                bounds=(-9.0, 5.0),
+                grid=log_grid(0.3),
+            ),
+            MOTOR_SHARE,
+            ON_LINK,
+        ),
+        "T = k dz(q_motor - q_link, b) + c (v_motor - v_link) in contact",
+        train,
+    ),
+    ArticulatedEffect(
+        "cogging",
+        "drive",
+        "joint",
+        (
+            FreeParameter("sine", "force", signed=True, mean=0.0, std=0.3, bounds=(-10.0, 10.0)),
+            FreeParameter("cosine", "force", signed=True, mean=0.0, std=0.3, bounds=(-10.0, 10.0)),
+            FreeParameter(
+                "periods_per_turn", fixed=True, signed=True, grid=TEETH, unit="1", bounds=(1.0, 400.0)
+            ),
+        ),
+        "f = A sin(n q + phase)",
+        cogging,
+    ),
+    ArticulatedEffect(
+        "actuator_delay",
+        "actuator",
+        "actuator",
+        (
+            FreeParameter(
+                "delay_s",
+                "1",
+                mean=math.log(0.01),
+                std=1.0,
+                bounds=(-9.0, -1.5),
+                grid=log_grid(0.003, 0.01, 0.03),
+                unit="s",
+            ),
+        ),
+        "input acts later by a delay",
+        written(DELAY="delay_s"),
+    ),
+    ArticulatedEffect(
+        "actuator_lag",
+        "actuator",
+        "actuator",
+        (
+            FreeParameter(
+                "time_constant_s",
+                "1",
+                mean=math.log(0.01),
+                std=1.0,
+                bounds=(-9.0, -1.0),
+                grid=log_grid(0.003, 0.01, 0.03),
+                unit="s",
+            ),
+        ),
+        "T u' + u = input",
+        written(LAG="time_constant_s"),
+    ),
+    ArticulatedEffect(
+        "force_gain_error", "actuator", "actuator", (RELATIVE,), "tau = (1 + e) nominal", scaled(Slot.GEAR)
+    ),
+    ArticulatedEffect(
+        "servo_gain_error",
+        "actuator",
+        "actuator",
+        (RELATIVE,),
+        "kp = (1 + e) nominal",
+        scaled(Slot.KP),
+        servo=True,
+    ),
+    ArticulatedEffect(
+        "actuator_saturation",
+        "actuator",
+        "actuator",
+        (
+            FreeParameter(
+                "limit", "peak", mean=math.log(0.5), std=0.7, bounds=(-4.0, 0.5), grid=log_grid(0.4, 0.6, 0.8)
+            ),
+        ),
+        "|force| <= limit",
+        saturated,
+    ),
+    ArticulatedEffect(
+        "actuator_deadband",
+        "actuator",
+        "actuator",
+        (
+            FreeParameter(
+                "half_width",
+                "input",
+                mean=math.log(0.2),
+                std=1.5,
+                bounds=(-9.0, 2.0),
+                grid=log_grid(0.03, 0.1, 0.3),
+            ),
+        ),
+        "no force within a band of the input (of the position error of a servo)",
+        written(DEADBAND="half_width"),
+    ),
+)
+"""Effects of drives."""

@@ -1,0 +1,123 @@
+"""An effect of articulated models: where it may sit, its parameters, and how it enters the runs of a joint.
+
+An effect at a joint or a drive sets entries of the parameter vector of that joint's runs (`joint_run.Slot`); one of a body changes the
+torque of the inverse dynamics of all joints; one of an encoder corrects the log. Parameters are of order one, as in the catalogue of
+linear structures (`bench.discrepancy.effects.effect`), with the scales of the joint's own records.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.discrepancy.articulated_search.slot_setters import Values, train
+from bench.discrepancy.effects.effect import FreeParameter
+from bench.discrepancy.multibody.encoders import Encoder
+
+Array = NDArray[np.float64]
+Site = Literal["joint", "body", "actuator", "sensor"]
+
+NUMBERS = frozenset({
+    "mass_error", "com_error", "armature_error", "damping_error", "force_gain_error", "servo_gain_error", "position_gain_error",
+    "force_offset", "position_offset",
+})  # fmt: skip
+"""Effects that are a wrong number."""
+
+
+@dataclass(frozen=True)
+class EffectsSettings:
+    """Numbers of `bench.discrepancy.articulated_search.effect`."""
+
+    positive: Mapping[str, Any] = field(
+        default_factory=lambda: {"mean": math.log(0.2), "std": 1.5, "bounds": (-9.0, 4.0)}
+    )
+    """Prior of a positive amplitude: a fifth of its scale, within a factor of twenty with 95 %."""
+    signed: Mapping[str, Any] = field(
+        default_factory=lambda: {"signed": True, "mean": 0.0, "std": 0.5, "bounds": (-30.0, 30.0)}
+    )
+    """Prior of an amplitude of either sign."""
+
+
+SETTINGS = EffectsSettings()
+
+
+class JointScales(NamedTuple):
+    """Magnitudes of a joint's records that make parameters dimensionless.
+
+    Attributes:
+        force: RMS torque of the drive.
+        peak: Largest force of the actuator.
+        position: Largest excursion from the mean angle.
+        velocity: Largest velocity.
+        inertia: Mean inertia about the joint.
+        input: RMS of the actuator's input, of a servo its position error.
+        mass: Mass of the body.
+        reach: Distance of the body's tip from its joint.
+        middle: Mean angle.
+    """
+
+    force: float
+    peak: float
+    position: float
+    velocity: float
+    inertia: float
+    input: float
+    mass: float
+    reach: float
+    middle: float
+
+
+@dataclass(frozen=True)
+class ArticulatedEffect:
+    """Something that may be missing from an articulated model.
+
+    Attributes:
+        name: Name in verdicts.
+        family: Family.
+        site: Where it sits.
+        parameters: Free parameters, the amplitude first.
+        equation: One line for reports.
+        slots: For joints and actuators: values and the parameter vector (SLOTS,) to be changed in place.
+        encoder: For sensors: values to what is wrong.
+        servo: Only for servos (True), only for forces (False), or both (None).
+        needs: Quantity that has to be measured ("velocity"), if any.
+    """
+
+    name: str
+    family: str
+    site: Site
+    parameters: tuple[FreeParameter, ...]
+    equation: str
+    slots: Callable[[Values, Array], None] | None = None
+    encoder: Callable[[Values], Encoder] | None = None
+    servo: bool | None = None
+    needs: str = ""
+
+    @property
+    def number(self) -> bool:
+        """Whether a number of the model or of the log is wrong, rather than a force missing."""
+        return self.name in NUMBERS
+
+    @property
+    def train(self) -> bool:
+        """Whether it is an elastic drive train between motor and link."""
+        return self.slots is train
+
+    def unit(self, parameter: FreeParameter, position: str) -> str:
+        """Unit of a parameter on a joint whose coordinate has the unit `position`."""
+        force, inertia = ("N m", "kg m^2") if position == "rad" else ("N", "kg")
+        return parameter.unit or {
+            "force": force, "peak": force, "input": force if self.servo is False else "input", "position": position,
+            "velocity": f"{position}/s", "inertia": inertia, "mass": "kg", "reach": "m", "1": "1",
+            "force/position": f"{force}/{position}", "force/velocity": f"{force} s/{position}",
+            "force/velocity/velocity": f"{force} s^2/{position}^2",
+        }[parameter.scale]  # fmt: skip
+
+    def values(self, eta: Array, scales: JointScales) -> Values:
+        """Physical values by name."""
+        return {p.name: p.value(float(e), scales) for p, e in zip(self.parameters, eta, strict=True)}

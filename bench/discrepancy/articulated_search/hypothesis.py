@@ -1,0 +1,119 @@
+"""Effects at places, and the uncertain parameters of the nominal model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.discrepancy.articulated_search.effect import ArticulatedEffect, JointScales
+from bench.discrepancy.case.case import Case
+from bench.discrepancy.multibody.joint_run import SLOTS, Slot
+from bench.discrepancy.multibody.model import ArticulatedModel, Joint
+from bench.errors import UnknownNameError
+
+Array = NDArray[np.float64]
+
+
+LOCAL_SLOTS = {
+    "damping": Slot.DAMPING,
+    "armature": Slot.INERTIA,
+    "frictionloss": Slot.LIMIT,
+    "stiffness": Slot.STIFFNESS,
+    "kp": Slot.KP,
+    "kv": Slot.KV,
+    "gear": Slot.GEAR,
+}
+"""Entries of a joint's parameter vector that nominal parameters set."""
+
+
+@dataclass(frozen=True)
+class Placed:
+    """An effect at a place: a joint, a body or an actuator.
+
+    Attributes:
+        effect: The effect.
+        where: Name of the joint, body or actuator.
+        joint: Index of the joint whose runs it changes, or whose encoder it is; of the joint that carries the body.
+        scales: Scales of that joint.
+    """
+
+    effect: ArticulatedEffect
+    where: str
+    joint: int
+    scales: JointScales
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """Name and place."""
+        return self.effect.name, self.where
+
+    def __str__(self) -> str:
+        return f"{self.effect.name} ({self.where})"
+
+
+Hypothesis = tuple[Placed, ...]
+
+
+@dataclass(frozen=True)
+class Nominal:
+    """A nominal parameter: what it sets, its value and standard uncertainty."""
+
+    name: str
+    kind: str
+    target: str
+    joint: int
+    value: float
+    std: float
+
+
+def nominal_parameters(case: Case, model: ArticulatedModel) -> tuple[Nominal, ...]:
+    """The uncertain parameters of ``nominal.json``: masses first, then joint by joint.
+
+    Raises:
+        UnknownNameError: A parameter names nothing in the model.
+    """
+    joints = {joint.name: j for j, joint in enumerate(model.joints)}
+    drives = {joint.drive.name: j for j, joint in enumerate(model.joints) if joint.drive is not None}
+    bodies = {body: i for i, body in enumerate(model.bodies)}
+    masses, others = [], []
+    for parameter in case.parameters:
+        kind, _, target = parameter.name.partition(":")
+        if kind == "mass":
+            known: Mapping[str, int] = bodies
+        elif kind in ("kp", "kv", "gear"):
+            known = drives
+        elif kind in LOCAL_SLOTS:
+            known = joints
+        else:
+            raise UnknownNameError("parameter", parameter.name, [f"{k}:NAME" for k in ("mass", *LOCAL_SLOTS)])
+        if target not in known:
+            raise UnknownNameError(f"target of parameter '{parameter.name}'", target, list(known))
+        if parameter.std > 0.0:
+            entry = Nominal(parameter.name, kind, target, known[target], parameter.value, parameter.std)
+            (masses if kind == "mass" else others).append(entry)
+    return (*masses, *sorted(others, key=lambda p: p.joint))
+
+
+def base_slots(joint: Joint, on_link: bool) -> Array:
+    """Parameter vector (SLOTS,) of a joint's nominal model."""
+    p = np.zeros(SLOTS)
+    drive = joint.drive
+    assert drive is not None
+    p[Slot.GEAR], p[Slot.SERVO] = drive.gear, float(drive.servo)
+    p[Slot.KP], p[Slot.KV] = drive.kp, drive.kv
+    p[Slot.LOW], p[Slot.HIGH], p[Slot.LAG] = drive.low, drive.high, drive.lag
+    p[Slot.DAMPING], p[Slot.LIMIT] = joint.damping, joint.friction
+    p[Slot.STIFFNESS], p[Slot.REFERENCE] = joint.stiffness, joint.reference
+    p[Slot.MOTOR], p[Slot.ENCODER], p[Slot.STRIBECK], p[Slot.RATIO] = joint.armature, float(on_link), 1.0, 1.0
+    return p
+
+
+def placed_values(placed: Placed, eta: Array) -> dict[str, float]:
+    """Physical values of an effect at its place; a stop's position is counted from the zero of the joint."""
+    values = placed.effect.values(eta, placed.scales)
+    if placed.effect.name == "one_sided_stop":
+        values["position"] += placed.scales.middle
+    return values

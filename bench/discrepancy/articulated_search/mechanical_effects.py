@@ -1,0 +1,169 @@
+"""Effects at a joint of an articulated model and at the body that it moves: friction, damping, stops, inertia."""
+
+from __future__ import annotations
+
+import math
+
+from bench.discrepancy.articulated_search.effect import SETTINGS, ArticulatedEffect
+from bench.discrepancy.articulated_search.slot_setters import (
+    added,
+    stop,
+    written,
+)
+from bench.discrepancy.effects.effect import FreeParameter, log_grid
+
+LIMIT = FreeParameter("limit", "force", **SETTINGS.positive)
+
+MECHANICAL_EFFECTS: tuple[ArticulatedEffect, ...] = (
+    ArticulatedEffect(
+        "coulomb_friction",
+        "friction",
+        "joint",
+        (LIMIT,),
+        "f = Fc sgn(v), set-valued at rest",
+        written(LIMIT="limit"),
+    ),
+    ArticulatedEffect(
+        "stribeck_friction",
+        "friction",
+        "joint",
+        (
+            LIMIT,
+            FreeParameter(
+                "rise", mean=math.log(0.7), std=0.7, bounds=(-3.0, 2.5), grid=log_grid(0.7), unit="1"
+            ),
+            FreeParameter(
+                "velocity",
+                "velocity",
+                mean=math.log(0.1),
+                std=1.0,
+                bounds=(-6.0, 0.7),
+                grid=log_grid(0.03, 0.1, 0.3),
+            ),
+        ),
+        "f = Fc (1 + rise exp(-(v/vs)^2)) sgn(v)",
+        written(LIMIT="limit", RISE="rise", STRIBECK="velocity"),
+    ),
+    ArticulatedEffect(
+        "presliding_friction",
+        "friction",
+        "joint",
+        (
+            LIMIT,
+            FreeParameter(
+                "stiffness",
+                "force/position",
+                mean=math.log(3.0),
+                std=1.5,
+                bounds=(-4.0, 7.0),
+                grid=log_grid(0.3, 1.0, 3.0, 10.0, 30.0),
+            ),
+            FreeParameter(
+                "damping",
+                "force/velocity",
+                mean=math.log(0.1),
+                std=1.5,
+                bounds=(-8.0, 3.0),
+                grid=log_grid(0.03, 0.3),
+            ),
+        ),
+        "f = s0 z + s1 z', z' = v - s0 |v| z / Fc (LuGre; Dahl for s1 = 0)",
+        written(BRISTLE_LIMIT="limit", BRISTLE_STIFFNESS="stiffness", BRISTLE_DAMPING="damping"),
+    ),
+    ArticulatedEffect(
+        "load_dependent_friction",
+        "friction",
+        "joint",
+        (
+            FreeParameter(
+                "limit_0", "force", mean=math.log(0.05), std=1.5, bounds=(-9.0, 4.0), grid=log_grid(0.05)
+            ),
+            FreeParameter(
+                "mu", mean=math.log(0.1), std=1.0, bounds=(-7.0, 1.0), grid=log_grid(0.1), unit="1"
+            ),
+            FreeParameter("of_actuator", fixed=True, signed=True, grid=(0.0, 1.0), unit="1"),
+        ),
+        "f = (F0 + mu |torque carried|) sgn(v), that of the link, or of the actuator",
+        written(LIMIT="limit_0", CARRIED="mu", CARRIED_BY="of_actuator"),
+    ),
+    ArticulatedEffect(
+        "force_offset",
+        "offset",
+        "joint",
+        (FreeParameter("force", "force", **SETTINGS.signed),),
+        "a constant torque on the joint",
+        added(OFFSET="force"),
+    ),
+    ArticulatedEffect(
+        "damping_error",
+        "damping",
+        "joint",
+        (FreeParameter("added", "force/velocity", signed=True, mean=0.0, std=0.3, bounds=(-30.0, 30.0)),),
+        "f = dc v, beyond the stated uncertainty",
+        added(DAMPING="added"),
+    ),
+    ArticulatedEffect(
+        "quadratic_damping",
+        "damping",
+        "joint",
+        (FreeParameter("c2", "force/velocity/velocity", **SETTINGS.positive),),
+        "f = c2 |v| v",
+        written(QUADRATIC="c2"),
+    ),
+    ArticulatedEffect(
+        "one_sided_stop",
+        "stop",
+        "joint",
+        (
+            FreeParameter(
+                "stiffness",
+                "force/position",
+                mean=math.log(3.0),
+                std=1.5,
+                bounds=(-4.0, 7.0),
+                grid=log_grid(3.0),
+            ),
+            FreeParameter(
+                "position",
+                "position",
+                signed=True,
+                mean=0.0,
+                std=0.7,
+                bounds=(-1.2, 1.2),
+                grid=(-0.8, -0.5, -0.2, 0.2, 0.5, 0.8),
+            ),
+            FreeParameter("damping", "force/velocity", mean=math.log(0.05), std=1.5, bounds=(-9.0, 3.0)),
+            FreeParameter("side", fixed=True, signed=True, grid=(1.0, -1.0), unit="1"),
+        ),
+        "f = k d + c d', d = side (q - q0) > 0",
+        stop,
+    ),
+    ArticulatedEffect(
+        "armature_error",
+        "inertia",
+        "joint",
+        (FreeParameter("added", "inertia", signed=True, mean=0.0, std=1.0, bounds=(-1.0, 50.0)),),
+        "tau = dJ q'', beyond the stated uncertainty",
+        added(INERTIA="added"),
+    ),
+    ArticulatedEffect(
+        "mass_error",
+        "inertia",
+        "body",
+        (FreeParameter("payload", "mass", signed=True, mean=0.0, std=0.3, bounds=(-0.9, 10.0), unit="kg"),),
+        "a mass at the tip of the body",
+    ),
+    ArticulatedEffect(
+        "com_error",
+        "inertia",
+        "body",
+        tuple(
+            FreeParameter(
+                f"shift_{axis}", "reach", signed=True, mean=0.0, std=0.1, bounds=(-3.0, 3.0), unit="m"
+            )
+            for axis in "xyz"
+        ),
+        "the centre of mass elsewhere in the body",
+    ),
+)
+"""Effects at joints and bodies."""

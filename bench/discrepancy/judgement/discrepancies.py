@@ -1,0 +1,95 @@
+"""What explanations leave of the records, and what the judging records say of them: whether they pay, harm, or are preferred."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.discrepancy.case.case import Case
+from bench.discrepancy.judgement.validation_discrepancy import (
+    DIVERGED_GAP,
+    errors_by_block,
+    noise_floors,
+)
+from bench.discrepancy.likelihood.problem import Problem
+from bench.discrepancy.search.explain import Explanation
+
+Array = NDArray[np.float64]
+
+
+class Discrepancies:
+    """NRMSE of explanations, on the judged coordinate where the nominal model is farthest off; kept by explanation."""
+
+    def __init__(self, case: Case, problem: Problem) -> None:
+        self.case, self.problem = case, problem
+        self._floor = noise_floors(problem, case.validation)
+        self._kept: dict[tuple[Explanation, bool], Array] = {}
+
+    def of(self, explanation: Explanation, *, judging: bool) -> Array:
+        """NRMSE (n_coordinates,) of an explanation, on the judging records or on those for identification."""
+        errors = self._errors(explanation, judging=judging)
+        return np.minimum(np.sqrt(errors.sum(axis=1)), DIVERGED_GAP)
+
+    def scores(self, explanations: Sequence[Explanation], nothing: Explanation) -> Array:
+        """Weighed squared errors (n, n_blocks) of explanations on blocks of the judging records, where `nothing` is farthest off.
+
+        Weighed as the records for identification are: by what the best of them leaves, and so that a record counts as a few samples.
+        """
+        widest = int(np.argmax(self._beyond(self.of(nothing, judging=True))))
+        table = np.array([self._errors(e, judging=True)[widest] for e in explanations])
+        least = max(float(table.sum(axis=1).min()), float(self._floor[widest]) ** 2, 1e-300)
+        error = self.problem.settings.likelihood.error
+        return error.samples * error.record_octaves * len(self.case.validation) * table / least
+
+    def _errors(self, explanation: Explanation, *, judging: bool) -> Array:
+        key = explanation, judging
+        if key not in self._kept:
+            records = self.case.validation if judging else self.case.identification
+            blocks = self.problem.settings.judgement.held_out.blocks
+            self._kept[key] = errors_by_block(self.problem, records, explanation.predict, blocks)
+        return self._kept[key]
+
+    def closed(self, explanation: Explanation, without: Explanation, nothing: Explanation) -> float:
+        """Part of the discrepancy of `nothing`, on the records for identification, that goes with what one has and the other lacks."""
+        before, left, right = (self.of(e, judging=False) for e in (nothing, without, explanation))
+        return float(np.max((left - right) / np.maximum(before, 1e-300)))
+
+    def pays(self, explanation: Explanation, nothing: Explanation, part: float) -> bool:
+        """Whether an explanation leaves at most a part of the judging records' discrepancy, beyond noise, on some coordinate and no
+        more than all of it on any."""
+        before, after = self._judged(nothing, explanation)
+        shrinks = self._beyond(after) <= part * self._beyond(before)
+        return bool(np.any(shrinks) and self.harm(explanation, nothing) <= 1.0)
+
+    def harm(self, explanation: Explanation, rest: Explanation) -> float:
+        """By what factor, beyond what is no change, an explanation leaves more of the judging records than a part of it does.
+
+        Of the coordinate where that is most; at most one where both leave nothing but noise.
+        """
+        settings = explanation.settings.judgement
+        before, after = self._judged(rest, explanation)
+        bar = np.maximum(before, settings.about_noise * self._floor) * settings.unchanged
+        return float(np.max(np.where(after < DIVERGED_GAP, after / np.maximum(bar, 1e-300), np.inf)))
+
+    def left(self, explanation: Explanation, nothing: Explanation) -> float:
+        """Part of the power of the judging records' discrepancy, beyond noise, that an explanation leaves where it is largest."""
+        before, after = (self._beyond(x) for x in self._judged(nothing, explanation))
+        widest = int(np.argmax(before))
+        return float(min((after[widest] / max(before[widest], 1e-300)) ** 2, 1.0))
+
+    def prefers(self, rival: Explanation, explanation: Explanation) -> bool:
+        """Whether the judging records prefer a rival of other names: it leaves less beyond noise where an explanation leaves most."""
+        names, others = ({(p.effect.name, p.place.name) for p in e.hypothesis} for e in (rival, explanation))
+        if not names or names == others:
+            return False
+        theirs, own = (self._beyond(x) for x in self._judged(rival, explanation))
+        widest = int(np.argmax(own))
+        return bool(theirs[widest] * rival.settings.judgement.unchanged < own[widest])
+
+    def _judged(self, nothing: Explanation, explanation: Explanation) -> tuple[Array, Array]:
+        return self.of(nothing, judging=True), self.of(explanation, judging=True)
+
+    def _beyond(self, found: Array) -> Array:
+        return np.sqrt(np.maximum(found**2 - self._floor**2, 0.0))

@@ -1,0 +1,65 @@
+"""Values of ``nominal.json`` in the place of those of a model."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterable
+
+import mujoco
+
+from bench.discrepancy.case.case import NominalParameter
+from bench.errors import UnknownNameError
+from bench.rig import Rig
+
+INERTIAL = ("mass", "inertia")
+"""Parameters of bodies."""
+
+
+LOCAL = ("damping", "frictionloss", "armature", "stiffness")
+"""Parameters of joints."""
+
+
+DRIVES = ("kp", "kv", "gear")
+"""Parameters of actuators."""
+
+
+def with_nominal_values(rig: Rig, parameters: Iterable[NominalParameter]) -> mujoco.MjModel:
+    """The compiled model of a rig with the values of nominal parameters in the place of its own.
+
+    Args:
+        rig: The user's model.
+        parameters: ``mass:BODY``, ``damping:JOINT``, ``kp:ACTUATOR``, …; in the units of the model.
+
+    Raises:
+        UnknownNameError: A parameter is of no kind that a model has, or names nothing in it.
+    """
+    structure: dict[str, dict[str, float]] = {}
+    drives: list[tuple[str, str, float]] = []
+    for parameter in parameters:
+        kind, _, target = parameter.name.partition(":")
+        if kind in DRIVES:
+            drives.append((kind, target, parameter.value))
+        elif kind in ("mass", *LOCAL):
+            structure.setdefault(kind, {})[target] = parameter.value
+        else:
+            raise UnknownNameError(
+                "parameter", parameter.name, [f"{k}:NAME" for k in ("mass", *LOCAL, *DRIVES)]
+            )
+    model = copy.copy(rig.with_structure(**structure).model)
+    actuators = [model.actuator(u).name for u in range(model.nu)]
+    for kind, name, value in drives:
+        if name not in actuators:
+            raise UnknownNameError(f"target of parameter '{kind}:{name}'", name, actuators)
+        _set_drive(model, actuators.index(name), kind, value)
+    return model
+
+
+def _set_drive(model: mujoco.MjModel, u: int, kind: str, value: float) -> None:
+    if kind == "gear":
+        model.actuator_gear[u, 0] = value
+    elif kind == "kv":
+        model.actuator_biasprm[u, 2] = -value
+    else:
+        if model.actuator_biasprm[u, 1] != 0.0:  # a servo's input and its position have one gain
+            model.actuator_biasprm[u, 1] = -value
+        model.actuator_gainprm[u, 0] = value

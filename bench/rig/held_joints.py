@@ -1,0 +1,69 @@
+"""Joints of the user's MJCF that were held: welded where they were."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import mujoco
+import numpy as np
+
+from bench.errors import ModelError, UnknownNameError
+from bench.rig.building import parse
+from bench.rig.description import Rig
+
+
+def with_held_joints(rig: Rig, joints: object) -> Rig:
+    """A rig whose joints of the given names are welded.
+
+    Args:
+        rig: The user's model.
+        joints: Name to "hold", at the zero of the joint, or to the coordinate at which it was held [rad or m].
+
+    Raises:
+        ModelError: A joint is no hinge and no slide.
+        UnknownNameError: A joint is none of the model.
+    """
+    if not isinstance(joints, Mapping) or not joints:
+        return rig
+    spec = parse(rig.mjcf, rig.folder, rig.name)
+    known = [joint.name for joint in spec.joints]
+    for name, at in joints.items():
+        if name not in known:
+            raise UnknownNameError("joint that was held", name, known)
+        joint = spec.joint(name)
+        for item in (*spec.actuators, *spec.sensors):
+            if (item.target if isinstance(item, mujoco.MjsActuator) else item.objname) == name:
+                spec.delete(item)
+        body = joint.parent
+        _turned(body, joint, 0.0 if at == "hold" else float(at))
+        spec.delete(joint)
+        # a body that something refers to is not made a part of the one before it, whose stated mass would then be that of both
+        spec.add_sensor(
+            name=f"held_{name}",
+            type=mujoco.mjtSensor.mjSENS_FRAMEPOS,
+            objtype=mujoco.mjtObj.mjOBJ_BODY,
+            objname=body.name,
+        )
+    return Rig(rig.name, spec.to_xml(), timestep=rig.timestep, folder=rig.folder)
+
+
+def _turned(body: mujoco.MjsBody, joint: mujoco.MjsJoint, at: float) -> None:
+    """Move a body as its joint does at a coordinate."""
+    if joint.type not in (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE):
+        raise ModelError(
+            f"joint '{joint.name}' is no hinge and no slide; one of those is expected where a joint was held"
+        )
+    if at == 0.0:
+        return
+    turn, moved, own = np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3), np.array(body.quat)
+    axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
+    if joint.type == mujoco.mjtJoint.mjJNT_SLIDE:
+        moved = at * axis
+    else:
+        mujoco.mju_axisAngle2Quat(turn, axis, at)
+        mujoco.mju_rotVecQuat(moved, np.array(joint.pos), turn)
+        moved = np.array(joint.pos) - moved
+    shift, quaternion = np.zeros(3), np.zeros(4)
+    mujoco.mju_rotVecQuat(shift, moved, own)
+    mujoco.mju_mulQuat(quaternion, own, turn)
+    body.pos, body.quat = np.array(body.pos) + shift, quaternion

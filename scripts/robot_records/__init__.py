@@ -1,0 +1,1 @@
+"""Public records of robots as cases of the diagnosis."""

@@ -1,0 +1,231 @@
+"""The robots whose records are public: how each is believed to be, and which part of its records finds and which judges."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from robot_records.case_folders import Axis, Records, cut, table
+
+TURN = 2.0 * np.pi
+SO101 = {
+    "Rotation": "shoulder_pan", "Pitch": "shoulder_lift", "Elbow": "elbow_flex", "Wrist_Pitch": "wrist_flex",
+    "Wrist_Roll": "wrist_roll",
+}  # fmt: skip
+SO101_FINDING = (
+    "friction_gravity", "fast_transitions", "random_waypoints", "workspace_sweep", "single_joint_elbow",
+    "single_joint_wrist_pitch", "reach_and_return", "figure_eight", "pick_place", "diagonal_sweep",
+)  # fmt: skip
+SO101_JUDGING = (
+    "boundary_exploration",
+    "hold_under_gravity",
+    "coupled_joints",
+    "square_pattern",
+    "spiral_motion",
+)
+LONGEST = 12.0
+"""Seconds of a motion that are used: a minute of each would take an hour."""
+
+
+def short(columns: dict, seconds: float = LONGEST, after: float = 0.0) -> dict:
+    """The first seconds of a table, from some time on."""
+    t = columns["time"] - columns["time"][0]
+    inside = (t >= after) & (t < after + seconds)
+    return {name: samples[inside] for name, samples in columns.items()}
+
+
+def so101(data: Path) -> Records:
+    """The SO-101 with the gains of its public model; the jaw, whose record is no angle, is held."""
+    folder = data / "so101"
+    axes = [
+        Axis(joint, f"position_{label}", f"command_{label}", 2e-4, TURN / 4096.0)
+        for label, joint in SO101.items()
+    ]
+    read = {
+        name: short(table(folder / "motions" / f"{name}.parquet"), after=5.0)
+        for name in (*SO101_FINDING[:3], *SO101_JUDGING[:2])
+    }
+    return Records(
+        (folder / "model_joints_properties.xml").read_text(), axes, [read[n] for n in SO101_FINDING[:3]],
+        [read[n] for n in SO101_JUDGING[:2]], 50.0, True, "friction against gravity, play of a degree, a zero that is off",
+        held={"gripper": "hold"},
+    )  # fmt: skip
+
+
+def ur10(data: Path) -> Records:
+    """The UR10 with the inertias of its simulator; its only record is smooth to 5 Hz and has no noise of its own."""
+    folder = data / "ur10"
+    columns = table(folder / "exciting.parquet")
+    names = [key.removeprefix("position_") for key in columns if key.startswith("position_")]
+    axes = [
+        Axis(
+            n,
+            f"position_{n}",
+            f"effort_{n}",
+            1e-4,
+            velocity=f"velocity_{n}",
+            velocity_noise=2e-3,
+            torque_noise=0.02,
+        )
+        for n in names
+    ]
+    return Records(
+        (folder / "model_ursim.xml").read_text(), axes, [cut(columns, 0.02, 0.6)], [cut(columns, 0.6, 0.98)], 125.0, False,
+        "Coulomb 12.7, 14.8, 8.3, 2.9, 2.5, 3.0 N m and viscous friction at every joint",
+    )  # fmt: skip
+
+
+def panda(data: Path) -> Records:
+    """The Panda without the placeholders of its public model; stale samples left out."""
+    folder = data / "panda"
+    columns = table(folder / "exciting.parquet")
+    names = [key.removeprefix("position_") for key in columns if key.startswith("position_")]
+    fresh = np.append(True, np.any([np.diff(columns[f"position_{n}"]) != 0.0 for n in names], axis=0))
+    columns = {key: samples[fresh] for key, samples in columns.items()}
+    axes = [
+        Axis(
+            n.removeprefix("fer_"), f"position_{n}", f"effort_{n}", 2e-4, velocity=f"velocity_{n}", velocity_noise=5e-3,
+            torque_noise=0.02,
+        )
+        for n in names
+    ]  # fmt: skip
+    return Records(
+        (folder / "model.xml").read_text(), axes, [cut(columns, 0.02, 0.6)], [cut(columns, 0.6, 1.0)], 30.0, False,
+        "friction of 0.15 to 0.6 N m, gravity within 2 %",
+    )  # fmt: skip
+
+
+def tx40(data: Path) -> Records:
+    """The TX40; torques are motor currents through the gears, in N m."""
+    folder = data / "tx40"
+    columns = table(folder / "joint_500Hz.parquet")
+    axes = [
+        Axis(f"joint_{i}", f"position_joint_{i}", f"torque_joint_{i}", 2e-4, torque_noise=0.02)
+        for i in range(1, 7)
+    ]
+    return Records(
+        (folder / "model.xml").read_text(), axes, [cut(columns, 0.01, 0.5)], [cut(columns, 0.5, 0.83)], 250.0, False,
+        "dry friction 7.1, 8.3, 6.3, 2.5 N m, viscous 8.1, 5.5, 2.0, 1.1 N m s/rad, rotors, a coupled wrist",
+    )  # fmt: skip
+
+
+def _pendulum(
+    data: Path, model: str, finding: tuple[str, ...], judging: tuple[str, ...], known: str
+) -> Records:
+    """A double pendulum, rigid: damping, friction and armature of its public model set to zero."""
+    folder = data / "double_pendulum"
+    text = re.sub(r'(damping|frictionloss|armature)="[^"]*"', r'\1="0"', (folder / model).read_text())
+    read = {name: table(folder / "runs" / f"{name}.parquet") for name in (*finding, *judging)}
+    axes = [
+        Axis(
+            joint, f"pos_meas{i}", f"tau_meas{i}", 2e-4, 3.8e-4, velocity=f"vel_meas{i}", velocity_noise=0.05, torque_noise=0.02
+        )
+        for i, joint in ((1, "shoulder"), (2, "elbow"))
+    ]  # fmt: skip
+    return Records(
+        text,
+        axes,
+        [short(read[n], 8.0) for n in finding],
+        [short(read[n], 8.0) for n in judging],
+        250.0,
+        False,
+        known,
+    )
+
+
+def double_pendulum_a0(data: Path) -> Records:
+    """Design A.0 by its drawing."""
+    known = "Coulomb friction 0.15 and 0.12 N m, rotors of 0.0022 kg m2"
+    return _pendulum(data, "model_A0_10.xml", ("A0_0815_00", "A0_0815_02"), ("A0_0815_12",), known)
+
+
+def double_pendulum_c1(data: Path) -> Records:
+    """Design C.1 by the hypothetical set of its lengths."""
+    known = "Coulomb friction 0.25 and 0.19 N m"
+    return _pendulum(data, "model_C0_h10.xml", ("C1_143339", "C1_143704"), ("C1_154220",), known)
+
+
+def simple_pendulum(data: Path) -> Records:
+    """The torque-limited pendulum by its drawing."""
+    folder = data / "simple_pendulum"
+    axes = [
+        Axis(
+            "pivot", "position_measured", "torque_measured", 1e-3, 2.91e-3, velocity="velocity_measured", velocity_noise=0.05,
+            torque_noise=0.02,
+        )
+    ]  # fmt: skip
+    read = {name: table(folder / "runs" / f"{name}.parquet") for name in ("ddp", "pd_system_identification")}
+    return Records(
+        (folder / "model.xml").read_text(), axes, [read["ddp"]], [read["pd_system_identification"]], 250.0, False,
+        "Coulomb friction 0.17 to 0.29 N m; a torque gain of 1.15 or mass",
+    )  # fmt: skip
+
+
+SERVO = """<mujoco><option timestep="0.001"/>
+<worldbody><body name="arm"><joint name="servo" axis="0 1 0" armature="{armature}" damping="{damping}"/>
+<inertial pos="0 0 -{length}" mass="{mass}" diaginertia="1e-6 1e-6 1e-6"/></body></worldbody>
+<actuator><position name="servo" joint="servo" kp="{kp}" kv="{kv}" forcerange="-{most} {most}"/></actuator></mujoco>"""
+
+
+def _servo(
+    data: Path, runs: tuple[str, ...], judging: tuple[str, ...], known: str, rate: float, **numbers: float
+) -> Records:
+    """A servo with a point mass on an arm, for as long as its torque is on."""
+    read = {}
+    for name in (*runs, *judging):
+        columns = table(data / "bam_servos" / "runs" / f"{name}.parquet")
+        columns["time"] = columns.pop("timestamp")
+        on = int(np.argmin(np.append(columns["torque_enable"], 0.0)))
+        read[name] = {key: samples[:on] for key, samples in columns.items()}
+    axes = [Axis("servo", "position", "goal_position", 3e-4, TURN / 4096.0)]
+    text = SERVO.format(**numbers)
+    return Records(text, axes, [read[n] for n in runs], [read[n] for n in judging], rate, True, known)
+
+
+def xl330(data: Path) -> Records:
+    """The XL330 at a gain of 400: torque = kt / R (V gain (goal - q) - kt qd), kt and R as published with the simplest friction."""
+    kt, resistance, volts, gain = 0.387, 4.02, 7.4, 400.0 * 4096.0 / TURN / (256.0 * 885.0)
+    return _servo(
+        data, ("xl330_kp400_sin_sin", "xl330_kp400_up_and_down"), ("xl330_kp400_sin_time_square",),
+        "friction that grows with the torque carried, preferred to Coulomb; a zero of 30 mrad", 190.0,
+        kp=kt / resistance * volts * gain, damping=kt**2 / resistance, most=kt / resistance * volts, kv=0.0, armature=0.0018,
+        mass=0.49, length=0.10,
+    )  # fmt: skip
+
+
+def sts3250(data: Path) -> Records:
+    """The STS3250 as a servo of the published stiffness and damping, without its friction."""
+    return _servo(
+        data, ("sts3250_kp32_sin_sin",), ("sts3250_kp32_lift_and_drop",), "load-dependent friction: 0.2 N m and 0.2 of the load", 49.0,
+        kp=67.3, kv=2.35, damping=0.0, most=100.0, armature=0.001, mass=1.13, length=0.12,
+    )  # fmt: skip
+
+
+def go2_leg(data: Path) -> Records:
+    """The left front leg of the Go2, with gains and friction of its repository."""
+    folder = data / "go2_air"
+    columns = table(folder / "go2_2026-03-19.parquet")
+    axes = [
+        Axis(f"FL_{part}", f"position_FL_{part}", f"command_FL_{part}", 1e-4, 3e-5) for part in ("hip", "thigh", "calf")
+    ]  # fmt: skip
+    model = (folder / "model_one_leg_FL.xml").read_text()
+    names = [mujoco.MjModel.from_xml_string(model).actuator(u).name for u in range(3)]
+    axes = [
+        Axis(a.joint, a.position, a.command, a.noise, a.resolution, actuator=n)
+        for a, n in zip(axes, names, strict=True)
+    ]
+    return Records(
+        model, axes, [cut(columns, 0.0, 0.55)], [cut(columns, 0.55, 1.0)], 200.0, True,
+        "friction, damping and armature; three published identifications differ by a half",
+    )  # fmt: skip
+
+
+ROBOTS: dict[str, Callable[[Path], Records]] = {
+    "UR10": ur10, "TX40": tx40, "Panda": panda, "double pendulum A.0": double_pendulum_a0, "double pendulum C.1": double_pendulum_c1,
+    "simple pendulum": simple_pendulum, "XL330": xl330, "STS3250": sts3250, "Go2 leg": go2_leg, "SO-101": so101,
+}  # fmt: skip
+"""All robots."""

@@ -1,0 +1,133 @@
+"""Public records of robots, diagnosed against their public models.
+
+    python scripts/robots.py --data FOLDER                 FOLDER holds so101, ur10, tx40, … (formats: their own READMEs)
+    python scripts/robots.py UR10 TX40 --data FOLDER
+
+A row for every robot: the discrepancy (NRMSE of free runs of the judging records, worst joint) of the model as stated, what is named
+with the share that it closes, what is left, the noise floor, and seconds of the processor. Nothing is tuned to them; a robot that is
+refused has a row that says why. The bench for backlash is left out: at ten samples a second it has no dynamics, and no encoder
+outside the loop.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import tempfile
+import time
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import tyro
+from rich.console import Console
+from rich.table import Table
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT / "scripts"))
+
+from robot_records.case_folders import write_folder  # noqa: E402
+from robot_records.robots import ROBOTS  # noqa: E402
+
+from bench.discrepancy import read_case  # noqa: E402
+from bench.discrepancy.articulated.diagnosis import diagnose_articulated  # noqa: E402
+from bench.errors import BenchError, UnknownNameError  # noqa: E402
+from bench.files import json_values, write_text  # noqa: E402
+
+
+@dataclass
+class Args:
+    """Diagnose public records of robots."""
+
+    names: tyro.conf.Positional[tuple[str, ...]] = ()
+    """Robots; all where none is named."""
+    data: Path = Path("robots")
+    """Folder of the records."""
+    out: Path | None = None
+    """Folder for the rows, one JSON file each; a robot that has one there is not diagnosed again."""
+    json: bool = False
+    """Print JSON."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One robot.
+
+    Attributes:
+        robot: Its name.
+        verdict: "effect", "none", "unknown", or why it was refused.
+        named: "effect (place)" to the share of the discrepancy that it closes.
+        parameters: "effect (place)" to its parameters.
+        before, after, floor: NRMSE of the worst joint as stated, with what is named, and what noise alone leaves.
+        joints: Joint to before, after and floor.
+        complete: Whether nothing more is missing.
+        seconds: Processor time [s].
+        known: What is published.
+    """
+
+    robot: str
+    verdict: str
+    named: dict[str, float]
+    parameters: dict[str, dict[str, float]]
+    before: float
+    after: float
+    floor: float
+    joints: dict[str, tuple[float, float, float]]
+    complete: bool
+    seconds: float
+    known: str
+
+
+def row_of(name: str, data: Path) -> Row:
+    """Diagnose one robot."""
+    records = ROBOTS[name](data)
+    began = time.process_time()
+    with tempfile.TemporaryDirectory() as folder:
+        write_folder(records, Path(folder))
+        try:
+            verdict = diagnose_articulated(read_case(folder), anyway=True, most=records.most).verdict
+        except BenchError as error:
+            nan = float("nan")
+            return Row(
+                name, str(error), {}, {}, nan, nan, nan, {}, False, time.process_time() - began, records.known
+            )
+    labels = [f"{e.name} ({e.where})" for e in verdict.named]
+    return Row(
+        name, verdict.verdict, dict(zip(labels, (float(e.closed) for e in verdict.named), strict=True)),
+        {label: {k: float(x.value) for k, x in e.parameters.items()} for label, e in zip(labels, verdict.named, strict=True)},
+        verdict.gap.before, verdict.gap.after, verdict.gap.noise_floor,
+        {g.dof: (g.before, g.after, g.noise_floor) for g in verdict.gaps}, verdict.complete, time.process_time() - began,
+        records.known,
+    )  # fmt: skip
+
+
+def main(args: Args) -> None:
+    """Run the command."""
+    names = args.names or tuple(ROBOTS)
+    for name in names:
+        if name not in ROBOTS:
+            raise UnknownNameError("robot", name, list(ROBOTS))
+    rows = []
+    for name in names:
+        kept = args.out / f"{name}.json" if args.out else None
+        if kept is not None and kept.is_file():
+            rows.append(Row(**json.loads(kept.read_text())))
+            continue
+        rows.append(row_of(name, args.data))
+        if kept is not None:
+            write_text(kept, json.dumps(json_values(asdict(rows[-1])), indent=1))
+    if args.json:
+        print(json.dumps(json_values([asdict(row) for row in rows]), indent=1))
+        return
+    shown = Table("robot", "verdict", "named (share)", "before", "after", "floor", "s", "known")
+    for row in rows:
+        named = ", ".join(f"{k} {100.0 * share:.0f} %" for k, share in row.named.items())
+        numbers = [f"{x:.3g}" for x in (row.before, row.after, row.floor)]
+        shown.add_row(row.robot, row.verdict, named, *numbers, f"{row.seconds:.0f}", row.known)
+    Console(width=180).print(shown)
+
+
+if __name__ == "__main__":
+    try:
+        main(tyro.cli(Args))
+    except BenchError as error:
+        sys.exit(f"robots: {error}")
