@@ -10,6 +10,7 @@ IDS = (
     "JointBench/SDOFExcitation-v0",
     "JointBench/JointExcitation-v0",
     "JointBench/Discrimination-v0",
+    "JointBench/ModelExcitation-v0",
 )
 """Registered environments."""
 
@@ -19,10 +20,11 @@ def _register() -> None:
         name = identifier.partition("/")[2].removesuffix("-v0")
         if identifier in registry:  # by the installed package, which makes the same
             continue
+        single, vector = ("model", "model") if name == "ModelExcitation" else ("single", "vector")
         register(
             id=identifier,
-            entry_point=f"{__name__}.single:{name}Env",
-            vector_entry_point=f"{__name__}.vector:{name}VectorEnv",
+            entry_point=f"{__name__}.{single}:{name}Env",
+            vector_entry_point=f"{__name__}.{vector}:{name}VectorEnv",
         )
 
 

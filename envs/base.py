@@ -12,8 +12,9 @@ from bench.errors import ParameterError
 
 from .benches import Benches
 from .options import Options, require_count
+from .practice import PracticeBenches
 from .setups import PAIRS, SDOF_LAWS, Setup, discrimination_setup, joint_setup, sdof_setup
-from .stepped import FLOATS
+from .stepped import FLOATS, SteppedBenches
 
 
 @dataclass(frozen=True)
@@ -67,8 +68,8 @@ def _names(argument: str, given: Any) -> tuple[str, ...]:
     return names
 
 
-def make_benches(kind: str, n: int, threads: int, arguments: dict[str, Any]) -> Benches:
-    """Benches for an environment with given arguments.
+def make_benches(kind: str, n: int, threads: int, arguments: dict[str, Any]) -> Benches | PracticeBenches:
+    """Benches for an environment with given arguments; practice benches where the reward looks at each rig itself.
 
     Raises:
         TypeError: An argument is unknown.
@@ -76,7 +77,10 @@ def make_benches(kind: str, n: int, threads: int, arguments: dict[str, Any]) -> 
     """
     rest = dict(arguments)
     setup = setup_of(kind, rest)
-    return Benches(setup, options_of(rest), n, threads)
+    options = options_of(rest)
+    if options.reward == "error":
+        return PracticeBenches(setup, options, n, drawn=True)
+    return Benches(setup, options, n, threads)
 
 
 def options_of(arguments: dict[str, Any]) -> Options:
@@ -94,12 +98,12 @@ def options_of(arguments: dict[str, Any]) -> Options:
     return Options(**arguments)
 
 
-def observation_space(benches: Benches) -> spaces.Box:
+def observation_space(benches: SteppedBenches) -> spaces.Box:
     """Box of a bench's observations."""
     return spaces.Box(-1.0, 1.0, (benches.n_observations,), np.float32)
 
 
-def action_space(benches: Benches) -> spaces.Box:
+def action_space(benches: SteppedBenches) -> spaces.Box:
     """Box of a bench's actions."""
     return spaces.Box(-1.0, 1.0, (benches.width,), np.float32)
 
@@ -111,7 +115,7 @@ def info_of(info: dict[str, Any], row: int) -> dict[str, float | bool]:
     return entries
 
 
-def rest_info(benches: Benches, places: np.ndarray) -> dict[str, np.ndarray]:
+def rest_info(benches: SteppedBenches, places: np.ndarray) -> dict[str, np.ndarray]:
     """`info` of benches that were just reset."""
     info = {name: np.zeros(len(places)) for name in FLOATS}
     info["effective_draws"] = benches.effective_draws(places)

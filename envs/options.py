@@ -16,7 +16,7 @@ ENFORCEMENTS = ("terminate", "cost")
 
 AVERAGES = ("prior", "posterior")
 
-REWARDS = ("information", "coverage")
+REWARDS = ("information", "coverage", "error")
 
 
 @dataclass(frozen=True)

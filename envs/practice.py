@@ -5,7 +5,12 @@ is that expectation under the prior. The registered environments average the mer
 of the episode instead, as a laboratory could; a policy that follows the hidden rig's resonance gets little of that, because the
 draws have other resonances. Policies see the same here as there, and nothing of the hidden rig; only their teacher knows it.
 
-Rigs are compiled `Family` members, equal to MuJoCo to rounding. Bench i hides a rig of hypothesis (or question) i modulo their number.
+With ``reward="error"`` the rigs have a background besides, see `bench.excitation.background`, and the reward is what an identification
+that does not know it gains: minus the logarithm of its expected error. Of the rewards that were tried this one ranks the error that
+identification leaves of a record (docs/excitation.md).
+
+Rigs are compiled `Family` members, equal to MuJoCo to rounding. Bench i hides a rig of hypothesis (or question) i modulo their number,
+or of one that is drawn in each episode.
 """
 
 from __future__ import annotations
@@ -18,8 +23,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.errors import UnknownNameError
+from bench.errors import ParameterError
 from bench.excitation import Contrast, Draw, Family, Hypothesis, Rivals, expected_log_bayes_factor, fans
+from bench.excitation.background import SETTINGS as BACKGROUND_SETTINGS
+from bench.excitation.background import BackgroundTerm, expected_error, with_background
 from bench.excitation.bayes_factor import accumulate_contrast
 from bench.excitation.information import (
     INFORMATION_LIMITS,
@@ -28,11 +35,10 @@ from bench.excitation.information import (
 from bench.excitation.station import Desk
 from bench.excitation.stepping import Packed, integrate_cases
 
-from .base import options_of, setup_of
+from .background import background_of
 from .options import Options
 from .setups import Setup, made, rival_experiment
 from .stepped import SteppedBenches, sensed
-from .vector import BenchVectorEnv
 
 
 @dataclass(frozen=True)
@@ -51,22 +57,38 @@ PRACTICE_SETTINGS = PracticeSettings()
 
 
 class _Fan:
-    """The rigs of a hypothesis on some benches, each followed by its perturbed ones."""
+    """The rigs of a hypothesis on some benches, each followed by its perturbed ones, or alone where the step is zero."""
 
-    def __init__(self, hypothesis: Hypothesis, n: int, channels: tuple[str, ...], actuators: tuple[str, ...]):
+    def __init__(
+        self,
+        hypothesis: Hypothesis,
+        n: int,
+        channels: tuple[str, ...],
+        actuators: tuple[str, ...],
+        step: float = INFORMATION_LIMITS.step,
+    ):
         self.family = Family(hypothesis, channels, actuators)
         self.p = self.family.n_parameters
         self.coordinates = np.zeros((n, self.p))
-        self._packed: Packed = self.family.packed(
-            fans(self.coordinates, INFORMATION_LIMITS.step).reshape(-1, self.p)
-        )
-        self._states = self._packed.start.reshape(n, 1 + self.p, -1).copy()
-        self._members = np.arange(n * (1 + self.p)).reshape(n, 1 + self.p)
+        self._step, self._size = step, 1 + self.p if step else 1
+        self._packed: Packed = self.family.packed(self._around(self.coordinates).reshape(-1, self.p))
+        self._states = self._packed.start.reshape(n, self._size, -1).copy()
+        self._members = np.arange(n * self._size).reshape(n, self._size)
+
+    def _around(self, coordinates: NDArray[np.float64]) -> NDArray[np.float64]:
+        return fans(coordinates, self._step)[..., : self._size, :]
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in self.__dict__.items() if name != "_packed"}
+
+    def __setstate__(self, saved: dict[str, Any]) -> None:
+        self.__dict__.update(saved)  # addresses of kernels hold in one process
+        self._packed = self.family.packed(self._around(self.coordinates).reshape(-1, self.p))
 
     def install(self, place: int, coordinates: NDArray[np.float64]) -> None:
         """Put a rig at rest on a bench."""
         self.coordinates[place] = coordinates
-        fresh = self.family.packed(fans(coordinates, INFORMATION_LIMITS.step))
+        fresh = self.family.packed(self._around(coordinates))
         rows = self._members[place]
         for name in ("constants", "coefficients", "theta"):
             getattr(self._packed, name)[rows] = getattr(fresh, name)
@@ -80,7 +102,7 @@ class _Fan:
             commands,
             states,
             members=self._members[places],
-            counts=np.full(len(places), 1 + self.p),
+            counts=np.full(len(places), self._size),
             timestep=self.family.timestep,
             clock=clock,
         )
@@ -96,8 +118,10 @@ class _Priors:
     motions that multiply what is known well already (Bouc-Wen's weakest direction stayed at a quarter of the prior).
     """
 
+    step = INFORMATION_LIMITS.step
+
     def __init__(self, hypothesis: Hypothesis, n: int, desk: Desk) -> None:
-        self.fan = _Fan(hypothesis, n, desk.station.channels, desk.station.actuators)
+        self.fan = _Fan(hypothesis, n, desk.station.channels, desk.station.actuators, self.step)
         p = self.fan.p
         self._weights = 1.0 / desk.noise
         self._sums = [np.zeros((n, 1, p, p)), np.zeros((n, 1, p)), np.zeros((n, 1))]
@@ -112,30 +136,54 @@ class _Priors:
     def run(self, places: NDArray[np.int64], commands: NDArray, clock: NDArray) -> tuple[NDArray, NDArray]:
         """What ideal sensors show ``(m, n, n_channels)``, and the values ``(m,)``."""
         outputs = self.fan.run(places, commands, clock)
+        ideal = self._shown(outputs, places, commands, clock)
         parts = [array[places] for array in self._sums]
-        values = np.zeros((len(places), 1))
-        counts = np.full((len(places), 1), self.fan.p)
+        counts, values = np.full((len(places), 1), self.fan.p), np.zeros((len(places), 1))
         fisher, score, square = parts
-        measured = outputs[:, 0].copy()
         accumulate(
-            0,
-            len(places),
-            outputs,
-            counts,
-            INFORMATION_LIMITS.step,
-            self._weights,
-            measured,
-            fisher,
-            score,
-            square,
-            values,
-        )
+            0, len(places), outputs, counts, self.step, self._weights, ideal.copy(), fisher, score, square, values
+        )  # fmt: skip
         for array, part in zip(self._sums, parts, strict=True):
             array[places] = part
+        known, bias = (np.where(np.isfinite(part[:, 0]), part[:, 0], 0.0) for part in (fisher, score))
+        return ideal, self._value(known, bias)
+
+    def _shown(
+        self, outputs: NDArray, places: NDArray[np.int64], commands: NDArray, clock: NDArray
+    ) -> NDArray[np.float64]:
+        """What ideal sensors show ``(m, n, n_channels)``."""
+        return outputs[:, 0]
+
+    def _value(self, fisher: NDArray, score: NDArray) -> NDArray[np.float64]:
         p = self.fan.p
-        known = np.where(np.isfinite(fisher[:, 0]), fisher[:, 0], 0.0)
-        remaining = np.trace(np.linalg.inv(np.eye(p) + known), axis1=1, axis2=2) / p
-        return outputs[:, 0], -p * np.log(remaining + PRACTICE_SETTINGS.floor**2)
+        remaining = np.trace(np.linalg.inv(np.eye(p) + fisher), axis1=1, axis2=2) / p
+        return -p * np.log(remaining + PRACTICE_SETTINGS.floor**2)
+
+
+class _Errors(_Priors):
+    """Benches of rigs with a background; the value is minus the logarithm of the expected error of an identification."""
+
+    step = BACKGROUND_SETTINGS.step
+
+    def __init__(self, hypothesis: Hypothesis, n: int, desk: Desk, terms: tuple[BackgroundTerm, ...]) -> None:
+        super().__init__(hypothesis, n, desk)
+        channels, actuators = desk.station.channels, desk.station.actuators
+        self._real = _Fan(with_background(hypothesis, terms), n, channels, actuators, 0.0)
+
+    def reset(self, place: int, rng: np.random.Generator) -> Draw:
+        super().reset(place, rng)
+        bound = np.sqrt(3.0)
+        besides = rng.uniform(-bound, bound, self._real.p - self.fan.p)
+        self._real.install(place, np.concatenate([self.fan.coordinates[place], besides]))
+        return self._real.family.hypothesis.at(self._real.coordinates[place])
+
+    def _shown(
+        self, outputs: NDArray, places: NDArray[np.int64], commands: NDArray, clock: NDArray
+    ) -> NDArray[np.float64]:
+        return self._real.run(places, commands, clock)[:, 0]
+
+    def _value(self, fisher: NDArray, score: NDArray) -> NDArray[np.float64]:
+        return -np.log(expected_error(fisher, score))
 
 
 @lru_cache(maxsize=16)
@@ -186,24 +234,46 @@ class _Pairs:
 class PracticeBenches(SteppedBenches):
     """In the place of `envs.benches.Benches`, with the reward at each rig itself; the option `average` means nothing here."""
 
-    def __init__(self, setup: Setup, options: Options, n: int, *, question: int | None = None) -> None:
-        """Set up benches; only one of the setup's questions is asked where `question` is given."""
+    def __init__(
+        self, setup: Setup, options: Options, n: int, *, question: int | None = None, drawn: bool = False
+    ) -> None:
+        """Set up benches.
+
+        Args:
+            setup: The laboratory and its questions.
+            options: What is asked for.
+            n: Number of benches.
+            question: Only one of the setup's questions is asked.
+            drawn: The kind of rig is drawn in each episode, where it belongs to the bench by default.
+
+        Raises:
+            ParameterError: The reward is "error" and the questions are of rivals, of which no error is told.
+        """
         super().__init__(setup, options, n)
+        self.setup: Setup = setup
         kinds: list[tuple[int, Any]] = []
         for i, asked in enumerate(setup.questions):
             if question is None or i == question:
                 kinds += [(i, asked)] if isinstance(asked, Rivals) else [(i, h) for h in asked.hypotheses]
-        size = -(-n // len(kinds))
-        self._groups = [
-            _Pairs(kind, _pool(setup.recipe, i), size, self.desk)
-            if isinstance(kind, Rivals)
-            else _Priors(kind, size, self.desk)
-            for i, kind in kinds
-        ]
+        self._drawn = drawn
+        self._kind = np.arange(n) % len(kinds)
+        self._groups = [self._group(i, kind) for i, kind in kinds]
         self._asked = np.array([i for i, _ in kinds])
-        self.question = self._asked[np.arange(n) % len(kinds)]
+        self.question = self._asked[self._kind]
         self._values = np.zeros(n)
         self._latest = np.zeros(n)
+
+    def _group(self, question: int, kind: Any) -> _Priors | _Pairs:
+        """Benches of one kind of rig; each has room for every bench."""
+        if isinstance(kind, Rivals):
+            if self.options.reward == "error":
+                raise ParameterError(
+                    'reward is "error", which rivals have not: their question is which of two holds; "information" is expected'
+                )
+            return _Pairs(kind, _pool(self.setup.recipe, question), self.n, self.desk)
+        if self.options.reward == "error":
+            return _Errors(kind, self.n, self.desk, background_of(self.setup))
+        return _Priors(kind, self.n, self.desk)
 
     def effective_draws(self, places: NDArray[np.int64]) -> NDArray[np.float64]:
         """One: the reward knows one rig ``(m,)``."""
@@ -212,15 +282,27 @@ class PracticeBenches(SteppedBenches):
     def reset(self, places: NDArray[np.int64], rngs: Sequence[np.random.Generator]) -> NDArray[np.float32]:
         """As `envs.benches.Benches.reset`."""
         for place in places:
-            group, row = self._groups[place % len(self._groups)], int(place) // len(self._groups)
-            self.truth[place] = group.reset(row, rngs[place])
+            if self._drawn:
+                self._kind[place] = rngs[place].integers(len(self._groups))
+            self.truth[place] = self._groups[self._kind[place]].reset(int(place), rngs[place])
             rngs[place].standard_normal(out=self._disturbance[place])
         self._disturbance[places] *= self.desk.noise
+        self.question[places] = self._asked[self._kind[places]]
         self.desk.begin(places)
         self._values[places], self._merit[places] = 0.0, 0.0
         rest = np.zeros((len(places), self.n_steps, len(self.station.actuators)))
         still = np.zeros((len(places), self.width))
         return self.desk.observe(places, self._disturbance[places, -1], rest, still, self.question)
+
+    def positions(self, place: int) -> NDArray[np.float64]:
+        """Nothing: compiled rigs keep what moves only.
+
+        Raises:
+            ParameterError: Always.
+        """
+        raise ParameterError(
+            'practice benches, and environments with reward="error", have no pictures; render with reward="information"'
+        )
 
     def _measured(
         self, places: NDArray[np.int64], commands: NDArray[np.float64]
@@ -229,10 +311,9 @@ class PracticeBenches(SteppedBenches):
         ideal = np.zeros((len(places), self.n_steps, len(self.station.channels)))
         values = np.zeros(len(places))
         for g, group in enumerate(self._groups):
-            mine = np.flatnonzero(places % len(self._groups) == g)
+            mine = np.flatnonzero(self._kind[places] == g)
             if mine.size:
-                rows = places[mine] // len(self._groups)
-                ideal[mine], values[mine] = group.run(rows, commands[mine], clock[mine])
+                ideal[mine], values[mine] = group.run(places[mine], commands[mine], clock[mine])
         self._latest = np.where(np.isfinite(values), values, self._values[places])
         return sensed(ideal, self._disturbance[places, self.desk.window[places]])
 
@@ -243,29 +324,3 @@ class PracticeBenches(SteppedBenches):
         self._values[places] = self._latest
         self._merit[places] += gain
         return gain, self.effective_draws(places)
-
-
-class PracticeVectorEnv(BenchVectorEnv):
-    """Vector environment of practice benches; see the module.
-
-    Not registered: its reward looks at the hidden rig.
-    """
-
-    KINDS = ("sdof", "joint", "discrimination")
-
-    def __init__(self, kind: str, num_envs: int = 1, **arguments: Any) -> None:
-        """Set up practice benches.
-
-        Args:
-            kind: "sdof", "joint" or "discrimination".
-            num_envs: How many.
-            **arguments: Those of `BenchVectorEnv` and of the environment.
-        """
-        if kind not in self.KINDS:
-            raise UnknownNameError("kind of practice bench", kind, self.KINDS)
-        self.kind = kind  # type: ignore[misc]
-        super().__init__(num_envs, **arguments)
-
-    def _make(self, n: int, threads: int, arguments: dict[str, Any]) -> Any:
-        rest = dict(arguments)
-        return PracticeBenches(setup_of(self.kind, rest), options_of(rest), n)

@@ -49,7 +49,10 @@ class RenderedPicture:
         if self._renderer is None:
             self._renderer = mujoco.Renderer(self.rig.scene, SETTINGS.height, SETTINGS.width)
         self._place(positions)
-        self._renderer.update_scene(self._data, camera=CAMERA)
+        own = mujoco.mj_name2id(self.rig.scene, mujoco.mjtObj.mjOBJ_CAMERA, CAMERA)
+        self._renderer.update_scene(
+            self._data, camera=own
+        )  # a free camera where a user's model has none of this name
         return self._renderer.render()
 
     def show(self, positions: NDArray[np.float64]) -> None:

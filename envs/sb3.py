@@ -12,11 +12,14 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvStepReturn
 
+from bench.errors import UnknownNameError
+
 from . import IDS
-from .practice import PracticeVectorEnv
+from .practice_vector import PracticeVectorEnv
 from .vector import BenchVectorEnv
 
-KINDS: dict[str, str] = dict(zip(IDS, PracticeVectorEnv.KINDS, strict=True))
+KINDS: dict[str, str] = dict(zip(IDS[:3], PracticeVectorEnv.KINDS, strict=True))
+"""Kinds of practice bench; `JointBench/ModelExcitation-v0` has none, since its reward is taken at the hidden arm already."""
 
 
 class BenchVecEnv(VecEnv):
@@ -38,8 +41,13 @@ class BenchVecEnv(VecEnv):
             num_envs: How many.
             practice: Practice benches in its place, see `envs.practice`.
             **arguments: Arguments of the environment.
+
+        Raises:
+            UnknownNameError: The environment has no practice benches.
         """
         mode = AutoresetMode.SAME_STEP
+        if practice and id not in KINDS:
+            raise UnknownNameError("environment with practice benches", id, KINDS)
         vector: Any = (
             PracticeVectorEnv(KINDS[id], num_envs, autoreset_mode=mode, **arguments)
             if practice

@@ -7,7 +7,6 @@ has been measured.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from types import MappingProxyType
@@ -16,10 +15,11 @@ import numpy as np
 
 from bench.errors import UnknownNameError
 from bench.excitation import Experiment, Hypothesis, Limits, RigPrior, Rivals, Uncertain, paired_experiment
-from bench.excitation.station import Station
 from bench.laws import find_law
 from bench.rig import Element, Rig
 from bench.rig.library import joint_rig, sdof_rig
+
+from .places import StationSetup
 
 
 @dataclass(frozen=True)
@@ -35,66 +35,21 @@ SETTINGS = SetupsSettings()
 
 
 @dataclass(frozen=True, eq=False)
-class Setup:
+class Setup(StationSetup):
     """A laboratory and the questions asked in it.
 
     Attributes:
-        questions: One prior, or rivals of which each episode asks one.
         experiments: The questions on their fixed draws, in the same order.
-        noise: Standard deviation of each measured channel's noise.
-        limits: Limits.
-        scale: What 1 stands for in observations, by channel, in the channel's unit.
-        band: Frequencies excited [Hz].
-        window: Default duration of a window [s].
-        duration: Default duration of an episode [s].
         recipe: Function of this module and its arguments that make this setup; it travels in place of the setup.
         place: What rigs are made of there.
     """
 
-    questions: tuple[RigPrior, ...] | tuple[Rivals, ...]
     experiments: tuple[Experiment, ...]
-    noise: Mapping[str, float]
-    limits: Limits
-    scale: Mapping[str, float]
-    band: tuple[float, float]
-    window: float
-    duration: float
     recipe: tuple[str, tuple]
     place: Laboratory
 
     def __reduce__(self) -> tuple:
         return (made, self.recipe)
-
-    def station(
-        self,
-        n_steps: int | None = None,
-        n_windows: int | None = None,
-        *,
-        shaping: str = "knots",
-        n_knots: int = 1,
-    ) -> Station:
-        """The experimenter's place, by default with windows and a duration as the environments have them.
-
-        Args:
-            n_steps: Steps a window.
-            n_windows: Windows of a test.
-            shaping: How actions become commands.
-            n_knots: Knots a window.
-        """
-        timestep = self.rig.timestep
-        steps = n_steps or round(self.window / timestep)
-        return Station(
-            self.noise,
-            self.scale,
-            self.limits,
-            timestep,
-            steps,
-            n_windows or round(self.duration / (steps * timestep)),
-            self.band,
-            shaping,
-            n_knots,
-            tuple(question.name for question in self.questions if isinstance(question, Rivals)),
-        )
 
     @property
     def rig(self) -> Rig:
@@ -110,7 +65,7 @@ def made(name: str, arguments: tuple) -> Setup:
 
 
 class Laboratory:
-    """A laboratory: its rig, its sensors, and where a joint's effects act."""
+    """A laboratory: its rig, its sensors, where a joint's effects act, and each joint's actuator, stroke and velocity (`driven`)."""
 
     def __init__(self, name: str) -> None:
         self.name = name
@@ -120,6 +75,7 @@ class Laboratory:
             self.scale = {"displacement": 0.04, "velocity": 0.6, "acceleration_x": 10.0}
             self.band, self.window, self.duration = (0.5, 5.0), 0.04, 8.0
             self.joint = "carriage"
+            self.driven = {"carriage": ("shaker", "displacement", "velocity")}
         else:
             self.noise = {
                 "axial": 2e-4, "torsional": 8e-3, "axial_velocity": 8e-3, "torsional_velocity": 0.3,
@@ -134,6 +90,10 @@ class Laboratory:
             self.scale = {**self.limits.watched, "displacement_1": 0.015, "rotation_1": 0.6}
             self.band, self.window, self.duration = (1.5, 12.0), 0.02, 4.0
             self.joint = "axial"
+            self.driven = {
+                "axial": ("force", "axial", "axial_velocity"),
+                "torsional": ("torque", "torsional", "torsional_velocity"),
+            }
 
     def rig(self, *elements: Element) -> Rig:
         """The rig with some elements."""
@@ -229,13 +189,13 @@ def _setup(
 ) -> Setup:
     return Setup(
         questions,
-        experiments,
         MappingProxyType(dict(place.noise)),
         place.limits,
         MappingProxyType(dict(place.scale)),
         place.band,
         place.window,
         place.duration,
+        experiments,
         recipe,
         place,
     )

@@ -14,6 +14,7 @@ from bench.excitation import Draw
 
 from .base import RENDER_MODES, action_space, info_of, make_benches, observation_space, rest_info
 from .rendering import RenderedPicture
+from .stepped import SteppedBenches
 
 
 class BenchEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
@@ -30,7 +31,7 @@ class BenchEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         if render_mode is not None and render_mode not in RENDER_MODES:
             raise UnknownNameError("render mode", render_mode, RENDER_MODES)
         self.render_mode = render_mode
-        self.benches = make_benches(self.kind, 1, 1, arguments)
+        self.benches: Any = self._make(arguments)
         self.metadata = {
             **type(self).metadata,
             "render_fps": round(1.0 / (self.benches.n_steps * self.benches.timestep)),
@@ -38,6 +39,10 @@ class BenchEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.observation_space = observation_space(self.benches)
         self.action_space = action_space(self.benches)
         self._picture: RenderedPicture | None = None
+
+    def _make(self, arguments: dict[str, Any]) -> SteppedBenches:
+        """The bench behind it."""
+        return make_benches(self.kind, 1, 1, arguments)
 
     @property
     def truth(self) -> Draw | None:
@@ -174,6 +179,12 @@ class SDOFExcitationEnv(BenchEnv):
     With `reward="coverage"` the merit is that of `bench.excitation.Coverage` instead: cells of state and memory, within the
     limits of stroke and velocity, that the measured motion has entered. It needs no draws and knows of no law.
 
+    With `reward="error"` the merit is minus the logarithm of the error that an identification of the hidden rig is expected to have,
+    root mean square over its parameters in prior standard deviations. The hidden rig then has a background, of which
+    the identification knows nothing: quadratic and cubic stiffness and quadratic damping beside its joint, each with a force at the
+    limit of 0.2 N (standard deviation). This reward knows the hidden rig, as a teacher may; observations do not. Rigs are compiled
+    ones in place of MuJoCo's, equal to rounding, and are not rendered; `average` and `n_draws` mean nothing.
+
     | Limit | Value | What happens |
     |---|---|---|
     | force | 2 N | cannot be exceeded: actions are fractions of it |
@@ -206,7 +217,7 @@ class SDOFExcitationEnv(BenchEnv):
     | `duration` | 8 s | duration of an episode |
     | `enforcement` | "terminate" | or "cost": what passing the stroke limit does |
     | `penalty` | 10 nat | size of the cost |
-    | `reward` | "information" | or "coverage": of the states and the memory of a joint of unknown kind |
+    | `reward` | "information" | or "coverage" of states and memory of a joint of unknown kind, or "error" that an identification leaves |
     | `average` | "prior" | or "posterior": weights of the draws in the reward |
     | `n_draws` | two a law | prior draws in the reward |
     | `render_mode` | None | "rgb_array" or "human" |
@@ -284,6 +295,7 @@ class JointExcitationEnv(BenchEnv):
 
     As in `SDOFExcitationEnv`, with the limits: force 800 N, torque 16 N m (by construction); energy 8e5 N² s and 320 (N m)² s (scaled
     down; the episode ends when both are used up); stroke of the joint 0.015 m and 0.6 rad; velocity of the joint 0.6 m/s and 24 rad/s.
+    With `reward="error"` the background acts on both joints, with 80 N and 1.6 N m at the limits (standard deviation).
 
     ## Starting State
 
@@ -381,7 +393,7 @@ class DiscriminationEnv(BenchEnv):
 
     ## Arguments
 
-    Those of the other environments but `laws`, and:
+    Those of the other environments but `laws`; `reward` is "information". And:
 
     | Argument | Default | Meaning |
     |---|---|---|

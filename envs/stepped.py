@@ -16,7 +16,7 @@ from bench.excitation.station import Desk
 
 from .coverage import CoverageReward
 from .options import Options, check_size
-from .setups import Setup
+from .places import StationSetup
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ class SteppedBenches(ABC):
     question: NDArray[np.int64]
     _values: NDArray[np.float64]  # worth of the records so far, by bench (and draw, or pair of rivals) [nat]
 
-    def __init__(self, setup: Setup, options: Options, n: int) -> None:
+    def __init__(self, setup: StationSetup, options: Options, n: int) -> None:
         """Set up the books; each bench must be `reset` before it is stepped.
 
         Raises:
@@ -88,7 +88,7 @@ class SteppedBenches(ABC):
                 parts of whole steps.
         """
         self.setup, self.options, self.n = setup, options, n
-        self.timestep = setup.rig.timestep
+        self.timestep = setup.timestep
         self.n_steps = round((options.window or setup.window) / self.timestep)
         self.n_windows = (
             round((options.duration or setup.duration) / (self.n_steps * self.timestep))

@@ -32,7 +32,7 @@ from bench.files import replacing, together, write_bytes, write_text
 from . import IDS
 from .base import setup_of
 from .feedback import Feedback, braked_design, pump
-from .practice import PracticeVectorEnv
+from .practice_vector import PracticeVectorEnv
 from .sb3 import KINDS, BenchVecEnv
 
 TASKS: dict[str, tuple[str, dict[str, Any]]] = {
@@ -44,7 +44,7 @@ TASKS: dict[str, tuple[str, dict[str, Any]]] = {
 """What can be trained: an environment and its arguments."""
 
 ALGORITHMS = ("ppo", "sac")
-REWARDS = ("practice", "prior", "posterior")
+TRAINED_BY = ("practice", "error", "prior", "posterior")
 STARTS = ("pump", "design", "nothing")
 
 
@@ -78,7 +78,8 @@ class Plan:
         n_envs: Benches side by side.
         network: Units of the hidden layers.
         start: What is imitated before, see `envs.feedback`: "pump", "design", or "nothing".
-        reward: "practice" (see `envs.practice`), or the registered environment with the merit's "prior" or "posterior" average.
+        reward: "practice" (merit at each rig) or "error" (expected error at each rig, which has a background), see `envs.practice`; or
+            the registered environment with the merit's "prior" or "posterior" average.
         learning_rate: Of Adam, at the start; falls linearly.
         discount: Of rewards, a window.
         evaluate_every: Windows between evaluations, each with a checkpoint.
@@ -103,13 +104,22 @@ class Plan:
         for what, name, known in (
             ("task", self.task, TASKS),
             ("algorithm", self.algorithm, ALGORITHMS),
-            ("reward", self.reward, REWARDS),
+            ("reward", self.reward, TRAINED_BY),
             ("start", self.start, STARTS),
         ):
             if name not in known:
                 raise UnknownNameError(what, name, known)
+        if self.reward == "error" and self.task not in ("sdof", "joint"):
+            raise ParameterError(
+                f"reward \"error\" came with task '{self.task}', in which nothing is identified; sdof or joint is expected"
+            )
         if min(self.steps, self.n_envs, self.evaluate_every, self.n_held_out, *self.network) < 1:
             raise ParameterError(f"{self} has a number below one; steps, benches and units are positive")
+
+    @property
+    def scored(self) -> str:
+        """The reward by which policies are scored on held-out rigs."""
+        return "error" if self.reward == "error" else "information"
 
 
 class Score(NamedTuple):
@@ -124,7 +134,9 @@ class Score(NamedTuple):
     certain: float  # mean time to expected 99 % certainty [s], the duration where not reached (rivals only)
 
 
-def evaluate(policy: Policy, task: str, *, n: int = 96, seed: int = SETTINGS.held_out) -> Score:
+def evaluate(
+    policy: Policy, task: str, *, n: int = 96, seed: int = SETTINGS.held_out, reward: str = "information"
+) -> Score:
     """Run a policy for one test on each of `n` held-out rigs (practice benches).
 
     Args:
@@ -132,9 +144,12 @@ def evaluate(policy: Policy, task: str, *, n: int = 96, seed: int = SETTINGS.hel
         task: One of `TASKS`.
         n: Number of rigs.
         seed: Seed of the first; counted up.
+        reward: "information", or "error", of rigs with a background.
     """
     identifier, arguments = TASKS[task]
-    env = PracticeVectorEnv(KINDS[identifier], n, autoreset_mode=AutoresetMode.SAME_STEP, **arguments)
+    env = PracticeVectorEnv(
+        KINDS[identifier], n, autoreset_mode=AutoresetMode.SAME_STEP, reward=reward, **arguments
+    )
     observation, _ = env.reset(seed=seed)
     benches = env.benches
     alive = np.ones(n, dtype=bool)
@@ -229,8 +244,8 @@ class Scheduled(VecEnvWrapper):
 
 def _environment(plan: Plan, schedule: NDArray[np.float32]) -> VecNormalize:
     identifier, arguments = TASKS[plan.task]
-    practice = plan.reward == "practice"
-    rest = arguments if practice else {**arguments, "average": plan.reward}
+    practice = plan.reward in {"practice", "error"}
+    rest = {**arguments, **({"reward": plan.scored} if practice else {"average": plan.reward})}
     env = BenchVecEnv(identifier, plan.n_envs, practice=practice, **rest)
     env.seed(plan.seed)
     return VecNormalize(Scheduled(env, schedule), gamma=plan.discount)
@@ -411,7 +426,7 @@ class Trainer:
     def checkpoint(self, steps: int) -> None:
         """Evaluate on held-out rigs and save."""
         policy = self.policy()
-        score = evaluate(policy, self.plan.task, n=self.plan.n_held_out)
+        score = evaluate(policy, self.plan.task, n=self.plan.n_held_out, reward=self.plan.scored)
         best = max((row.score for row in self.curve), default=-math.inf)
         self.curve.append(score._replace(steps=steps, seconds=round(self.seconds, 1)))
         document = {"plan": asdict(self.plan), "curve": [row._asdict() for row in self.curve]}

@@ -64,7 +64,10 @@ def as_mjcf(source: Path, folder: Path) -> Path:
         return source
     parameters, values = nominal["parameters"], {n: p["value"] for n, p in nominal["parameters"].items()}
     if nominal["rig"] == "sdof":
-        text, names = SDOF.format(**values), {"mass": "mass:mass", "stiffness": "stiffness:x", "damping": "damping:x"}
+        text, names = (
+            SDOF.format(**values),
+            {"mass": "mass:mass", "stiffness": "stiffness:x", "damping": "damping:x"},
+        )
     else:
         text, names = _two_bodies(values)
     folder.mkdir(parents=True, exist_ok=True)
@@ -133,7 +136,9 @@ def attempt(source: Path, results: Path, verdicts: Path | None) -> dict[str, Any
     off = max(abs(f.short) for f in worth.figures)
     within = off <= VerificationSettings().short
     causes = [worth.remedy, worth.simulator_line]
-    causes += [f"{c.what}: {c.text}" for c in changes if c.form in ("step", "log", "none") or "diagnosis" in c.text]
+    causes += [
+        f"{c.what}: {c.text}" for c in changes if c.form in ("step", "log", "none") or "diagnosis" in c.text
+    ]
     return {
         "case": source.name, "verdict": verdict.verdict, "named": [e.name for e in findings.effects],
         "forms": sorted({c.form for c in changes if c.form != "number"}), "line": worth.line, "figures": figures, "off": off,
@@ -145,7 +150,9 @@ def told(row: dict[str, Any]) -> str:
     """A row as a line or two."""
     if "error" in row:
         return f"{row['case']:12s} {row['error']}"
-    words = "within 5 %" if row["within"] else f"{100 * row['off']:.0f} % off: {row['cause'] or 'no cause known'}"
+    words = (
+        "within 5 %" if row["within"] else f"{100 * row['off']:.0f} % off: {row['cause'] or 'no cause known'}"
+    )
     return f"{row['case']:12s} {' + '.join(row['named']) or row['verdict']:32s} {row['line']}: {words}"
 
 
@@ -162,7 +169,9 @@ def main() -> None:
     )
     parser.add_argument("cases", type=Path)
     parser.add_argument("results", type=Path)
-    parser.add_argument("--only", nargs="*", default=[""], help="beginnings of names, in the order in which they are run")
+    parser.add_argument(
+        "--only", nargs="*", default=[""], help="beginnings of names, in the order in which they are run"
+    )
     parser.add_argument("--verdicts", type=Path, help="folder of verdicts that are there already")
     parser.add_argument("--again", action="store_true", help="cases that have a result, too")
     parser.add_argument("--json", action="store_true", help="print JSON")

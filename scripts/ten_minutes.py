@@ -71,14 +71,23 @@ def pendulum(folder: Path) -> list[list[str]]:
     logs.mkdir()
     native = EFFECTS["frictionloss of a servo"]
     measure(logs, MODELS[native.model], native.change)
-    columns = ["--map", "command=elbow.command", "position=elbow.position", "--unit", "command=rad", "position=rad"]
+    columns = [
+        "--map",
+        "command=elbow.command",
+        "position=elbow.position",
+        "--unit",
+        "command=rad",
+        "position=rad",
+    ]
     return _from_logs([logs / f"{name}.csv" for name in RECORDS], logs / "model.xml", folder, columns)
 
 
 def so101(folder: Path, robots: Path) -> list[list[str]]:
     """Commands for logs of the SO-101 arm."""
     home = robots / "so101"
-    return _from_logs([home / "motions" / f"{name}.parquet" for name in SO101], home / "model.xml", folder, [])
+    return _from_logs(
+        [home / "motions" / f"{name}.parquet" for name in SO101], home / "model.xml", folder, []
+    )
 
 
 def attempt(name: str, commands: list[list[str]], folder: Path) -> dict[str, Any]:
@@ -87,9 +96,19 @@ def attempt(name: str, commands: list[list[str]], folder: Path) -> dict[str, Any
     for command in commands:
         began = time.perf_counter()
         done = subprocess.run(
-            [sys.executable, "-m", "bench.cli", *command], capture_output=True, text=True, cwd=ROOT, check=False
+            [sys.executable, "-m", "bench.cli", *command],
+            capture_output=True,
+            text=True,
+            cwd=ROOT,
+            check=False,
         )
-        steps.append({"command": f"jointbench {' '.join(command)}", "seconds": time.perf_counter() - began, "status": done.returncode})
+        steps.append(
+            {
+                "command": f"jointbench {' '.join(command)}",
+                "seconds": time.perf_counter() - began,
+                "status": done.returncode,
+            }
+        )
         if done.returncode != 0:
             steps[-1]["error"] = done.stderr.strip().splitlines()[-3:]
             break
@@ -127,7 +146,9 @@ def main() -> None:
         "mismatch": example("mismatch"), "arm": example("arm"), "pendulum": pendulum,
     }  # fmt: skip
     parser.add_argument("--only", nargs="*", choices=[*machines, "so101"], default=None)
-    parser.add_argument("--robots", type=Path, help="folder of robots' records; SO-101 is left out without it")
+    parser.add_argument(
+        "--robots", type=Path, help="folder of robots' records; SO-101 is left out without it"
+    )
     parser.add_argument("--json", action="store_true", help="print JSON")
     asked = parser.parse_args()
     if asked.robots is not None:

@@ -35,7 +35,8 @@ class Args:
         seed: Seed.
         n_envs: Benches side by side.
         start: pump (imitates a push along the velocity), design (corrects a D-optimal multisine), or nothing.
-        reward: practice (merit at each rig itself), or prior or posterior (as the registered environments).
+        reward: practice (merit at each rig itself), error (expected error at each rig), or prior or posterior (as the registered
+            environments).
         learning_rate: Of Adam.
         discount: Of rewards, a window.
         out: Folder for checkpoint, curve and best policy; by default out/policies/TASK.
@@ -94,7 +95,7 @@ def main() -> int:
     shipped = None
     if args.task in policy_names():
         known = find_policy(args.task)
-        shipped = evaluate(known, args.task, n=plan.n_held_out)._replace(
+        shipped = evaluate(known, args.task, n=plan.n_held_out, reward=plan.scored)._replace(
             steps=known.about["steps"], seconds=known.about["seconds"]
         )
     if args.json:

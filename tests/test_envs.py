@@ -25,15 +25,17 @@ from envs.options import Options
 from envs.setups import PAIRS, SDOF_LAWS, discrimination_setup, joint_setup, sdof_setup
 from envs.stepped import FLOATS
 
-SDOF, JOINT, DISCRIMINATION = envs.IDS
+SDOF, JOINT, DISCRIMINATION = envs.IDS[:3]
 QUICK: dict[str, Any] = {"rig": "sdof", "pairs": ("gap_cubic", "coulomb_stribeck"), "n_draws": 2}
 VARIANTS: list[tuple[str, dict[str, Any]]] = [
     (SDOF, {}),
     (SDOF, {"shaping": "amplitude_frequency", "enforcement": "cost", "average": "posterior"}),
     (SDOF, {"laws": ("gap",), "n_knots": 2, "window": 0.08, "duration": 1.0, "n_draws": 3, "penalty": 0.0}),
     (SDOF, {"laws": ("bouc_wen", "coulomb")}),
+    (SDOF, {"reward": "error"}),
     (JOINT, {}),
     (JOINT, {"reward": "coverage", "n_draws": 1}),
+    (JOINT, {"reward": "error"}),
     (JOINT, {"shaping": "amplitude_frequency", "n_draws": 2, "average": "posterior"}),
     (DISCRIMINATION, {}),
     (DISCRIMINATION, {**QUICK, "shaping": "amplitude_frequency"}),
@@ -403,6 +405,8 @@ def test_documentation_states_every_argument_and_limit() -> None:
         (SDOF, {"shaping": "knot"}, "Did you mean 'knots'"),
         (SDOF, {"enforcement": "stop"}, "terminate"),
         (SDOF, {"average": "mean"}, "posterior"),
+        (SDOF, {"reward": "eror"}, "Did you mean 'error'"),
+        (DISCRIMINATION, {**QUICK, "reward": "error"}, "rivals have not"),
         (SDOF, {"window": 1e-4}, "at least one step"),
         (SDOF, {"n_knots": 0}, "at least one"),
         (SDOF, {"n_draws": 1}, "at least one each"),

@@ -14,10 +14,11 @@ from gymnasium.vector import AutoresetMode
 import envs
 from bench.errors import BenchError, ParameterError
 
-SDOF, JOINT, DISCRIMINATION = envs.IDS
+SDOF, JOINT, DISCRIMINATION = envs.IDS[:3]
 VARIANTS: list[tuple[str, dict[str, Any]]] = [
     (SDOF, {"duration": 0.4}),
     (SDOF, {"duration": 0.3, "average": "posterior", "shaping": "amplitude_frequency"}),
+    (SDOF, {"duration": 0.3, "reward": "error"}),
     (JOINT, {"duration": 0.14, "n_draws": 2}),
     (
         DISCRIMINATION,

@@ -469,6 +469,12 @@ def test_an_episode_tells_the_limits_and_what_is_known_by_when(tmp_path):
     assert record["information"].max() == pytest.approx(
         float(asked.experiment.merit(controls[None])[0]), rel=0.01
     )
+    unknown = [name for name in record.names if name.startswith("unknown/")]
+    assert unknown == [f"unknown/{name}" for name in asked.experiment.question.hypotheses[0].names]
+    for name in unknown:  # a record that goes on never knows less
+        assert record[name][0] == 1.0
+        assert np.all(np.diff(record[name]) <= 1e-9)
+    assert min(record[name][-1] for name in unknown) < 0.2
     path = log_episode(tmp_path / "episode.rrd", asked.rig, asked.experiment, controls)
     assert path is not None
     assert path.stat().st_size > 10_000

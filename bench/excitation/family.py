@@ -78,6 +78,12 @@ class Family:
                     "stiffnesses, dampings and parameters of laws are, masses and inertias are not: make those known"
                 )
 
+    def __reduce__(self) -> tuple:
+        return (
+            Family,
+            (self.hypothesis, self.channels, self.actuators),
+        )  # addresses of kernels hold in one process
+
     @property
     def n_parameters(self) -> int:
         """Number of uncertain parameters."""

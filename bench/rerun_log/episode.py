@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.excitation import Experiment
+from bench.excitation import Experiment, RigPrior, Sensitivity, fisher_information, sensitivity
+from bench.excitation.information import noise_vector
 from bench.recording import Recording
 from bench.rerun_log.comparison import log_comparison
 from bench.rig import Rig, simulate
@@ -26,8 +27,9 @@ def episode_record(
         n_told: Instants at which the information is told; each costs a simulation of every drawn rig.
 
     Returns:
-        The record, with "limit/…" for each limited channel, force and energy [1] (1 at the limit), and "information" [1] (nat; of
-        rivals the mean logarithm of the expected Bayes factor).
+        The record, with "limit/…" for each limited channel, force and energy [1] (1 at the limit), "information" [1] (nat; of
+        rivals the mean logarithm of the expected Bayes factor), and, where parameters are asked for, "unknown/…" for each [1]: the
+        standard deviation that is left of it, 1 before the test.
     """
     limits = experiment.limits
     record = simulate(rig, {name: controls[:, i] for i, name in enumerate(limits.actuators)})
@@ -47,8 +49,31 @@ def episode_record(
     # A test that ends there: what the free decay after it would tell is not known yet.
     told = np.array([0.0, *(float(experiment.merit(controls[None, :end])[0]) for end in ends)])
     course = np.interp(np.arange(n), np.concatenate([[0], ends]), told)
-    arrays = shares | {"information": course}
+    arrays = shares | {"information": course} | _unknown(experiment, controls, ends, n)
     return record.with_channels(arrays, units=dict.fromkeys(arrays, "1"))
+
+
+def _unknown(
+    experiment: Experiment, controls: NDArray[np.float64], ends: NDArray[np.int64], n: int
+) -> dict[str, NDArray[np.float64]]:
+    """What is left of each parameter's prior standard deviation, mean over the drawn rigs that have it, at the n samples."""
+    if not isinstance(experiment.question, RigPrior):
+        return {}
+    noise = noise_vector(experiment.noise, experiment.channels)
+    drive = {name: controls[:, i] for i, name in enumerate(experiment.actuators)}
+    left: dict[str, list[NDArray[np.float64]]] = {}
+    for draw in experiment.rigs_drawn:
+        output, jacobian = sensitivity(draw, drive, channels=experiment.channels)
+        parts = [fisher_information(Sensitivity(output[:end], jacobian[:end]), noise) for end in ends]
+        covariance = np.linalg.inv(np.eye(jacobian.shape[-1]) + np.stack(parts))
+        deviation = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
+        for name, course in zip(draw.hypothesis.names, deviation.T, strict=True):
+            left.setdefault(f"unknown/{name}", []).append(course)
+    knots = np.concatenate([[0], ends])
+    return {
+        name: np.interp(np.arange(n), knots, np.concatenate([[1.0], np.mean(courses, axis=0)]))
+        for name, courses in left.items()
+    }
 
 
 def _long(values: NDArray[np.float64], n: int) -> NDArray[np.float64]:

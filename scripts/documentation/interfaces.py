@@ -8,10 +8,12 @@ import os
 import re
 from contextlib import redirect_stdout, suppress
 
+import gymnasium
+from gymnasium.envs.registration import load_env_creator
+
 import envs
 from bench.cli import COMMANDS, main
 from bench.cli.schema import KINDS, generated
-from envs import single
 
 WIDTH = "100"
 """Columns of the help texts."""
@@ -30,7 +32,7 @@ def environments() -> dict[str, str]:
     made = {}
     for identifier in envs.IDS:
         slug = identifier.partition("/")[2]
-        text = inspect.getdoc(getattr(single, slug.removesuffix("-v0") + "Env")) or ""
+        text = inspect.getdoc(load_env_creator(str(gymnasium.spec(identifier).entry_point))) or ""
         question = text.partition("\n")[0]
         index.append(f"| [`{identifier}`]({slug}.md) | {question} |")
         # rst's double backquotes are Markdown's single ones

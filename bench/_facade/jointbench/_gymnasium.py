@@ -22,6 +22,7 @@ IDS = (
     "JointBench/SDOFExcitation-v0",
     "JointBench/JointExcitation-v0",
     "JointBench/Discrimination-v0",
+    "JointBench/ModelExcitation-v0",
 )
 """Those of `envs.IDS`, which is not imported for this."""
 
@@ -32,10 +33,11 @@ def register() -> None:
     for identifier in IDS:
         name = identifier.partition("/")[2].removesuffix("-v0")
         if identifier not in module.registry:
+            single, vector = ("model", "model") if name == "ModelExcitation" else ("single", "vector")
             module.register(
                 id=identifier,
-                entry_point=f"jointbench.envs.single:{name}Env",
-                vector_entry_point=f"jointbench.envs.vector:{name}VectorEnv",
+                entry_point=f"jointbench.envs.{single}:{name}Env",
+                vector_entry_point=f"jointbench.envs.{vector}:{name}VectorEnv",
             )
 
 

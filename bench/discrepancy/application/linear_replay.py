@@ -84,7 +84,7 @@ class LinearReplay:
             out[name] = error if np.isfinite(error).all() else np.full(len(error), DIVERGED_GAP)
         return out
 
-    def readings(
+    def sensed(
         self, applied: Applied, effects: Sequence[NamedEffect], record: CaseRecord
     ) -> dict[str, Array]:
         """What the response channels read (n,) when a model plays a record's loads; of wrong sensors what they say."""

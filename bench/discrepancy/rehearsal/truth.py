@@ -92,7 +92,7 @@ class Laboratory:
             of_joints = _OfJoints(bound(case, nominal), ArticulatedModel.of(nominal, case.rig))
             return cls(case, path, of_joints.readings, articulated)
         # a free run from rest, however far it drifts: this is what a machine does
-        return cls(case, path, LinearReplay(case, structure_of(case), windowed=False).readings, articulated)
+        return cls(case, path, LinearReplay(case, structure_of(case), windowed=False).sensed, articulated)
 
     @native.quiet()
     def measured(self, findings: Findings, rng: np.random.Generator, *, noisy: bool = True) -> Case:

@@ -1,0 +1,96 @@
+"""The background of a rig: small forces that no hypothesis holds, and what they leave of an identification that does not know them.
+
+A real rig is never one of the hypotheses. Its spring is not quite straight, its damper not quite linear; an excitation that lives on
+what no real rig repeats, as on motions that part exponentially, tells much of a model and nothing of the rig. To first order the least
+squares estimate of the parameters, with their standardised prior, is off by ``(I + F)^-1 (J' (e + d) - x)``: F the information in
+the parameters x, J the whitened derivatives at the rig without its background, e the noise and d what the background does to the
+record. Noise and prior leave the covariance ``(I + F)^-1``, and the record of the background leaves a bias that does not shrink as the
+record gets longer.
+
+References:
+    Box, Draper 1959, J. American Statistical Association 54(287) (variance and bias of designs where the model is wrong);
+    Ljung 1999, "System Identification", chapter 13 (the same for records).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.excitation.prior import Hypothesis, Uncertain
+from bench.laws import find_law
+from bench.rig import Element
+
+
+@dataclass(frozen=True)
+class BackgroundSettings:
+    """Numbers of `bench.excitation.background`."""
+
+    step: float = 1e-2
+    """Step of the differences in standard deviations: what identifications leave of the prior. Over much smaller steps motion that is
+    chaotic seems to tell more than any fit finds in it; over larger ones kinks are passed."""
+
+
+SETTINGS = BackgroundSettings()
+
+
+@dataclass(frozen=True)
+class BackgroundTerm:
+    """A force that is there besides what a hypothesis holds.
+
+    Attributes:
+        law: Name of a law that is linear in its parameter.
+        joint: Joint on which it acts.
+        parameter: The parameter.
+        deviation: Its standard deviation about zero, in the parameter's unit.
+    """
+
+    law: str
+    joint: str
+    parameter: str
+    deviation: float
+
+    @property
+    def name(self) -> str:
+        """Name of its element."""
+        return f"background_{self.joint}_{self.law}"
+
+    @property
+    def uncertain(self) -> Uncertain:
+        """The parameter, uniform about zero."""
+        reach = math.sqrt(3.0) * self.deviation
+        return Uncertain(f"{self.name}.{self.parameter}", -reach, reach, "linear")
+
+
+def with_background(hypothesis: Hypothesis, terms: tuple[BackgroundTerm, ...]) -> Hypothesis:
+    """A hypothesis whose rigs have a background; its coordinates come after those of the hypothesis.
+
+    Args:
+        hypothesis: The hypothesis.
+        terms: The background.
+    """
+    elements = []
+    for term in terms:
+        law = find_law(term.law)
+        elements.append(Element(law, (term.joint,), law.theta(**{term.parameter: 0.0}), name=term.name))
+    rig = hypothesis.rig.with_(elements=(*hypothesis.rig.elements, *elements))
+    parameters = (*hypothesis.parameters, *(term.uncertain for term in terms))
+    return Hypothesis(hypothesis.name, rig, parameters, hypothesis.weight)
+
+
+def expected_error(information: NDArray[np.float64], score: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Error that an identification is expected to leave, root mean square over the parameters [prior standard deviations] ``(…)``.
+
+    Args:
+        information: ``F = J'J`` ``(…, p, p)``.
+        score: ``J'd`` ``(…, p)``, d the whitened difference between the noiseless records of the rig and of the rig without
+            its background; `bench.excitation.information.accumulate` sums both.
+    """
+    p = score.shape[-1]
+    covariance = np.linalg.inv(np.eye(p) + information)
+    bias = np.einsum("...ij,...j->...i", covariance, score)
+    square = np.trace(covariance, axis1=-2, axis2=-1) + np.sum(bias**2, axis=-1)
+    return np.sqrt(square / p)

@@ -1,0 +1,1 @@
+"""Experiments with excitation policies: what a reward is worth, training, evaluation."""

@@ -1,0 +1,130 @@
+"""Policies trained for different rewards, beside a planner and an open-loop design, on held-out rigs without and with a background."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from evaluate_excitation import HELD_OUT, interval, middle
+from numpy.typing import NDArray
+
+from bench.excitation import Planner, Policy, RigPrior, estimate
+from bench.excitation.closed_loop import Runs, disturbances, run_commands, run_policy
+from bench.excitation.stepping import Packed
+from envs.setups import Setup
+
+from .trials import kinds_of, open_loop
+
+Source = Policy | Planner | NDArray[np.float64]
+BASELINES = ("random_multisine", "schroeder", "crest_multisine", "log_sweep", "prbs", "d_optimal")
+
+
+def trained(
+    task: str, rewards: tuple[str, ...], seeds: int, steps: int, folder: Path, tell: Callable[[str], None]
+) -> dict[str, Policy]:
+    """A policy for each reward and seed; stopped, the same call goes on.
+
+    Args:
+        task: sdof or joint.
+        rewards: "practice", "error", or those of the registered environments.
+        seeds: Seeds from 0 on.
+        steps: Windows of each training.
+        folder: Checkpoints, in a folder for each.
+        tell: Called with what is done.
+    """
+    from envs.training import Plan, Trainer
+
+    policies = {}
+    for reward in rewards:
+        for seed in range(seeds):
+            plan = Plan(task, steps=steps, seed=seed, reward=reward)
+            label = f"policy for {reward}, seed {seed}"
+            trainer = Trainer(plan, folder / f"{task}-{reward}-{seed}")
+            policies[label] = trainer.run(
+                progress=lambda text, share, of=label: tell(f"{of}: {100 * share:.0f} %, {text}")
+            )
+    return policies
+
+
+def contest(
+    setup: Setup, policies: dict[str, Policy], *, seeds: int, rigs: int, tell: Callable[[str], None]
+) -> list[dict[str, Any]]:
+    """One row a held-out rig and method: what identification leaves, and how many windows passed a limit.
+
+    Args:
+        setup: The laboratory.
+        policies: Policies by name.
+        seeds: Seeds of rigs.
+        rigs: Rigs a seed, each without and with its background.
+        tell: Called with what is done.
+    """
+    prior, station = setup.questions[0], setup.station()
+    assert isinstance(prior, RigPrior)
+    tell("designing")
+    opened = open_loop(setup, np.random.default_rng(HELD_OUT - 1))
+    planner = Planner(prior, station, opened["d_optimal"])
+    sources: dict[str, Source] = {**opened, "planner": planner, **policies}
+    noise = np.array([station.noise[name] for name in station.channels])
+    rows = []
+    for seed in range(seeds):
+        rng = np.random.default_rng(HELD_OUT + seed)
+        for kind in kinds_of(setup, rigs, rng):
+            n = len(kind.coordinates)
+            for real in (False, True):
+                packed = kind.real.packed(np.concatenate([kind.coordinates, real * kind.background], axis=1))
+                disturbance = disturbances(station, n, rng)
+                for name, source in sources.items():
+                    tell(f"seed {seed}, {kind.family.hypothesis.name}: {name}")
+                    runs = _run(source, setup, packed, disturbance, seed)
+                    off = estimate(kind.family, runs.records, noise).coordinates - kind.coordinates
+                    rows += [
+                        {
+                            "method": name, "seed": seed, "kind": kind.family.hypothesis.name, "background": real,
+                            "error": float(np.sqrt(np.mean(off[i] ** 2))),
+                            "violations": int(runs.violations[i]), "windows": int(runs.windows[i]),
+                        }
+                        for i in range(n)
+                    ]  # fmt: skip
+    return rows
+
+
+def _run(source: Source, setup: Setup, packed: Packed, disturbance: NDArray[np.float64], seed: int) -> Runs:
+    if isinstance(source, Policy):
+        return run_policy(source, packed, disturbance)
+    if isinstance(source, Planner):
+        return source.run(packed, disturbance, seed=seed)
+    return run_commands(setup.station(), source, packed, disturbance)
+
+
+def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """Interquartile means with 95 % intervals, and ratios to the best open-loop method, without and with a background, by kind."""
+    kinds = ["all", *dict.fromkeys(row["kind"] for row in rows)]
+    return {
+        where: {kind: _group([r for r in rows if r["background"] is real and kind in {"all", r["kind"]}]) for kind in kinds}
+        for where, real in (("without background", False), ("with background", True))
+    }  # fmt: skip
+
+
+def _group(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    methods = list(dict.fromkeys(row["method"] for row in rows))
+    of = {name: [row for row in rows if row["method"] == name] for name in methods}
+    errors = {name: np.array([row["error"] for row in mine]) for name, mine in of.items()}
+    seeds = np.array([row["seed"] for row in of[methods[0]]])
+    best = min(BASELINES, key=lambda name: middle(errors[name]))
+    entry = {}
+    for name, mine in of.items():
+        pair = np.stack([errors[name], errors[best]], axis=1)
+        entry[name] = {
+            "error": middle(errors[name]),
+            "interval": interval(pair, seeds, lambda x: middle(x[:, 0])),
+            "ratio": middle(errors[name]) / middle(errors[best]),
+            "ratio_interval": interval(pair, seeds, lambda x: middle(x[:, 0]) / middle(x[:, 1])),
+            "best_open_loop": best,
+            "violations_percent": 100.0
+            * sum(r["violations"] for r in mine)
+            / sum(r["windows"] for r in mine),
+            "rigs": len(mine),
+        }
+    return entry
