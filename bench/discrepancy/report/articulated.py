@@ -21,7 +21,7 @@ from bench.discrepancy.judgement.shares import closed_words
 from bench.discrepancy.report.answers import level
 from bench.discrepancy.report.ghost import with_ghost
 from bench.discrepancy.report.interactive import histories, matrix_plot
-from bench.discrepancy.report.opening import add_ranking, opened, with_applied
+from bench.discrepancy.report.opening import add_next_test, add_ranking, opened, with_applied
 from bench.discrepancy.report.simulated_records import MEASURED, NOMINAL
 from bench.discrepancy.verdict import InSimulator
 from bench.errors import ModelError
@@ -92,6 +92,7 @@ def articulated_page(
     _how_far(out, diagnosis, runs)
     _where(out, diagnosis)
     _parameters(out, diagnosis)
+    add_next_test(out, diagnosis.verdict.next_excitation)
     return out
 
 

@@ -19,7 +19,7 @@ from bench.discrepancy.report.articulated import articulated_page
 from bench.discrepancy.report.interactive import correlation_plot, histories, waterfall_plot
 from bench.discrepancy.report.locations import location_section
 from bench.discrepancy.report.model_update import recipes
-from bench.discrepancy.report.opening import add_ranking, opened, window, with_applied
+from bench.discrepancy.report.opening import add_next_test, add_ranking, opened, window, with_applied
 from bench.discrepancy.report.simulated_records import MEASURED, NOMINAL, judged, variants
 from bench.discrepancy.verdict import InSimulator
 from bench.page import Page
@@ -50,8 +50,7 @@ def page(
     if verdict.ranking:
         _ranking_section(out, diagnosis)
     _parameter_section(out, diagnosis)
-    if verdict.next_excitation:
-        _next_section(out, verdict.next_excitation)
+    add_next_test(out, verdict.next_excitation)
     _application_section(out, diagnosis)
     return out
 
@@ -166,31 +165,6 @@ def _parameter_section(out: Page, diagnosis: Diagnosis) -> None:
                 [correlation_plot([labels[i] for i in free], correlation)],
                 "Correlations of the estimates; a pair near one in magnitude is known as a combination only.",
             )
-
-
-def _next_section(out: Page, proposal: Mapping) -> None:
-    section = out.section(
-        "The next test" if proposal.get("excitation") else "What these records could have shown"
-    )
-    if proposal.get("reason"):
-        section.text(str(proposal["reason"]))
-    if not proposal.get("excitation"):
-        return
-    first, second = proposal["separates"]
-    section.text(
-        f"To tell {first} from {second}: {proposal['excitation']}, for {proposal['duration_s']:.3g} s. It is expected to bring "
-        f"log odds of {proposal['expected_log_odds']:.3g}; with a probability of {100 * proposal['power']:.0f} % the true one of "
-        f"the two is then known with 99 %. The present records give {proposal['log_odds_now']:.3g}."
-    )
-    rows = [(name, f"{value:.4g}") for name, value in proposal["peak_loads"].items()]
-    rows += [(name, f"{value:.4g}") for name, value in proposal["largest_response"].items()]
-    section.table("Largest values, within what the records show the rig to do", ("channel", "peak"), rows)
-    repeating = proposal.get("repeating")
-    if repeating:
-        section.text(
-            f"Repeating the longest present record instead: expected log odds {repeating['expected_log_odds']:.3g}, "
-            f"probability of a decision {100 * repeating['power']:.0f} %."
-        )
 
 
 def _application_section(out: Page, diagnosis: Diagnosis) -> None:

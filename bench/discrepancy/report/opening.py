@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -130,3 +131,36 @@ def window(runs: Mapping[str, Recording], channel: str) -> tuple[float, float]:
     middle = float(measured.time[int(np.argmax(np.abs(error)))])
     start = float(np.clip(middle - 0.5 * width, first, last - width))
     return start, start + width
+
+
+def add_next_test(out: Page, proposal: Mapping[str, Any]) -> None:
+    """Tell the test that would separate what the records leave open, or why none is known; nothing where they decide.
+
+    Args:
+        out: The page.
+        proposal: `next_excitation` of a verdict.
+    """
+    if not proposal:
+        return
+    section = out.section(
+        "The next test" if proposal.get("excitation") else "What these records could have shown"
+    )
+    if proposal.get("reason"):
+        section.text(str(proposal["reason"]))
+    if not proposal.get("excitation"):
+        return
+    first, second = proposal["separates"]
+    section.text(
+        f"To tell {first} from {second}: {proposal['excitation']}, for {proposal['duration_s']:.3g} s. It is expected to bring "
+        f"log odds of {proposal['expected_log_odds']:.3g}; with a probability of {100 * proposal['power']:.0f} % the true one of "
+        f"the two is then known with 99 %. The present records give {proposal['log_odds_now']:.3g}."
+    )
+    rows = [(name, f"{value:.4g}") for name, value in proposal["peak_loads"].items()]
+    rows += [(name, f"{value:.4g}") for name, value in proposal["largest_response"].items()]
+    section.table("Largest values, within what the records show the rig to do", ("channel", "peak"), rows)
+    repeating = proposal.get("repeating")
+    if repeating:
+        section.text(
+            f"Repeating the longest present record instead: expected log odds {repeating['expected_log_odds']:.3g}, "
+            f"probability of a decision {100 * repeating['power']:.0f} %."
+        )
