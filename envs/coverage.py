@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from bench.errors import ParameterError
 from bench.excitation import Coverage, CoverageSettings
 
-from .setups import Setup
+from .places import StationSetup
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ SETTINGS = CoverageRewardSettings()
 class CoverageReward:
     """Coverage of several benches, over the strokes and velocities within their limits."""
 
-    def __init__(self, setup: Setup, n: int) -> None:
+    def __init__(self, setup: StationSetup, n: int) -> None:
         """Open the books.
 
         Raises:

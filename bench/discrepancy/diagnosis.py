@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -220,7 +220,7 @@ def _diagnose(case: Case, how: How, rng: np.random.Generator, anyway: bool) -> D
     return Diagnosis(case, problem, tuple(explanations), verdict, final, where)
 
 
-def _kind(finding: Finding, seen: Sequence[NamedEffect]) -> tuple[Kind, Mapping[str, float]]:
+def _kind(finding: Finding, seen: Sequence[NamedEffect]) -> tuple[Kind, dict[str, float]]:
     """Kind of the verdict and the probabilities of all kinds, with effects that were read off the samples."""
     if not seen or finding.kind != "none":
         return finding.kind, finding.probabilities

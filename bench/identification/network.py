@@ -38,6 +38,7 @@ from bench.identification.network_training import (
     TrainingData,
     held_out_split,
     spread_order,
+    train,
 )
 from bench.identification.polynomial import slopes_beyond
 from bench.identification.validity_range import ValidityRange
@@ -249,9 +250,9 @@ def fit_network(
     _check(s, f, counts, validation_fraction)
     raw = np.hstack([s, a])
     scaling = _Scaling(*centre_and_scale(raw), *centre_and_scale(f))
-    train, held_out = held_out_split(len(s), validation_fraction, rng)
+    fitted, held_out = held_out_split(len(s), validation_fraction, rng)
     inputs = (raw - scaling.input_centre) / scaling.input_scale
-    order = spread_order(inputs, train, rng)
+    order = spread_order(inputs, fitted, rng)
     data = TrainingData(inputs, (f - scaling.output_centre) / scaling.output_scale, order, held_out)
     most = len(order) if max_samples is None else min(max_samples, len(order))
     sizes = tuple(max(most >> (n_stages - 1 - stage), min(100, most)) for stage in range(n_stages))
@@ -262,7 +263,7 @@ def fit_network(
     with threadpool_limits(1, user_api="blas"), ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
         starts = train(data, training, rng, pool.map)
     weights = _in_physical_units(starts[0].weights, data, n_hidden, scaling)
-    judged = held_out if len(train) < len(s) else None
+    judged = held_out if len(fitted) < len(s) else None
     report = _report(starts, f, weights(raw), judged, n_samples=sizes[-1], seconds=time.monotonic() - begun)
     mass, deviation = _mass(weights, raw[order[:most]]) if a.shape[1] else (None, None)
     model = NetworkModel(weights, ValidityRange.of(s), report, mass, deviation)

@@ -142,6 +142,7 @@ def sets(true: Rig, seed: int, timestep: float, progress: Progress) -> Sets:
     pilot = simulate(true, both, rng=np.random.default_rng(noise[0]), sample_rate=laboratory.SETUP.rate)
     progress("a rough joint from the first record")
     data = laboratory.view(laboratory.measured(pilot, rng))
+    assert data.time is not None
     rough = fit_memory(data.states, data.forces, time=data.time, form="sliders", refine=0)
     twin = laboratory.rig().with_(elements=(Element(rough.law, laboratory.AXES, rough.theta, name="joint"),))
     pool = candidates(rng)

@@ -47,11 +47,8 @@ def rows(progress: Progress) -> list[Row]:
     data = laboratory.view(*records)
     assert data.time is not None
     found = []
-    for label, changes in (
-        ("memory, sliders", {"form": "sliders"}),
-        ("memory, profiles", {"form": "profiles"}),
-    ):
-        model = fit_memory(data.states, data.forces, time=data.time, **changes)
+    for label, form in (("memory, sliders", "sliders"), ("memory, profiles", "profiles")):
+        model = fit_memory(data.states, data.forces, time=data.time, form=form)
         element = Element(model.law, laboratory.AXES, model.theta, name="joint")
         for integrator in ("RK4", "implicitfast"):
             compiled = laboratory.rig().with_(elements=(element,), integrator=integrator).model

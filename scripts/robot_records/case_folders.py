@@ -101,7 +101,8 @@ def write_folder(records: Records, folder: Path) -> None:
         }  # fmt: skip
         channels[axis.position] = {
             "unit": "rad", "joint": axis.joint, "quantity": "position", "noise_std": axis.noise,
-        } | ({"resolution": axis.resolution} if axis.resolution else {})  # fmt: skip
+            **({"resolution": axis.resolution} if axis.resolution else {}),
+        }  # fmt: skip
         if axis.velocity:
             channels[axis.velocity] = {
                 "unit": "rad/s", "joint": axis.joint, "quantity": "velocity", "noise_std": axis.velocity_noise,

@@ -52,7 +52,7 @@ def controls(
 ) -> Array:
     """Controls (steps, nu) of the actuators in `columns`, in the middle of every step; zero for the others."""
     step = float(model.opt.timestep)
-    middles = (np.arange(steps) + 0.5) * step / record.step
+    middles = np.arange(0.5, steps) * (step / record.step)
     out = np.zeros((steps, model.nu))
     for name, samples in columns.items():
         out[:, model.actuator(name).id] = at_times(samples, middles, interpolation)
