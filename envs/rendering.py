@@ -50,9 +50,8 @@ class RenderedPicture:
             self._renderer = mujoco.Renderer(self.rig.scene, SETTINGS.height, SETTINGS.width)
         self._place(positions)
         own = mujoco.mj_name2id(self.rig.scene, mujoco.mjtObj.mjOBJ_CAMERA, CAMERA)
-        self._renderer.update_scene(
-            self._data, camera=own
-        )  # a free camera where a user's model has none of this name
+        # -1 is a free camera: a user's model has none of this name
+        self._renderer.update_scene(self._data, camera=own)
         return self._renderer.render()
 
     def show(self, positions: NDArray[np.float64]) -> None:

@@ -152,7 +152,7 @@ def spoil_robot(folder: Path, rng: np.random.Generator) -> None:
 def read_robot(folder: Path) -> None:
     """Admit the case to the diagnosis, by the engine that it is for."""
     from bench.discrepancy.articulated.admission import admitted_robot
-    from bench.discrepancy.articulated.diagnosis import applies
+    from bench.discrepancy.articulated.recognition import applies
     from bench.discrepancy.case.reading import read_case
     from bench.discrepancy.checks.admission import admitted
 

@@ -21,11 +21,21 @@ from bench.documents.loading import load_document
 from bench.errors import BenchError, ParameterError
 from bench.files import json_values, write_text
 
-SIZES = (0.3, 0.1, 0.03, 0.01)
-"""Parts of a response's standard deviation by which an effect changes it: from what nobody overlooks to what a good model is off by."""
 STORE = "rehearsal.json"
 """Name of the file that holds what is done."""
 Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class RehearsalSettings:
+    """Numbers of `bench.discrepancy.rehearsal.rehearsing`."""
+
+    sizes: tuple[float, ...] = (0.3, 0.1, 0.03, 0.01)
+    """Parts of a response's standard deviation by which an effect changes it: from what nobody overlooks to what a good model is off
+    by."""
+
+
+SETTINGS = RehearsalSettings()
 
 
 @dataclass(frozen=True)
@@ -138,7 +148,7 @@ def rehearse(
     folder: Path,
     *,
     effects: Sequence[str] = (),
-    sizes: Sequence[float] = SIZES,
+    sizes: Sequence[float] = SETTINGS.sizes,
     seed: int = 0,
     again: bool = False,
     progress: Progress = lambda text, share: None,
