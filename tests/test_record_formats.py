@@ -76,7 +76,8 @@ def _mat(folder):
 
 
 def _mat73(folder):
-    h5py = pytest.importorskip("h5py")
+    import h5py
+
     path = folder / "run.mat"
     with h5py.File(path, "w", userblock_size=512) as file:
         for name, values in (("time", T), ("q", Q), ("u", U)):
@@ -87,7 +88,8 @@ def _mat73(folder):
 
 
 def _hdf5(folder):
-    h5py = pytest.importorskip("h5py")
+    import h5py
+
     path = folder / "run.h5"
     with h5py.File(path, "w") as file:
         for name, values in (("time", T), ("q", Q), ("u", U)):
@@ -119,7 +121,8 @@ def _lvm(folder):
 
 
 def _tdms(folder):
-    nptdms = pytest.importorskip("nptdms")
+    import nptdms
+
     path = folder / "run.tdms"
     with nptdms.TdmsWriter(str(path)) as writer:
         clock = {"wf_increment": 1.0 / RATE, "wf_start_offset": 0.0}
@@ -132,7 +135,8 @@ def _tdms(folder):
 
 
 def _uff(folder):
-    pyuff = pytest.importorskip("pyuff")
+    import pyuff
+
     path = folder / "run.uff"
     for k, (name, x) in enumerate((("q", Q), ("u", U))):
         data = {
@@ -144,7 +148,7 @@ def _uff(folder):
 
 
 def _bag(folder, plugin):
-    rosbags = pytest.importorskip("rosbags.rosbag2")
+    import rosbags.rosbag2 as rosbags
     from rosbags.typesys import Stores, get_typestore
 
     store = get_typestore(Stores.ROS2_HUMBLE)

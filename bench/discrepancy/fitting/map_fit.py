@@ -10,7 +10,6 @@ References:
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,12 +59,6 @@ class Fit:
     def covariance(self) -> Array:
         """Posterior covariance of the vector."""
         return np.asarray(np.linalg.inv(self.precision), dtype=np.float64)
-
-
-def start_vector(simulator: Simulator, etas: Sequence[Array], deviations: Array | None = None) -> Array:
-    """Join nominal deviations (zero where None) and the etas of the effects."""
-    head = np.zeros(len(simulator.nominal)) if deviations is None else deviations
-    return np.concatenate([head, *etas])
 
 
 def free_entries(

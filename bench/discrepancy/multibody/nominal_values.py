@@ -11,10 +11,6 @@ from bench.discrepancy.case.case import NominalParameter
 from bench.errors import UnknownNameError
 from bench.rig import Rig
 
-INERTIAL = ("mass", "inertia")
-"""Parameters of bodies."""
-
-
 LOCAL = ("damping", "frictionloss", "armature", "stiffness")
 """Parameters of joints."""
 
