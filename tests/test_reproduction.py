@@ -240,14 +240,11 @@ def test_the_chain_comes_to_rest_where_statics_say():
 
 
 def test_integration_without_hysteresis_is_an_oscillator():
-    from bench.reproduction.simulated_hysteresis import (
-        SIMULATED_HYSTERESIS_SETUP,
-        integrate,
-    )
+    from bench.reproduction.bouc_wen_rig import SETUP, integrate
 
     n = 4000
     rows = integrate(np.full(n, 2.0), [np.array([5.0, 0.0, 0.0, 0.0, 0.0])] * n)
-    time = np.arange(n) / SIMULATED_HYSTERESIS_SETUP.rate
+    time = np.arange(n) / SETUP.rate
     # RK4 at omega h = 2e-3: (omega h)^4 / 120 of a radian a radian, far below 1e-10
     np.testing.assert_allclose(rows[:, 0], 0.4 * (1.0 - np.cos(math.sqrt(5.0) * time)), atol=1e-10)
     np.testing.assert_allclose(rows[:, 2], 2.0 * np.cos(math.sqrt(5.0) * time), atol=1e-9)
