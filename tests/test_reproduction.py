@@ -251,7 +251,7 @@ def test_integration_without_hysteresis_is_an_oscillator():
 
 
 def test_the_encoders_lag_as_the_load_cells_do():
-    from bench.reproduction import laboratory_joint as laboratory
+    from bench.reproduction import laboratory
     from bench.rig import simulate
 
     true = simulate(laboratory.rig(), laboratory.drive((True, True)), rng=np.random.default_rng(1))

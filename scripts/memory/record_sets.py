@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from bench.excitation import Coverage
 from bench.identification.memory import fit_memory
-from bench.reproduction import laboratory_joint as laboratory
+from bench.reproduction import laboratory
 from bench.reproduction.joint_models import LOADINGS
 from bench.rig import Element, Rig, simulate
 from bench.signals import BandLimitedNoise, Concatenation, Constant, Excitation, Record, Signal, Tapered
