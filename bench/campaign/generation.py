@@ -25,7 +25,7 @@ from bench.errors import BenchError, ParameterError, SimulationError, UnknownNam
 from bench.measurement import measure
 from bench.recording import Recording
 from bench.rig import simulate
-from bench.rig.simulation import controls_of
+from bench.rig.drives import controls_of
 from bench.signals.streams import named_streams
 
 

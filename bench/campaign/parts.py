@@ -284,3 +284,14 @@ def strangers(folder: Path, layout: Layout) -> list[tuple[Path, str]]:
 def any_part(folder: Path, layout: Layout) -> bool:
     """Whether any file of a part is there."""
     return any(next((folder / kind).glob("part-*"), None) is not None for kind in layout.kinds)
+
+
+def counts(entries: list[Mapping[str, Any]] | list[dict[str, Any]]) -> dict[str, int]:
+    """Sums over the entries of parts."""
+    return {
+        "records": sum(entry["records"] for entry in entries),
+        "ok": sum(entry["ok"] for entry in entries),
+        "failed": sum(len(entry["failed"]) for entry in entries),
+        "rows": sum(entry["rows"] for entry in entries),
+        "bytes": sum(file["bytes"] for entry in entries for file in entry["files"].values()),
+    }

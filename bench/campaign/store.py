@@ -31,6 +31,7 @@ from bench.campaign.parts import (
     FOLDERS,
     Layout,
     any_part,
+    counts,
     entry_of,
     fault,
     is_entry,
@@ -87,7 +88,7 @@ class Store:
         Raises:
             FileFormatError: There is none, or it is no manifest of a campaign.
         """
-        from bench.campaign.schema import MANIFEST_LIMITS, ManifestDocument  # noqa: PLC0415  (pydantic, for those who read)
+        from bench.campaign.manifest_schema import MANIFEST_LIMITS, ManifestDocument  # noqa: PLC0415  (pydantic, for those who read)
         from bench.documents import checked, load_document  # noqa: PLC0415
 
         try:
@@ -346,14 +347,3 @@ class Store:
             "parts": done,
         }
         write_text(self.manifest_path, json.dumps(document, indent=1, ensure_ascii=False))
-
-
-def counts(entries: list[Mapping[str, Any]] | list[dict[str, Any]]) -> dict[str, int]:
-    """Sums over the entries of parts."""
-    return {
-        "records": sum(entry["records"] for entry in entries),
-        "ok": sum(entry["ok"] for entry in entries),
-        "failed": sum(len(entry["failed"]) for entry in entries),
-        "rows": sum(entry["rows"] for entry in entries),
-        "bytes": sum(file["bytes"] for entry in entries for file in entry["files"].values()),
-    }
