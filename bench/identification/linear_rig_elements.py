@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from bench.errors import UnknownNameError
 from bench.identification.linear_probe import Matrices
-from bench.identification.record_loop import COLUMNS
+from bench.identification.record_equations import COLUMNS
 from bench.rig import Rig
 
 Array = NDArray[np.float64]
