@@ -24,6 +24,7 @@ from bench.recording.clock import (
     places_of,
     refuse_gaps,
     roundest,
+    uniform_clock,
 )
 
 
@@ -53,6 +54,22 @@ class Mended(NamedTuple):
     """What was interpolated, for ``meta["repaired"]``; empty where nothing was."""
     notes: tuple[str, ...]
     """The same in sentences."""
+
+
+def on_clock(
+    time: ArrayLike,
+    values: NDArray[np.float64],
+    names: Sequence[str],
+    *,
+    sample_rate: float,
+    jitter: float,
+    mend: bool,
+) -> tuple[NDArray[np.float64], float, NDArray[np.float64], dict[str, Any]]:
+    """Clock, sample rate and values of a record; with `mend` as `mended` leaves them, with its report, else as they are or an error."""
+    if mend:
+        return mended(time, values, names, sample_rate=sample_rate, jitter=jitter)[:4]
+    start, rate = uniform_clock(time, sample_rate=sample_rate, jitter=jitter)
+    return grid(start, rate, np.size(time)), rate, values, {}
 
 
 def mended(
