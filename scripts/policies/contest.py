@@ -34,12 +34,13 @@ def trained(
         folder: Checkpoints, in a folder for each.
         tell: Called with what is done.
     """
-    from envs.training import Plan, Trainer
+    from envs.training import Trainer
+    from envs.training_plan import TrainingPlan
 
     policies = {}
     for reward in rewards:
         for seed in range(seeds):
-            plan = Plan(task, steps=steps, seed=seed, reward=reward)
+            plan = TrainingPlan(task, steps=steps, seed=seed, reward=reward)
             label = f"policy for {reward}, seed {seed}"
             trainer = Trainer(plan, folder / f"{task}-{reward}-{seed}")
             policies[label] = trainer.run(
