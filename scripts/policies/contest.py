@@ -7,13 +7,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from evaluate_excitation import HELD_OUT, interval, middle
+from evaluate_excitation import interval, middle
 from numpy.typing import NDArray
 
 from bench.excitation import Planner, Policy, RigPrior, estimate
 from bench.excitation.closed_loop import Runs, disturbances, run_commands, run_policy
 from bench.excitation.stepping import Packed
 from envs.setups import Setup
+from policies.judge import HELD_OUT
 
 from .trials import kinds_of, open_loop
 
