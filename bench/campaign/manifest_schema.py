@@ -24,7 +24,7 @@ Integer = Annotated[int, Strict(), Field(ge=0)]
 """A whole number as programs write it: 3.0 is none."""
 
 
-class ChannelEntry(Entry):
+class DataChannelEntry(Entry):
     """A channel of a data set."""
 
     entry_name = "a channel of a manifest"
@@ -97,7 +97,7 @@ class ManifestDocument(Document):
     """How a record's random streams are made."""
     versions: dict[str, Text]
     """Versions of what the bytes depend on."""
-    channels: Listed[ChannelEntry]
+    channels: Listed[DataChannelEntry]
     """Channels of the data set."""
     counts: dict[str, Integer]
     """Sums over the finished parts."""

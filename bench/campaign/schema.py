@@ -11,7 +11,7 @@ from pydantic import AfterValidator, Field, Strict, WrapValidator, model_validat
 
 from bench.campaign.alternatives import ElementPlan, ExcitationPlan, RigPlan, SensorPlan
 from bench.campaign.distribution import Distribution
-from bench.campaign.nest import Node
+from bench.campaign.nest import Nested
 from bench.campaign.plan import Compression, Plan, Precision, Sampling
 from bench.campaign.quantities import AnyQuantity, NumberQuantity, is_quantity_table, read_quantity, spread
 from bench.documents import (
@@ -39,7 +39,7 @@ from bench.signals import Signal
 from bench.signals.schema import varied_type
 
 
-def _nest(node: Any) -> Node:
+def _nest(node: Any) -> Nested:
     """A signal's or stage's table with its distributions read."""
     if is_quantity_table(node):
         return read_quantity(node, "")
@@ -50,7 +50,7 @@ def _nest(node: Any) -> Node:
     return node
 
 
-def _nested(entry: Any, handler: Any) -> Node:
+def _nested(entry: Any, handler: Any) -> Nested:
     handler(
         entry
     )  # says whether the table is valid; the plan keeps the numbers in the order in which they came
@@ -280,7 +280,7 @@ class PlanDocument(Document):
         )
 
 
-def _by_type(chains: Mapping[str, tuple[Any, ...]]) -> dict[str, dict[str, Node]]:
+def _by_type(chains: Mapping[str, tuple[Any, ...]]) -> dict[str, dict[str, Nested]]:
     return {
         channel: {
             stage["type"]: {key: value for key, value in stage.items() if key != "type"} for stage in stages

@@ -16,7 +16,7 @@ from bench import native
 from bench.campaign.addresses import Address, Source, sources_of, structure_address
 from bench.campaign.alternatives import ElementPlan, RigPlan
 from bench.campaign.distribution import Value
-from bench.campaign.drawing import Draw
+from bench.campaign.drawing import RecordDraw
 from bench.campaign.nest import filled
 from bench.campaign.plan import Plan
 from bench.errors import ParameterError, UnknownNameError
@@ -25,7 +25,7 @@ from bench.measurement import Chain, Stage
 from bench.recording import Channel
 from bench.rig import Element, Rig
 from bench.rig.configuration import rig_from_configuration
-from bench.rig.drives import controls_of
+from bench.rig.drives import Initial, controls_of
 from bench.rig.library import PRESCRIBED_ACTUATORS, prescribe, starting
 from bench.signals import Excitation, Signal
 
@@ -79,7 +79,7 @@ class Variant:
         self,
         batch: Batch,
         thetas: list[list[NDArray[np.float64]]],
-        draws: list[Draw],
+        draws: list[RecordDraw],
         starts: list[Mapping[str, tuple[float, float]]],
     ) -> None:
         """Write the values of every simulation into the batch, and where it starts."""
@@ -207,12 +207,8 @@ def _law(item: ElementPlan):
     return find_law(item.law, item.header)
 
 
-Initial = Mapping[str, tuple[float, float]]
-"""(position, velocity) by joint at the start."""
-
-
 def drive_of(
-    plan: Plan, variant: Variant, draw: Draw, rng: np.random.Generator
+    plan: Plan, variant: Variant, draw: RecordDraw, rng: np.random.Generator
 ) -> tuple[dict[str, NDArray], Initial]:
     """The record's commands at the steps ``(n,)`` by actuator, and its start.
 
@@ -235,7 +231,7 @@ def drive_of(
     return dict(prescribe(rig, displacement, joint=entry.prescribe)), start
 
 
-def excitation_of(plan: Plan, draw: Draw, rate: float) -> Excitation:
+def excitation_of(plan: Plan, draw: RecordDraw, rate: float) -> Excitation:
     """The record's excitation, at a sample rate [Hz]."""
     entry = plan.excitations[draw.excitation]
     signals = {
@@ -245,7 +241,7 @@ def excitation_of(plan: Plan, draw: Draw, rate: float) -> Excitation:
     return Excitation(signals, plan.duration, rate)
 
 
-def chains_of(plan: Plan, draw: Draw) -> dict[str, Chain]:
+def chains_of(plan: Plan, draw: RecordDraw) -> dict[str, Chain]:
     """The record's measurement chain by channel."""
     if draw.sensors < 0:
         return {}

@@ -32,7 +32,7 @@ class Reproduce:
         """Run the command."""
         from rich.markup import escape
 
-        from bench.reproduction import Verdict, reproduce
+        from bench.reproduction import RowVerdict, reproduce
         from bench.reproduction.writing import summary
         from bench.targets import check_folder
 
@@ -46,10 +46,10 @@ class Reproduce:
             "item", "quantity", "printed", "ours", "over ten seeds", "verdict", title=summary(result.results)
         )
         colours = {
-            Verdict.FAILS: "red",
-            Verdict.SHAPE: "yellow",
-            Verdict.HOLDS: "",
-            Verdict.NOT_COMPARABLE: "dim",
+            RowVerdict.FAILS: "red",
+            RowVerdict.SHAPE: "yellow",
+            RowVerdict.HOLDS: "",
+            RowVerdict.NOT_COMPARABLE: "dim",
         }
         for made in result.results:
             for row in made.rows:

@@ -32,9 +32,9 @@ from bench.excitation.information import (
     sensitivity,
 )
 from bench.excitation.limits import Limits, Peaks, feasible
-from bench.excitation.linear_structure import LinearStructure, linear_structure
+from bench.excitation.linear_structure import AffineStructure, linear_structure
 from bench.excitation.methods import METHODS, Design, controls_from, design, paired_experiment
-from bench.excitation.planner import Plan, Planner
+from bench.excitation.planner import Decision, Planner
 from bench.excitation.policy import Policy, find_policy, policy_names
 from bench.excitation.prior import Draw, Hypothesis, RigPrior, Uncertain
 from bench.excitation.rival_planner import RivalPlan, RivalPlanner
@@ -43,9 +43,11 @@ from bench.excitation.station import Desk, Station
 
 __all__ = [
     "METHODS",
+    "AffineStructure",
     "Contrast",
     "Coverage",
     "CoverageSettings",
+    "Decision",
     "Design",
     "Desk",
     "Directions",
@@ -56,9 +58,7 @@ __all__ = [
     "Family",
     "Hypothesis",
     "Limits",
-    "LinearStructure",
     "Peaks",
-    "Plan",
     "Planner",
     "Policy",
     "Records",

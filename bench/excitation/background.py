@@ -26,7 +26,7 @@ from bench.rig import Element
 
 
 @dataclass(frozen=True)
-class BackgroundSettings:
+class ExcitationBackgroundSettings:
     """Numbers of `bench.excitation.background`."""
 
     step: float = 1e-2
@@ -34,7 +34,7 @@ class BackgroundSettings:
     chaotic seems to tell more than any fit finds in it; over larger ones kinks are passed."""
 
 
-SETTINGS = BackgroundSettings()
+SETTINGS = ExcitationBackgroundSettings()
 
 
 @dataclass(frozen=True)

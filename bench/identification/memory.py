@@ -34,7 +34,7 @@ from numpy.typing import ArrayLike, NDArray
 from bench.errors import FileFormatError, IdentificationError
 from bench.identification.fit_data import checked_data, nmse_percent, read_only
 from bench.identification.memory_refinement import refined
-from bench.identification.memory_settings import FORMS, Form, MemorySettings, dictionary
+from bench.identification.memory_settings import FORMS, MemoryForm, MemorySettings, dictionary
 from bench.identification.memory_terms import MemoryRecord, MemoryTerms, fold, smoothness, solve
 from bench.identification.validity_range import ValidityRange
 from bench.laws.base import ForceLaw
@@ -268,7 +268,7 @@ SETTINGS = MemoryModuleSettings()
 class _Shape(NamedTuple):
     """A form after what held-out segments have to say of it."""
 
-    form: Form
+    form: MemoryForm
     terms: MemoryTerms
     strength: float  # of smoothing
     held_out: float  # [%]
@@ -277,7 +277,7 @@ class _Shape(NamedTuple):
 
 
 def _tried(
-    form: Form,
+    form: MemoryForm,
     settings: MemorySettings,
     records: Sequence[MemoryRecord],
     spreads: Array,

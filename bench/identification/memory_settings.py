@@ -16,8 +16,8 @@ from bench.laws.memory_layout import Direction, MemoryLayout
 Array = NDArray[np.float64]
 
 
-Form = Literal["sliders", "profiles"]
-FORMS: tuple[Form, ...] = ("sliders", "profiles")
+MemoryForm = Literal["sliders", "profiles"]
+FORMS: tuple[MemoryForm, ...] = ("sliders", "profiles")
 """The forms of a joint with memory."""
 
 
@@ -92,7 +92,7 @@ class MemorySettings:
                 "a share of the motion, a positive number and at least one strength are expected"
             )
 
-    def of_form(self, form: Form) -> MemorySettings:
+    def of_form(self, form: MemoryForm) -> MemorySettings:
         """The settings of one form, with its number of slip elements."""
         return replace(self, form=form, slips=getattr(SLIPS, form) if self.slips is None else self.slips)
 

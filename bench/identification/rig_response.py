@@ -21,9 +21,9 @@ from bench.identification.linear_rig import LinearRig, address
 from bench.identification.linear_rig_elements import sensor_columns
 from bench.recording import Recording
 from bench.rig import Rig, controls_of
+from bench.rig.drives import Initial
 
 Array = NDArray[np.float64]
-Initial = Mapping[str, tuple[float, float]]
 EngineName = Literal["auto", "linear", "mujoco"]
 
 _COMMAND_SENSORS = (int(mujoco.mjtSensor.mjSENS_ACTUATORFRC), int(mujoco.mjtSensor.mjSENS_JOINTACTFRC))

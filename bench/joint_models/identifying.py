@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from bench.errors import ParameterError, UnknownNameError
 from bench.joint_models.document import JointFile
-from bench.joint_models.records import Columns, joint_motions
+from bench.joint_models.records import JointColumns, joint_motions
 from bench.joint_models.registry import KINDS, Settings, held_out, identify, scores, without
 from bench.recording import Recording
 from bench.rig.element import Element
@@ -15,7 +15,7 @@ from bench.rig.element import Element
 def identified(
     kind: str,
     records: Mapping[str, Recording],
-    columns: Columns,
+    columns: JointColumns,
     settings: Settings,
     judged: Mapping[str, Recording] | None = None,
     joints: Sequence[str] = (),

@@ -69,7 +69,7 @@ class Fitted:
     report: Mapping[str, Any] = field(default_factory=dict)
 
 
-Fit = Callable[[Sequence[ComponentRecord], Settings, np.random.Generator], Fitted]
+FitFunction = Callable[[Sequence[ComponentRecord], Settings, np.random.Generator], Fitted]
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ class JointKind:
     """
 
     summary: str
-    fit: Fit
+    fit: FitFunction
     memory: bool = False
 
 

@@ -34,7 +34,7 @@ from bench.monitoring.run_length import alarm_threshold
 
 
 @dataclass(frozen=True)
-class DamperSettings:
+class DamperMonitorSettings:
     """Numbers of `bench.monitoring.damper`."""
 
     varied: float = 0.02
@@ -44,7 +44,7 @@ class DamperSettings:
     """How far beyond the learnt range, in the logarithm, a period's speed and frequency may lie: half of the change sought, for n = 1."""
 
 
-SETTINGS = DamperSettings()
+SETTINGS = DamperMonitorSettings()
 
 
 class DamperMonitor:

@@ -22,7 +22,7 @@ from bench.reduction import channel_nmse, element_from
 from bench.reproduction import joint_models
 from bench.reproduction.estimates import fine
 from bench.reproduction.imperial import imperial
-from bench.reproduction.item import Item, Picture, Progress
+from bench.reproduction.item import Item, Picture, ShowProgress
 from bench.reproduction.printed_figures import fig, panels
 from bench.reproduction.verdict import (
     VERDICT_SETUP,
@@ -107,7 +107,9 @@ def outcome(rig: Rig, element: Element, true: Recording, seed: int) -> ChainOutc
     return ChainOutcome(record, channel_nmse(true, record), outside, "")
 
 
-def _further(rig: Rig, candidates: dict[str, Element], progress: Progress) -> dict[str, list[ChainOutcome]]:
+def _further(
+    rig: Rig, candidates: dict[str, Element], progress: ShowProgress
+) -> dict[str, list[ChainOutcome]]:
     """The chain under further seeds of the unseen excitation, by joint; none for the one that always diverges."""
     found: dict[str, list[ChainOutcome]] = {label: [] for label in candidates}
     for number in VERDICT_SETUP.seeds:
@@ -210,7 +212,7 @@ def _pictures(
     return tuple(pictures)
 
 
-def run(progress: Progress) -> Item:
+def run(progress: ShowProgress) -> Item:
     """Make the item."""
     progress("fitting polynomial and network", 0.05)
     candidates = elements()

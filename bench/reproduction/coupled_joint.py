@@ -13,7 +13,7 @@ from bench.recording import Recording
 from bench.reproduction import joint_models, joint_one_record
 from bench.reproduction.estimates import fine
 from bench.reproduction.imperial import imperial
-from bench.reproduction.item import Item, Picture, Progress
+from bench.reproduction.item import Item, Picture, ShowProgress
 from bench.reproduction.printed_figures import fig, panels
 from bench.reproduction.verdict import (
     VERDICT_SETUP,
@@ -89,7 +89,7 @@ def _range_rows(records: dict[str, Recording]) -> list[Row]:
     return rows
 
 
-def _single(progress: Progress) -> list[tuple[str, float, float]]:
+def _single(progress: ShowProgress) -> list[tuple[str, float, float]]:
     """Loading of the only training record, and the worst NMSE of a polynomial and of a network on unseen records [%]."""
     found = []
     for number, name in enumerate(("axial", "torsional")):
@@ -263,7 +263,7 @@ def _pictures(records: dict[str, Recording], models: joint_models.Models) -> tup
     return (*pictures, Picture("errors", "NMSE on unseen records.", errors))
 
 
-def run(progress: Progress) -> Item:
+def run(progress: ShowProgress) -> Item:
     """Make the item."""
     progress("simulating the training records", 0.02)
     records = joint_models.training()

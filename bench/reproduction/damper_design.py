@@ -28,7 +28,7 @@ from bench.reproduction.estimates import (
     courses,
     fine,
 )
-from bench.reproduction.item import Item, Picture, Progress
+from bench.reproduction.item import Item, Picture, ShowProgress
 from bench.reproduction.printed_figures import fig, panels
 from bench.reproduction.verdict import (
     VERDICT_SETUP,
@@ -296,7 +296,7 @@ def _pictures(campaign: HarmonicCampaign, slow: _SlowTest) -> tuple[Picture, ...
     )
 
 
-def run(progress: Progress) -> Item:
+def run(progress: ShowProgress) -> Item:
     """Make the item."""
     rng = np.random.default_rng(SETUP.seed)
     progress("202 harmonic tests", 0.05)

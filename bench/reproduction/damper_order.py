@@ -26,7 +26,7 @@ from bench.reproduction.damper_online_order import (
 from bench.reproduction.estimates import (
     ESTIMATES_SETUP,
 )
-from bench.reproduction.item import Item, Picture, Progress
+from bench.reproduction.item import Item, Picture, ShowProgress
 from bench.reproduction.printed_figures import fig, panels
 from bench.reproduction.verdict import (
     VERDICT_SETUP,
@@ -316,7 +316,7 @@ def _pictures(study: OrderStudy, online: OnlineStudy) -> tuple[Picture, ...]:
     )
 
 
-def run(progress: Progress) -> Item:
+def run(progress: ShowProgress) -> Item:
     """Make the item."""
     progress("random tests", 0.02)
     rng = np.random.default_rng(SETUP.seed)

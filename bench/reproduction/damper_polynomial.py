@@ -24,7 +24,7 @@ from bench.reproduction.estimates import (
     ESTIMATES_SETUP,
     fine,
 )
-from bench.reproduction.item import Item, Picture, Progress
+from bench.reproduction.item import Item, Picture, ShowProgress
 from bench.reproduction.printed_figures import panels
 from bench.reproduction.verdict import Row, value_row
 from bench.rig import Element, simulate
@@ -203,7 +203,7 @@ def _pictures(experiment: PolynomialExperiment, found: damper_convergence.Study)
     )
 
 
-def run(progress: Progress) -> Item:
+def run(progress: ShowProgress) -> Item:
     """Make the item."""
     progress("random tests and on-line identification", 0.1)
     experiment = polynomial_experiment(np.random.default_rng(SETUP.seed))

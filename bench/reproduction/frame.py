@@ -30,7 +30,7 @@ from bench.laws.evaluate import evaluate
 from bench.recording import Recording, nmse
 from bench.reduction import element_from
 from bench.reproduction.estimates import fine
-from bench.reproduction.item import Item, Picture, Progress
+from bench.reproduction.item import Item, Picture, ShowProgress
 from bench.reproduction.verdict import (
     VERDICT_SETUP,
     Row,
@@ -226,7 +226,7 @@ def _short(label: str) -> str:
     return label.replace("isolator and dampers reduced to", "all:").replace("dampers reduced to", "dampers:")
 
 
-def run(progress: Progress) -> Item:
+def run(progress: ShowProgress) -> Item:
     """Make the item."""
     progress("true frame", 0.02)
     true = devices()

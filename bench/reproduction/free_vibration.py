@@ -18,7 +18,7 @@ from bench.figures import phase_plot, time_histories
 from bench.laws.coupling import POUND_FORCE
 from bench.recording import Recording
 from bench.reproduction.imperial import STIFFNESS, sdof_view
-from bench.reproduction.item import Item, Picture, Progress
+from bench.reproduction.item import Item, Picture, ShowProgress
 from bench.reproduction.printed_figures import fig, panels
 from bench.reproduction.verdict import Row, axis_row, told_row, value_row
 from bench.rig import Element, simulate
@@ -120,7 +120,7 @@ def _rows(shown: Recording, frequency: float, ratio: float) -> tuple[Row, ...]:
     )
 
 
-def run(progress: Progress) -> Item:
+def run(progress: ShowProgress) -> Item:
     """Make the item."""
     progress("simulating", 0.1)
     test = record()

@@ -17,7 +17,7 @@ from bench.laws.coupling import INCH, POUND_FORCE
 from bench.recording import Recording, nmse
 from bench.reproduction.estimates import fine
 from bench.reproduction.imperial import STIFFNESS, sdof_view
-from bench.reproduction.item import Item, Picture, Progress
+from bench.reproduction.item import Item, Picture, ShowProgress
 from bench.reproduction.printed_figures import fig, panels
 from bench.reproduction.verdict import (
     VERDICT_SETUP,
@@ -195,7 +195,7 @@ def _pictures(test: Recording) -> tuple[Picture, ...]:
     )
 
 
-def run(progress: Progress) -> Item:
+def run(progress: ShowProgress) -> Item:
     """Make the item."""
     progress("simulating", 0.1)
     test = record()

@@ -24,7 +24,7 @@ from bench.reproduction.estimates import (
     learnt,
 )
 from bench.reproduction.hysteretic_record import SETUP, identify, printed_model_fate, record
-from bench.reproduction.item import Item, Picture, Progress
+from bench.reproduction.item import Item, Picture, ShowProgress
 from bench.reproduction.printed_figures import fig, panels
 from bench.reproduction.verdict import VERDICT_SETUP, Row, axis_row, fact_row, told_row, value_row
 
@@ -233,7 +233,7 @@ def _pictures(shown: _Found) -> tuple[Picture, ...]:
     )
 
 
-def run(progress: Progress) -> Item:
+def run(progress: ShowProgress) -> Item:
     """Make the item."""
     progress("simulating", 0.1)
     shown = _found(SETUP.seed)

@@ -18,7 +18,7 @@ from bench.recording import Recording, nmse
 from bench.reduction import element_from
 from bench.reproduction.coupled_joint import PAIRS, Model, shown
 from bench.reproduction.estimates import fine
-from bench.reproduction.item import Item, Picture, Progress
+from bench.reproduction.item import Item, Picture, ShowProgress
 from bench.reproduction.joint_models import AXES, LOADINGS, train_network
 from bench.reproduction.laboratory import SETUP, drive, measured, rig, tests, view
 from bench.reproduction.printed_figures import fig, panels
@@ -209,7 +209,7 @@ def _pictures(
     return tuple(pictures)
 
 
-def run(progress: Progress) -> Item:
+def run(progress: ShowProgress) -> Item:
     """Make the item."""
     progress("measuring and identifying", 0.05)
     records, fitted = models()

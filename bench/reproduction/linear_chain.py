@@ -18,7 +18,7 @@ from bench.laws.coupling import INCH, POUND_FORCE
 from bench.recording import Recording, nmse
 from bench.reproduction.estimates import fine
 from bench.reproduction.imperial import STIFFNESS, imperial
-from bench.reproduction.item import Item, Picture, Progress
+from bench.reproduction.item import Item, Picture, ShowProgress
 from bench.reproduction.printed_figures import fig, panels
 from bench.reproduction.verdict import Row, fact_row, value_row
 from bench.rig import Element, Rig, simulate
@@ -208,7 +208,7 @@ def _pictures(whole: Excitation, record: Recording, solution: NDArray[np.float64
     )
 
 
-def run(progress: Progress) -> Item:
+def run(progress: ShowProgress) -> Item:
     """Make the item."""
     whole = excitation(True, True)
     loads = whole.sample(np.random.default_rng(LINEAR_CHAIN_SETUP.seed))[

@@ -25,7 +25,7 @@ from bench.reproduction.bouc_wen_rig import (
     settled_after,
 )
 from bench.reproduction.estimates import contribution_histories, estimate_histories, fine
-from bench.reproduction.item import Item, Picture, Progress
+from bench.reproduction.item import Item, Picture, ShowProgress
 from bench.reproduction.printed_figures import fig, panels
 from bench.reproduction.verdict import VERDICT_SETUP, Row, axis_row, fact_row, value_row
 
@@ -280,7 +280,7 @@ def _pictures(test: Recording, history: AdaptiveHistory, changed: AdaptiveHistor
     )
 
 
-def run(progress: Progress) -> Item:
+def run(progress: ShowProgress) -> Item:
     """Make the item."""
     progress("simulating", 0.05)
     test = record()

@@ -18,7 +18,7 @@ from bench.laws.coupling import INCH, POUND_FORCE
 from bench.recording import Recording
 from bench.reproduction.estimates import fine
 from bench.reproduction.imperial import STIFFNESS, imperial
-from bench.reproduction.item import Item, Picture, Progress
+from bench.reproduction.item import Item, Picture, ShowProgress
 from bench.reproduction.printed_figures import fig, panels
 from bench.reproduction.verdict import Row, axis_row, fact_row, told_row, value_row
 from bench.rig import Element, simulate
@@ -225,7 +225,7 @@ def _pictures(test: Recording, constant: Recording) -> tuple[Picture, ...]:
     )
 
 
-def run(progress: Progress) -> Item:
+def run(progress: ShowProgress) -> Item:
     """Make the item."""
     progress("simulating", 0.1)
     test = record(modulated())

@@ -29,7 +29,7 @@ APPLICATION = "jointbench"
 
 
 @dataclass(frozen=True)
-class ComparisonSettings:
+class LogComparisonSettings:
     """Numbers of `bench.rerun_log.comparison`."""
 
     # Other colours than the variants'; told apart with any colour vision (after IBM's design library palette).
@@ -49,7 +49,7 @@ class ComparisonSettings:
     )
 
 
-SETTINGS = ComparisonSettings()
+SETTINGS = LogComparisonSettings()
 
 
 class _Clock(NamedTuple):

@@ -17,6 +17,8 @@ from bench.signals.base import (
 
 Drive = Excitation | Recording | Mapping[str, ArrayLike]
 """What drives a rig: a designed excitation, a record with a channel per actuator, or arrays by actuator name."""
+Initial = Mapping[str, tuple[float, float]]
+"""(position, velocity) by joint at the start; at rest where not given."""
 
 
 def controls_of(rig: Rig, drive: Drive, rng: np.random.Generator | None = None) -> NDArray[np.float64]:

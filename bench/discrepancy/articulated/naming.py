@@ -12,7 +12,7 @@ from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.hypothesis import placed_values
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.settings import ArticulatedJudgementSettings as JudgementSettings
-from bench.discrepancy.verdict import Estimate, Kind, NamedEffect, NominalEstimate, Ranked, Verdict
+from bench.discrepancy.verdict import Estimate, NamedEffect, NominalEstimate, Ranked, Verdict, VerdictKind
 
 
 def verdict_of(
@@ -43,7 +43,7 @@ def verdict_of(
     final, base = rungs[last], rungs[0]
     whole = stated and complete(problem, final, settings)
     explained, _ = closed(predictions[0], predictions[last], predictions[0], rng)
-    kind: Kind = "effect" if last else "none"
+    kind: VerdictKind = "effect" if last else "none"
     if not whole and (not last or explained < settings.material):
         kind = "unknown"
     shares = [closed(predictions[k - 1], predictions[k], predictions[0], rng) for k in range(1, last + 1)]
@@ -72,7 +72,7 @@ def verdict_of(
 
 
 def _words(
-    kind: Kind,
+    kind: VerdictKind,
     effects: Sequence[NamedEffect],
     whole: bool,
     explained: float,
@@ -110,7 +110,7 @@ def _left(problem: ArticulatedProblem, final: ArticulatedFit) -> str:
 
 
 def _probabilities(
-    fits: Sequence[ArticulatedFit], final: ArticulatedFit, kind: Kind, settings: JudgementSettings
+    fits: Sequence[ArticulatedFit], final: ArticulatedFit, kind: VerdictKind, settings: JudgementSettings
 ) -> dict[str, float]:
     known = 1.0 - settings.outside
     if kind == "unknown":

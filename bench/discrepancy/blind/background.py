@@ -25,7 +25,7 @@ from bench.discrepancy.truth.recipe import Recipe, Shape, between
 from bench.discrepancy.truth.rigs import Bench, reach_of
 
 Array = NDArray[np.float64]
-Records = Sequence[dict[str, Array]]
+RecordArrays = Sequence[dict[str, Array]]
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class Background:
         return {"background": names, "background_share": self.share, "noise_stated": self.stated}
 
     def recorded_in(
-        self, clean: Records, *, judged: str, timed: Sequence[str], step: float, rng: np.random.Generator
+        self, clean: RecordArrays, *, judged: str, timed: Sequence[str], step: float, rng: np.random.Generator
     ) -> list[dict[str, Array]]:
         """Records with what comes into them.
 
@@ -124,7 +124,7 @@ GapOf = Callable[[Sequence[WithheldEffect]], float]
 
 
 def draw_background(
-    bench: Bench, bare: Records, rng: np.random.Generator, settings: BackgroundSettings, bisections: int
+    bench: Bench, bare: RecordArrays, rng: np.random.Generator, settings: BackgroundSettings, bisections: int
 ) -> Background | None:
     """Draw a background of a wanted size; None where one of its parts cannot reach it.
 

@@ -13,13 +13,12 @@ record is explained, an error that is there with the first sample and dies away 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.discrepancy.case.case import Case, CaseRecord
+from bench.discrepancy.case.case import Case, CaseRecord, Prediction
 from bench.discrepancy.case.channel_noise import noise_floor
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.model.structure import Structure
@@ -32,8 +31,6 @@ Array = NDArray[np.float64]
 
 STATED = "starts_in_motion"
 """Option of a case that says which records start in motion; where it is given, nothing is looked for."""
-
-Prediction = Callable[[CaseRecord], Mapping[str, Array]]
 
 
 def with_starts_found(

@@ -38,7 +38,7 @@ from bench.discrepancy.likelihood.problem import Array, Problem
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.model.placements import placements
 from bench.discrepancy.screening.candidates import along
-from bench.discrepancy.screening.linear_amplitudes import Node, products
+from bench.discrepancy.screening.linear_amplitudes import GridPoint, products
 from bench.discrepancy.screening.projection import Ground
 from bench.discrepancy.screening.screen import Screen
 from bench.discrepancy.search.explanation import Explanation
@@ -159,7 +159,7 @@ def damped(contact: Effect) -> Effect:
     )
 
 
-def _promised(screen: Screen, ground: Ground, node: Node) -> _Promise:
+def _promised(screen: Screen, ground: Ground, node: GridPoint) -> _Promise:
     """The evidence of a free force, linear in its coefficients along a motion that is known."""
     settings = screen.problem.settings.search
     left = ground.left

@@ -8,7 +8,7 @@ stated.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -33,8 +33,7 @@ from bench.discrepancy.search.explain import explain
 from bench.discrepancy.search.explanation import Explanation
 from bench.discrepancy.search.load_interpolation import promising_readings
 from bench.discrepancy.settings import DEFAULT, DiagnosisSettings
-
-Progress = Callable[[str], None]
+from bench.progress import Tell
 
 
 @dataclass(frozen=True)
@@ -51,7 +50,7 @@ class How:
 
     catalogue: Sequence[Effect]
     most: int = 3
-    progress: Progress = lambda text: None
+    progress: Tell = lambda text: None
     deadline: Deadline = NEVER
     settings: DiagnosisSettings = DEFAULT
 

@@ -18,19 +18,18 @@ References:
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.discrepancy.case.case import Case, CaseRecord
+from bench.discrepancy.case.case import Case, Prediction
 from bench.discrepancy.likelihood.whitening import RecordData, fast_length, masked
 from bench.discrepancy.model.structure import Structure
 from bench.discrepancy.settings import DEFAULT, ErrorSettings
 
 Array = NDArray[np.float64]
-Prediction = Callable[[CaseRecord], Mapping[str, Array]]
 
 
 @dataclass(frozen=True, eq=False)

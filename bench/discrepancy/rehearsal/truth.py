@@ -48,7 +48,7 @@ SETTINGS = TruthSettings()
 
 
 @dataclass(frozen=True, eq=False)
-class Laboratory:
+class ModelLaboratory:
     """A laboratory in which the user's model is the machine.
 
     Attributes:
@@ -64,7 +64,7 @@ class Laboratory:
     articulated: bool
 
     @classmethod
-    def of(cls, case: Case) -> Laboratory:
+    def of(cls, case: Case) -> ModelLaboratory:
         """The laboratory of a case.
 
         Raises:

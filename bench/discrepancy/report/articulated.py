@@ -34,14 +34,14 @@ FINAL = "with what is named"
 
 
 @dataclass(frozen=True)
-class ArticulatedSettings:
+class ArticulatedReportSettings:
     """Numbers of `bench.discrepancy.report.articulated`."""
 
     shown_joints: int = 3
     """Joints whose histories are drawn: those with most of the discrepancy."""
 
 
-SETTINGS = ArticulatedSettings()
+SETTINGS = ArticulatedReportSettings()
 
 
 def simulated_joints(diagnosis: ArticulatedDiagnosis) -> dict[str, Recording]:

@@ -35,7 +35,7 @@ class FleetSettings:
 SETTINGS = FleetSettings()
 
 
-class Options(NamedTuple):
+class DiagnosisOptions(NamedTuple):
     """Options of every diagnosis, as of `diagnose`."""
 
     exclude: tuple[str, ...] = ()
@@ -44,7 +44,7 @@ class Options(NamedTuple):
     budget: float = float("inf")
 
 
-def diagnose_one(folder: str, options: Options) -> dict[str, Any]:
+def diagnose_one(folder: str, options: DiagnosisOptions) -> dict[str, Any]:
     """The verdict of a case as a document with its name; an error where it cannot be diagnosed."""
     from bench.discrepancy.diagnosis import diagnose_folder  # noqa: PLC0415  (runs on workers)
 
@@ -56,7 +56,7 @@ def diagnose_one(folder: str, options: Options) -> dict[str, Any]:
 
 def diagnose_cases(
     folders: Sequence[Path],
-    options: Options,
+    options: DiagnosisOptions,
     *,
     scheduler: str = "",
     progress: Callable[[str], None] = lambda text: None,
