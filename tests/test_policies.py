@@ -19,9 +19,9 @@ from bench.errors import FileFormatError, ModelError, ParameterError, UnknownNam
 from bench.excitation import (
     Ensemble,
     Family,
-    Hypothesis,
     Planner,
     Policy,
+    RigHypothesis,
     RivalPlanner,
     Rivals,
     Station,
@@ -87,7 +87,7 @@ def test_families_are_the_ensembles_of_their_rigs(family: Family) -> None:
 
 
 def test_what_is_not_affine_is_no_family() -> None:
-    heavy = Hypothesis("heavy", GAP.hypothesis.rig, (Uncertain("mass:carriage", 1.0, 4.0),))
+    heavy = RigHypothesis("heavy", GAP.hypothesis.rig, (Uncertain("mass:carriage", 1.0, 4.0),))
     with pytest.raises(ModelError, match="masses and inertias"):
         Family(heavy, STATION.channels, STATION.actuators)
 

@@ -145,7 +145,7 @@ def loads_of(case: Case | None, model: mujoco.MjModel) -> dict[str, str]:
     return out
 
 
-class Options(NamedTuple):
+class RunOptions(NamedTuple):
     """How the corrected model is simulated where that differs from the user's own options.
 
     Attributes:
@@ -166,7 +166,7 @@ def apply(
     *,
     case: Case | None = None,
     linear: bool = True,
-    options: Options | None = None,
+    options: RunOptions | None = None,
 ) -> Applied:
     """Put what was found into a model.
 
@@ -182,7 +182,7 @@ def apply(
         UnknownNameError: It lacks what an effect refers to.
     """
     spec = specification(path)
-    own = options or Options()
+    own = options or RunOptions()
     if own.step is not None:
         spec.option.timestep = own.step
     if own.integrator is not None:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bench.discrepancy.articulated.judgement import Prediction, closed, complete
+from bench.discrepancy.articulated.judgement import PredictedErrors, closed, complete
 from bench.discrepancy.articulated.places import gaps_of, locations_of, remainder_of
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.hypothesis import placed_values
@@ -20,8 +20,8 @@ def verdict_of(
     fits: Sequence[ArticulatedFit],
     rungs: Sequence[ArticulatedFit],
     last: int,
-    untouched: Prediction,
-    predictions: Sequence[Prediction],
+    untouched: PredictedErrors,
+    predictions: Sequence[PredictedErrors],
     settings: JudgementSettings,
     rng: np.random.Generator,
     *,

@@ -56,7 +56,7 @@ class Trajectory(NamedTuple):
         return text.getvalue()
 
 
-class Proposal(NamedTuple):
+class JointProposal(NamedTuple):
     """A test that would tell two explanations apart: what a verdict says of it, and the trajectories to run."""
 
     told: dict[str, Any]
@@ -65,7 +65,7 @@ class Proposal(NamedTuple):
 
 def propose(
     problem: ArticulatedProblem, compiled: mujoco.MjModel, first: ArticulatedFit, second: ArticulatedFit
-) -> Proposal | None:
+) -> JointProposal | None:
     """The trajectories on which two explanations differ most; None where none is within the limits.
 
     Args:
@@ -105,7 +105,7 @@ def propose(
             for j, joint in enumerate(problem.joints)
         },
     }
-    return Proposal(told, trajectory)
+    return JointProposal(told, trajectory)
 
 
 def _candidates(

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.discrepancy.articulated_search.hypothesis import Hypothesis
+from bench.discrepancy.articulated_search.hypothesis import JointHypothesis
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem, misfit_of
 from bench.discrepancy.numerics.least_squares import Prior, minimise
 from bench.discrepancy.numerics.threads import in_threads
@@ -35,7 +35,7 @@ class ArticulatedFit:
         log_posterior: Laplace approximation of the log posterior of the hypothesis, up to a constant.
     """
 
-    hypothesis: Hypothesis
+    hypothesis: JointHypothesis
     vector: Array
     covariance: Array
     chi2: Array
@@ -43,7 +43,7 @@ class ArticulatedFit:
     log_posterior: float
 
     @classmethod
-    def at(cls, problem: ArticulatedProblem, hypothesis: Hypothesis, vector: Array) -> ArticulatedFit:
+    def at(cls, problem: ArticulatedProblem, hypothesis: JointHypothesis, vector: Array) -> ArticulatedFit:
         """A hypothesis as it stands at a vector (whose further entries are left out), not fitted and without a posterior."""
         size = problem.size(hypothesis)
         residuals = [problem.residual(j, hypothesis, vector[:size]) for j in range(len(problem.joints))]
@@ -100,7 +100,7 @@ class Others:
         return cls(base, tuple(f for f, _ in found), tuple(t for _, t in found))
 
 
-def own_entries(problem: ArticulatedProblem, hypothesis: Hypothesis, j: int) -> list[int]:
+def own_entries(problem: ArticulatedProblem, hypothesis: JointHypothesis, j: int) -> list[int]:
     """Entries of a vector that belong to joint `j` alone: its nominal parameters, and the free ones of effects there."""
     out, at = list(problem.locals(j)), len(problem.nominal)
     for placed in hypothesis:
@@ -136,7 +136,7 @@ def linearised(
 
 def fit(
     problem: ArticulatedProblem,
-    hypothesis: Hypothesis,
+    hypothesis: JointHypothesis,
     start: Array,
     *,
     scale: Array,
@@ -181,7 +181,7 @@ def fit(
 
 def refitted(
     problem: ArticulatedProblem,
-    hypothesis: Hypothesis,
+    hypothesis: JointHypothesis,
     start: Array,
     *,
     scale: Array,
@@ -216,7 +216,7 @@ def refitted(
 
 
 def free_entries(
-    problem: ArticulatedProblem, hypothesis: Hypothesis, active: Sequence[int] | None = None
+    problem: ArticulatedProblem, hypothesis: JointHypothesis, active: Sequence[int] | None = None
 ) -> NDArray[np.int64]:
     """Entries that a fit moves: all that are free, or those of the active joints and the masses."""
     out = [
@@ -234,7 +234,7 @@ def free_entries(
 
 def _summary(
     problem: ArticulatedProblem,
-    hypothesis: Hypothesis,
+    hypothesis: JointHypothesis,
     vector: Array,
     curvature: Array,
     free: NDArray[np.int64],

@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 from bench.discrepancy.articulated_search.effect import ArticulatedEffect, JointScales
 from bench.discrepancy.articulated_search.hypothesis import (
     LOCAL_SLOTS,
-    Hypothesis,
+    JointHypothesis,
     Nominal,
-    Placed,
+    PlacedOnJoint,
     base_slots,
     nominal_parameters,
     placed_values,
@@ -91,11 +91,11 @@ class ArticulatedProblem:
         """Indices of the nominal parameters of joint `j` alone."""
         return tuple(i for i, p in enumerate(self.nominal) if p.kind != "mass" and p.joint == j)
 
-    def size(self, hypothesis: Hypothesis) -> int:
+    def size(self, hypothesis: JointHypothesis) -> int:
         """Length of the vector of a hypothesis."""
         return len(self.nominal) + sum(len(placed.effect.parameters) for placed in hypothesis)
 
-    def etas(self, hypothesis: Hypothesis, vector: Array) -> list[Array]:
+    def etas(self, hypothesis: JointHypothesis, vector: Array) -> list[Array]:
         """The part of a vector that belongs to each effect."""
         out, at = [], len(self.nominal)
         for placed in hypothesis:
@@ -104,7 +104,7 @@ class ArticulatedProblem:
             at = stop
         return out
 
-    def reached(self, hypothesis: Hypothesis) -> tuple[int, ...]:
+    def reached(self, hypothesis: JointHypothesis) -> tuple[int, ...]:
         """Joints whose runs an effect of a hypothesis changes."""
         out: set[int] = set()
         for placed in hypothesis:
@@ -112,7 +112,7 @@ class ArticulatedProblem:
             out |= {placed.joint} if site in ("joint", "actuator") else set(range(len(self.joints)))
         return tuple(sorted(out))
 
-    def motions(self, hypothesis: Hypothesis, vector: Array) -> tuple[PreparedRecord, ...]:
+    def motions(self, hypothesis: JointHypothesis, vector: Array) -> tuple[PreparedRecord, ...]:
         """The records, their encoders corrected as a hypothesis has it."""
         wrong: dict[str, Encoder] = {}
         for placed, eta in zip(hypothesis, self.etas(hypothesis, vector), strict=True):
@@ -160,7 +160,7 @@ class ArticulatedProblem:
             records.append(replace(prepared, joints=tuple(joints)))
         return ArticulatedProblem(self.case, self.model, tuple(records), self.settings)
 
-    def settled(self, hypothesis: Hypothesis, vector: Array) -> ArticulatedProblem:
+    def settled(self, hypothesis: JointHypothesis, vector: Array) -> ArticulatedProblem:
         """The same problem with the links of elastic joints where a fit has them; itself where there are none behind their motors."""
         elastic = [
             placed.joint
@@ -175,7 +175,7 @@ class ArticulatedProblem:
             records.append(relinked(self.case, self.model, raw, links, settings=self.settings.articulated))
         return ArticulatedProblem(self.case, self.model, tuple(records), self.settings)
 
-    def slots(self, j: int, hypothesis: Hypothesis, vector: Array, *, on_link: bool) -> Array:
+    def slots(self, j: int, hypothesis: JointHypothesis, vector: Array, *, on_link: bool) -> Array:
         """Parameter vector (SLOTS,) of the runs of joint `j`."""
         joint = self.joints[j]
         p = base_slots(joint, on_link)
@@ -188,7 +188,7 @@ class ArticulatedProblem:
         return p
 
     def innovations(
-        self, j: int, hypothesis: Hypothesis, vector: Array, prepared: PreparedRecord
+        self, j: int, hypothesis: JointHypothesis, vector: Array, prepared: PreparedRecord
     ) -> tuple[Array, Array]:
         """Innovations (n, n_measured) and states (n, 4), see `joint_run.run`, of joint `j` in a record; NaN where it diverged."""
         record = prepared.joints[j]
@@ -198,7 +198,7 @@ class ArticulatedProblem:
     def run(
         self,
         j: int,
-        hypothesis: Hypothesis,
+        hypothesis: JointHypothesis,
         vector: Array,
         record: JointRecord,
         gain: Array,
@@ -215,7 +215,7 @@ class ArticulatedProblem:
         )  # fmt: skip
 
     def _coefficients(
-        self, record: JointRecord, hypothesis: Hypothesis, vector: Array
+        self, record: JointRecord, hypothesis: JointHypothesis, vector: Array
     ) -> tuple[Array, Array]:
         bias, inertia = record.bias, record.inertia
         for i in self.masses:
@@ -234,7 +234,7 @@ class ArticulatedProblem:
             bias, inertia = bias + change[0], inertia + change[1]
         return bias, np.maximum(inertia, 1e-3 * record.inertia)
 
-    def residual(self, j: int, hypothesis: Hypothesis, vector: Array) -> Array:
+    def residual(self, j: int, hypothesis: JointHypothesis, vector: Array) -> Array:
         """Whitened, weighted innovations of joint `j` over all records; their sum of squares is about `count` where nothing is missing."""
         settings = self.settings.articulated
         out = []
@@ -258,7 +258,7 @@ class ArticulatedProblem:
             [sum(float(np.sum(r.joints[j].weight ** 2)) for r in records) for j in range(len(self.joints))]
         )
 
-    def prior(self, hypothesis: Hypothesis) -> tuple[Array, Array, Array, Array]:
+    def prior(self, hypothesis: JointHypothesis) -> tuple[Array, Array, Array, Array]:
         """Mean, standard deviation, lower and upper bound of a vector."""
         n = len(self.nominal)
         mean, std = [np.zeros(n)], [np.ones(n)]
@@ -308,7 +308,7 @@ def misfit_of(chi2: float, count: float) -> float:
     return count * (mean if mean <= 1.0 else 1.0 + float(np.log(mean)))
 
 
-def placements(problem: ArticulatedProblem, catalogue: Sequence[ArticulatedEffect]) -> list[Placed]:
+def placements(problem: ArticulatedProblem, catalogue: Sequence[ArticulatedEffect]) -> list[PlacedOnJoint]:
     """Every effect at every place where it may sit."""
     out = []
     for j, joint in enumerate(problem.joints):
@@ -324,5 +324,5 @@ def placements(problem: ArticulatedProblem, catalogue: Sequence[ArticulatedEffec
             where = {"joint": joint.name, "sensor": joint.name, "actuator": drive.name, "body": joint.body}[
                 effect.site
             ]
-            out.append(Placed(effect, where, j, scales))
+            out.append(PlacedOnJoint(effect, where, j, scales))
     return out

@@ -20,7 +20,7 @@ from bench.discrepancy.articulated_search.fitting import (
     own_entries,
     refitted,
 )
-from bench.discrepancy.articulated_search.hypothesis import Hypothesis, Placed
+from bench.discrepancy.articulated_search.hypothesis import JointHypothesis, PlacedOnJoint
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.articulated_search.screening import Screened, by_effect, screen
 from bench.discrepancy.numerics.threads import in_threads
@@ -49,7 +49,7 @@ def nominal_fit(problem: ArticulatedProblem) -> ArticulatedFit:
 
 def search(
     problem: ArticulatedProblem,
-    candidates: Sequence[Placed],
+    candidates: Sequence[PlacedOnJoint],
     *,
     settings: SearchSettings | None = None,
     progress: Callable[[str], None] = lambda text: None,
@@ -129,7 +129,7 @@ def _predecessors(
 def _round(
     problem: ArticulatedProblem,
     base: ArticulatedFit,
-    candidates: Sequence[Placed],
+    candidates: Sequence[PlacedOnJoint],
     settings: SearchSettings,
     progress: Callable[[str], None],
 ) -> tuple[ArticulatedFit | None, list[ArticulatedFit]]:
@@ -274,7 +274,7 @@ def _fits(
         hopeful = k < settings.fitted and mine[0].gain >= settings.hope * gained
         if not (k < settings.least or hopeful or instead):
             continue
-        hypothesis: Hypothesis = (*base.hypothesis, mine[0].placed)
+        hypothesis: JointHypothesis = (*base.hypothesis, mine[0].placed)
         # nominal parameters that stood in for what was missing are also tried where they were stated, and fitted from there:
         # a start of less misfit need not be the nearer one
         untouched = np.concatenate([np.zeros(len(problem.nominal)), base.vector[len(problem.nominal) :]])

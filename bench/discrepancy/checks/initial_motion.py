@@ -25,7 +25,7 @@ from bench.discrepancy.model.structure import Structure
 from bench.discrepancy.response.windows import channels_of, drifts
 from bench.discrepancy.settings import DEFAULT, ChecksSettings, DiagnosisSettings
 from bench.discrepancy.simulation.linear_response import linear_run
-from bench.discrepancy.simulation.stick_slip import LinearStructure
+from bench.discrepancy.simulation.stick_slip import StructureMatrices
 
 Array = NDArray[np.float64]
 
@@ -72,7 +72,7 @@ def with_starts_found(
 def _begins_off_rest(
     case: Case,
     structure: Structure,
-    linear: LinearStructure,
+    linear: StructureMatrices,
     record: CaseRecord,
     predict: Prediction | None,
     *,
@@ -151,7 +151,7 @@ def _predicted(structure: Structure, record: CaseRecord, predict: Prediction) ->
     return np.column_stack([free_run[o.channel] for o in structure.observers])
 
 
-def _samples(linear: LinearStructure, record: CaseRecord, *, settings: ChecksSettings) -> int:
+def _samples(linear: StructureMatrices, record: CaseRecord, *, settings: ChecksSettings) -> int:
     """Samples at the beginning that are looked at."""
     squares = np.linalg.eigvals(np.linalg.solve(linear.mass, linear.stiffness)).real
     duration = len(record) * record.step

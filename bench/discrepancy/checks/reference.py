@@ -29,7 +29,7 @@ PROBES = {"position": mujoco.mjtSensor.mjSENS_JOINTPOS, "velocity": mujoco.mjtSe
 
 
 @dataclass(frozen=True)
-class Reference:
+class MujocoReference:
     """A model in MuJoCo, and where the channels of a case are in it.
 
     Attributes:
@@ -65,7 +65,7 @@ def actuators_of(case: Case, rig: Rig, *, settings: ModelSettings) -> dict[str, 
 
 
 @native.quiet()
-def reference_of(case: Case, rig: Rig, *, settings: ModelSettings) -> Reference:
+def reference_of(case: Case, rig: Rig, *, settings: ModelSettings) -> MujocoReference:
     """The reference of a case.
 
     Args:
@@ -104,7 +104,7 @@ def reference_of(case: Case, rig: Rig, *, settings: ModelSettings) -> Reference:
     data.qpos[:] = rest
     mujoco.mj_forward(model, data)
     offsets = data.sensordata[list(places.values())].copy()
-    return Reference(model, inputs, places, control, rest, offsets, unsteady, fastest)
+    return MujocoReference(model, inputs, places, control, rest, offsets, unsteady, fastest)
 
 
 def _prescribed(

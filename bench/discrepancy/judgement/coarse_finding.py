@@ -11,7 +11,7 @@ from bench.discrepancy.fitting.goodness_of_fit import names
 from bench.discrepancy.judgement import posterior as evidence
 from bench.discrepancy.judgement.coarse import Judged, judge
 from bench.discrepancy.judgement.finding import Finding
-from bench.discrepancy.likelihood.model_error import ModelError, crude_error, error_left, own_noise
+from bench.discrepancy.likelihood.model_error import ModelInadequacy, crude_error, error_left, own_noise
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.numerics.deadline import NEVER, Deadline
@@ -19,13 +19,13 @@ from bench.discrepancy.search.explanation import Explanation
 from bench.discrepancy.settings import DiagnosisSettings
 from bench.discrepancy.verdict import Ranked, VerdictKind
 
-Search = Callable[[Case, ModelError, Sequence[Explanation]], tuple[Case, list[Explanation]]]
+SearchAgain = Callable[[Case, ModelInadequacy, Sequence[Explanation]], tuple[Case, list[Explanation]]]
 """Searches the explanations of a case, weighed by an error, beside those that are known; the case comes back with what they tell of it."""
 
 
 def coarse_explanations(
     case: Case,
-    search: Search,
+    search: SearchAgain,
     known: Sequence[Explanation],
     deadline: Deadline = NEVER,
     *,
@@ -67,13 +67,13 @@ def reference(explanations: Sequence[Explanation]) -> Explanation:
     )
 
 
-def _left(case: Case, explanations: Sequence[Explanation]) -> ModelError:
+def _left(case: Case, explanations: Sequence[Explanation]) -> ModelInadequacy:
     """The error that the best of some explanations leaves."""
     structure, best = structure_of(case, settings=explanations[0].settings), reference(explanations)
     problem = Problem(case, structure, case.identification, settings=explanations[0].settings)
     if problem.windowed:
         before = best.parts[0][0].error
-        return ModelError({}, max(best.reduced * (1.0 if before is None else before.scale), 1.0))
+        return ModelInadequacy({}, max(best.reduced * (1.0 if before is None else before.scale), 1.0))
     return error_left(problem.data, structure, best.predict, problem.settings.likelihood.error)
 
 

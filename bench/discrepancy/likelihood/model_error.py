@@ -33,7 +33,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class ModelError:
+class ModelInadequacy:
     """Error of a model on some records.
 
     Attributes:
@@ -104,7 +104,7 @@ def error_left(
     structure: Structure,
     predict: Prediction,
     settings: ErrorSettings = DEFAULT.likelihood.error,
-) -> ModelError:
+) -> ModelInadequacy:
     """Error of the model that an explanation leaves.
 
     Args:
@@ -123,12 +123,12 @@ def error_left(
         response = smoothed(spectral_power(entry.responses, entry.n_bins, entry.compared), settings)
         beyond = np.maximum(found - own_noise(entry), settings.least**2 * response)
         power.update({(entry.record.name, name): beyond[:, c] for c, name in enumerate(channels)})
-    return ModelError(power, together=_together(structure), settings=settings)
+    return ModelInadequacy(power, together=_together(structure), settings=settings)
 
 
 def crude_error(
     case: Case, structure: Structure, settings: ErrorSettings = DEFAULT.likelihood.error
-) -> ModelError:
+) -> ModelInadequacy:
     """Error of a model of which nothing is known yet: white, a part of each channel."""
     level = {
         (record.name, name): (settings.crude * float(np.std(record.values[name]))) ** 2
@@ -136,7 +136,7 @@ def crude_error(
         for name in structure.channels
     }
     power = {key: np.array([value]) for key, value in level.items()}
-    return ModelError(power, together=_together(structure), crude=True, settings=settings)
+    return ModelInadequacy(power, together=_together(structure), crude=True, settings=settings)
 
 
 def _together(structure: Structure) -> float:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.discrepancy.case.case import CaseRecord
-from bench.discrepancy.likelihood.model_error import ModelError
+from bench.discrepancy.likelihood.model_error import ModelInadequacy
 from bench.discrepancy.likelihood.noise_covariance import sensor_gains, whitening_behind
 from bench.discrepancy.likelihood.time_varying_noise import whitening_together
 from bench.discrepancy.likelihood.whitening import RecordData, band_bins, projected, timed, without_bridged
@@ -45,7 +45,7 @@ class Problem(Simulator):
     """
 
     bins: Mapping[str, int] | None = None
-    error: ModelError | None = None
+    error: ModelInadequacy | None = None
     within: float = np.inf
     data: tuple[RecordData, ...] = field(init=False)
     passed: tuple[Hypothesis, Array] = field(init=False)

@@ -25,7 +25,7 @@ from bench.discrepancy.model.structure import Structure
 from bench.discrepancy.response.simulator import Simulator
 from bench.discrepancy.response.windows import channels_of
 from bench.discrepancy.settings import LikelihoodSettings
-from bench.discrepancy.simulation.stick_slip import NO_ELEMENTS, LinearStructure, free_run
+from bench.discrepancy.simulation.stick_slip import NO_ELEMENTS, StructureMatrices, free_run
 
 Array = NDArray[np.float64]
 
@@ -77,7 +77,7 @@ class RestartWindows(NamedTuple):
 
 def window_weights(
     structure: Structure,
-    linear: LinearStructure,
+    linear: StructureMatrices,
     *,
     step: float,
     length: int,

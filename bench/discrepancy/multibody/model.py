@@ -17,7 +17,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.discrepancy.multibody.drives import Drive, drive_of, is_driven
+from bench.discrepancy.multibody.drives import JointDrive, drive_of, is_driven
 from bench.discrepancy.multibody.inverse import along
 from bench.errors import ModelError, UnknownNameError
 from bench.rig import Rig
@@ -28,14 +28,14 @@ MOVING = {int(mujoco.mjtJoint.mjJNT_HINGE): "rad", int(mujoco.mjtJoint.mjJNT_SLI
 
 
 @dataclass(frozen=True)
-class ModelSettings:
+class MultibodyNumbers:
     """Numbers of `bench.discrepancy.multibody.model`."""
 
     difference: float = 1e-6
     """Step of central differences of the inverse dynamics [rad or m], a cube root of rounding."""
 
 
-SETTINGS = ModelSettings()
+SETTINGS = MultibodyNumbers()
 
 
 class Joint(NamedTuple):
@@ -61,7 +61,7 @@ class Joint(NamedTuple):
     stiffness: float
     reference: float
     range: tuple[float, float]
-    drive: Drive | None
+    drive: JointDrive | None
 
 
 class Dynamics(NamedTuple):

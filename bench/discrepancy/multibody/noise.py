@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.signal import welch
 
 from bench.discrepancy.multibody.model import ArticulatedModel
-from bench.discrepancy.multibody.motion import Clock, Motion
+from bench.discrepancy.multibody.motion import JointClock, JointMotion
 
 Array = NDArray[np.float64]
 
@@ -52,7 +52,9 @@ class NoiseDraw(NamedTuple):
     reference: Array
 
 
-def draw(model: ArticulatedModel, motion: Motion, clock: Clock, rng: np.random.Generator) -> NoiseDraw:
+def draw(
+    model: ArticulatedModel, motion: JointMotion, clock: JointClock, rng: np.random.Generator
+) -> NoiseDraw:
     """One draw of the noise of all encoders."""
     n, nj = motion.position.shape
     noise = np.zeros((3, n, nj))
@@ -67,7 +69,11 @@ def draw(model: ArticulatedModel, motion: Motion, clock: Clock, rng: np.random.G
 
 
 def torque_noise(
-    model: ArticulatedModel, motion: Motion, clock: Clock, step: float, settings: NoiseSettings | None = None
+    model: ArticulatedModel,
+    motion: JointMotion,
+    clock: JointClock,
+    step: float,
+    settings: NoiseSettings | None = None,
 ) -> Array:
     """White torque noise (n_joints,), one-sigma a sample, as strong as what the noise of the measured motion makes of the bias."""
     settings = settings or NoiseSettings()

@@ -117,7 +117,7 @@ def _of_joints(case: Case) -> list[EffectSite]:
     found = problem.ArticulatedProblem.of(own, model, own.identification)
     settings = CheckSettings()
 
-    def site(placed: hypothesis.Placed) -> EffectSite:
+    def site(placed: hypothesis.PlacedOnJoint) -> EffectSite:
         joint = found.joints[placed.joint]
 
         def at(size: float) -> NamedEffect | None:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from bench.discrepancy.case.acquisition import upsampled
 from bench.discrepancy.settings import DiagnosisSettings, ResponseSettings
-from bench.discrepancy.simulation.stick_slip import LinearStructure
+from bench.discrepancy.simulation.stick_slip import StructureMatrices
 
 Array = NDArray[np.float64]
 
@@ -35,7 +35,7 @@ class Actuated(NamedTuple):
     between_samples: bool
 
 
-def run_in(linear: LinearStructure, length: int, step: float, *, settings: ResponseSettings) -> int:
+def run_in(linear: StructureMatrices, length: int, step: float, *, settings: ResponseSettings) -> int:
     """Samples of run-in from rest, in whole periods, after which a linear structure is in its steady state.
 
     Args:

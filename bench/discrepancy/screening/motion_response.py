@@ -27,7 +27,7 @@ from bench.discrepancy.response.windows import channels_of
 from bench.discrepancy.simulation.linear_response import linear_run
 from bench.discrepancy.simulation.prescribed_response import driven_force
 from bench.discrepancy.simulation.step_size import steps
-from bench.discrepancy.simulation.stick_slip import Elements, LinearStructure
+from bench.discrepancy.simulation.stick_slip import Elements, StructureMatrices
 
 
 class About(NamedTuple):
@@ -59,7 +59,9 @@ class MotionResponse:
                 problem = _moving(problem, about, self._unspoilt)
         self.problem = problem
         linear = problem.structure.at(values)
-        self.linear = LinearStructure(linear.mass, linear.damping, linear.stiffness, np.eye(len(linear.mass)))
+        self.linear = StructureMatrices(
+            linear.mass, linear.damping, linear.stiffness, np.eye(len(linear.mass))
+        )
         for i in range(len(problem.records)):
             problem.motion(i)
         spread = np.where(problem.spread > 0.0, problem.spread, 1.0)

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from bench.discrepancy.simulation.prescribed_response import driven_states
 from bench.discrepancy.simulation.stick_slip import (
     Elements,
-    LinearStructure,
     Motion,
+    StructureMatrices,
     free_run,
     steps_of_each,
 )
@@ -23,7 +23,7 @@ def measured_states(motion: Motion, firsts: NDArray[np.int64]) -> Array:
 
 
 def restarted(
-    linear: LinearStructure,
+    linear: StructureMatrices,
     elements: Elements,
     *,
     loads: Array,
