@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from bench.discrepancy.multibody.model import ArticulatedModel, Drive, Joint
 from bench.errors import ModelError, ParameterError, UnknownNameError
-from bench.excitation import Hypothesis, Limits, RigPrior, Uncertain
+from bench.excitation import Limits, RigHypothesis, RigPrior, Uncertain
 from bench.rig import Rig
 from bench.rig.building import parse
 
@@ -154,7 +154,7 @@ class ArmSetup(StationSetup):
         return self.hypothesis.rig
 
     @property
-    def hypothesis(self) -> Hypothesis:
+    def hypothesis(self) -> RigHypothesis:
         """What is unknown of it."""
         prior = self.questions[0]
         assert isinstance(prior, RigPrior)
@@ -218,7 +218,7 @@ def arm_setup(asked: ArmArguments) -> ArmSetup:
     for name in (*asked.ranges, *asked.velocity, *asked.torque):
         if name not in known:
             raise UnknownNameError(f"driven joint of '{path}'", name, known)
-    prior = RigPrior((Hypothesis(path.stem, rig, _unknown(asked, axes)),))
+    prior = RigPrior((RigHypothesis(path.stem, rig, _unknown(asked, axes)),))
     noise, stroke, velocity = {}, {}, {}
     for axis in axes:
         position, speed, torque = axis.channels

@@ -22,9 +22,9 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from planted_forces import KINDS, RIGS, HostRig, PlantedForce
 
+from bench.arrays import Array
 from bench.discrepancy import Case, CaseChannel, NominalParameter, record_from_arrays
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.localisation.state_map import CELLS, cell_index, state_maps
@@ -32,7 +32,6 @@ from bench.discrepancy.model.structure import Structure
 from bench.discrepancy.simulation.prescribed_response import driven_force
 from bench.discrepancy.simulation.stick_slip import Elements, free_run
 
-Array = NDArray[np.float64]
 NOISES = (0.003, 0.01, 0.03)
 SUBSTEPS = 20
 RATE, DURATION = 1000.0, 20.0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -103,6 +104,10 @@ def test_diagnosis_lives_in_rooms():
         assert lines <= LARGEST_ROOM, room.name
 
 
+parsed = cache(ast.parse)
+"""Syntax tree of a text; several tests walk the same ones."""
+
+
 def docstring_lines(node: ast.FunctionDef | ast.ClassDef) -> int:
     """Lines of the docstring of a function or class, and of those within it."""
     inner = (n for n in ast.walk(node) if isinstance(n, ast.FunctionDef | ast.ClassDef))
@@ -110,6 +115,7 @@ def docstring_lines(node: ast.FunctionDef | ast.ClassDef) -> int:
     return sum((doc.end_lineno or 0) - doc.lineno + 1 for doc in docs)
 
 
+@cache
 def code() -> dict[str, str]:
     """Text of every file that runs, tests left out, by its path."""
     paths = (path for top in ("bench", "envs", "scripts", "examples") for path in (ROOT / top).rglob("*.py"))
@@ -121,7 +127,7 @@ def too_large(files: dict[str, str]) -> set[str]:
     found = set()
     for name, text in files.items():
         found |= {name} if len(text.splitlines()) > LARGEST_FILE else set()
-        for node in ast.walk(ast.parse(text)):
+        for node in ast.walk(parsed(text)):
             if isinstance(node, ast.FunctionDef | ast.ClassDef):
                 most = LARGEST_CLASS if isinstance(node, ast.ClassDef) else LARGEST_FUNCTION
                 lines = (node.end_lineno or 0) - node.lineno + 1 - docstring_lines(node)
@@ -143,7 +149,7 @@ def defined_twice(files: dict[str, str]) -> dict[str, list[str]]:
     """Public classes and types that more than one file defines, with the files."""
     found: dict[str, list[str]] = {}
     for path, text in files.items():
-        for node in ast.parse(text).body:
+        for node in parsed(text).body:
             targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
             names = [target.id for target in targets if isinstance(target, ast.Name)]
             names = [node.name] if isinstance(node, ast.ClassDef) else names

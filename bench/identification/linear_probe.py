@@ -15,11 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench import native
+from bench.arrays import Array
 from bench.errors import ModelError
 from bench.identification.parameter_address import ParameterAddress
 from bench.rig import Rig
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from bench.arrays import Array
 from bench.errors import ModelError, ParameterError, UnknownNameError
 from bench.identification.linear_probe import Matrices, Probe, cut, matrices_at, refuse, slope_of, value_of
 from bench.identification.linear_rig_elements import element_table, reached_coordinates, sensor_columns
@@ -29,8 +30,6 @@ from bench.identification.record_batch import run_records
 from bench.identification.record_equations import Sparse
 from bench.identification.record_loop import run, work_size
 from bench.rig import Rig
-
-Array = NDArray[np.float64]
 
 
 def current(rig: Rig, name: str) -> float:

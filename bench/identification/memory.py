@@ -29,8 +29,9 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from bench.arrays import Array
 from bench.errors import FileFormatError, IdentificationError
 from bench.identification.fit_data import checked_data, nmse_percent, read_only
 from bench.identification.memory_refinement import refined
@@ -42,8 +43,6 @@ from bench.laws.evaluate import evaluate
 from bench.laws.memory import memory_law
 from bench.laws.memory_energy import stored_energy
 from bench.laws.memory_layout import MemoryLayout
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -15,10 +15,10 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import qr
 from threadpoolctl import threadpool_limits
 
+from bench.arrays import Array
 from bench.identification.memory_terms import (
     MemoryRecord,
     MemoryTerms,
@@ -28,8 +28,6 @@ from bench.identification.memory_terms import (
     solve,
     triangular,
 )
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

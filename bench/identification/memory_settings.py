@@ -7,14 +7,11 @@ from itertools import combinations
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.errors import ParameterError
 from bench.identification.memory_terms import MemoryTerms
 from bench.laws.memory_layout import Direction, MemoryLayout
-
-Array = NDArray[np.float64]
-
 
 MemoryForm = Literal["sliders", "profiles"]
 FORMS: tuple[MemoryForm, ...] = ("sliders", "profiles")

@@ -21,11 +21,10 @@ from scipy.linalg.lapack import dgeqrf
 from scipy.optimize import nnls
 from threadpoolctl import threadpool_limits
 
+from bench.arrays import Array
 from bench.laws.evaluate import evaluate
 from bench.laws.memory import memory_law
 from bench.laws.memory_layout import Direction, MemoryLayout
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

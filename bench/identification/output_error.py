@@ -21,8 +21,8 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.errors import IdentificationError, ParameterError, UnknownNameError
 from bench.identification.geodesic_steps import FittedPoint, descend
 from bench.identification.linear_rig import current
@@ -38,9 +38,6 @@ from bench.identification.rig_response import (
 )
 from bench.recording import Recording
 from bench.rig import Rig
-
-Array = NDArray[np.float64]
-
 
 _POSITIVE = ("mass", "inertia")
 

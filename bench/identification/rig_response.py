@@ -13,9 +13,9 @@ from typing import Literal, NamedTuple
 import mujoco
 import numpy as np
 from mujoco.batch import Batch
-from numpy.typing import NDArray
 
 from bench import native
+from bench.arrays import Array
 from bench.errors import IdentificationError, ModelError, UnknownNameError
 from bench.identification.linear_rig import LinearRig, address
 from bench.identification.linear_rig_elements import sensor_columns
@@ -23,7 +23,6 @@ from bench.recording import Recording
 from bench.rig import Rig, controls_of
 from bench.rig.drives import Initial
 
-Array = NDArray[np.float64]
 EngineName = Literal["auto", "linear", "mujoco"]
 
 _COMMAND_SENSORS = (int(mujoco.mjtSensor.mjSENS_ACTUATORFRC), int(mujoco.mjtSensor.mjSENS_JOINTACTFRC))

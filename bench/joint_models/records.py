@@ -6,14 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bench.errors import IdentificationError, ParameterError, UnknownNameError
 from bench.identification.parametric import ComponentRecord
 from bench.identification.restoring_force import Body, joint_data
 from bench.recording import Recording
 
-Array = NDArray[np.float64]
 MOTIONS = ("displacement", "rotation", "angle")
 FORCES = ("force", "torque")
 

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.errors import IdentificationError, UnknownNameError
 from bench.identification.fit_data import nmse_percent
 from bench.identification.memory import fit_memory
@@ -25,8 +26,6 @@ from bench.joint_models.scales import starts_of
 from bench.laws.base import ForceLaw
 from bench.laws.evaluate import evaluate
 from bench.laws.registry import LAWS, find_law
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -18,9 +18,9 @@ from typing import Any
 
 import numpy as np
 from mujoco.batch import Batch
-from numpy.typing import NDArray
 
 from bench import Element, Rig, joint_rig, sdof_rig
+from bench.arrays import Array
 from bench.identification.linear_rig import LinearRig
 from benchmarks.joint_problem import CHANNELS, JointProblem, problems
 from benchmarks.timing import Row, interleave, ratio_row
@@ -35,8 +35,6 @@ METHODS = ("RK45", "DOP853", "LSODA", "Radau", "BDF")
 RTOLS = tuple(factor * 10.0**power for power in range(-4, -11, -1) for factor in (1.0, 0.5, 0.2))
 SUBSTEPS = (1, 2, 5, 10, 20, 50, 100, 200)
 """MuJoCo's steps a millisecond."""
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -17,17 +17,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from bench import joint_rig, simulate, write_recording
+from bench.arrays import Array
 from bench.demo.joint import laboratory_view, training_records
 from bench.identification.network import fit_network
 from bench.identification.polynomial import fit_polynomial
 from benchmarks.identify_parameters import output_error
 from benchmarks.timing import Row, interleave, ratio_row
-
-Array = NDArray[np.float64]
 
 THIN = 30
 """Every so many samples of the joint's three records are trained on: a training then takes a fraction of a second."""

@@ -11,14 +11,13 @@ import mujoco
 import numba
 import numpy as np
 from mujoco.batch import Batch
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from bench import joint_rig
+from bench.arrays import Array
 from bench.identification.linear_rig import LinearRig
 from bench.laws.coupling import AXIAL_TORSIONAL_JOINT, INCH, POUND_FORCE
 
-Array = NDArray[np.float64]
 CHANNELS = tuple(
     f"{kind}_{body}"
     for pair in (("displacement", "rotation"), ("velocity", "rotation_rate"))

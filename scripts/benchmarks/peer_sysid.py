@@ -20,8 +20,8 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.effects.catalogue import CATALOGUE
 from bench.discrepancy.effects.effect import Effect
@@ -31,7 +31,6 @@ from bench.discrepancy.model.placements import placements
 from bench.discrepancy.model.rigs import structure_of
 from benchmarks.sysid_candidate import Candidate
 
-Array = NDArray[np.float64]
 FIRST = 6
 """Iterations of the first fit of a candidate, from the best point of its grid."""
 CARRIED = 4

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.model.structure import Structure
-
-Array = NDArray[np.float64]
 
 
 class StructureMjcf:

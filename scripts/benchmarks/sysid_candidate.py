@@ -13,9 +13,9 @@ from typing import Any
 import mujoco
 import numpy as np
 from mujoco import sysid
-from numpy.typing import NDArray
 
 from bench import Element, Rig
+from bench.arrays import Array
 from bench.discrepancy.case.case import CaseRecord
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.likelihood.whitening import whitened
@@ -24,7 +24,6 @@ from bench.discrepancy.simulation.stick_slip import Motion
 from benchmarks.peer_model import Compiled
 from benchmarks.structure_mjcf import StructureMjcf
 
-Array = NDArray[np.float64]
 REACH = 20.0
 """Bound, in units of the prior's standard deviation, of what has none: the optimiser wants finite ones."""
 DIVERGED = 1e6

@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from bench import native
+from bench.arrays import Array
 from bench.discrepancy.application.drives import DRIVES, LOGGED, logged
 from bench.discrepancy.application.forces import FORCES, element, harden
 from bench.discrepancy.application.numbers import nominal_parameter, wrong_number
@@ -24,7 +24,6 @@ from bench.rig import Element, Rig
 from bench.rig.building import parse
 from bench.rig.mjcf_files import model_text
 
-Array = NDArray[np.float64]
 WRONG_NUMBERS = ("mass_error", "com_error", "stiffness_error", "damping_error")
 INTEGRATORS = {
     mujoco.mjtIntegrator.mjINT_EULER: "Euler",

@@ -12,9 +12,9 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from bench.arrays import Array
 from bench.discrepancy.application.applying import Applied
 from bench.discrepancy.application.forces import values_of
 from bench.discrepancy.application.running import Reading, Stretch, controls, hook_of, run, sampled
@@ -28,8 +28,6 @@ from bench.discrepancy.multibody.motion import JointMotion, motion_of
 from bench.discrepancy.multibody.records import RECORDS_SETTINGS
 from bench.discrepancy.settings import DEFAULT
 from bench.discrepancy.verdict import NamedEffect
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

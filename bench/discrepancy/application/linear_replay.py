@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from bench.arrays import Array
 from bench.discrepancy.application.applying import Applied, loads_of, rest_of
 from bench.discrepancy.application.drives import LOGGED
 from bench.discrepancy.application.forces import values_of
@@ -21,8 +21,6 @@ from bench.discrepancy.model.structure import Structure
 from bench.discrepancy.response.initial_states import in_motion
 from bench.discrepancy.response.windows import cut, drifts
 from bench.discrepancy.verdict import NamedEffect
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -8,16 +8,15 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 from mujoco import rollout
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from bench import native
+from bench.arrays import Array
 from bench.discrepancy.application.applying import Applied
 from bench.discrepancy.application.writing import hook_text
 from bench.discrepancy.case.acquisition import at_times
 from bench.discrepancy.case.case import CaseRecord
 
-Array = NDArray[np.float64]
 Hook = Callable[[mujoco.MjModel, mujoco.MjData], None]
 
 

@@ -10,8 +10,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.checks.bands import bands_between, common_factor, compare_channels, spectra
 from bench.discrepancy.checks.scales import grossly_apart, model_words, pair_words, shown_noise, suggestion
@@ -19,8 +19,6 @@ from bench.discrepancy.multibody.encoders import encoders_of, input_of
 from bench.discrepancy.multibody.model import ArticulatedModel, Joint
 from bench.discrepancy.multibody.motion import JointMotion, Moving
 from bench.discrepancy.settings import ChecksSettings, ScaleSettings
-
-Array = NDArray[np.float64]
 
 
 def suspicions(

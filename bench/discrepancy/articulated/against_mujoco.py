@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench import native
+from bench.arrays import Array
 from bench.discrepancy.articulated.against_model import needed
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.checks.like_mujoco import ITEMS
@@ -18,8 +19,6 @@ from bench.discrepancy.multibody.encoders import input_of
 from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.multibody.motion import JointMotion, Moving
 from bench.discrepancy.settings import LikenessSettings
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -9,17 +9,15 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from bench.arrays import Array
 from bench.discrepancy.articulated_search.hypothesis import JointHypothesis
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.multibody.encoders import input_of
 from bench.discrepancy.multibody.motion import clock_of
 from bench.discrepancy.multibody.noise import NoiseDraw, NoiseSettings, draw
 from bench.discrepancy.multibody.records import PreparedRecord
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,10 +13,10 @@ from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import norm
 
 from bench import native
+from bench.arrays import Array
 from bench.discrepancy.articulated.free_runs import FreeRuns
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
@@ -24,8 +24,6 @@ from bench.discrepancy.case.case import CaseRecord
 from bench.discrepancy.multibody.encoders import encoders_of, input_of
 from bench.discrepancy.multibody.records import prepare
 from bench.discrepancy.settings import ArticulatedNextTestSettings as NextTestSettings
-
-Array = NDArray[np.float64]
 
 
 class Trajectory(NamedTuple):

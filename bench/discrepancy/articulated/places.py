@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.articulated.judgement import PredictedErrors, closed
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.settings import ArticulatedSettings
 from bench.discrepancy.verdict import Gap, Location
-
-Array = NDArray[np.float64]
 
 
 def gaps_of(

@@ -12,14 +12,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from bench.arrays import Array
 from bench.discrepancy.articulated_search.slot_setters import SlotValues, train
 from bench.discrepancy.effects.effect import FreeParameter
 from bench.discrepancy.multibody.encoders import Encoder
 
-Array = NDArray[np.float64]
 JointSite = Literal["joint", "body", "actuator", "sensor"]
 
 NUMBERS = frozenset({

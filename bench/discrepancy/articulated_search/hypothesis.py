@@ -6,16 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.articulated_search.effect import ArticulatedEffect, JointScales
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.multibody.joint_run import SLOTS, Slot
 from bench.discrepancy.multibody.model import ArticulatedModel, Joint
 from bench.errors import UnknownNameError
-
-Array = NDArray[np.float64]
-
 
 LOCAL_SLOTS = {
     "damping": Slot.DAMPING,

@@ -16,8 +16,8 @@ from functools import cached_property
 from threading import Lock
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.articulated_search.effect import ArticulatedEffect, JointScales
 from bench.discrepancy.articulated_search.hypothesis import (
     LOCAL_SLOTS,
@@ -34,8 +34,6 @@ from bench.discrepancy.multibody.joint_run import Slot, predict
 from bench.discrepancy.multibody.model import ArticulatedModel, Joint
 from bench.discrepancy.multibody.records import JointRecord, PreparedRecord, corrected, prepare, relinked
 from bench.discrepancy.settings import DEFAULT, DiagnosisSettings
-
-Array = NDArray[np.float64]
 
 
 @dataclass(eq=False)

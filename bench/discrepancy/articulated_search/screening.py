@@ -11,15 +11,12 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit, free_entries, linearised
 from bench.discrepancy.articulated_search.hypothesis import PlacedOnJoint
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem, misfit_of
 from bench.discrepancy.numerics.threads import in_threads
-
-Array = NDArray[np.float64]
-
 
 UNSCALED = ("actuator_saturation", "backlash", "joint_compliance", "one_sided_stop")
 """Effects whose first parameter is no amplitude of the force."""

@@ -10,8 +10,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.articulated_search.fitting import (
     ArticulatedFit,
     Others,
@@ -25,8 +25,6 @@ from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.articulated_search.screening import Screened, by_effect, screen
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.settings import ArticulatedSearchSettings as SearchSettings
-
-Array = NDArray[np.float64]
 
 
 def _strained(problem: ArticulatedProblem, base: ArticulatedFit, settings: SearchSettings) -> set[int]:

@@ -5,12 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-import numpy as np
-from numpy.typing import NDArray
-
+from bench.arrays import Array
 from bench.discrepancy.multibody.joint_run import Slot
 
-Array = NDArray[np.float64]
 SlotValues = dict[str, float]
 
 

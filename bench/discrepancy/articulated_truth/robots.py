@@ -7,13 +7,12 @@ from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.articulated_truth.time_stepping import CELLS, ArmMotion, Cell, march
 from bench.discrepancy.multibody.model import ArticulatedModel, compiled_model
 from bench.mjcf import model_path
 
-Array = NDArray[np.float64]
 RobotKind = Literal["arm", "leg", "servo"]
 """Kinds of robots: torque-driven arms, a leg with servos, a desk arm with servos and coarse encoders."""
 MODELS: Mapping[str, tuple[str, ...]] = {"arm": ("two_link", "six_axis"), "leg": ("leg",), "servo": ("desk",)}

@@ -13,9 +13,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
+from bench.arrays import Array
 from bench.discrepancy.truth.background_settings import STATED, BackgroundSettings
 from bench.discrepancy.truth.foreign_memory import HIDDEN_RESONATOR
 from bench.discrepancy.truth.foreign_shapes import modulated, resonator, wavy
@@ -24,7 +24,6 @@ from bench.discrepancy.truth.out_of_catalogue import MODULATED_STIFFNESS, POSITI
 from bench.discrepancy.truth.recipe import Recipe, Shape, between
 from bench.discrepancy.truth.rigs import Bench, reach_of
 
-Array = NDArray[np.float64]
 RecordArrays = Sequence[dict[str, Array]]
 
 

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.blind.background import draw_background
 from bench.discrepancy.blind.detectability import detectability
 from bench.discrepancy.blind.handed_over import (
@@ -32,8 +32,6 @@ from bench.discrepancy.truth.recipe import Drawn, Recipe, Shape
 from bench.discrepancy.truth.rigs import Bench, BlindOptions, CasePlan, draw_bench, reach_of
 from bench.discrepancy.truth.withheld_effects import RECIPES
 from bench.errors import ParameterError, SimulationError
-
-Array = NDArray[np.float64]
 
 KINDS = ("none", "single", "double", "foreign")
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.articulated_truth.faults import (
     FAULTS,
     Fault,
@@ -33,8 +33,6 @@ from bench.discrepancy.case.case import Case, CaseChannel, NominalParameter, rec
 from bench.discrepancy.truth.rigs import BlindOptions
 from bench.errors import ParameterError
 from bench.mjcf import model_path
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.case.case import Case, CaseRecord, Prediction
 from bench.discrepancy.case.channel_noise import noise_floor
 from bench.discrepancy.model.rigs import structure_of
@@ -26,8 +26,6 @@ from bench.discrepancy.response.windows import channels_of, drifts
 from bench.discrepancy.settings import DEFAULT, ChecksSettings, DiagnosisSettings
 from bench.discrepancy.simulation.linear_response import linear_run
 from bench.discrepancy.simulation.stick_slip import StructureMatrices
-
-Array = NDArray[np.float64]
 
 STATED = "starts_in_motion"
 """Option of a case that says which records start in motion; where it is given, nothing is looked for."""

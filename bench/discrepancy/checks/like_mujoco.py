@@ -15,16 +15,14 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 from mujoco import rollout
-from numpy.typing import NDArray
 
 from bench import native
+from bench.arrays import Array
 from bench.discrepancy.case.acquisition import at_times
 from bench.discrepancy.case.case import CaseRecord
 from bench.discrepancy.checks.reference import MujocoReference
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.settings import LikenessSettings
-
-Array = NDArray[np.float64]
 
 
 class Deviation(NamedTuple):

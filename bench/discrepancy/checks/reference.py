@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench import native
+from bench.arrays import Array
 from bench.discrepancy.case.case import Case, CaseChannel
 from bench.discrepancy.model.mjcf import plain_rig
 from bench.discrepancy.model.mjcf_channels import loads_and_responses
@@ -23,7 +24,6 @@ from bench.discrepancy.settings import ModelSettings
 from bench.rig import Rig
 from bench.rig.building import parse
 
-Array = NDArray[np.float64]
 PROBES = {"position": mujoco.mjtSensor.mjSENS_JOINTPOS, "velocity": mujoco.mjtSensor.mjSENS_JOINTVEL}
 """Sensors for channels that refer to a joint; MuJoCo has none that reads its acceleration."""
 

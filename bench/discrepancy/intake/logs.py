@@ -9,15 +9,13 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.errors import RecordingError
 from bench.record_files.column_map import ColumnMap, name_and_unit
 from bench.record_files.columns import read_columns
 from bench.record_files.times import clock_of, time_source
 from bench.recording import Recording
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -22,14 +22,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.case.case import Case, Prediction
 from bench.discrepancy.likelihood.whitening import RecordData, fast_length, masked
 from bench.discrepancy.model.structure import Structure
 from bench.discrepancy.settings import DEFAULT, ErrorSettings
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.case.case import CaseRecord
 from bench.discrepancy.likelihood.model_error import ModelInadequacy
 from bench.discrepancy.likelihood.noise_covariance import sensor_gains, whitening_behind
@@ -26,8 +27,6 @@ from bench.discrepancy.motion.prescribed import decided
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.response.simulator import Simulator
 from bench.discrepancy.response.windows import cut
-
-Array = NDArray[np.float64]
 
 
 @dataclass

@@ -18,9 +18,9 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from bench import native
+from bench.arrays import Array
 from bench.discrepancy.case.case import Case, CaseChannel
 from bench.discrepancy.model.structure import Structure
 from bench.discrepancy.motion.observer import ACCELERATION, ORDERS, Observer
@@ -29,7 +29,6 @@ from bench.errors import FileFormatError, UnknownNameError
 from bench.rig import Rig
 from bench.rig.building import parse
 
-Array = NDArray[np.float64]
 MOTION = "motion of "
 """Beginning of the names of the actuators that stand for what prescribes a motion; the joint's name follows."""
 SCALAR = (int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE))

@@ -9,14 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from bench.arrays import Array
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.case.channel_noise import noise_floor
 from bench.discrepancy.case.single_axis import motion_channels
 from bench.discrepancy.motion.kalman_smoother import resting, smoother_of
 from bench.discrepancy.settings import DEFAULT, MotionSettings, RecordMemorySettings
 from bench.discrepancy.simulation.stick_slip import Motion
-
-Array = NDArray[np.float64]
 
 
 class Prescribed(NamedTuple):

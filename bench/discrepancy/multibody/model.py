@@ -15,14 +15,13 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.multibody.drives import JointDrive, drive_of, is_driven
 from bench.discrepancy.multibody.inverse import along
 from bench.errors import ModelError, UnknownNameError
 from bench.rig import Rig
 
-Array = NDArray[np.float64]
 MOVING = {int(mujoco.mjtJoint.mjJNT_HINGE): "rad", int(mujoco.mjtJoint.mjJNT_SLIDE): "m"}
 """Types of joint that a model may have, with the unit of their coordinate."""
 

@@ -6,16 +6,14 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from bench.arrays import Array
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.motion.kalman_smoother import Smoother, resting, smoother_of
 from bench.discrepancy.multibody.encoders import TRUE, Encoder, encoders_of
 from bench.discrepancy.multibody.model import ArticulatedModel, Dynamics
 from bench.discrepancy.settings import ArticulatedSettings, MotionSettings
-
-Array = NDArray[np.float64]
 
 
 class JointMotion(NamedTuple):

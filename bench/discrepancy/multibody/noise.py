@@ -10,13 +10,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import welch
 
+from bench.arrays import Array
 from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.multibody.motion import JointClock, JointMotion
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

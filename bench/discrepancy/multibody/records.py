@@ -15,19 +15,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.linalg import expm, solve_discrete_are
 from scipy.signal import butter, sosfiltfilt
 
+from bench.arrays import Array
 from bench.discrepancy.case.case import Case, CaseChannel, CaseRecord
 from bench.discrepancy.multibody.encoders import TRUE, Encoder, encoders_of, input_of, weights_of
 from bench.discrepancy.multibody.model import ArticulatedModel, Dynamics, Joint
 from bench.discrepancy.multibody.motion import Coefficients, JointClock, JointMotion, clock_of, motion_of
 from bench.discrepancy.multibody.noise import torque_noise
 from bench.discrepancy.settings import DEFAULT, ArticulatedSettings, DiagnosisSettings
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,10 +6,9 @@ from typing import Any
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
-Array = NDArray[np.float64]
+from bench.arrays import Array
 
 _inline: Any = numba.njit(error_model="numpy", nogil=True, forceinline=True)
 

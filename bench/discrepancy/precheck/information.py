@@ -16,8 +16,8 @@ from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.effects.catalogue import CATALOGUE
 from bench.discrepancy.effects.effect import FreeParameter
@@ -27,7 +27,6 @@ from bench.discrepancy.model.placements import placements
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.precheck.settings import CheckSettings
 
-Array = NDArray[np.float64]
 Identifiability = Literal["identifiable", "weak", "not identifiable"]
 
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Collection
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.articulated.free_runs import FreeRuns
 from bench.discrepancy.articulated_search.catalogue import CATALOGUE
 from bench.discrepancy.articulated_search.hypothesis import PlacedOnJoint
@@ -29,8 +29,6 @@ from bench.discrepancy.precheck.information import (
     sized,
 )
 from bench.discrepancy.precheck.settings import CheckSettings
-
-Array = NDArray[np.float64]
 
 
 def joints_told(

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.articulated.admission import admitted_robot
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.checks.channel_comparison import compare
@@ -16,8 +16,6 @@ from bench.discrepancy.multibody.channels import bound
 from bench.discrepancy.multibody.encoders import encoders_of, input_of
 from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.errors import BenchError
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

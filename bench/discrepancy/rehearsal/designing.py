@@ -19,8 +19,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.application.applying import specification
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.case.reading import GROUPS, read_case
@@ -42,7 +42,6 @@ from bench.errors import BenchError, ParameterError, SimulationError
 from bench.files import together, write_text
 from bench.signals import Multisine
 
-Array = NDArray[np.float64]
 NAMES = ("identification", "identification_2", "validation")
 
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bench.discrepancy.articulated_search import hypothesis, problem
 from bench.discrepancy.articulated_search.catalogue import CATALOGUE as JOINTS
@@ -23,8 +22,6 @@ from bench.discrepancy.precheck.joints import admitted_joints
 from bench.discrepancy.precheck.settings import CheckSettings
 from bench.discrepancy.verdict import Estimate, NamedEffect
 from bench.errors import ParameterError, UnknownNameError
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from bench import native
+from bench.arrays import Array
 from bench.discrepancy.application.applying import Applied, Findings, RunOptions, apply, specification
 from bench.discrepancy.application.joint_replay import encoders_wrong
 from bench.discrepancy.application.linear_replay import LinearReplay
@@ -30,7 +30,6 @@ from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.verdict import NamedEffect, NominalEstimate
 from bench.errors import ModelError, ParameterError, SimulationError
 
-Array = NDArray[np.float64]
 Readings = Callable[[Applied, Sequence[NamedEffect], CaseRecord], Mapping[str, Array]]
 
 

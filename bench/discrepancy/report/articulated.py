@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis
 from bench.discrepancy.articulated.free_runs import FreeRuns
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
@@ -29,7 +29,6 @@ from bench.page import Page
 from bench.recording import Recording
 from bench.rig import Rig
 
-Array = NDArray[np.float64]
 FINAL = "with what is named"
 
 

@@ -10,13 +10,11 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.case.acquisition import upsampled
 from bench.discrepancy.settings import DiagnosisSettings, ResponseSettings
 from bench.discrepancy.simulation.stick_slip import StructureMatrices
-
-Array = NDArray[np.float64]
 
 
 class Actuated(NamedTuple):

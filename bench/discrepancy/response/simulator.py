@@ -10,6 +10,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.case.case import CaseRecord
 from bench.discrepancy.model.nominal_elements import with_own_forces
 from bench.discrepancy.model.placement import Hypothesis
@@ -22,8 +23,6 @@ from bench.discrepancy.simulation.prescribed_response import driven_force
 from bench.discrepancy.simulation.restarts import measured_states, restarted
 from bench.discrepancy.simulation.step_size import steps
 from bench.discrepancy.simulation.stick_slip import Elements, Motion, StructureMatrices
-
-Array = NDArray[np.float64]
 
 
 @dataclass

@@ -12,12 +12,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.model.structure import Structure
 from bench.discrepancy.settings import DEFAULT, LikelihoodSettings
 from bench.discrepancy.simulation.stick_slip import Motion, StructureMatrices
-
-Array = NDArray[np.float64]
 
 
 def drifts(structure: Structure, linear: StructureMatrices, duration: float) -> bool:

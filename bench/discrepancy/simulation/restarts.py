@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.simulation.prescribed_response import driven_states
 from bench.discrepancy.simulation.stick_slip import (
     Elements,
@@ -13,8 +14,6 @@ from bench.discrepancy.simulation.stick_slip import (
     free_run,
     steps_of_each,
 )
-
-Array = NDArray[np.float64]
 
 
 def measured_states(motion: Motion, firsts: NDArray[np.int64]) -> Array:
