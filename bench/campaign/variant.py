@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-import mujoco
 import numpy as np
 from mujoco.batch import Batch
 from numpy.typing import NDArray
@@ -28,13 +27,6 @@ from bench.rig.configuration import rig_from_configuration
 from bench.rig.drives import Initial, controls_of
 from bench.rig.library import PRESCRIBED_ACTUATORS, prescribe, starting
 from bench.signals import Excitation, Signal
-
-STATE = (
-    mujoco.mjtState.mjSTATE_TIME
-    | mujoco.mjtState.mjSTATE_QPOS
-    | mujoco.mjtState.mjSTATE_QVEL
-    | mujoco.mjtState.mjSTATE_ACT
-)
 
 
 @dataclass(frozen=True, eq=False)

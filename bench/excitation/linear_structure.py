@@ -35,13 +35,6 @@ class LinearStructureSettings:
 
 SETTINGS = LinearStructureSettings()
 
-TRACKED = (
-    mujoco.mjtState.mjSTATE_TIME
-    | mujoco.mjtState.mjSTATE_QPOS
-    | mujoco.mjtState.mjSTATE_QVEL
-    | mujoco.mjtState.mjSTATE_ACT
-)
-
 
 class AffineStructure(NamedTuple):
     """Accelerations and sensors of a rig as affine functions.

@@ -142,7 +142,7 @@ class _Player:
             columns[actuator] = np.asarray(record.values[name]) / gain
         if record.periodic:
             return self._periodic(record, columns)
-        firsts, _length = (
+        firsts, _ = (
             cut(case, record, len(structure.observers))
             if self.replay.windowed
             else (np.zeros(1, dtype=np.int64), len(record))
