@@ -27,8 +27,7 @@ from bench.identification.linear_probe import Matrices, Probe, cut, matrices_at,
 from bench.identification.linear_rig_elements import element_table, reached_coordinates, sensor_columns
 from bench.identification.parameter_address import address
 from bench.identification.record_batch import run_records
-from bench.identification.record_equations import Sparse
-from bench.identification.record_loop import run, work_size
+from bench.identification.record_loop import Sparse, run, work_size
 from bench.rig import Rig
 
 

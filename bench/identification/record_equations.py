@@ -1,12 +1,14 @@
-"""Equations of motion that the compiled record loop integrates, and the channels read off a state."""
+"""Equations of motion that the compiled record loop integrates, and the channels read off a state.
+
+The functions are inlined into the loops of `bench.identification.record_loop` and `bench.identification.dormand_prince_8`. Numba keeps
+the machine code of a loop by the file that the loop stands in: after a change here, remove what is kept of those two.
+"""
 
 from __future__ import annotations
 
 from typing import Any, NamedTuple
 
 import numba
-import numpy as np
-from numpy.typing import NDArray
 
 from bench.laws.calling import advance, call_kernel, load_int, pointer_at
 
@@ -20,27 +22,6 @@ contracted = numba.njit(cache=True, error_model="numpy", nogil=True, fastmath=_C
 contracted_inline = numba.njit(
     cache=True, error_model="numpy", nogil=True, forceinline=True, fastmath=_CONTRACTED
 )
-
-
-class Sparse(NamedTuple):
-    """A matrix row by row: most entries of a structure's matrices are zero, and products with them took half the time.
-
-    Attributes:
-        starts: First entry of each row, and one past the last of all ``(n_rows + 1,)``.
-        columns: Column of each entry.
-        values: The entries.
-    """
-
-    starts: NDArray[np.int64]
-    columns: NDArray[np.int64]
-    values: NDArray[np.float64]
-
-    @classmethod
-    def of(cls, matrix: NDArray[np.float64]) -> Sparse:
-        """The entries of a matrix that are not zero."""
-        rows, columns = np.nonzero(matrix)
-        starts = np.searchsorted(rows, np.arange(matrix.shape[0] + 1))
-        return cls(starts.astype(np.int64), columns.astype(np.int64), np.append(matrix[rows, columns], 0.0))
 
 
 class Equations(NamedTuple):

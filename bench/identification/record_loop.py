@@ -13,8 +13,10 @@ References:
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bench.identification.dormand_prince_8 import POWERS, SMALLEST_STEP, STAGES8, across
 from bench.identification.record_equations import (
@@ -43,6 +45,27 @@ _A = np.array(
 _C = np.array([0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0, 1.0])
 _E = np.array([71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40])
 _STAGES = len(_C)
+
+
+class Sparse(NamedTuple):
+    """A matrix row by row: most entries of a structure's matrices are zero, and products with them took half the time.
+
+    Attributes:
+        starts: First entry of each row, and one past the last of all ``(n_rows + 1,)``.
+        columns: Column of each entry.
+        values: The entries.
+    """
+
+    starts: NDArray[np.int64]
+    columns: NDArray[np.int64]
+    values: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, matrix: NDArray[np.float64]) -> Sparse:
+        """The entries of a matrix that are not zero."""
+        rows, columns = np.nonzero(matrix)
+        starts = np.searchsorted(rows, np.arange(matrix.shape[0] + 1))
+        return cls(starts.astype(np.int64), columns.astype(np.int64), np.append(matrix[rows, columns], 0.0))
 
 
 def work_size(n: int, n_dof: int) -> int:
