@@ -1,4 +1,4 @@
-"""The diagnosis of a case: where the gap lies, which effect causes it, how far it shrinks.
+"""The diagnosis of a case: where the discrepancy lies, which effect causes it, how far it shrinks.
 
 The steps, each in its own room: read the case (`case`), find what it leaves unstated of its records (`checks.initial_motion`,
 `search.load_interpolation`), screen the catalogue and fit what is promising (`screening`, `fitting`, `search`), weigh the
@@ -62,7 +62,7 @@ class Diagnosis:
         verdict: The verdict.
         final: The explanation behind `verdict.gap.after`: the best one, or for an unknown effect its closure; the nominal
             model with its parameters re-estimated where a closure predicts the judging records worse than that.
-        where: Where the gap lies, with the maps behind `verdict.locations`.
+        where: Where the discrepancy lies, with the maps behind `verdict.locations`.
     """
 
     case: Case

@@ -1,4 +1,4 @@
-"""What was found of a case before its gap is measured: the verdict, what is named, and how it is put into words."""
+"""What was found of a case before its discrepancy is measured: the verdict, what is named, and how it is put into words."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """How far the discrepancy shrinks: free runs of the judging records before, in between and after.
 
-The gap is rms(simulated - measured) / std(measured) of a position-like channel over whole judging records, simulated
+The discrepancy is rms(simulated - measured) / std(measured) of a position-like channel over whole judging records, simulated
 from rest with the measured loads and nothing else. On the joint it is that of the relative motion of each axis.
 Records that start in motion, and windows of records that would drift, begin at the state estimated from the record itself
 (`fitting.initial_state_fit`), every model's from the same samples; the metric says so.
