@@ -1,4 +1,4 @@
-"""The simulator's own share of a discrepancy, named as a location of its own: the nominal model as its owner runs it against itself, converged."""
+"""The simulator's own share of a discrepancy, named as a location: the nominal model as its owner runs it against itself, converged."""
 
 from __future__ import annotations
 

@@ -5,7 +5,7 @@ What counts as right, by the class of a case:
 - none: the verdict *none* (anything else is a false alarm); foreign: the verdict *unknown*.
 - single, double: the verdict *effect*, with the withheld effects and no others, each at its place; one of them may be another
   member of a set that the verdict declares indistinguishable, if the set holds the truth.
-- struck (the true effect was taken out of the catalogue): *unknown*, or an effect of the truth's family: its nearest kin.
+- struck (the true effect was taken out of the catalogue): *unknown*, or an effect of the truth's family.
 - with a background (main, background, unstated, clean): see `background_score`; these have figures of their own.
 """
 
