@@ -27,7 +27,7 @@ from bench.recording.outliers import bridged, outliers
 
 
 @dataclass(frozen=True)
-class CaseNumbers:
+class CaseLimits:
     """Numbers of `bench.discrepancy.case.case`."""
 
     min_samples: int = 200
@@ -36,7 +36,7 @@ class CaseNumbers:
     """Largest value of a sample: its square over a power of the step is still a number."""
 
 
-SETTINGS = CaseNumbers()
+SETTINGS = CaseLimits()
 
 
 @dataclass(frozen=True)

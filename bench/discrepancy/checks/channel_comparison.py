@@ -54,7 +54,7 @@ class ChannelComparison(NamedTuple):
     steady: float
 
 
-def compare(
+def compare_channels(
     first: Array,
     second: Array,
     *,
@@ -136,7 +136,7 @@ def _between_channels(problem: Problem) -> Iterator[str]:
         if first.order == second.order or not np.array_equal(np.abs(first.row), np.abs(second.row)):
             continue
         for record in problem.records:
-            pair = compare(
+            pair = compare_channels(
                 record.values[first.channel],
                 record.values[second.channel],
                 orders=(first.order, second.order),

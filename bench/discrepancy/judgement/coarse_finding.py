@@ -19,13 +19,13 @@ from bench.discrepancy.search.explanation import Explanation
 from bench.discrepancy.settings import DiagnosisSettings
 from bench.discrepancy.verdict import Ranked, VerdictKind
 
-SearchAgain = Callable[[Case, ModelInadequacy, Sequence[Explanation]], tuple[Case, list[Explanation]]]
+SearchByError = Callable[[Case, ModelInadequacy, Sequence[Explanation]], tuple[Case, list[Explanation]]]
 """Searches the explanations of a case, weighed by an error, beside those that are known; the case comes back with what they tell of it."""
 
 
 def coarse_explanations(
     case: Case,
-    search: SearchAgain,
+    search: SearchByError,
     known: Sequence[Explanation],
     deadline: Deadline = NEVER,
     *,

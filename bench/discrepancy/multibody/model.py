@@ -27,14 +27,14 @@ MOVING = {int(mujoco.mjtJoint.mjJNT_HINGE): "rad", int(mujoco.mjtJoint.mjJNT_SLI
 
 
 @dataclass(frozen=True)
-class MultibodyNumbers:
+class MultibodySettings:
     """Numbers of `bench.discrepancy.multibody.model`."""
 
     difference: float = 1e-6
     """Step of central differences of the inverse dynamics [rad or m], a cube root of rounding."""
 
 
-SETTINGS = MultibodyNumbers()
+SETTINGS = MultibodySettings()
 
 
 class Joint(NamedTuple):
