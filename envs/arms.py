@@ -12,7 +12,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.discrepancy.multibody.model import ArticulatedModel, Drive, Joint
+from bench.discrepancy.multibody.drives import JointDrive
+from bench.discrepancy.multibody.model import ArticulatedModel, Joint
 from bench.errors import ModelError, ParameterError, UnknownNameError
 from bench.excitation import Limits, RigHypothesis, RigPrior, Uncertain
 from bench.rig import Rig
@@ -92,7 +93,7 @@ class Axis:
         torque: Largest torque of the drive at the joint [N m or N]; infinite where there is none.
     """
 
-    def __init__(self, joint: Joint, drive: Drive, asked: ArmArguments) -> None:
+    def __init__(self, joint: Joint, drive: JointDrive, asked: ArmArguments) -> None:
         self.joint, self.drive = joint, drive
         low, high = _within(joint.name, joint.range, asked.ranges.get(joint.name))
         if not np.isfinite([low, high]).all():

@@ -20,12 +20,13 @@ from numpy.typing import NDArray
 from bench import native
 from bench.campaign.drawing import RecordDraw, check_design, draws, median_draw, record_streams
 from bench.campaign.plan import Plan
-from bench.campaign.variant import STATE, Rows, Variant, Variants, chains_of, drive_of, kept_channels
+from bench.campaign.variant import Rows, Variant, Variants, chains_of, drive_of, kept_channels
 from bench.errors import BenchError, ParameterError, SimulationError, UnknownNameError
 from bench.measurement import measure
 from bench.recording import Recording
 from bench.rig import simulate
 from bench.rig.drives import controls_of
+from bench.rig.simulation import STATE
 from bench.signals.streams import named_streams
 
 

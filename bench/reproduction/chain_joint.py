@@ -17,12 +17,13 @@ from bench.demo.joint import (
 from bench.errors import RangeWarning, SimulationError
 from bench.figures import bar_table, loops, time_histories
 from bench.laws.network import published_network
+from bench.progress import ShowProgress
 from bench.recording import Recording, nmse
 from bench.reduction import channel_nmse, element_from
 from bench.reproduction import joint_models
 from bench.reproduction.estimates import fine
 from bench.reproduction.imperial import imperial
-from bench.reproduction.item import Item, Picture, ShowProgress
+from bench.reproduction.item import Item, Picture
 from bench.reproduction.printed_figures import fig, panels
 from bench.reproduction.verdict import (
     VERDICT_SETUP,

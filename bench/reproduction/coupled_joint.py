@@ -9,11 +9,12 @@ import numpy as np
 from bench.figures import bar_table, loops, time_histories
 from bench.identification.network import NetworkModel
 from bench.identification.polynomial import PolynomialModel, fit_polynomial
+from bench.progress import ShowProgress
 from bench.recording import Recording
 from bench.reproduction import joint_models, joint_one_record
 from bench.reproduction.estimates import fine
 from bench.reproduction.imperial import imperial
-from bench.reproduction.item import Item, Picture, ShowProgress
+from bench.reproduction.item import Item, Picture
 from bench.reproduction.printed_figures import fig, panels
 from bench.reproduction.verdict import (
     VERDICT_SETUP,

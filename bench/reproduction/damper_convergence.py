@@ -19,7 +19,7 @@ from bench.identification.damper_study import (
     PolynomialExperiment,
     polynomial_experiment,
 )
-from bench.reproduction.item import ShowProgress
+from bench.progress import ShowProgress
 from bench.reproduction.printed_figures import fig
 from bench.reproduction.verdict import (
     VERDICT_SETUP,

@@ -21,6 +21,7 @@ from bench.identification.damper import (
 from bench.identification.damper_study import DamperRecord, harmonic_record
 from bench.identification.damper_trust import TrustReport, check_design_model
 from bench.identification.harmonic_tests import HarmonicCampaign, harmonic_campaign
+from bench.progress import ShowProgress
 from bench.reproduction import damper_random
 from bench.reproduction.damper_records import LOOPS, beside
 from bench.reproduction.estimates import (
@@ -28,7 +29,7 @@ from bench.reproduction.estimates import (
     courses,
     fine,
 )
-from bench.reproduction.item import Item, Picture, ShowProgress
+from bench.reproduction.item import Item, Picture
 from bench.reproduction.printed_figures import fig, panels
 from bench.reproduction.verdict import (
     VERDICT_SETUP,

@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from bench.figures import COLOURS, style
 from bench.figures.look import axes_grid
 from bench.identification.damper_study import OrderStudy, order_study, random_record
+from bench.progress import ShowProgress
 from bench.reproduction.damper_online_order import (
     DAMPER_ONLINE_ORDER_SETUP,
     FOLLOWED,
@@ -26,7 +27,7 @@ from bench.reproduction.damper_online_order import (
 from bench.reproduction.estimates import (
     ESTIMATES_SETUP,
 )
-from bench.reproduction.item import Item, Picture, ShowProgress
+from bench.reproduction.item import Item, Picture
 from bench.reproduction.printed_figures import fig, panels
 from bench.reproduction.verdict import (
     VERDICT_SETUP,

@@ -27,10 +27,11 @@ from bench.identification.network import fit_network
 from bench.identification.polynomial import fit_polynomial
 from bench.laws import find_law
 from bench.laws.evaluate import evaluate
+from bench.progress import ShowProgress
 from bench.recording import Recording, nmse
 from bench.reduction import element_from
 from bench.reproduction.estimates import fine
-from bench.reproduction.item import Item, Picture, ShowProgress
+from bench.reproduction.item import Item, Picture
 from bench.reproduction.verdict import (
     VERDICT_SETUP,
     Row,

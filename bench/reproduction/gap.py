@@ -14,10 +14,11 @@ import numpy as np
 from bench.figures import loops, surface, time_histories
 from bench.identification.surface import fit_surface
 from bench.laws.coupling import INCH, POUND_FORCE
+from bench.progress import ShowProgress
 from bench.recording import Recording, nmse
 from bench.reproduction.estimates import fine
 from bench.reproduction.imperial import STIFFNESS, sdof_view
-from bench.reproduction.item import Item, Picture, ShowProgress
+from bench.reproduction.item import Item, Picture
 from bench.reproduction.printed_figures import fig, panels
 from bench.reproduction.verdict import (
     VERDICT_SETUP,

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from bench.figures import loops, style, time_histories
 from bench.figures.look import axes_grid, thin
 from bench.identification.adaptive_history import AdaptiveHistory
+from bench.progress import ShowProgress
 from bench.recording import Recording, nmse
 from bench.reproduction.estimates import (
     ESTIMATES_SETUP,
@@ -24,7 +25,7 @@ from bench.reproduction.estimates import (
     learnt,
 )
 from bench.reproduction.hysteretic_record import SETUP, identify, printed_model_fate, record
-from bench.reproduction.item import Item, Picture, ShowProgress
+from bench.reproduction.item import Item, Picture
 from bench.reproduction.printed_figures import fig, panels
 from bench.reproduction.verdict import VERDICT_SETUP, Row, axis_row, fact_row, told_row, value_row
 

@@ -19,8 +19,8 @@ from bench.demo.joint import (
 from bench.identification.network import NetworkModel, fit_network
 from bench.identification.polynomial import PolynomialModel, fit_polynomial
 from bench.identification.restoring_force import JointData
+from bench.progress import ShowProgress
 from bench.reproduction import joint_models
-from bench.reproduction.item import ShowProgress
 from bench.reproduction.verdict import (
     VERDICT_SETUP,
     Row,

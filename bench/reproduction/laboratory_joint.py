@@ -14,11 +14,12 @@ from bench.errors import RangeWarning, SimulationError
 from bench.figures import loops, time_histories
 from bench.identification.polynomial import fit_polynomial
 from bench.identification.restoring_force import JointData
+from bench.progress import ShowProgress
 from bench.recording import Recording, nmse
 from bench.reduction import element_from
 from bench.reproduction.coupled_joint import PAIRS, Model, shown
 from bench.reproduction.estimates import fine
-from bench.reproduction.item import Item, Picture, ShowProgress
+from bench.reproduction.item import Item, Picture
 from bench.reproduction.joint_models import AXES, LOADINGS, train_network
 from bench.reproduction.laboratory import SETUP, drive, measured, rig, tests, view
 from bench.reproduction.printed_figures import fig, panels

@@ -15,10 +15,11 @@ from scipy.linalg import eigh, expm
 from bench.demo.joint import excitation
 from bench.figures import time_histories
 from bench.laws.coupling import INCH, POUND_FORCE
+from bench.progress import ShowProgress
 from bench.recording import Recording, nmse
 from bench.reproduction.estimates import fine
 from bench.reproduction.imperial import STIFFNESS, imperial
-from bench.reproduction.item import Item, Picture, ShowProgress
+from bench.reproduction.item import Item, Picture
 from bench.reproduction.printed_figures import fig, panels
 from bench.reproduction.verdict import Row, fact_row, value_row
 from bench.rig import Element, Rig, simulate

@@ -31,11 +31,12 @@ from bench.nastran import (
     read_network,
 )
 from bench.nastran.bulk import Format
+from bench.progress import ShowProgress
 from bench.recording import Recording
 from bench.reproduction import original_deck
 from bench.reproduction.chain_joint import AXES
 from bench.reproduction.estimates import fine
-from bench.reproduction.item import Item, Picture, ShowProgress
+from bench.reproduction.item import Item, Picture
 from bench.reproduction.verdict import Row, fact_row, value_row
 from bench.rig import Element, simulate
 from bench.rig.library import chain_rig

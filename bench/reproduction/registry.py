@@ -8,7 +8,8 @@ from importlib import import_module
 from types import MappingProxyType
 
 from bench.errors import UnknownNameError
-from bench.reproduction.item import Item, ShowProgress
+from bench.progress import ShowProgress
+from bench.reproduction.item import Item
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,9 @@ from typing import Any
 
 from bench import model_path
 from bench.files import together, write_text
+from bench.progress import ShowProgress
 from bench.provenance import provenance, software_versions
-from bench.reproduction.item import Item, Result, Shown, ShowProgress
+from bench.reproduction.item import Item, Result, Shown
 from bench.reproduction.registry import ItemEntry, find_entries
 from bench.reproduction.writing import to_markdown, to_page
 

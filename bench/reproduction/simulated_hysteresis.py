@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from bench.figures import loops, time_histories
 from bench.identification.adaptive_history import AdaptiveHistory
+from bench.progress import ShowProgress
 from bench.recording import Recording
 from bench.reproduction.bouc_wen_rig import (
     SETUP,
@@ -25,7 +26,7 @@ from bench.reproduction.bouc_wen_rig import (
     settled_after,
 )
 from bench.reproduction.estimates import contribution_histories, estimate_histories, fine
-from bench.reproduction.item import Item, Picture, ShowProgress
+from bench.reproduction.item import Item, Picture
 from bench.reproduction.printed_figures import fig, panels
 from bench.reproduction.verdict import VERDICT_SETUP, Row, axis_row, fact_row, value_row
 

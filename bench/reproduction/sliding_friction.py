@@ -15,10 +15,11 @@ import numpy as np
 
 from bench.figures import loops, time_histories
 from bench.laws.coupling import INCH, POUND_FORCE
+from bench.progress import ShowProgress
 from bench.recording import Recording
 from bench.reproduction.estimates import fine
 from bench.reproduction.imperial import STIFFNESS, imperial
-from bench.reproduction.item import Item, Picture, ShowProgress
+from bench.reproduction.item import Item, Picture
 from bench.reproduction.printed_figures import fig, panels
 from bench.reproduction.verdict import Row, axis_row, fact_row, told_row, value_row
 from bench.rig import Element, simulate

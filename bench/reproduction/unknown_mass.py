@@ -8,8 +8,9 @@ from bench.demo.joint import laboratory_view
 from bench.figures import bar_table
 from bench.identification.network import NetworkModel, fit_network
 from bench.identification.polynomial import PolynomialModel, fit_polynomial
+from bench.progress import ShowProgress
 from bench.reproduction import joint_models
-from bench.reproduction.item import Item, Picture, ShowProgress
+from bench.reproduction.item import Item, Picture
 from bench.reproduction.verdict import Row, RowVerdict, fact_row, value_row
 from bench.rig.library import inertia_of, joint_rig
 
