@@ -2,7 +2,7 @@
 
 ``estimator = AdaptiveLeastSquares(bouc_wen_model(2)); estimator.update(sample)`` keeps constant memory and does bounded work a
 sample: O(n^2), and O(n^3) twice a window for the persistence monitor. `run` gives the same numbers at the speed of
-the compiled loop. The law and its discretisation are in `bench.identification.stream`, the models in
+the compiled loop. The law and its discretisation are in `bench.identification.stream_law`, the models in
 `bench.identification.regressors`.
 """
 

@@ -1,21 +1,8 @@
 """Compiled core of the adaptive estimator: one step a sample, called alike by the stream and by whole records.
 
 A step admits the sample (finite, in order, moving), forms ``z`` and ``phi`` of the model (`bench.identification.regressors`),
-updates the estimate, and keeps the books of the persistence monitor.
-
-The update is the exact solution over one step, with ``phi`` and ``m_s`` held, of the least-squares law with forgetting
-and normalisation (Ioannou & Sun 1996, section 4.3; printed without the error in Tasbihgoo 2006, eq. 2.8)::
-
-    theta' = P phi eps,  eps = (z - theta^T phi) / m_s^2,  m_s^2 = 1 + phi^T phi
-    P' = beta P - P phi phi^T P / m_s^2   while |P| <= R0, else 0
-
-In information form, ``(P^-1)' = -beta P^-1 + phi phi^T / m_s^2``, this is linear and integrates to a recursive least-squares
-step of forgetting factor ``mu = exp(-beta h)`` and weight ``g / m_s^2``, ``g = (1 - mu) / beta``: stable for any step, where
-an Euler step of the law is not. The printed bound, read literally, never leaves ``P' = 0`` again; here a step that would
-carry ``trace(P)`` (an upper bound of the spectral norm) beyond R0 is refused, the next is tried again.
-
-References:
-    Ioannou, P. A. and Sun, J. 1996, Robust Adaptive Control, sections 4.3.6-4.3.7.
+updates the estimate (`bench.identification.stream_law`), and keeps the books of the persistence monitor
+(`bench.identification.stream_monitor`).
 """
 
 from __future__ import annotations
