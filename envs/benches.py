@@ -21,7 +21,7 @@ from bench.excitation.information import (
     misfit,
 )
 from bench.excitation.stepping import run_of
-from bench.excitation.windows import WindowUnderWay, advance, advance_prior, advance_rivals
+from bench.excitation.windows import WindowUnderWay, advance_prior, advance_rivals, advance_window
 
 from .laboratory import Laboratories
 from .options import Options, check_size
@@ -174,7 +174,7 @@ class Benches(SteppedBenches):
             window = advance_prior(panel.ensemble, run, counts, weights, (fisher, score, square), values)
         else:
             values = np.zeros(counts.shape)
-            window = advance(panel.ensemble, run)
+            window = advance_window(panel.ensemble, run)
         return _Account(window, books, values)
 
     def _told(

@@ -19,7 +19,7 @@ from bench.discrepancy.blind.drawing import (
 )
 from bench.discrepancy.blind.proportions import calibration_error, share_of
 from bench.discrepancy.blind.region_overlap import region_scores
-from bench.discrepancy.blind.score_report import markdown, page, tables
+from bench.discrepancy.blind.score_report import markdown, score_page, tables
 from bench.discrepancy.blind.scoring import score_cases
 from bench.discrepancy.effects import friction_limits as limits
 from bench.discrepancy.effects.catalogue import CATALOGUE
@@ -560,7 +560,7 @@ def test_scores_are_told_as_tables_markdown_and_a_page(tmp_path, capsys):
     text = markdown(score, title="Trials")
     assert text.startswith("# Trials")
     assert "| gap | gap 1 |" in text
-    html = page(score).to_html()
+    html = score_page(score).to_html()
     assert "data:image/png;base64" in html
     folders = [str(tmp_path / "r"), str(tmp_path / "a")]
     told = tmp_path / "told.md"

@@ -14,7 +14,7 @@ from bench.errors import UnknownNameError
 from bench.reproduction import ENTRIES, Item, ItemEntry, Result, find_entries, reproduce, running
 from bench.reproduction.printed_figures import PANELS
 from bench.reproduction.verdict import OWN, RowVerdict, axis_row, fact_row, one_of_ours, value_row
-from bench.reproduction.writing import summary, to_gallery, to_markdown
+from bench.reproduction.writing import items_summary, to_gallery, to_markdown
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 
@@ -91,7 +91,7 @@ def test_what_was_put_in_is_told_and_not_counted_as_evidence():
         fact_row("c", "2", False, printed="1", source="p. 1"),
         fact_row("d", "1", True),
     )
-    told = summary([Result("A1", "t", "x", "nothing", rows, (), 1.0, "v")])
+    told = items_summary([Result("A1", "t", "x", "nothing", rows, (), 1.0, "v")])
     assert "Of 3 things that the text prints, 2 hold, 0 hold in shape only, 1 does not hold" in told
     assert "1 of those that hold were put in" in told
     assert "Of 1 checks of our own" in told
@@ -240,10 +240,10 @@ def test_the_chain_comes_to_rest_where_statics_say():
 
 
 def test_integration_without_hysteresis_is_an_oscillator():
-    from bench.reproduction.bouc_wen_rig import SETUP, integrate
+    from bench.reproduction.bouc_wen_rig import SETUP, integrate_alone
 
     n = 4000
-    rows = integrate(np.full(n, 2.0), [np.array([5.0, 0.0, 0.0, 0.0, 0.0])] * n)
+    rows = integrate_alone(np.full(n, 2.0), [np.array([5.0, 0.0, 0.0, 0.0, 0.0])] * n)
     time = np.arange(n) / SETUP.rate
     # RK4 at omega h = 2e-3: (omega h)^4 / 120 of a radian a radian, far below 1e-10
     np.testing.assert_allclose(rows[:, 0], 0.4 * (1.0 - np.cos(math.sqrt(5.0) * time)), atol=1e-10)

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from bench import native
 from bench.campaign.drawing import RecordDraw, check_design, draws, median_draw, record_streams
 from bench.campaign.plan import Plan
-from bench.campaign.variant import Rows, Variant, Variants, chains_of, drive_of, kept_channels
+from bench.campaign.variant import Rows, Variant, Variants, chains_of, drawn_commands, kept_channels
 from bench.errors import BenchError, ParameterError, SimulationError, UnknownNameError
 from bench.measurement import measure
 from bench.recording import Recording
@@ -150,7 +150,7 @@ class Generator:
         draw = draws(self.plan, [record])[0]
         variant = self.variants.of(draw.rig, draw.present)
         _, excitation, sensors = record_streams(self.plan, record)
-        drive, start = drive_of(self.plan, variant, draw, excitation)
+        drive, start = drawn_commands(self.plan, variant, draw, excitation)
         rig = variant.with_values(draw.values)
         recording = simulate(rig, drive, initial=start, sample_rate=self.plan.sample_rate)
         return measure(recording, chains_of(self.plan, draw), sensors)
@@ -159,7 +159,7 @@ class Generator:
         try:
             thetas = variant.thetas(draw.values)
             variant.check_structure(draw.values)
-            drive, start = drive_of(self.plan, variant, draw, record_streams(self.plan, draw.record)[1])
+            drive, start = drawn_commands(self.plan, variant, draw, record_streams(self.plan, draw.record)[1])
             controls = controls_of(variant.rig, drive)
             chains_of(self.plan, draw)
         except (BenchError, ArithmeticError, ValueError) as error:  # whatever one record's numbers lead to

@@ -32,11 +32,11 @@ from bench.campaign.parts import (
     Layout,
     any_part,
     counts,
-    entry_of,
     fault,
     is_entry,
     manifest_entries,
     mark_of,
+    part_entry,
     part_name,
     public,
     strangers,
@@ -279,7 +279,7 @@ class Store:
         Raises:
             OutputError: They cannot be written.
         """
-        entry = entry_of(Layout.of(plan), part, failed, contents)
+        entry = part_entry(Layout.of(plan), part, failed, contents)
         for kind, content in contents.items():
             # not beside their targets, since readers take whole folders
             write_bytes(self.path(kind, part), content, inside=self.folder / ".partial", settled=False)

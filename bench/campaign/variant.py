@@ -199,7 +199,7 @@ def _law(item: ElementPlan):
     return find_law(item.law, item.header)
 
 
-def drive_of(
+def drawn_commands(
     plan: Plan, variant: Variant, draw: RecordDraw, rng: np.random.Generator
 ) -> tuple[dict[str, NDArray], Initial]:
     """The record's commands at the steps ``(n,)`` by actuator, and its start.

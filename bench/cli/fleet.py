@@ -19,7 +19,7 @@ def diagnose_fleet(asked: Any, stages: Stages) -> None:
     """Diagnose the cases of a command, tell of all in one table, and write what was asked for."""
     import json
 
-    from bench.discrepancy.report.fleet import DiagnosisOptions, diagnose_cases, fleet_page, rows
+    from bench.discrepancy.report.fleet import DiagnosisOptions, diagnose_cases, fleet_page, fleet_rows
     from bench.errors import ParameterError
     from bench.files import json_values, together, write_text
 
@@ -38,7 +38,7 @@ def diagnose_fleet(asked: Any, stages: Stages) -> None:
     if asked.json == Path("-"):
         emit(document)
         return
-    header, lines = rows(found)
+    header, lines = fleet_rows(found)
     table = Table(*header)
     for line in lines:
         table.add_row(*line)

@@ -33,17 +33,23 @@ class Reproduce:
         from rich.markup import escape
 
         from bench.reproduction import RowVerdict, reproduce
-        from bench.reproduction.writing import summary
-        from bench.targets import check_folder
+        from bench.reproduction.writing import items_summary
+        from bench.targets import check_target_folder
 
-        check_folder(self.out, force=self.force, own=("table.json", "[A-D][0-9]*.json"))
+        check_target_folder(self.out, force=self.force, own=("table.json", "[A-D][0-9]*.json"))
         with progress_bar(quiet=self.json) as progress:
             result = reproduce(self.items, self.out, fresh=self.fresh, progress=progress)
         if self.json:
             emit(result.to_dict() | {"files": [str(path) for path in result.files]})
             return
         table = Table(
-            "item", "quantity", "printed", "ours", "over ten seeds", "verdict", title=summary(result.results)
+            "item",
+            "quantity",
+            "printed",
+            "ours",
+            "over ten seeds",
+            "verdict",
+            title=items_summary(result.results),
         )
         colours = {
             RowVerdict.FAILS: "red",

@@ -20,7 +20,7 @@ from bench.rerun_log import log_comparison
 from bench.rig.library import joint_rig
 
 
-def summary(result: DemoResult) -> list[Table]:
+def demo_summary(result: DemoResult) -> list[Table]:
     """The figures as tables for the terminal."""
     damper = Table(title="Friction damper, real: force NRMSE at 1 Hz, identified at 0.5 Hz")
     models = list(result.damper[0].nrmse)

@@ -88,7 +88,7 @@ class WindowUnderWay:
             other.result()
 
 
-def advance(ensemble: Ensemble, run: Run) -> WindowUnderWay:
+def advance_window(ensemble: Ensemble, run: Run) -> WindowUnderWay:
     """Begin to advance cases."""
     return WindowUnderWay(ensemble, run, _advance)
 

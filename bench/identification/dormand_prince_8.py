@@ -20,9 +20,9 @@ from scipy.integrate import DOP853
 from bench.identification.record_equations import (
     contracted,
     contracted_inline,
-    derivative,
     padded,
     reads_accelerations,
+    state_derivative,
     write_sample,
 )
 from bench.laws.calling import advance
@@ -87,7 +87,7 @@ def _stage(p, s, t, h, y, u, stage, slope):
         stage[i + 1] = y[i + 1] + h * b
         stage[i + 2] = y[i + 2] + h * c
         stage[i + 3] = y[i + 3] + h * d
-    derivative(p, t + _C8[s] * h, stage, u, advance(slope, s * width))
+    state_derivative(p, t + _C8[s] * h, stage, u, advance(slope, s * width))
 
 
 @contracted_inline
@@ -197,7 +197,7 @@ def across(p, t, step, h, tolerance, place, y, u, work, peak, observe, out):
             _interpolated(n, ((k - first) * step - done) / taken, y, powers, stage)
             rate = advance(slope, width)  # the second slope is not needed any more
             if accelerated:
-                derivative(p, t + (k - first) * step, stage, u, rate)
+                state_derivative(p, t + (k - first) * step, stage, u, rate)
             write_sample(p, observe, out, k // stride, stage, advance(rate, p.n_dof), u)
             k += stride
         done = length if ends else done + taken

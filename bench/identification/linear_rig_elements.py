@@ -14,7 +14,7 @@ from bench.identification.record_equations import COLUMNS
 from bench.rig import Rig
 
 
-def sensor_columns(rig: Rig, channels: Sequence[str]) -> list[int]:
+def channel_columns(rig: Rig, channels: Sequence[str]) -> list[int]:
     """Columns of MuJoCo's `sensordata` behind channels of a rig's records.
 
     Raises:

@@ -34,7 +34,7 @@ from numpy.typing import ArrayLike
 from bench.arrays import Array
 from bench.errors import FileFormatError, IdentificationError
 from bench.identification.fit_data import checked_data, nmse_percent, read_only
-from bench.identification.memory_refinement import refined
+from bench.identification.memory_refinement import refine_memory
 from bench.identification.memory_settings import FORMS, MemoryForm, MemorySettings, dictionary
 from bench.identification.memory_terms import MemoryRecord, MemoryTerms, fold, smoothness, solve
 from bench.identification.validity_range import ValidityRange
@@ -307,7 +307,7 @@ def _shaped(
     terms, weights = _pruned(terms, records, spreads, settings, strength)
     steps = 0
     if settings.refine and terms.layout.slips + terms.layout.maxwells:
-        terms, steps = refined(terms, records, spreads, strength, settings.refine)
+        terms, steps = refine_memory(terms, records, spreads, strength, settings.refine)
         terms, weights = _pruned(terms, records, spreads, settings, strength)
     return terms, weights, steps
 

@@ -33,7 +33,7 @@ from bench.identification.rig_response import (
     RigRecord,
     engine_for,
     moving_sensors,
-    prepare,
+    prepare_response,
     with_initial,
 )
 from bench.recording import Recording
@@ -134,7 +134,7 @@ def fit_output_error(
     names = _names(records, free)
     start = np.array([current(rig, name) for name in names])
     chosen = tuple(channels) if channels is not None else moving_sensors(rig, records[0])
-    prepared = [prepare(rig, r, chosen, inputs or {}, i) for r, i in with_initial(records, initial)]
+    prepared = [prepare_response(rig, r, chosen, inputs or {}, i) for r, i in with_initial(records, initial)]
     weights, known = _weights(records, chosen, prepared, noise)
     scale = _scales(names, start, search or {})
     prior = _priors(names, scale, priors or {}, known)

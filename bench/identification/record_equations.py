@@ -65,7 +65,7 @@ def row_times(matrix, row, y):
 
 
 @contracted_inline
-def derivative(p, t, y, u, slope):
+def state_derivative(p, t, y, u, slope):
     """Write dy/dt at pointer `slope` for the state at pointer `y` and the commands at pointer `u`."""
     width = 2 * p.n_dof
     for i in range(p.n_dof):

@@ -23,9 +23,9 @@ from bench.identification.record_equations import (
     Equations,
     contracted,
     contracted_inline,
-    derivative,
     padded,
     pointers,
+    state_derivative,
     write_sample,
 )
 from bench.laws.base import MAX_COORDINATES
@@ -79,13 +79,13 @@ def _classical(p, t, h, y, u, stage, slope):
     n = p.n
     for i in range(n):
         stage[i] = y[i] + 0.5 * h * slope[i]
-    derivative(p, t + 0.5 * h, stage, u, advance(slope, n))
+    state_derivative(p, t + 0.5 * h, stage, u, advance(slope, n))
     for i in range(n):
         stage[i] = y[i] + 0.5 * h * slope[n + i]
-    derivative(p, t + 0.5 * h, stage, u, advance(slope, 2 * n))
+    state_derivative(p, t + 0.5 * h, stage, u, advance(slope, 2 * n))
     for i in range(n):
         stage[i] = y[i] + h * slope[2 * n + i]
-    derivative(p, t + h, stage, u, advance(slope, 3 * n))
+    state_derivative(p, t + h, stage, u, advance(slope, 3 * n))
     for i in range(n):
         y[i] += h / 6.0 * (slope[i] + 2.0 * (slope[n + i] + slope[2 * n + i]) + slope[3 * n + i])
 
@@ -108,7 +108,7 @@ def _controlled(p, t, length, h, tolerance, y, u, stage, slope, peak):
                 for j in range(s):
                     total += _A[s, j] * slope[j * n + i]
                 stage[i] = y[i] + step * total
-            derivative(p, t + done + _C[s] * step, stage, u, advance(slope, s * n))
+            state_derivative(p, t + done + _C[s] * step, stage, u, advance(slope, s * n))
         worst = 0.0
         for i in range(n):
             error = 0.0
@@ -193,7 +193,7 @@ def run(
                 total += inputs[i, j] * u[j]
             load[i] = total
         t = start_time + k * step
-        derivative(p, t, y, u, slope)
+        state_derivative(p, t, y, u, slope)
         if k % stride == 0:
             write_sample(p, observe, out, k // stride, y, advance(slope, n_dof), u)
         if k == final:

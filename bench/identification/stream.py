@@ -55,7 +55,7 @@ from bench.identification.layout import (
 )
 from bench.identification.stream_law import learn
 from bench.identification.stream_models import regress, set_step
-from bench.identification.stream_monitor import accumulate, monitor
+from bench.identification.stream_monitor import add_to_gram, monitor
 
 
 @inlined
@@ -121,11 +121,11 @@ def watch_channels(h, force, x, v, a):
 
 
 @inlined
-def advance(h, theta, d, phi, b, level, peak, u, gram, start, pull, z, usable, step):
+def take_admitted(h, theta, d, phi, b, level, peak, u, gram, start, pull, z, usable, step):
     """Learn from an admitted sample and turn the monitor."""
     flags = 0
     if usable and h[HELD] == 0.0:
-        accumulate(gram[0], phi)
+        add_to_gram(gram[0], phi)
         h[COUNT] += 1.0
         flags |= learn(h, theta, d, u, phi, b, z, step)
         if flags & RESET:
@@ -160,7 +160,7 @@ def sample(h, theta, d, phi, b, work, inverse, level, peak, y, u, gram, start, p
         # Overflow in a power of the input has entered the filters: they begin anew with the next sample.
         h[STARTED] = 0.0
         return flags | NOT_FINITE
-    flags |= advance(h, theta, d, phi, b, level, peak, u, gram, start, pull, z, usable, step)
+    flags |= take_admitted(h, theta, d, phi, b, level, peak, u, gram, start, pull, z, usable, step)
     if flags & RESET and h[RATE] > 0.0:
         # The filters still hold the system of before the change; a new start knows the new one only.
         h[STARTED] = 0.0
@@ -183,7 +183,7 @@ def sample_given(h, theta, d, phi, b, level, peak, u, gram, start, pull, inverse
         if step == 0.0 or flags:
             return flags
     set_step(h, step)
-    return flags | advance(
+    return flags | take_admitted(
         h, theta, d, phi, b, level, peak, u, gram, start, pull, z * h[Z_INVERSE], True, step
     )
 

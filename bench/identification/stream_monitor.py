@@ -33,7 +33,7 @@ from bench.identification.layout import (
 
 
 @fast
-def accumulate(gram, phi):
+def add_to_gram(gram, phi):
     """Add phi phi^T to the lower triangle."""
     for i in range(phi.size):
         for j in range(i + 1):

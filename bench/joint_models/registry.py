@@ -189,7 +189,9 @@ def scores(
     return nmse_percent(true, np.concatenate([f[mask] for f, mask in zip(predicted, chosen, strict=True)]))
 
 
-def held_out(kind: str, motions: Sequence[ComponentRecord], settings: Settings) -> list[NDArray[np.bool_]]:
+def judging_samples(
+    kind: str, motions: Sequence[ComponentRecord], settings: Settings
+) -> list[NDArray[np.bool_]]:
     """Samples of every record that are left for judging: the end of each of five stretches, or of the whole with a memory.
 
     Stretches, since a sweep ends at frequencies that its beginning never had; with a memory a record is not cut, since its state would
@@ -204,7 +206,9 @@ def held_out(kind: str, motions: Sequence[ComponentRecord], settings: Settings) 
     return masks
 
 
-def without(motions: Sequence[ComponentRecord], masks: Sequence[NDArray[np.bool_]]) -> list[ComponentRecord]:
+def without_masked(
+    motions: Sequence[ComponentRecord], masks: Sequence[NDArray[np.bool_]]
+) -> list[ComponentRecord]:
     """Records without the samples of the masks."""
     return [
         ComponentRecord(*(column[~mask] for column in motion))

@@ -60,7 +60,7 @@ def is_time(heading: str) -> bool:
     return bool(time_source((heading,)))
 
 
-def clock_of(values: NDArray, stated: str, heading: str, *, told: str = "") -> FileTimes:
+def file_times(values: NDArray, stated: str, heading: str, *, told: str = "") -> FileTimes:
     """The times of a column.
 
     Args:

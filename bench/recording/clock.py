@@ -77,7 +77,7 @@ def uniform_clock(
         RecordingError: Not increasing, gaps, not uniform, not finite, fewer than two samples.
     """
     t = increasing(time)
-    places = places_of(t, sample_rate)
+    places = clock_places(t, sample_rate)
     refuse_gaps(t, places)
     return float(t[0]), rate_of(t, places, sample_rate, jitter)
 
@@ -126,7 +126,7 @@ def increasing(time: ArrayLike) -> NDArray[np.float64]:
     return t
 
 
-def places_of(t: NDArray[np.float64], sample_rate: float) -> NDArray[np.int64]:
+def clock_places(t: NDArray[np.float64], sample_rate: float) -> NDArray[np.int64]:
     """Place of each sample on the uniform clock ``(n,)``; the median step is blind to gaps in less than half of the record.
 
     Args:

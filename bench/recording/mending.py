@@ -16,12 +16,12 @@ from numpy.typing import ArrayLike, NDArray
 from bench.errors import RecordingError
 from bench.recording.clock import (
     CLOCK_SETTINGS,
+    clock_places,
     gap_text,
     grid,
     increasing,
     lateness,
     not_uniform,
-    places_of,
     refuse_gaps,
     roundest,
     uniform_clock,
@@ -105,7 +105,7 @@ def mended(
         Fritsch, F. N. and Carlson, R. E. (1980), Monotone piecewise cubic interpolation, SIAM J. Numer. Anal. 17.
     """
     t = increasing(time)
-    places = places_of(t, sample_rate)
+    places = clock_places(t, sample_rate)
     if not bridge:
         refuse_gaps(t, places)
     rate, moved, notes = _settled(t, places, sample_rate, jitter)

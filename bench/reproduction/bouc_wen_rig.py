@@ -57,7 +57,7 @@ def record(seed: int = SETUP.seed, *, timestep: float = SETUP.timestep) -> Recor
     )
 
 
-def integrate(force: NDArray[np.float64], thetas: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+def integrate_alone(force: NDArray[np.float64], thetas: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
     """Displacement, velocity, acceleration (n, 3) under a force held over each step; theta may change with the sample."""
     step = 1.0 / SETUP.rate
     x = v = r = 0.0
@@ -99,7 +99,7 @@ def noise_estimator() -> AdaptiveLeastSquares:
     return AdaptiveLeastSquares(model, initial_covariance=1e6, sample_rate=SETUP.rate)
 
 
-def estimate(
+def run_estimator(
     estimator: AdaptiveLeastSquares, time: NDArray, force: NDArray, velocity: NDArray, acceleration: NDArray
 ) -> AdaptiveHistory:
     """Run the estimator over a record, keeping the regressors."""

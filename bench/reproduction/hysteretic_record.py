@@ -78,7 +78,7 @@ def record(seed: int = SETUP.seed) -> Recording:
     return sdof_view(simulate(rig, drive(), rng=np.random.default_rng(seed)), SETUP.mass)
 
 
-def identify(test: Recording) -> tuple[AdaptiveLeastSquares, AdaptiveHistory]:
+def identify_general_model(test: Recording) -> tuple[AdaptiveLeastSquares, AdaptiveHistory]:
     """The seven parameters on line, P(0) = 1000 on parameters scaled to the rig's ranges."""
     model = sdof_model(
         2, mass=SETUP.mass, filter_rate=SETUP.filter_rate, reference=Reference(10.0, 0.3, 6.0, 200.0)

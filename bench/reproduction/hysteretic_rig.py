@@ -24,7 +24,7 @@ from bench.reproduction.estimates import (
     fine,
     learnt,
 )
-from bench.reproduction.hysteretic_record import SETUP, identify, printed_model_fate, record
+from bench.reproduction.hysteretic_record import SETUP, identify_general_model, printed_model_fate, record
 from bench.reproduction.item import Item, Picture
 from bench.reproduction.printed_figures import fig, panels
 from bench.reproduction.verdict import VERDICT_SETUP, Row, axis_row, fact_row, told_row, value_row
@@ -50,7 +50,7 @@ class _Found(NamedTuple):
 
 def _found(seed: int) -> _Found:
     test = record(seed)
-    estimator, history = identify(test)
+    estimator, history = identify_general_model(test)
     return _Found(test, estimator.theta, history)
 
 

@@ -18,11 +18,11 @@ from bench.progress import ShowProgress
 from bench.recording import Recording
 from bench.reproduction.bouc_wen_rig import (
     SETUP,
-    estimate,
-    integrate,
+    integrate_alone,
     noise_estimator,
     plain_estimator,
     record,
+    run_estimator,
     settled_after,
 )
 from bench.reproduction.estimates import contribution_histories, estimate_histories, fine
@@ -45,7 +45,7 @@ def _noisy_error(test: Recording, seeds: Sequence[int]) -> float:
             for name in ("force", "acceleration")
         )
         model = noise_estimator()
-        estimate(model, test.time, force, test["velocity"], a)
+        run_estimator(model, test.time, force, test["velocity"], a)
         error = np.abs(model.theta - SETUP.true)[[0, 3, 4]] / np.abs(SETUP.true[[0, 3, 4]])
         worst = max(worst, 100.0 * float(error.max()))
     return worst
@@ -56,8 +56,8 @@ def _tracking(force: NDArray[np.float64]) -> tuple[AdaptiveHistory, float]:
     n, change = int(45.0 * SETUP.rate), 30.0
     time = np.arange(n) / SETUP.rate
     thetas = [SETUP.changed if t >= change else SETUP.true for t in time]
-    motion = integrate(force[:n], thetas)
-    history = estimate(plain_estimator(jump_ratio=4.0), time, force[:n], motion[:, 1], motion[:, 2])
+    motion = integrate_alone(force[:n], thetas)
+    history = run_estimator(plain_estimator(jump_ratio=4.0), time, force[:n], motion[:, 1], motion[:, 2])
     return history, (settled_after(history, SETUP.changed) - change) / SETUP.period
 
 
@@ -72,7 +72,9 @@ class _Other(NamedTuple):
 
 def _other(seed: int) -> _Other:
     test = record(seed)
-    history = estimate(plain_estimator(), test.time, test["force"], test["velocity"], test["acceleration"])
+    history = run_estimator(
+        plain_estimator(), test.time, test["force"], test["velocity"], test["acceleration"]
+    )
     return _judged(test, history)
 
 
@@ -229,7 +231,7 @@ def _apart() -> float:
     """Largest difference of the rig's displacement from that of the equations integrated alone, over its peak."""
     coarse = record(timestep=1.0 / SETUP.rate).slice_time(0.0, 30.0)
     x = coarse["displacement"]
-    alone = integrate(coarse["force"], [SETUP.true] * len(coarse))[:, 0]
+    alone = integrate_alone(coarse["force"], [SETUP.true] * len(coarse))[:, 0]
     return float(np.max(np.abs(alone - x)) / np.max(np.abs(x)))
 
 
@@ -286,7 +288,9 @@ def run(progress: ShowProgress) -> Item:
     progress("simulating", 0.05)
     test = record()
     progress("identifying on line", 0.15)
-    history = estimate(plain_estimator(), test.time, test["force"], test["velocity"], test["acceleration"])
+    history = run_estimator(
+        plain_estimator(), test.time, test["force"], test["velocity"], test["acceleration"]
+    )
     progress("identifying under noise", 0.35)
     noisy = _noisy_error(test, range(1, 11))
     progress("changing a parameter mid-record", 0.5)

@@ -24,7 +24,7 @@ _ASIDE = (
 )
 
 
-def summary(results: Sequence[Result]) -> str:
+def items_summary(results: Sequence[Result]) -> str:
     """How many rows came to which verdict, those that are no evidence told apart."""
     rows = [row for result in results for row in result.rows]
     printed = [row for row in rows if not row.own]
@@ -56,7 +56,9 @@ def to_page(results: Sequence[Result], folder: Path) -> Page:
     """One page with every item; pictures are read from `folder` and embedded."""
     seconds = sum(result.seconds for result in results)
     page = Page(
-        TITLE, lead=f"{LEAD} {summary(results)} {len(results)} items in {seconds:.0f} s.", footer=_footer()
+        TITLE,
+        lead=f"{LEAD} {items_summary(results)} {len(results)} items in {seconds:.0f} s.",
+        footer=_footer(),
     )
     for verdict, heading in _ASIDE[:2]:
         found = _found(results, verdict)
@@ -90,7 +92,7 @@ def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
 
 def to_markdown(results: Sequence[Result]) -> str:
     """What does not hold and why, then all rows, a table an item."""
-    lines = [f"# {TITLE}", "", LEAD, "", summary(results), ""]
+    lines = [f"# {TITLE}", "", LEAD, "", items_summary(results), ""]
     for verdict, heading in _ASIDE:
         lines += [f"## {heading}", ""]
         found = _found(results, verdict)
@@ -115,7 +117,7 @@ def to_gallery(results: Sequence[Result]) -> str:
         f"{LEAD} Every figure with data is here, favourable or not. The rows behind it, and what does not hold and why: "
         "[reproduction.md](reproduction.md); both pages are made together by `python scripts/make_gallery.py`.",
         "",
-        summary(results),
+        items_summary(results),
         "",
     ]
     for result in results:

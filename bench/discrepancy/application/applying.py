@@ -22,7 +22,7 @@ from bench.discrepancy.verdict import NamedEffect, NominalEstimate
 from bench.errors import ModelError
 from bench.rig import Element, Rig
 from bench.rig.building import parse
-from bench.rig.mjcf_files import model_text
+from bench.rig.mjcf_files import mjcf_text
 
 WRONG_NUMBERS = ("mass_error", "com_error", "stiffness_error", "damping_error")
 INTEGRATORS = {
@@ -96,7 +96,7 @@ def specification(path: str | Path) -> mujoco.MjSpec:
     Raises:
         ModelError: MuJoCo does not read it, or it is beyond the limits of a model.
     """
-    return parse(model_text(path), str(Path(path).parent), f"'{path}'")
+    return parse(mjcf_text(path), str(Path(path).parent), f"'{path}'")
 
 
 @native.quiet()

@@ -263,7 +263,7 @@ def _rows(model: mujoco.MjModel) -> tuple[NDArray[np.int64], ...]:
 
 
 @native.quiet()
-def march(
+def march_bodies(
     model: mujoco.MjModel,
     table: Array,
     *,

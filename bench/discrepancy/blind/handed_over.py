@@ -75,7 +75,7 @@ def _parameters(truth: Truth, rng: np.random.Generator) -> tuple[NominalParamete
     return tuple(out)
 
 
-def measured(
+def hand_over(
     name: str,
     bench: Bench,
     responses: Sequence[Mapping[str, Array]],

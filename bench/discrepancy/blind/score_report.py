@@ -173,7 +173,7 @@ def _row(cells: Sequence[str]) -> str:
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
 
-def page(score: BlindScore, *, title: str = "Blind trials", lead: str = "") -> Page:
+def score_page(score: BlindScore, *, title: str = "Blind trials", lead: str = "") -> Page:
     """The tables as a self-contained page, with the bands drawn."""
     from bench.figures import bar_table  # noqa: PLC0415  (matplotlib, for pages only)
 

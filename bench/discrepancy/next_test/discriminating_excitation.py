@@ -26,8 +26,8 @@ from bench.discrepancy.next_test.distinguishability import why_alike, why_none
 from bench.discrepancy.next_test.feasible_excitations import (
     SizedExcitation,
     candidates,
-    feasible,
     limits_of,
+    scaled_to_limits,
 )
 from bench.discrepancy.next_test.outlook import Outlook, outlook
 from bench.discrepancy.numerics.threads import in_threads
@@ -150,7 +150,7 @@ def _finalists(simulator: Simulator, first: Belief, second: Belief) -> list[Size
                 load={k: level * v for k, v in limits.load.items()},
                 motion={k: level * v for k, v in limits.motion.items()},
             )
-            found = feasible(
+            found = scaled_to_limits(
                 simulator, shown, columns, at_level,
                 [lambda record, rival=rival: rival.respond(simulator, record) for rival in (first, second)],
             )  # fmt: skip

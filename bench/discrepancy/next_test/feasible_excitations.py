@@ -145,7 +145,7 @@ def candidates(simulator: Simulator, loads: Sequence[int], samples: int) -> list
     return out
 
 
-def feasible(
+def scaled_to_limits(
     simulator: Simulator, label: str, columns: Array, limits: RigLimits, simulate: Sequence[FreeRun]
 ) -> tuple[SizedExcitation, list[Array]] | None:
     """Scale loads of unit peak to the limits of the rig under every rival.

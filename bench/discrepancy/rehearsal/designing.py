@@ -110,7 +110,7 @@ class Designed:
         return {"chosen": dict(zip(NAMES, self.chosen, strict=True)), "tried": tried}
 
 
-def design(
+def design_signals(
     folder: Path,
     *,
     seconds: float = 20.0,

@@ -149,7 +149,7 @@ class MotionResponse:
 
     def effect_response(self, placed: Placed, eta: Array) -> Array:
         """Whitened response to an effect along the measured motion."""
-        return self.response(lambda i: -force_along(self.problem, placed, eta, i))
+        return self.response(lambda i: -force_along_motion(self.problem, placed, eta, i))
 
 
 def _unspoilt(simulator: Simulator, base: Fit, record: CaseRecord) -> Array:
@@ -175,7 +175,7 @@ def _moving(problem: Problem, about: About, unspoilt: Sequence[Array]) -> Proble
     return problem.moving(motions)
 
 
-def force_along(simulator: Simulator, placed: Placed, eta: Array, index: int) -> Array:
+def force_along_motion(simulator: Simulator, placed: Placed, eta: Array, index: int) -> Array:
     """Force of an effect on the degrees of freedom (n, n_dof) along the measured motion of record `index`."""
     motion = simulator.motion(index)
     record = simulator.records[index]
