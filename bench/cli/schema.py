@@ -49,7 +49,9 @@ KINDS: dict[str, DocumentKind] = {
         "protocol.json of a sealed case", "bench.discrepancy.blind.schema", "ProtocolDocument"
     ),
     "answer": DocumentKind("the answer of a sealed case", "bench.discrepancy.blind.schema", "AnswerDocument"),
-    "manifest": DocumentKind("manifest.json of a campaign", "bench.campaign.schema", "ManifestDocument"),
+    "manifest": DocumentKind(
+        "manifest.json of a campaign", "bench.campaign.manifest_schema", "ManifestDocument"
+    ),
     "policy": DocumentKind("the header of a trained policy", "bench.excitation.schema", "PolicyHeader"),
 }
 """Kinds of documents by name."""

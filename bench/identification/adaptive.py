@@ -18,7 +18,7 @@ from bench.errors import IdentificationError, ParameterError, RecordingError
 from bench.identification import layout, stream
 from bench.identification.adaptive_history import AdaptiveHistory, Sample
 from bench.identification.adaptive_state import initial_state
-from bench.identification.event_log import EVENT_BITS, EventLog
+from bench.identification.event_log import SETTINGS, EventLog
 from bench.identification.persistence import PersistenceHistory, PersistenceReport
 from bench.identification.regressors import CHANNELS, RegressorModel
 from bench.identification.stream_law import reset_covariance
@@ -255,7 +255,7 @@ class AdaptiveLeastSquares:
         reports = np.empty((halves, 5 + n))
         seen, made = int(self._header[layout.SEEN]), self._log.made
         loop(self._state, stamps, *channels, every, theta, phi, z, flags, reports)
-        for k in np.flatnonzero(flags & EVENT_BITS):
+        for k in np.flatnonzero(flags & SETTINGS.bits):
             self._log.note(int(flags[k]), float(stamps[k]), seen + int(k) + 1)
         reports = reports[: int(self._header[layout.REPORTS])]
         if reports.shape[0]:

@@ -17,11 +17,11 @@ class EventLogSettings:
 
     most: int = 1000
     """Most events kept; the oldest go first."""
+    bits: int = (1 << len(EVENT_KINDS)) - 1
+    """Those of the flags that are events."""
 
 
 SETTINGS = EventLogSettings()
-EVENT_BITS = (1 << len(EVENT_KINDS)) - 1
-"""Bits of the flags that are events."""
 
 
 class EventLog:
