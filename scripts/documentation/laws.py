@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from documentation import equations
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -156,6 +157,11 @@ def _shown(law: ForceLaw) -> str:
     )
 
 
+def _symbols(law: ForceLaw) -> list[str]:
+    """Names in a law's equation that are symbols though they look like words."""
+    return [p.name for p in law.parameters]
+
+
 def page(law: ForceLaw) -> str:
     """The page of a law as Markdown."""
     described = describe(law)
@@ -192,8 +198,8 @@ def page(law: ForceLaw) -> str:
         [
             f"# {law.name}",
             "",
-            "```text",
-            law.equation,
+            "```math",
+            equations.display(law.equation, _symbols(law)),
             "```",
             "",
             f"![Force of {law.name} over displacement and velocity](pictures/{law.name}.png)",
@@ -237,9 +243,9 @@ def pages() -> dict[str, str]:
     ]
     index += ["| law | equation | states | in MuJoCo |", "|---|---|---|---|"]
     for law in LAWS.values():
-        equation = law.equation.replace("|", "\\|")
+        equation = equations.inline(law.equation, _symbols(law))
         index.append(
-            f"| [`{law.name}`]({law.name}.md) | `{equation}` | {len(law.states) or '–'} | {'yes' if law.name in NATIVE else '–'} |"
+            f"| [`{law.name}`]({law.name}.md) | ${equation}$ | {len(law.states) or '–'} | {'yes' if law.name in NATIVE else '–'} |"
         )
     index.append("")
     return {"reference/laws/index.md": "\n".join(index)} | {
