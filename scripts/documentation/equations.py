@@ -315,7 +315,7 @@ def display(text: str, parameters: Collection[str] = ()) -> str:
     rows: list[tuple[list[Token], list[tuple[str, list[Token]]]]] = []
     clauses = _clauses(tokens(text))
     if not any(_defines(clause) for _, clause in clauses):
-        return inline(text, parameters, flat=False)
+        return Setter(tokens(text), parameters, flat=False).stream()
     for mark, clause in clauses:
         if not rows or _defines(clause):
             rows.append((clause, []))
@@ -324,15 +324,14 @@ def display(text: str, parameters: Collection[str] = ()) -> str:
     return "\\begin{split}\n" + " \\\\\n".join(_row(*row, parameters) for row in rows) + "\n\\end{split}"
 
 
-def inline(text: str, parameters: Collection[str] = (), *, flat: bool = True) -> str:
-    """An equation as LaTeX in one line, for a line of text or a cell of a table.
-
-    Args:
-        text: The equation in plain text.
-        parameters: Names that are symbols though they look like words.
-        flat: Divisions by a stroke.
+def cell(text: str, parameters: Collection[str] = ()) -> str:
+    """An equation as Markdown for a cell of a table, its parts set one by one, so that a line may break between them.
 
     Raises:
         ValueError: The text is not in the notation.
     """
-    return Setter(tokens(text), parameters, flat).stream()
+    return "".join(
+        f"{mark} ${Setter(clause, parameters, flat=True).stream()}$" for mark, clause in _clauses(tokens(text))
+    ).strip()
+
+

@@ -243,9 +243,9 @@ def pages() -> dict[str, str]:
     ]
     index += ["| law | equation | states | in MuJoCo |", "|---|---|---|---|"]
     for law in LAWS.values():
-        equation = equations.inline(law.equation, _symbols(law))
+        equation = equations.cell(law.equation, _symbols(law))
         index.append(
-            f"| [`{law.name}`]({law.name}.md) | ${equation}$ | {len(law.states) or '–'} | {'yes' if law.name in NATIVE else '–'} |"
+            f"| [`{law.name}`]({law.name}.md) | {equation} | {len(law.states) or '–'} | {'yes' if law.name in NATIVE else '–'} |"
         )
     index.append("")
     return {"reference/laws/index.md": "\n".join(index)} | {
