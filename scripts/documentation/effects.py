@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from documentation import equations
 from matplotlib.figure import Figure
 
 from bench.discrepancy.articulated_search.catalogue import CATALOGUE as ARTICULATED
@@ -13,6 +12,7 @@ from bench.discrepancy.articulated_search.effect import ArticulatedEffect
 from bench.discrepancy.effects.catalogue import CATALOGUE as LINEAR
 from bench.discrepancy.effects.effect import Effect, FreeParameter
 from bench.figures.look import COLOURS, REFERENCE_COLOUR, save, style
+from documentation import equations
 
 LOOKS = {
     "coulomb_friction": "The missing force is a step at every reversal of the velocity, the same at every amplitude. Free decays end after finitely many swings, along straight lines. Small motions are damped most.",

@@ -73,7 +73,13 @@ def tokens(text: str) -> list[Token]:
 
 
 def _letter(text: str) -> str:
-    return f"\\{text}" if text.lower() in GREEK else text if len(text) <= 1 or text.isdigit() else f"\\mathrm{{{text}}}"
+    return (
+        f"\\{text}"
+        if text.lower() in GREEK
+        else text
+        if len(text) <= 1 or text.isdigit()
+        else f"\\mathrm{{{text}}}"
+    )
 
 
 def symbol(token: Token, parameters: Collection[str]) -> str | None:
@@ -182,9 +188,17 @@ class Setter:
             return f"-{self.factor()}"
         if self._next("(", "|"):
             made = self._bracket()
+        elif not self._factor_follows():
+            raise ValueError("a factor is missing behind an operator")
         else:
             token = self.rest.pop(0)
-            made = self._named(token) if token.kind == "name" else f"\\dot{{{token.text}}}" if token.kind == "rate" else token.text
+            made = (
+                self._named(token)
+                if token.kind == "name"
+                else f"\\dot{{{token.text}}}"
+                if token.kind == "rate"
+                else token.text
+            )
         if self.rest and self.rest[0].kind == "index":
             made += f"_{{{self.rest.pop(0).text[1:-1]}}}"
         if self._next("^"):
@@ -266,7 +280,9 @@ def _clauses(found: list[Token]) -> list[tuple[str, list[Token]]]:
 def _defines(clause: list[Token]) -> bool:
     """Whether a clause says what something is: a symbol or an expression, and the first relation is "="."""
     relation = next((t.text for t in clause if t.kind == "relation"), "")
-    return relation == "=" and not (clause[0].kind == "name" and symbol(clause[0], ()) is None and not clause[0].called)
+    return relation == "=" and not (
+        clause[0].kind == "name" and symbol(clause[0], ()) is None and not clause[0].called
+    )
 
 
 def _condition(clause: list[Token]) -> int | None:
@@ -281,6 +297,7 @@ def is_equation(text: str) -> bool:
 
 def _row(first: list[Token], more: list[tuple[str, list[Token]]], parameters: Collection[str]) -> str:
     """One definition with what belongs to it; branches in a brace."""
+
     def put(found: list[Token], flat: bool = False) -> str:
         return Setter(list(found), parameters, flat).stream()
 
@@ -331,7 +348,6 @@ def cell(text: str, parameters: Collection[str] = ()) -> str:
         ValueError: The text is not in the notation.
     """
     return "".join(
-        f"{mark} ${Setter(clause, parameters, flat=True).stream()}$" for mark, clause in _clauses(tokens(text))
+        f"{mark} ${Setter(clause, parameters, flat=True).stream()}$"
+        for mark, clause in _clauses(tokens(text))
     ).strip()
-
-

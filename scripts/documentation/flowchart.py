@@ -89,6 +89,8 @@ def svg(text: str) -> str:
     made += [f'<path class="arrow" marker-end="url(#head)" d="{_path(corners)}"/>' for corners in lines]
     for name, box in boxes.items():
         x, y = box.xy
-        made.append(f'<rect x="{x - box.w / 2:.1f}" y="{y - box.h / 2:.1f}" width="{box.w:.1f}" height="{box.h}" rx="5"/>')
+        made.append(
+            f'<rect x="{x - box.w / 2:.1f}" y="{y - box.h / 2:.1f}" width="{box.w:.1f}" height="{box.h}" rx="5"/>'
+        )
         made.append(f'<text x="{x:.1f}" y="{y + 4.5:.1f}">{escape(name)}</text>')
     return "".join([*made, "</svg></div>"])

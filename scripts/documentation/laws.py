@@ -5,13 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from documentation import equations
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from bench.figures.look import COLOURS, save, style
 from bench.laws import LAWS, ForceLaw, Parameter, describe
 from bench.laws.evaluate import evaluate
+from documentation import equations
 
 NATIVE = {
     "linear": "`stiffness` and `damping` of a joint.",

@@ -9,8 +9,8 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from documentation.flowchart import svg  # noqa: E402
-from documentation.mathml import set_equations  # noqa: E402
+from documentation.flowchart import svg
+from documentation.mathml import set_equations
 
 CHART = re.compile(r'<pre class="mermaid"><code>(.*?)</code></pre>', re.DOTALL)
 
