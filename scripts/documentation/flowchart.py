@@ -5,6 +5,7 @@ Only what the architecture page writes is read: ``flowchart TD`` and lines ``a -
 
 from __future__ import annotations
 
+import itertools
 import re
 from html import escape
 
@@ -62,7 +63,7 @@ def layout(pairs: list[tuple[str, str]]) -> tuple[dict[str, _Box], list[list[tup
 def _path(corners: list[tuple[float, float]]) -> str:
     """A line through the corners, rounded at each."""
     text = f"M{corners[0][0]:.1f} {corners[0][1]:.1f}"
-    for corner, after in zip(corners[1:-1], corners[2:], strict=True):
+    for corner, after in itertools.pairwise(corners[1:]):
         middle = ((corner[0] + after[0]) / 2.0, (corner[1] + after[1]) / 2.0)
         text += f" Q{corner[0]:.1f} {corner[1]:.1f} {middle[0]:.1f} {middle[1]:.1f}"
     return text + f" L{corners[-1][0]:.1f} {corners[-1][1]:.1f}"
