@@ -223,8 +223,11 @@ PRINTED = Path("-")
 @contextlib.contextmanager
 def _stages(shown: bool) -> Iterator[Callable[[str], None]]:
     """A line on standard error with what is being done and for how long; call what is given with the text."""
+    if not shown:  # a disabled display of rich before 15 still ends with an empty line
+        yield lambda text: None
+        return
     columns = (SpinnerColumn(), TimeElapsedColumn(), TextColumn("{task.description}", markup=False))
-    with Progress(*columns, console=Console(stderr=True), disable=not shown, transient=True) as bar:
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("reading", total=None)
         yield lambda text: bar.update(task, description=text)
 

@@ -59,7 +59,9 @@ class Units:
 
 
 SI = Units("SI", "m", "N", 1.0, 1.0)
+"""Decks in metre, newton and kilogram."""
 INCH_POUND = Units("inch-pound", "in", "lbf", 0.0254, 4.4482216152605)
+"""Decks in inch and pound-force; masses in lbf s²/in."""
 
 
 @dataclass(frozen=True)

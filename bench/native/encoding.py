@@ -32,7 +32,9 @@ from bench.laws.base import MAX_COORDINATES, ForceLaw
 from bench.native.table import registered, slot
 
 MAGIC = 7_305_512.0
+"""First number of every row that holds an element: by it the callback tells these rows from those of others."""
 PREFIX = "element/"
+"""How the names of the numeric fields begin that hold elements."""
 HEADER = 8
 MAX_TERMS = 16
 OWN = slice(1, 3)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from bench.figures.look import COLOURS, save, style
 from bench.laws import LAWS, ForceLaw, Parameter, describe
 from bench.laws.evaluate import evaluate
+from documentation import equations
 
 NATIVE = {
     "linear": "`stiffness` and `damping` of a joint.",
@@ -172,6 +173,11 @@ def _as_markdown(documentation: str) -> str:
     return text.replace("References:\n    ", "References: ")
 
 
+def _symbols(law: ForceLaw) -> list[str]:
+    """Names in a law's equation that are symbols though they look like words."""
+    return [p.name for p in law.parameters]
+
+
 def page(law: ForceLaw) -> str:
     """The page of a law as Markdown."""
     states = ", ".join(f"`{s}`" for s in law.states) or "none: the force depends on the present motion only"
@@ -190,8 +196,8 @@ def page(law: ForceLaw) -> str:
         [
             f"# {law.name}",
             "",
-            "```text",
-            law.equation,
+            "```math",
+            equations.display(law.equation, _symbols(law)),
             "```",
             "",
             f"![Force of {law.name} over displacement and velocity](pictures/{law.name}.png)",
@@ -233,9 +239,9 @@ def pages() -> dict[str, str]:
     ]
     index += ["| law | equation | states | in MuJoCo |", "|---|---|---|---|"]
     for law in LAWS.values():
-        equation = law.equation.replace("|", "\\|")
+        equation = equations.cell(law.equation, _symbols(law))
         index.append(
-            f"| [`{law.name}`]({law.name}.md) | `{equation}` | {len(law.states) or '–'} | {'yes' if law.name in NATIVE else '–'} |"
+            f"| [`{law.name}`]({law.name}.md) | {equation} | {len(law.states) or '–'} | {'yes' if law.name in NATIVE else '–'} |"
         )
     index.append("")
     return {"reference/laws/index.md": "\n".join(index)} | {
