@@ -6,6 +6,7 @@ import math
 
 from bench.discrepancy.articulated_search.effect import ArticulatedEffect
 from bench.discrepancy.articulated_search.slot_setters import (
+    added,
     cogging,
     saturated,
     scaled,
@@ -135,8 +136,27 @@ DRIVE_EFFECTS: tuple[ArticulatedEffect, ...] = (
                 unit="s",
             ),
         ),
-        "T u' + u = input",
+        "T f' + f = force of the actuator",
         written(LAG="time_constant_s"),
+    ),
+    ArticulatedEffect(
+        "target_lag",
+        "actuator",
+        "actuator",
+        (
+            FreeParameter(
+                "time_constant_s",
+                "1",
+                mean=math.log(0.03),
+                std=1.0,
+                bounds=(-9.0, -0.5),
+                grid=log_grid(0.01, 0.03, 0.1),
+                unit="s",
+            ),
+        ),
+        "T u' + u = target of the servo",
+        added(INPUT_LAG="time_constant_s"),
+        servo=True,
     ),
     ArticulatedEffect(
         "force_gain_error", "actuator", "actuator", (RELATIVE,), "tau = (1 + e) nominal", scaled(Slot.GEAR)

@@ -1,4 +1,4 @@
-"""Faults of what drives a joint, told against the input that its nominal equation asks for along the measured motion: another clock, another
+"""Faults of what drives a joint, told against the input that its nominal equation asks for along its motion: another clock, another
 quantity."""
 
 from __future__ import annotations
