@@ -34,6 +34,8 @@ class DrivesSettings:
     """Samples up to which a shift may be one of the clock of the record: its step, and half of one of the input that is held over it."""
     certain: float = 5.0
     """Standard errors from which a shift is told."""
+    sigmas: float = 2.0
+    """Stated standard deviations of the damping that may make a servo lag otherwise than its model: 95 %."""
     alike: float = 0.5
     """Correlation of a servo's target with what the motion asks for, below which it is the target of something else."""
 
@@ -95,14 +97,18 @@ def _of_clocks(own: Case, joint: Joint, record: CaseRecord, found: Timing) -> It
     held = 0.5 * record.step if own.load_interpolation == "zero_order_hold" else 0.0
     late = -found.lag - held  # the joint after the target
     least = SETTINGS.certain * found.lag_std
-    overstated = joint.damping / (abs(joint.drive.gear) * joint.drive.kp)
+    hold = abs(joint.drive.gear) * joint.drive.kp
+    # a servo lags by its damping over its gain
+    overstated = joint.damping / hold
+    stated = [p.std for p in own.parameters if p.name in (f"damping:{joint.name}", f"kv:{joint.drive.name}")]
+    unsure = SETTINGS.sigmas * float(np.hypot.reduce(stated or [0.0])) / hold
     if abs(found.drift) > max(SETTINGS.samples * record.step, SETTINGS.certain * found.drift_std):
         yield (
             f"the lag between '{channel}' and '{position}' changes by {1e3 * found.drift:.3g} ms along '{record.name}': their clocks drift "
             "apart; resample one of them"
         )
         return
-    if late > max(SETTINGS.latest, SETTINGS.samples * record.step, least):
+    if late > max(SETTINGS.latest + unsure, SETTINGS.samples * record.step, least):
         yield (
             f"'{position}' answers '{channel}' {1e3 * late:.3g} ms later than the model does in '{record.name}': more than a drive's own "
             "delay, which the diagnosis would name; look whether the two were logged by one clock, else it will take it for damping or delay"

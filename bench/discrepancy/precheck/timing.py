@@ -19,10 +19,10 @@ class TimingSettings:
 
     blocks: int = 8
     """Blocks of a record, each left out in turn, whose scatter is the error of the estimates: errors of a model run through samples."""
-    steps: int = 8
-    """Most steps of Gauss and Newton: from the peak of the correlation it takes three."""
-    settled: float = 1e-3
-    """Change of the shift, in samples, at which they end."""
+    steps: int = 30
+    """Most steps of Gauss and Newton: from the peak of the correlation it takes three, of a clock that runs far off some more."""
+    settled: float = 0.01
+    """Change of the shift, in samples, at which they end: far below the part of a sample from which a shift counts."""
     reach: float = 0.25
     """Part of the record up to which a shift is looked for."""
 
