@@ -177,7 +177,7 @@ class Row:
         after: NRMSE of the corrected model in MuJoCo.
         floor: NRMSE of noise alone.
         forms: Forms in which what was named is in the model.
-        remedy: Cause of the difference between the two: the setting of the simulation that would do.
+        remedy: Cause of the difference between the two, or the setting of the simulation that would do.
         seconds: Processor time of diagnosis and verification.
     """
 
@@ -288,10 +288,9 @@ def attempt(name: str, folder: Path) -> Row:
     changes = apply(folder / "model.xml", found, case=case, linear=linear).changes
     worth = verify(folder / "model.xml", found, verdict.gaps, case)
     figure = worth.worst
-    cause = " ".join(filter(None, (worth.remedy, worth.simulator_line)))
     return Row(
         name, verdict.verdict, tuple(e.name for e in verdict.named), is_named(verdict, native.called), figure.before, figure.diagnosis,
-        figure.after, figure.floor, tuple(sorted({c.form for c in changes})), cause, time.process_time() - began,
+        figure.after, figure.floor, tuple(sorted({c.form for c in changes})), worth.remedy, time.process_time() - began,
     )  # fmt: skip
 
 
@@ -323,7 +322,11 @@ def main() -> None:
                 print(told(rows[-1]), flush=True)
     counts = Counter(row.word for row in rows)
     if asked.json:
-        document = {"n": len(rows), **counts, "rows": [asdict(row) | {"word": row.word, "left": row.left} for row in rows]}
+        document = {
+            "n": len(rows),
+            **counts,
+            "rows": [asdict(row) | {"word": row.word, "left": row.left} for row in rows],
+        }
         print(json.dumps(document, indent=1))
     else:
         others = "".join(f", {n} {word}" for word, n in counts.items() if word != "closed")

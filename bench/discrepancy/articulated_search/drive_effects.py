@@ -176,7 +176,12 @@ DRIVE_EFFECTS: tuple[ArticulatedEffect, ...] = (
         "actuator",
         (
             FreeParameter(
-                "limit", "peak", mean=math.log(0.5), std=0.7, bounds=(-4.0, 0.5), grid=log_grid(0.4, 0.6, 0.8)
+                "limit",
+                "peak",
+                mean=math.log(0.5),
+                std=0.7,
+                bounds=(-4.0, 0.5),
+                grid=log_grid(0.2, 0.4, 0.6, 0.8),
             ),
         ),
         "|force| <= limit",

@@ -110,11 +110,11 @@ def _of_clocks(own: Case, joint: Joint, record: CaseRecord, found: Timing) -> It
         return
     if late > max(SETTINGS.latest + unsure, SETTINGS.samples * record.step, least):
         yield (
-            f"'{position}' answers '{channel}' {1e3 * late:.3g} ms later than the model does in '{record.name}': more than a drive's own "
-            "delay, which the diagnosis would name; look whether the two were logged by one clock, else it will take it for damping or delay"
+            f"'{position}' answers '{channel}' {1e3 * late:.3g} ms later than the model does in '{record.name}', more than a drive's own "
+            "delay: look whether one clock logged the two, else the diagnosis takes it for a delay or for damping"
         )
     elif -late > max(SETTINGS.samples * record.step + overstated, least):
         yield (
-            f"'{position}' answers '{channel}' {-1e3 * late:.3g} ms before the model does in '{record.name}': the clocks of the two differ; "
+            f"'{position}' answers '{channel}' {-1e3 * late:.3g} ms before the model does in '{record.name}': their clocks differ; "
             "align them"
         )
