@@ -290,7 +290,7 @@ def attempt(name: str, folder: Path) -> Row:
     figure = worth.worst
     return Row(
         name, verdict.verdict, tuple(e.name for e in verdict.named), is_named(verdict, native.called), figure.before, figure.diagnosis,
-        figure.after, figure.floor, tuple(sorted({c.form for c in changes})), worth.remedy, time.process_time() - began,
+        figure.after, figure.floor, tuple(sorted({c.form for c in changes})), worth.remedy or worth.less, time.process_time() - began,
     )  # fmt: skip
 
 
