@@ -135,7 +135,7 @@ def attempt(source: Path, results: Path, verdicts: Path | None) -> dict[str, Any
     figures = [vars(f) | {"short": f.short} for f in worth.figures]
     off = max(abs(f.short) for f in worth.figures)
     within = off <= VerificationSettings().short
-    causes = [worth.remedy, worth.simulator_line]
+    causes = [worth.remedy, worth.less, worth.simulator_line]
     causes += [
         f"{c.what}: {c.text}" for c in changes if c.form in ("step", "log", "none") or "diagnosis" in c.text
     ]

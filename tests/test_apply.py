@@ -271,6 +271,11 @@ ARM_EFFECTS = {
     "actuator_delay": (
         setting("actuator", "m2", delay=0.0207, nsample=400, interp=1), None, effect("actuator_delay", "m2", "elbow", delay_s=0.0207)
     ),
+    "target_lag": (
+        setting("actuator", "m2", dyntype=mujoco.mjtDyn.mjDYN_FILTEREXACT, dynprm=(0, 0.04), actdim=1), None,
+        effect("target_lag", "m2", "elbow", time_constant_s=0.04),
+    ),
+    "gravity_compensation": (setting("body", "fore", gravcomp=0.9), None, effect("gravity_compensation", "fore", "elbow", share=0.9)),
     "servo_gain_error": (
         setting("actuator", "m2", gainprm=(0, 24.0), biasprm=(1, -24.0)), None,
         effect("servo_gain_error", "m2", "elbow", relative_error=-0.4),

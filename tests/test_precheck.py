@@ -24,6 +24,32 @@ def test_a_fault_of_each_kind_is_found(fault, tmp_path):
     assert doubts
 
 
+@pytest.mark.parametrize(
+    ("fault", "seed", "said"),
+    [
+        ("skew", 68, "drift apart"),
+        ("torque meaning", 16, "magnitude"),
+        ("saturation", 15, "never beyond"),
+        ("delay", 4, "later than"),
+    ],
+)
+def test_a_fault_of_an_arm_is_told_for_what_it_is(fault, seed, said, tmp_path):
+    word, _, doubts = check_one(fault, seed, tmp_path / "case", "arm")
+    assert word == "doubtful"
+    assert any(said in doubt for doubt in doubts), doubts
+
+
+def test_an_arm_whose_drives_are_late_by_their_own_delay_is_ready(tmp_path):
+    word, _, doubts = check_one("", 100_049, tmp_path / "case", "arm")
+    assert word == "ready", doubts
+
+
+def test_times_in_milliseconds_are_refused_at_once(tmp_path):
+    word, _, doubts = check_one("clock", 10, tmp_path / "case", "arm")
+    assert word == "unusable"
+    assert "milliseconds" in doubts[0]
+
+
 def _write(folder, records, nominal):
     folder.mkdir()
     (folder / "nominal.json").write_text(json.dumps(nominal))

@@ -206,7 +206,9 @@ def test_signals_are_designed_without_records_and_keep_their_limits(arm, tmp_pat
 @pytest.mark.slow
 def test_a_native_effect_is_named_applied_and_closed(tmp_path):
     row = native_effects.attempt("kp", tmp_path)  # the others: scripts/native_effects.py
-    assert row.passed, row
+    assert row.right, row
+    assert row.applied, row
+    assert row.after < 0.05 * row.before
     assert row.before > 10.0 * row.floor
 
 

@@ -49,12 +49,14 @@ def lag(target: Target, effect: NamedEffect) -> Change:
         return Change(
             effect.name, actuator.name, "none", "the actuator has an activation of another kind already"
         )
+    before = 0.0 if actuator.dyntype == mujoco.mjtDyn.mjDYN_NONE else float(actuator.dynprm[0])
     actuator.dyntype = mujoco.mjtDyn.mjDYN_FILTEREXACT
-    actuator.dynprm[0] = constant
+    actuator.dynprm[0] = before + constant
     actuator.actdim = 1
     actuator.actearly = True
-    servo = " (of the servo's target; the diagnosis lags its force)" if actuator.biasprm[1] else ""
-    return _done(effect, actuator, f"a first-order filter of {constant:.6g} s{servo}")
+    other = actuator.biasprm[1] and effect.name == "actuator_lag"
+    servo = " (of the servo's target; the diagnosis lags its force)" if other else ""
+    return _done(effect, actuator, f"a first-order filter of {before + constant:.6g} s{servo}")
 
 
 def gain(target: Target, effect: NamedEffect) -> Change:
@@ -153,6 +155,7 @@ def logged(target: Target, effect: NamedEffect) -> Change:
 DRIVES: dict[str, Callable[[Target, NamedEffect], Change]] = {
     "actuator_delay": delay,
     "actuator_lag": lag,
+    "target_lag": lag,
     "force_gain_error": gain,
     "force_polarity": gain,
     "servo_gain_error": servo_gain,

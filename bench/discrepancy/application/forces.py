@@ -169,6 +169,15 @@ def armature_error(target: Target, effect: NamedEffect) -> Change:
     return Change(effect.name, item.name, "native", text, (("joint", item.name),))
 
 
+def gravity_compensation(target: Target, effect: NamedEffect) -> Change:
+    """``gravcomp``: the part of a body's weight that does not act."""
+    body = target.body(effect.where)
+    before = float(body.gravcomp)
+    body.gravcomp = before + values_of(effect)["share"]
+    text = f"gravcomp {before:.6g} -> {body.gravcomp:.6g}"
+    return Change(effect.name, effect.where, "native", text, (("body", effect.where),))
+
+
 def force_offset(target: Target, effect: NamedEffect) -> Change:
     """A constant force: a spring so long that its force is one."""
     v = values_of(effect)
@@ -306,6 +315,7 @@ FORCES: dict[str, Callable[[Target, NamedEffect], Change]] = {
     "quadratic_damping": _polynomial("damping", 1),
     "force_offset": force_offset,
     "armature_error": armature_error,
+    "gravity_compensation": gravity_compensation,
     "gap": gap,
     "asymmetric_gap": gap,
     "one_sided_stop": one_sided_stop,

@@ -67,7 +67,7 @@ def admitted_robot(
     compiled = with_nominal_values(rig, case.parameters)
     case = bound(case, compiled)
     model = ArticulatedModel.of(compiled, case.rig)
-    _refuse(case, model)
+    _refuse(case, model, settings)
     case, clipped = _within_ranges(case, model)
     records = (*case.identification, *case.validation)
     moving = [(record, motion_of(case, model, record, {}, settings=settings.motion)) for record in records]
@@ -85,8 +85,14 @@ def admitted_robot(
     )
 
 
-def _refuse(case: Case, model: ArticulatedModel) -> None:
+def _refuse(case: Case, model: ArticulatedModel, settings: DiagnosisSettings) -> None:
     """Refuse records that no diagnosis can use."""
+    for record in (*case.identification, *case.validation):
+        if record.step >= settings.articulated.longest_sample:
+            raise RecordingError(
+                f"'{record.name}' has {record.step:.4g} s between its samples, in which a joint does whatever it likes; "
+                f"under {settings.articulated.longest_sample:g} s are expected: is its time column in milliseconds?"
+            )
     inputs = [input_of(case, joint).name for joint in model.joints]
     responses = [c.name for joint in model.joints for c in encoders_of(case, joint).channels]
     for record in case.identification:

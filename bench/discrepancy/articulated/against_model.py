@@ -86,7 +86,7 @@ def _against_model(
         found = []
         for record, motion in moving:
             noise = (shown_noise(case, channel, record), 0.0)
-            asked = _asked(model, joint, j, motion)
+            asked = asked_input(model, joint, j, motion)
             bands = bands_between(spectra(record.values[channel], asked, record.step, noise, settings))
             if bands is not None:
                 found.append(common_factor(bands, settings))
@@ -101,7 +101,7 @@ def _against_model(
     yield from (words for _, words in sorted(said, key=lambda entry: entry[0]))
 
 
-def _asked(model: ArticulatedModel, joint: Joint, j: int, motion: JointMotion) -> Array:
+def asked_input(model: ArticulatedModel, joint: Joint, j: int, motion: JointMotion) -> Array:
     """The input (n,) of a joint's drive along a motion, by its nominal equation without dry friction."""
     drive = joint.drive
     assert drive is not None

@@ -118,14 +118,30 @@ def kept(
         likelier = rungs[k].log_posterior - rungs[last].log_posterior
         if complete(problem, rungs[last], settings) and likelier < settings.certain:
             break
-        difference = predictions[last].excess - predictions[k].excess
-        error = float(np.std(difference, ddof=1)) / np.sqrt(len(difference))
-        gained, left = float(np.mean(difference)), float(np.mean(predictions[k].excess))
+        gained = float(np.mean(predictions[last].excess - predictions[k].excess))
+        left = float(np.mean(predictions[k].excess))
         small = 0.0 if not last or complete(problem, rungs[k], settings) else settings.small
         least = small * float(np.mean(predictions[0].excess))
-        if gained > max(settings.sure * error, left if last else 0.0, least):
+        if gained > max(left if last else 0.0, least) and better(predictions[last], predictions[k], settings):
             last = k
     return last, predictions
+
+
+def better(before: PredictedErrors, after: PredictedErrors, settings: JudgementSettings) -> bool:
+    """Whether a prediction improves on another by more than the standard error over the blocks.
+
+    Where a few blocks hold most of a discrepancy, its mean is uncertain by itself, however much of it is taken away everywhere: what
+    takes away more than it leaves may show in the logarithms of the blocks instead.
+    """
+    gained = before.excess - after.excess
+    if _sure(gained, settings):
+        return True
+    factors = np.log(before.power.sum(axis=1) / np.maximum(after.power.sum(axis=1), 1e-300))
+    return float(np.mean(gained)) > float(np.mean(after.excess)) and _sure(factors, settings)
+
+
+def _sure(gains: Array, settings: JudgementSettings) -> bool:
+    return float(np.mean(gains)) > settings.sure * float(np.std(gains, ddof=1)) / np.sqrt(len(gains))
 
 
 def complete(problem: ArticulatedProblem, found: ArticulatedFit, settings: JudgementSettings) -> bool:

@@ -63,7 +63,9 @@ def verdict_of(
         gap=widest,
         gaps=gaps,
         probabilities=probabilities,
-        explanation=_words(kind, effects, whole, explained, final, problem),
+        explanation=_words(
+            kind, effects, whole, widest.closed if kind == "effect" else explained, final, problem
+        ),
         warnings=(),
         complete=whole,
         remainder=remainder_of(problem, final, predictions[last], untouched),

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from bench.arrays import Array
-from bench.discrepancy.articulated.judgement import PredictedErrors, closed
+from bench.discrepancy.articulated.judgement import PredictedErrors
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.settings import ArticulatedSettings
@@ -28,8 +28,7 @@ def gaps_of(
         run = f"free runs of {record.window * record.sample:.3g} s" if record.window else "free run"
         first, after = untouched, predictions[-1]
         floor = float(after.floor[j])
-        one = [PredictedErrors(p.power[:, j : j + 1], p.floor[j : j + 1]) for p in (first, after)]
-        share, interval = closed(one[0], one[1], one[0], rng)
+        share, interval = _closed(first.power[:, j], after.power[:, j], floor, rng)
         steps = [
             ("nominal", float(first.discrepancy[j])),
             ("parameters only", float(predictions[0].discrepancy[j])),
@@ -46,6 +45,18 @@ def gaps_of(
             )
         )  # fmt: skip
     return tuple(out)
+
+
+def _closed(
+    first: Array, after: Array, floor: float, rng: np.random.Generator
+) -> tuple[float, tuple[float, float]]:
+    """Part of an NRMSE beyond that of the noise that is closed, see `Gap`, and its block-bootstrap interval; from powers (n_blocks,)."""
+    drawn = rng.integers(len(first), size=(1000, len(first)))
+    rows = np.vstack([np.arange(len(first)), drawn])
+    before, left = (np.sqrt(power[rows].mean(axis=1)) for power in (first, after))
+    shares = np.minimum((before - left) / np.maximum(before - floor, 1e-12), 1.0)
+    low, high = np.percentile(shares[1:], [2.5, 97.5])
+    return float(shares[0]), (float(low), float(high))
 
 
 def locations_of(problem: ArticulatedProblem, base: ArticulatedFit) -> tuple[Location, ...]:

@@ -6,6 +6,7 @@ import math
 
 from bench.discrepancy.articulated_search.effect import ArticulatedEffect
 from bench.discrepancy.articulated_search.slot_setters import (
+    added,
     cogging,
     saturated,
     scaled,
@@ -26,15 +27,15 @@ ON_LINK = FreeParameter("encoder_on_link", fixed=True, signed=True, grid=(0.0, 1
 RELATIVE = FreeParameter("relative_error", signed=True, mean=0.0, std=0.3, bounds=(-0.95, 20.0), unit="1")
 
 
-def _time(name: str, highest: float) -> FreeParameter:
-    """A delay or time constant [s]: ten milliseconds within a factor of seven with 95 %, up to a highest logarithm."""
+def _time(name: str, middle: float, highest: float) -> FreeParameter:
+    """A delay or time constant [s]: a middle within a factor of seven with 95 %, up to a highest logarithm."""
     return FreeParameter(
         name,
         "1",
-        mean=math.log(0.01),
+        mean=math.log(middle),
         std=1.0,
         bounds=(-9.0, highest),
-        grid=log_grid(0.003, 0.01, 0.03),
+        grid=log_grid(0.3 * middle, middle, 3.0 * middle),
         unit="s",
     )
 
@@ -120,7 +121,7 @@ DRIVE_EFFECTS: tuple[ArticulatedEffect, ...] = (
         "actuator_delay",
         "actuator",
         "actuator",
-        (_time("delay_s", -1.5),),
+        (_time("delay_s", 0.01, -1.5),),
         "input acts later by a delay",
         written(DELAY="delay_s"),
     ),
@@ -128,9 +129,18 @@ DRIVE_EFFECTS: tuple[ArticulatedEffect, ...] = (
         "actuator_lag",
         "actuator",
         "actuator",
-        (_time("time_constant_s", -1.0),),
-        "T u' + u = input",
+        (_time("time_constant_s", 0.01, -1.0),),
+        "T f' + f = force of the actuator",
         written(LAG="time_constant_s"),
+    ),
+    ArticulatedEffect(
+        "target_lag",
+        "actuator",
+        "actuator",
+        (_time("time_constant_s", 0.03, -0.5),),
+        "T u' + u = target of the servo",
+        added(INPUT_LAG="time_constant_s"),
+        servo=True,
     ),
     ArticulatedEffect(
         "force_gain_error", "actuator", "actuator", (RELATIVE,), "tau = (1 + e) nominal", scaled(Slot.GEAR)
@@ -150,7 +160,12 @@ DRIVE_EFFECTS: tuple[ArticulatedEffect, ...] = (
         "actuator",
         (
             FreeParameter(
-                "limit", "peak", mean=math.log(0.5), std=0.7, bounds=(-4.0, 0.5), grid=log_grid(0.4, 0.6, 0.8)
+                "limit",
+                "peak",
+                mean=math.log(0.5),
+                std=0.7,
+                bounds=(-4.0, 0.5),
+                grid=log_grid(0.2, 0.4, 0.6, 0.8),
             ),
         ),
         "|force| <= limit",

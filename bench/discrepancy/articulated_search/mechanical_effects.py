@@ -165,5 +165,12 @@ MECHANICAL_EFFECTS: tuple[ArticulatedEffect, ...] = (
         ),
         "the centre of mass elsewhere in the body",
     ),
+    ArticulatedEffect(
+        "gravity_compensation",
+        "inertia",
+        "body",
+        (FreeParameter("share", signed=True, mean=0.0, std=0.5, bounds=(-2.0, 2.0), unit="1"),),
+        "a part of the body's weight is carried otherwise: by a counterbalance, or by the controller",
+    ),
 )
 """Effects at joints and bodies."""

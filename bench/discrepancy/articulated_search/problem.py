@@ -226,6 +226,8 @@ class ArticulatedProblem:
             values = placed.effect.values(eta, placed.scales)
             if "payload" in values:
                 change = record.payloads[placed.where] * values["payload"]
+            elif "share" in values:
+                change = np.stack([-values["share"] * record.weights[placed.where], np.zeros_like(bias)])
             else:
                 shift = np.array(list(values.values()))
                 change = np.tensordot(shift, record.centres[placed.where], axes=1)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.discrepancy.case.case import CaseRecord
-from bench.discrepancy.checks.scales import observed
+from bench.discrepancy.checks.scales import observed, parallel
 from bench.discrepancy.likelihood.problem import Array, Problem
 from bench.discrepancy.settings import DEFAULT, ChecksSettings
 
@@ -133,7 +133,7 @@ def _between_channels(problem: Problem) -> Iterator[str]:
     """Notes on pairs of channels that measure the same motion: unit, sign, lag, clock."""
     levels = dict(zip(problem.structure.channels, problem.noise, strict=True))
     for first, second in combinations(observed(problem), 2):
-        if first.order == second.order or not np.array_equal(np.abs(first.row), np.abs(second.row)):
+        if first.order == second.order or not np.isclose(abs(parallel(first.row, second.row)), 1.0):
             continue
         for record in problem.records:
             pair = compare_channels(

@@ -91,7 +91,7 @@ def _between(declared: Case, problem: Problem, settings: ScaleSettings) -> Itera
     agreeing: set[str] = set()
     for i, (first, low, row, level) in enumerate(channels):
         for second, high, other, second_level in channels[i + 1 :]:
-            ratio = _parallel(row, other)
+            ratio = parallel(row, other)
             if low == high or ratio == 0.0:
                 continue
             for record in problem.records:
@@ -120,7 +120,7 @@ def _between(declared: Case, problem: Problem, settings: ScaleSettings) -> Itera
                 )
 
 
-def _parallel(row: Array, other: Array) -> float:
+def parallel(row: Array, other: Array) -> float:
     """Second row over the first where they read one coordinate; zero where they do not."""
     at = int(np.argmax(np.abs(row)))
     ratio = float(other[at] / row[at]) if row[at] else 0.0

@@ -58,7 +58,7 @@ class Slot(IntEnum):
     STOP_DAMPING = 24
     STOP_SIDE = 25
     DEADBAND = 26  # half width, of the servo's position error or of the force
-    LAG = 27  # time constant [s]
+    LAG = 27  # time constant of the force [s]
     DELAY = 28  # of the input [s]
     TRAIN = 29  # 1: an elastic drive train between motor and link
     TRAIN_STIFFNESS = 30
@@ -73,6 +73,7 @@ class Slot(IntEnum):
 
     ON_LINK = 37  # 1: damping acts on the link's side of a train
     CARRIED_BY = 38  # 0: friction grows with the torque on the link, 1: with that of the actuator
+    INPUT_LAG = 39  # time constant of a filter of the input [s], of a servo that of its target
 
 
 SLOTS = len(Slot)
@@ -234,8 +235,9 @@ def run(
     train = p[29] > 0.5
     on_link = train and p[34] > 0.5
     q, v, ql, vl, z = 0.0, 0.0, 0.0, 0.0, 0.0
-    lagged = math.nan
+    lagged, target = math.nan, u[0]
     keep = math.exp(-step / p[27]) if p[27] > 0.0 else 0.0
+    half = math.exp(-0.5 * step / p[39]) if p[39] > 0.0 else 0.0
     for i in range(n):
         if i % every == 0:
             q, v, ql, vl = _set_anew(p, bias[min(i * n_sub, bias.shape[0] - 1)], starts[i // every], on_link)
@@ -254,7 +256,10 @@ def run(
         for k in range(i * n_sub, (i + 1) * n_sub):
             q += 0.5 * step * v
             ql += 0.5 * step * vl
-            force, implicit, lagged = _actuator(p, _input(u, k, p[28] / step), q, v, lagged, keep)
+            command = _input(u, k, p[28] / step)
+            target = command + (target - command) * half  # in the middle of the step, where the force acts
+            force, implicit, lagged = _actuator(p, target, q, v, lagged, keep)
+            target = command + (target - command) * half
             bristle_force, bristle = _bristles(p, v, z)
             own = force + bristle_force - p[19] * math.sin(p[20] * q + p[21])
             x, w = (ql, vl) if train else (q, v)

@@ -138,6 +138,13 @@ class ArticulatedModel:
         _add_point(out.model, i, mass, self.tips[body] if at is None else at)
         return out
 
+    def weight(self, body: str, q: Array) -> Array:
+        """Torque (n, n_joints) that the weight of a body asks of every joint at positions (n, n_joints)."""
+        still = np.zeros_like(q)
+        return (
+            self.dynamics(q, still, still).torque - self.with_mass(body, 0.0).dynamics(q, still, still).torque
+        )
+
     def with_centre(self, body: str, shift: Array) -> ArticulatedModel:
         """The model with the centre of mass of a body moved by `shift` (3,) [m] in the body's frame, the inertia about it kept."""
         out = self._copied()

@@ -51,6 +51,7 @@ class JointRecord:
         changes: Body to the changes of bias and inertia (2, n_steps) for a kilogram more of it.
         payloads: The same for a kilogram at its tip.
         centres: The same (3, 2, n_steps) for a metre of its centre of mass along each axis.
+        weights: Body to the change of bias (n_steps,) by its weight.
         gain: (2, 2) of the innovations.
         whitening: (n_measured, n_measured) of the innovations.
         sample: Time between samples [s].
@@ -76,6 +77,7 @@ class JointRecord:
     changes: Mapping[str, Array]
     payloads: Mapping[str, Array]
     centres: Mapping[str, Array]
+    weights: Mapping[str, Array]
     sample: float
     weight: Array
     encoder: Encoder = TRUE
@@ -215,6 +217,7 @@ def prepare(
         )
         for body in model.bodies
     }
+    weights = {body: clock.between(model.weight(body, motion.position)) for body in model.bodies}
     slope = clock.between(model.slopes(*moved))
     process = torque_noise(model, motion, clock, record.step)
     joints = []
@@ -228,7 +231,8 @@ def prepare(
                 base.reference[j], base.load[j], _input(case, record, channel, clock), *_measured(motion, j),
                 encoders_of(case, joint).channels[0].side, float(np.hypot(stated, process[j])),
                 {b: c[j] for b, c in masses.items()}, {b: c[j] for b, c in payloads.items()},
-                {b: np.ascontiguousarray(c[:, j]) for b, c in centres.items()}, record.step, weights_of(case, record, joint),
+                {b: np.ascontiguousarray(c[:, j]) for b, c in centres.items()}, {b: c[j] for b, c in weights.items()}, record.step,
+                weights_of(case, record, joint),
             )
         )  # fmt: skip
     return PreparedRecord(record, motion, tuple(joints))

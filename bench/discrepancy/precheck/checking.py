@@ -16,6 +16,7 @@ from bench.discrepancy.checks.admission import admitted
 from bench.discrepancy.checks.data_quality import doubts
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.rigs import structure_of
+from bench.discrepancy.precheck.drives import drive_doubts
 from bench.discrepancy.precheck.information import Told, effects_told, parameters_told, shortened
 from bench.discrepancy.precheck.joint_information import joints_told
 from bench.discrepancy.precheck.joints import admitted_joints, joint_doubts
@@ -137,8 +138,8 @@ def _of_joints(
     own, model, said = admitted_joints(case)
     found = [*found, *said]
     if own is None or model is None:
-        return _said(found, notes, began)
-    found += joint_doubts(own, model)
+        return Checked("unusable", tuple(found), notes, seconds=time.perf_counter() - began)
+    found += [*joint_doubts(own, model), *drive_doubts(own, model, settings)]
     parameters: list[Told] = []
     effects: list[Told] = []
     if informed:

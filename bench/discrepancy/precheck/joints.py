@@ -15,7 +15,8 @@ from bench.discrepancy.model.mjcf_file import rig_of
 from bench.discrepancy.multibody.channels import bound
 from bench.discrepancy.multibody.encoders import encoders_of, input_of
 from bench.discrepancy.multibody.model import ArticulatedModel
-from bench.errors import BenchError
+from bench.discrepancy.precheck.positions import position_doubts
+from bench.errors import BenchError, RecordingError
 
 
 @dataclass(frozen=True)
@@ -23,7 +24,7 @@ class JointsSettings:
     """Numbers of `bench.discrepancy.precheck.joints`."""
 
     follows: float = 0.5
-    """Correlation of a servo's target with its joint from which their order in time tells something."""
+    """Correlation of a servo's target with its joint from which their sizes tell something."""
     still: float = 30.0
     """Noise that the motion of a joint has to exceed, so that friction and inertia can be told from it."""
     reversals: int = 4
@@ -36,13 +37,15 @@ SETTINGS = JointsSettings()
 def admitted_joints(case: Case) -> tuple[Case | None, ArticulatedModel | None, list[str]]:
     """The case as the diagnosis takes it, its model, and what is said of both; what it would refuse is said, nothing is raised.
 
-    Without case and model where they cannot be read at all.
+    Without case and model where these cannot be read at all, or no diagnosis can use the records.
     """
     found: list[str] = []
     try:
         try:
             own, compiled, notes = admitted_robot(case, anyway=True)
             found += notes
+        except RecordingError as error:
+            return None, None, [str(error)]
         except (
             BenchError
         ) as error:  # the first thing that is refused; what else is doubtful is told all the same
@@ -75,6 +78,7 @@ def joint_doubts(own: Case, model: ArticulatedModel) -> list[str]:
             q = np.asarray(record.values[position.name])
             u = np.asarray(record.values[driving.name])
             found += _moves(joint.name, record, q, float(position.noise_std or 0.0))
+            found += position_doubts(position.name, record, float(position.noise_std or 0.0))
             if servo:
                 found += _follows(joint.name, driving.name, record, q, u)
             velocity = next((c for c in encoders.channels if c.quantity == "velocity"), None)
@@ -117,18 +121,6 @@ def _follows(joint: str, target: str, record: CaseRecord, q: Array, u: Array) ->
         yield (
             f"joint '{joint}' moves {factor:.3g} times as far as its target '{target}' in '{record.name}': degrees, or a gear?"
         )
-    if correlation > SETTINGS.follows:
-        n = len(q)
-        spectra = np.fft.rfft(q - q.mean(), 2 * n) * np.conj(np.fft.rfft(u - u.mean(), 2 * n))
-        lags = np.fft.irfft(spectra)
-        reach = min(n // 4, round(1.0 / record.step))
-        window = np.concatenate([lags[-reach:], lags[: reach + 1]])
-        lag = (int(np.argmax(window)) - reach) * record.step
-        if lag < -1.5 * record.step:
-            yield (
-                f"joint '{joint}' moves {-1e3 * lag:.3g} ms before its target '{target}' in '{record.name}': the clocks of the two differ; "
-                "align them"
-            )
 
 
 def _derivatives(

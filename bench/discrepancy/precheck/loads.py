@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bench.arrays import Array
 from bench.discrepancy.case.case import CaseRecord
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.precheck.information import parameter_columns
@@ -49,24 +50,27 @@ def _unsigned(problem: Problem, record: CaseRecord, settings: CheckSettings) -> 
     )
     for j, name in enumerate(problem.structure.loads):
         load = np.asarray(record.values[name])
-        acting = load[np.abs(load) > 1e-3 * np.abs(load).max(initial=0.0)]
-        if (
-            len(acting) < 0.2 * len(load)
-            or max(np.mean(acting > 0.0), np.mean(acting < 0.0)) < settings.one_sided
-        ):
-            continue
         need = (
             implied @ problem.structure.inputs[:, j] if problem.structure.inputs.ndim == 2 else implied[:, 0]
         )
-        if np.std(need) == 0.0 or np.std(load) == 0.0:
-            continue
-        plain = abs(float(np.corrcoef(load, need)[0, 1]))
-        folded = abs(float(np.corrcoef(load, np.abs(need))[0, 1]))
-        if folded > plain + settings.unsigned:
+        if is_magnitude(load, np.asarray(need, dtype=np.float64), settings):
             yield (
                 f"'{name}' in '{record.name}' never changes its sign, while the motion asks for a load of both: it looks like a magnitude "
                 "(an unsigned current?); give it the sign of its command"
             )
+
+
+def is_magnitude(load: Array, need: Array, settings: CheckSettings) -> bool:
+    """Whether an input (n,) of one sign goes with the magnitude of what the motion asks for (n,), and not with that itself."""
+    acting = load[np.abs(load) > 1e-3 * np.abs(load).max(initial=0.0)]
+    if (
+        len(acting) < 0.2 * len(load)
+        or max(np.mean(acting > 0.0), np.mean(acting < 0.0)) < settings.one_sided
+        or min(np.std(need), np.std(load)) == 0.0
+    ):
+        return False
+    plain, folded = (float(np.corrcoef(load, x)[0, 1]) ** 2 for x in (need, np.abs(need)))
+    return 1.0 - plain > settings.unsigned and 1.0 - folded < settings.magnitude * (1.0 - plain)
 
 
 def _late(problem: Problem, record: CaseRecord, settings: CheckSettings) -> Iterator[str]:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from bench.discrepancy.checks.channel_comparison import compare_channels
+from bench.discrepancy.checks.scales import parallel
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.precheck.settings import CheckSettings
 
@@ -22,7 +23,7 @@ def motion_doubts(problem: Problem, settings: CheckSettings) -> Iterator[str]:
     for i, first in enumerate(observers):
         for j in range(i + 1, len(observers)):
             second = observers[j]
-            if first.order == second.order or not np.array_equal(np.abs(first.row), np.abs(second.row)):
+            if first.order == second.order or not np.isclose(abs(parallel(first.row, second.row)), 1.0):
                 continue
             for record in problem.records:
                 pair = compare_channels(

@@ -21,7 +21,8 @@ class CheckSettings:
         records_seconds: Seconds of each record that the information is computed on, so that it takes seconds itself.
         shift: Power that is left of the residual at the best shift in time, over that at none, from which the shift is told.
         one_sided: Share of a load's samples of one sign from which it may be a magnitude.
-        unsigned: By how much the magnitude of the load that the motion implies has to correlate better with it than the load itself.
+        unsigned: Power of a load of one sign that the load which the motion implies leaves, from which it may be the magnitude of that.
+        magnitude: What the magnitude of that leaves over it, below which it is: a model that is wrong leaves as much of both.
         glitch: Jump from a neighbour to a sample and back, over what the samples around do at most, from which it is a torn value.
         frozen: Samples in a row with one value, of a channel that otherwise moves at every sample, from which it is a stuck one.
         one_motion: Correlation, at frequencies where both are strong, below which two channels of one motion do not tell the same: what
@@ -39,7 +40,8 @@ class CheckSettings:
     records_seconds: float = 20.0
     shift: float = 0.1
     one_sided: float = 0.98
-    unsigned: float = 0.3
+    unsigned: float = 0.05
+    magnitude: float = 0.25
     glitch: float = 8.0
     frozen: int = 12
     one_motion: float = 0.9

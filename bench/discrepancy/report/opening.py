@@ -24,6 +24,8 @@ class OpeningSettings:
 
     cycles: int = 4
     """Cycles that a picture shows at first: with more of them, before and after would be one line on a telephone."""
+    seen: float = 0.1
+    """Part of the motion from which an error shows beside it; a smaller one is as wide as the lines, and is drawn itself."""
 
 
 SETTINGS = OpeningSettings()
@@ -52,9 +54,11 @@ def opened(
     section = page.section("")
     section.facts(answers(verdict, settings=settings))
     dof = _shown(verdict.gap, next(iter(runs.values())))
+    errors = verdict.gap.before < SETTINGS.seen
+    what = f"what every simulation misses {dof} by" if errors else dof
     section.plots(
-        [histories(runs, [dof], window=window(runs, dof))],
-        f"Judging record, {dof}, where the nominal model misses it most; no fit has seen it. Drag to zoom; a double click shows all.",
+        [histories(runs, [dof], window=window(runs, dof), errors=errors)],
+        f"Judging record, {what}, where the nominal model misses it most; no fit has seen it. Drag to zoom; a double click shows all.",
     )
     for step in next_steps(verdict, model):
         section.text(step.text)

@@ -192,6 +192,15 @@ class ArticulatedSettings:
         unit="sigmas",
     )
     at_bound: float = setting(1e-6, "Distance from a bound at which a parameter sits on it.", "Rounding.")
+    longest_sample: float = setting(
+        0.2,
+        "Time between samples from which a record is refused.",
+        (
+            "It then holds nothing beyond 2.5 Hz, where drives and links answer; a log whose times are milliseconds called seconds is one "
+            "such up to a rate of 5 kHz."
+        ),
+        unit="s",
+    )
     longest_step: float = setting(
         1e-3,
         "Longest integration step.",
