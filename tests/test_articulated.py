@@ -219,6 +219,43 @@ def test_a_joint_that_was_held_is_welded_where_it_was(tmp_path):
         admitted_robot(read_case(folder))
 
 
+def problem_of(folder, **joints):
+    """The problem of a case whose joints of the given names follow, without what drives them."""
+    document = json.loads((folder / "nominal.json").read_text())
+    for name in joints:
+        for part, key in (
+            ("channels", f"{name}_in"),
+            ("parameters", f"damping:{name}"),
+            ("parameters", f"kp:{name}_drive"),
+        ):
+            document[part].pop(key, None)
+    (folder / "nominal.json").write_text(json.dumps(document | {"joints": joints}))
+    case, compiled, _ = admitted_robot(read_case(folder))
+    return ArticulatedProblem.of(case, ArticulatedModel.of(compiled), case.identification)
+
+
+@pytest.mark.parametrize("followed", KP)
+def test_a_joint_that_is_followed_leaves_the_equations_of_the_others_as_they_are(tmp_path, followed):
+    folder = write_case(tmp_path, mjcf(servo=True, friction=LIMIT), servo=True)
+    whole = problem_of(folder)
+    part = problem_of(folder, **{followed: "follow"})
+    (free,) = part.joints
+    at = [joint.name for joint in whole.joints].index(free.name)
+    mine, theirs = part.records[0].joints[0], whole.records[0].joints[at]
+    for name in ("inertia", "bias", "slope", "reference", "load", "command", "position"):
+        np.testing.assert_allclose(getattr(mine, name), getattr(theirs, name), rtol=1e-6, atol=1e-9)
+    assert {p.where for p in placements(part, CATALOGUE) if p.effect.site == "joint"} == {free.name}
+    with pytest.raises(BenchError, match="elbwo"):
+        problem_of(folder, elbwo="follow")
+
+
+def test_bodies_without_a_name_go_by_what_moves_them():
+    text = mjcf(servo=True).replace('body name="fore"', "body").replace('name="fore_tip"', 'name="tip"')
+    model = ArticulatedModel.of(mujoco.MjModel.from_xml_string(text))
+    assert model.bodies == ("upper", "body of elbow")
+    assert model.with_payload("body of elbow", 0.3).mass("body of elbow") == pytest.approx(0.8)
+
+
 def test_the_next_test_tells_two_explanations_apart_within_what_the_arm_has_shown(tmp_path):
     folder = write_case(tmp_path, mjcf(servo=True), servo=True)
     case, compiled, _ = admitted_robot(read_case(folder))

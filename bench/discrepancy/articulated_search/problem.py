@@ -234,21 +234,21 @@ class ArticulatedProblem:
             bias, inertia = bias + change[0], inertia + change[1]
         return bias, np.maximum(inertia, 1e-3 * record.inertia)
 
-    def residual(self, j: int, hypothesis: Hypothesis, vector: Array) -> Array:
-        """Whitened, weighted innovations of joint `j` over all records; their sum of squares is about `count` where nothing is missing."""
-        settings = self.settings.articulated
+    def residuals(self, j: int, hypothesis: Hypothesis, vector: Array) -> list[Array]:
+        """Whitened, weighted innovations (n, n_measured) of joint `j` in every record."""
+        most = self.settings.articulated.diverged
         out = []
         for original, prepared in zip(self.records, self.motions(hypothesis, vector), strict=True):
             innovation, _ = self.innovations(j, hypothesis, vector, prepared)
             # a corrected log has another noise; residuals are compared in units of what was logged
             innovation = innovation * (original.joints[j].noise / prepared.joints[j].noise)
             whitened = innovation @ original.joints[j].whitening.T * original.joints[j].weight
-            out.append(
-                np.nan_to_num(
-                    whitened, nan=settings.diverged, posinf=settings.diverged, neginf=-settings.diverged
-                ).ravel()
-            )
-        return np.concatenate(out)
+            out.append(np.nan_to_num(whitened, nan=most, posinf=most, neginf=-most))
+        return out
+
+    def residual(self, j: int, hypothesis: Hypothesis, vector: Array) -> Array:
+        """Those of all records in one (n,); their sum of squares is about `count` where nothing is missing."""
+        return np.concatenate([r.ravel() for r in self.residuals(j, hypothesis, vector)])
 
     @cached_property
     def count(self) -> Array:

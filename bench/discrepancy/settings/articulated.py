@@ -86,6 +86,16 @@ class ArticulatedJudgementSettings:
         "Log posterior (odds of a million) that a further effect has to add to what is complete within the accuracy of the noise.",
         "A clean model is offered a few hundred effects, and the noise is not quite what its model says.",
     )
+    ordinates: int = setting(
+        8,
+        "Ordinates of a periodogram below which no power is asked for.",
+        "Fewer of them fluctuate by more than a third.",
+    )
+    draws: int = setting(
+        8,
+        "Draws of the parameters, for what their uncertainty leaves on the judging records.",
+        "It is known to a third then, and added to the noise, which is mostly more.",
+    )
     material: float = setting(
         0.5,
         "Part of the discrepancy that the effects together have to close for them to be called its cause.",
