@@ -14,13 +14,13 @@ from bench.discrepancy import diagnose, read_case
 from bench.discrepancy.articulated.admission import admitted_robot
 from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis
 from bench.discrepancy.articulated.free_runs import FreeRuns
-from bench.discrepancy.articulated.judgement import JudgementSettings, complete
+from bench.discrepancy.articulated.judgement import JudgementSettings
 from bench.discrepancy.articulated.next_test import propose
 from bench.discrepancy.articulated.recognition import applies
 from bench.discrepancy.articulated_search.catalogue import CATALOGUE
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit, fit, refitted
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem, placements
-from bench.discrepancy.articulated_search.search import without_idle
+from bench.discrepancy.articulated_search.search import complete, without_idle
 from bench.discrepancy.multibody.channels import bound
 from bench.discrepancy.multibody.encoders import weight_of_readings
 from bench.discrepancy.multibody.model import ArticulatedModel, compiled_model

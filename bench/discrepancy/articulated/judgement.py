@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from bench.discrepancy.articulated.free_runs import FreeRuns
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
+from bench.discrepancy.articulated_search.search import complete
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.settings import ArticulatedJudgementSettings as JudgementSettings
 
@@ -128,14 +129,6 @@ def kept(
         if gained > max(settings.sure * error, left if last else 0.0, least):
             last = k
     return last, predictions
-
-
-def complete(problem: ArticulatedProblem, found: ArticulatedFit, settings: JudgementSettings) -> bool:
-    """Whether no joint keeps more than the noise, and no nominal parameter is strained for it."""
-    # the mean square of n residuals is known to sqrt(2 / n)
-    noise = (1.0 + settings.noise_known) ** 2 + settings.sure * np.sqrt(2.0 / found.count)
-    far = np.abs(found.vector[: len(problem.nominal)]) > settings.strained
-    return bool(np.all(found.reduced <= noise) and not far.any())
 
 
 def closed(

@@ -6,12 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bench.discrepancy.articulated.judgement import Prediction, closed, complete
+from bench.discrepancy.articulated.judgement import Prediction, closed
 from bench.discrepancy.articulated.places import gaps_of, locations_of, remainder_of
 from bench.discrepancy.articulated.whiteness import Coloured
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.hypothesis import placed_values
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
+from bench.discrepancy.articulated_search.search import complete
 from bench.discrepancy.settings import ArticulatedJudgementSettings as JudgementSettings
 from bench.discrepancy.verdict import Estimate, Kind, NamedEffect, NominalEstimate, Ranked, Verdict
 

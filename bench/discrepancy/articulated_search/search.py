@@ -24,9 +24,18 @@ from bench.discrepancy.articulated_search.hypothesis import Hypothesis, Placed
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.articulated_search.screening import Screened, by_effect, screen
 from bench.discrepancy.numerics.threads import in_threads
+from bench.discrepancy.settings import ArticulatedJudgementSettings as JudgementSettings
 from bench.discrepancy.settings import ArticulatedSearchSettings as SearchSettings
 
 Array = NDArray[np.float64]
+
+
+def complete(problem: ArticulatedProblem, found: ArticulatedFit, settings: JudgementSettings) -> bool:
+    """Whether no joint keeps more than the noise, and no nominal parameter is strained for it."""
+    # the mean square of n residuals is known to sqrt(2 / n)
+    noise = (1.0 + settings.noise_known) ** 2 + settings.sure * np.sqrt(2.0 / found.count)
+    far = np.abs(found.vector[: len(problem.nominal)]) > settings.strained
+    return bool(np.all(found.reduced <= noise) and not far.any())
 
 
 def _strained(problem: ArticulatedProblem, base: ArticulatedFit, settings: SearchSettings) -> set[int]:
@@ -55,7 +64,7 @@ def search(
     progress: Callable[[str], None] = lambda text: None,
 ) -> list[ArticulatedFit]:
     """All fitted hypotheses: the one that nothing is worth adding to or taking from, then the likeliest first."""
-    settings = settings or problem.settings.articulated.search
+    settings, judged = settings or problem.settings.articulated.search, problem.settings.articulated.judgement
     progress("nominal model")
     current = nominal_fit(problem)
     found, dropped = [current], set[tuple[str, str]]()
@@ -66,7 +75,10 @@ def search(
             problem, current, rest, settings, lambda text, n=count: progress(f"effect {n}: {text}")
         )
         found += fits
-        if best is None or best.log_posterior < current.log_posterior + settings.worth:
+        # to what is complete, the judgement adds nothing but what is certain
+        whole = complete(problem, current, judged)
+        least = judged.certain if whole else settings.worth
+        if best is None or best.log_posterior < current.log_posterior + least:
             break
         problem = problem.settled(best.hypothesis, best.vector)
         current, fits = without_idle(problem, best, settings)
