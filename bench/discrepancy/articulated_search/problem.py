@@ -112,6 +112,15 @@ class ArticulatedProblem:
             out |= {placed.joint} if site in ("joint", "actuator") else set(range(len(self.joints)))
         return tuple(sorted(out))
 
+    def entries(self, j: int, hypothesis: Hypothesis) -> NDArray[np.int64]:
+        """Entries of the vector of a hypothesis on which the runs of joint `j` depend."""
+        out, at = [*self.masses, *self.locals(j)], len(self.nominal)
+        for placed in hypothesis:
+            stop = at + len(placed.effect.parameters)
+            out += range(at, stop) if j in self.reached((placed,)) else ()
+            at = stop
+        return np.array(out, dtype=np.int64)
+
     def motions(self, hypothesis: Hypothesis, vector: Array) -> tuple[PreparedRecord, ...]:
         """The records, their encoders corrected as a hypothesis has it."""
         wrong: dict[str, Encoder] = {}

@@ -195,6 +195,11 @@ class ArticulatedSettings:
         "Corrected records kept.",
         "One sensor effect's derivatives over all identification records; memory.",
     )
+    kept_runs: int = setting(
+        12,
+        "Runs kept of every joint during a fit.",
+        "The masses of an arm, between two columns of a Jacobian that leave a joint as it is; memory.",
+    )
     diverged: float = setting(
         1000000.0,
         "Residual that stands for a run that is not finite.",
