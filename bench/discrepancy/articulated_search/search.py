@@ -278,14 +278,16 @@ def _fits(
     """Fits of the most promising effects on top of a fit, on the joints that they change."""
     others = Others.of(problem, base)
     out: list[ArticulatedFit] = []
-    gained = 0.0
+    gained, swapped = 0.0, 0
     strained = _strained(problem, base, settings)
     for k, mine in enumerate(points):
-        # where a number of the model was moved too far, all numbers that may be wrong instead are tried
-        instead = mine[0].placed.effect.number and mine[0].placed.joint in strained
         hopeful = k < settings.fitted and mine[0].gain >= settings.hope * gained
-        if not (k < settings.least or hopeful or instead):
-            continue
+        if not (k < settings.least or hopeful):
+            # where a number of the model was moved too far, numbers that may be wrong instead are tried, whatever they promise
+            instead = mine[0].placed.effect.number and mine[0].placed.joint in strained
+            if not instead or swapped == settings.fitted:
+                continue
+            swapped += 1
         hypothesis: Hypothesis = (*base.hypothesis, mine[0].placed)
         # nominal parameters that stood in for what was missing are also tried where they were stated, and fitted from there:
         # a start of less misfit need not be the nearer one

@@ -12,7 +12,11 @@ class ArticulatedSearchSettings:
     """The search on articulated models."""
 
     most: int = setting(3, "Largest number of effects named together.", "Convention.")
-    fitted: int = setting(10, "Screened effects that are fitted in a round, at most.", "Convention.")
+    fitted: int = setting(
+        10,
+        "Screened effects that are fitted in a round, at most; and as many wrong numbers instead of those that the fit has strained.",
+        "Convention.",
+    )
     least: int = setting(3, "Of those, the ones that are fitted whatever they promise.", "Convention.")
     hope: float = setting(
         0.5,
