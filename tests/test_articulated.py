@@ -17,6 +17,7 @@ from bench.discrepancy.articulated.free_runs import FreeRuns
 from bench.discrepancy.articulated.judgement import JudgementSettings
 from bench.discrepancy.articulated.next_test import propose
 from bench.discrepancy.articulated.recognition import applies
+from bench.discrepancy.articulated.whiteness import coloured
 from bench.discrepancy.articulated_search.catalogue import CATALOGUE
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit, fit, refitted
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem, placements
@@ -232,6 +233,28 @@ def problem_of(folder, **joints):
     (folder / "nominal.json").write_text(json.dumps(document | {"joints": joints}))
     case, compiled, _ = admitted_robot(read_case(folder))
     return ArticulatedProblem.of(case, ArticulatedModel.of(compiled), case.identification)
+
+
+def test_a_slow_motion_under_the_noise_is_left_and_noise_alone_is_not(tmp_path):
+    folder = write_case(tmp_path, mjcf(servo=True), servo=True, length=2.0 * LENGTH)
+    found = {}
+    for name in ("noise", "motion"):
+        problem = problem_of(folder)
+        known = ArticulatedFit.at(problem, (), np.zeros(len(problem.nominal)))
+        known = replace(known, covariance=np.zeros_like(known.covariance))
+        assert complete(problem, known, JudgementSettings())  # by the mean square
+        found[name] = coloured((problem,), known, JudgementSettings())
+        table = np.loadtxt(folder / "identification.csv", delimiter=",", skiprows=1)
+        header = (folder / "identification.csv").read_text().splitlines()[0]
+        table[:, 4] += 0.45 * NOISE * np.sin(2.0 * np.pi * 0.5 * table[:, 0])
+        np.savetxt(
+            folder / "identification.csv", table, delimiter=",", header=header, comments="", fmt="%.9g"
+        )
+    assert found["noise"] is None
+    assert found["motion"] is not None
+    assert found["motion"].joint == 1
+    assert 0.5 <= found["motion"].below < 2.0
+    assert found["motion"].power > 3.0
 
 
 @pytest.mark.parametrize("followed", KP)
