@@ -243,7 +243,7 @@ def test_a_slow_motion_under_the_noise_is_left_and_noise_alone_is_not(tmp_path):
         known = ArticulatedFit.at(problem, (), np.zeros(len(problem.nominal)))
         known = replace(known, covariance=np.zeros_like(known.covariance))
         assert complete(problem, known, JudgementSettings())  # by the mean square
-        found[name] = coloured((problem,), known, JudgementSettings())
+        found[name] = coloured(problem, known, JudgementSettings())
         table = np.loadtxt(folder / "identification.csv", delimiter=",", skiprows=1)
         header = (folder / "identification.csv").read_text().splitlines()[0]
         table[:, 4] += 0.45 * NOISE * np.sin(2.0 * np.pi * 0.5 * table[:, 0])

@@ -111,7 +111,7 @@ def diagnose_articulated(
     last, predictions = kept(judging, rungs, judged)
     untouched = predict(judging, None, predictions[0].floor, judged)
     final = rungs[last]
-    left = coloured((problem, judging), final, judged)
+    left = coloured(judging, final, judged)
     verdict = verdict_of(
         problem, fits, rungs, last, untouched, predictions, judged, rng, stated=stated, left=left
     )

@@ -15,7 +15,7 @@ References:
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -48,15 +48,11 @@ class Coloured(NamedTuple):
 
 
 def coloured(
-    problems: Sequence[ArticulatedProblem], found: ArticulatedFit, settings: JudgementSettings
+    problem: ArticulatedProblem, found: ArticulatedFit, settings: JudgementSettings
 ) -> Coloured | None:
-    """What a fit leaves beyond noise in the records of any of some problems, the surest; None where it is noise."""
-    sure = [
-        one
-        for problem in problems
-        for one in _beyond(problem.settled(found.hypothesis, found.vector), found, settings)
-        if one.odds > settings.certain
-    ]
+    """What a fit leaves beyond noise in the records of a problem, the surest; None where it is noise."""
+    settled = problem.settled(found.hypothesis, found.vector)
+    sure = [one for one in _beyond(settled, found, settings) if one.odds > settings.certain]
     return max(sure, key=lambda one: one.odds, default=None)
 
 
