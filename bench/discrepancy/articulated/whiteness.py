@@ -5,8 +5,9 @@ hardly raise its mean square. So the power of the whitened innovations below a f
 noise. With m ordinates of the periodogram and their mean x, in units of what noise and the uncertainty of the parameters leave, the log
 likelihood grows by ``m (x - 1 - ln x)`` if their scale may be another: ordinates of white noise are exponential, each on its own.
 
-Asked of joints that a servo holds, whose noise is that of their encoder. Where a torque drives a joint, what smoothing loses of the others'
-motion acts on it as well: draws of the noise leave up to four times less there, on a six-axis arm without fault, than that does.
+Asked of the judging records, and of joints that a servo holds, whose noise is that of their encoder. Where a torque drives a joint, what
+smoothing loses of the others' motion acts on it as well: draws of the noise leave up to four times less there, on a six-axis arm without
+fault, than that does.
 
 References:
     M. S. Bartlett, *An Introduction to Stochastic Processes*, 1955, section 9.2 (whiteness by the cumulated periodogram);
