@@ -279,6 +279,21 @@ def test_bodies_without_a_name_go_by_what_moves_them():
     assert model.with_payload("body of elbow", 0.3).mass("body of elbow") == pytest.approx(0.8)
 
 
+def test_a_body_that_turns_about_its_own_centre_has_its_armature_once_and_its_mass_as_it_is():
+    text = (
+        '<mujoco><worldbody><body name="rotor"><joint name="axis" type="hinge" axis="0 1 0" armature="0.05"/>'
+        '<inertial pos="0 0 0" mass="2" diaginertia="0.01 0.02 0.03"/></body></worldbody></mujoco>'
+    )
+    model = ArticulatedModel.of(mujoco.MjModel.from_xml_string(text))
+    at, pushed = np.zeros((1, 1)), np.full((1, 1), 10.0)
+    assert model.dynamics(at, at, pushed).torque[0, 0] == pytest.approx(0.2)
+    assert model.joint("axis").armature == 0.05
+    moved = model.with_payload("rotor", 0.5, np.array([0.0, 0.0, 0.2])).dynamics(at, at, pushed)
+    assert moved.inertia[0, 0] == pytest.approx(0.02 + 0.5 * 0.2**2)
+    moved = model.with_centre("rotor", np.array([0.0, 0.0, 0.1])).dynamics(at, at, pushed)
+    assert moved.torque[0, 0] == pytest.approx(10.0 * (0.02 + 2.0 * 0.1**2))
+
+
 def test_the_next_test_tells_two_explanations_apart_within_what_the_arm_has_shown(tmp_path):
     folder = write_case(tmp_path, mjcf(servo=True), servo=True)
     case, compiled, _ = admitted_robot(read_case(folder))

@@ -251,6 +251,11 @@ def _bare(model: mujoco.MjModel) -> mujoco.MjModel:
     bare.dof_frictionloss[:] = 0.0
     bare.dof_armature[:] = 0.0
     bare.jnt_stiffness[:] = 0.0
+    # of a body whose inertia is diagonal in its joints MuJoCo keeps the row of the mass matrix from when it was compiled, armature
+    # included, and of one whose centre of mass is its origin that it is; here masses, centres and armatures change
+    bare.body_simple[:] = 0
+    bare.dof_simplenum[:] = 0
+    bare.body_sameframe[:] = int(mujoco.mjtSameFrame.mjSAMEFRAME_NONE)
     disabled = (
         mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
         | mujoco.mjtDisableBit.mjDSBL_ACTUATION
