@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from bench.discrepancy.articulated.free_runs import FreeRuns
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
+from bench.discrepancy.articulated_search.hypothesis import Placed
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.articulated_search.search import complete
 from bench.discrepancy.numerics.threads import in_threads
@@ -110,8 +111,9 @@ def kept(
     """How many effects of a ladder the judging records bear out, and the predictions of every rung.
 
     Effects are kept up to the last that improves on what was kept before it by more than the standard error allows for, and that takes
-    away more than it leaves. What is complete gets no more but what is certain, and nothing small is added where even then something
-    is left: it stands in for a little of the form of the law that is not right.
+    away more than it leaves; one at a joint or its drive has to improve on that joint, or it stands in for something else. What is
+    complete gets no more but what is certain, and nothing small is added where even then something is left: it stands in for a little
+    of the form of the law that is not right.
     """
     floor = noise_floor(problem, rungs[-1], settings)
     predictions = [predict(problem, rung, floor, settings) for rung in rungs]
@@ -126,9 +128,16 @@ def kept(
         gained, left = float(np.mean(difference)), float(np.mean(predictions[k].excess))
         small = 0.0 if not last or complete(problem, rungs[k], settings) else settings.small
         least = small * float(np.mean(predictions[0].excess))
-        if gained > max(settings.sure * error, left if last else 0.0, least):
+        own = _own(rungs[k].hypothesis[-1], predictions[last], predictions[k])
+        if gained > max(settings.sure * error, left if last else 0.0, least) and own > 0.0:
             last = k
     return last, predictions
+
+
+def _own(placed: Placed, before: Prediction, after: Prediction) -> float:
+    """What the joint of an effect gains by it; all joints together where it reaches them all."""
+    gained = (before.power - after.power).mean(axis=0)
+    return float(gained[placed.joint] if placed.effect.site in ("joint", "actuator") else gained.sum())
 
 
 def closed(
