@@ -24,14 +24,13 @@ from typing import Any
 import mujoco
 import numpy as np
 from mujoco import rollout
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy import diagnose, read_case
 from bench.discrepancy.application.reading import findings_of
 from bench.discrepancy.application.verification import verify
 from bench.discrepancy.verdict import Verdict
 
-Array = NDArray[np.float64]
 Change = Callable[[Any], None]
 OPEN = 0.05
 """Part of the discrepancy beyond the noise that may be left: what nominal parameters within their uncertainty change as well."""

@@ -16,7 +16,7 @@ from bench.discrepancy.judgement.coarse import Judged, judge, outside
 from bench.discrepancy.judgement.discrepancies import Discrepancies
 from bench.discrepancy.judgement.held_out import HeldOut, held_out, shares
 from bench.discrepancy.likelihood.model_error import (
-    ModelError,
+    ModelInadequacy,
     band_weights,
     crude_error,
     error_left,
@@ -141,7 +141,7 @@ def test_records_in_windows_count_as_many_samples_as_whole_ones():
             replace(p, value=0.0, std=0.0) if p.name == "stiffness" else p for p in case.parameters
         ),
     )
-    problem = problem_of(slide, ModelError({}, scale=4.0))
+    problem = problem_of(slide, ModelInadequacy({}, scale=4.0))
     assert problem.windowed
     assert problem.n_residuals == pytest.approx(80.0)
 

@@ -8,7 +8,7 @@ import pytest
 from bench.discrepancy import Case, CaseChannel, NominalParameter, diagnose, record_from_arrays
 from bench.discrepancy.effects.friction_limits import coulomb_limit
 from bench.discrepancy.simulation.prescribed_response import driven_force
-from bench.discrepancy.simulation.stick_slip import Elements, LinearStructure, free_run
+from bench.discrepancy.simulation.stick_slip import Elements, StructureMatrices, free_run
 
 RATE = 500.0
 
@@ -31,7 +31,7 @@ def test_a_schedule_scales_the_limit_of_friction_that_slides_and_sticks():
         scaled_friction(factor, 4.0, 7.0), position=velocity, velocity=velocity, step=1 / RATE, start_time=7.0
     )
     np.testing.assert_allclose(force[:, 0], 4.0 * factor * np.sign(velocity[:, 0]), atol=1e-12)
-    block = LinearStructure(*(np.array([[x]]) for x in (2.0, 0.0, 0.0, 1.0)))
+    block = StructureMatrices(*(np.array([[x]]) for x in (2.0, 0.0, 0.0, 1.0)))
     falling = 1.0 - t
     motion = free_run(block, scaled_friction(falling, 4.0), loads=np.full((n, 1), 2.0), step=1 / RATE)
     loose = t > 0.5 + 2.0 / RATE  # the limit falls below the load at half a second

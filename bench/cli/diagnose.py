@@ -15,7 +15,7 @@ from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from bench.cli.console import emit
 from bench.cli.records import pairs
-from bench.cli.verdict_text import summary
+from bench.cli.verdict_text import verdict_summary
 
 if TYPE_CHECKING:
     from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis
@@ -149,7 +149,7 @@ class Diagnose:
         if self.json == PRINTED:
             emit(document)
         else:
-            for part in summary(found.verdict, model):
+            for part in verdict_summary(found.verdict, model):
                 Console().print(part, markup=False, highlight=False)
             for path in written:
                 print(f"written: {path}")

@@ -84,5 +84,5 @@ Listed = Annotated[tuple[T, ...], Strict(False), _FirstOnly()]
 """Any number of values; a tuple in the model."""
 Table = Annotated[dict[Name, T], BeforeValidator(_few)]
 """Values by name."""
-Pair = Annotated[tuple[Number, Number], Strict(False)]
+NumberPair = Annotated[tuple[Number, Number], Strict(False)]
 """Two numbers, mostly the lowest and the highest."""

@@ -156,9 +156,24 @@ def _shown(law: ForceLaw) -> str:
     )
 
 
+def _example(law: ForceLaw) -> str:
+    """How an element of the law is made."""
+    if law.n_inputs:
+        return "# reads an actuator's force as its input: see `Element.inputs`"
+    joints = ", ".join(f'"joint_{k + 1}"' for k in range(law.n_coordinates))
+    place = '"carriage"' if law.n_coordinates == 1 else f"({joints})"
+    given = ", ".join(f"{p.name}={p.default:g}" for p in law.parameters[:2])
+    return f'element = Element.of("{law.name}", {place}, {given})'
+
+
+def _as_markdown(documentation: str) -> str:
+    """A docstring as Markdown: double backquotes and "::" are single ones and a plain colon; indented lines are code in both."""
+    text = documentation.strip().replace("``", "`").replace("::\n", ":\n")
+    return text.replace("References:\n    ", "References: ")
+
+
 def page(law: ForceLaw) -> str:
     """The page of a law as Markdown."""
-    described = describe(law)
     states = ", ".join(f"`{s}`" for s in law.states) or "none: the force depends on the present motion only"
     if len(law.states) > 3:
         states = f"`{law.states[0]}` … `{law.states[-1]}`"
@@ -170,23 +185,6 @@ def page(law: ForceLaw) -> str:
     near = ", ".join(f"[`{name}`]({name}.md)" for name in RELATIVES.get(law.name, ()))
     coordinates = f"{law.n_coordinates - law.n_inputs}" + (
         f" and {law.n_inputs} input" if law.n_inputs else ""
-    )
-    joints = ", ".join(f'"joint_{k + 1}"' for k in range(law.n_coordinates - law.n_inputs))
-    given = ", ".join(f"{p.name}={p.default:g}" for p in law.parameters[:2])
-    place = (
-        '"carriage"'
-        if law.n_coordinates == 1
-        else f"({joints},)"
-        if law.n_coordinates - law.n_inputs == 1
-        else f"({joints})"
-    )
-    # double backquotes and "::" of docstrings are Markdown's single ones and plain colon; indented lines are code in both
-    notes = (
-        described["documentation"]
-        .strip()
-        .replace("``", "`")
-        .replace("::\n", ":\n")
-        .replace("References:\n    ", "References: ")
     )
     return "\n".join(
         [
@@ -214,14 +212,12 @@ def page(law: ForceLaw) -> str:
             "```python",
             "from bench import Element",
             "",
-            f'element = Element.of("{law.name}", {place}, {given})'
-            if not law.n_inputs
-            else "# reads an actuator's force as its input: see `Element.inputs`",
+            _example(law),
             "```",
             "",
             "## Notes",
             "",
-            notes,
+            _as_markdown(describe(law)["documentation"]),
             "",
         ]
     )

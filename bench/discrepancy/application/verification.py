@@ -15,7 +15,7 @@ from bench import native
 from bench.discrepancy.application.applying import (
     INTEGRATORS,
     Findings,
-    Options,
+    RunOptions,
     apply,
     specification,
 )
@@ -173,12 +173,12 @@ def verify(
     replay = replay_of(path, case, articulated=articulated)
     nothing = Findings(())
 
-    def errors(what: Findings, options: Options) -> dict[str, NDArray[np.float64]]:
+    def errors(what: Findings, options: RunOptions) -> dict[str, NDArray[np.float64]]:
         return replay.errors(
             apply(path, what, case=case, linear=not articulated, options=options), what.effects
         )
 
-    def figures(options: Options) -> tuple[Figure, ...]:
+    def figures(options: RunOptions) -> tuple[Figure, ...]:
         before, after = errors(nothing, options), errors(findings, options)
         return tuple(
             Figure(
@@ -191,14 +191,14 @@ def verify(
     option = specification(path).option
     step, integrator = float(option.timestep), mujoco.mjtIntegrator(option.integrator)
     progress("the judging records in your simulator")
-    found = figures(Options())
+    found = figures(RunOptions())
     if not found:
         raise ModelError(
             f"the verdict judges {', '.join(g.dof or 'one coordinate' for g in gaps)}, the case something else; give the verdict's case"
         )
     out = Verification(step, INTEGRATORS[integrator], found)
-    fine = errors(nothing, Options(step / settings.converged, mujoco.mjtIntegrator.mjINT_RK4, hard=True))
-    own = root_mean_square(errors(nothing, Options())[out.worst.dof] - fine[out.worst.dof])
+    fine = errors(nothing, RunOptions(step / settings.converged, mujoco.mjtIntegrator.mjINT_RK4, hard=True))
+    own = root_mean_square(errors(nothing, RunOptions())[out.worst.dof] - fine[out.worst.dof])
     out = replace(out, own_share=own)
     if _short(found) <= settings.short:
         return out
@@ -216,7 +216,7 @@ def _short(found: Sequence[Figure]) -> float:
 
 def _remedied(
     out: Verification,
-    figures: Callable[[Options], tuple[Figure, ...]],
+    figures: Callable[[RunOptions], tuple[Figure, ...]],
     settings: VerificationSettings,
     progress: Callable[[str], None],
 ) -> Verification:
@@ -233,7 +233,7 @@ def _remedied(
     for name, step, integrator in trials:
         progress(f"with {name}")
         try:
-            tried = figures(Options(step, integrator))
+            tried = figures(RunOptions(step, integrator))
         except BenchError:
             continue
         if _short(tried) < _short(best):

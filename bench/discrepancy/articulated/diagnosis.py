@@ -11,7 +11,6 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bench.discrepancy.articulated.admission import admitted_robot
 from bench.discrepancy.articulated.judgement import kept, ladder, predict
@@ -31,8 +30,6 @@ from bench.discrepancy.verdict import (
     Verdict,
 )
 from bench.errors import UnknownNameError
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

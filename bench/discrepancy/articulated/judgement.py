@@ -11,21 +11,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.articulated.free_runs import FreeRuns
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
-from bench.discrepancy.articulated_search.hypothesis import Placed
+from bench.discrepancy.articulated_search.hypothesis import PlacedOnJoint
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.articulated_search.search import complete
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.settings import ArticulatedJudgementSettings as JudgementSettings
 
-Array = NDArray[np.float64]
-
 
 @dataclass(frozen=True, eq=False)
-class Prediction:
+class PredictedErrors:
     """Squared errors of free runs of the judging records.
 
     Attributes:
@@ -73,7 +71,7 @@ def size_of(problem: ArticulatedProblem, r: int, j: int) -> float:
 
 def predict(
     problem: ArticulatedProblem, found: ArticulatedFit | None, floor: Array, settings: JudgementSettings
-) -> Prediction:
+) -> PredictedErrors:
     """Free runs of a problem's records with a fit's model, with the nominal model as it is where None; `floor` as of `noise_floor`."""
     hypothesis = found.hypothesis if found else ()
     vector = believed(problem, found, settings) if found else np.zeros(len(problem.nominal))
@@ -92,7 +90,7 @@ def predict(
                 [float(np.mean(b**2)) for b in np.array_split(error * factor / size, settings.blocks)]
             )
         rows.append(np.array(columns).T)
-    return Prediction(np.minimum(np.vstack(rows), 1e6), floor)
+    return PredictedErrors(np.minimum(np.vstack(rows), 1e6), floor)
 
 
 def ladder(fits: Sequence[ArticulatedFit]) -> list[ArticulatedFit]:
@@ -107,7 +105,7 @@ def ladder(fits: Sequence[ArticulatedFit]) -> list[ArticulatedFit]:
 
 def kept(
     problem: ArticulatedProblem, rungs: Sequence[ArticulatedFit], settings: JudgementSettings
-) -> tuple[int, list[Prediction]]:
+) -> tuple[int, list[PredictedErrors]]:
     """How many effects of a ladder the judging records bear out, and the predictions of every rung.
 
     Effects are kept up to the last that improves on what was kept before it by more than the standard error allows for, and that takes
@@ -134,14 +132,14 @@ def kept(
     return last, predictions
 
 
-def _own(placed: Placed, before: Prediction, after: Prediction) -> float:
+def _own(placed: PlacedOnJoint, before: PredictedErrors, after: PredictedErrors) -> float:
     """What the joint of an effect gains by it; all joints together where it reaches them all."""
     gained = (before.power - after.power).mean(axis=0)
     return float(gained[placed.joint] if placed.effect.site in ("joint", "actuator") else gained.sum())
 
 
 def closed(
-    before: Prediction, after: Prediction, first: Prediction, rng: np.random.Generator
+    before: PredictedErrors, after: PredictedErrors, first: PredictedErrors, rng: np.random.Generator
 ) -> tuple[float, tuple[float, float]]:
     """Part of the first discrepancy that lies between two predictions, and its block-bootstrap interval; of the squares of NRMSE."""
     table = np.column_stack([before.excess - after.excess, first.excess])

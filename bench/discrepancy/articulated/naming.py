@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bench.discrepancy.articulated.judgement import Prediction, closed
+from bench.discrepancy.articulated.judgement import PredictedErrors, closed
 from bench.discrepancy.articulated.places import gaps_of, locations_of, remainder_of
 from bench.discrepancy.articulated.whiteness import Coloured
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
@@ -14,7 +14,7 @@ from bench.discrepancy.articulated_search.hypothesis import placed_values
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.articulated_search.search import complete
 from bench.discrepancy.settings import ArticulatedJudgementSettings as JudgementSettings
-from bench.discrepancy.verdict import Estimate, Kind, NamedEffect, NominalEstimate, Ranked, Verdict
+from bench.discrepancy.verdict import Estimate, NamedEffect, NominalEstimate, Ranked, Verdict, VerdictKind
 
 
 def verdict_of(
@@ -22,8 +22,8 @@ def verdict_of(
     fits: Sequence[ArticulatedFit],
     rungs: Sequence[ArticulatedFit],
     last: int,
-    untouched: Prediction,
-    predictions: Sequence[Prediction],
+    untouched: PredictedErrors,
+    predictions: Sequence[PredictedErrors],
     settings: JudgementSettings,
     rng: np.random.Generator,
     *,
@@ -47,7 +47,7 @@ def verdict_of(
     final, base = rungs[last], rungs[0]
     whole = stated and left is None and complete(problem, final, settings)
     explained, _ = closed(predictions[0], predictions[last], predictions[0], rng)
-    kind: Kind = "effect" if last else "none"
+    kind: VerdictKind = "effect" if last else "none"
     if not whole and (not last or explained < settings.material):
         kind = "unknown"
     shares = [closed(predictions[k - 1], predictions[k], predictions[0], rng) for k in range(1, last + 1)]
@@ -75,7 +75,9 @@ def verdict_of(
     )
 
 
-def _words(kind: Kind, effects: Sequence[NamedEffect], whole: bool, explained: float, left: str) -> str:
+def _words(
+    kind: VerdictKind, effects: Sequence[NamedEffect], whole: bool, explained: float, left: str
+) -> str:
     names = " and ".join(f"{e.name} ({e.where})" for e in effects)
     left = "" if whole else f" {left}"
     if kind == "none":
@@ -112,7 +114,7 @@ def _left(problem: ArticulatedProblem, final: ArticulatedFit, left: Coloured | N
 
 
 def _probabilities(
-    fits: Sequence[ArticulatedFit], final: ArticulatedFit, kind: Kind, settings: JudgementSettings
+    fits: Sequence[ArticulatedFit], final: ArticulatedFit, kind: VerdictKind, settings: JudgementSettings
 ) -> dict[str, float]:
     known = 1.0 - settings.outside
     if kind == "unknown":

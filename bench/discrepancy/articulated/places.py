@@ -5,22 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from bench.discrepancy.articulated.judgement import Prediction, closed
+from bench.arrays import Array
+from bench.discrepancy.articulated.judgement import PredictedErrors, closed
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.settings import ArticulatedSettings
 from bench.discrepancy.verdict import Gap, Location
 
-Array = NDArray[np.float64]
-
 
 def gaps_of(
     problem: ArticulatedProblem,
     rungs: Sequence[ArticulatedFit],
-    untouched: Prediction,
-    predictions: Sequence[Prediction],
+    untouched: PredictedErrors,
+    predictions: Sequence[PredictedErrors],
     rng: np.random.Generator,
 ) -> tuple[Gap, ...]:
     """NRMSE of the free runs of every joint, as stated, then rung by rung; arguments as of `verdict_of`."""
@@ -30,7 +28,7 @@ def gaps_of(
         run = f"free runs of {record.window * record.sample:.3g} s" if record.window else "free run"
         first, after = untouched, predictions[-1]
         floor = float(after.floor[j])
-        one = [Prediction(p.power[:, j : j + 1], p.floor[j : j + 1]) for p in (first, after)]
+        one = [PredictedErrors(p.power[:, j : j + 1], p.floor[j : j + 1]) for p in (first, after)]
         share, interval = closed(one[0], one[1], one[0], rng)
         steps = [
             ("nominal", float(first.discrepancy[j])),
@@ -100,7 +98,7 @@ def _gathered(
 
 
 def remainder_of(
-    problem: ArticulatedProblem, final: ArticulatedFit, left: Prediction, untouched: Prediction
+    problem: ArticulatedProblem, final: ArticulatedFit, left: PredictedErrors, untouched: PredictedErrors
 ) -> dict[str, object]:
     """What remains at the joint that keeps most over its noise, with its band and interval."""
     j = int(np.argmax(final.reduced))

@@ -25,6 +25,20 @@ ON_LINK = FreeParameter("encoder_on_link", fixed=True, signed=True, grid=(0.0, 1
 """Side of the encoder; tried where the channel does not state its ``"side"``."""
 RELATIVE = FreeParameter("relative_error", signed=True, mean=0.0, std=0.3, bounds=(-0.95, 20.0), unit="1")
 
+
+def _time(name: str, highest: float) -> FreeParameter:
+    """A delay or time constant [s]: ten milliseconds within a factor of seven with 95 %, up to a highest logarithm."""
+    return FreeParameter(
+        name,
+        "1",
+        mean=math.log(0.01),
+        std=1.0,
+        bounds=(-9.0, highest),
+        grid=log_grid(0.003, 0.01, 0.03),
+        unit="s",
+    )
+
+
 DRIVE_EFFECTS: tuple[ArticulatedEffect, ...] = (
     ArticulatedEffect(
         "joint_compliance",
@@ -106,17 +120,7 @@ DRIVE_EFFECTS: tuple[ArticulatedEffect, ...] = (
         "actuator_delay",
         "actuator",
         "actuator",
-        (
-            FreeParameter(
-                "delay_s",
-                "1",
-                mean=math.log(0.01),
-                std=1.0,
-                bounds=(-9.0, -1.5),
-                grid=log_grid(0.003, 0.01, 0.03),
-                unit="s",
-            ),
-        ),
+        (_time("delay_s", -1.5),),
         "input acts later by a delay",
         written(DELAY="delay_s"),
     ),
@@ -124,17 +128,7 @@ DRIVE_EFFECTS: tuple[ArticulatedEffect, ...] = (
         "actuator_lag",
         "actuator",
         "actuator",
-        (
-            FreeParameter(
-                "time_constant_s",
-                "1",
-                mean=math.log(0.01),
-                std=1.0,
-                bounds=(-9.0, -1.0),
-                grid=log_grid(0.003, 0.01, 0.03),
-                unit="s",
-            ),
-        ),
+        (_time("time_constant_s", -1.0),),
         "T u' + u = input",
         written(LAG="time_constant_s"),
     ),

@@ -16,12 +16,11 @@ from threading import Lock
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.discrepancy.articulated_search.hypothesis import Hypothesis
+from bench.arrays import Array
+from bench.discrepancy.articulated_search.hypothesis import JointHypothesis
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem, misfit_of
 from bench.discrepancy.numerics.least_squares import Prior, minimise
 from bench.discrepancy.numerics.threads import in_threads
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +36,7 @@ class ArticulatedFit:
         log_posterior: Laplace approximation of the log posterior of the hypothesis, up to a constant.
     """
 
-    hypothesis: Hypothesis
+    hypothesis: JointHypothesis
     vector: Array
     covariance: Array
     chi2: Array
@@ -45,7 +44,7 @@ class ArticulatedFit:
     log_posterior: float
 
     @classmethod
-    def at(cls, problem: ArticulatedProblem, hypothesis: Hypothesis, vector: Array) -> ArticulatedFit:
+    def at(cls, problem: ArticulatedProblem, hypothesis: JointHypothesis, vector: Array) -> ArticulatedFit:
         """A hypothesis as it stands at a vector (whose further entries are left out), not fitted and without a posterior."""
         size = problem.size(hypothesis)
         residuals = [problem.residual(j, hypothesis, vector[:size]) for j in range(len(problem.joints))]
@@ -102,7 +101,7 @@ class Others:
         return cls(base, tuple(f for f, _ in found), tuple(t for _, t in found))
 
 
-def own_entries(problem: ArticulatedProblem, hypothesis: Hypothesis, j: int) -> list[int]:
+def own_entries(problem: ArticulatedProblem, hypothesis: JointHypothesis, j: int) -> list[int]:
     """Entries of a vector that belong to joint `j` alone: its nominal parameters, and the free ones of effects there."""
     out, at = list(problem.locals(j)), len(problem.nominal)
     for placed in hypothesis:
@@ -119,7 +118,7 @@ class _Runs:
     What one joint has of its own moves no other: most columns of a Jacobian take one run.
     """
 
-    def __init__(self, problem: ArticulatedProblem, hypothesis: Hypothesis) -> None:
+    def __init__(self, problem: ArticulatedProblem, hypothesis: JointHypothesis) -> None:
         self.problem, self.hypothesis = problem, hypothesis
         self.entries = [problem.entries(j, hypothesis) for j in range(len(problem.joints))]
         self.kept: list[OrderedDict[bytes, Array]] = [OrderedDict() for _ in problem.joints]
@@ -168,7 +167,7 @@ def linearised(
 
 def fit(
     problem: ArticulatedProblem,
-    hypothesis: Hypothesis,
+    hypothesis: JointHypothesis,
     start: Array,
     *,
     scale: Array,
@@ -215,7 +214,7 @@ def fit(
 
 def refitted(
     problem: ArticulatedProblem,
-    hypothesis: Hypothesis,
+    hypothesis: JointHypothesis,
     start: Array,
     *,
     scale: Array,
@@ -250,7 +249,7 @@ def refitted(
 
 
 def free_entries(
-    problem: ArticulatedProblem, hypothesis: Hypothesis, active: Sequence[int] | None = None
+    problem: ArticulatedProblem, hypothesis: JointHypothesis, active: Sequence[int] | None = None
 ) -> NDArray[np.int64]:
     """Entries that a fit moves: all that are free, or those of the active joints and the masses."""
     out = [
@@ -268,7 +267,7 @@ def free_entries(
 
 def _summary(
     problem: ArticulatedProblem,
-    hypothesis: Hypothesis,
+    hypothesis: JointHypothesis,
     vector: Array,
     curvature: Array,
     free: NDArray[np.int64],

@@ -10,8 +10,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.articulated_search.fitting import (
     ArticulatedFit,
     Others,
@@ -20,14 +20,12 @@ from bench.discrepancy.articulated_search.fitting import (
     own_entries,
     refitted,
 )
-from bench.discrepancy.articulated_search.hypothesis import Hypothesis, Placed
+from bench.discrepancy.articulated_search.hypothesis import JointHypothesis, PlacedOnJoint
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.articulated_search.screening import Screened, by_effect, screen
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.settings import ArticulatedJudgementSettings as JudgementSettings
 from bench.discrepancy.settings import ArticulatedSearchSettings as SearchSettings
-
-Array = NDArray[np.float64]
 
 
 def complete(problem: ArticulatedProblem, found: ArticulatedFit, settings: JudgementSettings) -> bool:
@@ -58,7 +56,7 @@ def nominal_fit(problem: ArticulatedProblem) -> ArticulatedFit:
 
 def search(
     problem: ArticulatedProblem,
-    candidates: Sequence[Placed],
+    candidates: Sequence[PlacedOnJoint],
     *,
     settings: SearchSettings | None = None,
     progress: Callable[[str], None] = lambda text: None,
@@ -141,7 +139,7 @@ def _predecessors(
 def _round(
     problem: ArticulatedProblem,
     base: ArticulatedFit,
-    candidates: Sequence[Placed],
+    candidates: Sequence[PlacedOnJoint],
     settings: SearchSettings,
     progress: Callable[[str], None],
 ) -> tuple[ArticulatedFit | None, list[ArticulatedFit]]:
@@ -288,7 +286,7 @@ def _fits(
             if not instead or swapped == settings.fitted:
                 continue
             swapped += 1
-        hypothesis: Hypothesis = (*base.hypothesis, mine[0].placed)
+        hypothesis: JointHypothesis = (*base.hypothesis, mine[0].placed)
         # nominal parameters that stood in for what was missing are also tried where they were stated, and fitted from there:
         # a start of less misfit need not be the nearer one
         untouched = np.concatenate([np.zeros(len(problem.nominal)), base.vector[len(problem.nominal) :]])

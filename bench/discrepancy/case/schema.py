@@ -83,7 +83,7 @@ def _known_unit(unit: str) -> str:
     return unit
 
 
-RigName = Annotated[
+CaseRigName = Annotated[
     Name,
     BeforeValidator(_known_rig),
     Field(json_schema_extra={"anyOf": [{"enum": list(PARAMETERS)}, {"pattern": r"\.xml$"}]}),
@@ -174,7 +174,7 @@ class NominalDocument(Document):
     """The nominal model of a case, and its channels."""
 
     entry_name = "a nominal model"
-    rig: RigName
+    rig: CaseRigName
     """A rig of the bench (sdof, damper, joint), or the path of an MJCF file in the same folder."""
     parameters: Table[ParameterEntry]
     """Nominal parameters by name; of an MJCF as "stiffness:JOINT", "mass:BODY", …"""

@@ -147,8 +147,10 @@ def _finalists(
     ranked = sorted((bounded(e, settings.within) for e in with_effects), key=lambda e: -e.log_posterior)
     near = [e for e in ranked if e.log_posterior > ranked[0].log_posterior - settings.reach]
     found = [held_out(e) for e in [*near[: settings.finalists], nothing]]
-    tolls = np.array([_log_prior(entry.explanation) for entry in found])
-    best = found[int(np.argmin([entry.total - 2.0 * toll for entry, toll in zip(found, tolls, strict=True)]))]
+    priors = np.array([_log_prior(entry.explanation) for entry in found])
+    best = found[
+        int(np.argmin([entry.total - 2.0 * prior for entry, prior in zip(found, priors, strict=True)]))
+    ]
     base = _pruned(best, found, known, settings)
     # what is larger than what is material has been weighed already
     return [base, *(e for e in found if e is not base and _no_larger(e.explanation, base.explanation))]

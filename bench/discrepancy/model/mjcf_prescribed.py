@@ -18,9 +18,9 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from bench import native
+from bench.arrays import Array
 from bench.discrepancy.case.case import Case, CaseChannel
 from bench.discrepancy.model.structure import Structure
 from bench.discrepancy.motion.observer import ACCELERATION, ORDERS, Observer
@@ -30,7 +30,6 @@ from bench.rig import Rig
 from bench.rig.building import parse
 from bench.rig.held_joints import MOTION
 
-Array = NDArray[np.float64]
 SCALAR = (int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE))
 AXES = ("_x", "_y", "_z")
 

@@ -15,28 +15,27 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
-from bench.discrepancy.multibody.drives import Drive, drive_of, is_driven
+from bench.arrays import Array
+from bench.discrepancy.multibody.drives import JointDrive, drive_of, is_driven
 from bench.discrepancy.multibody.inverse import along
 from bench.errors import ModelError, UnknownNameError
 from bench.rig import Rig
 from bench.rig.held_joints import MOTION
 
-Array = NDArray[np.float64]
 MOVING = {int(mujoco.mjtJoint.mjJNT_HINGE): "rad", int(mujoco.mjtJoint.mjJNT_SLIDE): "m"}
 """Types of joint that a model may have, with the unit of their coordinate."""
 
 
 @dataclass(frozen=True)
-class ModelSettings:
+class MultibodySettings:
     """Numbers of `bench.discrepancy.multibody.model`."""
 
     difference: float = 1e-6
     """Step of central differences of the inverse dynamics [rad or m], a cube root of rounding."""
 
 
-SETTINGS = ModelSettings()
+SETTINGS = MultibodySettings()
 
 
 class Joint(NamedTuple):
@@ -62,7 +61,7 @@ class Joint(NamedTuple):
     stiffness: float
     reference: float
     range: tuple[float, float]
-    drive: Drive | None
+    drive: JointDrive | None
 
 
 class Dynamics(NamedTuple):

@@ -25,7 +25,7 @@ from bench.discrepancy.precheck.samples import sample_doubts
 from bench.discrepancy.precheck.settings import CheckSettings
 from bench.errors import BenchError
 
-Word = Literal["ready", "doubtful", "unusable"]
+Readiness = Literal["ready", "doubtful", "unusable"]
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Checked:
         seconds: Time it took [s].
     """
 
-    word: Word
+    word: Readiness
     doubts: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     parameters: tuple[Told, ...] = ()

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from bench.discrepancy.checks.channel_comparison import compare
+from bench.discrepancy.checks.channel_comparison import compare_channels
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.precheck.settings import CheckSettings
 
@@ -25,7 +25,7 @@ def motion_doubts(problem: Problem, settings: CheckSettings) -> Iterator[str]:
             if first.order == second.order or not np.array_equal(np.abs(first.row), np.abs(second.row)):
                 continue
             for record in problem.records:
-                pair = compare(
+                pair = compare_channels(
                     record.values[first.channel],
                     record.values[second.channel],
                     orders=(first.order, second.order),

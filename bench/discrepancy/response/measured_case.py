@@ -8,8 +8,8 @@ from __future__ import annotations
 from dataclasses import KW_ONLY, dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.case.channel_noise import noise_floor, raised_noise
 from bench.discrepancy.effects.effect import Scales
@@ -22,8 +22,6 @@ from bench.discrepancy.response.windows import channels_of, drifts
 from bench.discrepancy.settings import DEFAULT, DiagnosisSettings
 from bench.discrepancy.simulation.step_size import speeds
 from bench.discrepancy.simulation.stick_slip import Motion
-
-Array = NDArray[np.float64]
 
 
 @dataclass

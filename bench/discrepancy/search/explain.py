@@ -17,7 +17,7 @@ from bench.discrepancy.case.case import Case
 from bench.discrepancy.effects.effect import Effect
 from bench.discrepancy.fitting.goodness_of_fit import consistent, key_of, names, near
 from bench.discrepancy.fitting.map_fit import Fit
-from bench.discrepancy.likelihood.model_error import ModelError
+from bench.discrepancy.likelihood.model_error import ModelInadequacy
 from bench.discrepancy.likelihood.problem import Problem, band_bins
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.model.placements import placements
@@ -41,7 +41,7 @@ def explain(
     *,
     most: int = 3,
     progress: Callable[[str], None] = lambda text: None,
-    error: ModelError | None = None,
+    error: ModelInadequacy | None = None,
     deadline: Deadline = NEVER,
     seeds: Sequence[Explanation] = (),
     settings: DiagnosisSettings,
@@ -87,7 +87,7 @@ def _in_groups(
     *,
     most: int,
     progress: Callable[[str], None],
-    error: ModelError | None,
+    error: ModelInadequacy | None,
     deadline: Deadline,
     settings: DiagnosisSettings,
 ) -> list[Explanation]:

@@ -1,4 +1,4 @@
-"""Attribution: which effects, out of the catalogue, explain the records.
+"""Forward selection: which effects, out of the catalogue, explain the records.
 
 Screening proposes, output-error fits decide, and hypotheses are compared by their evidence. Effects are added one at
 a time as long as the residuals do not look like noise: to the best few hypotheses so far and to those that promise most together
@@ -217,7 +217,7 @@ def _promising(screen: Screen, best: Fit) -> bool:
 
 
 def prepare(problem: Problem, candidates: Sequence[Placed]) -> Prepared:
-    """Fit the nominal model and screen the catalogue: the cheap part of an attribution.
+    """Fit the nominal model and screen the catalogue: the cheap part of a search.
 
     Args:
         problem: Records and priors.

@@ -19,8 +19,8 @@ from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.case.case import Case, CaseChannel, CaseRecord
 from bench.discrepancy.case.schema import RIGS
 from bench.discrepancy.effects.catalogue import effect_named
@@ -41,7 +41,6 @@ from bench.discrepancy.response.simulator import Simulator
 from bench.discrepancy.search.fits import Search, Task, converge
 from bench.discrepancy.search.soft_friction import IDEAL, RUBBING, frictional, nominal_level
 
-Array = NDArray[np.float64]
 LOADS = ("force", "torque")
 """Load channels of the bench's own rigs."""
 
