@@ -80,7 +80,7 @@ def left_out(
 
 def _balance(case: Case, model: ArticulatedModel, record: CaseRecord, motion: JointMotion) -> Array:
     """Torque asked for less torque of the drive (n, n_joints), by the equations of the joints."""
-    out = np.empty_like(motion.position)
+    out = np.empty((len(motion.position), len(model.joints)))
     for j, joint in enumerate(model.joints):
         drive = joint.drive
         assert drive is not None
@@ -106,13 +106,14 @@ def _balance_of_mujoco(
     inputs = {joint.name: record.values[input_of(case, joint).name] for joint in model.joints}
     with native.quiet():
         for k, sample in enumerate(picked):
-            for j, joint in enumerate(model.joints):
-                assert joint.drive is not None
+            for j, joint in enumerate(model.moving):
                 data.qpos[joint.dof], data.qvel[joint.dof] = (
                     motion.position[sample, j],
                     motion.velocity[sample, j],
                 )
                 data.qacc[joint.dof] = motion.acceleration[sample, j]
+            for joint in model.joints:
+                assert joint.drive is not None
                 data.ctrl[compiled.actuator(joint.drive.name).id] = inputs[joint.name][sample]
             mujoco.mj_inverse(compiled, data)
             asked = np.array(data.qfrc_inverse)

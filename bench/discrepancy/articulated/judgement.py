@@ -15,7 +15,9 @@ import numpy as np
 from bench.arrays import Array
 from bench.discrepancy.articulated.free_runs import FreeRuns
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
+from bench.discrepancy.articulated_search.hypothesis import PlacedOnJoint
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
+from bench.discrepancy.articulated_search.search import complete
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.settings import ArticulatedJudgementSettings as JudgementSettings
 
@@ -107,8 +109,9 @@ def kept(
     """How many effects of a ladder the judging records bear out, and the predictions of every rung.
 
     Effects are kept up to the last that improves on what was kept before it by more than the standard error allows for, and that takes
-    away more than it leaves. What is complete gets no more but what is certain, and nothing small is added where even then something
-    is left: it stands in for a little of the form of the law that is not right.
+    away more than it leaves; one at a joint or its drive has to improve on that joint, or it stands in for something else. What is
+    complete gets no more but what is certain, and nothing small is added where even then something is left: it stands in for a little
+    of the form of the law that is not right.
     """
     floor = noise_floor(problem, rungs[-1], settings)
     predictions = [predict(problem, rung, floor, settings) for rung in rungs]
@@ -122,7 +125,9 @@ def kept(
         left = float(np.mean(predictions[k].excess))
         small = 0.0 if not last or complete(problem, rungs[k], settings) else settings.small
         least = small * float(np.mean(predictions[0].excess))
-        if gained > max(left if last else 0.0, least) and better(predictions[last], predictions[k], settings):
+        own = _own(rungs[k].hypothesis[-1], predictions[last], predictions[k])
+        improved = own > 0.0 and better(predictions[last], predictions[k], settings)
+        if gained > max(left if last else 0.0, least) and improved:
             last = k
     return last, predictions
 
@@ -144,12 +149,10 @@ def _sure(gains: Array, settings: JudgementSettings) -> bool:
     return float(np.mean(gains)) > settings.sure * float(np.std(gains, ddof=1)) / np.sqrt(len(gains))
 
 
-def complete(problem: ArticulatedProblem, found: ArticulatedFit, settings: JudgementSettings) -> bool:
-    """Whether no joint keeps more than the noise, and no nominal parameter is strained for it."""
-    # the mean square of n residuals is known to sqrt(2 / n)
-    noise = (1.0 + settings.noise_known) ** 2 + settings.sure * np.sqrt(2.0 / found.count)
-    far = np.abs(found.vector[: len(problem.nominal)]) > settings.strained
-    return bool(np.all(found.reduced <= noise) and not far.any())
+def _own(placed: PlacedOnJoint, before: PredictedErrors, after: PredictedErrors) -> float:
+    """What the joint of an effect gains by it; all joints together where it reaches them all."""
+    gained = (before.power - after.power).mean(axis=0)
+    return float(gained[placed.joint] if placed.effect.site in ("joint", "actuator") else gained.sum())
 
 
 def closed(

@@ -64,7 +64,7 @@ class JointProposal(NamedTuple):
 def propose(
     problem: ArticulatedProblem, compiled: mujoco.MjModel, first: ArticulatedFit, second: ArticulatedFit
 ) -> JointProposal | None:
-    """The trajectories on which two explanations differ most; None where none is within the limits.
+    """The trajectories on which two explanations differ most; None where none is within the limits, or a joint is only followed.
 
     Args:
         problem: The records for identification.
@@ -74,6 +74,8 @@ def propose(
     """
     settings = problem.settings.articulated.next_test
     found: list[tuple[float, Trajectory, CaseRecord]] = []
+    if problem.model.followed:  # nobody can say how it would move
+        return None
     for trajectory in _candidates(problem, first, second, settings):
         record = _record(problem, trajectory)
         if not _within_limits(problem, record) or _collides(compiled, problem, trajectory):

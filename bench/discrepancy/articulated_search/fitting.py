@@ -8,8 +8,10 @@ else is missing.
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass
+from threading import Lock
 
 import numpy as np
 from numpy.typing import NDArray
@@ -110,6 +112,33 @@ def own_entries(problem: ArticulatedProblem, hypothesis: JointHypothesis, j: int
     return out
 
 
+class _Runs:
+    """Residuals of joints at vectors of a hypothesis, the last few of every joint kept.
+
+    What one joint has of its own moves no other: most columns of a Jacobian take one run.
+    """
+
+    def __init__(self, problem: ArticulatedProblem, hypothesis: JointHypothesis) -> None:
+        self.problem, self.hypothesis = problem, hypothesis
+        self.entries = [problem.entries(j, hypothesis) for j in range(len(problem.joints))]
+        self.kept: list[OrderedDict[bytes, Array]] = [OrderedDict() for _ in problem.joints]
+        self.lock = Lock()
+
+    def residual(self, j: int, vector: Array) -> Array:
+        """Residual of joint `j`, not to be written to."""
+        key, kept = vector[self.entries[j]].tobytes(), self.kept[j]
+        with self.lock:
+            if key in kept:
+                kept.move_to_end(key)
+                return kept[key]
+        new = self.problem.residual(j, self.hypothesis, vector)
+        with self.lock:
+            kept[key] = new
+            if len(kept) > self.problem.settings.articulated.kept_runs:
+                kept.popitem(last=False)
+        return new
+
+
 def linearised(
     problem: ArticulatedProblem, base: ArticulatedFit, j: int, columns: Sequence[int]
 ) -> tuple[Array, Array]:
@@ -117,8 +146,11 @@ def linearised(
     settings = problem.settings.articulated
     _, std, _, high = problem.prior(base.hypothesis)
     residual = problem.residual(j, base.hypothesis, base.vector) / base.scale[j]
+    felt = set(problem.entries(j, base.hypothesis).tolist())
 
     def column(i: int) -> Array:
+        if i not in felt:
+            return np.zeros_like(residual)
         step = (
             settings.difference * std[i]
             if base.vector[i] + settings.difference * std[i] <= high[i]
@@ -162,8 +194,10 @@ def fit(
     passive = [j for j in range(n_joints) if j not in active]
     masses = list(problem.masses)
 
+    runs = _Runs(problem, hypothesis)
+
     def residual_at(vector: Array) -> Array:
-        parts = in_threads(lambda j: problem.residual(j, hypothesis, vector) / scale[j], active)
+        parts = in_threads(lambda j: runs.residual(j, vector) / scale[j], active)
         for j in passive:
             assert others is not None
             parts.append(others.factors[j] @ vector[masses] - others.targets[j])

@@ -16,6 +16,7 @@ from functools import cached_property
 from threading import Lock
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bench.arrays import Array
 from bench.discrepancy.articulated_search.effect import ArticulatedEffect, JointScales
@@ -109,6 +110,15 @@ class ArticulatedProblem:
             site = placed.effect.site
             out |= {placed.joint} if site in ("joint", "actuator") else set(range(len(self.joints)))
         return tuple(sorted(out))
+
+    def entries(self, j: int, hypothesis: JointHypothesis) -> NDArray[np.int64]:
+        """Entries of the vector of a hypothesis on which the runs of joint `j` depend."""
+        out, at = [*self.masses, *self.locals(j)], len(self.nominal)
+        for placed in hypothesis:
+            stop = at + len(placed.effect.parameters)
+            out += range(at, stop) if j in self.reached((placed,)) else ()
+            at = stop
+        return np.array(out, dtype=np.int64)
 
     def motions(self, hypothesis: JointHypothesis, vector: Array) -> tuple[PreparedRecord, ...]:
         """The records, their encoders corrected as a hypothesis has it."""
@@ -234,21 +244,21 @@ class ArticulatedProblem:
             bias, inertia = bias + change[0], inertia + change[1]
         return bias, np.maximum(inertia, 1e-3 * record.inertia)
 
-    def residual(self, j: int, hypothesis: JointHypothesis, vector: Array) -> Array:
-        """Whitened, weighted innovations of joint `j` over all records; their sum of squares is about `count` where nothing is missing."""
-        settings = self.settings.articulated
+    def residuals(self, j: int, hypothesis: JointHypothesis, vector: Array) -> list[Array]:
+        """Whitened, weighted innovations (n, n_measured) of joint `j` in every record."""
+        most = self.settings.articulated.diverged
         out = []
         for original, prepared in zip(self.records, self.motions(hypothesis, vector), strict=True):
             innovation, _ = self.innovations(j, hypothesis, vector, prepared)
             # a corrected log has another noise; residuals are compared in units of what was logged
             innovation = innovation * (original.joints[j].noise / prepared.joints[j].noise)
             whitened = innovation @ original.joints[j].whitening.T * original.joints[j].weight
-            out.append(
-                np.nan_to_num(
-                    whitened, nan=settings.diverged, posinf=settings.diverged, neginf=-settings.diverged
-                ).ravel()
-            )
-        return np.concatenate(out)
+            out.append(np.nan_to_num(whitened, nan=most, posinf=most, neginf=-most))
+        return out
+
+    def residual(self, j: int, hypothesis: JointHypothesis, vector: Array) -> Array:
+        """Those of all records in one (n,); their sum of squares is about `count` where nothing is missing."""
+        return np.concatenate([r.ravel() for r in self.residuals(j, hypothesis, vector)])
 
     @cached_property
     def count(self) -> Array:

@@ -194,8 +194,9 @@ class NominalDocument(Document):
     """Laws of the bench that the model holds besides, see `case.elements`."""
     limits: Table[Positive] = Field(default_factory=dict)
     """Largest magnitude of a channel that the next test may reach; those of the records by default."""
-    joints: Table[Literal["hold"] | Number] = Field(default_factory=dict)
-    """Joints of an MJCF that were held: "hold" where its own zero was, or the coordinate at which they were."""
+    joints: Table[Literal["hold", "follow"] | Number] = Field(default_factory=dict)
+    """Joints of an MJCF that were held: "hold" where its own zero was, or the coordinate at which they were. One that is measured and
+    has no drive that was recorded: "follow", and it moves as it was measured."""
     window_s: Positive | None = None
     """Length of the windows that records of a rig that nothing holds are cut into [s]."""
 

@@ -28,9 +28,8 @@ from bench.discrepancy.settings import ModelSettings
 from bench.errors import FileFormatError, UnknownNameError
 from bench.rig import Rig
 from bench.rig.building import parse
+from bench.rig.held_joints import MOTION
 
-MOTION = "motion of "
-"""Beginning of the names of the actuators that stand for what prescribes a motion; the joint's name follows."""
 SCALAR = (int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE))
 AXES = ("_x", "_y", "_z")
 

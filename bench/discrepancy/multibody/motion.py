@@ -17,7 +17,7 @@ from bench.discrepancy.settings import ArticulatedSettings, MotionSettings
 
 
 class JointMotion(NamedTuple):
-    """Measured motion of all joints, smoothed: positions, velocities, accelerations (n, n_joints) and the smoothers behind them."""
+    """Measured motion of all joints, smoothed: positions, velocities, accelerations (n, n_moving) and the smoothers behind them."""
 
     position: Array
     velocity: Array
@@ -41,9 +41,9 @@ def motion_of(
     A delay shifts the smoothed motion. The samples keep theirs: interpolated, they would have less noise than was logged.
     """
     clock = np.arange(len(record)) * record.step
-    out = np.zeros((3, len(record), len(model.joints)))
+    out = np.zeros((3, len(record), len(model.moving)))
     samples, smoothers, noises = [], [], []
-    for j, joint in enumerate(model.joints):
+    for j, joint in enumerate(model.moving):
         measured = encoders_of(case, joint)
         wrong = encoders.get(joint.name, TRUE)
         raw = np.column_stack([record.values[c.name] for c in measured.channels])
