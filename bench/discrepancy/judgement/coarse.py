@@ -142,9 +142,8 @@ def _finalists(
 ) -> list[HeldOut]:
     """What is near the likeliest on held-out blocks, the best first, without effects that close nothing material; the nominal model
     alone among them."""
-    nothing = bounded(nominal_alone(explanations), settings.within)
-    with_effects = [e for e in explanations if e.hypothesis][: 2 * settings.finalists]
-    ranked = sorted((bounded(e, settings.within) for e in with_effects), key=lambda e: -e.log_posterior)
+    nothing = nominal_alone(explanations)
+    ranked = sorted((e for e in explanations if e.hypothesis), key=lambda e: -e.log_posterior)
     near = [e for e in ranked if e.log_posterior > ranked[0].log_posterior - settings.reach]
     found = [held_out(e) for e in [*near[: settings.finalists], nothing]]
     tolls = np.array([_log_prior(entry.explanation) for entry in found])
@@ -174,28 +173,6 @@ def _steady(entry: HeldOut, case: Case, rng: np.random.Generator) -> HeldOut:
         return entry
     moved = steadied(entry.explanation, case.validation, rng)
     return entry if moved is None else replace(entry, explanation=moved)
-
-
-def bounded(explanation: Explanation, within: float) -> Explanation:
-    """An explanation whose nominal parameters stay within so many stated standard deviations, fitted again where they do not."""
-    parts = []
-    for problem, fitted in explanation.parts:
-        if np.any(np.abs(fitted.vector[: problem.n_physical]) > within):
-            narrow = problem.bounded(within)
-            parts.append(
-                (
-                    narrow,
-                    fit(
-                        narrow,
-                        fitted.hypothesis,
-                        start=fitted.vector,
-                        iterations=explanation.settings.search.thorough,
-                    ),
-                )
-            )
-        else:
-            parts.append((problem, fitted))
-    return Explanation(tuple(parts))
 
 
 def _log_priors(found: Sequence[HeldOut]) -> Array:

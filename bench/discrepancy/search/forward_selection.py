@@ -33,6 +33,7 @@ from bench.discrepancy.search.rivals import challenge, reduce_best, simplify
 from bench.discrepancy.search.scheduled import with_schedules
 from bench.discrepancy.search.soft_friction import soften, stand_in
 from bench.discrepancy.search.timed_force import with_timed_force
+from bench.discrepancy.settings import SearchSettings
 
 Prepared = tuple[Search, Screen, list[Point]]
 """A search before its first step: the nominal model fitted, the catalogue screened, its grid points by decreasing gain."""
@@ -87,7 +88,9 @@ def attribute(
     best = search.ranked()[0]
     if not problem.scaled:
         simplify(search, candidates)
-    elif (
+    elif _large(best, problem):
+        simplify(search, [placed for placed in candidates if _plain(placed, settings)])
+    if problem.scaled and (
         near(best)
         and _worth_challenging(best, problem)
         and deadline.allows("rivals of what was found, from further starts")
@@ -190,19 +193,22 @@ def _plain_bases(search: Search, best: Fit) -> list[Fit]:
     backlash without play, say, whose asymmetry is that of friction beside a constant force.
     """
     settings = search.problem.settings.search
-    largest = 2.0 * settings.plain.parameters + 2.0 * abs(settings.log_prior_effect)
-    if (
-        search.problem.error is None
-        or len(best.hypothesis) != 1
-        or complexity(best.hypothesis, settings=search.problem.settings.search) <= largest
-    ):
+    if not _large(best, search.problem):
         return []
-    plain = [f for f in search.ranked(1) if _free(f) <= settings.plain.parameters and np.isfinite(f.cost)]
+    plain = [f for f in search.ranked(1) if _plain(f.hypothesis[0], settings) and np.isfinite(f.cost)]
     return plain[: settings.plain.bases]
 
 
-def _free(fitted: Fit) -> int:
-    return sum(not p.fixed for placed in fitted.hypothesis for p in placed.effect.parameters)
+def _large(best: Fit, problem: Problem) -> bool:
+    """Whether a single effect, where the error of the model weighs, takes more to be described than two plain ones."""
+    settings = problem.settings.search
+    largest = 2.0 * settings.plain.parameters + 2.0 * abs(settings.log_prior_effect)
+    alone = problem.error is not None and len(best.hypothesis) == 1
+    return alone and complexity(best.hypothesis, settings=settings) > largest
+
+
+def _plain(placed: Placed, settings: SearchSettings) -> bool:
+    return sum(not p.fixed for p in placed.effect.parameters) <= settings.plain.parameters
 
 
 def _promising(screen: Screen, best: Fit) -> bool:
