@@ -141,16 +141,33 @@ def _finalists(
     explanations: Sequence[Explanation], known: Discrepancies, settings: CoarseSettings
 ) -> list[HeldOut]:
     """What is near the likeliest on held-out blocks, the best first, without effects that close nothing material; the nominal model
-    alone among them."""
-    nothing = nominal_alone(explanations)
-    ranked = sorted((e for e in explanations if e.hypothesis), key=lambda e: -e.log_posterior)
-    near = [e for e in ranked if e.log_posterior > ranked[0].log_posterior - settings.reach]
-    found = [held_out(e) for e in [*near[: settings.finalists], nothing]]
-    tolls = np.array([_log_prior(entry.explanation) for entry in found])
-    best = found[int(np.argmin([entry.total - 2.0 * toll for entry, toll in zip(found, tolls, strict=True)]))]
-    base = _pruned(best, found, known, settings)
+    alone among them.
+
+    What loses an effect for that makes room for others: they are near what is left of it.
+    """
+    nothing = held_out(nominal_alone(explanations))
+    pool = [e for e in explanations if e.hypothesis]
+    kept: dict[Explanation, HeldOut] = {}
+    struck: list[HeldOut] = []
+    while True:
+        pool.sort(key=lambda e: -e.log_posterior)
+        near = [e for e in pool if e.log_posterior > pool[0].log_posterior - settings.reach]
+        kept.update((e, held_out(e)) for e in near[: settings.finalists] if e not in kept)
+        found = [*(kept[e] for e in near[: settings.finalists]), nothing]
+        best = min(found, key=_score)
+        base = _pruned(best, [*found, *kept.values()], known, settings)
+        if base is best or not pool or len(struck) == settings.finalists:
+            break
+        struck.append(base)
+        pool = [e for e in pool if kept.get(e) is not best]
+    base = min([base, *struck], key=_score)
     # what is larger than what is material has been weighed already
     return [base, *(e for e in found if e is not base and _no_larger(e.explanation, base.explanation))]
+
+
+def _score(entry: HeldOut) -> float:
+    """What an explanation leaves on held-out blocks, its description paid."""
+    return entry.total - 2.0 * _log_prior(entry.explanation)
 
 
 def _with(entry: HeldOut, own: HeldOut, found: Sequence[HeldOut]) -> list[HeldOut]:

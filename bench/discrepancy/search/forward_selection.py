@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from bench.discrepancy.effects.read_off import TIMED
+from bench.discrepancy.effects.read_off import DIFFERS, TIMED
 from bench.discrepancy.fitting.goodness_of_fit import complexity, consistent, names, near
 from bench.discrepancy.fitting.map_fit import Fit, fit
 from bench.discrepancy.likelihood.problem import Problem
@@ -29,6 +29,7 @@ from bench.discrepancy.screening.score_test import lack_of_fit
 from bench.discrepancy.screening.screen import Screen
 from bench.discrepancy.search.extension import contacts, extend
 from bench.discrepancy.search.fits import Search, integrate_finer, multistart
+from bench.discrepancy.search.friction_by_record import with_friction_by_record
 from bench.discrepancy.search.rivals import challenge, reduce_best, simplify
 from bench.discrepancy.search.scheduled import with_schedules
 from bench.discrepancy.search.soft_friction import soften, stand_in
@@ -84,6 +85,8 @@ def attribute(
             break
         extend(search, screen, bases, count=4 if consistent(best) else 6 - size)
         soften(search, size + 1)
+        if any(p.effect.name == DIFFERS for p in candidates) and not consistent(search.ranked()[0]):
+            with_friction_by_record(search, search.ranked(size)[: settings.scheduled])
         reduce_best(search)
     best = search.ranked()[0]
     if not problem.scaled:
