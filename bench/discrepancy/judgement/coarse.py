@@ -37,7 +37,8 @@ class Judged:
         within: Those within one standard error of the best.
         alike: Those that the blocks do not tell from the chosen one: two standard errors; and those that the judging records prefer.
         vetoed: Whether the judging records refused what the others would have named.
-        nominal: Largest judged discrepancy of the nominal model, its parameters re-estimated within their uncertainty.
+        calibrated: Whether no noise is stated, and the nominal model, its parameters re-estimated, leaves no more of the judging records
+            than two standard deviations of what sensors are calibrated to.
         left: Part of the power of the judged discrepancy, beyond noise, that the chosen one leaves.
     """
 
@@ -47,7 +48,7 @@ class Judged:
     within: tuple[HeldOut, ...]
     alike: tuple[HeldOut, ...]
     vetoed: bool
-    nominal: float
+    calibrated: bool
     left: float
     settings: CoarseSettings
 
@@ -122,16 +123,27 @@ def judge(
             )
             break
         vetoed = True
+    least = problem.settings.likelihood.error.least
+    calibrated = not problem.noise_stated and bool(
+        np.max(known.of(nothing.explanation, judging=True)) <= 2.0 * least
+    )
+    if (
+        calibrated and nothing in alike
+    ):  # as small as what sensors may be off by: it takes more than a standard error
+        chosen = nothing
     weights = shares(found, _log_priors(found), rng, judgement.held_out.draws)
-    preferred = [other for other in found if known.prefers(other.explanation, chosen.explanation)]
+    if chosen.explanation.hypothesis:
+        weights = _undecided(weights, found, chosen, known)
+    elif calibrated:
+        weights = _at_least_half(weights, found.index(nothing))
     return Judged(
         chosen,
         tuple(found),
-        _undecided(weights, found, [chosen, *preferred]) if chosen.explanation.hypothesis else weights,
+        weights,
         within,
         alike,
         vetoed,
-        float(np.max(known.of(nothing.explanation, judging=True))),
+        calibrated,
         known.left(chosen.explanation, nothing.explanation),
         settings,
     )
@@ -177,11 +189,28 @@ def _with(entry: HeldOut, own: HeldOut, found: Sequence[HeldOut]) -> list[HeldOu
     return [entry if other is own else other for other in found]
 
 
-def _undecided(weights: Array, found: Sequence[HeldOut], among: Sequence[HeldOut]) -> Array:
-    """Weights (n,) of which some explanations have equal parts: the records for finding speak for one of them, those for judging for
-    others, and neither is to be believed more."""
-    own = np.array([entry in among for entry in found])
-    return np.where(own, float(weights[own].mean()), weights)
+def _undecided(weights: Array, found: Sequence[HeldOut], chosen: HeldOut, known: Discrepancies) -> Array:
+    """Weights (n,) of which the chosen explanation and some others have equal parts: the records for finding speak for one of them, those
+    for judging for another, and neither is to be believed more."""
+    own = float(weights[found.index(chosen)])
+    among = np.array(
+        [
+            entry is chosen
+            or known.prefers(entry.explanation, chosen.explanation)
+            or (weight > own and known.prefers(chosen.explanation, entry.explanation))
+            for weight, entry in zip(weights, found, strict=True)
+        ]
+    )
+    return np.where(among, float(weights[among].mean()), weights)
+
+
+def _at_least_half(weights: Array, i: int) -> Array:
+    """Weights (n,) of which entry `i` has no less than all others together."""
+    own = max(float(weights[i]), 0.5)
+    others = np.where(np.arange(len(weights)) == i, 0.0, weights)
+    out = others * (1.0 - own) / max(float(others.sum()), 1e-300)
+    out[i] = own
+    return out
 
 
 def _steady(entry: HeldOut, case: Case, rng: np.random.Generator) -> HeldOut:
@@ -211,9 +240,11 @@ def _as_good(entry: HeldOut, best: HeldOut, settings: CoarseSettings, errors: fl
     return entry is best or worse <= max(errors * error, settings.telling)
 
 
-def _plainness(entry: HeldOut) -> tuple[float, float]:
-    """What comes first is simpler: fewer parameters, fewer and commoner effects; and then what predicts better."""
-    return (complexity(entry.explanation.hypothesis, settings=entry.explanation.settings.search), entry.total)
+def _plainness(entry: HeldOut) -> tuple[float, float, float]:
+    """What comes first is simpler: fewer parameters, fewer and commoner effects; as simple, commoner; and then what predicts better."""
+    hypothesis, settings = entry.explanation.hypothesis, entry.explanation.settings.search
+    plain, common = complexity(hypothesis, settings=settings), log_prior_of(hypothesis, settings=settings)
+    return round(plain, 6), -common, entry.total
 
 
 def _no_larger(explanation: Explanation, other: Explanation) -> bool:

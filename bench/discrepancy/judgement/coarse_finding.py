@@ -119,10 +119,9 @@ def _kind(problem: Problem, judged: Judged) -> Kind:
     if judged.chosen.explanation.hypothesis:
         # that which rivals of other families explain as well is something, and nobody can say what kind of thing
         return "effect" if judged.agreed >= judged.settings.kind else "unknown"
-    # without stated noise a nominal model is as right as a model can be within two standard deviations of what sensors are
-    # calibrated to; noise that is stated and is not all that is left is something that is missing, whatever it be
-    material = judged.nominal > 2.0 * problem.settings.likelihood.error.least
-    return "unknown" if problem.noise_stated or (judged.vetoed and material) else "none"
+    # without stated noise a nominal model is as right as a model can be within what sensors are calibrated to; noise that is stated and
+    # is not all that is left is something that is missing, whatever it be
+    return "unknown" if problem.noise_stated or (judged.vetoed and not judged.calibrated) else "none"
 
 
 def _probabilities(kind: Kind, judged: Judged) -> dict[str, float]:
@@ -215,6 +214,11 @@ def _words(kind: Kind, judged: Judged, nearest: Explanation) -> str:
                 if others
                 else ""
             )
+        )
+    if kind == "none" and judged.calibrated and len(judged.alike) > 1:
+        return (
+            "The nominal model, its parameters re-estimated, leaves no more than what sensors are calibrated to, and no effect of the "
+            f"catalogue improves on it by two standard errors; nearest comes {names(nearest.hypothesis)}."
         )
     if kind == "none":
         return "No effect of the catalogue predicts the records better than the nominal model does with its parameters re-estimated."
