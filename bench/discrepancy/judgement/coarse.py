@@ -114,22 +114,21 @@ def judge(
     for own in sorted(within, key=_plainness):
         entry = _borne_out(_steady(own, case, rng), found, known)
         if not entry.explanation.hypothesis or known.pays(entry.explanation, nothing.explanation, part):
-            found, chosen = _with(entry, own, found), entry
+            found = _with(entry, own, found)
+            preferred = [other for other in found if known.prefers(other.explanation, entry.explanation)]
             alike = tuple(
                 other
                 for other in found
-                if known.prefers(other.explanation, entry.explanation)
-                or _as_good(other, base, settings, judgement.coarse_alike)
+                if other in preferred or _as_good(other, base, settings, judgement.coarse_alike)
             )
+            # what records of one kind each speak for is as likely, and the simplest and commonest of it is named
+            equals = [e for e in preferred if known.pays(e.explanation, nothing.explanation, part)]
+            chosen = min([entry, *(e for e in equals if _borne_out(e, found, known) is e)], key=_plainness)
             break
         vetoed = True
-    least = problem.settings.likelihood.error.least
-    calibrated = not problem.noise_stated and bool(
-        np.max(known.of(nothing.explanation, judging=True)) <= 2.0 * least
-    )
-    if (
-        calibrated and nothing in alike
-    ):  # as small as what sensors may be off by: it takes more than a standard error
+    calibrated = _calibrated(problem, known, nothing)
+    # what is as small as what sensors may be off by takes more than one standard error
+    if calibrated and nothing in alike:
         chosen = nothing
     weights = shares(found, _log_priors(found), rng, judgement.held_out.draws)
     if chosen.explanation.hypothesis:
@@ -147,6 +146,12 @@ def judge(
         known.left(chosen.explanation, nothing.explanation),
         settings,
     )
+
+
+def _calibrated(problem: Problem, known: Discrepancies, nothing: HeldOut) -> bool:
+    """Whether no noise is stated, and the nominal model leaves no more of the judging records than sensors may be off by."""
+    largest = float(np.max(known.of(nothing.explanation, judging=True)))
+    return not problem.noise_stated and largest <= 2.0 * problem.settings.likelihood.error.least
 
 
 def _finalists(
