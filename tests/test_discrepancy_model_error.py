@@ -280,7 +280,11 @@ def test_a_mass_beyond_its_uncertainty_is_named_and_not_moved_in_silence():
         return linear_motion(force, mass=1.3 * MASS, stiffness=STIFFNESS)
 
     case = planted_case(heavy, humming, noise=UNSTATED)
-    verdict = diagnose(case, catalogue=FEW).verdict
+    diagnosis = diagnose(case, catalogue=FEW)
+    verdict = diagnosis.verdict
+    within = DEFAULT.judgement.coarse.within
+    for explained in diagnosis.explanations:
+        assert all(np.abs(fitted.vector[: p.n_physical]).max() <= within for p, fitted in explained.parts)
     assert [e.name for e in verdict.named] == ["mass_error"]
     assert verdict.named[0].parameters["relative_error"].value == pytest.approx(0.29, abs=0.03)
     assert all(abs(p.shift_in_std) < 3.0 for p in verdict.nominal)
