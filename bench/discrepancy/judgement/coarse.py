@@ -178,8 +178,10 @@ def _finalists(
         struck.append(base)
         pool = [e for e in pool if kept.get(e) is not best]
     base = min([base, *struck], key=_score)
+    own = key_of(base.explanation.hypothesis)
+    others = [e for e in found if key_of(e.explanation.hypothesis) != own]
     # what is larger than what is material has been weighed already
-    return [base, *(e for e in found if e is not base and _no_larger(e.explanation, base.explanation))]
+    return [base, *(e for e in others if _no_larger(e.explanation, base.explanation))]
 
 
 def _score(entry: HeldOut) -> float:

@@ -165,7 +165,8 @@ def _understated(problem: Problem, best: Explanation) -> Iterator[str]:
 def _marginal(judged: Judged) -> dict[tuple[str, str], float]:
     """Probability that each (name, place) belongs to the truth."""
     total: dict[tuple[str, str], float] = {}
-    outside = judged.settings.outside if judged.vetoed else judged.outside
+    unnamed = judged.vetoed or not judged.chosen.explanation.hypothesis
+    outside = judged.settings.outside if unnamed else judged.outside
     for weight, entry in zip(judged.weights, judged.found, strict=True):
         for key in {(p.effect.name, p.place.name) for p in entry.explanation.hypothesis}:
             total[key] = total.get(key, 0.0) + (1.0 - outside) * float(weight)
