@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from bench.discrepancy.effects.read_off import DIFFERS, TIMED
+from bench.discrepancy.effects.read_off import TIMED
 from bench.discrepancy.fitting.goodness_of_fit import complexity, consistent, names, near
 from bench.discrepancy.fitting.map_fit import Fit, fit
 from bench.discrepancy.likelihood.problem import Problem
@@ -29,9 +29,8 @@ from bench.discrepancy.screening.score_test import lack_of_fit
 from bench.discrepancy.screening.screen import Screen
 from bench.discrepancy.search.extension import contacts, extend
 from bench.discrepancy.search.fits import Search, integrate_finer, multistart
-from bench.discrepancy.search.friction_by_record import with_friction_by_record
 from bench.discrepancy.search.rivals import challenge, reduce_best, simplify
-from bench.discrepancy.search.scheduled import with_schedules
+from bench.discrepancy.search.scheduled import beside_records_apart, with_schedules
 from bench.discrepancy.search.soft_friction import soften, stand_in
 from bench.discrepancy.search.timed_force import with_timed_force
 from bench.discrepancy.settings import SearchSettings
@@ -85,8 +84,7 @@ def attribute(
             break
         extend(search, screen, bases, count=4 if consistent(best) else 6 - size)
         soften(search, size + 1)
-        if any(p.effect.name == DIFFERS for p in candidates) and not consistent(search.ranked()[0]):
-            with_friction_by_record(search, search.ranked(size)[: settings.scheduled])
+        beside_records_apart(search, search.ranked(size)[: settings.scheduled], _read_off(candidates))
         reduce_best(search)
     best = search.ranked()[0]
     if not problem.scaled:
@@ -126,10 +124,15 @@ def _single(
         extend(search, screen, [nothing], count=6, among={p.key for p in rare})
     stand_in(search)
     if deadline.allows("forces from outside and friction that follows a channel"):
-        asked = {p.effect.name for p in candidates if p.effect.site == "read off"}
+        asked = _read_off(candidates)
         if TIMED in asked:
             with_timed_force(search)
         with_schedules(search, asked)
+
+
+def _read_off(candidates: Sequence[Placed]) -> set[str]:
+    """Names of the effects that are read off the records."""
+    return {p.effect.name for p in candidates if p.effect.site == "read off"}
 
 
 def _bases(search: Search, screen: Screen, size: int, *, best: Fit, nothing: Fit) -> list[Fit]:

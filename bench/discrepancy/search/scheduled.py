@@ -14,7 +14,7 @@ Where no channel tells, friction may differ from record to record all the same (
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -70,8 +70,20 @@ def with_schedules(search: Search, asked: Collection[str]) -> None:
         for placed, start in (one for one in _seeds(search) if FOLLOWED + one[0].effect.name in asked):
             tasks += _followed(problem, placed, start, channel)
     converge(search, tasks)
-    if not channels and DIFFERS in asked:
-        with_friction_by_record(search, search.ranked(0)[:1])
+    beside_records_apart(search, search.ranked(0)[:1], asked)
+
+
+def beside_records_apart(search: Search, bases: Sequence[Fit], asked: Collection[str]) -> None:
+    """Fit friction that differs between records beside some hypotheses, where no channel tells by what and nothing explains the records.
+
+    Args:
+        search: Fits so far; the new ones are added.
+        bases: Fitted hypotheses.
+        asked: Names of the effects of the catalogue.
+    """
+    told = scheduling(search.problem.case) or DIFFERS not in asked
+    if not told and not consistent(search.ranked()[0]):
+        with_friction_by_record(search, bases)
 
 
 def _seeds(search: Search) -> list[tuple[Placed, Array]]:
