@@ -18,7 +18,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -70,13 +70,13 @@ class Compared:
 
 
 class Worker:
-    """A process that diagnoses with the code of one checkout."""
+    """A process that answers questions with the code of one checkout: by default, diagnoses."""
 
-    def __init__(self, checkout: Path) -> None:
+    def __init__(self, checkout: Path, script: str = __file__) -> None:
         path = os.pathsep.join([str(checkout.resolve()), str(checkout.resolve() / "scripts")])
         self.checkout = checkout.resolve()
         self.process = subprocess.Popen(
-            [sys.executable, str(Path(__file__).resolve()), "--worker"],
+            [sys.executable, str(Path(script).resolve()), "--worker"],
             env={**os.environ, "PYTHONPATH": path}, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
         )  # fmt: skip
         home = Path(self.ask({})["home"])
@@ -91,7 +91,7 @@ class Worker:
         self.process.stdin.flush()
         line = self.process.stdout.readline()
         if not line:
-            raise SystemExit(f"error: the diagnosis of {question} with {self.checkout} ended early")
+            raise SystemExit(f"error: the work on {question} with {self.checkout} ended early")
         return json.loads(line)
 
     def close(self) -> None:
@@ -101,21 +101,25 @@ class Worker:
         self.process.wait()
 
 
-def work() -> None:
-    """Answer questions until there are none; what is imported is the checkout's."""
+def work(answer: Callable[[dict[str, Any]], dict[str, Any]]) -> None:
+    """Answer questions until there are none; what is imported is the checkout's. The first one, empty, asks where `bench` lies."""
     answers, sys.stdout = sys.stdout, sys.stderr
     for line in sys.stdin:
-        answers.write(json.dumps(_answer(json.loads(line))) + "\n")
+        question = json.loads(line)
+        answers.write(json.dumps(answer(question) if question else _home()) + "\n")
         answers.flush()
 
 
-def _answer(question: dict[str, Any]) -> dict[str, Any]:
+def _home() -> dict[str, Any]:
     import bench
+
+    return {"home": str(Path(bench.__file__).resolve())}
+
+
+def _answer(question: dict[str, Any]) -> dict[str, Any]:
     from bench.discrepancy import diagnose, read_case
     from bench.errors import BenchError
 
-    if not question:
-        return {"home": str(Path(bench.__file__).resolve())}
     try:
         if "folder" in question:
             case = read_case(question["folder"])
@@ -200,7 +204,7 @@ def compare(args: Args) -> Iterator[Compared]:
 def main() -> int:
     """Compare and print."""
     if sys.argv[1:] == ["--worker"]:
-        work()
+        work(_answer)
         return 0
     import tyro
 

@@ -266,11 +266,10 @@ def test_a_true_law_is_likelier_than_any_free_curve(name):
     options = BlindOptions(
         effects=(name,), shares=(0.0, 1.0, 0.0, 0.0), rigs=(1.0, 0.0, 0.0), detectability=False
     )
-    for seed in (1, 2):
-        case, _ = draw_case(name, np.random.default_rng(seed), options)
-        found = diagnose(case, catalogue=[effect_named(name)])
-        assert found.explanations[0].consistent
-        assert likelier_force(found.explanations) is None
+    case, _ = draw_case(name, np.random.default_rng(1), options)
+    found = diagnose(case, catalogue=[effect_named(name)])
+    assert found.explanations[0].consistent
+    assert likelier_force(found.explanations) is None
 
 
 @pytest.mark.slow
