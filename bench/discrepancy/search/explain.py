@@ -83,7 +83,7 @@ def explain(
 def _problem(
     case: Case,
     structure: Structure,
-    error: ModelError | None,
+    error: ModelInadequacy | None,
     *,
     bins: dict[str, int] | None = None,
     settings: DiagnosisSettings,
