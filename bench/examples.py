@@ -6,7 +6,7 @@ import shutil
 from pathlib import Path
 
 from bench.errors import UnknownNameError
-from bench.targets import check_folder, check_targets
+from bench.targets import check_target_folder, check_targets
 
 
 def _folder() -> Path:
@@ -53,7 +53,7 @@ def copy_example(name: str, target: str | Path | None = None, *, force: bool = F
         place.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(source, place)
         return [place]
-    check_folder(place, force=force)
+    check_target_folder(place, force=force)
     files = [path for path in sorted(source.rglob("*")) if path.is_file() and _kept(path)]
     for path in files:
         copy = place / path.relative_to(source)

@@ -42,7 +42,7 @@ def check_targets(*paths: str | Path | None, force: bool = False) -> None:
             )
 
 
-def check_folder(folder: str | Path, *, force: bool = False, own: Iterable[str] = ()) -> None:
+def check_target_folder(folder: str | Path, *, force: bool = False, own: Iterable[str] = ()) -> None:
     """Refuse a folder for results that cannot be one, or that holds files of others, before anything is made.
 
     Args:

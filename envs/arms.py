@@ -12,9 +12,10 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.discrepancy.multibody.model import ArticulatedModel, Drive, Joint
+from bench.discrepancy.multibody.drives import JointDrive
+from bench.discrepancy.multibody.model import ArticulatedModel, Joint
 from bench.errors import ModelError, ParameterError, UnknownNameError
-from bench.excitation import Hypothesis, Limits, RigPrior, Uncertain
+from bench.excitation import Limits, RigHypothesis, RigPrior, Uncertain
 from bench.rig import Rig
 from bench.rig.building import parse
 
@@ -92,7 +93,7 @@ class Axis:
         torque: Largest torque of the drive at the joint [N m or N]; infinite where there is none.
     """
 
-    def __init__(self, joint: Joint, drive: Drive, asked: ArmArguments) -> None:
+    def __init__(self, joint: Joint, drive: JointDrive, asked: ArmArguments) -> None:
         self.joint, self.drive = joint, drive
         low, high = _within(joint.name, joint.range, asked.ranges.get(joint.name))
         if not np.isfinite([low, high]).all():
@@ -154,7 +155,7 @@ class ArmSetup(StationSetup):
         return self.hypothesis.rig
 
     @property
-    def hypothesis(self) -> Hypothesis:
+    def hypothesis(self) -> RigHypothesis:
         """What is unknown of it."""
         prior = self.questions[0]
         assert isinstance(prior, RigPrior)
@@ -218,7 +219,7 @@ def arm_setup(asked: ArmArguments) -> ArmSetup:
     for name in (*asked.ranges, *asked.velocity, *asked.torque):
         if name not in known:
             raise UnknownNameError(f"driven joint of '{path}'", name, known)
-    prior = RigPrior((Hypothesis(path.stem, rig, _unknown(asked, axes)),))
+    prior = RigPrior((RigHypothesis(path.stem, rig, _unknown(asked, axes)),))
     noise, stroke, velocity = {}, {}, {}
     for axis in axes:
         position, speed, torque = axis.channels

@@ -10,7 +10,7 @@ from .setups import Setup
 
 
 @dataclass(frozen=True)
-class BackgroundSettings:
+class EnvBackgroundSettings:
     """Numbers of `envs.background`."""
 
     share: float = 0.1
@@ -25,7 +25,7 @@ class BackgroundSettings:
     """Law, parameter, power of the motion, and whether that is the velocity."""
 
 
-SETTINGS = BackgroundSettings()
+SETTINGS = EnvBackgroundSettings()
 
 
 def background_of(setup: Setup) -> tuple[BackgroundTerm, ...]:

@@ -18,7 +18,7 @@ from .stepped import FLOATS, SteppedBenches
 
 
 @dataclass(frozen=True)
-class BaseSettings:
+class EnvSettings:
     """Numbers of `envs.base`."""
 
     most_draws: int = 10_000
@@ -26,7 +26,7 @@ class BaseSettings:
     each."""
 
 
-SETTINGS = BaseSettings()
+SETTINGS = EnvSettings()
 
 RENDER_MODES = ("rgb_array", "human")
 

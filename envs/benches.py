@@ -21,7 +21,7 @@ from bench.excitation.information import (
     misfit,
 )
 from bench.excitation.stepping import run_of
-from bench.excitation.windows import Window, advance, advance_prior, advance_rivals
+from bench.excitation.windows import WindowUnderWay, advance_prior, advance_rivals, advance_window
 
 from .laboratory import Laboratories
 from .options import Options, check_size
@@ -43,7 +43,7 @@ class _Panel(NamedTuple):
 class _Account(NamedTuple):
     """A window on the prior draws under way."""
 
-    window: Window
+    window: WindowUnderWay
     # states, information, score, square and contrast of the benches that run
     books: list[NDArray[np.float64]]
     values: NDArray[np.float64]  # (m, n_draws) or (m, n_pairs), written
@@ -174,7 +174,7 @@ class Benches(SteppedBenches):
             window = advance_prior(panel.ensemble, run, counts, weights, (fisher, score, square), values)
         else:
             values = np.zeros(counts.shape)
-            window = advance(panel.ensemble, run)
+            window = advance_window(panel.ensemble, run)
         return _Account(window, books, values)
 
     def _told(

@@ -17,14 +17,14 @@ from numpy.typing import NDArray
 from bench import native
 from bench.errors import ModelError
 from bench.excitation.linear_structure import sensor_columns
-from bench.excitation.prior import Draw, Hypothesis
+from bench.excitation.prior import Draw, RigHypothesis
 from bench.rig import Rig
 
 EXPANDED = {"stiffness": "jnt_stiffness", "damping": "dof_damping"}
 """Structural quantities that may differ between laboratories, and MuJoCo's fields for them."""
 
 
-def combined(hypotheses: tuple[Hypothesis, ...], channels: tuple[str, ...]) -> Rig:
+def combined(hypotheses: tuple[RigHypothesis, ...], channels: tuple[str, ...]) -> Rig:
     """The rig of the first hypothesis with the elements of all, and nothing that the laboratories do not need."""
     first = hypotheses[0].rig
     elements = {element.name: element for hypothesis in hypotheses for element in hypothesis.rig.elements}
@@ -77,7 +77,7 @@ class Laboratories:
 
     def __init__(
         self,
-        hypotheses: tuple[Hypothesis, ...],
+        hypotheses: tuple[RigHypothesis, ...],
         n: int,
         *,
         channels: tuple[str, ...],
@@ -191,6 +191,6 @@ class Laboratories:
             self._structure[quantity][:] = values
 
 
-def _structural(hypothesis: Hypothesis) -> list[tuple[str, str]]:
+def _structural(hypothesis: RigHypothesis) -> list[tuple[str, str]]:
     pairs = [name.partition(":") for name in hypothesis.names if "." not in name]
     return [(quantity, place) for quantity, _, place in pairs]

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.errors import ParameterError
-from bench.excitation import Contrast, Draw, Family, Hypothesis, Rivals, expected_log_bayes_factor, fans
+from bench.excitation import Contrast, Draw, Family, RigHypothesis, Rivals, expected_log_bayes_factor, fans
 from bench.excitation.background import SETTINGS as BACKGROUND_SETTINGS
 from bench.excitation.background import BackgroundTerm, expected_error, with_background
 from bench.excitation.bayes_factor import accumulate_contrast
@@ -61,7 +61,7 @@ class _Fan:
 
     def __init__(
         self,
-        hypothesis: Hypothesis,
+        hypothesis: RigHypothesis,
         n: int,
         channels: tuple[str, ...],
         actuators: tuple[str, ...],
@@ -120,7 +120,7 @@ class _Priors:
 
     step = INFORMATION_LIMITS.step
 
-    def __init__(self, hypothesis: Hypothesis, n: int, desk: Desk) -> None:
+    def __init__(self, hypothesis: RigHypothesis, n: int, desk: Desk) -> None:
         self.fan = _Fan(hypothesis, n, desk.station.channels, desk.station.actuators, self.step)
         p = self.fan.p
         self._weights = 1.0 / desk.noise
@@ -165,7 +165,9 @@ class _Errors(_Priors):
 
     step = BACKGROUND_SETTINGS.step
 
-    def __init__(self, hypothesis: Hypothesis, n: int, desk: Desk, terms: tuple[BackgroundTerm, ...]) -> None:
+    def __init__(
+        self, hypothesis: RigHypothesis, n: int, desk: Desk, terms: tuple[BackgroundTerm, ...]
+    ) -> None:
         super().__init__(hypothesis, n, desk)
         channels, actuators = desk.station.channels, desk.station.actuators
         self._real = _Fan(with_background(hypothesis, terms), n, channels, actuators, 0.0)

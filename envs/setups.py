@@ -14,7 +14,7 @@ from types import MappingProxyType
 import numpy as np
 
 from bench.errors import UnknownNameError
-from bench.excitation import Experiment, Hypothesis, Limits, RigPrior, Rivals, Uncertain, paired_experiment
+from bench.excitation import Experiment, Limits, RigHypothesis, RigPrior, Rivals, Uncertain, paired_experiment
 from bench.laws import find_law
 from bench.rig import Element, Rig
 from bench.rig.library import joint_rig, sdof_rig
@@ -121,7 +121,7 @@ PAIRS = ("gap_cubic", "presliding_bouc_wen", "coulomb_stribeck", "axial_gap_coup
 RIGS = ("sdof", "joint")
 
 
-def _sdof_hypothesis(place: Laboratory, law: str) -> Hypothesis:
+def _sdof_hypothesis(place: Laboratory, law: str) -> RigHypothesis:
     own = {
         "gap": (
             Uncertain("gap.stiffness", 300.0, 1500.0),
@@ -135,7 +135,7 @@ def _sdof_hypothesis(place: Laboratory, law: str) -> Hypothesis:
         "coulomb": (Uncertain("coulomb.limit", 0.1, 1.0),),
     }[law]
     fixed = {"coulomb": {"regularisation_velocity": 2e-2}}.get(law, {})
-    return Hypothesis(law, place.rig(place.element(law, **fixed)), (*_sdof_structure(), *own))
+    return RigHypothesis(law, place.rig(place.element(law, **fixed)), (*_sdof_structure(), *own))
 
 
 @lru_cache(maxsize=16)
@@ -172,7 +172,7 @@ def joint_setup(n_draws: int = 4) -> Setup:
     )
     rig = place.rig(place.element(law, "axial", "torsional"))
     return _identification(
-        place, RigPrior((Hypothesis(law, rig, parameters),)), n_draws, ("joint", (n_draws,))
+        place, RigPrior((RigHypothesis(law, rig, parameters),)), n_draws, ("joint", (n_draws,))
     )
 
 
@@ -248,7 +248,7 @@ def _rivals(place: Laboratory, pair: str) -> Rivals:
     return Rivals(pair, first, second)
 
 
-def _effect(place: Laboratory, law: str) -> Hypothesis:
+def _effect(place: Laboratory, law: str) -> RigHypothesis:
     """One effect beside the spring and damper of a rig."""
     # Forces and lengths of the joint rig stand to those of the SDOF rig as its axial contact to the other's.
     force, length = (1.0, 1.0) if place.name == "sdof" else (250.0, 0.25)
@@ -295,5 +295,7 @@ def _effect(place: Laboratory, law: str) -> Hypothesis:
     joints = ("axial", "torsional") if law == "gap_coupling" else ()
     element = place.element(law, *joints, **fixed)
     if place.name == "sdof":
-        return Hypothesis(law, place.rig(element), (*_sdof_structure(), *own))
-    return Hypothesis(law, place.rig(place.element("linear", stiffness=3.5e4, damping=300.0), element), own)
+        return RigHypothesis(law, place.rig(element), (*_sdof_structure(), *own))
+    return RigHypothesis(
+        law, place.rig(place.element("linear", stiffness=3.5e4, damping=300.0), element), own
+    )

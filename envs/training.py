@@ -12,7 +12,7 @@ import math
 import os
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -22,104 +22,18 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.callbacks import BaseCallback
-from stable_baselines3.common.vec_env import VecEnvWrapper, VecNormalize
+from stable_baselines3.common.vec_env import VecNormalize
 
-from bench.errors import FileFormatError, ParameterError, UnknownNameError
+from bench.errors import FileFormatError
 from bench.excitation.policy import Policy
-from bench.excitation.station import Station
 from bench.files import replacing, together, write_bytes, write_text
 
-from . import IDS
-from .base import setup_of
-from .feedback import Feedback, braked_design, pump
+from .imitation import first_feedback, imitate
+from .policy_export import export
 from .practice_vector import PracticeVectorEnv
 from .sb3 import KINDS, BenchVecEnv
-
-TASKS: dict[str, tuple[str, dict[str, Any]]] = {
-    "sdof": (IDS[0], {}),
-    "joint": (IDS[1], {}),
-    "rivals": (IDS[2], {"rig": "sdof"}),
-    "joint_rivals": (IDS[2], {}),
-}
-"""What can be trained: an environment and its arguments."""
-
-ALGORITHMS = ("ppo", "sac")
-TRAINED_BY = ("practice", "error", "prior", "posterior")
-STARTS = ("pump", "design", "nothing")
-
-
-@dataclass(frozen=True)
-class TrainingSettings:
-    """Numbers of `envs.training`."""
-
-    held_out: int = 1_000_000
-    """Seeds from here on are for evaluation only."""
-    episodes: int = 3
-    noise: float = 0.3
-    log_std: float = -1.2
-    """Logarithm of the exploration's standard deviation at the start."""
-    gae_lambda: float = 1.0
-    """Advantages of PPO are whole returns less the value, never bootstrapped from it: what a test has told about the hidden rig so far
-    is not in the observation, so that the value is a poor guess; with 0.95 some seeds score less the longer they are trained."""
-
-
-SETTINGS = TrainingSettings()
-
-
-@dataclass(frozen=True)
-class Plan:
-    """What to train and how.
-
-    Attributes:
-        task: One of `TASKS`.
-        algorithm: "ppo" or "sac".
-        steps: Windows in all.
-        seed: Seed of rigs, noise, network and exploration.
-        n_envs: Benches side by side.
-        network: Units of the hidden layers.
-        start: What is imitated before, see `envs.feedback`: "pump", "design", or "nothing".
-        reward: "practice" (merit at each rig) or "error" (expected error at each rig, which has a background), see `envs.practice`; or
-            the registered environment with the merit's "prior" or "posterior" average.
-        learning_rate: Of Adam, at the start; falls linearly.
-        discount: Of rewards, a window.
-        evaluate_every: Windows between evaluations, each with a checkpoint.
-        n_held_out: Rigs of an evaluation.
-    """
-
-    task: str = "sdof"
-    algorithm: str = "ppo"
-    steps: int = 4_000_000
-    seed: int = 0
-    n_envs: int = 192
-    network: tuple[int, ...] = (64, 64)
-    start: str = "pump"
-    reward: str = "practice"
-    learning_rate: float = 4e-4
-    discount: float = 0.995
-    evaluate_every: int = 100_000
-    n_held_out: int = 96
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "network", tuple(self.network))
-        for what, name, known in (
-            ("task", self.task, TASKS),
-            ("algorithm", self.algorithm, ALGORITHMS),
-            ("reward", self.reward, TRAINED_BY),
-            ("start", self.start, STARTS),
-        ):
-            if name not in known:
-                raise UnknownNameError(what, name, known)
-        if self.reward == "error" and self.task not in ("sdof", "joint"):
-            raise ParameterError(
-                f"reward \"error\" came with task '{self.task}', in which nothing is identified; sdof or joint is expected"
-            )
-        if min(self.steps, self.n_envs, self.evaluate_every, self.n_held_out, *self.network) < 1:
-            raise ParameterError(f"{self} has a number below one; steps, benches and units are positive")
-
-    @property
-    def scored(self) -> str:
-        """The reward by which policies are scored on held-out rigs."""
-        return "error" if self.reward == "error" else "information"
+from .scheduled import Scheduled, scheduled
+from .training_plan import SETTINGS, TASKS, TrainingPlan
 
 
 class Score(NamedTuple):
@@ -180,69 +94,7 @@ def evaluate(
     )
 
 
-def export(model: PPO | SAC, normaliser: VecNormalize, *, name: str, about: dict[str, Any]) -> Policy:
-    """The mean of a model's actions as a `Policy` of plain arrays.
-
-    Args:
-        model: The model.
-        normaliser: The statistics of its observations, over the benches with their schedule.
-        name: Name of the policy.
-        about: Where it comes from.
-    """
-    layers = [module for module in _layers(model) if isinstance(module, torch.nn.Linear)]
-    statistics = normaliser.obs_rms
-    return Policy(
-        name,
-        tuple(layer.weight.detach().cpu().numpy() for layer in layers),
-        tuple(layer.bias.detach().cpu().numpy() for layer in layers),
-        statistics.mean,  # type: ignore[union-attr]
-        np.sqrt(statistics.var + normaliser.epsilon),  # type: ignore[union-attr]
-        _scheduled(normaliser).schedule,
-        _scheduled(normaliser).station,
-        isinstance(model, SAC),
-        about,
-    )
-
-
-def _layers(model: PPO | SAC) -> list[torch.nn.Module]:
-    if isinstance(model, SAC):
-        return [*model.actor.latent_pi, model.actor.mu]
-    return [*model.policy.mlp_extractor.policy_net, model.policy.action_net]
-
-
-class Scheduled(VecEnvWrapper):
-    """Adds a schedule to actions, as `bench.excitation.Policy` does.
-
-    Attributes:
-        station: Where the benches stand.
-        schedule: Actions ``(n_questions, n_windows, width)``.
-    """
-
-    def __init__(self, venv: BenchVecEnv, schedule: NDArray[np.float32]) -> None:
-        super().__init__(venv)
-        self.station: Station = venv.benches.benches.station
-        self.schedule = schedule
-        self._last = np.zeros((venv.num_envs, venv.benches.benches.n_observations), dtype=np.float32)
-
-    def reset(self) -> NDArray[np.float32]:
-        """Reset all."""
-        self._last = np.asarray(self.venv.reset())
-        return self._last
-
-    def step_async(self, actions: NDArray[np.float32]) -> None:
-        """Take corrections of the schedule."""
-        self.venv.step_async(np.clip(actions + self.station.scheduled(self._last, self.schedule), -1.0, 1.0))
-
-    def step_wait(self) -> Any:
-        """Run the step; the end of a test is an end, with nothing to come, since the window is observed and the duration known."""
-        observation, reward, done, infos = self.venv.step_wait()
-        self._last = np.asarray(observation)
-        for place in np.flatnonzero(done):
-            infos[place]["TimeLimit.truncated"] = False
-        return observation, reward, done, infos
-
-
-def _environment(plan: Plan, schedule: NDArray[np.float32]) -> VecNormalize:
+def _environment(plan: TrainingPlan, schedule: NDArray[np.float32]) -> VecNormalize:
     identifier, arguments = TASKS[plan.task]
     practice = plan.reward in {"practice", "error"}
     rest = {**arguments, **({"reward": plan.scored} if practice else {"average": plan.reward})}
@@ -251,7 +103,7 @@ def _environment(plan: Plan, schedule: NDArray[np.float32]) -> VecNormalize:
     return VecNormalize(Scheduled(env, schedule), gamma=plan.discount)
 
 
-def _model(plan: Plan, env: VecNormalize) -> PPO | SAC:
+def _model(plan: TrainingPlan, env: VecNormalize) -> PPO | SAC:
     def rate(left: float) -> float:
         return plan.learning_rate * max(left, 0.1)
 
@@ -269,59 +121,12 @@ def _model(plan: Plan, env: VecNormalize) -> PPO | SAC:
             "MlpPolicy", env, batch_size=512, gradient_steps=16, buffer_size=300_000, policy_kwargs=kwargs, **common
         )  # fmt: skip
     kwargs = {"net_arch": {"pi": units, "vf": [64, 64]}, "log_std_init": SETTINGS.log_std}
-    episode = _scheduled(env).station.n_windows
+    episode = scheduled(env).station.n_windows
     n_steps = min(episode, max(1, plan.evaluate_every // plan.n_envs))
     return PPO(
         "MlpPolicy", env, n_steps=n_steps, batch_size=max(64, n_steps * plan.n_envs // 8), n_epochs=8, clip_range=0.2,
         target_kl=0.04, gae_lambda=SETTINGS.gae_lambda, policy_kwargs=kwargs, **common,
     )  # fmt: skip
-
-
-def _scheduled(env: VecNormalize) -> Scheduled:
-    assert isinstance(env.venv, Scheduled)
-    return env.venv
-
-
-def first_feedback(plan: Plan) -> Feedback:
-    """What training starts from."""
-    identifier, arguments = TASKS[plan.task]
-    setup = setup_of(KINDS[identifier], dict(arguments))
-    if plan.start == "design":
-        return braked_design(setup, np.random.default_rng(plan.seed))
-    start = pump(setup.station())
-    return start if plan.start == "pump" else replace(start, schedule=np.zeros_like(start.schedule))
-
-
-def imitate(model: PPO | SAC, env: VecNormalize, feedback: Feedback, *, seed: int) -> None:
-    """Fit a model's mean action to a feedback's corrections, and the statistics of the observations to what it meets.
-
-    Args:
-        model: The model.
-        env: Its environment.
-        feedback: What is imitated; its schedule is the environment's.
-        seed: Seed of the tests.
-    """
-    venv, rng = _scheduled(env), np.random.default_rng(seed)
-    seen, told = [], []
-    observation = venv.reset()
-    for _ in range(SETTINGS.episodes * feedback.station.n_windows):
-        wanted = feedback.correction(observation)
-        seen.append(observation)
-        told.append(wanted)
-        observation = np.asarray(venv.step(wanted + SETTINGS.noise * rng.standard_normal(wanted.shape))[0])
-    x, y = np.concatenate(seen), np.concatenate(told)
-    env.obs_rms.update(x)  # type: ignore[union-attr]
-    y = np.arctanh(np.clip(y, -0.96, 0.96)) if isinstance(model, SAC) else y
-    target = torch.as_tensor(y, dtype=torch.float32)
-    inputs = torch.as_tensor(np.asarray(env.normalize_obs(x)), dtype=torch.float32)
-    network = torch.nn.Sequential(*_layers(model))
-    optimiser = torch.optim.Adam(network.parameters(), lr=2e-3)
-    for _ in range(1500):
-        rows = torch.as_tensor(rng.integers(len(x), size=512))
-        loss = torch.nn.functional.mse_loss(network(inputs[rows]), target[rows])
-        optimiser.zero_grad()
-        loss.backward()
-        optimiser.step()
 
 
 class _Watch(BaseCallback):
@@ -365,7 +170,7 @@ class Trainer:
         curve: Evaluations so far, the first before training.
     """
 
-    def __init__(self, plan: Plan, folder: Path, *, resume: bool = True) -> None:
+    def __init__(self, plan: TrainingPlan, folder: Path, *, resume: bool = True) -> None:
         """Start or go on.
 
         Args:
@@ -385,14 +190,14 @@ class Trainer:
         document = folder / "curve.json"
         if resume and document.is_file():
             saved = json.loads(document.read_text(encoding="utf-8"))
-            if replace(Plan(**saved["plan"]), steps=plan.steps) != plan:
+            if replace(TrainingPlan(**saved["plan"]), steps=plan.steps) != plan:
                 raise FileFormatError(
                     f"{folder} holds the training of another plan ({saved['plan']}); take another folder or start afresh"
                 )
             self.curve = [Score(**row) for row in saved["curve"]]
             self._spent = self.curve[-1].seconds
             fresh = _environment(plan, np.load(folder / "schedule.npy"))
-            self.env = VecNormalize.load(str(folder / "statistics.pkl"), _scheduled(fresh))
+            self.env = VecNormalize.load(str(folder / "statistics.pkl"), scheduled(fresh))
             kind = SAC if plan.algorithm == "sac" else PPO
             self.model = kind.load(folder / "model.zip", env=self.env, device="cpu")
             return

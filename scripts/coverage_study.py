@@ -30,7 +30,7 @@ from bench.identification.memory import fit_memory
 from bench.identification.network import fit_network
 from bench.identification.polynomial import fit_polynomial
 from bench.identification.restoring_force import JointData
-from bench.reproduction import laboratory_joint as laboratory
+from bench.reproduction import laboratory
 from bench.reproduction.joint_models import LOADINGS
 from bench.rig import Element, Rig, simulate
 from bench.signals import BandLimitedNoise, Excitation, Harmonic, Tapered

@@ -44,9 +44,13 @@ def pages() -> dict[str, str]:
     )
 
 
-def stale(docs: Path = DOCS) -> list[str]:
-    """Paths of pages that differ from what the code says, of missing ones, and of those that nothing makes any more."""
-    made = pages()
+def stale(made: dict[str, str], docs: Path = DOCS) -> list[str]:
+    """Paths of pages that differ from what the code says, of missing ones, and of those that nothing makes any more.
+
+    Args:
+        made: The pages as the code makes them.
+        docs: The folder of the documentation.
+    """
     old = [
         path
         for path, text in made.items()
@@ -63,12 +67,14 @@ def stale(docs: Path = DOCS) -> list[str]:
 
 def main(args: Args) -> int:
     """Write or check."""
+    made = pages()
+    old = stale(made)
     if args.check:
-        for path in stale():
+        for path in old:
             print(f"out of date: docs/{path}")
-        return 1 if stale() else 0
-    for path in stale():
-        text = pages().get(path)
+        return 1 if old else 0
+    for path in old:
+        text = made.get(path)
         if text is None:
             (DOCS / path).unlink()
             continue

@@ -13,12 +13,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import tyro
-from numpy.typing import NDArray
 from scipy import signal
 
+from bench.arrays import Array
 from bench.recording.jumps import JUMPS, JumpSettings, hidden_dropouts
 
-Array = NDArray[np.float64]
 RATE, N = 500.0, 3000
 LOST: tuple[int, ...] = (3, 10, 30)
 KINDS = ("noise", "sweep", "multisine", "steps", "impacts")

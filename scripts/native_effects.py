@@ -31,15 +31,14 @@ from typing import Any
 import mujoco
 import numpy as np
 from mujoco import rollout
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy import diagnose, read_case
 from bench.discrepancy.application.applying import apply
 from bench.discrepancy.application.reading import findings_of
 from bench.discrepancy.application.verification import VerificationSettings, is_articulated, verify
 from bench.discrepancy.verdict import Verdict
 
-Array = NDArray[np.float64]
 Change = Callable[[Any], None]
 RECORDS = ("identification", "identification_2", "validation")
 RATE, SECONDS = 200.0, 10.0

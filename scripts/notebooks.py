@@ -43,7 +43,10 @@ def run(path: Path, *, keep: bool) -> None:
     """
     notebook = nbformat.read(path, as_version=4)
     os.environ["PYTHONPATH"] = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
-    NotebookClient(notebook, timeout=600, kernel_name="python3").execute(cwd=str(path.parent))
+    commands = str(Path(sys.executable).parent)  # where `jointbench` and `python` of this environment are
+    os.environ["PATH"] = os.pathsep.join([commands, os.environ.get("PATH", "")])
+    client = NotebookClient(notebook, timeout=600, kernel_name="python3", coalesce_streams=True)
+    client.execute(cwd=str(path.parent))
     if not keep:
         return
     for cell in notebook.cells:

@@ -19,12 +19,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy import diagnose_folder
 from bench.rig import Element, Rig, simulate
 
-Array = NDArray[np.float64]
 RATE, DURATION, STEP = 500.0, 16.0, 1e-4
 TORQUE_NOISE, ANGLE_NOISE = 2e-3, 1e-3
 MASS, DAMPING = (0.5, 0.01), (0.012, 0.003)

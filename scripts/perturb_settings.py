@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 
 import tyro
 
-from bench.discrepancy.settings import DEFAULT, Described, described, with_values
+from bench.discrepancy.settings import DEFAULT, DescribedSetting, described, with_values
 
 SHARES = ("part of", "share", "probability", "correlation", "coherence")
 """First words of the meaning of a number that has to stay below one."""
@@ -59,7 +59,7 @@ class Task(NamedTuple):
         return hashlib.sha256(json.dumps(self).encode()).hexdigest()[:16]
 
 
-def moved(entry: Described, factor: float) -> Any:
+def moved(entry: DescribedSetting, factor: float) -> Any:
     """The value of a threshold times a factor."""
 
     def one(value: Any) -> Any:

@@ -27,7 +27,7 @@ sys.path.insert(0, str(ROOT / "scripts"))
 from benchmark import machine  # noqa: E402
 
 from bench.discrepancy import BlindOptions, BlindScore, make_blind, run_blind  # noqa: E402
-from bench.discrepancy.blind.score_report import markdown, page  # noqa: E402
+from bench.discrepancy.blind.score_report import markdown, score_page  # noqa: E402
 from bench.discrepancy.blind.scoring import score_cases, summary  # noqa: E402
 from bench.files import write_text  # noqa: E402
 from bench.provenance import provenance  # noqa: E402
@@ -115,7 +115,7 @@ def write(args: Args, score: BlindScore, commits: list[str], seconds: float) -> 
     write_text(args.out.with_suffix(".json"), json.dumps(document, indent=1, ensure_ascii=False) + "\n")
     write_text(args.out.with_suffix(".md"), markdown(score, title="Sealed cases", lead=lead))
     if args.html is not None:
-        page(score, title="Sealed cases", lead=lead).write(args.html)
+        score_page(score, title="Sealed cases", lead=lead).write(args.html)
     print(json.dumps(document) if args.json else args.out.with_suffix(".md"))
 
 

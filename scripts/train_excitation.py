@@ -66,7 +66,8 @@ def main() -> int:
     args = tyro.cli(Args, description=__doc__)
     from bench.errors import BenchError
     from bench.excitation import find_policy, policy_names
-    from envs.training import Plan, Trainer, evaluate
+    from envs.training import Trainer, evaluate
+    from envs.training_plan import TrainingPlan
 
     folder = args.out or Path("out/policies") / args.task
     columns = (
@@ -76,7 +77,7 @@ def main() -> int:
         TimeElapsedColumn(),
     )
     try:
-        plan = Plan(
+        plan = TrainingPlan(
             args.task, args.algorithm, args.steps, args.seed, args.n_envs,
             start=args.start, reward=args.reward, learning_rate=args.learning_rate, discount=args.discount,
         )  # fmt: skip

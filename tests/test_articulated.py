@@ -14,13 +14,14 @@ from bench.discrepancy import diagnose, read_case
 from bench.discrepancy.articulated.admission import admitted_robot
 from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis
 from bench.discrepancy.articulated.free_runs import FreeRuns
-from bench.discrepancy.articulated.judgement import JudgementSettings, complete
+from bench.discrepancy.articulated.judgement import JudgementSettings
 from bench.discrepancy.articulated.next_test import propose
 from bench.discrepancy.articulated.recognition import applies
+from bench.discrepancy.articulated.whiteness import coloured
 from bench.discrepancy.articulated_search.catalogue import CATALOGUE
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit, fit, refitted
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem, placements
-from bench.discrepancy.articulated_search.search import without_idle
+from bench.discrepancy.articulated_search.search import complete, without_idle
 from bench.discrepancy.multibody.channels import bound
 from bench.discrepancy.multibody.encoders import weight_of_readings
 from bench.discrepancy.multibody.model import ArticulatedModel, compiled_model
@@ -217,6 +218,80 @@ def test_a_joint_that_was_held_is_welded_where_it_was(tmp_path):
     (folder / "nominal.json").write_text(json.dumps(document))
     with pytest.raises(BenchError, match="elbwo"):
         admitted_robot(read_case(folder))
+
+
+def problem_of(folder, **joints):
+    """The problem of a case whose joints of the given names follow, without what drives them."""
+    document = json.loads((folder / "nominal.json").read_text())
+    for name in joints:
+        for part, key in (
+            ("channels", f"{name}_in"),
+            ("parameters", f"damping:{name}"),
+            ("parameters", f"kp:{name}_drive"),
+        ):
+            document[part].pop(key, None)
+    (folder / "nominal.json").write_text(json.dumps(document | {"joints": joints}))
+    case, compiled, _ = admitted_robot(read_case(folder))
+    return ArticulatedProblem.of(case, ArticulatedModel.of(compiled), case.identification)
+
+
+def test_a_slow_motion_under_the_noise_is_left_and_noise_alone_is_not(tmp_path):
+    folder = write_case(tmp_path, mjcf(servo=True), servo=True, length=2.0 * LENGTH)
+    found = {}
+    for name in ("noise", "motion"):
+        problem = problem_of(folder)
+        known = ArticulatedFit.at(problem, (), np.zeros(len(problem.nominal)))
+        known = replace(known, covariance=np.zeros_like(known.covariance))
+        assert complete(problem, known, JudgementSettings())  # by the mean square
+        found[name] = coloured(problem, known, JudgementSettings())
+        table = np.loadtxt(folder / "identification.csv", delimiter=",", skiprows=1)
+        header = (folder / "identification.csv").read_text().splitlines()[0]
+        table[:, 4] += 0.45 * NOISE * np.sin(2.0 * np.pi * 0.5 * table[:, 0])
+        np.savetxt(
+            folder / "identification.csv", table, delimiter=",", header=header, comments="", fmt="%.9g"
+        )
+    assert found["noise"] is None
+    assert found["motion"] is not None
+    assert found["motion"].joint == 1
+    assert 0.5 <= found["motion"].below < 2.0
+    assert found["motion"].power > 3.0
+
+
+@pytest.mark.parametrize("followed", KP)
+def test_a_joint_that_is_followed_leaves_the_equations_of_the_others_as_they_are(tmp_path, followed):
+    folder = write_case(tmp_path, mjcf(servo=True, friction=LIMIT), servo=True)
+    whole = problem_of(folder)
+    part = problem_of(folder, **{followed: "follow"})
+    (free,) = part.joints
+    at = [joint.name for joint in whole.joints].index(free.name)
+    mine, theirs = part.records[0].joints[0], whole.records[0].joints[at]
+    for name in ("inertia", "bias", "slope", "reference", "load", "command", "position"):
+        np.testing.assert_allclose(getattr(mine, name), getattr(theirs, name), rtol=1e-6, atol=1e-9)
+    assert {p.where for p in placements(part, CATALOGUE) if p.effect.site == "joint"} == {free.name}
+    with pytest.raises(BenchError, match="elbwo"):
+        problem_of(folder, elbwo="follow")
+
+
+def test_bodies_without_a_name_go_by_what_moves_them():
+    text = mjcf(servo=True).replace('body name="fore"', "body").replace('name="fore_tip"', 'name="tip"')
+    model = ArticulatedModel.of(mujoco.MjModel.from_xml_string(text))
+    assert model.bodies == ("upper", "body of elbow")
+    assert model.with_payload("body of elbow", 0.3).mass("body of elbow") == pytest.approx(0.8)
+
+
+def test_a_body_that_turns_about_its_own_centre_has_its_armature_once_and_its_mass_as_it_is():
+    text = (
+        '<mujoco><worldbody><body name="rotor"><joint name="axis" type="hinge" axis="0 1 0" armature="0.05"/>'
+        '<inertial pos="0 0 0" mass="2" diaginertia="0.01 0.02 0.03"/></body></worldbody></mujoco>'
+    )
+    model = ArticulatedModel.of(mujoco.MjModel.from_xml_string(text))
+    at, pushed = np.zeros((1, 1)), np.full((1, 1), 10.0)
+    assert model.dynamics(at, at, pushed).torque[0, 0] == pytest.approx(0.2)
+    assert model.joint("axis").armature == 0.05
+    moved = model.with_payload("rotor", 0.5, np.array([0.0, 0.0, 0.2])).dynamics(at, at, pushed)
+    assert moved.inertia[0, 0] == pytest.approx(0.02 + 0.5 * 0.2**2)
+    moved = model.with_centre("rotor", np.array([0.0, 0.0, 0.1])).dynamics(at, at, pushed)
+    assert moved.torque[0, 0] == pytest.approx(10.0 * (0.02 + 2.0 * 0.1**2))
 
 
 def test_the_next_test_tells_two_explanations_apart_within_what_the_arm_has_shown(tmp_path):

@@ -134,7 +134,7 @@ def _case(effect: str, seed: int):
     ],
 )
 def test_sysid_is_given_the_same_problem(effect, tolerance):
-    from benchmarks.peer_sysid import Candidate
+    from benchmarks.sysid_candidate import Candidate
 
     from bench.discrepancy.effects.catalogue import CATALOGUE
     from bench.discrepancy.likelihood.problem import Problem

@@ -19,11 +19,11 @@ from bench.discrepancy.blind.drawing import (
 )
 from bench.discrepancy.blind.proportions import calibration_error, share_of
 from bench.discrepancy.blind.region_overlap import region_scores
-from bench.discrepancy.blind.score_report import markdown, page, tables
+from bench.discrepancy.blind.score_report import markdown, score_page, tables
 from bench.discrepancy.blind.scoring import score_cases
 from bench.discrepancy.effects import friction_limits as limits
 from bench.discrepancy.effects.catalogue import CATALOGUE
-from bench.discrepancy.simulation.stick_slip import Elements, LinearStructure, free_run
+from bench.discrepancy.simulation.stick_slip import Elements, StructureMatrices, free_run
 from bench.discrepancy.truth import out_of_catalogue as foreign
 from bench.discrepancy.truth.ground_truth import ROWS, Truth, WithheldEffect, motion_of, played, sensed
 from bench.discrepancy.truth.loads import SIGNALS, load
@@ -87,7 +87,7 @@ def test_time_stepping_agrees_with_located_stick_slip():
     own = march(SDOF, [coulomb(3.0)], loads=loads, step=1 / 500)
     table = np.array([[0, 0, limits.coulomb_limit.address, 1, 0, 0, 0, 0]], dtype=np.int64)
     elements = Elements(table, np.ones((1, 1)), np.array([3.0, 0.0]), np.zeros(0))
-    located = free_run(LinearStructure(*SDOF), elements, loads=loads, step=1 / 500, substeps=8)
+    located = free_run(StructureMatrices(*SDOF), elements, loads=loads, step=1 / 500, substeps=8)
     # an event costs the time stepping one step of 10 microseconds, of some 0.1 s between events
     assert relative(own.position, located.position) < 3e-4
     assert np.mean(np.abs(own.velocity) < 1e-12) > 0.02  # it does stick
@@ -236,7 +236,7 @@ def test_a_drawn_effect_reaches_the_wanted_gap_and_the_noise_is_the_stated_one(n
     )  # fmt: skip
     case, answer = draw_case("case", np.random.default_rng(9), options)
     values = np.array([answer["true"][n] for n in ("mass", "damping", "stiffness")])
-    linear = LinearStructure(*(v * np.ones((1, 1)) for v in values), np.ones((1, 1)))
+    linear = StructureMatrices(*(v * np.ones((1, 1)) for v in values), np.ones((1, 1)))
     (channel,) = (c for c in case.channels if c.name != "force")
     for record, low, high in (
         (case.identification[0], *DRAWING_SETTINGS.close),
@@ -560,7 +560,7 @@ def test_scores_are_told_as_tables_markdown_and_a_page(tmp_path, capsys):
     text = markdown(score, title="Trials")
     assert text.startswith("# Trials")
     assert "| gap | gap 1 |" in text
-    html = page(score).to_html()
+    html = score_page(score).to_html()
     assert "data:image/png;base64" in html
     folders = [str(tmp_path / "r"), str(tmp_path / "a")]
     told = tmp_path / "told.md"

@@ -16,7 +16,7 @@ from bench.discrepancy.effects.friction_limits import soft_coulomb_limit
 from bench.discrepancy.model.mjcf_friction import frictionloss_of, softness
 from bench.discrepancy.report.model_update import recipes
 from bench.discrepancy.simulation.prescribed_response import driven_force
-from bench.discrepancy.simulation.stick_slip import Elements, LinearStructure, free_run
+from bench.discrepancy.simulation.stick_slip import Elements, StructureMatrices, free_run
 
 MASS, DAMPING, STIFFNESS, LOSS = 2.4, 6.0, 1500.0, 2.0
 RATE = 500.0
@@ -61,7 +61,7 @@ def test_the_fast_simulator_creeps_as_mujoco_does(soft):
     n, fine = 1500, 20
     force, x, model = simulated(f'frictionloss="{LOSS}" {soft}', 3, n, fine)
     creep, lead = softness(model, model.dof_solref[0], model.dof_solimp[0], float(model.dof_invweight0[0]))
-    structure = LinearStructure(*(np.array([[a]]) for a in (MASS, DAMPING, STIFFNESS, 1.0)))
+    structure = StructureMatrices(*(np.array([[a]]) for a in (MASS, DAMPING, STIFFNESS, 1.0)))
     table = np.array([[0, 0, soft_coulomb_limit.address, 1, 0, 0, 0, 0]], dtype=np.int64)
     theta = np.array([LOSS, LOSS * creep, lead, 0.0])
     motion = free_run(

@@ -25,7 +25,7 @@ from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.screening.screen import Screen
 from bench.discrepancy.settings import DEFAULT, with_values
-from bench.discrepancy.simulation.stick_slip import NO_ELEMENTS, Elements, LinearStructure, free_run
+from bench.discrepancy.simulation.stick_slip import NO_ELEMENTS, Elements, StructureMatrices, free_run
 from bench.errors import FileFormatError, ModelError, UnknownNameError
 from bench.laws import LAWS
 from bench.rig import Element, Rig, simulate
@@ -96,7 +96,7 @@ def write(folder, text, *, parameters=None, channels=None, hidden=NO_ELEMENTS, n
     (folder / "nominal.json").write_text(json.dumps(nominal))
     rng = np.random.default_rng(7)
     time = STEP * np.arange(n)
-    true = LinearStructure(*(np.full((1, 1), value) for value in (1.51, 4.2, 905.0, 1.0)))
+    true = StructureMatrices(*(np.full((1, 1), value) for value in (1.51, 4.2, 905.0, 1.0)))
     for name in ("identification", "validation"):
         force = loads(n, rng)
         motion = free_run(true, hidden, loads=force[:, None], step=STEP)

@@ -15,8 +15,8 @@ from bench.cli import main
 from bench.discrepancy import Case, diagnose, read_case, record_from_arrays
 from bench.discrepancy.blind.protocol import write_case
 from bench.discrepancy.case.schema import check_units
-from bench.discrepancy.checks.channel_comparison import compare, unit_factor
-from bench.discrepancy.checks.data_quality import notes, refuse
+from bench.discrepancy.checks.channel_comparison import compare_channels, unit_factor
+from bench.discrepancy.checks.data_quality import notes, refuse_unusable
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.rigs import structure_of
 from bench.errors import BenchError, IdentificationError, RecordingError, UnitError
@@ -48,7 +48,7 @@ def with_parameter(case: Case, name: str, **changes) -> Case:
 def test_nothing_is_noted_of_a_good_case():
     case = planted_case()
     problem = Problem(case, structure_of(case), case.identification)
-    refuse(problem)
+    refuse_unusable(problem)
     check_units(case)
     assert notes(case, problem) == ()
 
@@ -155,7 +155,7 @@ def test_factors_of_units_are_told_from_others():
 
 def test_comparison_of_two_channels_finds_factor_and_lag():
     x, a = linear_motion(load(4, 4000))
-    pair = compare(
+    pair = compare_channels(
         2.0 * np.interp(np.arange(4000) - 1.5, np.arange(4000), x),
         a,
         orders=(0, 2),

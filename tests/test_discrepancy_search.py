@@ -21,7 +21,7 @@ from bench.discrepancy.screening.linear_amplitudes import (
 )
 from bench.discrepancy.screening.screen import Screen
 from bench.discrepancy.simulation.linear_response import linear_run
-from bench.discrepancy.simulation.stick_slip import NO_ELEMENTS, LinearStructure, free_run
+from bench.discrepancy.simulation.stick_slip import NO_ELEMENTS, StructureMatrices, free_run
 
 TIME = np.linspace(0.0, 3.0, 200)
 DATA = 2.0 * np.exp(-1.3 * TIME) * np.cos(4.0 * TIME)
@@ -127,7 +127,7 @@ def test_slopes_whose_squares_overflow_end_a_minimisation_where_it_is():
 @pytest.mark.parametrize("factor", [0, 1, 2])
 def test_exact_linear_runs_agree_with_the_integrator(factor):
     rng = np.random.default_rng(3)
-    structure = LinearStructure(
+    structure = StructureMatrices(
         np.diag([1.0, 2.5]), np.array([[1.2, -0.4], [-0.4, 2.0]]), np.array([[900.0, -300.0], [-300.0, 1500.0]]),
         np.eye(2),
     )  # fmt: skip
@@ -142,7 +142,7 @@ def test_exact_linear_runs_agree_with_the_integrator(factor):
 
 
 def test_restarts_are_runs_of_their_own():
-    structure = LinearStructure(np.eye(1), np.full((1, 1), 0.3), np.full((1, 1), 80.0), np.eye(1))
+    structure = StructureMatrices(np.eye(1), np.full((1, 1), 0.3), np.full((1, 1), 80.0), np.eye(1))
     loads = np.random.default_rng(1).normal(size=(300, 1))
     whole = linear_run(structure, loads=loads, step=5e-3, restarts=np.array([120]))
     second = linear_run(structure, loads=loads[120:], step=5e-3)

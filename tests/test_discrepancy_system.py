@@ -13,15 +13,15 @@ from scipy.signal import cont2discrete, dlsim
 from bench.discrepancy.effects import friction_limits
 from bench.discrepancy.motion.kalman_smoother import smooth_motion
 from bench.discrepancy.simulation.prescribed_response import driven_force
-from bench.discrepancy.simulation.stick_slip import NO_ELEMENTS, Elements, LinearStructure, free_run
+from bench.discrepancy.simulation.stick_slip import NO_ELEMENTS, Elements, StructureMatrices, free_run
 from bench.laws.bouc_wen import BOUC_WEN
 from bench.laws.gap import GAP
 
 MASS, DAMPING, STIFFNESS = 2.0, 5.0, 900.0
 
 
-def structure() -> LinearStructure:
-    return LinearStructure(*(np.array([[x]]) for x in (MASS, DAMPING, STIFFNESS, 1.0)))
+def structure() -> StructureMatrices:
+    return StructureMatrices(*(np.array([[x]]) for x in (MASS, DAMPING, STIFFNESS, 1.0)))
 
 
 def element(law=None, theta=(), limit=None) -> Elements:
@@ -84,7 +84,7 @@ def test_friction_holds_until_the_load_exceeds_it_and_then_stops_in_finite_time(
     """A free block under a ramp: it does not move before F = Fc, then moves as the ramp integrated twice."""
     step, slope, limit = 1e-3, 4.0, 6.0
     t = step * np.arange(3000)
-    block = LinearStructure(np.array([[MASS]]), np.zeros((1, 1)), np.zeros((1, 1)), np.ones((1, 1)))
+    block = StructureMatrices(np.array([[MASS]]), np.zeros((1, 1)), np.zeros((1, 1)), np.ones((1, 1)))
     motion = free_run(
         block,
         element(theta=(limit,), limit=friction_limits.coulomb_limit),
@@ -101,7 +101,7 @@ def test_friction_holds_until_the_load_exceeds_it_and_then_stops_in_finite_time(
 
 def test_friction_stops_a_sliding_block_where_energy_says():
     step, limit, speed = 1e-3, 6.0, 1.5
-    block = LinearStructure(np.array([[MASS]]), np.zeros((1, 1)), np.zeros((1, 1)), np.ones((1, 1)))
+    block = StructureMatrices(np.array([[MASS]]), np.zeros((1, 1)), np.zeros((1, 1)), np.ones((1, 1)))
     motion = free_run(
         block,
         element(theta=(limit,), limit=friction_limits.coulomb_limit),

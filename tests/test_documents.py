@@ -9,12 +9,14 @@ import subprocess
 import sys
 import tomllib
 from pathlib import Path
+from typing import Any, TypeVar
 
 import jsonschema
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from typing_extensions import TypeAliasType
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "scripts"))
 
@@ -30,7 +32,8 @@ from bench.discrepancy.blind.schema import AnswerDocument
 from bench.discrepancy.case.schema import NominalDocument
 from bench.discrepancy.verdict import Estimate, Gap, Location, NamedEffect, Ranked, Split, Verdict
 from bench.discrepancy.verdict_schema import ResultDocument, VerdictDocument
-from bench.documents import Document, DocumentLimits, checked, load_document
+from bench.documents import Document, DocumentLimits, Listed, Number, checked, load_document
+from bench.documents.derived import kind_of
 from bench.errors import (
     BenchError,
     DocumentError,
@@ -356,3 +359,9 @@ def test_nothing_of_this_is_loaded_before_a_document_is_read():
 @pytest.mark.parametrize("target", TARGETS)
 def test_whatever_is_done_to_a_document_ends_in_an_error_of_the_bench(target, tmp_path):
     assert run(target, 50, seed=20) == []
+
+
+def test_an_array_by_an_alias_of_the_type_statement_is_a_list_of_numbers():
+    item = TypeVar("item", bound=np.generic)
+    alias = TypeAliasType("alias", np.ndarray[tuple[Any, ...], np.dtype[item]], type_params=(item,))
+    assert kind_of(alias[np.float64], lambda hint: None) == Listed[Number]

@@ -17,7 +17,7 @@ from gymnasium.utils.env_checker import check_env
 import envs
 from bench import simulate
 from bench.errors import BenchError, ModelError
-from bench.excitation import Hypothesis, Uncertain
+from bench.excitation import RigHypothesis, Uncertain
 from bench.excitation.shaping import SHAPINGS, Shaping
 from envs import rendering, single
 from envs.laboratory import Laboratories, combined
@@ -136,14 +136,14 @@ def test_laboratories_hold_the_hidden_rig(setup: Any) -> None:
 
 def test_laboratories_refuse_what_they_cannot_tell_apart() -> None:
     gap, other = sdof_setup().questions[0].hypotheses[:2]
-    clash = Hypothesis(
+    clash = RigHypothesis(
         "clash",
         other.rig.with_(elements=[other.rig.elements[0].with_(name="gap")]),
         (Uncertain("gap.A", 1.0, 2.0),),
     )
     with pytest.raises(ModelError, match="another law under the name 'gap'"):
         combined((gap, clash), ("displacement",))
-    heavy = Hypothesis("heavy", gap.rig, (Uncertain("mass:carriage", 1.0, 2.0),))
+    heavy = RigHypothesis("heavy", gap.rig, (Uncertain("mass:carriage", 1.0, 2.0),))
     with pytest.raises(ModelError, match="cannot differ between laboratories"):
         Laboratories((heavy,), 1, channels=("displacement",), actuators=("shaker",))
 

@@ -18,8 +18,8 @@ from bench.excitation import (
     Contrast,
     Ensemble,
     Experiment,
-    Hypothesis,
     Limits,
+    RigHypothesis,
     RigPrior,
     Rivals,
     Uncertain,
@@ -57,9 +57,9 @@ def sdof(*elements: Element) -> Rig:
     return sdof_rig(*elements, mass=2.0, stiffness=300.0, damping=1.5, timestep=1e-2)
 
 
-def hypothesis(law: str, **ranges: tuple[float, float]) -> Hypothesis:
+def hypothesis(law: str, **ranges: tuple[float, float]) -> RigHypothesis:
     own = tuple(Uncertain(f"{law}.{name}", *bounds) for name, bounds in ranges.items())
-    return Hypothesis(law, sdof(Element.of(law, "carriage", name=law)), (*STRUCTURE, *own))
+    return RigHypothesis(law, sdof(Element.of(law, "carriage", name=law)), (*STRUCTURE, *own))
 
 
 GAP = hypothesis("gap", stiffness=(300.0, 1500.0), clearance=(2e-3, 1e-2))
@@ -186,7 +186,9 @@ def test_ensembles_name_what_they_do_not_know() -> None:
 
 
 def test_sensitivity_of_a_linear_rig_is_that_of_its_variational_equation() -> None:
-    draw = Hypothesis("linear", sdof(), STRUCTURE).of({"stiffness:carriage": 280.0, "damping:carriage": 2.0})
+    draw = RigHypothesis("linear", sdof(), STRUCTURE).of(
+        {"stiffness:carriage": 280.0, "damping:carriage": 2.0}
+    )
     u = wave(500)
     found = sensitivity(draw, {"shaker": u[:, 0]}, channels=("displacement",), central=True)
     # d/dk of m x'' + c x' + k x = F is the same oscillator driven by -x, and by -x' for c; solved exactly for held forces.
@@ -209,7 +211,7 @@ def test_sensitivity_of_a_linear_rig_is_that_of_its_variational_equation() -> No
 
 
 @pytest.mark.parametrize("kind", [GAP, BOUC_WEN], ids=lambda h: h.name)
-def test_information_agrees_with_central_differences_in_mujoco(kind: Hypothesis) -> None:
+def test_information_agrees_with_central_differences_in_mujoco(kind: RigHypothesis) -> None:
     draw = kind.at(np.zeros(len(kind.parameters)))
     drive, channels = {"shaker": wave(250)[:, 0]}, tuple(NOISE)
     noise = np.array(list(NOISE.values()))
@@ -226,7 +228,7 @@ def test_information_agrees_with_central_differences_in_mujoco(kind: Hypothesis)
 @pytest.mark.slow
 def test_scatter_of_200_identifications_is_the_inverse_information() -> None:
     names = ("gap.stiffness", "gap.clearance")
-    kind = Hypothesis("gap", GAP.rig, tuple(p for p in GAP.parameters if p.name in names))
+    kind = RigHypothesis("gap", GAP.rig, tuple(p for p in GAP.parameters if p.name in names))
     truth, u, channels = kind.at([0.3, -0.4]), wave(300), tuple(NOISE)
     noise = np.array(list(NOISE.values()))
     at_truth = sensitivity(truth, {"shaker": u[:, 0]}, channels=channels)
@@ -420,7 +422,7 @@ def test_coordinates_are_standardised(low: float, factor: float, at: float, log:
 
 
 def test_draws_are_spread_and_weighed() -> None:
-    prior = RigPrior((GAP, Hypothesis("bouc_wen", BOUC_WEN.rig, BOUC_WEN.parameters, weight=3.0)))
+    prior = RigPrior((GAP, RigHypothesis("bouc_wen", BOUC_WEN.rig, BOUC_WEN.parameters, weight=3.0)))
     rng = np.random.default_rng(0)
     draws = prior.draws(7, rng)
     assert [d.hypothesis.name for d in draws] == ["gap"] * 4 + ["bouc_wen"] * 3
@@ -444,7 +446,7 @@ def test_priors_say_what_is_wrong() -> None:
     with pytest.raises(UnknownNameError, match="element"):
         with_values(GAP.rig, {"nothing.clearance": 1.0})
     with pytest.raises(UnknownNameError, match="parameter"):
-        Hypothesis("gap", GAP.rig, (Uncertain("gap.width", 1.0, 2.0),))
+        RigHypothesis("gap", GAP.rig, (Uncertain("gap.width", 1.0, 2.0),))
     with pytest.raises(ParameterError, match="at least one each"):
         PRIOR.draws(1, np.random.default_rng(0))
     with pytest.raises(ParameterError, match="limit of 'shaker'"):
@@ -454,7 +456,7 @@ def test_priors_say_what_is_wrong() -> None:
 
 
 def test_unstable_rigs_are_named_instead_of_searched_for_ever() -> None:
-    away = Hypothesis(
+    away = RigHypothesis(
         "constant", sdof(Element.of("constant_force", "carriage", F0=100.0, name="constant")), STRUCTURE
     )
     prior = RigPrior((away,))

@@ -27,7 +27,7 @@ from bench.files import (
     write_bytes,
     write_text,
 )
-from bench.targets import check_folder, check_targets
+from bench.targets import check_target_folder, check_targets
 
 
 def everything(folder: Path) -> dict[str, bytes]:
@@ -146,11 +146,11 @@ def test_places_are_checked_before_anything_runs(tmp_path: Path) -> None:
         check_targets(tmp_path / "there" / "in a file")
     with pytest.raises(OutputError, match="too long"):
         check_targets(tmp_path / ("n" * 300))
-    check_folder(tmp_path / "new")
+    check_target_folder(tmp_path / "new")
     with pytest.raises(OutputError, match="--force"):
-        check_folder(tmp_path)
-    check_folder(tmp_path, force=True)
-    check_folder(tmp_path, own=("th*",))
+        check_target_folder(tmp_path)
+    check_target_folder(tmp_path, force=True)
+    check_target_folder(tmp_path, own=("th*",))
 
 
 RIG = """

@@ -1,9 +1,10 @@
-"""Imports: no circle of files, no room too large, nothing loose beside the rooms of the diagnosis."""
+"""Structure: no circle of files, nothing too large, one name for one thing, nothing loose beside the rooms of the diagnosis."""
 
 from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -16,19 +17,20 @@ LEAVES = {"verdict", "verdict_schema", "settings"}
 LARGEST_ROOM, MOST_LOOSE = 2500, 4
 """Lines of a room of the diagnosis, and files beside its rooms."""
 LARGEST_FILE, LARGEST_FUNCTION, LARGEST_CLASS = 350, 60, 300
-"""Lines of a file of the diagnosis, of a function and of a class in it, these without their docstrings."""
-OWED = {
-    "blind/scoring.py: summary",
-}
-"""What still owes a cut; what is paid has to be struck off."""
+"""Lines of a file, and of a function and a class without their docstrings; tests, one file a subject, are not counted."""
 COMPILED_LOOPS = {
-    "articulated_truth/time_stepping.py: _march",
-    "simulation/equations_of_motion.py: derivative",
-    "simulation/prescribed_response.py: _driven",
-    "simulation/stick_slip.py: _free_run",
-    "truth/moreau_steps.py: march_through",
+    "bench/discrepancy/articulated_truth/time_stepping.py: _march",
+    "bench/discrepancy/simulation/equations_of_motion.py: derivative",
+    "bench/discrepancy/simulation/prescribed_response.py: _driven",
+    "bench/discrepancy/simulation/stick_slip.py: _free_run",
+    "bench/discrepancy/truth/moreau_steps.py: march_through",
+    "bench/excitation/stepping.py: _advance_single",
+    "bench/laws/memory.py: force",
 }
-"""Functions that stay whole: one compiled loop each, whose parts would pass a dozen numbers to one another."""
+"""Functions that stay whole: one compiled loop each, whose parts would pass a dozen numbers to one another, or a kernel of a law,
+one C function that calls no other."""
+COMMANDS = {"BlindScore", "Design"}
+"""Names that a command shares with what it prints: a command is called what a person types."""
 
 
 def modules() -> dict[str, Path]:
@@ -102,28 +104,70 @@ def test_diagnosis_lives_in_rooms():
         assert lines <= LARGEST_ROOM, room.name
 
 
-def lines_of(node: ast.FunctionDef | ast.ClassDef) -> int:
-    """Lines of a function or class without its docstring."""
-    doc, end = node.body[0], node.end_lineno or node.lineno
-    documented = isinstance(doc, ast.Expr) and isinstance(doc.value, ast.Constant)
-    return end - node.lineno + 1 - ((doc.end_lineno or 0) - doc.lineno + 1 if documented else 0)
+parsed = cache(ast.parse)
+"""Syntax tree of a text; several tests walk the same ones."""
 
 
-def too_large() -> set[str]:
-    """Files of the diagnosis, and functions and classes in them, that are longer than the limits."""
+def docstring_lines(node: ast.FunctionDef | ast.ClassDef) -> int:
+    """Lines of the docstring of a function or class, and of those within it."""
+    inner = (n for n in ast.walk(node) if isinstance(n, ast.FunctionDef | ast.ClassDef))
+    docs = (n.body[0] for n in inner if ast.get_docstring(n) is not None)
+    return sum((doc.end_lineno or 0) - doc.lineno + 1 for doc in docs)
+
+
+@cache
+def code() -> dict[str, str]:
+    """Text of every file that runs, tests left out, by its path."""
+    paths = (path for top in ("bench", "envs", "scripts", "examples") for path in (ROOT / top).rglob("*.py"))
+    return {path.relative_to(ROOT).as_posix(): path.read_text() for path in paths}
+
+
+def too_large(files: dict[str, str]) -> set[str]:
+    """Files, and functions and classes in them, that are longer than the limits."""
     found = set()
-    for path in DIAGNOSIS.rglob("*.py"):
-        name, text = path.relative_to(DIAGNOSIS).as_posix(), path.read_text()
+    for name, text in files.items():
         found |= {name} if len(text.splitlines()) > LARGEST_FILE else set()
-        for node in ast.walk(ast.parse(text)):
+        for node in ast.walk(parsed(text)):
             if isinstance(node, ast.FunctionDef | ast.ClassDef):
                 most = LARGEST_CLASS if isinstance(node, ast.ClassDef) else LARGEST_FUNCTION
-                found |= {f"{name}: {node.name}"} if lines_of(node) > most else set()
+                lines = (node.end_lineno or 0) - node.lineno + 1 - docstring_lines(node)
+                found |= {f"{name}: {node.name}"} if lines > most else set()
     return found
 
 
-def test_files_functions_and_classes_of_the_diagnosis_are_short():
-    assert too_large() == OWED | COMPILED_LOOPS
+def test_files_functions_and_classes_are_short():
+    assert too_large(code()) == COMPILED_LOOPS
+
+
+def test_what_is_too_large_is_found():
+    body = "    x = 1\n" * LARGEST_FUNCTION
+    assert too_large({"a.py": f"def short():\n    'It.'\n{body[:-10]}"}) == set()
+    assert too_large({"a.py": f"class A:\n  def long():\n{body.replace('    ', '      ')}"}) == {"a.py: long"}
+
+
+def defined_twice(files: dict[str, str]) -> dict[str, list[str]]:
+    """Public classes and types that more than one file defines, with the files."""
+    found: dict[str, list[str]] = {}
+    for path, text in files.items():
+        for node in parsed(text).body:
+            targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
+            names = [target.id for target in targets if isinstance(target, ast.Name)]
+            names = [node.name] if isinstance(node, ast.ClassDef) else names
+            # a name in CamelCase is a type, one in capitals a constant
+            for name in names:
+                if name[0].isupper() and not name.isupper() and path not in found.setdefault(name, []):
+                    found[name].append(path)
+    return {name: paths for name, paths in found.items() if len(paths) > 1}
+
+
+def test_one_name_is_one_type():
+    packages = {path: text for path, text in code().items() if not path.startswith(("scripts", "examples"))}
+    assert set(defined_twice(packages)) == COMMANDS
+
+
+def test_names_defined_twice_are_found():
+    texts = {"a.py": "class Row: ...\nPair = tuple\nLIMIT = 1", "b.py": "Row = int\nLIMIT = 2\nOther = 3"}
+    assert defined_twice(texts) == {"Row": ["a.py", "b.py"]}
 
 
 def drawn(page: str) -> set[tuple[str, str]]:

@@ -12,7 +12,7 @@ import pytest
 
 from bench.cli import main
 from bench.identification import ValidityRange
-from bench.joint_models import Columns, joint_motions, read_joint
+from bench.joint_models import JointColumns, joint_motions, read_joint
 from bench.laws.evaluate import evaluate
 from bench.record_files import read_recording
 
@@ -138,7 +138,7 @@ def test_force_from_load_and_inertia(folder):
     assert main(["identify", str(folder / "run_1.parquet"), *words, *judge, "-o", str(out), "--json"]) == 0
     assert set(read_joint(out).scores) == {"identification", "judging records"}
     record = read_recording(folder / "run_1.parquet")
-    columns = Columns(("displacement",), ("velocity",), (), ("load_cell",), ("acceleration_x",), (2.0,))
+    columns = JointColumns(("displacement",), ("velocity",), (), ("load_cell",), ("acceleration_x",), (2.0,))
     (motion,), _ = joint_motions([record], columns)
     guide = 1500.0 * record["displacement"] + 4.0 * record["velocity"]
     # guide and gap together; MuJoCo's own equation of motion, so that only rounding parts them

@@ -140,12 +140,12 @@ class Callbacks(RuleBasedStateMachine):
         data = mujoco.MjData(model)
         data.qvel[0] = 0.1
         if own:
-            native.check(model)
+            native.check_registered(model)
         else:
             start = model.numeric_adr[native.encoding.rows(model)[0]]
             model.numeric_data[start + 2] += 1.0
             with pytest.raises(NativeError, match="of another process"):
-                native.check(model)
+                native.check_registered(model)
         mujoco.mj_forward(model, data)
         assert np.isfinite(data.qfrc_passive).all() == own
 
@@ -210,7 +210,7 @@ own = rig("linear").model
 forked = pickle.load(open("forked.pkl", "rb"))
 assert forked.numeric_data[1] == own.numeric_data[1]
 try:
-    native.check(forked)
+    native.check_registered(forked)
 except NativeError:
     print("refused")
 mujoco.mj_saveModel(rig("bouc_wen").model, "other.mjb")
@@ -228,7 +228,7 @@ def test_a_model_of_another_process_shows_nan_and_is_refused_until_bound(tmp_pat
     ):
         native.install()
         with pytest.raises(NativeError, match=r"another process.*bind"):
-            native.check(model)
+            native.check_registered(model)
         with pytest.raises(NativeError), native.running(model):
             raise AssertionError("no step is run")
         data = mujoco.MjData(model)

@@ -19,9 +19,9 @@ from bench.errors import FileFormatError, ModelError, ParameterError, UnknownNam
 from bench.excitation import (
     Ensemble,
     Family,
-    Hypothesis,
     Planner,
     Policy,
+    RigHypothesis,
     RivalPlanner,
     Rivals,
     Station,
@@ -87,7 +87,7 @@ def test_families_are_the_ensembles_of_their_rigs(family: Family) -> None:
 
 
 def test_what_is_not_affine_is_no_family() -> None:
-    heavy = Hypothesis("heavy", GAP.hypothesis.rig, (Uncertain("mass:carriage", 1.0, 4.0),))
+    heavy = RigHypothesis("heavy", GAP.hypothesis.rig, (Uncertain("mass:carriage", 1.0, 4.0),))
     with pytest.raises(ModelError, match="masses and inertias"):
         Family(heavy, STATION.channels, STATION.actuators)
 
@@ -248,9 +248,10 @@ def test_rival_planners_say_what_they_cannot_take() -> None:
 def test_exported_policies_are_the_trained_networks(algorithm: str, tmp_path: Path) -> None:
     import torch
 
-    from envs.training import Plan, Trainer
+    from envs.training import Trainer
+    from envs.training_plan import TrainingPlan
 
-    plan = Plan(algorithm=algorithm, n_envs=3, network=(8, 5), start="nothing", n_held_out=3)
+    plan = TrainingPlan(algorithm=algorithm, n_envs=3, network=(8, 5), start="nothing", n_held_out=3)
     trainer = Trainer(plan, tmp_path)
     with torch.no_grad():  # networks begin with outputs of nearly zero
         for parameter in trainer.model.policy.parameters():
@@ -270,9 +271,12 @@ def test_exported_policies_are_the_trained_networks(algorithm: str, tmp_path: Pa
 
 @pytest.mark.slow
 def test_a_smoke_training_improves_on_its_start_and_goes_on_where_it_was(tmp_path: Path) -> None:
-    from envs.training import Plan, Trainer
+    from envs.training import Trainer
+    from envs.training_plan import TrainingPlan
 
-    plan = Plan(steps=24_000, n_envs=48, network=(16,), start="nothing", evaluate_every=9_600, n_held_out=24)
+    plan = TrainingPlan(
+        steps=24_000, n_envs=48, network=(16,), start="nothing", evaluate_every=9_600, n_held_out=24
+    )
     trainer = Trainer(plan, tmp_path)
     trainer.run()
     first, last = trainer.curve[0], trainer.curve[-1]

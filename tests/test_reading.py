@@ -21,8 +21,9 @@ import scipy.io
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "scripts"))
 
 from fuzz import run
+from fuzzing.binary_records import make_hdf5, make_mat, make_npz, make_parquet
 from fuzzing.products import PRODUCT_TARGETS
-from fuzzing.records import RECORD_TARGETS, make_hdf5, make_mat, make_npz, make_parquet
+from fuzzing.records import RECORD_TARGETS
 
 from bench.discrepancy import read_case
 from bench.errors import BenchError, FileFormatError, ModelError, RecordingError, RecordWarning, UnitError

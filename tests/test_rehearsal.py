@@ -18,7 +18,7 @@ from bench.discrepancy.precheck.checking import check_folder
 from bench.discrepancy.rehearsal import rehearsing
 from bench.discrepancy.rehearsal.placing import sites
 from bench.discrepancy.rehearsal.rehearsing import STORE, Outcome, Rehearsal, rehearse
-from bench.discrepancy.rehearsal.truth import Laboratory
+from bench.discrepancy.rehearsal.truth import ModelLaboratory
 from bench.record_files import read_recording
 from bench.record_files.plain_writing import write_record
 from bench.recording import Channel, Recording
@@ -131,7 +131,7 @@ def test_check_tells_nothing_of_a_servo_that_stands(arm, tmp_path):
 
 def test_an_effect_of_a_size_changes_the_motion_by_as_much(arm):
     case = shortened(arm)
-    laboratory = Laboratory.of(case)
+    laboratory = ModelLaboratory.of(case)
     rng = np.random.default_rng(0)
     base = laboratory.measured(Findings(()), rng, noisy=False)
     before = base.validation[0].values["position"]

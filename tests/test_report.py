@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from browser import CHROMIUM, browser, shown_whole
 
-from bench.cli.verdict_text import summary
+from bench.cli.verdict_text import verdict_summary
 from bench.discrepancy.report.answers import answers, next_steps
 from bench.discrepancy.report.interactive import (
     SETTINGS,
@@ -98,7 +98,7 @@ def test_a_report_is_drawn_whole_at_every_width_and_in_both_schemes(tmp_path):
 
 def test_page_and_console_give_the_same_answers():
     text = report().to_html()
-    table = summary(VERDICT, OPTIONS)[1]
+    table = verdict_summary(VERDICT, OPTIONS)[1]
     told = [str(cell) for cell in table.columns[1].cells]
     assert told[: len(answers(VERDICT))] == [a.answer for a in answers(VERDICT)]
     for found in answers(VERDICT):

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from bench.errors import UnknownNameError
-from bench.reproduction import ENTRIES, Entry, Item, Result, find_entries, reproduce, running
+from bench.reproduction import ENTRIES, Item, ItemEntry, Result, find_entries, reproduce, running
 from bench.reproduction.printed_figures import PANELS
-from bench.reproduction.verdict import OWN, Verdict, axis_row, fact_row, one_of_ours, value_row
-from bench.reproduction.writing import summary, to_gallery, to_markdown
+from bench.reproduction.verdict import OWN, RowVerdict, axis_row, fact_row, one_of_ours, value_row
+from bench.reproduction.writing import items_summary, to_gallery, to_markdown
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 
@@ -48,28 +48,28 @@ def range_of(values, seeds=(), **options):
 
 
 def test_a_range_holds_only_if_both_of_its_ends_lie_where_the_axis_says():
-    assert range_of([-0.9, 0.0, 0.6]).verdict is Verdict.HOLDS
-    assert range_of([-0.9, 0.0, 0.4]).verdict is Verdict.FAILS
-    assert range_of([-1.1, 0.0, 0.9]).verdict is Verdict.FAILS
-    assert range_of([-0.3, 0.0, 0.9], below=(0.4, 0.2)).verdict is Verdict.HOLDS
+    assert range_of([-0.9, 0.0, 0.6]).verdict is RowVerdict.HOLDS
+    assert range_of([-0.9, 0.0, 0.4]).verdict is RowVerdict.FAILS
+    assert range_of([-1.1, 0.0, 0.9]).verdict is RowVerdict.FAILS
+    assert range_of([-0.3, 0.0, 0.9], below=(0.4, 0.2)).verdict is RowVerdict.HOLDS
 
 
 def test_the_verdict_is_that_of_the_seeds_and_not_of_the_record_shown():
     wide, fit = [-1.2, 1.2], [-0.8, 0.8]
-    assert range_of(fit, seeds=[wide, wide, fit]).verdict is Verdict.FAILS
-    assert range_of(wide, seeds=[fit, fit, wide]).verdict is Verdict.HOLDS
+    assert range_of(fit, seeds=[wide, wide, fit]).verdict is RowVerdict.FAILS
+    assert range_of(wide, seeds=[fit, fit, wide]).verdict is RowVerdict.HOLDS
     row = value_row("n", "1", 2.0, 5.0, low=1.0, high=3.0, seeds=[2.0, 2.5, 9.0])
-    assert row.verdict is Verdict.HOLDS
+    assert row.verdict is RowVerdict.HOLDS
     assert row.spread == "2.5 (2 … 9)"
-    assert value_row("n", "1", 2.0, 2.0, high=3.0, seeds=[4.0, 5.0, 2.0]).verdict is Verdict.FAILS
+    assert value_row("n", "1", 2.0, 2.0, high=3.0, seeds=[4.0, 5.0, 2.0]).verdict is RowVerdict.FAILS
 
 
 def test_a_value_holds_between_its_limits_and_cannot_be_judged_without():
     assert value_row("n", "1", 2.0, 2.1, low=1.9, high=2.2).holds is True
     assert value_row("n", "1", 2.0, 2.3, high=2.2).holds is False
-    assert value_row("n", "1", 2.0, 2.3, high=2.2, shape=(0.0, 3.0)).verdict is Verdict.SHAPE
+    assert value_row("n", "1", 2.0, 2.3, high=2.2, shape=(0.0, 3.0)).verdict is RowVerdict.SHAPE
     assert value_row("n", "1", None, math.nan, high=2.2).holds is False
-    assert value_row("n", "1", 2.0, 2.3).verdict is Verdict.NOT_COMPARABLE
+    assert value_row("n", "1", 2.0, 2.3).verdict is RowVerdict.NOT_COMPARABLE
     assert value_row("n", "1", 2.0, 2.3).holds is None
     assert value_row("n", "1", 2.0, 2.3).deviation == pytest.approx(15.0)
 
@@ -78,10 +78,10 @@ def test_a_printed_value_holds_where_it_could_be_one_of_ours():
     def row(printed, seeds):
         return one_of_ours("e", "%", printed, seeds[0], seeds, source="p. 1", shape=(0.0, 5.0)).verdict
 
-    assert row(4.0, [3.0, 3.5, 4.5]) is Verdict.HOLDS
-    assert row(2.0, [3.0, 3.5, 4.5]) is Verdict.SHAPE
-    assert row(2.0, [6.0, 7.0, 8.0]) is Verdict.FAILS
-    assert row(9.0, [3.0, 3.5, 4.5]) is Verdict.FAILS
+    assert row(4.0, [3.0, 3.5, 4.5]) is RowVerdict.HOLDS
+    assert row(2.0, [3.0, 3.5, 4.5]) is RowVerdict.SHAPE
+    assert row(2.0, [6.0, 7.0, 8.0]) is RowVerdict.FAILS
+    assert row(9.0, [3.0, 3.5, 4.5]) is RowVerdict.FAILS
 
 
 def test_what_was_put_in_is_told_and_not_counted_as_evidence():
@@ -91,7 +91,7 @@ def test_what_was_put_in_is_told_and_not_counted_as_evidence():
         fact_row("c", "2", False, printed="1", source="p. 1"),
         fact_row("d", "1", True),
     )
-    told = summary([Result("A1", "t", "x", "nothing", rows, (), 1.0, "v")])
+    told = items_summary([Result("A1", "t", "x", "nothing", rows, (), 1.0, "v")])
     assert "Of 3 things that the text prints, 2 hold, 0 hold in shape only, 1 does not hold" in told
     assert "1 of those that hold were put in" in told
     assert "Of 1 checks of our own" in told
@@ -128,7 +128,7 @@ def test_every_row_says_where_it_is_printed_and_why_it_is_judged_so(published):
             assert row.reason, name
             assert (row.source == OWN) == row.own, name
             assert row.holds is None or row.tolerance, name
-            if row.verdict in {Verdict.FAILS, Verdict.SHAPE} and not row.own:
+            if row.verdict in {RowVerdict.FAILS, RowVerdict.SHAPE} and not row.own:
                 assert row.why, name
 
 
@@ -164,7 +164,7 @@ def counting(monkeypatch):
     def run(entry, progress):
         return item.make(entry, progress)
 
-    monkeypatch.setattr(Entry, "run", run)
+    monkeypatch.setattr(ItemEntry, "run", run)
     return item
 
 
@@ -240,21 +240,18 @@ def test_the_chain_comes_to_rest_where_statics_say():
 
 
 def test_integration_without_hysteresis_is_an_oscillator():
-    from bench.reproduction.simulated_hysteresis import (
-        SIMULATED_HYSTERESIS_SETUP,
-        integrate,
-    )
+    from bench.reproduction.bouc_wen_rig import SETUP, integrate_alone
 
     n = 4000
-    rows = integrate(np.full(n, 2.0), [np.array([5.0, 0.0, 0.0, 0.0, 0.0])] * n)
-    time = np.arange(n) / SIMULATED_HYSTERESIS_SETUP.rate
+    rows = integrate_alone(np.full(n, 2.0), [np.array([5.0, 0.0, 0.0, 0.0, 0.0])] * n)
+    time = np.arange(n) / SETUP.rate
     # RK4 at omega h = 2e-3: (omega h)^4 / 120 of a radian a radian, far below 1e-10
     np.testing.assert_allclose(rows[:, 0], 0.4 * (1.0 - np.cos(math.sqrt(5.0) * time)), atol=1e-10)
     np.testing.assert_allclose(rows[:, 2], 2.0 * np.cos(math.sqrt(5.0) * time), atol=1e-9)
 
 
 def test_the_encoders_lag_as_the_load_cells_do():
-    from bench.reproduction import laboratory_joint as laboratory
+    from bench.reproduction import laboratory
     from bench.rig import simulate
 
     true = simulate(laboratory.rig(), laboratory.drive((True, True)), rng=np.random.default_rng(1))

@@ -9,8 +9,8 @@ from bench import Element, Recording
 from bench.laws import LAWS
 from bench.rerun_log.bands import (
     BANDS_SETTINGS,
-    bands_of,
     changes,
+    element_bands,
 )
 
 
@@ -27,7 +27,7 @@ def record_of(element: str, t, x, v, r) -> Recording:
 
 def test_a_gap_is_in_contact_for_the_share_of_a_sine_that_geometry_says():
     gap = Element.of("gap", "carriage", clearance=0.3, offset=0.1, name="gap")
-    (band,) = bands_of(gap)
+    (band,) = element_bands(gap)
     t, x, v = sine(1.0)
     states = band.of(record_of("gap", t, x, v, x))
     assert states is not None
@@ -38,7 +38,7 @@ def test_a_gap_is_in_contact_for_the_share_of_a_sine_that_geometry_says():
 
 
 def test_a_one_sided_stop_never_touches_the_other_side():
-    (band,) = bands_of(Element.of("one_sided_stop", "carriage", position=-0.2, side=-1.0, name="stop"))
+    (band,) = element_bands(Element.of("one_sided_stop", "carriage", position=-0.2, side=-1.0, name="stop"))
     t, x, v = sine(1.0)
     states = band.of(record_of("stop", t, x, v, x))
     np.testing.assert_array_equal(states == 0, x < -0.2)
@@ -46,14 +46,14 @@ def test_a_one_sided_stop_never_touches_the_other_side():
 
 
 def test_coulomb_friction_sticks_below_its_regularisation_velocity():
-    (band,) = bands_of(Element.of("coulomb", "carriage", regularisation_velocity=0.5, name="slide"))
+    (band,) = element_bands(Element.of("coulomb", "carriage", regularisation_velocity=0.5, name="slide"))
     t, x, v = sine(1.0)
     np.testing.assert_array_equal(band.of(record_of("slide", t, x, v, x)) == 0, np.abs(v) < 0.5)
 
 
 def test_a_jenkins_slider_slips_from_the_yield_of_each_half_cycle_to_its_reversal():
     amplitude, yield_at, limit = 1.0, 0.2, 5.0
-    (band,) = bands_of(
+    (band,) = element_bands(
         Element.of("jenkins", "carriage", stiffness=limit / yield_at, limit=limit, name="slide")
     )
     t, x, v = sine(amplitude)
@@ -77,7 +77,7 @@ def test_bands_of_every_law_read_channels_that_the_law_has():
         suffixes = [""] if len(names) == 1 else [f"_{i + 1}" for i in range(len(names))]
         held = {f"e/{motion}{s}" for motion in ("displacement", "velocity", "force") for s in suffixes}
         held |= {f"e/{state.partition(' [')[0]}" for state in law.states}
-        bands = bands_of(element)
+        bands = element_bands(element)
         assert {channel for band in bands for channel in band.channels} <= held, law.name
         assert len({band.name for band in bands}) == len(bands), law.name
         quiet += not bands
@@ -96,6 +96,6 @@ def test_friction_and_gap_laws_all_have_bands():
         "jenkins",
         "iwan",
     ):
-        assert bands_of(Element.of(name, "carriage")), name
-    assert len(bands_of(Element.of("axial_torsional_joint", "axial", "torsional"))) == 2
-    assert len(bands_of(Element.of("jenkins_backlash", "carriage"))) == 2
+        assert element_bands(Element.of(name, "carriage")), name
+    assert len(element_bands(Element.of("axial_torsional_joint", "axial", "torsional"))) == 2
+    assert len(element_bands(Element.of("jenkins_backlash", "carriage"))) == 2

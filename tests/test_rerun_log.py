@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from bench import Element, Recording, Rig, simulate
 from bench.errors import BenchError, ParameterError, RecordingError, UnknownNameError
 from bench.rerun_log import body_poses, joint_positions, log_comparison
-from bench.rerun_log.bands import bands_of, changes
+from bench.rerun_log.bands import changes, element_bands
 from bench.rerun_log.scene import eye_of, mesh_of, skin_slices
 from bench.rerun_log.traces import extremes, frame_of
 from bench.rig.library import chain_rig, joint_rig, sdof_rig
@@ -309,7 +309,7 @@ def test_bands_loops_scores_and_blueprint_are_in_the_file(case, written):
     rigs, records = case
     chunks = chunks_of(written)
     for number, (name, record) in enumerate(records.items()):
-        (gap,) = bands_of(rigs["true"].element("gap"))
+        (gap,) = element_bands(rigs["true"].element("gap"))
         states = gap.of(record)
         lane = chunks[f"/bands/gap.gap/{number}-{name}"]
         at = column(lane, "time")

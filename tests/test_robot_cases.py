@@ -14,7 +14,7 @@ from bench.discrepancy.articulated.admission import admitted_robot
 from bench.discrepancy.articulated.recognition import applies
 from bench.discrepancy.articulated_truth.faults import FAULTS
 from bench.discrepancy.articulated_truth.robots import MODELS, draw_robot, reference_of
-from bench.discrepancy.articulated_truth.time_stepping import CELLS, Cell, march
+from bench.discrepancy.articulated_truth.time_stepping import CELLS, Cell, march_bodies
 from bench.discrepancy.multibody.model import ArticulatedModel, compiled_model
 from bench.errors import ParameterError
 
@@ -27,7 +27,7 @@ def swung(table, model, n=250):
     t = np.arange(n) / RATE
     reference = 0.4 * np.sin(4.0 * np.outer(t, [1.0, 1.5])) * np.minimum(t, 1.0)[:, None] ** 2
     speed = np.gradient(reference, 1.0 / RATE, axis=0)
-    return march(
+    return march_bodies(
         model.model,
         table,
         servo=False,

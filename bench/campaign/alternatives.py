@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from bench.campaign.distribution import Quantity
-from bench.campaign.nest import Node, as_entry, leaves
+from bench.campaign.nest import Nested, as_entry, leaves
 from bench.errors import ParameterError
 
 
@@ -127,7 +127,7 @@ class ExcitationPlan:
     """
 
     name: str
-    signals: Mapping[str, Node]
+    signals: Mapping[str, Nested]
     weight: float = 1.0
     rigs: tuple[str, ...] = ()
     prescribe: str = ""
@@ -165,7 +165,7 @@ class SensorPlan:
     """
 
     name: str
-    chains: Mapping[str, Mapping[str, Node]]
+    chains: Mapping[str, Mapping[str, Nested]]
     weight: float = 1.0
     rigs: tuple[str, ...] = ()
     withheld: bool = False

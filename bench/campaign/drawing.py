@@ -22,7 +22,7 @@ from bench.errors import ParameterError
 
 
 @dataclass(frozen=True)
-class DrawingSettings:
+class RecordDrawSettings:
     """Numbers of `bench.campaign.drawing`."""
 
     choices: int = 3
@@ -33,12 +33,12 @@ class DrawingSettings:
     """Numbers of a Latin hypercube, which must be held whole: 160 MB."""
 
 
-SETTINGS = DrawingSettings()
+SETTINGS = RecordDrawSettings()
 
 _designing = threading.Lock()
 
 
-class Draw(NamedTuple):
+class RecordDraw(NamedTuple):
     """One record's draw.
 
     Attributes:
@@ -66,7 +66,7 @@ def record_streams(
     return np.random.default_rng(draw), np.random.default_rng(excitation), np.random.default_rng(sensors)
 
 
-def draws(plan: Plan, records: Iterable[int]) -> list[Draw]:
+def draws(plan: Plan, records: Iterable[int]) -> list[RecordDraw]:
     """What the records draw."""
     return [draw_at(plan, record, point_of(plan, record)) for record in records]
 
@@ -87,7 +87,7 @@ def point_of(plan: Plan, record: int) -> NDArray[np.float64]:
     return _sobol(block, dimension(plan), plan.seed)[place]
 
 
-def draw_at(plan: Plan, record: int, point: NDArray[np.float64]) -> Draw:
+def draw_at(plan: Plan, record: int, point: NDArray[np.float64]) -> RecordDraw:
     """What a record draws whose point ``(dimension,)`` is given."""
     shared = {
         name: quantity.at(float(u))
@@ -111,10 +111,10 @@ def draw_at(plan: Plan, record: int, point: NDArray[np.float64]) -> Draw:
         slots = iter(point[at + rigs + excitations :])
         for column, quantity, _ in plan.sensors[sensors].quantities():
             values[column] = _value(quantity, slots, shared)
-    return Draw(record, rig, excitation, sensors, present, values)
+    return RecordDraw(record, rig, excitation, sensors, present, values)
 
 
-def median_draw(plan: Plan, rig: int, excitation: int, sensors: int) -> Draw:
+def median_draw(plan: Plan, rig: int, excitation: int, sensors: int) -> RecordDraw:
     """A draw with all elements of a rig and every quantity at its median, to try a plan with; record 0."""
     shared = {name: quantity.at(0.5) for name, quantity in plan.shared.items()}
     named = [(column, quantity) for column, quantity, _ in plan.rigs[rig].quantities()]
@@ -122,7 +122,7 @@ def median_draw(plan: Plan, rig: int, excitation: int, sensors: int) -> Draw:
     if sensors >= 0:
         named += [(column, quantity) for column, quantity, _ in plan.sensors[sensors].quantities()]
     values = {column: _value(quantity, repeat(0.5), shared) for column, quantity in named}
-    return Draw(0, rig, excitation, sensors, (True,) * len(plan.rigs[rig].elements), values)
+    return RecordDraw(0, rig, excitation, sensors, (True,) * len(plan.rigs[rig].elements), values)
 
 
 def _blocks(plan: Plan) -> tuple[int, int, int]:

@@ -18,10 +18,11 @@ from typing import Any, NamedTuple
 
 from bench.campaign.lock import CampaignError
 from bench.campaign.means import cores, means_of
+from bench.campaign.parts import counts
 from bench.campaign.plan import Plan
 from bench.campaign.reading import plan_from_dict, read_plan
 from bench.campaign.size import check_size
-from bench.campaign.store import Store, counts
+from bench.campaign.store import Store
 from bench.campaign.task import generator_of, payload_of
 from bench.errors import ParameterError
 

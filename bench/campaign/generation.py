@@ -18,14 +18,15 @@ from mujoco.batch import SimulationError as BatchError
 from numpy.typing import NDArray
 
 from bench import native
-from bench.campaign.drawing import Draw, check_design, draws, median_draw, record_streams
+from bench.campaign.drawing import RecordDraw, check_design, draws, median_draw, record_streams
 from bench.campaign.plan import Plan
-from bench.campaign.variant import STATE, Rows, Variant, Variants, chains_of, drive_of, kept_channels
+from bench.campaign.variant import Rows, Variant, Variants, chains_of, drawn_commands, kept_channels
 from bench.errors import BenchError, ParameterError, SimulationError, UnknownNameError
 from bench.measurement import measure
 from bench.recording import Recording
 from bench.rig import simulate
-from bench.rig.simulation import controls_of
+from bench.rig.drives import controls_of
+from bench.rig.simulation import STATE
 from bench.signals.streams import named_streams
 
 
@@ -54,7 +55,7 @@ class Part(NamedTuple):
         failures: The others.
     """
 
-    draws: list[Draw]
+    draws: list[RecordDraw]
     good: list[int]
     values: NDArray
     has: NDArray[np.bool_]
@@ -65,7 +66,7 @@ class Part(NamedTuple):
 class _Ready:
     """A record that is ready to run: its place in the part, theta by element controls ``(n, n_actuators)``, start."""
 
-    draw: Draw
+    draw: RecordDraw
     place: int
     thetas: list[NDArray[np.float64]]
     controls: NDArray[np.float64]
@@ -127,7 +128,7 @@ class Generator:
         values = np.empty((len(self.channels), len(records), self.plan.n_samples), dtype=self.plan.precision)
         has = np.zeros((len(self.channels), len(records)), dtype=bool)
         failures: list[Failure] = []
-        groups: dict[tuple[int, tuple[bool, ...]], list[tuple[int, Draw]]] = {}
+        groups: dict[tuple[int, tuple[bool, ...]], list[tuple[int, RecordDraw]]] = {}
         for place, draw in enumerate(drawn):
             groups.setdefault((draw.rig, draw.present), []).append((place, draw))
         for (rig, present), members in groups.items():
@@ -149,16 +150,16 @@ class Generator:
         draw = draws(self.plan, [record])[0]
         variant = self.variants.of(draw.rig, draw.present)
         _, excitation, sensors = record_streams(self.plan, record)
-        drive, start = drive_of(self.plan, variant, draw, excitation)
+        drive, start = drawn_commands(self.plan, variant, draw, excitation)
         rig = variant.with_values(draw.values)
         recording = simulate(rig, drive, initial=start, sample_rate=self.plan.sample_rate)
         return measure(recording, chains_of(self.plan, draw), sensors)
 
-    def _prepared(self, variant: Variant, draw: Draw, place: int) -> _Ready | Failure:
+    def _prepared(self, variant: Variant, draw: RecordDraw, place: int) -> _Ready | Failure:
         try:
             thetas = variant.thetas(draw.values)
             variant.check_structure(draw.values)
-            drive, start = drive_of(self.plan, variant, draw, record_streams(self.plan, draw.record)[1])
+            drive, start = drawn_commands(self.plan, variant, draw, record_streams(self.plan, draw.record)[1])
             controls = controls_of(variant.rig, drive)
             chains_of(self.plan, draw)
         except (BenchError, ArithmeticError, ValueError) as error:  # whatever one record's numbers lead to
@@ -168,7 +169,7 @@ class Generator:
     def _run(
         self,
         variant: Variant,
-        members: Sequence[tuple[int, Draw]],
+        members: Sequence[tuple[int, RecordDraw]],
         values: NDArray,
         has: NDArray[np.bool_],
         threads: int,

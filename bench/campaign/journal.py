@@ -1,7 +1,7 @@
 """The journal of a campaign: what is finished, noted when it was written, each line with a check of its own.
 
 The first line tells whose journal it is (hash of the plan, versions of the software), each further line is the entry of a part
-as `bench.campaign.parts.entry_of` made it from the bytes that were written. A line's ``check`` hashes the plan's hash and the
+as `bench.campaign.parts.part_entry` made it from the bytes that were written. A line's ``check`` hashes the plan's hash and the
 line: one that was torn, changed, or copied from the journal of another plan is none.
 """
 

@@ -7,11 +7,11 @@ from typing import Any
 
 from bench.campaign.distribution import Distribution, Quantity, Shared, Value
 
-Node = Any
+Nested = Any
 """A signal's or chain's dictionary in which a distribution may stand for a number."""
 
 
-def as_entry(node: Node) -> Any:
+def as_entry(node: Nested) -> Any:
     """A quantity, or a nest of them, as in a plan."""
     if isinstance(node, Distribution | Shared):
         return node.to_dict()
@@ -22,7 +22,7 @@ def as_entry(node: Node) -> Any:
     return node
 
 
-def leaves(node: Node, path: str) -> Iterator[tuple[str, Quantity]]:
+def leaves(node: Nested, path: str) -> Iterator[tuple[str, Quantity]]:
     """(path, quantity) of the numbers and distributions in a nest; fixed names and lists of plain numbers are none."""
     if isinstance(node, Distribution | Shared) or (
         isinstance(node, int | float) and not isinstance(node, bool)
@@ -36,7 +36,7 @@ def leaves(node: Node, path: str) -> Iterator[tuple[str, Quantity]]:
             yield from leaves(value, f"{path}/{index}")
 
 
-def filled(node: Node, path: str, values: Mapping[str, Value]) -> Any:
+def filled(node: Nested, path: str, values: Mapping[str, Value]) -> Any:
     """The nest with the values drawn in the places of its distributions."""
     if isinstance(node, Distribution | Shared):
         return values[path]

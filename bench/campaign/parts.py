@@ -1,6 +1,6 @@
 """When a part is finished: its files agree with what was noted of them when they were written, from the bytes in memory.
 
-What is there is never hashed to be believed. `entry_of` hashes what is about to be written; `fault` holds the files against it:
+What is there is never hashed to be believed. `part_entry` hashes what is about to be written; `fault` holds the files against it:
 
 * in `verify`, every byte: size, sha256, then number of rows, record numbers and plan as the footer tells them;
 * at a resume, which must not read a terabyte: the file's size, its times of change and its inode are those noted when it was
@@ -104,7 +104,7 @@ def part_name(index: int) -> str:
     return f"part-{index:06d}.parquet"
 
 
-def entry_of(layout: Layout, part: int, failed: list[int], contents: Mapping[str, bytes]) -> dict[str, Any]:
+def part_entry(layout: Layout, part: int, failed: list[int], contents: Mapping[str, bytes]) -> dict[str, Any]:
     """What journal and manifest say of a part.
 
     Args:
@@ -199,7 +199,7 @@ def is_entry(layout: Layout, entry: Any) -> bool:
             len(records) > 0
             and set(failed) <= set(records)
             and len(set(failed)) == len(failed)
-            and entry == {**entry_of(layout, part, failed, {}), "files": entry["files"]}
+            and entry == {**part_entry(layout, part, failed, {}), "files": entry["files"]}
             and all(
                 isinstance(entry["files"][kind]["bytes"], int)
                 and isinstance(entry["files"][kind]["sha256"], str)
@@ -284,3 +284,14 @@ def strangers(folder: Path, layout: Layout) -> list[tuple[Path, str]]:
 def any_part(folder: Path, layout: Layout) -> bool:
     """Whether any file of a part is there."""
     return any(next((folder / kind).glob("part-*"), None) is not None for kind in layout.kinds)
+
+
+def counts(entries: list[Mapping[str, Any]] | list[dict[str, Any]]) -> dict[str, int]:
+    """Sums over the entries of parts."""
+    return {
+        "records": sum(entry["records"] for entry in entries),
+        "ok": sum(entry["ok"] for entry in entries),
+        "failed": sum(len(entry["failed"]) for entry in entries),
+        "rows": sum(entry["rows"] for entry in entries),
+        "bytes": sum(file["bytes"] for entry in entries for file in entry["files"].values()),
+    }

@@ -29,7 +29,7 @@ from bench.campaign.distribution import (
     Shared,
     Uniform,
 )
-from bench.documents import Entry, Listed, Name, Number, Pair, Whole, any_of, checked_as, refuse, told
+from bench.documents import Entry, Listed, Name, Number, NumberPair, Whole, any_of, checked_as, refuse, told
 from bench.errors import shortened, unknown_name
 
 Scalar = Annotated[
@@ -56,7 +56,7 @@ class UniformTable(_Table):
     """Uniform between two numbers."""
 
     makes = Uniform
-    uniform: Pair
+    uniform: NumberPair
     """Lowest and highest."""
 
 
@@ -64,7 +64,7 @@ class LogUniformTable(_Table):
     """Uniform in the logarithm, between two positive numbers."""
 
     makes = LogUniform
-    log_uniform: Pair
+    log_uniform: NumberPair
     """Lowest and highest."""
 
 
@@ -72,7 +72,7 @@ class NormalTable(_Table):
     """Normal, truncated where an end is given."""
 
     makes = Normal
-    normal: Pair
+    normal: NumberPair
     """Mean and standard deviation."""
     low: Number | None = None
     """Lower end."""

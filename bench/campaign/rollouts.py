@@ -19,7 +19,7 @@ from bench.files import folder_made_in
 MINARI_ROOT = "MINARI_DATASETS_PATH"
 """Environment variable by which Minari finds its data sets."""
 
-Policy = Callable[[Any, np.random.Generator], Any]
+Actor = Callable[[Any, np.random.Generator], Any]
 """An action from an observation and a source of randomness."""
 
 
@@ -44,7 +44,7 @@ class Rollout(NamedTuple):
 
 
 def collect(
-    env: Any, policy: Policy, *, episodes: int, seed: int = 0, max_steps: int = 100_000
+    env: Any, policy: Actor, *, episodes: int, seed: int = 0, max_steps: int = 100_000
 ) -> list[Rollout]:
     """Run a policy for some episodes.
 
@@ -71,7 +71,7 @@ def collect(
     ]
 
 
-def _episode(env: Any, policy: Policy, sequence: np.random.SeedSequence, max_steps: int) -> Rollout:
+def _episode(env: Any, policy: Actor, sequence: np.random.SeedSequence, max_steps: int) -> Rollout:
     reset = int(sequence.generate_state(1)[0]) >> 1  # gymnasium takes a C long, 32 bits on some systems
     rng = np.random.default_rng(sequence)
     observation, _ = env.reset(seed=reset)

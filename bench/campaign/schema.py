@@ -1,17 +1,17 @@
-"""Documents of campaigns: the plan, and the manifest that a campaign leaves."""
+"""Document of a campaign: the plan."""
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import AfterValidator, Field, Strict, WrapValidator, model_validator
 
 from bench.campaign.alternatives import ElementPlan, ExcitationPlan, RigPlan, SensorPlan
 from bench.campaign.distribution import Distribution
-from bench.campaign.nest import Node
+from bench.campaign.nest import Nested
 from bench.campaign.plan import Compression, Plan, Precision, Sampling
 from bench.campaign.quantities import AnyQuantity, NumberQuantity, is_quantity_table, read_quantity, spread
 from bench.documents import (
@@ -19,7 +19,6 @@ from bench.documents import (
     AS_WHOLE,
     Count,
     Document,
-    DocumentLimits,
     Entry,
     Flag,
     Label,
@@ -39,11 +38,8 @@ from bench.mjcf import IntegratorName, StructureName
 from bench.signals import Signal
 from bench.signals.schema import varied_type
 
-MANIFEST_LIMITS = DocumentLimits()
-"""A manifest of as many parts as `PlanLimits` allows stays within these."""
 
-
-def _nest(node: Any) -> Node:
+def _nest(node: Any) -> Nested:
     """A signal's or stage's table with its distributions read."""
     if is_quantity_table(node):
         return read_quantity(node, "")
@@ -54,7 +50,7 @@ def _nest(node: Any) -> Node:
     return node
 
 
-def _nested(entry: Any, handler: Any) -> Node:
+def _nested(entry: Any, handler: Any) -> Nested:
     handler(
         entry
     )  # says whether the table is valid; the plan keeps the numbers in the order in which they came
@@ -284,105 +280,10 @@ class PlanDocument(Document):
         )
 
 
-def _by_type(chains: Mapping[str, tuple[Any, ...]]) -> dict[str, dict[str, Node]]:
+def _by_type(chains: Mapping[str, tuple[Any, ...]]) -> dict[str, dict[str, Nested]]:
     return {
         channel: {
             stage["type"]: {key: value for key, value in stage.items() if key != "type"} for stage in stages
         }
         for channel, stages in chains.items()
     }
-
-
-Integer = Annotated[int, Strict(), Field(ge=0)]
-"""A whole number as programs write it: 3.0 is none."""
-
-
-class ChannelEntry(Entry):
-    """A channel of a data set."""
-
-    entry_name = "a channel of a manifest"
-    name: Name
-    """Name."""
-    unit: Text
-    """Unit."""
-    quantity: Text
-    """Quantity."""
-    role: Text
-    """Role."""
-
-
-class PartFile(Entry):
-    """A file of a part."""
-
-    entry_name = "a file of a part"
-    bytes: Integer
-    """Size."""
-    sha256: Text
-    """Hash."""
-
-
-class PartEntry(Entry):
-    """A finished part."""
-
-    entry_name = "a part of a manifest"
-    part: Integer
-    """Number."""
-    first: Integer
-    """First record."""
-    records: Integer
-    """Number of records."""
-    ok: Integer
-    """Records that have samples."""
-    failed: Listed[Integer]
-    """Records that failed."""
-    rows: Integer
-    """Rows of samples."""
-    files: dict[Literal["samples", "records", "answers"], PartFile]
-    """Its files."""
-
-    @model_validator(mode="after")
-    def _files_are_there(self) -> PartEntry:
-        missing = {"samples", "records"} - set(self.files)
-        if missing:
-            refuse(f"a part has samples and records; {' and '.join(sorted(missing))} missing", "files")
-        if self.ok + len(self.failed) != self.records:
-            refuse(
-                f"{self.ok} records and {len(self.failed)} failed ones came; {self.records} in all are expected"
-            )
-        return self
-
-
-class ManifestDocument(Document):
-    """What a campaign says of itself."""
-
-    entry_name = "a manifest"
-    format: Literal[1]
-    """Version of the layout."""
-    name: Text
-    """Name."""
-    status: Literal["running", "stopped", "complete"]
-    """Whether all parts are finished."""
-    plan: PlanDocument
-    """The plan, without what is withheld."""
-    plan_sha256: Text
-    """Hash of the whole plan."""
-    seeds: Text
-    """How a record's random streams are made."""
-    versions: dict[str, Text]
-    """Versions of what the bytes depend on."""
-    channels: Listed[ChannelEntry]
-    """Channels of the data set."""
-    counts: dict[str, Integer]
-    """Sums over the finished parts."""
-    parts: Listed[PartEntry]
-    """Finished parts."""
-
-    @model_validator(mode="after")
-    def _parts_are_of_the_plan(self) -> ManifestDocument:
-        for index, part in enumerate(self.parts):
-            if part.first + part.records > self.plan.records:
-                refuse(
-                    f"records {part.first} to {part.first + part.records - 1} came; the plan has {self.plan.records}",
-                    "parts", index,
-                )  # fmt: skip
-        return self

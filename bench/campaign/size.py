@@ -50,8 +50,8 @@ def check_size(generator: Generator, folder: Path, *, at_once: int, limits: Size
     part, memory = part_bytes(generator), memory_bytes()
     if memory and part * at_once > limits.memory * memory:
         raise ParameterError(
-            f"a part of {min(plan.records_per_part, plan.records)} records of {plan.duration:g} s takes about {told(part)} while "
-            f"it is made, and {at_once} at a time do not fit into the {told(memory)} of this machine; give shorter records, "
+            f"a part of {min(plan.records_per_part, plan.records)} records of {plan.duration:g} s takes about {bytes_text(part)} while "
+            f"it is made, and {at_once} at a time do not fit into the {bytes_text(memory)} of this machine; give shorter records, "
             "a longer timestep, a smaller records_per_part, or fewer threads"
         )
     raw = data_bytes(generator)
@@ -60,8 +60,8 @@ def check_size(generator: Generator, folder: Path, *, at_once: int, limits: Size
     free = shutil.disk_usage(nearest).free
     if limits.packed * raw > free + there:
         raise OutputError(
-            f"{plan.records} records of {plan.n_samples} samples in {len(generator.channels)} channels are {told(raw)}, which "
-            f"do not fit into the {told(free)} that are free at {nearest} even if packed to "
+            f"{plan.records} records of {plan.n_samples} samples in {len(generator.channels)} channels are {bytes_text(raw)}, which "
+            f"do not fit into the {bytes_text(free)} that are free at {nearest} even if packed to "
             f"{100 * limits.packed:.0f} %; ask for fewer, or choose another disk"
         )
 
@@ -106,7 +106,7 @@ def memory_bytes() -> float:
     return min(whole, most)
 
 
-def told(size: float) -> str:
+def bytes_text(size: float) -> str:
     """A number of bytes as people write it."""
     for unit in ("bytes", "kB", "MB", "GB"):
         if size < 1000.0:

@@ -31,11 +31,12 @@ from bench.campaign.parts import (
     FOLDERS,
     Layout,
     any_part,
-    entry_of,
+    counts,
     fault,
     is_entry,
     manifest_entries,
     mark_of,
+    part_entry,
     part_name,
     public,
     strangers,
@@ -87,7 +88,7 @@ class Store:
         Raises:
             FileFormatError: There is none, or it is no manifest of a campaign.
         """
-        from bench.campaign.schema import MANIFEST_LIMITS, ManifestDocument  # noqa: PLC0415  (pydantic, for those who read)
+        from bench.campaign.manifest_schema import MANIFEST_LIMITS, ManifestDocument  # noqa: PLC0415  (pydantic, for those who read)
         from bench.documents import checked, load_document  # noqa: PLC0415
 
         try:
@@ -278,7 +279,7 @@ class Store:
         Raises:
             OutputError: They cannot be written.
         """
-        entry = entry_of(Layout.of(plan), part, failed, contents)
+        entry = part_entry(Layout.of(plan), part, failed, contents)
         for kind, content in contents.items():
             # not beside their targets, since readers take whole folders
             write_bytes(self.path(kind, part), content, inside=self.folder / ".partial", settled=False)
@@ -346,14 +347,3 @@ class Store:
             "parts": done,
         }
         write_text(self.manifest_path, json.dumps(document, indent=1, ensure_ascii=False))
-
-
-def counts(entries: list[Mapping[str, Any]] | list[dict[str, Any]]) -> dict[str, int]:
-    """Sums over the entries of parts."""
-    return {
-        "records": sum(entry["records"] for entry in entries),
-        "ok": sum(entry["ok"] for entry in entries),
-        "failed": sum(len(entry["failed"]) for entry in entries),
-        "rows": sum(entry["rows"] for entry in entries),
-        "bytes": sum(file["bytes"] for entry in entries for file in entry["files"].values()),
-    }

@@ -7,15 +7,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-import mujoco
 import numpy as np
 from mujoco.batch import Batch
 from numpy.typing import NDArray
 
 from bench import native
+from bench.campaign.addresses import Address, Source, sources_of, structure_address
 from bench.campaign.alternatives import ElementPlan, RigPlan
 from bench.campaign.distribution import Value
-from bench.campaign.drawing import Draw
+from bench.campaign.drawing import RecordDraw
 from bench.campaign.nest import filled
 from bench.campaign.plan import Plan
 from bench.errors import ParameterError, UnknownNameError
@@ -23,33 +23,10 @@ from bench.laws.along import force_along
 from bench.measurement import Chain, Stage
 from bench.recording import Channel
 from bench.rig import Element, Rig
-from bench.rig.building import STRUCTURE
 from bench.rig.configuration import rig_from_configuration
+from bench.rig.drives import Initial, controls_of
 from bench.rig.library import PRESCRIBED_ACTUATORS, prescribe, starting
-from bench.rig.simulation import controls_of
 from bench.signals import Excitation, Signal
-
-STATE = (
-    mujoco.mjtState.mjSTATE_TIME
-    | mujoco.mjtState.mjSTATE_QPOS
-    | mujoco.mjtState.mjSTATE_QVEL
-    | mujoco.mjtState.mjSTATE_ACT
-)
-
-
-class Source(NamedTuple):
-    """Where a channel comes from: a column of the controls or of the sensors, or an element's motion, force or state."""
-
-    kind: str  # "command", "sensor", "displacement", "velocity", "force", "state"
-    index: int
-    item: int = -1
-
-
-class Address(NamedTuple):
-    """A number of a model that a batch can hold one of for each simulation."""
-
-    field: str
-    index: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +71,7 @@ class Variant:
         self,
         batch: Batch,
         thetas: list[list[NDArray[np.float64]]],
-        draws: list[Draw],
+        draws: list[RecordDraw],
         starts: list[Mapping[str, tuple[float, float]]],
     ) -> None:
         """Write the values of every simulation into the batch, and where it starts."""
@@ -168,47 +145,6 @@ class Rows(NamedTuple):
     stride: int
 
 
-def structure_address(model: mujoco.MjModel, kind: str, name: str) -> Address:
-    """Where a structural quantity stands, as `Rig.with_structure` writes it.
-
-    Raises:
-        UnknownNameError: No such quantity, body, joint or tendon.
-    """
-    if kind not in STRUCTURE:
-        raise UnknownNameError("structural quantity", kind, STRUCTURE)
-    if kind in {"mass", "inertia"}:
-        body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
-        if body < 0:
-            raise UnknownNameError("body", name, [model.body(i).name for i in range(1, model.nbody)])
-        return Address(f"body_{kind}", body)
-    joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name)
-    if joint >= 0:
-        return (
-            Address("jnt_stiffness", joint)
-            if kind == "stiffness"
-            else Address(f"dof_{kind}", int(model.jnt_dofadr[joint]))
-        )
-    tendon = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TENDON, name)
-    if tendon < 0:
-        known = [model.joint(i).name for i in range(model.njnt)] + [
-            model.tendon(i).name for i in range(model.ntendon)
-        ]
-        raise UnknownNameError("joint or tendon", name, known)
-    return Address(f"tendon_{kind}", tendon)
-
-
-def sources_of(rig: Rig) -> dict[str, Source]:
-    """Source of every channel of the rig, in the order of `rig.channels`."""
-    built = rig.built
-    sources = [Source("command", i) for i in range(len(built.actuators))]
-    sources += [Source("sensor", i) for i in range(built.model.nsensordata)]
-    for place, item in enumerate(built.placed):
-        moving = range(len(item.element.joints))
-        sources += [Source(kind, i, place) for kind in ("displacement", "velocity", "force") for i in moving]
-        sources += [Source("state", i, place) for i in range(len(item.element.law.states))]
-    return {channel.name: source for channel, source in zip(rig.channels, sources, strict=True)}
-
-
 class Variants:
     """The variants of a plan, each compiled when it is first asked for; safe to share between threads."""
 
@@ -263,12 +199,8 @@ def _law(item: ElementPlan):
     return find_law(item.law, item.header)
 
 
-Initial = Mapping[str, tuple[float, float]]
-"""(position, velocity) by joint at the start."""
-
-
-def drive_of(
-    plan: Plan, variant: Variant, draw: Draw, rng: np.random.Generator
+def drawn_commands(
+    plan: Plan, variant: Variant, draw: RecordDraw, rng: np.random.Generator
 ) -> tuple[dict[str, NDArray], Initial]:
     """The record's commands at the steps ``(n,)`` by actuator, and its start.
 
@@ -291,7 +223,7 @@ def drive_of(
     return dict(prescribe(rig, displacement, joint=entry.prescribe)), start
 
 
-def excitation_of(plan: Plan, draw: Draw, rate: float) -> Excitation:
+def excitation_of(plan: Plan, draw: RecordDraw, rate: float) -> Excitation:
     """The record's excitation, at a sample rate [Hz]."""
     entry = plan.excitations[draw.excitation]
     signals = {
@@ -301,7 +233,7 @@ def excitation_of(plan: Plan, draw: Draw, rate: float) -> Excitation:
     return Excitation(signals, plan.duration, rate)
 
 
-def chains_of(plan: Plan, draw: Draw) -> dict[str, Chain]:
+def chains_of(plan: Plan, draw: RecordDraw) -> dict[str, Chain]:
     """The record's measurement chain by channel."""
     if draw.sensors < 0:
         return {}

@@ -12,6 +12,7 @@ from bench.campaign.journal import journal_faults
 from bench.campaign.parts import (
     Layout,
     any_part,
+    counts,
     file_fault,
     is_entry,
     manifest_entries,
@@ -19,7 +20,7 @@ from bench.campaign.parts import (
     public,
     strangers,
 )
-from bench.campaign.store import Store, counts
+from bench.campaign.store import Store
 
 
 def verify(folder: str | Path) -> list[str]:

@@ -15,7 +15,7 @@ from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from bench.cli.console import emit
 from bench.cli.records import pairs
-from bench.cli.verdict_text import summary
+from bench.cli.verdict_text import verdict_summary
 
 if TYPE_CHECKING:
     from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis
@@ -149,7 +149,7 @@ class Diagnose:
         if self.json == PRINTED:
             emit(document)
         else:
-            for part in summary(found.verdict, model):
+            for part in verdict_summary(found.verdict, model):
                 Console().print(part, markup=False, highlight=False)
             for path in written:
                 print(f"written: {path}")
@@ -223,8 +223,11 @@ PRINTED = Path("-")
 @contextlib.contextmanager
 def _stages(shown: bool) -> Iterator[Callable[[str], None]]:
     """A line on standard error with what is being done and for how long; call what is given with the text."""
+    if not shown:  # a disabled display of rich before 15 still ends with an empty line
+        yield lambda text: None
+        return
     columns = (SpinnerColumn(), TimeElapsedColumn(), TextColumn("{task.description}", markup=False))
-    with Progress(*columns, console=Console(stderr=True), disable=not shown, transient=True) as bar:
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("reading", total=None)
         yield lambda text: bar.update(task, description=text)
 

@@ -60,11 +60,11 @@ class BlindMake:
         from bench.discrepancy.blind.protocol import SEAL
         from bench.discrepancy.truth.background_settings import BackgroundSettings
         from bench.discrepancy.truth.loads import RIGS_SETTINGS
-        from bench.targets import check_folder
+        from bench.targets import check_target_folder
 
         begun = next(self.folder.glob(f"*/{SEAL}"), None) is not None  # by the same command, which goes on
         for folder in (self.folder, self.answers):
-            check_folder(folder, force=self.force or begun)
+            check_target_folder(folder, force=self.force or begun)
         chosen = {key: value for key, value in vars(self).items() if key in BlindOptions.__dataclass_fields__}
         if isinstance(self.rigs[0], str):
             chosen["robots"] = chosen.pop("rigs")
@@ -134,7 +134,7 @@ class BlindScore:
     def __call__(self) -> None:
         """Run the command."""
         from bench.discrepancy import score_blind
-        from bench.discrepancy.blind.score_report import markdown, page, tables
+        from bench.discrepancy.blind.score_report import markdown, score_page, tables
         from bench.files import together, write_text
         from bench.targets import check_targets
 
@@ -142,7 +142,7 @@ class BlindScore:
         score = score_blind(self.results, self.answers, cases=self.cases)
         with together():
             if self.html is not None:
-                page(score).write(self.html)
+                score_page(score).write(self.html)
             if self.markdown is not None:
                 write_text(self.markdown, markdown(score))
         if self.json:

@@ -66,7 +66,6 @@ class Excite:
 
         from bench.documents import naming
         from bench.errors import ParameterError
-        from bench.excitation import Rivals, design
         from bench.excitation.request import request
         from bench.excitation.schema import ExcitationRequest
 
@@ -80,26 +79,8 @@ class Excite:
             )
         rng = np.random.default_rng(self.seed)
         asked = request(rig, document.experiment, draws=self.draws, rng=rng)
-        notes: list[str] = []
         with progress_bar(quiet=self.json) as show:
-            if self.method == "policy":
-                made, notes = _from_policy(asked, self.policy, rng)
-            elif self.method == "planner" and isinstance(asked.experiment.question, Rivals):
-                show("planning", 0.0)
-                made, notes = _from_rival_planner(asked, rng)
-            else:
-                made = design(
-                    METHODS[self.method] or "d_optimal",
-                    asked.experiment,
-                    duration=asked.duration,
-                    band=asked.band,
-                    rng=rng,
-                    evaluations=self.evaluations,
-                    progress=lambda n, merit: show(f"{n} signals, {merit:.2f} nat", n / self.evaluations),
-                )
-                if self.method == "planner":
-                    show("planning", 1.0)
-                    made, notes = _from_planner(asked, made, rng)
+            made, notes = self._made(asked, rng, show)
             if self.rrd is not None:
                 from bench.excitation.methods import controls_from
                 from bench.rerun_log import log_episode
@@ -121,8 +102,31 @@ class Excite:
         }
         if self.json:
             emit(result)
-            return
-        _tell(result)
+        else:
+            _tell(result)
+
+    def _made(self, asked: Any, rng: Any, show: Any) -> tuple[Any, list[str]]:
+        """What the method makes of what is asked, and what the reader must know of it."""
+        from bench.excitation import Rivals, design
+
+        if self.method == "policy":
+            return _from_policy(asked, self.policy, rng)
+        if self.method == "planner" and isinstance(asked.experiment.question, Rivals):
+            show("planning", 0.0)
+            return _from_rival_planner(asked, rng)
+        made = design(
+            METHODS[self.method] or "d_optimal",
+            asked.experiment,
+            duration=asked.duration,
+            band=asked.band,
+            rng=rng,
+            evaluations=self.evaluations,
+            progress=lambda n, merit: show(f"{n} signals, {merit:.2f} nat", n / self.evaluations),
+        )
+        if self.method != "planner":
+            return made, []
+        show("planning", 1.0)
+        return _from_planner(asked, made, rng)
 
     def _check(self) -> None:
         """Raise an error for arguments that do not go together."""

@@ -19,13 +19,13 @@ def diagnose_fleet(asked: Any, stages: Stages) -> None:
     """Diagnose the cases of a command, tell of all in one table, and write what was asked for."""
     import json
 
-    from bench.discrepancy.report.fleet import Options, diagnose_cases, fleet_page, rows
+    from bench.discrepancy.report.fleet import DiagnosisOptions, diagnose_cases, fleet_page, fleet_rows
     from bench.errors import ParameterError
     from bench.files import json_values, together, write_text
 
     if asked.rrd is not None:
         raise ParameterError("--rrd is of one case; diagnose it on its own")
-    options = Options(asked.exclude, asked.most, asked.anyway, asked.budget)
+    options = DiagnosisOptions(asked.exclude, asked.most, asked.anyway, asked.budget)
     with stages(asked.progress) as stage:
         found = diagnose_cases(asked.cases, options, scheduler=asked.scheduler, progress=stage)
     document = {"cases": found}
@@ -38,7 +38,7 @@ def diagnose_fleet(asked: Any, stages: Stages) -> None:
     if asked.json == Path("-"):
         emit(document)
         return
-    header, lines = rows(found)
+    header, lines = fleet_rows(found)
     table = Table(*header)
     for line in lines:
         table.add_row(*line)

@@ -40,7 +40,7 @@ class Init:
         """Run the command."""
         from bench.discrepancy.intake.asking import drafted
         from bench.errors import ParameterError
-        from bench.targets import check_folder
+        from bench.targets import check_target_folder
 
         models = [path for path in self.logs if path.suffix == ".xml"]
         logs = [path for path in self.logs if path.suffix != ".xml"]
@@ -49,7 +49,7 @@ class Init:
                 f"{len(logs)} log(s) and {len(models)} model(s) came; give logs and one MJCF, as in: "
                 "jointbench init run.csv model.xml -o case"
             )
-        check_folder(self.output, force=self.force)
+        check_target_folder(self.output, force=self.force)
         made, written = drafted(
             logs,
             models[0],

@@ -78,7 +78,7 @@ class Doctor:
         Console().print(table)
 
 
-Row = tuple[str, str, str]
+CheckRow = tuple[str, str, str]
 """What, what was found, and what to do about it (empty: nothing)."""
 
 
@@ -89,7 +89,7 @@ def _installed(name: str) -> str | None:
         return None
 
 
-def _machine() -> list[Row]:
+def _machine() -> list[CheckRow]:
     import bench
     from bench.kernel_cache import place
 
@@ -101,7 +101,7 @@ def _machine() -> list[Row]:
     ]
 
 
-def _packages() -> list[Row]:
+def _packages() -> list[CheckRow]:
     rows = [(name, _installed(name) or "missing", "") for name in CORE]
     rows = [
         (name, found, "pip install --force-reinstall jointbench" if found == "missing" else "")
@@ -116,7 +116,7 @@ def _packages() -> list[Row]:
     return rows
 
 
-def _callback() -> list[Row]:
+def _callback() -> list[CheckRow]:
     """Whether a rig runs, with its forces: MuJoCo's structs are those that the callback was tested with."""
     import time
 
@@ -136,7 +136,7 @@ def _callback() -> list[Row]:
     return [("native forces", f"run ({seconds:.1f} s, compilation included)", "")]
 
 
-def _rendering() -> list[Row]:
+def _rendering() -> list[CheckRow]:
     """Whether MuJoCo can draw here; a process of its own, since a missing driver may end it."""
     import subprocess
 

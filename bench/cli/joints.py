@@ -11,8 +11,7 @@ from rich.console import Console
 from rich.table import Table
 
 from bench.cli.console import emit
-
-Out = Annotated[Path, tyro.conf.arg(aliases=["-o"])]
+from bench.cli.paths import Out
 
 
 @dataclass
@@ -71,7 +70,7 @@ class Identify:
     def __call__(self) -> None:
         """Run the command."""
         from bench.errors import ParameterError, UnknownNameError
-        from bench.joint_models import KINDS, Columns, Settings, write_joint
+        from bench.joint_models import KINDS, JointColumns, Settings, write_joint
         from bench.joint_models.identifying import identified
         from bench.record_files import read_recording
         from bench.targets import check_targets
@@ -83,7 +82,7 @@ class Identify:
                 "give at least one record, as in: jointbench identify run.csv --model polynomial"
             )
         check_targets(self.output, force=self.force)
-        columns = Columns(
+        columns = JointColumns(
             self.displacement, self.velocity, self.restoring_force, self.applied, self.acceleration, self.mass,
             self.element, self.body,
         )  # fmt: skip

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Literal
 
 import tyro
 
 from bench.cli.console import emit
-
-Out = Annotated[Path, tyro.conf.arg(aliases=["-o"])]
+from bench.cli.paths import Out
 
 
 def pairs(option: str, texts: Sequence[str]) -> dict[str, str]:

@@ -41,7 +41,7 @@ class Rehearse:
     def __call__(self) -> None:
         """Run the command."""
         from bench.discrepancy.case.reading import read_case
-        from bench.discrepancy.rehearsal.page import page, table
+        from bench.discrepancy.rehearsal.page import rehearsal_page, table
         from bench.discrepancy.rehearsal.rehearsing import rehearse
 
         case = read_case(self.case, planned=True)
@@ -50,7 +50,7 @@ class Rehearse:
             done = rehearse(
                 case, self.output, effects=self.effects, sizes=self.sizes, seed=self.seed, again=self.force, progress=show
             )  # fmt: skip
-        page(done).write(self.output / "index.html")
+        rehearsal_page(done).write(self.output / "index.html")
         if self.json:
             emit(done.to_json())
             return
@@ -94,12 +94,12 @@ class Design:
 
     def __call__(self) -> None:
         """Run the command."""
-        from bench.discrepancy.rehearsal.designing import design, write_design
-        from bench.targets import check_folder
+        from bench.discrepancy.rehearsal.designing import design_signals, write_design
+        from bench.targets import check_target_folder
 
-        check_folder(self.output, force=self.force)
+        check_target_folder(self.output, force=self.force)
         with progress_bar(quiet=self.json) as show:
-            made = design(
+            made = design_signals(
                 self.case, seconds=self.seconds, rate=self.rate, effects=self.effects, seed=self.seed, progress=show
             )  # fmt: skip
         written = write_design(made, self.case, self.output)

@@ -30,10 +30,10 @@ class Demo:
     def __call__(self) -> None:
         """Run the command."""
         from bench import demo
-        from bench.demo.report import summary, write
-        from bench.targets import check_folder
+        from bench.demo.report import demo_summary, write
+        from bench.targets import check_target_folder
 
-        check_folder(self.out, force=self.force)
+        check_target_folder(self.out, force=self.force)
         with progress_bar(quiet=self.json) as progress:
             result = demo.compute(progress)
             files = write(result, self.out, progress)
@@ -41,7 +41,7 @@ class Demo:
             emit(result.to_dict() | {"files": [str(path) for path in files]})
             return
         console = Console()
-        for table in summary(result):
+        for table in demo_summary(result):
             console.print(table)
         console.print(f"{result.seconds:.0f} s. Open {files[0]} in a browser, and {files[1]} with `rerun`.")
 

@@ -16,7 +16,7 @@ from rich.text import Text
 from bench.cli.console import emit
 
 
-class Kind(NamedTuple):
+class DocumentKind(NamedTuple):
     """A kind of document.
 
     Attributes:
@@ -30,23 +30,29 @@ class Kind(NamedTuple):
     model: str
 
 
-KINDS: dict[str, Kind] = {
-    "rig": Kind("a rig for `simulate` and `view`", "bench.rig.schema", "RigDocument"),
-    "excitation": Kind(
+KINDS: dict[str, DocumentKind] = {
+    "rig": DocumentKind("a rig for `simulate` and `view`", "bench.rig.schema", "RigDocument"),
+    "excitation": DocumentKind(
         "a rig with an [experiment] for `excite`", "bench.excitation.schema", "ExcitationRequest"
     ),
-    "plan": Kind("a plan for `campaign`", "bench.campaign.schema", "PlanDocument"),
-    "nominal": Kind(
+    "plan": DocumentKind("a plan for `campaign`", "bench.campaign.schema", "PlanDocument"),
+    "nominal": DocumentKind(
         "nominal.json of a case for `diagnose`", "bench.discrepancy.case.schema", "NominalDocument"
     ),
-    "verdict": Kind("what `diagnose --json` writes", "bench.discrepancy.verdict_schema", "VerdictDocument"),
-    "settings": Kind(
+    "verdict": DocumentKind(
+        "what `diagnose --json` writes", "bench.discrepancy.verdict_schema", "VerdictDocument"
+    ),
+    "settings": DocumentKind(
         "thresholds for `diagnose --settings`", "bench.discrepancy.settings.document", "SettingsDocument"
     ),
-    "protocol": Kind("protocol.json of a sealed case", "bench.discrepancy.blind.schema", "ProtocolDocument"),
-    "answer": Kind("the answer of a sealed case", "bench.discrepancy.blind.schema", "AnswerDocument"),
-    "manifest": Kind("manifest.json of a campaign", "bench.campaign.schema", "ManifestDocument"),
-    "policy": Kind("the header of a trained policy", "bench.excitation.schema", "PolicyHeader"),
+    "protocol": DocumentKind(
+        "protocol.json of a sealed case", "bench.discrepancy.blind.schema", "ProtocolDocument"
+    ),
+    "answer": DocumentKind("the answer of a sealed case", "bench.discrepancy.blind.schema", "AnswerDocument"),
+    "manifest": DocumentKind(
+        "manifest.json of a campaign", "bench.campaign.manifest_schema", "ManifestDocument"
+    ),
+    "policy": DocumentKind("the header of a trained policy", "bench.excitation.schema", "PolicyHeader"),
 }
 """Kinds of documents by name."""
 

@@ -32,24 +32,30 @@ class Reproduce:
         """Run the command."""
         from rich.markup import escape
 
-        from bench.reproduction import Verdict, reproduce
-        from bench.reproduction.writing import summary
-        from bench.targets import check_folder
+        from bench.reproduction import RowVerdict, reproduce
+        from bench.reproduction.writing import items_summary
+        from bench.targets import check_target_folder
 
-        check_folder(self.out, force=self.force, own=("table.json", "[A-D][0-9]*.json"))
+        check_target_folder(self.out, force=self.force, own=("table.json", "[A-D][0-9]*.json"))
         with progress_bar(quiet=self.json) as progress:
             result = reproduce(self.items, self.out, fresh=self.fresh, progress=progress)
         if self.json:
             emit(result.to_dict() | {"files": [str(path) for path in result.files]})
             return
         table = Table(
-            "item", "quantity", "printed", "ours", "over ten seeds", "verdict", title=summary(result.results)
+            "item",
+            "quantity",
+            "printed",
+            "ours",
+            "over ten seeds",
+            "verdict",
+            title=items_summary(result.results),
         )
         colours = {
-            Verdict.FAILS: "red",
-            Verdict.SHAPE: "yellow",
-            Verdict.HOLDS: "",
-            Verdict.NOT_COMPARABLE: "dim",
+            RowVerdict.FAILS: "red",
+            RowVerdict.SHAPE: "yellow",
+            RowVerdict.HOLDS: "",
+            RowVerdict.NOT_COMPARABLE: "dim",
         }
         for made in result.results:
             for row in made.rows:

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from bench.discrepancy.verdict import Verdict
 
 
-def summary(verdict: Verdict, model: str = "") -> list[Any]:
+def verdict_summary(verdict: Verdict, model: str = "") -> list[Any]:
     """A verdict for people: a sentence and a table to print; the report holds the rest.
 
     Args:

@@ -17,7 +17,7 @@ from bench.demo.damper import (
     DamperTest,
     damper_test,
 )
-from bench.demo.joint import JointModel, Progress, joint_models, training_records, unseen_record
+from bench.demo.joint import DemoJoint, ShowProgress, joint_models, training_records, unseen_record
 from bench.demo.measured_case import damper_case
 from bench.recording import Recording
 
@@ -54,7 +54,7 @@ class DemoResult:
     """
 
     damper: tuple[DamperTest, ...]
-    joint: tuple[JointModel, ...]
+    joint: tuple[DemoJoint, ...]
     training: tuple[Recording, ...] = field(repr=False)
     unseen: Recording = field(repr=False)
     diagnosis: Diagnosis = field(repr=False)
@@ -82,7 +82,7 @@ class DemoResult:
         }
 
 
-def compute(progress: Progress = lambda label, share: None) -> DemoResult:
+def compute(progress: ShowProgress = lambda label, share: None) -> DemoResult:
     """Run all parts of the demo.
 
     Args:

@@ -18,6 +18,7 @@ from bench.identification.restoring_force import JointData, joint_data
 from bench.laws.along import force_along
 from bench.laws.coupling import INCH, POUND_FORCE
 from bench.laws.network import published_network
+from bench.progress import ShowProgress
 from bench.recording import Recording, nmse
 from bench.reduction import Comparison, channel_nmse, element_from
 from bench.rig import Element, Rig, simulate
@@ -41,11 +42,8 @@ class JointSetup:
 
 JOINT_SETUP = JointSetup()
 
-Progress = Callable[[str, float], None]
-"""Called with what is being done and the share of the whole that is done."""
 
-
-class JointModel(NamedTuple):
+class DemoJoint(NamedTuple):
     """A reduced-order joint and how it did."""
 
     label: str
@@ -109,7 +107,7 @@ def _pair(
     return nmse(true["joint/force_1"], forces[0]), nmse(true["joint/force_2"], forces[1])
 
 
-def _joint_model(label: str, element: Element, unseen: Recording, seconds: float) -> JointModel:
+def _joint_model(label: str, element: Element, unseen: Recording, seconds: float) -> DemoJoint:
     """Score a model on the true states of the unseen test, and in the true joint's place in the rig."""
     q = np.stack([unseen["axial"], unseen["torsional"]], axis=1)
     v = np.stack([unseen["axial_velocity"], unseen["torsional_velocity"]], axis=1)
@@ -124,19 +122,19 @@ def _joint_model(label: str, element: Element, unseen: Recording, seconds: float
                 rng=np.random.default_rng(JOINT_SETUP.unseen_seed),
             )
         except SimulationError as error:
-            return JointModel(label, element, None, None, open_loop, seconds, str(error))
+            return DemoJoint(label, element, None, None, open_loop, seconds, str(error))
     note = " ".join(str(warning.message) for warning in caught)
     comparison = Comparison(unseen, reduced, channel_nmse(unseen, reduced))
     forces = _pair(unseen, [reduced["joint/force_1"], reduced["joint/force_2"]])
-    return JointModel(label, element, comparison, forces, open_loop, seconds, note)
+    return DemoJoint(label, element, comparison, forces, open_loop, seconds, note)
 
 
 def joint_models(
     records: tuple[Recording, ...],
     unseen: Recording,
-    progress: Progress,
+    progress: ShowProgress,
     span: tuple[float, float] = (0.0, 1.0),
-) -> list[JointModel]:
+) -> list[DemoJoint]:
     """Identify the joint and put each model into the rig, beside the published network.
 
     Args:

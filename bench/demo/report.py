@@ -8,7 +8,7 @@ from rich.table import Table
 
 from bench.demo import DemoResult
 from bench.demo.damper import DamperTest
-from bench.demo.joint import JointModel, Progress
+from bench.demo.joint import DemoJoint, ShowProgress
 from bench.discrepancy import write_report, write_rerun
 from bench.discrepancy.report.figures import state_figure
 from bench.figures import bar_table, loops, time_histories
@@ -20,7 +20,7 @@ from bench.rerun_log import log_comparison
 from bench.rig.library import joint_rig
 
 
-def summary(result: DemoResult) -> list[Table]:
+def demo_summary(result: DemoResult) -> list[Table]:
     """The figures as tables for the terminal."""
     damper = Table(title="Friction damper, real: force NRMSE at 1 Hz, identified at 0.5 Hz")
     models = list(result.damper[0].nrmse)
@@ -61,7 +61,7 @@ def _joint_rows(result: DemoResult) -> list[list[str]]:
     return rows
 
 
-def write(result: DemoResult, folder: Path, progress: Progress) -> list[Path]:
+def write(result: DemoResult, folder: Path, progress: ShowProgress) -> list[Path]:
     """Write index.html, joint.rrd, diagnosis.html, diagnosis.rrd and the records; returns the files, the page first.
 
     Args:
@@ -87,13 +87,13 @@ def write(result: DemoResult, folder: Path, progress: Progress) -> list[Path]:
     return [page, viewer, *told, *records]
 
 
-def _converged(result: DemoResult) -> list[JointModel]:
+def _converged(result: DemoResult) -> list[DemoJoint]:
     return [model for model in result.joint if model.comparison is not None]
 
 
-def best_of_each_kind(result: DemoResult) -> list[JointModel]:
+def best_of_each_kind(result: DemoResult) -> list[DemoJoint]:
     """The best model of each kind that did not diverge: kinds are the words before the brackets ("network", "polynomial")."""
-    best: dict[str, JointModel] = {}
+    best: dict[str, DemoJoint] = {}
     for model in sorted(_converged(result), key=lambda model: sum(model.force_nmse or (0.0, 0.0))):
         best.setdefault(model.label.partition(" (")[0].split()[-1], model)
     return list(best.values())

@@ -1,4 +1,4 @@
-"""The diagnosis of a case: where the gap lies, which effect causes it, how far it shrinks.
+"""The diagnosis of a case: where the discrepancy lies, which effect causes it, how far it shrinks.
 
 The steps, each in its own room: read the case (`case`), find what it leaves unstated of its records (`checks.initial_motion`,
 `search.load_interpolation`), screen the catalogue and fit what is promising (`screening`, `fitting`, `search`), weigh the
@@ -35,7 +35,8 @@ from bench.discrepancy.judgement import posterior as evidence
 from bench.discrepancy.judgement.closing import complete, nominal_estimates, with_closed
 from bench.discrepancy.judgement.finding import Finding
 from bench.discrepancy.judgement.stages import shrunk
-from bench.discrepancy.judgement.two_regimes import How, Progress, found_of
+from bench.discrepancy.judgement.two_regimes import How, Tell, found_of
+from bench.discrepancy.judgement.untold import not_certain_where_untold
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.localisation.localise import Whereabouts, locate
 from bench.discrepancy.localisation.remainder import remainder
@@ -45,10 +46,10 @@ from bench.discrepancy.numerics.deadline import Deadline
 from bench.discrepancy.search.explanation import Explanation, nominal_alone
 from bench.discrepancy.search.load_interpolation import reading_notes
 from bench.discrepancy.settings import DEFAULT, DiagnosisSettings, changed
-from bench.discrepancy.verdict import Kind, NamedEffect, Ranked, Verdict
+from bench.discrepancy.verdict import NamedEffect, Ranked, Verdict, VerdictKind
 from bench.errors import BenchError, UnknownNameError
 
-Placed = TypeVar("Placed", NamedEffect, Ranked)
+_Placed = TypeVar("_Placed", NamedEffect, Ranked)
 
 
 @dataclass(frozen=True)
@@ -62,7 +63,7 @@ class Diagnosis:
         verdict: The verdict.
         final: The explanation behind `verdict.gap.after`: the best one, or for an unknown effect its closure; the nominal
             model with its parameters re-estimated where a closure predicts the judging records worse than that.
-        where: Where the gap lies, with the maps behind `verdict.locations`.
+        where: Where the discrepancy lies, with the maps behind `verdict.locations`.
     """
 
     case: Case
@@ -81,7 +82,7 @@ def diagnose(
     most: int = 3,
     anyway: bool = False,
     rng: np.random.Generator | None = None,
-    progress: Progress = lambda text: None,
+    progress: Tell = lambda text: None,
     budget: float = math.inf,
     settings: DiagnosisSettings = DEFAULT,
 ) -> Diagnosis | ArticulatedDiagnosis:
@@ -170,6 +171,7 @@ def _diagnose(case: Case, how: How, rng: np.random.Generator, anyway: bool) -> D
     told, admission = admitted(case, anyway=anyway, settings=how.settings)
     quiet = without_idle_noise(told, settings=how.settings.case)
     case, finding = found_of(quiet, how, rng)
+    finding = not_certain_where_untold(finding, how.settings.judgement.coarse)
     problem = Problem(
         case, structure_of(case, settings=how.settings), case.identification, settings=how.settings
     )
@@ -220,7 +222,7 @@ def _diagnose(case: Case, how: How, rng: np.random.Generator, anyway: bool) -> D
     return Diagnosis(case, problem, tuple(explanations), verdict, final, where)
 
 
-def _kind(finding: Finding, seen: Sequence[NamedEffect]) -> tuple[Kind, dict[str, float]]:
+def _kind(finding: Finding, seen: Sequence[NamedEffect]) -> tuple[VerdictKind, dict[str, float]]:
     """Kind of the verdict and the probabilities of all kinds, with effects that were read off the samples."""
     if not seen or finding.kind != "none":
         return finding.kind, finding.probabilities
@@ -252,7 +254,7 @@ def _untried(deadline: Deadline) -> tuple[str, ...]:
     return (f"there was no time for {'; '.join(deadline.skipped)}: a larger --budget may change the verdict",)
 
 
-def _somewhere(problem: Problem, found: Sequence[Placed]) -> tuple[Placed, ...]:
+def _somewhere(problem: Problem, found: Sequence[_Placed]) -> tuple[_Placed, ...]:
     """Effects with the name of the only place where they need none to be told apart."""
     sites = {place.name: place.site for place in problem.structure.places}
     return tuple(replace(effect, where=effect.where or sites.get("", "")) for effect in found)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from bench.files import json_values
 
-Kind = Literal["effect", "none", "unknown"]
+VerdictKind = Literal["effect", "none", "unknown"]
 
 
 @dataclass(frozen=True)
@@ -194,7 +194,7 @@ class Verdict:
         settings: Thresholds that differ from their defaults, as `jointbench diagnose --settings` reads them.
     """
 
-    verdict: Kind
+    verdict: VerdictKind
     named: tuple[NamedEffect, ...]
     ranking: tuple[Ranked, ...]
     indistinguishable: tuple[tuple[str, ...], ...]

@@ -78,6 +78,9 @@ def kind_of(hint: Any, own: Own, name: str = "") -> Any:
     if hint in SCALARS:
         return SCALARS[hint]
     origin, arguments = get_origin(hint), get_args(hint)
+    alias = getattr(origin, "__value__", None)
+    if alias is not None:  # an alias by Python's `type` statement, as NDArray from numpy 2.5 on
+        return kind_of(alias[arguments], own, name)
     if hint in (Any, type(None)) or origin is Literal:
         return hint
     if is_dataclass(hint):

@@ -65,15 +65,23 @@ AS_NUMBER = BeforeValidator(_plain)
 AS_WHOLE = BeforeValidator(_whole)
 """The same of a whole number."""
 Number = Annotated[float, Strict(), Field(allow_inf_nan=False), AS_NUMBER]
+"""A finite number; text and `true` are none."""
 Positive = Annotated[float, Strict(), Field(gt=0.0, allow_inf_nan=False), AS_NUMBER]
+"""A finite number above zero."""
 NotNegative = Annotated[float, Strict(), Field(ge=0.0, allow_inf_nan=False), AS_NUMBER]
+"""A finite number, zero or above."""
 Probability = Annotated[float, Strict(), Field(ge=0.0, le=1.0), AS_NUMBER]
+"""A number from zero to one."""
 Limit = Annotated[float, Strict(), Field(gt=0.0, allow_inf_nan=True), AS_NUMBER]
 """A positive number or infinity, which stands for no limit (TOML can write it)."""
 Whole = Annotated[int, Strict(), AS_WHOLE]
+"""A whole number."""
 Count = Annotated[int, Strict(), Field(ge=0), AS_WHOLE]
+"""A whole number, zero or above."""
 Flag = Annotated[bool, Strict(), AS_NUMBER]
+"""True or false; 0 and 1 are numbers."""
 Text = Annotated[str, Strict()]
+"""Any text."""
 Name = Annotated[
     str, Strict(), StringConstraints(min_length=1, max_length=256, pattern=r"^[^\x00-\x1f\x7f]+$")
 ]
@@ -84,5 +92,5 @@ Listed = Annotated[tuple[T, ...], Strict(False), _FirstOnly()]
 """Any number of values; a tuple in the model."""
 Table = Annotated[dict[Name, T], BeforeValidator(_few)]
 """Values by name."""
-Pair = Annotated[tuple[Number, Number], Strict(False)]
+NumberPair = Annotated[tuple[Number, Number], Strict(False)]
 """Two numbers, mostly the lowest and the highest."""

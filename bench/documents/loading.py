@@ -42,6 +42,7 @@ class DocumentLimits:
 
 
 LIMITS = DocumentLimits()
+"""The limits that every document is read within."""
 
 
 class _LongInteger(NamedTuple):

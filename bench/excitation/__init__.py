@@ -2,9 +2,9 @@
 
 ::
 
-    from bench.excitation import Experiment, Hypothesis, Limits, RigPrior, Uncertain, design
+    from bench.excitation import Experiment, Limits, RigHypothesis, RigPrior, Uncertain, design
 
-    prior = RigPrior((Hypothesis("gap", rig, (Uncertain("gap.clearance", 2e-3, 12e-3),)),))
+    prior = RigPrior((RigHypothesis("gap", rig, (Uncertain("gap.clearance", 2e-3, 12e-3),)),))
     rng = np.random.default_rng(1)
     experiment = Experiment(
         prior,
@@ -32,20 +32,22 @@ from bench.excitation.information import (
     sensitivity,
 )
 from bench.excitation.limits import Limits, Peaks, feasible
-from bench.excitation.linear_structure import LinearStructure, linear_structure
+from bench.excitation.linear_structure import AffineStructure, linear_structure
 from bench.excitation.methods import METHODS, Design, controls_from, design, paired_experiment
-from bench.excitation.planner import Plan, Planner
+from bench.excitation.planner import Decision, Planner
 from bench.excitation.policy import Policy, find_policy, policy_names
-from bench.excitation.prior import Draw, Hypothesis, RigPrior, Uncertain
+from bench.excitation.prior import Draw, RigHypothesis, RigPrior, Uncertain
 from bench.excitation.rival_planner import RivalPlan, RivalPlanner
 from bench.excitation.rivals import RivalDraws, Rivals
 from bench.excitation.station import Desk, Station
 
 __all__ = [
     "METHODS",
+    "AffineStructure",
     "Contrast",
     "Coverage",
     "CoverageSettings",
+    "Decision",
     "Design",
     "Desk",
     "Directions",
@@ -54,14 +56,12 @@ __all__ = [
     "Estimates",
     "Experiment",
     "Family",
-    "Hypothesis",
     "Limits",
-    "LinearStructure",
     "Peaks",
-    "Plan",
     "Planner",
     "Policy",
     "Records",
+    "RigHypothesis",
     "RigPrior",
     "RivalDraws",
     "RivalPlan",

@@ -20,13 +20,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.excitation.prior import Hypothesis, Uncertain
+from bench.excitation.prior import RigHypothesis, Uncertain
 from bench.laws import find_law
 from bench.rig import Element
 
 
 @dataclass(frozen=True)
-class BackgroundSettings:
+class ExcitationBackgroundSettings:
     """Numbers of `bench.excitation.background`."""
 
     step: float = 1e-2
@@ -34,7 +34,7 @@ class BackgroundSettings:
     chaotic seems to tell more than any fit finds in it; over larger ones kinks are passed."""
 
 
-SETTINGS = BackgroundSettings()
+SETTINGS = ExcitationBackgroundSettings()
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class BackgroundTerm:
         return Uncertain(f"{self.name}.{self.parameter}", -reach, reach, "linear")
 
 
-def with_background(hypothesis: Hypothesis, terms: tuple[BackgroundTerm, ...]) -> Hypothesis:
+def with_background(hypothesis: RigHypothesis, terms: tuple[BackgroundTerm, ...]) -> RigHypothesis:
     """A hypothesis whose rigs have a background; its coordinates come after those of the hypothesis.
 
     Args:
@@ -78,7 +78,7 @@ def with_background(hypothesis: Hypothesis, terms: tuple[BackgroundTerm, ...]) -
         elements.append(Element(law, (term.joint,), law.theta(**{term.parameter: 0.0}), name=term.name))
     rig = hypothesis.rig.with_(elements=(*hypothesis.rig.elements, *elements))
     parameters = (*hypothesis.parameters, *(term.uncertain for term in terms))
-    return Hypothesis(hypothesis.name, rig, parameters, hypothesis.weight)
+    return RigHypothesis(hypothesis.name, rig, parameters, hypothesis.weight)
 
 
 def expected_error(information: NDArray[np.float64], score: NDArray[np.float64]) -> NDArray[np.float64]:

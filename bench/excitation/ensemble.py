@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.errors import ModelError, ParameterError, UnknownNameError
-from bench.excitation.linear_structure import LinearStructure, linear_structure
+from bench.excitation.linear_structure import AffineStructure, linear_structure
 from bench.excitation.stepping import (
     STEPPING_LIMITS,
     Packed,
@@ -215,7 +215,7 @@ def _frame_of(rig: Rig) -> _Frame:
     )
 
 
-def _structure_of(rig: Rig, channels: tuple[str, ...]) -> LinearStructure:
+def _structure_of(rig: Rig, channels: tuple[str, ...]) -> AffineStructure:
     """The linear structure, which ordinary elements have no part in."""
     exact = tuple(element.name for element in rig.elements if element.exact)
     key = (rig.mjcf, rig.folder, rig.structure, rig.integrator, channels, exact)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from bench.errors import ModelError
 from bench.excitation.ensemble import Ensemble
-from bench.excitation.prior import Hypothesis
+from bench.excitation.prior import RigHypothesis
 from bench.excitation.stepping import Packed, integrate_cases
 
 
@@ -45,7 +45,7 @@ class Family:
         ModelError: The rig is not linear around its elements, or not affine in an uncertain parameter.
     """
 
-    hypothesis: Hypothesis
+    hypothesis: RigHypothesis
     channels: tuple[str, ...]
     actuators: tuple[str, ...]
     _packed: Packed = field(init=False, repr=False)

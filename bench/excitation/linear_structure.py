@@ -35,15 +35,8 @@ class LinearStructureSettings:
 
 SETTINGS = LinearStructureSettings()
 
-TRACKED = (
-    mujoco.mjtState.mjSTATE_TIME
-    | mujoco.mjtState.mjSTATE_QPOS
-    | mujoco.mjtState.mjSTATE_QVEL
-    | mujoco.mjtState.mjSTATE_ACT
-)
 
-
-class LinearStructure(NamedTuple):
+class AffineStructure(NamedTuple):
     """Accelerations and sensors of a rig as affine functions.
 
     Columns of both maps: constant, positions (nv), velocities (nv), commands (n_actuators), generalised forces of the
@@ -72,7 +65,7 @@ def sensor_columns(rig: Rig, channels: tuple[str, ...]) -> NDArray[np.int64]:
     return np.array([known.index(name) for name in channels], dtype=np.int64)
 
 
-def linear_structure(rig: Rig, channels: tuple[str, ...]) -> LinearStructure:
+def linear_structure(rig: Rig, channels: tuple[str, ...]) -> AffineStructure:
     """Read the linear structure of a rig.
 
     Args:
@@ -109,7 +102,7 @@ def linear_structure(rig: Rig, channels: tuple[str, ...]) -> LinearStructure:
         constant = _respond(bare, data, np.zeros(n), len(rig.actuators))
         rows = [_respond(bare, data, unit, len(rig.actuators)) - constant for unit in np.eye(n)]
     table = np.column_stack([constant, *rows])
-    structure = LinearStructure(table[: model.nv].copy(), table[model.nv :][columns].copy())
+    structure = AffineStructure(table[: model.nv].copy(), table[model.nv :][columns].copy())
     _check(rig, structure, columns)
     return structure
 
@@ -154,7 +147,7 @@ def element_forces(rig: Rig, q: NDArray, v: NDArray, u: NDArray, z: NDArray) -> 
     return total
 
 
-def _check(rig: Rig, structure: LinearStructure, columns: NDArray) -> None:
+def _check(rig: Rig, structure: AffineStructure, columns: NDArray) -> None:
     """Compare the affine maps with the model, elements in place, at random states."""
     model, n_actuators = rig.model, len(rig.actuators)
     data = mujoco.MjData(model)

@@ -43,7 +43,7 @@ class PlannerSettings:
 SETTINGS = PlannerSettings()
 
 
-class Plan(NamedTuple):
+class Decision(NamedTuple):
     """What was decided at a time."""
 
     time: float  # [s]
@@ -91,7 +91,7 @@ class Planner(SequentialPlanner):
         n = self.station.n_samples
         return [0, *(round(share * n) for share in self.decisions), n]
 
-    def _decider(self, m: int, seed: int, told: Callable[[int, Plan], None] | None) -> Decide:
+    def _decider(self, m: int, seed: int, told: Callable[[int, Decision], None] | None) -> Decide:
         def decide(records: Records, controls: NDArray[np.float64], begin: int) -> None:
             if not begin:
                 controls[:] = self.opening
@@ -118,7 +118,7 @@ class Planner(SequentialPlanner):
         begin: int,
         seed: int,
         place: int,
-        told: Callable[[int, Plan], None] | None,
+        told: Callable[[int, Decision], None] | None,
     ) -> NDArray[np.float64]:
         """The best commands found for the rest of the test ``(n - begin, n_actuators)``."""
         from cmaes import CMA  # noqa: PLC0415  (for this method alone)
@@ -139,7 +139,7 @@ class Planner(SequentialPlanner):
                 best, least = fitted[int(np.argmin(errors))], float(errors.min())
         if told is not None:
             values = dict(zip(family.hypothesis.names, family.values(x).tolist(), strict=True))
-            told(place, Plan(begin * self.station.timestep, family.hypothesis.name, values, least))
+            told(place, Decision(begin * self.station.timestep, family.hypothesis.name, values, least))
         return best
 
     def _weigh(

@@ -71,7 +71,7 @@ class Uncertain:
 
 
 @dataclass(frozen=True, eq=False)
-class Hypothesis:
+class RigHypothesis:
     """A kind of rig with uncertain parameters.
 
     Attributes:
@@ -122,7 +122,7 @@ class Draw:
         values: Values of the uncertain parameters by name, in their units.
     """
 
-    hypothesis: Hypothesis
+    hypothesis: RigHypothesis
     values: Mapping[str, float]
 
     @property
@@ -147,7 +147,7 @@ class Draw:
         return (_draw, (self.hypothesis, dict(self.values)))
 
 
-def _draw(hypothesis: Hypothesis, values: dict[str, float]) -> Draw:
+def _draw(hypothesis: RigHypothesis, values: dict[str, float]) -> Draw:
     return hypothesis.of(values)
 
 
@@ -159,7 +159,7 @@ class RigPrior:
         hypotheses: The hypotheses; their rigs share joints, actuators and time step.
     """
 
-    hypotheses: tuple[Hypothesis, ...]
+    hypotheses: tuple[RigHypothesis, ...]
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "hypotheses", tuple(self.hypotheses))

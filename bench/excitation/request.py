@@ -37,7 +37,7 @@ from bench.errors import ParameterError, UnknownNameError
 from bench.excitation.experiment import Experiment
 from bench.excitation.limits import Limits
 from bench.excitation.methods import paired_experiment
-from bench.excitation.prior import Hypothesis, RigPrior, Uncertain
+from bench.excitation.prior import RigHypothesis, RigPrior, Uncertain
 from bench.excitation.rivals import Rivals
 from bench.excitation.schema import ExperimentEntry, RivalEntry
 from bench.rig import Rig
@@ -106,7 +106,7 @@ def request(
     for name in (*asked.noise, *limits.watched):
         if name not in measured:
             raise UnknownNameError(f"measured channel of rig '{rig.name}'", name, measured)
-    described = Hypothesis(rig.name, rig, _uncertain(rig, asked.uncertain))
+    described = RigHypothesis(rig.name, rig, _uncertain(rig, asked.uncertain))
     if asked.rival is not None:
         rivals = Rivals(rig.name, described, _rival(rig, asked.rival, asked.uncertain))
         experiment = paired_experiment(
@@ -124,12 +124,12 @@ def request(
     return Request(rig, experiment, asked.duration, asked.band)
 
 
-def _rival(rig: Rig, entry: RivalEntry, ranges: Mapping[str, tuple[float, float]]) -> Hypothesis:
+def _rival(rig: Rig, entry: RivalEntry, ranges: Mapping[str, tuple[float, float]]) -> RigHypothesis:
     """The rig with other elements, and its own ranges beside those of the structure."""
     other = rig.with_(elements=tuple(item.element() for item in entry.elements))
     shared = {name: bounds for name, bounds in ranges.items() if "." not in name}
     structure = _uncertain(other, shared) if shared else ()
-    return Hypothesis("rival", other, (*structure, *_uncertain(other, entry.uncertain)))
+    return RigHypothesis("rival", other, (*structure, *_uncertain(other, entry.uncertain)))
 
 
 def _uncertain(rig: Rig, ranges: Mapping[str, tuple[float, float]]) -> tuple[Uncertain, ...]:

@@ -13,7 +13,7 @@ from bench.excitation.ensemble import Ensemble
 from bench.excitation.information import (
     INFORMATION_LIMITS,
 )
-from bench.excitation.prior import Draw, Hypothesis, RigPrior
+from bench.excitation.prior import Draw, RigHypothesis, RigPrior
 
 
 @dataclass(frozen=True)
@@ -47,8 +47,8 @@ class Rivals:
     """
 
     name: str
-    first: Hypothesis
-    second: Hypothesis
+    first: RigHypothesis
+    second: RigHypothesis
 
     @property
     def prior(self) -> RigPrior:
@@ -95,7 +95,7 @@ class Rivals:
 
 
 def imitate(
-    hypothesis: Hypothesis,
+    hypothesis: RigHypothesis,
     record: NDArray[np.float64],
     *,
     reference: NDArray[np.float64],

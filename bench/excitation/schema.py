@@ -13,14 +13,14 @@ from bench.documents import (
     Limit,
     Listed,
     Name,
-    Pair,
+    NumberPair,
     Positive,
     Table,
     refuse,
 )
 from bench.rig.schema import ElementDocument, RigDocument
 
-Ranges = Table[Pair]
+Ranges = Table[NumberPair]
 Size = Annotated[int, Strict(), Field(ge=1, le=1_000_000), AS_WHOLE]
 
 
@@ -70,7 +70,7 @@ class ExperimentEntry(LimitsEntry):
     entry_name = "an experiment"
     duration: Positive
     """Duration [s]."""
-    band: Pair
+    band: NumberPair
     """Lowest and highest frequency [Hz]."""
     noise: Annotated[Table[Positive], Field(min_length=1)]
     """Standard deviation of the noise, by measured channel."""
@@ -109,7 +109,7 @@ class StationEntry(Entry):
     """Steps a window."""
     n_windows: Size
     """Windows of a whole test."""
-    band: Pair
+    band: NumberPair
     """Frequencies excited [Hz]."""
     shaping: Literal["knots", "amplitude_frequency"] = "knots"
     """How actions become commands."""

@@ -69,7 +69,7 @@ def _advance_rivals(counter, run, places, counts, weights, contrast, values):
         case = claim(counter)
 
 
-class Window:
+class WindowUnderWay:
     """A window of all cases under way.
 
     The other threads of the ensemble begin at once; the one that made it takes part when it calls `finish`.
@@ -88,9 +88,9 @@ class Window:
             other.result()
 
 
-def advance(ensemble: Ensemble, run: Run) -> Window:
+def advance_window(ensemble: Ensemble, run: Run) -> WindowUnderWay:
     """Begin to advance cases."""
-    return Window(ensemble, run, _advance)
+    return WindowUnderWay(ensemble, run, _advance)
 
 
 def advance_prior(
@@ -100,7 +100,7 @@ def advance_prior(
     weights: NDArray[np.float64],
     books: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
     values: NDArray[np.float64],
-) -> Window:
+) -> WindowUnderWay:
     """Begin to advance draws from a prior, adding to their information and writing its ``log det(I + F)``.
 
     Args:
@@ -111,7 +111,7 @@ def advance_prior(
         books: Fisher information, score and square of `bench.excitation.information.accumulate`; only the first is added to.
         values: ``(n_cases, n_draws)``, written.
     """
-    return Window(ensemble, run, _advance_prior, counts, weights, *books, values)
+    return WindowUnderWay(ensemble, run, _advance_prior, counts, weights, *books, values)
 
 
 def advance_rivals(
@@ -122,7 +122,7 @@ def advance_rivals(
     weights: NDArray[np.float64],
     contrast: Contrast,
     values: NDArray[np.float64],
-) -> Window:
+) -> WindowUnderWay:
     """Begin to advance pairs of rivals, adding to their contrast and writing its expected log Bayes factor [nat].
 
     Args:
@@ -134,4 +134,4 @@ def advance_rivals(
         contrast: Sums with leading axes (n_cases, n_pairs), added to.
         values: ``(n_cases, n_pairs)``, written.
     """
-    return Window(ensemble, run, _advance_rivals, places, counts, weights, contrast, values)
+    return WindowUnderWay(ensemble, run, _advance_rivals, places, counts, weights, contrast, values)

@@ -2,16 +2,14 @@
 
 ``estimator = AdaptiveLeastSquares(bouc_wen_model(2)); estimator.update(sample)`` keeps constant memory and does bounded work a
 sample: O(n^2), and O(n^3) twice a window for the persistence monitor. `run` gives the same numbers at the speed of
-the compiled loop. The law and its discretisation are in `bench.identification.stream`, the models in
+the compiled loop. The law and its discretisation are in `bench.identification.stream_law`, the models in
 `bench.identification.regressors`.
 """
 
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,46 +17,13 @@ from numpy.typing import ArrayLike, NDArray
 from bench.errors import IdentificationError, ParameterError, RecordingError
 from bench.identification import layout, stream
 from bench.identification.adaptive_history import AdaptiveHistory, Sample
-from bench.identification.persistence import EVENT_KINDS, Event, PersistenceHistory, PersistenceReport
-from bench.identification.regressors import CHANNELS, KINDS, RegressorModel
+from bench.identification.adaptive_state import initial_state
+from bench.identification.event_log import SETTINGS, EventLog
+from bench.identification.persistence import PersistenceHistory, PersistenceReport
+from bench.identification.regressors import CHANNELS, RegressorModel
+from bench.identification.stream_law import reset_covariance
 
-
-@dataclass(frozen=True)
-class AdaptiveSettings:
-    """Numbers of `bench.identification.adaptive`."""
-
-    max_events: int = 1000
-    """Most events kept; the oldest go first."""
-    event_bits: int = (1 << len(EVENT_KINDS)) - 1
-
-
-SETTINGS = AdaptiveSettings()
 _TROUBLE = ~(layout.REPORTED | layout.EXCITATION_BACK | layout.MOVING)
-_KINDS = tuple(EVENT_KINDS)
-
-
-def _setting(name: str, value: float, low: float, expected: str, *, strict: bool = False) -> float:
-    if not (math.isfinite(value) and (value > low if strict else value >= low)):
-        raise ParameterError(f"{name} = {value} came; {expected} is expected")
-    return float(value)
-
-
-def _model_settings(model: RegressorModel) -> dict[int, float]:
-    """Header entries that the model fixes."""
-    return {
-        layout.N: model.n_parameters,
-        layout.N_FILTERS: model.n_filters,
-        layout.KIND: KINDS.index(model.kind),
-        layout.ORDER_1: model.orders[0],
-        layout.ORDER_2: model.orders[1],
-        layout.MASS: model.mass,
-        layout.RATE: model.filter_rate,
-        layout.Z_INVERSE: 1.0 / model.force_scale,
-        layout.V_FLOOR: model.floors[0],
-        layout.F_FLOOR: model.floors[1],
-        layout.CROSSOVER: model.crossover,
-        layout.DENOISE_AFTER: model.denoise_after,
-    }
 
 
 class AdaptiveLeastSquares:
@@ -79,7 +44,7 @@ class AdaptiveLeastSquares:
             and clean signals bear; noise e (relative to z) makes estimates unreliable below about e^2 / number of
             samples in the window.
         max_pull: Largest part of a parameter by which the start may still pull its estimate, for it to be trusted: what the
-            estimate would move by, were the start's own information left out (see `bench.identification.stream.judge_prior`). The
+            estimate would move by, were the start's own information left out (see `stream_monitor.judge_prior`). The
             pull is exact where data hold no noise, so that this is what a trusted estimate may be off by on account of its start,
             and not a statistical threshold.
         jump_ratio: Reset the covariance when the mean square of the recent normalised innovation exceeds its long
@@ -90,7 +55,7 @@ class AdaptiveLeastSquares:
 
     Attributes:
         model: The model.
-        events: The last `max_events` events.
+        events: The last events, `EventLogSettings.most` of them.
 
     Raises:
         ParameterError: A setting lies outside its range.
@@ -118,46 +83,26 @@ class AdaptiveLeastSquares:
         stuck_after: int = 100,
         gap: float = 1.5,
     ) -> None:
-        n = model.n_parameters
         self.model = model
-        self.events: deque[Event] = deque(maxlen=SETTINGS.max_events)
-        self._state = state = np.zeros(layout.size(n, model.n_filters))
-        p0 = _setting("initial_covariance", initial_covariance, 0.0, "a positive number", strict=True)
-        limit = 10.0 * p0 * n if bound is None else bound
-        if not limit >= p0 * n:
-            raise ParameterError(
-                f"bound = {limit:g} came; at least n times the initial covariance, {p0 * n:g}, is expected, for P starts there"
-            )
-        step = 0.0
-        if sample_rate is not None:
-            step = 1.0 / _setting("sample_rate", sample_rate, 0.0, "a positive rate", strict=True)
-        settings = _model_settings(model) | {
-            layout.BETA: _setting("forgetting", forgetting, 0.0, "a rate of at least 0 1/s"),
-            layout.P0: p0,
-            layout.BOUND: limit,
-            layout.STEP: step,
-            layout.GAP: _setting("gap", gap, 1.0, "a factor above 1", strict=True),
-            layout.STUCK: _setting("stuck_after", stuck_after, 1.0, "a count of at least 1"),
-            layout.HALF_WINDOW: 0.5 * _setting("window", window, 0.0, "a positive time", strict=True),
-            layout.LEVEL_FLOOR: _setting("level_floor", level_floor, 0.0, "a fraction of at least 0"),
-            layout.MIN_EIGENVALUE: _setting("min_eigenvalue", min_eigenvalue, 0.0, "a number of at least 0"),
-            layout.JUMP: _setting("jump_ratio", jump_ratio, 0.0, "a ratio of at least 0"),
-            layout.JUMP_TIME: _setting("jump_time", jump_time, 0.0, "a positive time", strict=True),
-            layout.NORMALISE: float(normalise),
-            layout.T_REJECTED: math.inf,
-            layout.T_RESET: -math.inf,
-            layout.EXCITED: -1.0,
-            layout.MAX_PULL: _setting("max_pull", max_pull, 0.0, "a positive fraction", strict=True),
-            layout.SMALLEST: math.nan,
-            layout.CONDITION: math.nan,
-        }  # fmt: skip
-        state[list(settings)] = list(settings.values())
-        state[layout.USES_F : layout.USES_A + 1] = model.uses
-        state[layout.LAST_VALUE : layout.LAST_VALUE + 4] = math.nan
-        self._look_into(state)
-        self._report_time = math.nan
-        self._last_seen: dict[str, int] = {}
-        self._events_made = 0
+        self._log = EventLog()
+        self.events = self._log.events
+        self._state = initial_state(
+            model,
+            sample_rate=sample_rate,
+            forgetting=forgetting,
+            initial_covariance=initial_covariance,
+            bound=bound,
+            normalise=normalise,
+            window=window,
+            level_floor=level_floor,
+            min_eigenvalue=min_eigenvalue,
+            max_pull=max_pull,
+            jump_ratio=jump_ratio,
+            jump_time=jump_time,
+            stuck_after=stuck_after,
+            gap=gap,
+        )
+        self._look_into(self._state)
         self.reset_covariance()
         if theta0 is not None:
             self._begin_at(np.asarray(theta0, dtype=float))
@@ -193,7 +138,7 @@ class AdaptiveLeastSquares:
         time, force, x, v, a = sample
         flags = stream.update(self._state, time, force, x, v, a)
         if flags:
-            self._note(flags, time, int(self._header[layout.SEEN]))
+            self._log.note(flags, time, int(self._header[layout.SEEN]))
             return not flags & _TROUBLE
         return True
 
@@ -217,7 +162,7 @@ class AdaptiveLeastSquares:
             )
         flags = stream.update_given(self._state, time, z, phi)
         if flags:
-            self._note(flags, time, int(self._header[layout.SEEN]))
+            self._log.note(flags, time, int(self._header[layout.SEEN]))
             return not flags & _TROUBLE
         return True
 
@@ -308,14 +253,14 @@ class AdaptiveLeastSquares:
         span = float(np.sum(steps[steps > 0.0])) if stamps.size else 0.0
         halves = int(min(span / self._header[layout.HALF_WINDOW], stamps.size)) + 2
         reports = np.empty((halves, 5 + n))
-        seen, made = int(self._header[layout.SEEN]), self._events_made
+        seen, made = int(self._header[layout.SEEN]), self._log.made
         loop(self._state, stamps, *channels, every, theta, phi, z, flags, reports)
-        for k in np.flatnonzero(flags & SETTINGS.event_bits):
-            self._note(int(flags[k]), float(stamps[k]), seen + int(k) + 1)
+        for k in np.flatnonzero(flags & SETTINGS.bits):
+            self._log.note(int(flags[k]), float(stamps[k]), seen + int(k) + 1)
         reports = reports[: int(self._header[layout.REPORTS])]
         if reports.shape[0]:
-            self._report_time = float(reports[-1, 0])
-        fresh = min(self._events_made - made, len(self.events))
+            self._log.report_time = float(reports[-1, 0])
+        fresh = min(self._log.made - made, len(self.events))
         theta *= self.model.to_physical
         phi *= np.array(self.model.scale)
         history = AdaptiveHistory(
@@ -325,42 +270,16 @@ class AdaptiveLeastSquares:
             predicted=z[:, 1] * self.model.force_scale,
             regressors=phi,
             flags=flags,
-            persistence=PersistenceHistory(
-                time=reports[:, 0].copy(),
-                smallest_eigenvalue=reports[:, 1].copy(),
-                condition=reports[:, 2].copy(),
-                level=reports[:, 5:].copy(),
-                n_unexcited=reports[:, 3].astype(np.int64),
-                trusted=reports[:, 4] == 1.0,
-            ),
+            persistence=PersistenceHistory.of_rows(reports),
             events=tuple(self.events)[len(self.events) - fresh :],
         )
         for array in (*history[:6], *history.persistence):
             array.flags.writeable = False
         return history
 
-    def _note(self, flags: int, time: float, index: int) -> None:
-        """Turn flags into events; the same kind in the sample before is the same event."""
-        if flags & layout.REPORTED:
-            self._report_time = time
-        for bit, kind in enumerate(_KINDS):
-            if not flags & (1 << bit):
-                continue
-            last = self._last_seen.get(kind)
-            self._last_seen[kind] = index
-            if last == index - 1 and self.events and self.events[-1].kind == kind:
-                self.events[-1] = self.events[-1]._replace(count=self.events[-1].count + 1)
-                continue
-            reason = EVENT_KINDS[kind]
-            if kind == "constant":
-                still = [name for i, name in enumerate(CHANNELS) if flags & (layout.FIRST_CHANNEL << i)]
-                reason = f"{reason}; channel: {', '.join(still)}"
-            self.events.append(Event(time, kind, reason))
-            self._events_made += 1
-
     def reset_covariance(self) -> None:
         """Set P back to its start; the estimates stay (Ioannou and Sun 1996, section 4.3.7)."""
-        stream.reset_covariance(self._header, self._d, self._u)
+        reset_covariance(self._header, self._d, self._u)
         self._start[:] = self._theta
         self._header[layout.T_RESET] = (
             self._header[layout.T_LAST] if self._header[layout.STARTED] else -math.inf
@@ -398,20 +317,18 @@ class AdaptiveLeastSquares:
         """The last report of the monitor."""
         silent = ~(self._level > self._header[layout.LEVEL_FLOOR] * self._peak)
         return PersistenceReport(
-            time=self._report_time,
+            time=self._log.report_time,
             smallest_eigenvalue=float(self._header[layout.SMALLEST]),
             condition=float(self._header[layout.CONDITION]),
             level=self._level.copy(),
-            unexcited=tuple(name for name, flag in zip(self.model.names, silent, strict=True) if flag)
-            if math.isfinite(self._report_time)
-            else (),
+            unexcited=self._named(silent) if math.isfinite(self._log.report_time) else (),
             trusted=self.trusted,
-            ruled_by_start=tuple(
-                name
-                for name, pull in zip(self.model.names, self._pull, strict=True)
-                if not pull <= self._header[layout.MAX_PULL]
-            ),
+            ruled_by_start=self._named(~(self._pull <= self._header[layout.MAX_PULL])),
         )
+
+    def _named(self, chosen: NDArray[np.bool_]) -> tuple[str, ...]:
+        """Names of chosen parameters."""
+        return tuple(name for name, one in zip(self.model.names, chosen, strict=True) if one)
 
     @property
     def trusted(self) -> bool:

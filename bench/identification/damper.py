@@ -28,7 +28,7 @@ from bench.recording import nmse
 
 
 @dataclass(frozen=True)
-class DamperSettings:
+class DesignModelSettings:
     """Numbers of `bench.identification.damper`."""
 
     good_fit: float = 5.0
@@ -41,7 +41,7 @@ class DamperSettings:
     """Share of moving samples in which the damper may push along its velocity."""
 
 
-SETTINGS = DamperSettings()
+SETTINGS = DesignModelSettings()
 
 
 class DesignFit(NamedTuple):

@@ -14,9 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.identification.output_error_problem import SETTINGS, Linearisation, OutputErrorProblem
-
-Array = NDArray[np.float64]
 
 
 class FittedPoint(NamedTuple):

@@ -30,7 +30,8 @@ fast = numba.njit(cache=True, error_model="numpy", nogil=True, fastmath={"reasso
 ) = range(65)  # fmt: skip
 CONSTANT_RUN, LAST_VALUE, HEADER = 65, 69, 73
 
-BOUC_WEN, SDOF, DAMPER_LOG, POLYNOMIAL, GIVEN = range(5)
+BOUC_WEN, SDOF, DAMPER_LOG, POLYNOMIAL = range(4)
+"""Places in `bench.identification.regressors.KINDS`; what is given has no regressor of its own to form."""
 
 # Flag bits of a sample: the kinds of events in the order of `bench.identification.persistence.EVENT_KINDS`, then the rest.
 NOT_FINITE, BACKWARDS, CLOCK_RESET, DROPPED, CONSTANT, MOVING, EXCITATION_LOST, EXCITATION_BACK, RESET = (

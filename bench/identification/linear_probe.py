@@ -15,11 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench import native
+from bench.arrays import Array
 from bench.errors import ModelError
 from bench.identification.parameter_address import ParameterAddress
 from bench.rig import Rig
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -128,7 +127,7 @@ def value_of(model: mujoco.MjModel, entry: ParameterAddress) -> float:
     return float(np.ravel(getattr(model, entry.field)[entry.index])[0])
 
 
-def refuse(rig: Rig, model: mujoco.MjModel) -> None:
+def refuse_nonlinear(rig: Rig, model: mujoco.MjModel) -> None:
     """Raise `ModelError` where a probe at a few states could miss that the rig is not linear."""
     slides = (int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE))
     collides = not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CONTACT and np.any(
@@ -191,7 +190,7 @@ def matrices_at(
     return at, moved(model, entries, values)
 
 
-def cut(matrices: Matrices, kept: NDArray[np.int64]) -> Matrices:
+def rows_and_columns(matrices: Matrices, kept: NDArray[np.int64]) -> Matrices:
     """The rows and columns of some degrees of freedom."""
     square = np.ix_(kept, kept)
     return Matrices(

@@ -21,15 +21,22 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from bench.arrays import Array
 from bench.errors import ModelError, ParameterError, UnknownNameError
-from bench.identification.linear_probe import Matrices, Probe, cut, matrices_at, refuse, slope_of, value_of
-from bench.identification.linear_rig_elements import element_table, reached_coordinates, sensor_columns
+from bench.identification.linear_probe import (
+    Matrices,
+    Probe,
+    matrices_at,
+    refuse_nonlinear,
+    rows_and_columns,
+    slope_of,
+    value_of,
+)
+from bench.identification.linear_rig_elements import channel_columns, element_table, reached_coordinates
 from bench.identification.parameter_address import address
 from bench.identification.record_batch import run_records
 from bench.identification.record_loop import Sparse, run, work_size
 from bench.rig import Rig
-
-Array = NDArray[np.float64]
 
 
 def current(rig: Rig, name: str) -> float:
@@ -77,9 +84,9 @@ class LinearRig:
             UnknownNameError: No such channel or parameter.
         """
         addresses = [address(rig, name) for name in parameters]
-        columns = sensor_columns(rig, channels)
+        columns = channel_columns(rig, channels)
         bare = rig.with_(elements=()).model
-        refuse(rig, bare)
+        refuse_nonlinear(rig, bare)
         structural = [entry.field != "numeric_data" for entry in addresses]
         start = np.array([value_of(rig.model, entry) for entry in addresses])
         base = Probe(bare).matrices()
@@ -104,8 +111,8 @@ class LinearRig:
             rig,
             tuple(channels),
             tuple(parameters),
-            cut(base, kept),
-            tuple(None if slope is None else cut(slope, kept) for slope in slopes),
+            rows_and_columns(base, kept),
+            tuple(None if slope is None else rows_and_columns(slope, kept) for slope in slopes),
             tuple(
                 -1 if free else offsets[entry.index]
                 for entry, free in zip(addresses, structural, strict=True)

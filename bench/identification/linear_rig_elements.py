@@ -7,15 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.errors import UnknownNameError
 from bench.identification.linear_probe import Matrices
-from bench.identification.record_loop import COLUMNS
+from bench.identification.record_equations import COLUMNS
 from bench.rig import Rig
 
-Array = NDArray[np.float64]
 
-
-def sensor_columns(rig: Rig, channels: Sequence[str]) -> list[int]:
+def channel_columns(rig: Rig, channels: Sequence[str]) -> list[int]:
     """Columns of MuJoCo's `sensordata` behind channels of a rig's records.
 
     Raises:

@@ -29,12 +29,13 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from bench.arrays import Array
 from bench.errors import FileFormatError, IdentificationError
 from bench.identification.fit_data import checked_data, nmse_percent, read_only
-from bench.identification.memory_refinement import refined
-from bench.identification.memory_settings import FORMS, Form, MemorySettings, dictionary
+from bench.identification.memory_refinement import refine_memory
+from bench.identification.memory_settings import FORMS, MemoryForm, MemorySettings, dictionary
 from bench.identification.memory_terms import MemoryRecord, MemoryTerms, fold, smoothness, solve
 from bench.identification.validity_range import ValidityRange
 from bench.laws.base import ForceLaw
@@ -42,8 +43,6 @@ from bench.laws.evaluate import evaluate
 from bench.laws.memory import memory_law
 from bench.laws.memory_energy import stored_energy
 from bench.laws.memory_layout import MemoryLayout
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -268,7 +267,7 @@ SETTINGS = MemoryModuleSettings()
 class _Shape(NamedTuple):
     """A form after what held-out segments have to say of it."""
 
-    form: Form
+    form: MemoryForm
     terms: MemoryTerms
     strength: float  # of smoothing
     held_out: float  # [%]
@@ -277,7 +276,7 @@ class _Shape(NamedTuple):
 
 
 def _tried(
-    form: Form,
+    form: MemoryForm,
     settings: MemorySettings,
     records: Sequence[MemoryRecord],
     spreads: Array,
@@ -308,7 +307,7 @@ def _shaped(
     terms, weights = _pruned(terms, records, spreads, settings, strength)
     steps = 0
     if settings.refine and terms.layout.slips + terms.layout.maxwells:
-        terms, steps = refined(terms, records, spreads, strength, settings.refine)
+        terms, steps = refine_memory(terms, records, spreads, strength, settings.refine)
         terms, weights = _pruned(terms, records, spreads, settings, strength)
     return terms, weights, steps
 

@@ -15,21 +15,19 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import qr
 from threadpoolctl import threadpool_limits
 
+from bench.arrays import Array
 from bench.identification.memory_terms import (
     MemoryRecord,
     MemoryTerms,
     fold,
-    rows_of,
     smoothness,
     solve,
     triangular,
+    weighted_rows,
 )
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -52,7 +50,7 @@ class _Point(NamedTuple):
     loss: float
 
 
-def refined(
+def refine_memory(
     terms: MemoryTerms, records: Sequence[MemoryRecord], spreads: Array, strength: float, steps: int
 ) -> tuple[MemoryTerms, int]:
     """The terms with better shapes, and the number of trials."""
@@ -87,7 +85,7 @@ def refined(
 
 
 def _evaluate(terms: MemoryTerms, records: Sequence[MemoryRecord], spreads: Array, penalty: Array) -> _Point:
-    blocks = [rows_of(terms, r, terms.states(r), r.used, spreads) for r in records]
+    blocks = [weighted_rows(terms, r, terms.states(r), r.used, spreads) for r in records]
     matrix = np.vstack(blocks)
     factor = triangular(matrix)
     weights = solve(factor, penalty)
@@ -139,7 +137,7 @@ def _jacobian(at: _Point, records: Sequence[MemoryRecord], spreads: Array) -> Ar
         kinds.append((moves[-1], [(n + g + i, slice(start + i, start + i + 1)) for i in range(m)]))
     for move, owners in kinds:
         changed = _moved(terms, move)
-        rows = np.vstack([rows_of(changed, r, changed.states(r), r.used, spreads) for r in records])
+        rows = np.vstack([weighted_rows(changed, r, changed.states(r), r.used, spreads) for r in records])
         for place, columns in owners:
             difference = rows[:, columns] - at.matrix[:, columns]
             jacobian[:, place] = difference @ at.weights[columns] / move[place]

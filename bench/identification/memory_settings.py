@@ -7,17 +7,14 @@ from itertools import combinations
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.errors import ParameterError
 from bench.identification.memory_terms import MemoryTerms
 from bench.laws.memory_layout import Direction, MemoryLayout
 
-Array = NDArray[np.float64]
-
-
-Form = Literal["sliders", "profiles"]
-FORMS: tuple[Form, ...] = ("sliders", "profiles")
+MemoryForm = Literal["sliders", "profiles"]
+FORMS: tuple[MemoryForm, ...] = ("sliders", "profiles")
 """The forms of a joint with memory."""
 
 
@@ -92,7 +89,7 @@ class MemorySettings:
                 "a share of the motion, a positive number and at least one strength are expected"
             )
 
-    def of_form(self, form: Form) -> MemorySettings:
+    def of_form(self, form: MemoryForm) -> MemorySettings:
         """The settings of one form, with its number of slip elements."""
         return replace(self, form=form, slips=getattr(SLIPS, form) if self.slips is None else self.slips)
 

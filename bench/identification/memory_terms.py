@@ -21,11 +21,10 @@ from scipy.linalg.lapack import dgeqrf
 from scipy.optimize import nnls
 from threadpoolctl import threadpool_limits
 
+from bench.arrays import Array
 from bench.laws.evaluate import evaluate
 from bench.laws.memory import memory_law
 from bench.laws.memory_layout import Direction, MemoryLayout
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -210,7 +209,9 @@ def fold(terms: MemoryTerms, records: Sequence[MemoryRecord], spreads: Array) ->
         for record in records:
             states = terms.states(record)
             for start in range(0, len(record.used), SETTINGS.block):
-                block = rows_of(terms, record, states, record.used[start : start + SETTINGS.block], spreads)
+                block = weighted_rows(
+                    terms, record, states, record.used[start : start + SETTINGS.block], spreads
+                )
                 total += float(np.sum(block[:, -1] ** 2))
                 factor = _triangle(np.vstack([factor, block]))
     return _factor(factor, total)
@@ -229,7 +230,7 @@ def _factor(triangle: Array, total: float) -> Factor:
     return Factor(padded[:, :-1], padded[:, -1], float(last**2), total)
 
 
-def rows_of(
+def weighted_rows(
     terms: MemoryTerms, record: MemoryRecord, states: Array, rows: NDArray[np.int64], spreads: Array
 ) -> Array:
     """Columns of all weights, then the forces, at some samples, over the spreads of the outputs: (k n_rows, n_weights + 1)."""

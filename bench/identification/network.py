@@ -32,10 +32,10 @@ from bench.errors import FileFormatError, IdentificationError, ParameterError
 from bench.identification.fit_data import centre_and_scale, checked_data, nmse_percent, read_only
 from bench.identification.hidden_layer import HiddenLayerProblem
 from bench.identification.network_training import (
-    Progress,
-    Start,
+    RandomStart,
     Training,
     TrainingData,
+    TrainingProgress,
     held_out_split,
     spread_order,
     train,
@@ -45,7 +45,7 @@ from bench.identification.validity_range import ValidityRange
 from bench.laws.base import ForceLaw
 from bench.laws.network import NetworkWeights, fold_scaling, network_law, published_network
 
-__all__ = ["NetworkModel", "NetworkReport", "Progress", "fit_network", "published_network"]
+__all__ = ["NetworkModel", "NetworkReport", "TrainingProgress", "fit_network", "published_network"]
 
 
 @dataclass(frozen=True)
@@ -204,7 +204,7 @@ def fit_network(
     accelerations: ArrayLike | None = None,
     time_limit: float | None = None,
     threads: int | None = None,
-    progress: Progress | None = None,
+    progress: TrainingProgress | None = None,
 ) -> NetworkModel:
     """Train a network on states and forces.
 
@@ -306,7 +306,7 @@ def _in_physical_units(
 
 
 def _report(
-    starts: list[Start],
+    starts: list[RandomStart],
     forces: NDArray[np.float64],
     estimated: NDArray[np.float64],
     held_out: NDArray[np.int64] | None,

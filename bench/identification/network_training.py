@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from bench.identification.hidden_layer import HiddenLayerProblem
 from bench.identification.levenberg_marquardt import RegularisedMinimum, minimise_regularised
 
-Progress = Callable[[str, int, float], None]
+TrainingProgress = Callable[[str, int, float], None]
 """Called with the stage ("stage 1/3, start 2/4"), the iteration and the normalised mean-square error [%]."""
 
 
@@ -50,11 +50,11 @@ class Training(NamedTuple):
     max_iterations: int
     regularise: bool
     time_limit: float
-    progress: Progress | None
+    progress: TrainingProgress | None
 
 
 @dataclass
-class Start:
+class RandomStart:
     """One random start, and how far it has come."""
 
     number: int
@@ -66,7 +66,7 @@ class Start:
 
 def train(
     data: TrainingData, training: Training, rng: np.random.Generator, run: Callable[..., Iterable]
-) -> list[Start]:
+) -> list[RandomStart]:
     """All stages; the starts with the best first."""
     clock = time.monotonic()
     variance = float(np.sum(np.var(data.outputs, axis=0)))
@@ -74,13 +74,13 @@ def train(
         data.inputs[data.held_out], data.outputs[data.held_out], training.n_hidden, run=run
     )
     last = len(training.sizes) - 1
-    starts: list[Start] = []
-    retired: list[Start] = []
+    starts: list[RandomStart] = []
+    retired: list[RandomStart] = []
     for stage, size in enumerate(training.sizes):
         chosen = data.order[:size]
         problem = HiddenLayerProblem(data.inputs[chosen], data.outputs[chosen], training.n_hidden, run=run)
         if stage == 0:
-            starts = [Start(i, problem.random_weights(rng)) for i in range(training.n_starts)]
+            starts = [RandomStart(i, problem.random_weights(rng)) for i in range(training.n_starts)]
         percent = 100.0 / (size * variance)
         remaining = clock + training.time_limit * 0.5 ** (last - stage) - time.monotonic()
         for turn, start in enumerate(starts):
@@ -110,7 +110,9 @@ def train(
     return starts + retired
 
 
-def _reporter(progress: Progress | None, label: str, percent: float) -> Callable[[int, float], None] | None:
+def _reporter(
+    progress: TrainingProgress | None, label: str, percent: float
+) -> Callable[[int, float], None] | None:
     if progress is None:
         return None
     return lambda iteration, squares: progress(label, iteration, percent * squares)

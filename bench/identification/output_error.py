@@ -21,8 +21,8 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.errors import IdentificationError, ParameterError, UnknownNameError
 from bench.identification.geodesic_steps import FittedPoint, descend
 from bench.identification.linear_rig import current
@@ -33,14 +33,11 @@ from bench.identification.rig_response import (
     RigRecord,
     engine_for,
     moving_sensors,
-    prepare,
+    prepare_response,
     with_initial,
 )
 from bench.recording import Recording
 from bench.rig import Rig
-
-Array = NDArray[np.float64]
-
 
 _POSITIVE = ("mass", "inertia")
 
@@ -137,7 +134,7 @@ def fit_output_error(
     names = _names(records, free)
     start = np.array([current(rig, name) for name in names])
     chosen = tuple(channels) if channels is not None else moving_sensors(rig, records[0])
-    prepared = [prepare(rig, r, chosen, inputs or {}, i) for r, i in with_initial(records, initial)]
+    prepared = [prepare_response(rig, r, chosen, inputs or {}, i) for r, i in with_initial(records, initial)]
     weights, known = _weights(records, chosen, prepared, noise)
     scale = _scales(names, start, search or {})
     prior = _priors(names, scale, priors or {}, known)

@@ -7,15 +7,13 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.identification.rig_response import (
     LinearEngine,
     MujocoEngine,
     RigRecord,
 )
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

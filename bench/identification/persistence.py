@@ -87,3 +87,15 @@ class PersistenceHistory(NamedTuple):
     level: NDArray[np.float64]
     n_unexcited: NDArray[np.int64]
     trusted: NDArray[np.bool_]
+
+    @classmethod
+    def of_rows(cls, rows: NDArray[np.float64]) -> PersistenceHistory:
+        """The reports as the compiled loop writes them ``(m, 5 + n)``: time, eigenvalue, condition, silent, trusted, levels."""
+        return cls(
+            time=rows[:, 0].copy(),
+            smallest_eigenvalue=rows[:, 1].copy(),
+            condition=rows[:, 2].copy(),
+            level=rows[:, 5:].copy(),
+            n_unexcited=rows[:, 3].astype(np.int64),
+            trusted=rows[:, 4] == 1.0,
+        )

@@ -3,12 +3,6 @@
 A Chebyshev basis is close to orthogonal for states spread evenly over their range (condition number 45 against 880 of
 the power series, order 3 in four states). Records of a joint dwell near its centre, where T_2 is nearly constant and T_3
 nearly linear: on the joint rig's three records the order is reversed, 4e5 against 260. Both give the same forces.
-
-The records are read in blocks and folded into one triangular factor (sequential QR), whose singular values give the
-condition number and a minimum-norm solution: forming ``A'A`` would square the condition number, and the whole regressor
-matrix of three 30 s records at 1 kHz and 256 terms would take 180 MB.
-
-`ValidityRange`, which every reduced-order model carries, lives here too.
 """
 
 from __future__ import annotations
@@ -23,28 +17,15 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg.lapack import dgeqrf
-from threadpoolctl import threadpool_limits
 
 from bench.errors import FileFormatError, IdentificationError, ParameterError
 from bench.identification.fit_data import centre_and_scale, checked_data, nmse_percent, read_only
+from bench.identification.polynomial_regression import SETTINGS, in_blocks, polynomial_terms, solve_in_blocks
 from bench.identification.surroundings import SETTINGS as SURROUNDINGS
 from bench.identification.surroundings import surroundings
 from bench.identification.validity_range import ValidityRange
 from bench.laws.base import ForceLaw
 from bench.laws.polynomial import Basis, Kind, polynomial_exponents, polynomial_law
-
-
-@dataclass(frozen=True)
-class PolynomialSettings:
-    """Numbers of `bench.identification.polynomial`."""
-
-    block: int = 4096
-    around: int = 20
-    """Points of the surroundings for each term: as many times over-determined as a record should be."""
-
-
-SETTINGS = PolynomialSettings()
 
 
 @dataclass(frozen=True)
@@ -129,7 +110,7 @@ class PolynomialModel:
         inside = data
         if self.beyond is not None:
             inside = np.clip(data, self.centre - self.scale, self.centre + self.scale)
-        blocks = _regressors(inside, self.exponents, self.basis, self.centre, self.scale)
+        blocks = polynomial_terms(inside, self.exponents, self.basis, self.centre, self.scale)
         force = np.vstack([block @ self.coefficients.T for block in blocks])
         if self.beyond is None:
             return force
@@ -248,17 +229,14 @@ def fit_polynomial(
         raise IdentificationError(
             f"{len(s)} samples came for {unknowns} unknowns a force; give longer records, lower orders or kind='total'"
         )
-    blocks = (
-        np.hstack(parts)
-        for parts in zip(_regressors(s, exponents, basis, centre, scale), _blocks(a), _blocks(f), strict=True)
-    )
+    blocks = _regression(s, f, a, exponents, basis, centre, scale)
     if weight and not a.shape[1]:
         around = surroundings(s, f, SETTINGS.around * n_terms)
         factor = math.sqrt(weight * len(s) / len(around.states))
-        terms = _regressors(around.states, exponents, basis, centre, scale)
-        beside = (factor * np.hstack(parts) for parts in zip(terms, _blocks(around.forces), strict=True))
-        blocks = itertools.chain(blocks, beside)
-    solution, singular, rank = _solve(blocks, f.shape[1], unknowns, ridge, rcond)
+        nothing = np.zeros((len(around.states), 0))
+        beside = _regression(around.states, around.forces, nothing, exponents, basis, centre, scale)
+        blocks = itertools.chain(blocks, (factor * block for block in beside))
+    solution, singular, rank = solve_in_blocks(blocks, f.shape[1], unknowns, ridge, rcond)
     coefficients = read_only(solution[:n_terms].T)
     mass = read_only(solution[n_terms:].T) if a.shape[1] else None
     condition = float(singular[0] / singular[-1]) if singular[-1] > 0.0 else float("inf")
@@ -280,6 +258,21 @@ def fit_polynomial(
     return replace(
         model, report=replace(pending, nmse=nmse_percent(f, estimated), seconds=time.perf_counter() - begun)
     )
+
+
+def _regression(
+    states: NDArray[np.float64],
+    forces: NDArray[np.float64],
+    accelerations: NDArray[np.float64],
+    exponents: NDArray[np.int64],
+    basis: Basis,
+    centre: NDArray[np.float64],
+    scale: NDArray[np.float64],
+) -> Iterator[NDArray[np.float64]]:
+    """Regressors beside what they are to give, block by block."""
+    terms = polynomial_terms(states, exponents, basis, centre, scale)
+    for parts in zip(terms, in_blocks(accelerations), in_blocks(forces), strict=True):
+        yield np.hstack(parts)
 
 
 def _check(basis: Basis, *, normalise: bool, bounded: bool, weights: tuple[float, float]) -> None:
@@ -310,56 +303,3 @@ def _orders_of(orders: int | Sequence[int], n_states: int) -> tuple[int, ...]:
             f"{len(powers)} polynomial orders came for {n_states} states; one a state is expected"
         )
     return powers
-
-
-def _blocks(array: NDArray[np.float64]) -> Iterator[NDArray[np.float64]]:
-    for first in range(0, len(array), SETTINGS.block):
-        yield array[first : first + SETTINGS.block]
-
-
-def _regressors(
-    states: NDArray[np.float64],
-    exponents: NDArray[np.int64],
-    basis: Basis,
-    centre: NDArray[np.float64],
-    scale: NDArray[np.float64],
-) -> Iterator[NDArray[np.float64]]:
-    """The terms at all states, in blocks (up to `block`, n_terms)."""
-    c = 1.0 if basis == "chebyshev" else 0.0
-    orders = exponents.max(axis=0)
-    for block in _blocks(states):
-        terms = np.ones((len(exponents), len(block)))
-        for i, order in enumerate(orders):
-            u = (block[:, i] - centre[i]) / scale[i]
-            table = [np.ones_like(u), u]
-            for _ in range(1, order):
-                table.append((1.0 + c) * u * table[-1] - c * table[-2])
-            terms *= np.array(table)[exponents[:, i]]
-        yield terms.T
-
-
-def _solve(
-    blocks: Iterator[NDArray[np.float64]],
-    n_outputs: int,
-    unknowns: int,
-    ridge: float,
-    rcond: float,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], int]:
-    """Least-squares solution (unknowns, n_outputs), singular values and rank, by sequential QR of regressors beside targets."""
-    width = unknowns + n_outputs
-    triangle = np.zeros((0, width))
-    # One BLAS thread: OpenBLAS' own spin when another process is busy, which made this twenty times slower.
-    with threadpool_limits(1, user_api="blas"):
-        for block in blocks:
-            stacked = np.vstack([triangle, block])
-            factor = dgeqrf(np.asfortranarray(stacked), lwork=64 * width, overwrite_a=1)[0]
-            triangle = np.triu(factor[:width])
-        # Columns of unit norm: rank and condition then speak of the data, not of the units of the states.
-        size = np.linalg.norm(triangle[:unknowns, :unknowns], axis=0)
-        size = np.where(size > 0.0, size, 1.0)
-        left, singular, right = np.linalg.svd(triangle[:unknowns, :unknowns] / size)
-    projected = left.T @ triangle[:unknowns, unknowns:]
-    kept = singular > rcond * singular[0]
-    penalty = ridge * float(np.sum(singular**2)) / unknowns
-    gains = np.where(kept, singular / np.where(kept, singular**2 + penalty, 1.0), 0.0)
-    return (right.T @ (gains[:, None] * projected)) / size[:, None], singular, int(kept.sum())

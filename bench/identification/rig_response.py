@@ -13,17 +13,16 @@ from typing import Literal, NamedTuple
 import mujoco
 import numpy as np
 from mujoco.batch import Batch
-from numpy.typing import NDArray
 
 from bench import native
+from bench.arrays import Array
 from bench.errors import IdentificationError, ModelError, UnknownNameError
 from bench.identification.linear_rig import LinearRig, address
-from bench.identification.linear_rig_elements import sensor_columns
+from bench.identification.linear_rig_elements import channel_columns
 from bench.recording import Recording
 from bench.rig import Rig, controls_of
+from bench.rig.drives import Initial
 
-Array = NDArray[np.float64]
-Initial = Mapping[str, tuple[float, float]]
 EngineName = Literal["auto", "linear", "mujoco"]
 
 _COMMAND_SENSORS = (int(mujoco.mjtSensor.mjSENS_ACTUATORFRC), int(mujoco.mjtSensor.mjSENS_JOINTACTFRC))
@@ -71,7 +70,7 @@ class MujocoEngine:
 
     def __init__(self, rig: Rig, channels: Sequence[str], free: Sequence[str], threads: int) -> None:
         self.rig = rig
-        self.columns = sensor_columns(rig, channels)
+        self.columns = channel_columns(rig, channels)
         self.addresses = [address(rig, name) for name in free]
         self.threads = threads
 
@@ -137,7 +136,7 @@ def with_initial(
     return list(zip(records, initial, strict=True))
 
 
-def prepare(
+def prepare_response(
     rig: Rig, record: Recording, channels: tuple[str, ...], inputs: Mapping[str, str], initial: Initial
 ) -> RigRecord:
     """Commands, measured channels and clock of a record, as the engines take them.

@@ -2,7 +2,7 @@
 
 Masri and Caughey integrated an interpolated surface against Chebyshev polynomials, which needs values on the whole
 rectangle; here the coefficients are fitted to the samples themselves by least squares, which needs none in the corners a
-motion never visits, and `Coverage` says where the samples lie. A surface is a function of the present state: a joint with
+motion never visits, and `SurfaceCoverage` says where the samples lie. A surface is a function of the present state: a joint with
 memory (hysteresis) has none, and leaves a loop as the misfit.
 
 Both bases span the same functions and convert into each other exactly. The Chebyshev coefficients of a low order
@@ -17,19 +17,18 @@ References:
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import Polynomial, chebyshev, polynomial
 from numpy.typing import ArrayLike, NDArray
 
 from bench.errors import IdentificationError, ParameterError, RecordingError
+from bench.laws.polynomial import Basis
 from bench.recording import nmse
 
-Basis = Literal["chebyshev", "power"]
 
-
-class Coverage(NamedTuple):
+class SurfaceCoverage(NamedTuple):
     """Where the states of a record lie.
 
     Attributes:
@@ -97,7 +96,7 @@ class RestoringSurface:
     coefficients: NDArray[np.float64]
     x_range: tuple[float, float]
     v_range: tuple[float, float]
-    coverage: Coverage
+    coverage: SurfaceCoverage
     nmse: float
     condition: float
 
@@ -190,7 +189,7 @@ def restoring_force(force: ArrayLike, acceleration: ArrayLike, *, mass: float) -
 
 def coverage(
     x: ArrayLike, v: ArrayLike, *, cells: tuple[int, int] = (30, 30), min_count: int = 1
-) -> Coverage:
+) -> SurfaceCoverage:
     """Count the samples of a record over a grid of cells in the phase plane.
 
     Args:
@@ -208,7 +207,7 @@ def coverage(
         raise ParameterError(f"cells {cells} and min_count {min_count} came; at least 1 each is expected")
     counts, x_edges, v_edges = np.histogram2d(x, v, bins=cells)
     whole = counts.astype(np.int64)
-    return Coverage(whole, x_edges, v_edges, float(np.mean(whole >= min_count)), min_count)
+    return SurfaceCoverage(whole, x_edges, v_edges, float(np.mean(whole >= min_count)), min_count)
 
 
 def fit_surface(
@@ -280,7 +279,9 @@ def fit_surface(
     )
 
 
-def _cell_weights(x: NDArray[np.float64], v: NDArray[np.float64], covered: Coverage) -> NDArray[np.float64]:
+def _cell_weights(
+    x: NDArray[np.float64], v: NDArray[np.float64], covered: SurfaceCoverage
+) -> NDArray[np.float64]:
     """Weights that make the squares of each cell count as those of one sample."""
     i, j = (
         np.clip(np.searchsorted(edges, values, side="right") - 1, 0, edges.size - 2)

@@ -18,12 +18,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import nnls
 from scipy.spatial import cKDTree
 from scipy.stats.qmc import Halton
 
-Array = NDArray[np.float64]
+from bench.arrays import Array
 
 
 @dataclass(frozen=True)

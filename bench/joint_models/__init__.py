@@ -5,13 +5,13 @@ laboratory measured into motions and restoring forces, `document` is the file be
 """
 
 from bench.joint_models.document import JointFile, read_joint, write_joint
-from bench.joint_models.records import Columns, joint_motions
+from bench.joint_models.records import JointColumns, joint_motions
 from bench.joint_models.registry import KINDS, Fitted, JointKind, Settings, identify
 
 __all__ = [
     "KINDS",
-    "Columns",
     "Fitted",
+    "JointColumns",
     "JointFile",
     "JointKind",
     "Settings",

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 
 from bench.errors import ParameterError, UnknownNameError
 from bench.joint_models.document import JointFile
-from bench.joint_models.records import Columns, joint_motions
-from bench.joint_models.registry import KINDS, Settings, held_out, identify, scores, without
+from bench.joint_models.records import JointColumns, joint_motions
+from bench.joint_models.registry import KINDS, Settings, identify, judging_samples, scores, without_masked
 from bench.recording import Recording
 from bench.rig.element import Element
 
@@ -15,7 +15,7 @@ from bench.rig.element import Element
 def identified(
     kind: str,
     records: Mapping[str, Recording],
-    columns: Columns,
+    columns: JointColumns,
     settings: Settings,
     judged: Mapping[str, Recording] | None = None,
     joints: Sequence[str] = (),
@@ -46,8 +46,8 @@ def identified(
         )
     if kind not in KINDS:
         raise UnknownNameError("kind of joint model", kind, KINDS)
-    masks = held_out(kind, motions, settings)
-    training = motions if judged else without(motions, masks)
+    masks = judging_samples(kind, motions, settings)
+    training = motions if judged else without_masked(motions, masks)
     fitted = identify(kind, training, settings)
     results = {"identification": scores(fitted, training)}
     if judged:

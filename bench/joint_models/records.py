@@ -6,20 +6,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bench.errors import IdentificationError, ParameterError, UnknownNameError
 from bench.identification.parametric import ComponentRecord
 from bench.identification.restoring_force import Body, joint_data
 from bench.recording import Recording
 
-Array = NDArray[np.float64]
 MOTIONS = ("displacement", "rotation", "angle")
 FORCES = ("force", "torque")
 
 
 @dataclass(frozen=True)
-class Columns:
+class JointColumns:
     """Which channels say what of a joint; one entry a coordinate.
 
     Attributes:
@@ -43,7 +41,9 @@ class Columns:
     body: Body = "second"
 
 
-def joint_motions(records: Sequence[Recording], columns: Columns) -> tuple[list[ComponentRecord], Columns]:
+def joint_motions(
+    records: Sequence[Recording], columns: JointColumns
+) -> tuple[list[ComponentRecord], JointColumns]:
     """Motions and restoring forces of a joint, one of each record, and the channels they were taken from.
 
     Args:
@@ -62,7 +62,7 @@ def joint_motions(records: Sequence[Recording], columns: Columns) -> tuple[list[
     return [_motion(record, chosen) for record in inside], chosen
 
 
-def _chosen(record: Recording, columns: Columns) -> Columns:
+def _chosen(record: Recording, columns: JointColumns) -> JointColumns:
     if columns.displacement and (columns.force or columns.applied):
         return _checked(columns)
     if columns.displacement or columns.force or columns.applied:
@@ -78,11 +78,11 @@ def _chosen(record: Recording, columns: Columns) -> Columns:
             tuple(channel for channel in record.names if channel.startswith(f"{name}/{kind}"))
             for kind in ("displacement", "velocity", "force")
         )
-        return Columns(displacement, velocity, force, element=name)
+        return JointColumns(displacement, velocity, force, element=name)
     motions = [c.name for c in record.channels if c.quantity in MOTIONS]
     loads = [c.name for c in record.channels if c.quantity in FORCES and c.role != "command"]
     if len(motions) == len(loads) == 1:
-        return Columns((motions[0],), (), (loads[0],))
+        return JointColumns((motions[0],), (), (loads[0],))
     several = f"several elements ({', '.join(found)}): name one with --element"
     if len(found) < 2:
         several = (
@@ -100,7 +100,7 @@ def elements_of(record: Recording) -> list[str]:
     return [name for name in dict.fromkeys(names) if name]
 
 
-def _checked(columns: Columns) -> Columns:
+def _checked(columns: JointColumns) -> JointColumns:
     k = len(columns.displacement)
     given = {
         "--velocity": columns.velocity,
@@ -122,7 +122,7 @@ def _checked(columns: Columns) -> Columns:
     return columns
 
 
-def _motion(record: Recording, columns: Columns) -> ComponentRecord:
+def _motion(record: Recording, columns: JointColumns) -> ComponentRecord:
     settled = record.scored
     x = np.stack([record[name] for name in columns.displacement], axis=1)
     if columns.velocity:

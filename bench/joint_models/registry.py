@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.errors import IdentificationError, UnknownNameError
 from bench.identification.fit_data import nmse_percent
 from bench.identification.memory import fit_memory
@@ -25,8 +26,6 @@ from bench.joint_models.scales import starts_of
 from bench.laws.base import ForceLaw
 from bench.laws.evaluate import evaluate
 from bench.laws.registry import LAWS, find_law
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -69,7 +68,7 @@ class Fitted:
     report: Mapping[str, Any] = field(default_factory=dict)
 
 
-Fit = Callable[[Sequence[ComponentRecord], Settings, np.random.Generator], Fitted]
+FitFunction = Callable[[Sequence[ComponentRecord], Settings, np.random.Generator], Fitted]
 
 
 @dataclass(frozen=True)
@@ -83,7 +82,7 @@ class JointKind:
     """
 
     summary: str
-    fit: Fit
+    fit: FitFunction
     memory: bool = False
 
 
@@ -190,7 +189,9 @@ def scores(
     return nmse_percent(true, np.concatenate([f[mask] for f, mask in zip(predicted, chosen, strict=True)]))
 
 
-def held_out(kind: str, motions: Sequence[ComponentRecord], settings: Settings) -> list[NDArray[np.bool_]]:
+def judging_samples(
+    kind: str, motions: Sequence[ComponentRecord], settings: Settings
+) -> list[NDArray[np.bool_]]:
     """Samples of every record that are left for judging: the end of each of five stretches, or of the whole with a memory.
 
     Stretches, since a sweep ends at frequencies that its beginning never had; with a memory a record is not cut, since its state would
@@ -205,7 +206,9 @@ def held_out(kind: str, motions: Sequence[ComponentRecord], settings: Settings) 
     return masks
 
 
-def without(motions: Sequence[ComponentRecord], masks: Sequence[NDArray[np.bool_]]) -> list[ComponentRecord]:
+def without_masked(
+    motions: Sequence[ComponentRecord], masks: Sequence[NDArray[np.bool_]]
+) -> list[ComponentRecord]:
     """Records without the samples of the masks."""
     return [
         ComponentRecord(*(column[~mask] for column in motion))

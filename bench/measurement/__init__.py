@@ -31,6 +31,7 @@ from bench.measurement.quantisation import Quantisation
 from bench.measurement.sensors import measure
 
 STAGES = Stage.registry()
+"""Kinds of stages by name, as a measurement chain names them in a document."""
 
 __all__ = [
     "ORDER",

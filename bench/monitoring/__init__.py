@@ -5,14 +5,8 @@ energies of single periods scatter about them), and afterwards asks after each p
 learnt, with a threshold from the mean number of periods between false alarms. `bench.monitoring.study` counts both.
 """
 
-from bench.monitoring.damper import (
-    Alarm,
-    Baseline,
-    DamperMonitor,
-    MonitorSettings,
-    PeriodJudged,
-    monitor_record,
-)
+from bench.monitoring.damper import DamperMonitor, monitor_record
+from bench.monitoring.findings import Alarm, Baseline, MonitorSettings, PeriodJudged
 from bench.monitoring.periods import Period, PeriodSplitter
 from bench.monitoring.run_length import alarm_threshold, mean_run_length
 

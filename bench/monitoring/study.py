@@ -22,7 +22,8 @@ from bench.identification.damper_study import (
     DAMPER_STUDY_SETTINGS,
     damper_record,
 )
-from bench.monitoring.damper import DamperMonitor, MonitorSettings, monitor_record
+from bench.monitoring.damper import DamperMonitor, monitor_record
+from bench.monitoring.findings import MonitorSettings
 from bench.monitoring.periods import PeriodSplitter
 
 

@@ -19,8 +19,9 @@ from bench.nastran.cards import (
     Tload1,
 )
 from bench.nastran.expanded import ExpandedSystem, expanded_system
-from bench.nastran.integration import LagStudy, Response, integrate, lag_study
+from bench.nastran.integration import Response, integrate
 from bench.nastran.joint_model import JointAxis, JointModel, joint_model_cards, read_joint_model
+from bench.nastran.lag_study import LagStudy, lag_study
 from bench.nastran.network_deck import (
     INCH_POUND,
     SI,

@@ -22,9 +22,10 @@ from typing import Literal, TypeVar, get_args
 from bench.errors import FileFormatError, UnknownNameError
 from bench.files import write_text
 from bench.limits import READING_LIMITS, ReadingLimits, regular_file, size_text
-from bench.nastran.cards import Card, DeckPlace, Field, RawCard
+from bench.nastran.cards import Field
 from bench.nastran.interpretation import interpret
 from bench.nastran.numbers import integer_text, real_text
+from bench.nastran.raw_card import Card, DeckPlace, RawCard
 
 Format = Literal["small", "large", "free"]
 

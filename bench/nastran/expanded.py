@@ -40,7 +40,7 @@ from bench.laws.network import NetworkWeights
 from bench.nastran.network_deck import network_weights
 from bench.rig import Element, Rig
 
-Form = Literal["deck", "printed"]
+EquationForm = Literal["deck", "printed"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +68,7 @@ class ExpandedSystem:
     constant: NDArray[np.float64]
     relation: NDArray[np.float64]
     weights: NetworkWeights
-    form: Form
+    form: EquationForm
     timestep: float
     freedoms: tuple[str, ...]
     actuators: tuple[str, ...]
@@ -108,7 +108,9 @@ class ExpandedSystem:
         return load
 
 
-def expanded_system(rig: Rig, element: str | Element = "joint", *, form: Form = "deck") -> ExpandedSystem:
+def expanded_system(
+    rig: Rig, element: str | Element = "joint", *, form: EquationForm = "deck"
+) -> ExpandedSystem:
     """Assemble the expanded equations of a rig whose only element is a network joint.
 
     Mass, damping, stiffness and input matrices are read off the MuJoCo model, which must be linear without its joint.
@@ -124,8 +126,8 @@ def expanded_system(rig: Rig, element: str | Element = "joint", *, form: Form = 
         ModelError: The rig holds other elements, or its structure is not linear (rotations about different axes, limits,
             friction, contact, springs with a preload).
     """
-    if form not in get_args(Form):
-        raise UnknownNameError("form of the expanded system", form, get_args(Form))
+    if form not in get_args(EquationForm):
+        raise UnknownNameError("form of the expanded system", form, get_args(EquationForm))
     joint = rig.element(element) if isinstance(element, str) else element
     others = [present.name for present in rig.elements if present.name != joint.name]
     if others:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from bench.nastran.cards import (
-    Card,
     DmigColumn,
     DmigHeader,
     Grid,
@@ -13,12 +12,12 @@ from bench.nastran.cards import (
     Mpc,
     Nolin1,
     OtherCard,
-    RawCard,
     ScalarPoints,
     Sload,
     Tabled1,
     Tload1,
 )
+from bench.nastran.raw_card import Card, RawCard
 from bench.nastran.structure_cards import Cbar, Conm2, Mat1, Nolin2, Pbar, ScalarElement, Spc
 
 

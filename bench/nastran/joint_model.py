@@ -24,8 +24,9 @@ import numpy as np
 from bench.errors import FileFormatError, ParameterError
 from bench.laws import find_law
 from bench.nastran.bulk import Deck
-from bench.nastran.cards import Card, Grid, Mpc, Nolin1, Tabled1
+from bench.nastran.cards import Grid, Mpc, Nolin1, Tabled1
 from bench.nastran.network_deck import SI, Units, unit_scales
+from bench.nastran.raw_card import Card
 from bench.nastran.structure_cards import Cbar, Conm2, Mat1, Nolin2, Pbar, ScalarElement, Spc
 from bench.rig import Element
 

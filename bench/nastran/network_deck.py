@@ -29,7 +29,6 @@ from bench.errors import ParameterError
 from bench.laws.network import NetworkWeights, fold_scaling
 from bench.nastran.bulk import Format, deck_text, write_deck
 from bench.nastran.cards import (
-    Card,
     DmigColumn,
     DmigHeader,
     Grid,
@@ -41,6 +40,7 @@ from bench.nastran.cards import (
     Tabled1,
     Tload1,
 )
+from bench.nastran.raw_card import Card
 from bench.nastran.tanh_table import tanh_points
 from bench.rig import Element
 
@@ -59,7 +59,9 @@ class Units:
 
 
 SI = Units("SI", "m", "N", 1.0, 1.0)
+"""Decks in metre, newton and kilogram."""
 INCH_POUND = Units("inch-pound", "in", "lbf", 0.0254, 4.4482216152605)
+"""Decks in inch and pound-force; masses in lbf s²/in."""
 
 
 @dataclass(frozen=True)

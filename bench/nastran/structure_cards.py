@@ -9,7 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar, Self
 
-from bench.nastran.cards import Card, Field, RawCard
+from bench.nastran.cards import Field
+from bench.nastran.raw_card import Card, RawCard
 
 
 @dataclass(frozen=True)

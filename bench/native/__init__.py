@@ -24,11 +24,11 @@ from bench.native.encoding import (
     UNBOUND,
     Coordinate,
     bind_row,
-    check,
+    check_registered,
     claim_states,
     coordinate,
+    element_rows,
     row_size,
-    rows,
     write_row,
 )
 from bench.native.layout import TESTED_MUJOCO
@@ -43,7 +43,7 @@ __all__ = [
     "UNBOUND",
     "Coordinate",
     "bind",
-    "check",
+    "check_registered",
     "claim_states",
     "coordinate",
     "install",
@@ -167,7 +167,7 @@ def running(*models: mujoco.MjModel) -> Iterator[None]:
     """
     install()
     for model in models:
-        check(model)
+        check_registered(model)
     with untimed(), quiet():
         yield
     for name, function in _ours.items():
@@ -189,7 +189,7 @@ def bind(model: mujoco.MjModel, laws: Sequence[ForceLaw]) -> None:
         NativeError: The number of laws differs from the number of elements, an element is not one of its law as the bench writes
             it, or a foreign callback is in place.
     """
-    elements = rows(model)
+    elements = element_rows(model)
     if len(elements) != len(laws):
         raise NativeError(f"the model holds {len(elements)} elements, but {len(laws)} laws were given")
     install()

@@ -32,7 +32,9 @@ from bench.laws.base import MAX_COORDINATES, ForceLaw
 from bench.native.table import registered, slot
 
 MAGIC = 7_305_512.0
+"""First number of every row that holds an element: by it the callback tells these rows from those of others."""
 PREFIX = "element/"
+"""How the names of the numeric fields begin that hold elements."""
 HEADER = 8
 MAX_TERMS = 16
 OWN = slice(1, 3)
@@ -187,20 +189,20 @@ def _checksum(law: ForceLaw, row: Sequence[float]) -> float:
     return float(zlib.crc32(repr(identity).encode()) % _DIGITS)
 
 
-def rows(model: mujoco.MjModel) -> list[int]:
+def element_rows(model: mujoco.MjModel) -> list[int]:
     """The numerics of a model that are marked as elements."""
     data, at = model.numeric_data, model.numeric_adr
     return [i for i in range(model.nnumeric) if model.numeric_size[i] and data[at[i]] == MAGIC]
 
 
-def check(model: mujoco.MjModel) -> None:
+def check_registered(model: mujoco.MjModel) -> None:
     """Refuse a model with elements whose laws were not registered by this process.
 
     Raises:
         NativeError: Such an element; the model comes from another process, or from a file.
     """
     data = model.numeric_data
-    for numeric in rows(model):
+    for numeric in element_rows(model):
         start, size = int(model.numeric_adr[numeric]), int(model.numeric_size[numeric])
         if size <= HEADER or not registered(float(data[start + 1]), float(data[start + 2])):
             raise NativeError(

@@ -24,7 +24,7 @@ from bench.record_files.parquet import read_parquet
 from bench.record_files.robot_logs import BAGS, read_bag, read_folder, read_lists
 from bench.record_files.samples_json import read_samples
 from bench.record_files.text import read_csv
-from bench.record_files.times import Clock, clock_of, is_time, time_source
+from bench.record_files.times import FileTimes, file_times, is_time, time_source
 from bench.recording import Recording
 
 TEXT = (".csv", ".tsv", ".txt", ".dat", ".asc")
@@ -47,7 +47,7 @@ READABLE = (
 class Columns(NamedTuple):
     """What a file holds of a record."""
 
-    clock: Clock | None
+    clock: FileTimes | None
     """Its times; None where a sample rate stands in for them."""
     arrays: dict[str, NDArray[np.float64]]
     """Values by channel name, each ``(n,)``."""
@@ -174,7 +174,7 @@ def _assembled(
                 f"'{path}': no column is named 'time' or 't' (it has {_listing(variables)}); name it with time=, or give sample_rate="
             )
         values, unit = find(variables, source, file=path.name, kinds="biufmM")
-        clock = clock_of(values, layout.time_unit, source, told=unit)
+        clock = file_times(values, layout.time_unit, source, told=unit)
         notes = (*notes, *clock.notes)
     sources = dict(layout.columns)
     if not sources:

@@ -11,12 +11,10 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.errors import RecordingError
 from bench.record_files.column_map import Variable
-
-Array = NDArray[np.float64]
 
 
 class Stream(NamedTuple):

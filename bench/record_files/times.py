@@ -30,7 +30,7 @@ class TimesSettings:
 SETTINGS = TimesSettings()
 
 
-class Clock(NamedTuple):
+class FileTimes(NamedTuple):
     """Times of a file."""
 
     seconds: NDArray[np.float64]
@@ -60,7 +60,7 @@ def is_time(heading: str) -> bool:
     return bool(time_source((heading,)))
 
 
-def clock_of(values: NDArray, stated: str, heading: str, *, told: str = "") -> Clock:
+def file_times(values: NDArray, stated: str, heading: str, *, told: str = "") -> FileTimes:
     """The times of a column.
 
     Args:
@@ -74,10 +74,10 @@ def clock_of(values: NDArray, stated: str, heading: str, *, told: str = "") -> C
     """
     if values.dtype.kind in "mM":
         if not len(values):
-            return Clock(np.empty(0))
+            return FileTimes(np.empty(0))
         steps = (values - values[0]).astype("m8[ns]")
         seconds = steps.astype(np.int64) / 1e9
-        return Clock(np.where(np.isnat(values), np.nan, seconds), start=str(values[0]))
+        return FileTimes(np.where(np.isnat(values), np.nan, seconds), start=str(values[0]))
     match = _NAMED.fullmatch(name_and_unit(heading)[0].lower())
     told = told or (match["unit"] if match and match["unit"] else "")
     unit = stated or told
@@ -104,7 +104,7 @@ def clock_of(values: NDArray, stated: str, heading: str, *, told: str = "") -> C
     start = str(values[0]) + (f" {unit}" if unit else "") if late else ""
     if late:
         numbers = (values - values[0]).astype(float)  # integers are subtracted before a double rounds them
-    return Clock(numbers if scale == 1.0 else _scaled(numbers, scale), notes, doubt, start, told)
+    return FileTimes(numbers if scale == 1.0 else _scaled(numbers, scale), notes, doubt, start, told)
 
 
 def _scaled(numbers: NDArray[np.float64], scale: float) -> NDArray[np.float64]:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 from bench.errors import RecordingError, UnitError, UnknownNameError
-from bench.recording.units import check_unit
+from bench.recording.units import check_unit, conversion
 
 ROLES = ("measured", "command", "prescribed", "")
 """What a channel is in its test: read by a sensor, sent to an actuator, imposed on the specimen, or not said."""
@@ -67,9 +67,26 @@ class Channel:
         """Name and unit as an axis of a plot shows them."""
         return f"{self.name} [{self.unit}]"
 
+    def with_noise_times(self, factor: float) -> Channel:
+        """The channel with its noise, where it is known, so many times as large."""
+        return self if self.noise_std is None else replace(self, noise_std=factor * self.noise_std)
+
+    def in_unit(self, unit: str) -> tuple[float, float, Channel]:
+        """Slope and offset that take values to another unit, and the channel in it.
+
+        Raises:
+            UnitError: The unit is unknown, or of another dimension.
+        """
+        try:
+            slope, offset = conversion(self.unit, unit)
+        except UnitError as error:
+            raise UnitError(f"channel '{self.name}': {error}") from None
+        noise = None if self.noise_std is None else abs(slope) * self.noise_std
+        return slope, offset, replace(self, unit=unit, noise_std=noise)
+
 
 def channels_from(
-    names: Sequence[str],
+    names: Iterable[str],
     *,
     units: Mapping[str, str],
     quantities: Mapping[str, str] | None = None,
@@ -92,6 +109,7 @@ def channels_from(
         RecordingError: A channel has no unit, or as `Channel`.
         UnitError: As `Channel`.
     """
+    names = tuple(names)
     for mapping in (units, quantities, roles, noise_std):
         for name in mapping or {}:
             if name not in names:

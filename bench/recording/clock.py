@@ -37,6 +37,32 @@ def grid(start: float, sample_rate: float, n: int) -> NDArray[np.float64]:
     return time
 
 
+def samples_between(
+    time: NDArray[np.float64], sample_rate: float, start: float | None, stop: float | None
+) -> tuple[int, int]:
+    """First sample at or after `start`, and first at or after `stop`; None for the ends of the record.
+
+    Raises:
+        RecordingError: Fewer than two samples lie there, or a time is NaN.
+    """
+
+    def place(at: float) -> int:
+        if math.isnan(at):
+            raise RecordingError("a time to cut the record at is NaN; a number of seconds is expected")
+        steps = (at - float(time[0])) * sample_rate
+        # one part in a million of a step, as in `Recording.scored`
+        return math.ceil(min(max(steps, -1.0), len(time) + 1.0) - 1e-6)
+
+    places = (0 if start is None else place(start), len(time) if stop is None else place(stop))
+    first, last = (min(max(at, 0), len(time)) for at in places)
+    if last - first < 2:
+        raise RecordingError(
+            f"fewer than two samples lie in {start} <= t < {stop} s; the record goes from {time[0]:.9g} to "
+            f"{time[-1]:.9g} s in steps of {1.0 / sample_rate:.6g} s"
+        )
+    return first, last
+
+
 def uniform_clock(
     time: ArrayLike, *, sample_rate: float = 0.0, jitter: float = CLOCK_SETTINGS.jitter
 ) -> tuple[float, float]:
@@ -51,7 +77,7 @@ def uniform_clock(
         RecordingError: Not increasing, gaps, not uniform, not finite, fewer than two samples.
     """
     t = increasing(time)
-    places = places_of(t, sample_rate)
+    places = clock_places(t, sample_rate)
     refuse_gaps(t, places)
     return float(t[0]), rate_of(t, places, sample_rate, jitter)
 
@@ -100,7 +126,7 @@ def increasing(time: ArrayLike) -> NDArray[np.float64]:
     return t
 
 
-def places_of(t: NDArray[np.float64], sample_rate: float) -> NDArray[np.int64]:
+def clock_places(t: NDArray[np.float64], sample_rate: float) -> NDArray[np.int64]:
     """Place of each sample on the uniform clock ``(n,)``; the median step is blind to gaps in less than half of the record.
 
     Args:

@@ -2,28 +2,22 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
-from fractions import Fraction
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bench.errors import RecordingError, UnitError, UnknownNameError
+from bench.errors import RecordingError, UnknownNameError
 from bench.recording.channel import Channel, channels_from
-from bench.recording.clock import (
-    CLOCK_SETTINGS,
-    grid,
-    uniform_clock,
-)
+from bench.recording.clock import CLOCK_SETTINGS, grid, samples_between, uniform_clock
+from bench.recording.columns import as_columns, digest, refuse_not_finite, refuse_twins, stacked
 from bench.recording.frozen import frozen
-from bench.recording.mending import mended
-from bench.recording.units import conversion, si_unit
+from bench.recording.mending import on_clock
+from bench.recording.units import si_unit
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -55,21 +49,12 @@ class Recording:
 
     def __post_init__(self) -> None:
         channels = tuple(self.channels)
-        _unique([channel.name for channel in channels])
+        refuse_twins([channel.name for channel in channels])
         start, rate = uniform_clock(self.time, sample_rate=self.sample_rate)
         n = np.size(self.time)
-        try:
-            values = np.array(self.values, dtype=float, order="F")
-        except (TypeError, ValueError):
-            raise RecordingError("the values are no numbers; an array (n, n_channels) is expected") from None
-        if values.shape != (n, len(channels)):
-            raise RecordingError(
-                f"values have shape {values.shape}; (n, n_channels) = {(n, len(channels))} is expected from the time "
-                "and the channels"
-            )
-        values.flags.writeable = False
+        values = as_columns(self.values, n, len(channels))
         time = grid(start, rate, n)
-        _refuse_not_finite(time, values, channels)
+        refuse_not_finite(time, values, channels)
         settle = float(self.settle)
         if not 0.0 <= settle < time[-1] - time[0]:
             raise RecordingError(
@@ -126,25 +111,19 @@ class Recording:
         """
         if gaps not in ("raise", "interpolate"):
             raise RecordingError(f"gaps is {gaps!r}; 'raise' or 'interpolate' is expected")
-        channels = channels_from(
-            list(arrays), units=units, quantities=quantities, roles=roles, noise_std=noise_std
-        )
-        values = _stacked(arrays, None if time is None else np.size(time))
+        channels = channels_from(arrays, units=units, quantities=quantities, roles=roles, noise_std=noise_std)
+        values = stacked(arrays, None if time is None else np.size(time))
         if time is None:
             if not (math.isfinite(sample_rate) and sample_rate > 0.0):
                 raise RecordingError("without a time, sample_rate is needed: a finite number > 0 [Hz]")
             time = grid(0.0, sample_rate, len(values))
         meta = dict(meta or {})
-        if gaps == "interpolate":
-            names = [channel.name for channel in channels]
-            time, rate, values, report, _ = mended(
-                time, values, names, sample_rate=sample_rate, jitter=jitter
-            )
-            if report:
-                meta["repaired"] = report
-        else:
-            start, rate = uniform_clock(time, sample_rate=sample_rate, jitter=jitter)
-            time = grid(start, rate, np.size(time))
+        names = [channel.name for channel in channels]
+        time, rate, values, report = on_clock(
+            time, values, names, sample_rate=sample_rate, jitter=jitter, mend=gaps == "interpolate"
+        )
+        if report:
+            meta["repaired"] = report
         return cls(time, values, channels, settle=settle, meta=meta, sample_rate=rate)
 
     @property
@@ -169,15 +148,7 @@ class Recording:
 
         The same data give the same hash on every machine, whichever run or file they came from.
         """
-        head = {
-            "channels": [asdict(channel) for channel in self.channels],
-            "clock": [float(self.time[0]).hex(), self.sample_rate.hex(), len(self)],
-            "settle": self.settle.hex(),
-        }
-        digest = hashlib.sha256(json.dumps(head, sort_keys=True).encode())
-        # adding zero turns -0.0 into 0.0: equal recordings must have equal hashes
-        digest.update((self.values + 0.0).astype("<f8", copy=False).tobytes(order="F"))
-        return digest.hexdigest()
+        return digest(self.time, self.sample_rate, self.settle, self.values, self.channels)
 
     def __len__(self) -> int:
         return len(self.time)
@@ -234,9 +205,8 @@ class Recording:
         if isinstance(names, str):
             raise RecordingError(f"select takes a sequence of names; write select(['{names}'])")
         columns = [self._column(name) for name in names]
-        return replace(
-            self, values=self.values[:, columns], channels=tuple(self.channels[i] for i in columns)
-        )
+        channels = tuple(self.channels[i] for i in columns)
+        return replace(self, values=self.values[:, columns], channels=channels)
 
     def renamed(self, names: Mapping[str, str]) -> Recording:
         """A recording with channels renamed.
@@ -292,16 +262,11 @@ class Recording:
         """
         known = {channel.name: channel for channel in self.channels}
         new = channels_from(
-            list(arrays),
-            units=units or {},
-            quantities=quantities,
-            roles=roles,
-            noise_std=noise_std,
-            known=known,
+            arrays, units=units or {}, quantities=quantities, roles=roles, noise_std=noise_std, known=known
         )
         described = known | {channel.name: channel for channel in new}
         columns = dict(zip(self.names, self.values.T, strict=True)) | dict(arrays)
-        return replace(self, values=_stacked(columns, len(self)), channels=tuple(described.values()))
+        return replace(self, values=stacked(columns, len(self)), channels=tuple(described.values()))
 
     def slice_time(
         self, start: float | None = None, stop: float | None = None, *, rezero: bool = False
@@ -316,16 +281,7 @@ class Recording:
         Raises:
             RecordingError: Fewer than two samples lie there.
         """
-        places = [
-            0 if start is None else self._place(start),
-            len(self) if stop is None else self._place(stop),
-        ]
-        first, last = (min(max(place, 0), len(self)) for place in places)
-        if last - first < 2:
-            raise RecordingError(
-                f"fewer than two samples lie in {start} <= t < {stop} s; the record goes from {self.time[0]:.9g} to "
-                f"{self.time[-1]:.9g} s in steps of {1.0 / self.sample_rate:.6g} s"
-            )
+        first, last = samples_between(self.time, self.sample_rate, start, stop)
         settle = max(0.0, self.settle - first / self.sample_rate)
         if settle >= (last - first - 1) / self.sample_rate:
             raise RecordingError(
@@ -350,27 +306,12 @@ class Recording:
         Raises:
             RecordingError: Not a finite number > 0, or not a ratio of whole numbers up to 20 000 to the old rate.
         """
-        from bench.recording.resampling import resampled  # noqa: PLC0415  (scipy.signal is slow to import)
+        from bench.recording.resampling import ratio_of, resampled  # noqa: PLC0415  (scipy.signal is slow to import)
 
-        if not (math.isfinite(sample_rate) and sample_rate > 0.0):
-            raise RecordingError(f"sample_rate is {sample_rate}; a finite number > 0 [Hz] is expected")
-        ratio = Fraction(sample_rate / self.sample_rate).limit_denominator(20_000)
-        new = float(self.sample_rate * ratio)
-        # a thousandth of a step over the record: a tenth of the jitter that passes for a uniform clock
-        if (
-            ratio.numerator > 20_000
-            or ratio == 0
-            or abs(new / sample_rate - 1.0) * self.duration * sample_rate > 1e-3
-        ):
-            raise RecordingError(
-                f"{sample_rate} Hz is no ratio of whole numbers up to 20 000 to the record's {self.sample_rate} Hz; "
-                f"the nearest rate that is: {new:.12g} Hz"
-            )
+        ratio = ratio_of(self.sample_rate, sample_rate, self.duration)
         values = resampled(self.values, ratio.numerator, ratio.denominator)
         noise = math.sqrt(min(1.0, float(ratio)))
-        channels = tuple(
-            c if c.noise_std is None else replace(c, noise_std=noise * c.noise_std) for c in self.channels
-        )
+        channels = tuple(channel.with_noise_times(noise) for channel in self.channels)
         return Recording(
             grid(float(self.time[0]), sample_rate, len(values)),
             values,
@@ -393,71 +334,17 @@ class Recording:
         values, channels = np.array(self.values, order="F"), list(self.channels)
         for name, unit in units.items():
             column = self._column(name)
-            channel = channels[column]
-            try:
-                slope, offset = conversion(channel.unit, unit)
-            except UnitError as error:
-                raise UnitError(f"channel '{name}': {error}") from None
+            slope, offset, channels[column] = channels[column].in_unit(unit)
             values[:, column] = slope * values[:, column] + offset
-            noise = None if channel.noise_std is None else abs(slope) * channel.noise_std
-            channels[column] = replace(channel, unit=unit, noise_std=noise)
         return replace(self, values=values, channels=tuple(channels))
 
     def to_si(self) -> Recording:
         """The record with every channel in the SI unit of its dimension (m, m/s, N, rad, N m, …)."""
-        return self.to_units(
-            {channel.name: si_unit(channel.unit, channel.quantity) for channel in self.channels}
-        )
+        units = {channel.name: si_unit(channel.unit, channel.quantity) for channel in self.channels}
+        return self.to_units(units)
 
     def _column(self, name: str) -> int:
         try:
             return self.names.index(name)
         except ValueError:
             raise UnknownNameError("channel of the recording", str(name), self.names) from None
-
-    def _place(self, time: float) -> int:
-        if math.isnan(time):
-            raise RecordingError("a time to cut the record at is NaN; a number of seconds is expected")
-        steps = (time - float(self.time[0])) * self.sample_rate
-        # the same part in a million of a step as in `scored`
-        return math.ceil(min(max(steps, -1.0), len(self) + 1.0) - 1e-6)
-
-
-def _unique(names: Sequence[str]) -> None:
-    for i, name in enumerate(names):
-        if name in names[:i]:
-            raise RecordingError(f"two channels are named '{name}'; give each its own name")
-
-
-def _stacked(arrays: Mapping[str, ArrayLike], n: int | None) -> NDArray[np.float64]:
-    """Values ``(n, n_channels)`` from arrays by name, with the name in the message where one does not fit."""
-    columns = []
-    for name, array in arrays.items():
-        try:
-            column = np.asarray(array, dtype=float)
-        except (TypeError, ValueError):
-            raise RecordingError(
-                f"the values of channel '{name}' are no numbers; an array (n,) is expected"
-            ) from None
-        n = column.size if n is None else n
-        if column.shape != (n,):
-            raise RecordingError(
-                f"channel '{name}' has shape {column.shape}; ({n},) is expected, as long as the clock"
-            )
-        columns.append(column)
-    return np.stack(columns, axis=1) if columns else np.empty((n or 0, 0))
-
-
-def _refuse_not_finite(
-    time: NDArray[np.float64], values: NDArray[np.float64], channels: Sequence[Channel]
-) -> None:
-    good = np.isfinite(values)
-    if good.all():
-        return
-    column = int(np.argmin(good.all(axis=0)))
-    bad = np.flatnonzero(~good[:, column])
-    others = f", as at {bad.size - 1} more of its {len(time)} samples" if bad.size > 1 else ""
-    raise RecordingError(
-        f"channel '{channels[column].name}' is {values[bad[0], column]} at t = {time[bad[0]]:.9g} s (sample {bad[0]}){others}; "
-        "cut the record there, or bridge short dropouts with Recording.from_arrays(…, gaps='interpolate')"
-    )

@@ -16,14 +16,15 @@ from numpy.typing import ArrayLike, NDArray
 from bench.errors import RecordingError
 from bench.recording.clock import (
     CLOCK_SETTINGS,
+    clock_places,
     gap_text,
     grid,
     increasing,
     lateness,
     not_uniform,
-    places_of,
     refuse_gaps,
     roundest,
+    uniform_clock,
 )
 
 
@@ -53,6 +54,22 @@ class Mended(NamedTuple):
     """What was interpolated, for ``meta["repaired"]``; empty where nothing was."""
     notes: tuple[str, ...]
     """The same in sentences."""
+
+
+def on_clock(
+    time: ArrayLike,
+    values: NDArray[np.float64],
+    names: Sequence[str],
+    *,
+    sample_rate: float,
+    jitter: float,
+    mend: bool,
+) -> tuple[NDArray[np.float64], float, NDArray[np.float64], dict[str, Any]]:
+    """Clock, sample rate and values of a record; with `mend` as `mended` leaves them, with its report, else as they are or an error."""
+    if mend:
+        return mended(time, values, names, sample_rate=sample_rate, jitter=jitter)[:4]
+    start, rate = uniform_clock(time, sample_rate=sample_rate, jitter=jitter)
+    return grid(start, rate, np.size(time)), rate, values, {}
 
 
 def mended(
@@ -88,7 +105,7 @@ def mended(
         Fritsch, F. N. and Carlson, R. E. (1980), Monotone piecewise cubic interpolation, SIAM J. Numer. Anal. 17.
     """
     t = increasing(time)
-    places = places_of(t, sample_rate)
+    places = clock_places(t, sample_rate)
     if not bridge:
         refuse_gaps(t, places)
     rate, moved, notes = _settled(t, places, sample_rate, jitter)

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from fractions import Fraction
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import firwin, resample_poly
+
+from bench.errors import RecordingError
 
 
 @dataclass(frozen=True)
@@ -20,6 +24,30 @@ class ResamplingSettings:
 
 
 SETTINGS = ResamplingSettings()
+
+
+def ratio_of(old: float, new: float, duration: float) -> Fraction:
+    """Ratio of two sample rates, of whole numbers.
+
+    Args:
+        old: The record's [Hz].
+        new: The one asked for [Hz].
+        duration: Of the record [s].
+
+    Raises:
+        RecordingError: Not a finite number > 0, or not a ratio of whole numbers up to 20 000.
+    """
+    if not (math.isfinite(new) and new > 0.0):
+        raise RecordingError(f"sample_rate is {new}; a finite number > 0 [Hz] is expected")
+    ratio = Fraction(new / old).limit_denominator(20_000)
+    nearest = float(old * ratio)
+    # a thousandth of a step over the record: a tenth of the jitter that passes for a uniform clock
+    if ratio.numerator > 20_000 or ratio == 0 or abs(nearest / new - 1.0) * duration * new > 1e-3:
+        raise RecordingError(
+            f"{new} Hz is no ratio of whole numbers up to 20 000 to the record's {old} Hz; "
+            f"the nearest rate that is: {nearest:.12g} Hz"
+        )
+    return ratio
 
 
 def resampled(values: NDArray[np.float64], up: int, down: int) -> NDArray[np.float64]:

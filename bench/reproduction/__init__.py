@@ -5,19 +5,19 @@
 """
 
 from bench.reproduction.item import Item, Picture, Result
-from bench.reproduction.registry import ENTRIES, Entry, find_entries
+from bench.reproduction.registry import ENTRIES, ItemEntry, find_entries
 from bench.reproduction.running import Reproduction, fingerprint, reproduce
-from bench.reproduction.verdict import Row, Verdict
+from bench.reproduction.verdict import Row, RowVerdict
 
 __all__ = [
     "ENTRIES",
-    "Entry",
     "Item",
+    "ItemEntry",
     "Picture",
     "Reproduction",
     "Result",
     "Row",
-    "Verdict",
+    "RowVerdict",
     "find_entries",
     "fingerprint",
     "reproduce",

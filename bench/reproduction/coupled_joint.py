@@ -9,11 +9,12 @@ import numpy as np
 from bench.figures import bar_table, loops, time_histories
 from bench.identification.network import NetworkModel
 from bench.identification.polynomial import PolynomialModel, fit_polynomial
+from bench.progress import ShowProgress
 from bench.recording import Recording
 from bench.reproduction import joint_models, joint_one_record
 from bench.reproduction.estimates import fine
 from bench.reproduction.imperial import imperial
-from bench.reproduction.item import Item, Picture, Progress
+from bench.reproduction.item import Item, Picture
 from bench.reproduction.printed_figures import fig, panels
 from bench.reproduction.verdict import (
     VERDICT_SETUP,
@@ -89,7 +90,7 @@ def _range_rows(records: dict[str, Recording]) -> list[Row]:
     return rows
 
 
-def _single(progress: Progress) -> list[tuple[str, float, float]]:
+def _single(progress: ShowProgress) -> list[tuple[str, float, float]]:
     """Loading of the only training record, and the worst NMSE of a polynomial and of a network on unseen records [%]."""
     found = []
     for number, name in enumerate(("axial", "torsional")):
@@ -102,11 +103,10 @@ def _single(progress: Progress) -> list[tuple[str, float, float]]:
     return found
 
 
-def _rows(
-    models: joint_models.Models, single: list[tuple[str, float, float]], one_record: list[Row]
-) -> tuple[Row, ...]:
-    rows = _range_rows(joint_models.training())
-    ratios = []
+def _unseen_rows(models: joint_models.Models) -> tuple[list[Row], list[float]]:
+    """Both models on records that they have not seen, and the error of the polynomial over that of the network there."""
+    rows: list[Row] = []
+    ratios: list[float] = []
     drawn = {"polynomial": "4.8", "network": "4.10"}
     for name, record in joint_models.unseen().items():
         scores = zip(joint_models.AXES, *(joint_models.errors(m, record) for m in models[:2]), strict=True)
@@ -128,7 +128,12 @@ def _rows(
                         else "reported: the text gives no number and makes no claim of accuracy for it",
                     )
                 )
-    rows += [
+    return rows, ratios
+
+
+def _comparison_rows(models: joint_models.Models, ratios: list[float]) -> list[Row]:
+    """Polynomial against network: error, time to fit, size."""
+    return [
         value_row(
             "error of the polynomial over that of the network, least of the unseen tests",
             "1",
@@ -171,20 +176,36 @@ def _rows(
             reason="a count",
         ),
     ]
-    for name, polynomial, network in single:
-        for kind, score in (("polynomial", polynomial), ("network", network)):
-            rows.append(
-                value_row(
-                    f"trained on the {name} record only: worst unseen NMSE, {kind}",
-                    "%",
-                    "three data sets were required",
-                    score,
-                    low=VERDICT_SETUP.good_fit,
-                    source="p. 77, sentence",
-                    reason="not a good fit (section 3.4.2)",
-                )
-            )
-    return (*rows, *one_record)
+
+
+def _single_rows(single: list[tuple[str, float, float]]) -> list[Row]:
+    """Models of a single training record on the unseen ones."""
+    return [
+        value_row(
+            f"trained on the {name} record only: worst unseen NMSE, {kind}",
+            "%",
+            "three data sets were required",
+            score,
+            low=VERDICT_SETUP.good_fit,
+            source="p. 77, sentence",
+            reason="not a good fit (section 3.4.2)",
+        )
+        for name, polynomial, network in single
+        for kind, score in (("polynomial", polynomial), ("network", network))
+    ]
+
+
+def _rows(
+    models: joint_models.Models, single: list[tuple[str, float, float]], one_record: list[Row]
+) -> tuple[Row, ...]:
+    unseen, ratios = _unseen_rows(models)
+    return (
+        *_range_rows(joint_models.training()),
+        *unseen,
+        *_comparison_rows(models, ratios),
+        *_single_rows(single),
+        *one_record,
+    )
 
 
 def _pictures(records: dict[str, Recording], models: joint_models.Models) -> tuple[Picture, ...]:
@@ -243,7 +264,7 @@ def _pictures(records: dict[str, Recording], models: joint_models.Models) -> tup
     return (*pictures, Picture("errors", "NMSE on unseen records.", errors))
 
 
-def run(progress: Progress) -> Item:
+def run(progress: ShowProgress) -> Item:
     """Make the item."""
     progress("simulating the training records", 0.02)
     records = joint_models.training()

@@ -19,7 +19,7 @@ from bench.identification.damper_study import (
     PolynomialExperiment,
     polynomial_experiment,
 )
-from bench.reproduction.item import Progress
+from bench.progress import ShowProgress
 from bench.reproduction.printed_figures import fig
 from bench.reproduction.verdict import (
     VERDICT_SETUP,
@@ -83,7 +83,7 @@ class Study(NamedTuple):
     within_half: list[float]
 
 
-def study(progress: Progress) -> Study:
+def study(progress: ShowProgress) -> Study:
     """Run the experiment for each start covariance and seed."""
     found: dict[float, list[ConvergenceOutcome]] = {}
     within = []

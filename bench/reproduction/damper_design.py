@@ -21,6 +21,7 @@ from bench.identification.damper import (
 from bench.identification.damper_study import DamperRecord, harmonic_record
 from bench.identification.damper_trust import TrustReport, check_design_model
 from bench.identification.harmonic_tests import HarmonicCampaign, harmonic_campaign
+from bench.progress import ShowProgress
 from bench.reproduction import damper_random
 from bench.reproduction.damper_records import LOOPS, beside
 from bench.reproduction.estimates import (
@@ -28,7 +29,7 @@ from bench.reproduction.estimates import (
     courses,
     fine,
 )
-from bench.reproduction.item import Item, Picture, Progress
+from bench.reproduction.item import Item, Picture
 from bench.reproduction.printed_figures import fig, panels
 from bench.reproduction.verdict import (
     VERDICT_SETUP,
@@ -160,40 +161,32 @@ def _slow_test(rng: np.random.Generator) -> _SlowTest:
     )
 
 
-def _rows(campaign: HarmonicCampaign, slow: _SlowTest) -> tuple[Row, ...]:
+def _convergence_row(slow: _SlowTest) -> Row:
+    """How soon the estimates on line come to those of least squares."""
     late = slow.online.time > 4.0  # the first period
     c, n = slow.online.coefficients[late], slow.online.exponents[late]
     near = [
         100.0 * max(abs(values.max() / final - 1.0), abs(values.min() / final - 1.0))
         for values, final in ((c, slow.offline.coefficient), (n, slow.offline.exponent))
     ]
+    return fact_row(
+        "0.25 Hz, ±0.051 m: C and n on line converge to the off-line values within the first period",
+        f"after it C stays within {near[0]:.1f} %, n within {near[1]:.1f} %",
+        max(near) < 10.0,
+        printed="converges to their optimum values within the first period",
+        source=f"p. 48, sentence, and {fig('3.3 a, b')}",
+        tolerance="within 10 % of the off-line values from the second period on",
+        reason="5 % of the printed axis of C (200), about a tenth of its value, can be seen in the figure",
+        shape=slow.online.settled <= 1.0,
+        why="C and n trade against one another: the force they give together settles within the first period, C and n "
+        "each a little away from least squares, which weighs the seal's friction less",
+    )
+
+
+def _settling_rows(campaign: HarmonicCampaign) -> list[Row]:
+    """After how many periods the force of the estimates on line has settled."""
     settled = np.array([test.settled for test in campaign.tests])
-    return (
-        *_table_rows(campaign),
-        _nearly_the_same(campaign),
-        value_row(
-            "harmonic tests",
-            "1",
-            202.0,
-            float(len(campaign.tests)),
-            low=202.0,
-            high=202.0,
-            source="p. 49, number",
-            reason="a count",
-            chosen="the number of tests",
-        ),
-        fact_row(
-            "0.25 Hz, ±0.051 m: C and n on line converge to the off-line values within the first period",
-            f"after it C stays within {near[0]:.1f} %, n within {near[1]:.1f} %",
-            max(near) < 10.0,
-            printed="converges to their optimum values within the first period",
-            source=f"p. 48, sentence, and {fig('3.3 a, b')}",
-            tolerance="within 10 % of the off-line values from the second period on",
-            reason="5 % of the printed axis of C (200), about a tenth of its value, can be seen in the figure",
-            shape=slow.online.settled <= 1.0,
-            why="C and n trade against one another: the force they give together settles within the first period, C and n "
-            "each a little away from least squares, which weighs the seal's friction less",
-        ),
+    return [
         value_row(
             "on line, force of C and n settled after, median of all tests",
             "periods",
@@ -213,6 +206,12 @@ def _rows(campaign: HarmonicCampaign, slow: _SlowTest) -> tuple[Row, ...]:
             reason="said of all data, with no exception named: all but what two standard deviations leave out",
             why="tests in which the damper yields elastically or its friction rules take longer",
         ),
+    ]
+
+
+def _fit_rows(slow: _SlowTest) -> list[Row]:
+    """How good the design model is in the slow test."""
+    return [
         value_row(
             "0.25 Hz, ±0.051 m: NMSE of the on-line model",
             "%",
@@ -229,6 +228,27 @@ def _rows(campaign: HarmonicCampaign, slow: _SlowTest) -> tuple[Row, ...]:
             tolerance="yes",
             reason="in slow harmonic motion the model holds",
         ),
+    ]
+
+
+def _rows(campaign: HarmonicCampaign, slow: _SlowTest) -> tuple[Row, ...]:
+    return (
+        *_table_rows(campaign),
+        _nearly_the_same(campaign),
+        value_row(
+            "harmonic tests",
+            "1",
+            202.0,
+            float(len(campaign.tests)),
+            low=202.0,
+            high=202.0,
+            source="p. 49, number",
+            reason="a count",
+            chosen="the number of tests",
+        ),
+        _convergence_row(slow),
+        *_settling_rows(campaign),
+        *_fit_rows(slow),
         value_row(
             "tests of the campaign in which the model is trusted",
             "1",
@@ -277,7 +297,7 @@ def _pictures(campaign: HarmonicCampaign, slow: _SlowTest) -> tuple[Picture, ...
     )
 
 
-def run(progress: Progress) -> Item:
+def run(progress: ShowProgress) -> Item:
     """Make the item."""
     rng = np.random.default_rng(SETUP.seed)
     progress("202 harmonic tests", 0.05)

@@ -63,7 +63,7 @@ class OnlineStudy(NamedTuple):
     surface: NDArray[np.float64]
 
 
-def identify(record: DamperRecord, order_x: int, order_v: int, covariance: float) -> OrderPoint:
+def run_online(record: DamperRecord, order_x: int, order_v: int, covariance: float) -> OrderPoint:
     """Run the estimator over a record."""
     part = record.part(slice(None, None, DAMPER_ONLINE_ORDER_SETUP.every))
     peaks = [float(np.abs(channel).max()) for channel in part[1:]]
@@ -92,19 +92,19 @@ def online_study(record: DamperRecord, highest: int) -> OnlineStudy:
     return OnlineStudy(
         {
             covariance: [
-                identify(record, order, order, covariance) for order in DAMPER_ONLINE_ORDER_SETUP.orders
+                run_online(record, order, order, covariance) for order in DAMPER_ONLINE_ORDER_SETUP.orders
             ]
             for covariance in DAMPER_ONLINE_ORDER_SETUP.covariances
         },
         np.array(
-            [identify(record, order, DAMPER_ONLINE_ORDER_SETUP.fixed, printed).error for order in orders]
+            [run_online(record, order, DAMPER_ONLINE_ORDER_SETUP.fixed, printed).error for order in orders]
         ),
         np.array(
-            [identify(record, DAMPER_ONLINE_ORDER_SETUP.fixed, order, printed).error for order in orders]
+            [run_online(record, DAMPER_ONLINE_ORDER_SETUP.fixed, order, printed).error for order in orders]
         ),
         np.array(
             [
-                [identify(record, p, q, printed).error for q in DAMPER_ONLINE_ORDER_SETUP.map_orders]
+                [run_online(record, p, q, printed).error for q in DAMPER_ONLINE_ORDER_SETUP.map_orders]
                 for p in DAMPER_ONLINE_ORDER_SETUP.map_orders
             ]
         ),

@@ -14,10 +14,12 @@ from matplotlib.figure import Figure
 from bench.figures import COLOURS, style
 from bench.figures.look import axes_grid
 from bench.identification.damper_study import OrderStudy, order_study, random_record
+from bench.progress import ShowProgress
 from bench.reproduction.damper_online_order import (
     DAMPER_ONLINE_ORDER_SETUP,
     FOLLOWED,
     OnlineStudy,
+    OrderPoint,
     asymptotes_figure,
     online_study,
     surface_figure,
@@ -25,7 +27,7 @@ from bench.reproduction.damper_online_order import (
 from bench.reproduction.estimates import (
     ESTIMATES_SETUP,
 )
-from bench.reproduction.item import Item, Picture, Progress
+from bench.reproduction.item import Item, Picture
 from bench.reproduction.printed_figures import fig, panels
 from bench.reproduction.verdict import (
     VERDICT_SETUP,
@@ -121,53 +123,55 @@ def indicators(study: OrderStudy) -> Figure:
     return figure
 
 
-def _online_rows(study: OnlineStudy) -> list[Row]:
-    """The sentences of section 3.4.2 on the identification error of the on-line estimator."""
-    made = []
-    for covariance, points in study.diagonal.items():
-        error = np.array([point.error for point in points])
-        mass = np.array([point.values[0] for point in points])
-        rises = float(error[-1] / error.min())
-        made += [
-            fact_row(
-                f"identification error falls with the order, P(0) = {covariance:g}",
-                f"{error[0]:.2f} % at order {DAMPER_ONLINE_ORDER_SETUP.orders[0]}, "
-                f"{error.min():.2f} % at order {DAMPER_ONLINE_ORDER_SETUP.orders[int(error.argmin())]}",
-                error.min() < error[0],
-                printed="decreases with the model order until over-parameterisation",
-                source=f"p. 61, sentence (i); {fig('3.12 f')}",
-                tolerance="least at a higher order than the first",
-                reason="no number is printed",
-            ),
-            value_row(
-                f"identification error at order {DAMPER_ONLINE_ORDER_SETUP.orders[-1]} over its least, P(0) = {covariance:g}",
-                "1",
-                "will not always decrease with increasing order; over-parameterisation",
-                rises,
-                low=1.1,
-                source=f"p. 61, sentence (ii); {fig('3.11')}, {fig('3.12 f')}",
-                reason="a tenth of the error can be told in the printed figure",
-                why="a finite P(0) is a ridge that holds back what the record does not determine: the on-line error then only "
-                "flattens. On unseen data the error of batch least squares does rise (below)",
-            ),
-            fact_row(
-                f"estimate of the mass over the orders from 3 on, P(0) = {covariance:g}",
-                f"{mass[2:].min():.0f} … {mass[2:].max():.0f} kg",
-                float(np.ptp(mass[2:])) < 0.1 * abs(float(np.median(mass[2:]))),
-                printed="the only parameter that remains largely invariant until over-parameterised",
-                source=f"p. 61, sentence (iii); {fig('3.12 a')}",
-                tolerance="within a tenth of its median",
-                reason="a tenth of the axis of ±1 can be told in the printed figure",
-                why="with a large P(0) the coefficient of the acceleration moves with the order as the others do",
-            ),
-        ]
+def _diagonal_rows(covariance: float, points: list[OrderPoint]) -> list[Row]:
+    """Error and mass over the common order, for one start covariance."""
+    error = np.array([point.error for point in points])
+    mass = np.array([point.values[0] for point in points])
+    rises = float(error[-1] / error.min())
+    return [
+        fact_row(
+            f"identification error falls with the order, P(0) = {covariance:g}",
+            f"{error[0]:.2f} % at order {DAMPER_ONLINE_ORDER_SETUP.orders[0]}, "
+            f"{error.min():.2f} % at order {DAMPER_ONLINE_ORDER_SETUP.orders[int(error.argmin())]}",
+            error.min() < error[0],
+            printed="decreases with the model order until over-parameterisation",
+            source=f"p. 61, sentence (i); {fig('3.12 f')}",
+            tolerance="least at a higher order than the first",
+            reason="no number is printed",
+        ),
+        value_row(
+            f"identification error at order {DAMPER_ONLINE_ORDER_SETUP.orders[-1]} over its least, P(0) = {covariance:g}",
+            "1",
+            "will not always decrease with increasing order; over-parameterisation",
+            rises,
+            low=1.1,
+            source=f"p. 61, sentence (ii); {fig('3.11')}, {fig('3.12 f')}",
+            reason="a tenth of the error can be told in the printed figure",
+            why="a finite P(0) is a ridge that holds back what the record does not determine: the on-line error then only "
+            "flattens. On unseen data the error of batch least squares does rise (below)",
+        ),
+        fact_row(
+            f"estimate of the mass over the orders from 3 on, P(0) = {covariance:g}",
+            f"{mass[2:].min():.0f} … {mass[2:].max():.0f} kg",
+            float(np.ptp(mass[2:])) < 0.1 * abs(float(np.median(mass[2:]))),
+            printed="the only parameter that remains largely invariant until over-parameterised",
+            source=f"p. 61, sentence (iii); {fig('3.12 a')}",
+            tolerance="within a tenth of its median",
+            reason="a tenth of the axis of ±1 can be told in the printed figure",
+            why="with a large P(0) the coefficient of the acceleration moves with the order as the others do",
+        ),
+    ]
+
+
+def _order_rows(study: OnlineStudy) -> list[Row]:
+    """What moves with the order, and which of the two orders rules the error."""
     points = study.diagonal[1e3]
     moved = [
         float(np.ptp(values[2:]) / np.abs(np.median(values[2:])))
         for values in np.array([point.values for point in points]).T
     ]
     by_x, by_v = (float(np.ptp(values[1:11])) for values in (study.over_x, study.over_v))
-    made += [
+    return [
         fact_row(
             "the mass is the estimate that moves least with the order, P(0) = 1000",
             ", ".join(
@@ -190,9 +194,15 @@ def _online_rows(study: OnlineStudy) -> list[Row]:
             tolerance="range along v more than twice that along x",
             reason="no number is printed; less than the double is not to be ruled",
         ),
-        _indicator_row(study),
     ]
-    return made
+
+
+def _online_rows(study: OnlineStudy) -> list[Row]:
+    """The sentences of section 3.4.2 on the identification error of the on-line estimator."""
+    diagonal = [
+        row for covariance, points in study.diagonal.items() for row in _diagonal_rows(covariance, points)
+    ]
+    return [*diagonal, *_order_rows(study), _indicator_row(study)]
 
 
 def _indicator_row(study: OnlineStudy) -> Row:
@@ -307,7 +317,7 @@ def _pictures(study: OrderStudy, online: OnlineStudy) -> tuple[Picture, ...]:
     )
 
 
-def run(progress: Progress) -> Item:
+def run(progress: ShowProgress) -> Item:
     """Make the item."""
     progress("random tests", 0.02)
     rng = np.random.default_rng(SETUP.seed)

@@ -17,6 +17,7 @@ from bench.identification.damper_study import (
     damper_record,
     polynomial_experiment,
 )
+from bench.progress import ShowProgress
 from bench.recording import nmse
 from bench.reproduction import damper_convergence
 from bench.reproduction.damper_records import LOOPS, beside
@@ -24,7 +25,7 @@ from bench.reproduction.estimates import (
     ESTIMATES_SETUP,
     fine,
 )
-from bench.reproduction.item import Item, Picture, Progress
+from bench.reproduction.item import Item, Picture
 from bench.reproduction.printed_figures import panels
 from bench.reproduction.verdict import Row, value_row
 from bench.rig import Element, simulate
@@ -203,7 +204,7 @@ def _pictures(experiment: PolynomialExperiment, found: damper_convergence.Study)
     )
 
 
-def run(progress: Progress) -> Item:
+def run(progress: ShowProgress) -> Item:
     """Make the item."""
     progress("random tests and on-line identification", 0.1)
     experiment = polynomial_experiment(np.random.default_rng(SETUP.seed))

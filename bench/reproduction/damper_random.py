@@ -24,7 +24,7 @@ from bench.reproduction.printed_figures import fig, panels
 from bench.reproduction.verdict import (
     VERDICT_SETUP,
     Row,
-    Verdict,
+    RowVerdict,
     value_row,
 )
 
@@ -100,7 +100,7 @@ def rows() -> list[Row]:
         printed = None if narrow else "incapable of accurately tracking C and n"
         source = "" if narrow else f"{fig('3.10')}, sentence on p. 59"
         # Where some seeds lie on the other side the sentence is not refuted, and not borne out either.
-        split = Verdict.SHAPE if min(error) < VERDICT_SETUP.good_fit < max(error) else None
+        split = RowVerdict.SHAPE if min(error) < VERDICT_SETUP.good_fit < max(error) else None
         found.append(
             value_row(
                 f"design model on line on random motion, {motion.name}: NMSE of the force",

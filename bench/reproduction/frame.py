@@ -27,10 +27,11 @@ from bench.identification.network import fit_network
 from bench.identification.polynomial import fit_polynomial
 from bench.laws import find_law
 from bench.laws.evaluate import evaluate
+from bench.progress import ShowProgress
 from bench.recording import Recording, nmse
 from bench.reduction import element_from
 from bench.reproduction.estimates import fine
-from bench.reproduction.item import Item, Picture, Progress
+from bench.reproduction.item import Item, Picture
 from bench.reproduction.verdict import (
     VERDICT_SETUP,
     Row,
@@ -226,7 +227,7 @@ def _short(label: str) -> str:
     return label.replace("isolator and dampers reduced to", "all:").replace("dampers reduced to", "dampers:")
 
 
-def run(progress: Progress) -> Item:
+def run(progress: ShowProgress) -> Item:
     """Make the item."""
     progress("true frame", 0.02)
     true = devices()

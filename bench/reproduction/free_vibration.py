@@ -16,9 +16,10 @@ import numpy as np
 
 from bench.figures import phase_plot, time_histories
 from bench.laws.coupling import POUND_FORCE
+from bench.progress import ShowProgress
 from bench.recording import Recording
 from bench.reproduction.imperial import STIFFNESS, sdof_view
-from bench.reproduction.item import Item, Picture, Progress
+from bench.reproduction.item import Item, Picture
 from bench.reproduction.printed_figures import fig, panels
 from bench.reproduction.verdict import Row, axis_row, told_row, value_row
 from bench.rig import Element, simulate
@@ -120,7 +121,7 @@ def _rows(shown: Recording, frequency: float, ratio: float) -> tuple[Row, ...]:
     )
 
 
-def run(progress: Progress) -> Item:
+def run(progress: ShowProgress) -> Item:
     """Make the item."""
     progress("simulating", 0.1)
     test = record()

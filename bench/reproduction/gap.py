@@ -14,10 +14,11 @@ import numpy as np
 from bench.figures import loops, surface, time_histories
 from bench.identification.surface import fit_surface
 from bench.laws.coupling import INCH, POUND_FORCE
+from bench.progress import ShowProgress
 from bench.recording import Recording, nmse
 from bench.reproduction.estimates import fine
 from bench.reproduction.imperial import STIFFNESS, sdof_view
-from bench.reproduction.item import Item, Picture, Progress
+from bench.reproduction.item import Item, Picture
 from bench.reproduction.printed_figures import fig, panels
 from bench.reproduction.verdict import (
     VERDICT_SETUP,
@@ -83,12 +84,12 @@ def dead_space(test: Recording) -> tuple[float, float, float]:
     return edges[0], edges[1], float(np.mean(slopes))
 
 
-def _rows(test: Recording, others: list[Recording]) -> tuple[Row, ...]:
+def _range_rows(test: Recording, others: list[Recording]) -> list[Row]:
     shown = test.slice_time(*SETUP.window)
     cut = [other.slice_time(*SETUP.window) for other in others]
     axes = {"displacement": ("in", 0.8, 0.4, "a"), "velocity": ("in/s", 20.0, 10.0, "b")}
     axes["restoring_force"] = ("lbf", 20.0, 10.0, "c")
-    ranges = [
+    return [
         axis_row(
             f"{name.replace('_', ' ')}, 20 to 50 s",
             unit,
@@ -102,12 +103,15 @@ def _rows(test: Recording, others: list[Recording]) -> tuple[Row, ...]:
         )
         for name, (unit, axis, inner, part) in axes.items()
     ]
+
+
+def _rows(test: Recording, others: list[Recording]) -> tuple[Row, ...]:
     found = [_read(record) for record in (test, *others)]
     by_x, by_v, left, right, slope, unseen = (list(column) for column in zip(*found, strict=True))
     # A line fitted beyond half of the stroke averages over thousands of samples; what is left is the creep of the bearings.
     near = "the straight line is exact but for the bearings' force at up to a quarter of the rms velocity"
     return (
-        *ranges,
+        *_range_rows(test, others),
         fact_row(
             "force depends on displacement, not on velocity",
             f"r² with x {by_x[0]:.2f}, with v {by_v[0]:.2f}",
@@ -192,7 +196,7 @@ def _pictures(test: Recording) -> tuple[Picture, ...]:
     )
 
 
-def run(progress: Progress) -> Item:
+def run(progress: ShowProgress) -> Item:
     """Make the item."""
     progress("simulating", 0.1)
     test = record()

@@ -1,28 +1,21 @@
 """A5: the hysteretic rig under wide-band random excitation, identified on line (Tasbihgoo 2006, Figs 2.14 to 2.17).
 
-The printed estimates cannot themselves be the rig: with a cubic term of -48.61 lbf/in^3 the model softens beyond its
-strength and runs away when it is simulated under ±15 lbf. The virtual rig is a spring, a damper and a Bouc-Wen element
-side by side, found by searching mass, stiffness, strength, skew and bandwidth for the printed ranges and the signs of the
-printed estimates; the seven-parameter model is then identified from its record as the dissertation did.
+The seven-parameter model is identified from the record of the virtual rig of `bench.reproduction.hysteretic_record` as the
+dissertation did from its laboratory.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
-from scipy.integrate import solve_ivp
 
 from bench.figures import loops, style, time_histories
 from bench.figures.look import axes_grid, thin
-from bench.identification.adaptive import AdaptiveLeastSquares
 from bench.identification.adaptive_history import AdaptiveHistory
-from bench.identification.regressors import Reference, sdof_model
-from bench.laws.coupling import INCH, POUND_FORCE
+from bench.progress import ShowProgress
 from bench.recording import Recording, nmse
 from bench.reproduction.estimates import (
     ESTIMATES_SETUP,
@@ -31,115 +24,13 @@ from bench.reproduction.estimates import (
     fine,
     learnt,
 )
-from bench.reproduction.imperial import STIFFNESS, sdof_view
-from bench.reproduction.item import Item, Picture, Progress
+from bench.reproduction.hysteretic_record import SETUP, identify_general_model, printed_model_fate, record
+from bench.reproduction.item import Item, Picture
 from bench.reproduction.printed_figures import fig, panels
-from bench.reproduction.verdict import (
-    VERDICT_SETUP,
-    Row,
-    axis_row,
-    fact_row,
-    told_row,
-    value_row,
-)
-from bench.rig import Element, simulate
-from bench.rig.library import sdof_rig
-from bench.signals import BandLimitedNoise, Excitation
+from bench.reproduction.verdict import VERDICT_SETUP, Row, axis_row, fact_row, told_row, value_row
 
 CHOSEN = "mass, springs, damper, strength, skew and band"
 UNITS = ("lbf/in", "lbf s/in", "lbf/in^3", "1/in", "1/in", "1/(lbf in)", "1/(lbf in)")
-
-
-@dataclass(frozen=True)
-class HystereticRigSetup:
-    """Numbers of `bench.reproduction.hysteretic_rig`."""
-
-    mass: float = 0.082
-    spring: float = 11.4
-    damper: float = 0.27
-    slope: float = 41.0
-    strength: float = 19.0
-    skew: float = 0.77
-    band: tuple[float, float] = (0.5, 13.0)
-    peak: float = 15.0
-    duration: float = 120.0
-    rate: float = 1000.0
-    seed: int = 7
-    printed: tuple[float, ...] = (48.48, 0.18, -48.61, -0.12, -1.76, -0.00, 0.12)
-    filter_rate: float = 5.0
-
-
-SETUP = HystereticRigSetup()
-
-
-def drive() -> Excitation:
-    """The excitation."""
-    noise = BandLimitedNoise(low=SETUP.band[0], cutoff=SETUP.band[1], peak=SETUP.peak * POUND_FORCE)
-    return Excitation({"shaker": noise}, duration=SETUP.duration, sample_rate=SETUP.rate)
-
-
-def record(seed: int = SETUP.seed) -> Recording:
-    """The test."""
-    softening = SETUP.slope / SETUP.strength / INCH
-    rig = sdof_rig(
-        Element.of(
-            "linear",
-            "carriage",
-            name="spring",
-            stiffness=SETUP.spring * STIFFNESS,
-            damping=SETUP.damper * STIFFNESS,
-        ),
-        Element.of(
-            "bouc_wen",
-            "carriage",
-            name="slide",
-            A=SETUP.slope * STIFFNESS,
-            beta=(1.0 - SETUP.skew) * softening,
-            gamma=SETUP.skew * softening,
-            n=1.0,
-        ),
-        mass=SETUP.mass * STIFFNESS,
-    )
-    return sdof_view(simulate(rig, drive(), rng=np.random.default_rng(seed)), SETUP.mass)
-
-
-def identify(test: Recording) -> tuple[AdaptiveLeastSquares, AdaptiveHistory]:
-    """The seven parameters on line, P(0) = 1000 on parameters scaled to the rig's ranges."""
-    model = sdof_model(
-        2, mass=SETUP.mass, filter_rate=SETUP.filter_rate, reference=Reference(10.0, 0.3, 6.0, 200.0)
-    )
-    estimator = AdaptiveLeastSquares(model, initial_covariance=1000.0, sample_rate=SETUP.rate)
-    history = estimator.run(
-        test.time,
-        force=test["force"],
-        displacement=test["displacement"],
-        velocity=test["velocity"],
-        acceleration=test["acceleration"],
-        keep_regressors=True,
-    )
-    return estimator, history
-
-
-def printed_model_fate(test: Recording) -> str:
-    """What becomes of the printed estimates when they are simulated as a rig, integrated by themselves."""
-    k, c, d, *powers = SETUP.printed
-    time, force = test.time, test["force"]
-
-    def slope(t: float, y: Sequence[float]) -> tuple[float, float, float]:
-        x, v, w = y
-        r = k * x + c * v + d * x**3 + w
-        size, speed = abs(r), abs(v)
-        terms = (speed * r, v * size, speed * size * r, v * size * size)
-        hysteretic = sum(theta * term for theta, term in zip(powers, terms, strict=True))
-        return v, (float(np.interp(t, time, force)) - r) / SETUP.mass, hysteretic
-
-    def gone(t: float, y: Sequence[float]) -> float:
-        return abs(y[0]) - 10.0 * 0.5  # ten times the printed range
-
-    gone.terminal = True  # type: ignore[attr-defined]
-    # 10 ms: the force, flat to 13 Hz, must not be stepped over; 1e-6 is far below the margin of the event.
-    end = solve_ivp(slope, (0.0, time[-1]), (0.0, 0.0, 0.0), events=gone, rtol=1e-6, atol=1e-6, max_step=0.01)
-    return f"runs away after {end.t[-1]:.0f} s" if end.status == 1 else "stays bounded"
 
 
 class _Found(NamedTuple):
@@ -159,7 +50,7 @@ class _Found(NamedTuple):
 
 def _found(seed: int) -> _Found:
     test = record(seed)
-    estimator, history = identify(test)
+    estimator, history = identify_general_model(test)
     return _Found(test, estimator.theta, history)
 
 
@@ -193,37 +84,43 @@ def _range_rows(shown: _Found, others: list[_Found]) -> list[Row]:
     ]
 
 
-def _rows(shown: _Found, others: list[_Found], fate: str) -> tuple[Row, ...]:
-    rows = _range_rows(shown, others)
+def _parameter_rows(shown: _Found, others: list[_Found]) -> list[Row]:
     names = ("k", "c", "d", "-νβa₁/η", "νγa₁/η", "-νβa₂/η", "νγa₂/η")
-    for i, (name, unit) in enumerate(zip(names, UNITS, strict=True)):
-        rows.append(
-            value_row(
-                f"θ{i + 1} = {name}",
-                unit,
-                SETUP.printed[i],
-                float(shown.theta[i]),
-                source=f"p. 34, number, and {fig('2.15')}",
-                reason="another system: the laboratory's rig is known by these seven numbers alone",
-                seeds=[found.theta[i] for found in others],
-            )
+    return [
+        value_row(
+            f"θ{i + 1} = {name}",
+            unit,
+            SETUP.printed[i],
+            float(shown.theta[i]),
+            source=f"p. 34, number, and {fig('2.15')}",
+            reason="another system: the laboratory's rig is known by these seven numbers alone",
+            seeds=[found.theta[i] for found in others],
         )
+        for i, (name, unit) in enumerate(zip(names, UNITS, strict=True))
+    ]
+
+
+def _sign_row(shown: _Found, others: list[_Found]) -> Row:
     printed = _signs(SETUP.printed[:5]) + "-+"  # -0.00 is printed with its sign
     all_signs = [_signs(found.theta) for found in others]
     agree = [sum(a == b for a, b in zip(signs, printed, strict=True)) for signs in all_signs]
-    rows += [
-        fact_row(
-            "signs of all seven",
-            _signs(shown.theta),
-            float(np.median(agree)) == 7.0,
-            printed=printed,
-            source="p. 34, numbers",
-            tolerance="all seven as printed, median of the seeds",
-            reason="a sign is all that two different rigs may share; -0.00 counts with the sign it is printed with",
-            spread=f"{min(agree)} to {max(agree)} of seven agree",
-            chosen="skew of the rig's hysteresis, for the signs of θ4 and θ5",
-            why="the rig was searched for the first five signs; the terms in r² are small and trade against the others",
-        ),
+    return fact_row(
+        "signs of all seven",
+        _signs(shown.theta),
+        float(np.median(agree)) == 7.0,
+        printed=printed,
+        source="p. 34, numbers",
+        tolerance="all seven as printed, median of the seeds",
+        reason="a sign is all that two different rigs may share; -0.00 counts with the sign it is printed with",
+        spread=f"{min(agree)} to {max(agree)} of seven agree",
+        chosen="skew of the rig's hysteresis, for the signs of θ4 and θ5",
+        why="the rig was searched for the first five signs; the terms in r² are small and trade against the others",
+    )
+
+
+def _prediction_rows(shown: _Found, others: list[_Found]) -> list[Row]:
+    """z as the printed parameters and our own predict it."""
+    return [
         value_row(
             "z of our rig predicted with the printed parameters: NMSE, 55 to 120 s",
             "%",
@@ -245,6 +142,15 @@ def _rows(shown: _Found, others: list[_Found], fate: str) -> tuple[Row, ...]:
             reason="a good fit (section 3.4.2); no number is printed",
             seeds=[found.error() for found in others],
         ),
+    ]
+
+
+def _rows(shown: _Found, others: list[_Found], fate: str) -> tuple[Row, ...]:
+    return (
+        *_range_rows(shown, others),
+        *_parameter_rows(shown, others),
+        _sign_row(shown, others),
+        *_prediction_rows(shown, others),
         told_row(
             "the printed parameters simulated as a rig",
             "",
@@ -253,8 +159,7 @@ def _rows(shown: _Found, others: list[_Found], fate: str) -> tuple[Row, ...]:
             printed="θ as printed",
             source="p. 34, numbers",
         ),
-    ]
-    return tuple(rows)
+    )
 
 
 def _restoring(found: _Found) -> tuple[Figure, Figure]:
@@ -286,23 +191,13 @@ def _restoring(found: _Found) -> tuple[Figure, Figure]:
     return figure, phase
 
 
-def run(progress: Progress) -> Item:
-    """Make the item."""
-    progress("simulating", 0.1)
-    shown = _found(SETUP.seed)
-    test, history = shown.record, shown.history
-    fate = printed_model_fate(test)
-    others = []
-    for number, seed in enumerate(VERDICT_SETUP.seeds):
-        progress(f"seed {seed}", 0.2 + 0.06 * number)
-        others.append(_found(seed))
-    progress("drawing", 0.85)
+def _pictures(shown: _Found) -> tuple[Picture, ...]:
     restoring, over_x = _restoring(shown)
     window = (20.0, 30.0)
-    records = {"rig": test}
+    history, records = shown.history, {"rig": shown.record}
     names = tuple(f"θ{i + 1}" for i in range(7))
     phases = [("displacement", "velocity"), ("displacement", "restoring_force")]
-    pictures = (
+    return (
         Picture(
             "histories",
             "Excitation, displacement, velocity and acceleration (Fig 2.14 a to d).",
@@ -337,6 +232,18 @@ def run(progress: Progress) -> Item:
             panels("2.17"),
         ),
     )
+
+
+def run(progress: ShowProgress) -> Item:
+    """Make the item."""
+    progress("simulating", 0.1)
+    shown = _found(SETUP.seed)
+    fate = printed_model_fate(shown.record)
+    others = []
+    for number, seed in enumerate(VERDICT_SETUP.seeds):
+        progress(f"seed {seed}", 0.2 + 0.06 * number)
+        others.append(_found(seed))
+    progress("drawing", 0.85)
     text = (
         f"The virtual rig: {SETUP.mass:g} lbf s²/in on a spring of {SETUP.spring:g} lbf/in, a damper of {SETUP.damper:g} "
         f"lbf s/in and a Bouc-Wen element of slope {SETUP.slope:g} lbf/in and strength {SETUP.strength:g} lbf, under "
@@ -347,4 +254,4 @@ def run(progress: Progress) -> Item:
         f"model {fate}: it predicts the force of a measured motion, and is no model to simulate with."
     )
     searched = f"{CHOSEN}, searched for the axes of Fig 2.14 and the signs of θ1 to θ5; the filter rate"
-    return Item(text, _rows(shown, others, fate), pictures, searched)
+    return Item(text, _rows(shown, others, fate), _pictures(shown), searched)

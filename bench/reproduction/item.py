@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -10,9 +9,6 @@ from bench.reproduction.verdict import Row
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-Progress = Callable[[str, float], None]
-"""Called with what is being done and the share of the whole that is done."""
 
 
 class Picture(NamedTuple):

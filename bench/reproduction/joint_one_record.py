@@ -19,8 +19,8 @@ from bench.demo.joint import (
 from bench.identification.network import NetworkModel, fit_network
 from bench.identification.polynomial import PolynomialModel, fit_polynomial
 from bench.identification.restoring_force import JointData
+from bench.progress import ShowProgress
 from bench.reproduction import joint_models
-from bench.reproduction.item import Progress
 from bench.reproduction.verdict import (
     VERDICT_SETUP,
     Row,
@@ -124,7 +124,7 @@ def _worst(model: PolynomialModel | NetworkModel, excited: float) -> float:
     return max(scores)
 
 
-def rows(progress: Progress) -> list[Row]:
+def rows(progress: ShowProgress) -> list[Row]:
     """For each condition, whether the one record fails where all three do not."""
     made = []
     for number, condition in enumerate(CONDITIONS):

@@ -31,11 +31,12 @@ from bench.nastran import (
     read_network,
 )
 from bench.nastran.bulk import Format
+from bench.progress import ShowProgress
 from bench.recording import Recording
 from bench.reproduction import original_deck
 from bench.reproduction.chain_joint import AXES
 from bench.reproduction.estimates import fine
-from bench.reproduction.item import Item, Picture, Progress
+from bench.reproduction.item import Item, Picture
 from bench.reproduction.verdict import Row, fact_row, value_row
 from bench.rig import Element, simulate
 from bench.rig.library import chain_rig
@@ -212,7 +213,7 @@ def _pictures(record: Recording, relative: np.ndarray, study: LagStudy) -> tuple
     )
 
 
-def run(progress: Progress) -> Item:
+def run(progress: ShowProgress) -> Item:
     """Make the item."""
     progress("bulk data", 0.05)
     deck, cards = _deck_rows()

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench.nastran import INCH_POUND, deck_text, joint_model_cards, parse_deck, read_joint_model
-from bench.nastran.cards import Card
+from bench.nastran.raw_card import Card
 from bench.nastran.structure_cards import Conm2, ScalarElement
 from bench.reproduction.chain_joint import AXES
 from bench.reproduction.verdict import Row, fact_row, told_row, value_row

@@ -8,11 +8,12 @@ from importlib import import_module
 from types import MappingProxyType
 
 from bench.errors import UnknownNameError
-from bench.reproduction.item import Item, Progress
+from bench.progress import ShowProgress
+from bench.reproduction.item import Item
 
 
 @dataclass(frozen=True)
-class Entry:
+class ItemEntry:
     """An item by its name.
 
     Attributes:
@@ -27,39 +28,43 @@ class Entry:
     module: str
     weight: float = 2.0
 
-    def run(self, progress: Progress) -> Item:
+    def run(self, progress: ShowProgress) -> Item:
         """Make the item."""
         return import_module(f"bench.reproduction.{self.module}").run(progress)
 
 
 _ENTRIES = (
-    Entry("A1", "Free vibration after impulses (Fig 2.6)", "free_vibration"),
-    Entry("A2", "Gap under wide-band random excitation (Figs 2.7, 2.8)", "gap"),
-    Entry("A3", "Sliding friction, constant and modulated (Figs 2.9, 2.10)", "sliding_friction"),
-    Entry(
+    ItemEntry("A1", "Free vibration after impulses (Fig 2.6)", "free_vibration"),
+    ItemEntry("A2", "Gap under wide-band random excitation (Figs 2.7, 2.8)", "gap"),
+    ItemEntry("A3", "Sliding friction, constant and modulated (Figs 2.9, 2.10)", "sliding_friction"),
+    ItemEntry(
         "A4", "Simulated Bouc-Wen hysteresis identified on line (Figs 2.11-2.13)", "simulated_hysteresis", 6.0
     ),
-    Entry("A5", "Hysteretic rig identified on line (Figs 2.14-2.17)", "hysteretic_rig", 6.0),
-    Entry(
+    ItemEntry("A5", "Hysteretic rig identified on line (Figs 2.14-2.17)", "hysteretic_rig", 6.0),
+    ItemEntry(
         "B1",
         "Damper design model over 202 harmonic tests (Figs 3.3, 3.4, 3.10, Tables 3.1, 3.2)",
         "damper_design",
         20.0,
     ),
-    Entry("B2", "Damper polynomial model under random excitation (Figs 3.5-3.9)", "damper_polynomial", 10.0),
-    Entry("B3", "Order of the damper polynomial model (Figs 3.11, 3.12)", "damper_order", 30.0),
-    Entry("C2", "Coupled joint: polynomial and network (Figs 4.6-4.10, section 4.5)", "coupled_joint", 120.0),
-    Entry("C3", "Laboratory joint (Figs 4.14-4.18, 5.10-5.12)", "laboratory_joint", 60.0),
-    Entry("C4", "Joint identified without the mass (section 4.5)", "unknown_mass", 60.0),
-    Entry("D1", "Linear chain of four bodies (Fig 5.3, eqs 5.47-5.53)", "linear_chain"),
-    Entry("D3", "Reduced-order joint in the chain (Figs 5.4, 5.8, 5.9)", "chain_joint", 90.0),
-    Entry(
+    ItemEntry(
+        "B2", "Damper polynomial model under random excitation (Figs 3.5-3.9)", "damper_polynomial", 10.0
+    ),
+    ItemEntry("B3", "Order of the damper polynomial model (Figs 3.11, 3.12)", "damper_order", 30.0),
+    ItemEntry(
+        "C2", "Coupled joint: polynomial and network (Figs 4.6-4.10, section 4.5)", "coupled_joint", 120.0
+    ),
+    ItemEntry("C3", "Laboratory joint (Figs 4.14-4.18, 5.10-5.12)", "laboratory_joint", 60.0),
+    ItemEntry("C4", "Joint identified without the mass (section 4.5)", "unknown_mass", 60.0),
+    ItemEntry("D1", "Linear chain of four bodies (Fig 5.3, eqs 5.47-5.53)", "linear_chain"),
+    ItemEntry("D3", "Reduced-order joint in the chain (Figs 5.4, 5.8, 5.9)", "chain_joint", 90.0),
+    ItemEntry(
         "D4",
         "Joint and network as Nastran bulk data (eqs 5.16-5.46, 5.55, appendices B.1 to B.3)",
         "nastran_system",
         20.0,
     ),
-    Entry(
+    ItemEntry(
         "D5",
         "Frame on an isolator with dampers, four reduced-order joints at once (chapter 6)",
         "frame",
@@ -67,14 +72,14 @@ _ENTRIES = (
     ),
 )
 
-ENTRIES: Mapping[str, Entry] = MappingProxyType({entry.identifier: entry for entry in _ENTRIES})
+ENTRIES: Mapping[str, ItemEntry] = MappingProxyType({entry.identifier: entry for entry in _ENTRIES})
 """Every item by its name."""
 
 ALIASES: Mapping[str, str] = MappingProxyType({"C1": "C2", "D2": "D3"})
 """Systems that are made as part of another item."""
 
 
-def find_entries(identifiers: Sequence[str] | None) -> tuple[Entry, ...]:
+def find_entries(identifiers: Sequence[str] | None) -> tuple[ItemEntry, ...]:
     """The items asked for, each once, in the order of the dissertation.
 
     Args:

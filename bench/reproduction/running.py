@@ -13,9 +13,10 @@ from typing import Any
 
 from bench import model_path
 from bench.files import together, write_text
+from bench.progress import ShowProgress
 from bench.provenance import provenance, software_versions
-from bench.reproduction.item import Item, Progress, Result, Shown
-from bench.reproduction.registry import Entry, find_entries
+from bench.reproduction.item import Item, Result, Shown
+from bench.reproduction.registry import ItemEntry, find_entries
 from bench.reproduction.writing import to_markdown, to_page
 
 
@@ -64,7 +65,7 @@ def reproduce(
     out: str | Path,
     *,
     fresh: bool = False,
-    progress: Progress = lambda label, share: None,
+    progress: ShowProgress = lambda label, share: None,
 ) -> Reproduction:
     """Make items of the dissertation and write them.
 
@@ -104,7 +105,7 @@ def reproduce(
     return Reproduction(reproduction.results, (*files, *pictures), reproduction.seconds)
 
 
-def _part(progress: Progress, entry: Entry, start: float, share: float) -> Progress:
+def _part(progress: ShowProgress, entry: ItemEntry, start: float, share: float) -> ShowProgress:
     def report(label: str, inner: float) -> None:
         progress(f"{entry.identifier}: {label}", start + share * min(max(inner, 0.0), 1.0))
 
@@ -112,11 +113,11 @@ def _part(progress: Progress, entry: Entry, start: float, share: float) -> Progr
     return report
 
 
-def _file(folder: Path, entry: Entry) -> Path:
+def _file(folder: Path, entry: ItemEntry) -> Path:
     return folder / f"{entry.identifier}.json"
 
 
-def _kept(folder: Path, entry: Entry) -> Result | None:
+def _kept(folder: Path, entry: ItemEntry) -> Result | None:
     """The item as an earlier run wrote it; None where there is none of this version, or a picture is missing."""
     try:
         result = Result.from_dict(json.loads(_file(folder, entry).read_text(encoding="utf-8")))
@@ -126,7 +127,7 @@ def _kept(folder: Path, entry: Entry) -> Result | None:
     return result if result.version == fingerprint() and present else None
 
 
-def _made(folder: Path, entry: Entry, progress: Progress) -> Result:
+def _made(folder: Path, entry: ItemEntry, progress: ShowProgress) -> Result:
     from bench.figures import save  # noqa: PLC0415  (matplotlib, which a kept item does not need)
 
     start = time.perf_counter()

@@ -15,10 +15,11 @@ import numpy as np
 
 from bench.figures import loops, time_histories
 from bench.laws.coupling import INCH, POUND_FORCE
+from bench.progress import ShowProgress
 from bench.recording import Recording
 from bench.reproduction.estimates import fine
 from bench.reproduction.imperial import STIFFNESS, imperial
-from bench.reproduction.item import Item, Picture, Progress
+from bench.reproduction.item import Item, Picture
 from bench.reproduction.printed_figures import fig, panels
 from bench.reproduction.verdict import Row, axis_row, fact_row, told_row, value_row
 from bench.rig import Element, simulate
@@ -98,45 +99,36 @@ def _loops_apart(constant: Recording) -> float:
     return 100.0 * float(np.max(np.abs(first[:n] - later[:n])) / np.ptp(first))
 
 
-def _rows(test: Recording, constant: Recording) -> tuple[Row, ...]:
-    loose, tight = 1.0 / SETUP.modulation, 1.5 / SETUP.modulation
-    swing = {
-        name: (envelope(test[name], test.time, loose), envelope(test[name], test.time, tight))
-        for name in ("displacement", "velocity", "force_gauge")
-    }
-    last = constant.slice_time(20.0, 20.0 + 1.0 / SETUP.frequency)
-    area = float(np.sum(last["slide/force"] * last["velocity"]) / constant.sample_rate)
-    stroke = 2.0 * float(np.ptp(last["displacement"]))
-    omega = 2.0 * math.pi * SETUP.frequency
-    loops_apart = _loops_apart(constant)
+def _range_rows(test: Recording) -> list[Row]:
     axes = {
         "displacement": ("in", 1.0, 0.5, "a"),
         "velocity": ("in/s", 20.0, 10.0, "b"),
         "acceleration": ("in/s^2", 400.0, 200.0, "c"),
         "force_gauge": ("lbf", 15.0, 7.5, "d"),
     }
-    return (
-        *(
-            axis_row(
-                name.replace("_", " "),
-                unit,
-                axis,
-                inner,
-                test[name],
-                source=fig(f"2.9 {part}"),
-                chosen=CHOSEN,
-                why="force, friction and back-EMF that give all other axes leave it a little beyond its own",
-            )
-            for name, (unit, axis, inner, part) in axes.items()
-        ),
-        told_row(
-            "periods of the normal force in 30 s",
-            "1",
-            f"{SETUP.modulation * SETUP.duration:g}",
-            "put in; the axis of Fig 2.9 e is the stepper motor's relative position, not a force",
-            printed="about two",
-            source=f"{fig('2.9 e')}, sentence on p. 21",
-        ),
+    return [
+        axis_row(
+            name.replace("_", " "),
+            unit,
+            axis,
+            inner,
+            test[name],
+            source=fig(f"2.9 {part}"),
+            chosen=CHOSEN,
+            why="force, friction and back-EMF that give all other axes leave it a little beyond its own",
+        )
+        for name, (unit, axis, inner, part) in axes.items()
+    ]
+
+
+def _grip_rows(test: Recording) -> list[Row]:
+    """What a strong grip does to the gauge and to the motion."""
+    loose, tight = 1.0 / SETUP.modulation, 1.5 / SETUP.modulation
+    swing = {
+        name: (envelope(test[name], test.time, loose), envelope(test[name], test.time, tight))
+        for name in ("displacement", "velocity", "force_gauge")
+    }
+    return [
         fact_row(
             "strong grip: the gauge reads more",
             f"{swing['force_gauge'][0]:.3g} → {swing['force_gauge'][1]:.3g} lbf",
@@ -156,6 +148,17 @@ def _rows(test: Recording, constant: Recording) -> tuple[Row, ...]:
             tolerance="to less than half",
             reason="no number is printed; the amplitude halved is significant",
         ),
+    ]
+
+
+def _loop_rows(constant: Recording) -> list[Row]:
+    """Loops under a constant grip: whether they repeat, and their area."""
+    last = constant.slice_time(20.0, 20.0 + 1.0 / SETUP.frequency)
+    area = float(np.sum(last["slide/force"] * last["velocity"]) / constant.sample_rate)
+    stroke = 2.0 * float(np.ptp(last["displacement"]))
+    omega = 2.0 * math.pi * SETUP.frequency
+    loops_apart = _loops_apart(constant)
+    return [
         fact_row(
             "constant grip, steady: successive loops do not fall on top of each other",
             f"they differ by {loops_apart:.2g} % of the stroke",
@@ -175,6 +178,22 @@ def _rows(test: Recording, constant: Recording) -> tuple[Row, ...]:
             high=1.0,
             reason="the loop of dry friction is a rectangle; the creep velocity over the peak velocity is cut from its corners",
         ),
+    ]
+
+
+def _rows(test: Recording, constant: Recording) -> tuple[Row, ...]:
+    return (
+        *_range_rows(test),
+        told_row(
+            "periods of the normal force in 30 s",
+            "1",
+            f"{SETUP.modulation * SETUP.duration:g}",
+            "put in; the axis of Fig 2.9 e is the stepper motor's relative position, not a force",
+            printed="about two",
+            source=f"{fig('2.9 e')}, sentence on p. 21",
+        ),
+        *_grip_rows(test),
+        *_loop_rows(constant),
     )
 
 
@@ -207,7 +226,7 @@ def _pictures(test: Recording, constant: Recording) -> tuple[Picture, ...]:
     )
 
 
-def run(progress: Progress) -> Item:
+def run(progress: ShowProgress) -> Item:
     """Make the item."""
     progress("simulating", 0.1)
     test = record(modulated())

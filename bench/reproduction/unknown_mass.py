@@ -8,9 +8,10 @@ from bench.demo.joint import laboratory_view
 from bench.figures import bar_table
 from bench.identification.network import NetworkModel, fit_network
 from bench.identification.polynomial import PolynomialModel, fit_polynomial
+from bench.progress import ShowProgress
 from bench.reproduction import joint_models
-from bench.reproduction.item import Item, Picture, Progress
-from bench.reproduction.verdict import Row, Verdict, fact_row, value_row
+from bench.reproduction.item import Item, Picture
+from bench.reproduction.verdict import Row, RowVerdict, fact_row, value_row
 from bench.rig.library import inertia_of, joint_rig
 
 SOURCE = "p. 96, sentence (section 4.5)"
@@ -41,7 +42,7 @@ def _rows(
                 high=1.5,
                 source=SOURCE,
                 reason="half as much again is not crucial; no number is printed",
-                verdict=None if after / before <= 1.5 or after > 5.0 else Verdict.SHAPE,
+                verdict=None if after / before <= 1.5 or after > 5.0 else RowVerdict.SHAPE,
                 why=f"{after:.2g} % instead of {before:.2g} %: still a good fit, by much, but not as good: two more inputs",
             )
         )
@@ -63,7 +64,7 @@ def _rows(
     return tuple(rows)
 
 
-def run(progress: Progress) -> Item:
+def run(progress: ShowProgress) -> Item:
     """Make the item."""
     progress("models that know the mass", 0.05)
     given = joint_models.models()

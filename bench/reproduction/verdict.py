@@ -40,7 +40,7 @@ OWN = "not in the text: a check of our own"
 """Source of rows of which the dissertation prints nothing."""
 
 
-class Verdict(StrEnum):
+class RowVerdict(StrEnum):
     """What may be said of a row."""
 
     HOLDS = "holds"
@@ -75,7 +75,7 @@ class Row(NamedTuple):
     spread: str
     tolerance: str
     reason: str
-    verdict: Verdict
+    verdict: RowVerdict
     chosen: str = ""
     deviation: float | None = None
     why: str = ""
@@ -88,9 +88,9 @@ class Row(NamedTuple):
     @property
     def holds(self) -> bool | None:
         """Whether it holds, in shape included; None where it cannot be judged."""
-        if self.verdict is Verdict.NOT_COMPARABLE:
+        if self.verdict is RowVerdict.NOT_COMPARABLE:
             return None
-        return self.verdict is not Verdict.FAILS
+        return self.verdict is not RowVerdict.FAILS
 
     def cells(self) -> tuple[str, ...]:
         """The row as text, in the order of `HEADER`."""
@@ -108,7 +108,7 @@ class Row(NamedTuple):
     def from_dict(cls, values: dict[str, Any]) -> Row:
         """The row from the values of `to_dict`."""
         plain = {name: values[name] for name in cls._fields if name != "verdict"}
-        return cls(**plain, verdict=Verdict(values["verdict"]))
+        return cls(**plain, verdict=RowVerdict(values["verdict"]))
 
 
 HEADER = ("quantity", "printed (where)", "ours", "over ten seeds", "tolerance and its reason", "verdict")
@@ -169,7 +169,7 @@ def axis_row(
         spread,
         between + (", median of the seeds" if len(seeds) else ""),
         AXIS_REASON,
-        Verdict.HOLDS if inside else Verdict.FAILS,
+        RowVerdict.HOLDS if inside else RowVerdict.FAILS,
         chosen,
         100.0 * float(np.max(judged / outer) - 1.0),
         why,
@@ -190,7 +190,7 @@ def value_row(
     reason: str = "",
     seeds: ArrayLike = (),
     chosen: str = "",
-    verdict: Verdict | None = None,
+    verdict: RowVerdict | None = None,
     why: str = "",
 ) -> Row:
     """A value beside a printed one; it holds where it lies between `low` and `high`.
@@ -217,11 +217,11 @@ def value_row(
     if required and not tolerance:
         tolerance = _limits(low, high) + (", median of the seeds" if values.size else "")
     if verdict is None:
-        verdict = Verdict.NOT_COMPARABLE
+        verdict = RowVerdict.NOT_COMPARABLE
         if required:
-            verdict = Verdict.HOLDS if low <= judged <= high else Verdict.FAILS
-            if verdict is Verdict.FAILS and shape is not None and shape[0] <= judged <= shape[1]:
-                verdict = Verdict.SHAPE
+            verdict = RowVerdict.HOLDS if low <= judged <= high else RowVerdict.FAILS
+            if verdict is RowVerdict.FAILS and shape is not None and shape[0] <= judged <= shape[1]:
+                verdict = RowVerdict.SHAPE
     number = printed if isinstance(printed, float | int) else None
     return Row(
         quantity,
@@ -273,14 +273,14 @@ def one_of_ours(
         why: As of `Row`.
     """
     values = np.asarray(seeds, dtype=float)
-    verdict = Verdict.HOLDS if values.min() <= printed <= values.max() else Verdict.FAILS
+    verdict = RowVerdict.HOLDS if values.min() <= printed <= values.max() else RowVerdict.FAILS
     if (
-        verdict is Verdict.FAILS
+        verdict is RowVerdict.FAILS
         and shape is not None
         and shape[0] <= np.median(values) <= shape[1]
         and shape[0] <= printed <= shape[1]
     ):
-        verdict = Verdict.SHAPE
+        verdict = RowVerdict.SHAPE
     also = f"; in shape where {shape_text}" if shape_text else ""
     return value_row(
         quantity,
@@ -312,7 +312,7 @@ def fact_row(
     why: str = "",
 ) -> Row:
     """Something that is so or is not; `shape` tells whether what is not so still is so in shape."""
-    verdict = Verdict.HOLDS if holds else (Verdict.SHAPE if shape else Verdict.FAILS)
+    verdict = RowVerdict.HOLDS if holds else (RowVerdict.SHAPE if shape else RowVerdict.FAILS)
     return Row(
         quantity, "", printed, source or OWN, ours, spread, tolerance, reason, verdict, chosen, None, why
     )
@@ -322,4 +322,4 @@ def told_row(
     quantity: str, unit: str, ours: str, reason: str, *, printed: str = "", source: str = "", spread: str = ""
 ) -> Row:
     """A quantity that cannot be judged, and why not."""
-    return Row(quantity, unit, printed, source or OWN, ours, spread, "", reason, Verdict.NOT_COMPARABLE)
+    return Row(quantity, unit, printed, source or OWN, ours, spread, "", reason, RowVerdict.NOT_COMPARABLE)

@@ -9,7 +9,7 @@ from pathlib import Path
 from bench.page import Page
 from bench.provenance import software_versions
 from bench.reproduction.item import Result
-from bench.reproduction.verdict import HEADER, Row, Verdict
+from bench.reproduction.verdict import HEADER, Row, RowVerdict
 
 TITLE = "The dissertation, reproduced"
 LEAD = (
@@ -18,20 +18,20 @@ LEAD = (
     "records were never published: what the text prints of them (axes, numbers, sentences) stands beside what the rigs give."
 )
 _ASIDE = (
-    (Verdict.FAILS, "What does not hold"),
-    (Verdict.SHAPE, "What holds in shape only"),
-    (Verdict.NOT_COMPARABLE, "What cannot be compared"),
+    (RowVerdict.FAILS, "What does not hold"),
+    (RowVerdict.SHAPE, "What holds in shape only"),
+    (RowVerdict.NOT_COMPARABLE, "What cannot be compared"),
 )
 
 
-def summary(results: Sequence[Result]) -> str:
+def items_summary(results: Sequence[Result]) -> str:
     """How many rows came to which verdict, those that are no evidence told apart."""
     rows = [row for result in results for row in result.rows]
     printed = [row for row in rows if not row.own]
     counts = Counter(row.verdict for row in printed)
-    chosen = sum(bool(row.chosen) and row.verdict is Verdict.HOLDS for row in printed)
+    chosen = sum(bool(row.chosen) and row.verdict is RowVerdict.HOLDS for row in printed)
     checks = [row for row in rows if row.own and row.holds is not None]
-    told = ", ".join(f"{counts[verdict]} {_plural(verdict, counts[verdict])}" for verdict in Verdict)
+    told = ", ".join(f"{counts[verdict]} {_plural(verdict, counts[verdict])}" for verdict in RowVerdict)
     return (
         f"Of {len(printed)} things that the text prints, {told}; {chosen} of those that hold were put in or chosen for, and "
         f"are no evidence. Of {len(checks)} checks of our own, of which the text says nothing, "
@@ -39,10 +39,10 @@ def summary(results: Sequence[Result]) -> str:
     )
 
 
-def _plural(verdict: Verdict, count: int) -> str:
-    if verdict is Verdict.NOT_COMPARABLE:
+def _plural(verdict: RowVerdict, count: int) -> str:
+    if verdict is RowVerdict.NOT_COMPARABLE:
         return "cannot be compared"
-    words = {Verdict.HOLDS: ("holds", "hold"), Verdict.FAILS: ("does not hold", "do not hold")}
+    words = {RowVerdict.HOLDS: ("holds", "hold"), RowVerdict.FAILS: ("does not hold", "do not hold")}
     return words.get(verdict, ("holds in shape only", "hold in shape only"))[count != 1]
 
 
@@ -56,7 +56,9 @@ def to_page(results: Sequence[Result], folder: Path) -> Page:
     """One page with every item; pictures are read from `folder` and embedded."""
     seconds = sum(result.seconds for result in results)
     page = Page(
-        TITLE, lead=f"{LEAD} {summary(results)} {len(results)} items in {seconds:.0f} s.", footer=_footer()
+        TITLE,
+        lead=f"{LEAD} {items_summary(results)} {len(results)} items in {seconds:.0f} s.",
+        footer=_footer(),
     )
     for verdict, heading in _ASIDE[:2]:
         found = _found(results, verdict)
@@ -76,7 +78,7 @@ def to_page(results: Sequence[Result], folder: Path) -> Page:
     return page
 
 
-def _found(results: Sequence[Result], verdict: Verdict) -> list[tuple[str, Row]]:
+def _found(results: Sequence[Result], verdict: RowVerdict) -> list[tuple[str, Row]]:
     return [(result.identifier, row) for result in results for row in result.rows if row.verdict is verdict]
 
 
@@ -90,14 +92,14 @@ def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
 
 def to_markdown(results: Sequence[Result]) -> str:
     """What does not hold and why, then all rows, a table an item."""
-    lines = [f"# {TITLE}", "", LEAD, "", summary(results), ""]
+    lines = [f"# {TITLE}", "", LEAD, "", items_summary(results), ""]
     for verdict, heading in _ASIDE:
         lines += [f"## {heading}", ""]
         found = _found(results, verdict)
         for name, row in found:
             unit = f" [{row.unit}]" if row.unit else ""
             said = f"printed {row.printed} ({row.source})" if row.printed else row.source
-            why = row.reason if verdict is Verdict.NOT_COMPARABLE else row.why or "not explained"
+            why = row.reason if verdict is RowVerdict.NOT_COMPARABLE else row.why or "not explained"
             over = f"; over ten seeds {row.spread}" if row.spread else ""
             lines += [f"- **{name}, {row.quantity}{unit}**: {said}; ours {row.ours}{over}. Why: {why}."]
         lines += [*([] if found else ["Nothing."]), ""]
@@ -115,18 +117,18 @@ def to_gallery(results: Sequence[Result]) -> str:
         f"{LEAD} Every figure with data is here, favourable or not. The rows behind it, and what does not hold and why: "
         "[reproduction.md](reproduction.md); both pages are made together by `python scripts/make_gallery.py`.",
         "",
-        summary(results),
+        items_summary(results),
         "",
     ]
     for result in results:
         counts = Counter(row.verdict for row in result.rows)
-        told = ", ".join(f"{counts[verdict]} {verdict.value}" for verdict in Verdict if counts[verdict])
+        told = ", ".join(f"{counts[verdict]} {verdict.value}" for verdict in RowVerdict if counts[verdict])
         lines += [f"## {result.identifier}: {result.title}", "", result.text, ""]
         lines += [f"Searched or chosen: {result.searched}", "", f"Rows: {told}.", ""]
         for row in result.rows:
-            if row.verdict is Verdict.FAILS:
+            if row.verdict is RowVerdict.FAILS:
                 lines += [f"- Does not hold: {row.quantity}: printed {row.printed or '–'}, ours {row.ours}."]
-        lines += [""] * bool(counts[Verdict.FAILS])
+        lines += [""] * bool(counts[RowVerdict.FAILS])
         for shown in result.pictures:
             lines += [f"![{shown.caption}](gallery/{shown.file})", "", f"*{shown.caption}*", ""]
     return "\n".join(lines)

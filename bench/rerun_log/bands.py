@@ -122,7 +122,7 @@ def _clearances(element: Element) -> list[tuple[str, str, float, float]]:
     return []
 
 
-def bands_of(element: Element) -> tuple[Band, ...]:
+def element_bands(element: Element) -> tuple[Band, ...]:
     """The gaps and sliders of an element; empty for laws that have neither.
 
     A friction law without presliding sticks below its regularisation velocity. One with presliding (Dahl, LuGre,

@@ -18,18 +18,18 @@ from numpy.typing import ArrayLike, NDArray
 from bench.errors import ParameterError, RecordingError, UnknownNameError
 from bench.files import OutputError, replacing
 from bench.recording import Recording, nmse
-from bench.rerun_log.bands import Band, bands_of, changes
+from bench.rerun_log.bands import Band, changes, element_bands
 from bench.rerun_log.kinematics import body_poses, joint_positions
 from bench.rerun_log.layout import LogPage, Loop, blueprint, holder_of, label_of
 from bench.rerun_log.scene import eye_of, log_scene
-from bench.rerun_log.traces import frame_of, log_frame, log_loop, log_series, style
+from bench.rerun_log.traces import frame_of, log_frame, log_loop, log_series, trace_style
 from bench.rig import Rig
 
 APPLICATION = "jointbench"
 
 
 @dataclass(frozen=True)
-class ComparisonSettings:
+class LogComparisonSettings:
     """Numbers of `bench.rerun_log.comparison`."""
 
     # Other colours than the variants'; told apart with any colour vision (after IBM's design library palette).
@@ -49,7 +49,7 @@ class ComparisonSettings:
     )
 
 
-SETTINGS = ComparisonSettings()
+SETTINGS = LogComparisonSettings()
 
 
 class _Clock(NamedTuple):
@@ -104,7 +104,7 @@ def log_comparison(
     pairs = _loops(records, first_rig) if loops is None else list(loops)
     for pair in pairs:
         holder_of(records, *pair)
-    own = [band for element in (first_rig.elements if first_rig else ()) for band in bands_of(element)]
+    own = [band for element in (first_rig.elements if first_rig else ()) for band in element_bands(element)]
     lanes = _lanes([*own, *bands], records)
     scenes = {key: variant for variant, key in _keys(records).items() if variant in rigs}
     page = LogPage.of(records, scenes, pairs, lanes=len(lanes))
@@ -220,7 +220,7 @@ def _log_channels(stream: rr.RecordingStream, records: Mapping[str, Recording], 
         for channel in recording.names:
             log_series(
                 stream, ["channels", label_of(recording, channel), keys[variant]], clock.time, recording[channel],
-                label=variant, look=style(number), rate=clock.series_rate,
+                label=variant, look=trace_style(number), rate=clock.series_rate,
             )  # fmt: skip
 
 
@@ -236,7 +236,7 @@ def _log_errors(
             log_series(
                 stream, ["errors", label_of(reference, channel), keys[variant]], clock.time,
                 recording[channel] - reference[channel],
-                label=f"{variant} − {first}", look=style(number), rate=clock.series_rate,
+                label=f"{variant} − {first}", look=trace_style(number), rate=clock.series_rate,
             )  # fmt: skip
 
 
@@ -262,7 +262,7 @@ def _log_loops(
                 continue
             log_loop(
                 stream, ["loops", loop.name, keys[variant]], clock.time, frame.place(recording[x_name], recording[y_name]),
-                look=style(number), layer=number, frames=clock.time[clock.frames],
+                look=trace_style(number), layer=number, frames=clock.time[clock.frames],
             )  # fmt: skip
 
 

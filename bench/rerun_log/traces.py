@@ -46,7 +46,7 @@ class Style(NamedTuple):
     width: float  # [points]
 
 
-def style(number: int) -> Style:
+def trace_style(number: int) -> Style:
     """The reference (number 0) broad and pale, the others thin and coloured on top of it."""
     if number == 0:
         return Style(SETTINGS.reference_colour, 2.6)

@@ -10,7 +10,8 @@ under the sensor's name (vectors as ``name_x``, ``name_y``, ``name_z``); for eac
 """
 
 from bench.rig.description import Rig
+from bench.rig.drives import Drive, controls_of
 from bench.rig.element import Element, Validity
-from bench.rig.simulation import Drive, controls_of, simulate, simulate_batch
+from bench.rig.simulation import simulate, simulate_batch
 
 __all__ = ["Drive", "Element", "Rig", "Validity", "controls_of", "simulate", "simulate_batch"]

@@ -80,7 +80,7 @@ def _command_quantity(model: mujoco.MjModel, actuator: int) -> tuple[str, str]:
     return force
 
 
-def channels_of(built: Built) -> list[Channel]:
+def rig_channels(built: Built) -> list[Channel]:
     """The channels of a rig's records: commands, sensors, then each element's."""
     model = built.model
     channels = []

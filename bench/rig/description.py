@@ -14,9 +14,9 @@ import numpy as np
 from bench.errors import ModelError, ParameterError, UnknownNameError
 from bench.recording import Channel
 from bench.rig.building import INTEGRATORS, STRUCTURE, Built, build, parse, specify
-from bench.rig.channels import channels_of
+from bench.rig.channels import rig_channels
 from bench.rig.element import Element
-from bench.rig.mjcf_files import model_text
+from bench.rig.mjcf_files import mjcf_text
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +68,7 @@ class Rig:
             ModelError: The file cannot be read or compiled.
         """
         file = Path(path)
-        text = model_text(file)
+        text = mjcf_text(file)
         settings.setdefault("folder", str(file.parent))
         if "timestep" not in settings:
             settings["timestep"] = float(parse(text, settings["folder"], str(file)).option.timestep)
@@ -143,7 +143,7 @@ class Rig:
     @cached_property
     def channels(self) -> tuple[Channel, ...]:
         """The channels of this rig's records, in order."""
-        return tuple(channels_of(self.built))
+        return tuple(rig_channels(self.built))
 
     def to_xml(self) -> str:
         """The model with its elements' numbers as MJCF, to be looked at or loaded elsewhere (then call `native.bind`)."""

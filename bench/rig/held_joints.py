@@ -1,4 +1,4 @@
-"""Joints of the user's MJCF that were held: welded where they were."""
+"""Joints of the user's MJCF that were held, welded where they were, or that followed a motion."""
 
 from __future__ import annotations
 
@@ -11,23 +11,27 @@ from bench.errors import ModelError, UnknownNameError
 from bench.rig.building import parse
 from bench.rig.description import Rig
 
+MOTION = "motion of "
+"""Beginning of the names of the actuators that stand for what prescribes a motion; the joint's name follows."""
+
 
 def with_held_joints(rig: Rig, joints: object) -> Rig:
     """A rig whose joints of the given names are welded.
 
     Args:
         rig: The user's model.
-        joints: Name to "hold", at the zero of the joint, or to the coordinate at which it was held [rad or m].
+        joints: Name to "hold", at the zero of the joint, or to the coordinate at which it was held [rad or m]; one to "follow" stays.
 
     Raises:
         ModelError: A joint is no hinge and no slide.
         UnknownNameError: A joint is none of the model.
     """
-    if not isinstance(joints, Mapping) or not joints:
+    held = {n: at for n, at in joints.items() if at != "follow"} if isinstance(joints, Mapping) else {}
+    if not held:
         return rig
     spec = parse(rig.mjcf, rig.folder, rig.name)
     known = [joint.name for joint in spec.joints]
-    for name, at in joints.items():
+    for name, at in held.items():
         if name not in known:
             raise UnknownNameError("joint that was held", name, known)
         joint = spec.joint(name)

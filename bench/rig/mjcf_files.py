@@ -44,7 +44,7 @@ class MjcfFilesSettings:
 SETTINGS = MjcfFilesSettings()
 
 
-def model_text(path: str | Path, *, limits: ReadingLimits = READING_LIMITS) -> str:
+def mjcf_text(path: str | Path, *, limits: ReadingLimits = READING_LIMITS) -> str:
     """The text of an MJCF file.
 
     Args:
@@ -89,7 +89,7 @@ def included_files(text: str, folder: Path, *, limits: ReadingLimits = READING_L
             path = _inside(folder, name)
             if path in chain:
                 raise ModelError(f"the file {name!r} of the MJCF includes itself; remove that include")
-            inner = model_text(path, limits=limits)
+            inner = mjcf_text(path, limits=limits)
             total += len(inner)
             if total > limits.model_bytes:
                 raise ModelError(

@@ -30,6 +30,7 @@ from bench.signals.streams import named_streams
 from bench.signals.sweeps import Step, SteppedSine, Sweep
 
 SIGNALS = Signal.registry()
+"""Kinds of signals by name, as an excitation names them in a document."""
 
 __all__ = [
     "PRBS",

@@ -24,14 +24,14 @@ from bench.signals.streams import named_streams
 
 
 @dataclass(frozen=True)
-class BaseSettings:
+class SignalSettings:
     """Numbers of `bench.signals.base`."""
 
     max_samples: int = 10_000_000
     """Samples of one record at most: with the states, sensors and commands of a small rig they take 2 GB while they are simulated."""
 
 
-BASE_SETTINGS = BaseSettings()
+BASE_SETTINGS = SignalSettings()
 
 
 @dataclass(frozen=True)

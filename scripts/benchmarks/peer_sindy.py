@@ -16,14 +16,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import pysindy
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.model.structure import Place, Structure
 
-Array = NDArray[np.float64]
 Column = Callable[[Array, Array, Array, float | Array], Array]
 """Positions, velocities (…, n_dof), loads (…, n_loads) and time (…) to a column of the library (…)."""
 CLEARANCES = tuple(round(0.1 * i, 1) for i in range(1, 10))

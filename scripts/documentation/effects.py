@@ -8,9 +8,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from bench.discrepancy.articulated_search.catalogue import CATALOGUE as ARTICULATED
+from bench.discrepancy.articulated_search.effect import ArticulatedEffect
 from bench.discrepancy.effects.catalogue import CATALOGUE as LINEAR
 from bench.discrepancy.effects.effect import Effect, FreeParameter
 from bench.figures.look import COLOURS, REFERENCE_COLOUR, save, style
+from documentation import equations
 
 LOOKS = {
     "coulomb_friction": "The missing force is a step at every reversal of the velocity, the same at every amplitude. Free decays end after finitely many swings, along straight lines. Small motions are damped most.",
@@ -140,13 +142,21 @@ def _drawn(effect: Effect) -> bool:
     return effect.signal is not None and not effect.pickup
 
 
+def _equation(effect: Effect | ArticulatedEffect) -> list[str]:
+    """The equation of an effect; a sentence where it is one."""
+    text = effect.equation
+    if not equations.is_equation(text):
+        return [f"{text[0].upper()}{text[1:]}.", ""]
+    return ["```math", equations.display(text, [p.name for p in effect.parameters]), "```", ""]
+
+
 def page(name: str) -> str:
     """The page of the effect of that name, of linear structures and of arms together."""
     linear = next((e for e in LINEAR if e.name == name), None)
     arm = next((e for e in ARTICULATED if e.name == name), None)
     first = linear or arm
     assert first is not None
-    lines = [f"# {name}", "", "```text", first.equation, "```", "", "## In a record", "", look_of(name), ""]
+    lines = [f"# {name}", "", *_equation(first), "## In a record", "", look_of(name), ""]
     if linear is not None and linear.law is not None:
         law = linear.law.name
         lines += [
@@ -169,11 +179,7 @@ def page(name: str) -> str:
     if arm is not None:
         lines += ["## On an arm, a leg or a servo", "", f"Place: {arm.site}. Family: {arm.family}.", ""]
         lines += [
-            *(
-                ["```text", arm.equation, "```", ""]
-                if linear is not None and arm.equation != linear.equation
-                else []
-            ),
+            *(_equation(arm) if linear is not None and arm.equation != linear.equation else []),
             *_table(arm.parameters),
             "",
         ]

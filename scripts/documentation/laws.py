@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from bench.figures.look import COLOURS, save, style
 from bench.laws import LAWS, ForceLaw, Parameter, describe
 from bench.laws.evaluate import evaluate
+from documentation import equations
 
 NATIVE = {
     "linear": "`stiffness` and `damping` of a joint.",
@@ -156,9 +157,29 @@ def _shown(law: ForceLaw) -> str:
     )
 
 
+def _example(law: ForceLaw) -> str:
+    """How an element of the law is made."""
+    if law.n_inputs:
+        return "# reads an actuator's force as its input: see `Element.inputs`"
+    joints = ", ".join(f'"joint_{k + 1}"' for k in range(law.n_coordinates))
+    place = '"carriage"' if law.n_coordinates == 1 else f"({joints})"
+    given = ", ".join(f"{p.name}={p.default:g}" for p in law.parameters[:2])
+    return f'element = Element.of("{law.name}", {place}, {given})'
+
+
+def _as_markdown(documentation: str) -> str:
+    """A docstring as Markdown: double backquotes and "::" are single ones and a plain colon; indented lines are code in both."""
+    text = documentation.strip().replace("``", "`").replace("::\n", ":\n")
+    return text.replace("References:\n    ", "References: ")
+
+
+def _symbols(law: ForceLaw) -> list[str]:
+    """Names in a law's equation that are symbols though they look like words."""
+    return [p.name for p in law.parameters]
+
+
 def page(law: ForceLaw) -> str:
     """The page of a law as Markdown."""
-    described = describe(law)
     states = ", ".join(f"`{s}`" for s in law.states) or "none: the force depends on the present motion only"
     if len(law.states) > 3:
         states = f"`{law.states[0]}` … `{law.states[-1]}`"
@@ -171,29 +192,12 @@ def page(law: ForceLaw) -> str:
     coordinates = f"{law.n_coordinates - law.n_inputs}" + (
         f" and {law.n_inputs} input" if law.n_inputs else ""
     )
-    joints = ", ".join(f'"joint_{k + 1}"' for k in range(law.n_coordinates - law.n_inputs))
-    given = ", ".join(f"{p.name}={p.default:g}" for p in law.parameters[:2])
-    place = (
-        '"carriage"'
-        if law.n_coordinates == 1
-        else f"({joints},)"
-        if law.n_coordinates - law.n_inputs == 1
-        else f"({joints})"
-    )
-    # double backquotes and "::" of docstrings are Markdown's single ones and plain colon; indented lines are code in both
-    notes = (
-        described["documentation"]
-        .strip()
-        .replace("``", "`")
-        .replace("::\n", ":\n")
-        .replace("References:\n    ", "References: ")
-    )
     return "\n".join(
         [
             f"# {law.name}",
             "",
-            "```text",
-            law.equation,
+            "```math",
+            equations.display(law.equation, _symbols(law)),
             "```",
             "",
             f"![Force of {law.name} over displacement and velocity](pictures/{law.name}.png)",
@@ -214,14 +218,12 @@ def page(law: ForceLaw) -> str:
             "```python",
             "from bench import Element",
             "",
-            f'element = Element.of("{law.name}", {place}, {given})'
-            if not law.n_inputs
-            else "# reads an actuator's force as its input: see `Element.inputs`",
+            _example(law),
             "```",
             "",
             "## Notes",
             "",
-            notes,
+            _as_markdown(describe(law)["documentation"]),
             "",
         ]
     )
@@ -237,9 +239,9 @@ def pages() -> dict[str, str]:
     ]
     index += ["| law | equation | states | in MuJoCo |", "|---|---|---|---|"]
     for law in LAWS.values():
-        equation = law.equation.replace("|", "\\|")
+        equation = equations.cell(law.equation, _symbols(law))
         index.append(
-            f"| [`{law.name}`]({law.name}.md) | `{equation}` | {len(law.states) or '–'} | {'yes' if law.name in NATIVE else '–'} |"
+            f"| [`{law.name}`]({law.name}.md) | {equation} | {len(law.states) or '–'} | {'yes' if law.name in NATIVE else '–'} |"
         )
     index.append("")
     return {"reference/laws/index.md": "\n".join(index)} | {

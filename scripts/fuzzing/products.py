@@ -13,8 +13,9 @@ import numpy as np
 
 from bench.errors import BenchError
 from fuzzing.documents import PLAN, Target, make_campaign, make_case, write
+from fuzzing.models import ODD_MJCF
 from fuzzing.mutations import VALUES, flipped, mutated
-from fuzzing.records import ODD_MJCF, spoilt_text
+from fuzzing.records import spoilt_text
 
 ARM = """<mujoco model="arm">
   <option timestep="0.002" gravity="0 0 -9.81"/>

@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.io import loadmat
 from scipy.signal import firwin
 
+from bench.arrays import Array
 from bench.identification.memory import MemoryModel, MemorySettings, fit_memory
 from bench.identification.memory_output_error import refine_in_rig
 from bench.record_files.hdf5 import read_hdf5
@@ -24,8 +24,6 @@ from bench.recording import Recording
 from bench.rig import Element, Rig, simulate
 from bench.rig.library import sdof_rig
 from memory.row import Progress, Row
-
-Array = NDArray[np.float64]
 
 RATE, PERIOD = 750.0, 8192
 FINER = 4  # steps a sample while fitting

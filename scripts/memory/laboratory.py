@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bench.reproduction import laboratory_joint as laboratory
+from bench.reproduction import laboratory
 from bench.reproduction.joint_models import LOADINGS
 from bench.rig import Element, Rig, simulate
 from memory.row import Progress, Row

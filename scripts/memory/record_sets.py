@@ -11,17 +11,15 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.excitation import Coverage
 from bench.identification.memory import fit_memory
-from bench.reproduction import laboratory_joint as laboratory
+from bench.reproduction import laboratory
 from bench.reproduction.joint_models import LOADINGS
 from bench.rig import Element, Rig, simulate
 from bench.signals import BandLimitedNoise, Concatenation, Constant, Excitation, Record, Signal, Tapered
 from memory.row import Progress
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

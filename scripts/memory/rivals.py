@@ -11,14 +11,12 @@ from itertools import combinations_with_replacement
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.identification.memory import runs
 from bench.identification.parametric import ComponentRecord, fit_law
 from bench.laws.bouc_wen_variants import GENERALISED_BOUC_WEN
 from bench.rig import Element
-
-Array = NDArray[np.float64]
 
 
 def bouc_wen(states: Array, forces: Array, time: Array, joints: tuple[str, ...]) -> tuple[Element, ...]:

@@ -8,7 +8,7 @@ from benchmarks.timing import interleave
 
 from bench import native
 from bench.identification.memory import fit_memory
-from bench.reproduction import laboratory_joint as laboratory
+from bench.reproduction import laboratory
 from bench.reproduction.joint_models import LOADINGS
 from bench.rig import Element, simulate
 from memory.row import Progress, Row

@@ -8,8 +8,8 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.errors import RangeWarning, SimulationError
 from bench.identification.memory import MemorySettings, fit_memory
 from bench.identification.network import fit_network
@@ -20,8 +20,6 @@ from bench.rig import Element, Rig, simulate
 from bench.signals import Excitation
 from memory.rivals import bouc_wen, lstm, narx
 from memory.row import Progress, Row
-
-Array = NDArray[np.float64]
 
 FORMS: Mapping[str, MemorySettings] = {
     "memory, sliders": MemorySettings(form="sliders"),

@@ -7,13 +7,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from evaluate_excitation import HELD_OUT, interval, middle
+from evaluate_excitation import interval, middle
 from numpy.typing import NDArray
 
 from bench.excitation import Planner, Policy, RigPrior, estimate
 from bench.excitation.closed_loop import Runs, disturbances, run_commands, run_policy
 from bench.excitation.stepping import Packed
 from envs.setups import Setup
+from policies.judge import HELD_OUT
 
 from .trials import kinds_of, open_loop
 
@@ -34,12 +35,13 @@ def trained(
         folder: Checkpoints, in a folder for each.
         tell: Called with what is done.
     """
-    from envs.training import Plan, Trainer
+    from envs.training import Trainer
+    from envs.training_plan import TrainingPlan
 
     policies = {}
     for reward in rewards:
         for seed in range(seeds):
-            plan = Plan(task, steps=steps, seed=seed, reward=reward)
+            plan = TrainingPlan(task, steps=steps, seed=seed, reward=reward)
             label = f"policy for {reward}, seed {seed}"
             trainer = Trainer(plan, folder / f"{task}-{reward}-{seed}")
             policies[label] = trainer.run(

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import spearmanr
 
+from bench.arrays import Array
 from bench.excitation import Experiment, fans
 from bench.excitation.background import SETTINGS, expected_error
 from bench.excitation.contrastive import contrastive_bound, local_contrasts
@@ -18,7 +18,6 @@ from envs.setups import Setup
 
 from .trials import Trial, trials_of
 
-Array = NDArray[np.float64]
 SCALES = tuple(3.0**-k for k in range(1, 7))
 """Narrowed priors of the local contrasts: from a third of the prior's deviation to less than what a gap's errors are."""
 CONTRASTS, WIDE, TWINS = 8, 64, 4

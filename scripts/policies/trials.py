@@ -10,14 +10,14 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.excitation import (
     METHODS,
     Experiment,
     Family,
-    Hypothesis,
     Planner,
+    RigHypothesis,
     RigPrior,
     controls_from,
     design,
@@ -32,7 +32,6 @@ from bench.excitation.stepping import integrate_cases
 from envs.background import background_of
 from envs.setups import Setup
 
-Array = NDArray[np.float64]
 DESIGN_DRAWS = 24
 """Rigs that open-loop designs are made for, as in the evaluation."""
 EVALUATIONS = 480
@@ -101,7 +100,7 @@ def excitations(
     yield "D-optimal for the rig", np.stack(own)
 
 
-def _greedy(setup: Setup, hypothesis: Hypothesis, coordinates: Array, rng: np.random.Generator) -> Array:
+def _greedy(setup: Setup, hypothesis: RigHypothesis, coordinates: Array, rng: np.random.Generator) -> Array:
     one = Experiment(RigPrior((hypothesis,)), setup.noise, setup.limits, (hypothesis.at(coordinates),))
     made = design(
         "d_optimal", one, duration=setup.duration, band=setup.band, rng=rng, evaluations=EVALUATIONS

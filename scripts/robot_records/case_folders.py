@@ -10,9 +10,8 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pyarrow.parquet as pq
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from bench.arrays import Array
 
 
 @dataclass(frozen=True)

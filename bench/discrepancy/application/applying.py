@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from bench import native
+from bench.arrays import Array
 from bench.discrepancy.application.drives import DRIVES, LOGGED, logged
 from bench.discrepancy.application.forces import FORCES, element, harden
 from bench.discrepancy.application.numbers import nominal_parameter, wrong_number
@@ -22,9 +22,8 @@ from bench.discrepancy.verdict import NamedEffect, NominalEstimate
 from bench.errors import ModelError
 from bench.rig import Element, Rig
 from bench.rig.building import parse
-from bench.rig.mjcf_files import model_text
+from bench.rig.mjcf_files import mjcf_text
 
-Array = NDArray[np.float64]
 WRONG_NUMBERS = ("mass_error", "com_error", "stiffness_error", "damping_error")
 INTEGRATORS = {
     mujoco.mjtIntegrator.mjINT_EULER: "Euler",
@@ -97,7 +96,7 @@ def specification(path: str | Path) -> mujoco.MjSpec:
     Raises:
         ModelError: MuJoCo does not read it, or it is beyond the limits of a model.
     """
-    return parse(model_text(path), str(Path(path).parent), f"'{path}'")
+    return parse(mjcf_text(path), str(Path(path).parent), f"'{path}'")
 
 
 @native.quiet()
@@ -145,7 +144,7 @@ def loads_of(case: Case | None, model: mujoco.MjModel) -> dict[str, str]:
     return out
 
 
-class Options(NamedTuple):
+class RunOptions(NamedTuple):
     """How the corrected model is simulated where that differs from the user's own options.
 
     Attributes:
@@ -166,7 +165,7 @@ def apply(
     *,
     case: Case | None = None,
     linear: bool = True,
-    options: Options | None = None,
+    options: RunOptions | None = None,
 ) -> Applied:
     """Put what was found into a model.
 
@@ -182,7 +181,7 @@ def apply(
         UnknownNameError: It lacks what an effect refers to.
     """
     spec = specification(path)
-    own = options or Options()
+    own = options or RunOptions()
     if own.step is not None:
         spec.option.timestep = own.step
     if own.integrator is not None:

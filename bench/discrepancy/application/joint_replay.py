@@ -12,24 +12,22 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from bench.arrays import Array
 from bench.discrepancy.application.applying import Applied
 from bench.discrepancy.application.forces import values_of
-from bench.discrepancy.application.running import Reading, Window, controls, hook_of, run, sampled
+from bench.discrepancy.application.running import Reading, Stretch, controls, hook_of, run, sampled
 from bench.discrepancy.application.target import PREFIX, as_mujoco
 from bench.discrepancy.articulated_search.catalogue import CATALOGUE
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.multibody.channels import bound
 from bench.discrepancy.multibody.encoders import Encoder, input_of
 from bench.discrepancy.multibody.model import ArticulatedModel, Joint
-from bench.discrepancy.multibody.motion import Motion, motion_of
+from bench.discrepancy.multibody.motion import JointMotion, motion_of
 from bench.discrepancy.multibody.records import RECORDS_SETTINGS
 from bench.discrepancy.settings import DEFAULT
 from bench.discrepancy.verdict import NamedEffect
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -112,7 +110,7 @@ class JointReplay:
         model: mujoco.MjModel,
         j: int,
         record: CaseRecord,
-        motion: Motion,
+        motion: JointMotion,
         wrong: Mapping[str, Encoder],
     ) -> Array:
         """Measured less simulated positions (n,) of joint `j`."""
@@ -168,11 +166,11 @@ class JointReplay:
         applied: Applied,
         model: mujoco.MjModel,
         j: int,
-        motion: Motion,
+        motion: JointMotion,
         first: int,
         follow: _Followed,
         begin: int,
-    ) -> Window:
+    ) -> Stretch:
         """State at the first sample of a window: as measured; a train wound up by what its link weighs."""
         data = mujoco.MjData(model)
         for i, joint in enumerate(self.model.joints):
@@ -189,7 +187,7 @@ class JointReplay:
             data.qpos[address] = -wound
             if name in applied.outputs:
                 data.qpos[model.joint(name).qposadr[0]] += wound
-        return Window(begin, np.array(data.qpos), np.array(data.qvel))
+        return Stretch(begin, np.array(data.qpos), np.array(data.qvel))
 
 
 def _wound(model: mujoco.MjModel, train: int, weight: float) -> float:
@@ -271,7 +269,7 @@ class _Followed:
 
 def _followed(
     joints: Sequence[Joint],
-    motion: Motion,
+    motion: JointMotion,
     record: CaseRecord,
     model: mujoco.MjModel,
     steps: int,

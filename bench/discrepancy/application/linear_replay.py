@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from bench.arrays import Array
 from bench.discrepancy.application.applying import Applied, loads_of, rest_of
 from bench.discrepancy.application.drives import LOGGED
 from bench.discrepancy.application.forces import values_of
-from bench.discrepancy.application.running import Reading, Window, controls, hook_of, run, sampled
+from bench.discrepancy.application.running import Reading, Stretch, controls, hook_of, run, sampled
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.effects.catalogue import CATALOGUE
 from bench.discrepancy.judgement.validation_discrepancy import DIVERGED_GAP, coordinates
@@ -21,8 +21,6 @@ from bench.discrepancy.model.structure import Structure
 from bench.discrepancy.response.initial_states import in_motion
 from bench.discrepancy.response.windows import cut, drifts
 from bench.discrepancy.verdict import NamedEffect
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -144,7 +142,7 @@ class _Player:
             columns[actuator] = np.asarray(record.values[name]) / gain
         if record.periodic:
             return self._periodic(record, columns)
-        firsts, _length = (
+        firsts, _ = (
             cut(case, record, len(structure.observers))
             if self.replay.windowed
             else (np.zeros(1, dtype=np.int64), len(record))
@@ -204,7 +202,7 @@ class _Player:
         begin = int(np.floor(first * record.step / step + 1e-6))
         steps = int(np.ceil((end - 1) * record.step / step - 1e-9)) - begin + 1
         position, velocity = run(
-            self.model, self.hook, [Window(begin, q, v)], control, max(steps, 2), rested=first == 0
+            self.model, self.hook, [Stretch(begin, q, v)], control, max(steps, 2), rested=first == 0
         )
         times = np.asarray(np.arange(first, end) * record.step - begin * step, dtype=np.float64)
         return self._observed(position[0], velocity[0], times)
@@ -225,7 +223,7 @@ class _Player:
             controls(record, columns, self.model, steps, self.replay.case.load_interpolation),
             (SETTINGS.periods, 1),
         )
-        start = [Window(0, self.rest, np.zeros(self.model.nv))]
+        start = [Stretch(0, self.rest, np.zeros(self.model.nv))]
         position, velocity = run(self.model, self.hook, start, control, len(control), rested=True)
         times = np.asarray(((SETTINGS.periods - 1) * n + np.arange(n)) * record.step, dtype=np.float64)
         return self._observed(position[0], velocity[0], times)

@@ -1,4 +1,4 @@
-"""The simulator's own share of a gap, named as a location of its own: the nominal model as its owner runs it against itself, converged."""
+"""The simulator's own share of a discrepancy, named as a location: the nominal model as its owner runs it against itself, converged."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 
 import mujoco
 
-from bench.discrepancy.application.applying import INTEGRATORS, Findings, Options, apply, specification
+from bench.discrepancy.application.applying import INTEGRATORS, Findings, RunOptions, apply, specification
 from bench.discrepancy.application.verification import (
     VerificationSettings,
     is_articulated,
@@ -42,10 +42,10 @@ def with_simulator(verdict: Verdict, case: Case, settings: VerificationSettings 
         replay = replay_of(path, case, articulated=articulated)
         option = specification(path).option
         step, integrator = float(option.timestep), INTEGRATORS[mujoco.mjtIntegrator(option.integrator)]
-        fine = Options(step / own.converged, mujoco.mjtIntegrator.mjINT_RK4, hard=True)
+        fine = RunOptions(step / own.converged, mujoco.mjtIntegrator.mjINT_RK4, hard=True)
         runs = [
             replay.errors(apply(path, nothing, case=case, linear=not articulated, options=options), ())
-            for options in (Options(), fine)
+            for options in (RunOptions(), fine)
         ]
     except (BenchError, KeyError):
         return verdict

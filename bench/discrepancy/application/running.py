@@ -8,20 +8,19 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 from mujoco import rollout
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from bench import native
+from bench.arrays import Array
 from bench.discrepancy.application.applying import Applied
 from bench.discrepancy.application.writing import hook_text
 from bench.discrepancy.case.acquisition import at_times
 from bench.discrepancy.case.case import CaseRecord
 
-Array = NDArray[np.float64]
 Hook = Callable[[mujoco.MjModel, mujoco.MjData], None]
 
 
-class Motion(NamedTuple):
+class RunMotion(NamedTuple):
     """A run: positions (n, nq) and velocities (n, nv) at its samples, and accelerations (n, nv)."""
 
     position: Array
@@ -59,7 +58,7 @@ def controls(
     return out
 
 
-class Window(NamedTuple):
+class Stretch(NamedTuple):
     """A stretch of a record: its first step, and position (nq,) and velocity (nv,) there."""
 
     first: int
@@ -70,7 +69,7 @@ class Window(NamedTuple):
 def run(
     model: mujoco.MjModel,
     hook: Hook | None,
-    windows: list[Window],
+    windows: list[Stretch],
     control: Array,
     steps: int,
     *,
@@ -159,13 +158,13 @@ def _remember(
         mujoco.mj_initCtrlHistory(model, data, u, times.reshape(-1, 1), np.ascontiguousarray(values))
 
 
-def sampled(position: Array, velocity: Array, model: mujoco.MjModel, times: Array) -> Motion:
+def sampled(position: Array, velocity: Array, model: mujoco.MjModel, times: Array) -> RunMotion:
     """A run of one window at sample times, of its own steps where these are no whole number of them."""
     step = float(model.opt.timestep)
     clock = np.arange(len(position)) * step
     if not (np.isfinite(position).all() and np.isfinite(velocity).all()):
         nan = np.full((len(times), velocity.shape[1]), np.nan)
-        return Motion(nan, nan, nan)
+        return RunMotion(nan, nan, nan)
     at = times / step
     if np.allclose(at, np.round(at), atol=1e-6):
         index = np.round(at).astype(int)
@@ -177,4 +176,4 @@ def sampled(position: Array, velocity: Array, model: mujoco.MjModel, times: Arra
     else:  # the step's own: constant over it
         rates = np.diff(velocity, axis=0) / step
         a = rates[np.minimum(np.floor(at + 1e-6).astype(int), len(rates) - 1)]
-    return Motion(q, v, a)
+    return RunMotion(q, v, a)

@@ -8,11 +8,9 @@ from typing import Any, Literal
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from bench.errors import ModelError, UnknownNameError
 
-Array = NDArray[np.float64]
 Form = Literal["native", "callback", "step", "log", "number", "none"]
 PREFIX = "added_"
 """Beginning of the names of joints and tendons that an effect adds."""

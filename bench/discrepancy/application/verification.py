@@ -15,7 +15,7 @@ from bench import native
 from bench.discrepancy.application.applying import (
     INTEGRATORS,
     Findings,
-    Options,
+    RunOptions,
     apply,
     specification,
 )
@@ -176,12 +176,12 @@ def verify(
     replay = replay_of(path, case, articulated=articulated)
     nothing = Findings(())
 
-    def errors(what: Findings, options: Options) -> dict[str, NDArray[np.float64]]:
+    def errors(what: Findings, options: RunOptions) -> dict[str, NDArray[np.float64]]:
         return replay.errors(
             apply(path, what, case=case, linear=not articulated, options=options), what.effects
         )
 
-    def figures(options: Options) -> tuple[Figure, ...]:
+    def figures(options: RunOptions) -> tuple[Figure, ...]:
         before, after = errors(nothing, options), errors(findings, options)
         return tuple(
             Figure(
@@ -194,14 +194,14 @@ def verify(
     option = specification(path).option
     step, integrator = float(option.timestep), mujoco.mjtIntegrator(option.integrator)
     progress("the judging records in your simulator")
-    found = figures(Options())
+    found = figures(RunOptions())
     if not found:
         raise ModelError(
             f"the verdict judges {', '.join(g.dof or 'one coordinate' for g in gaps)}, the case something else; give the verdict's case"
         )
     out = Verification(step, INTEGRATORS[integrator], found)
-    fine = errors(nothing, Options(step / settings.converged, mujoco.mjtIntegrator.mjINT_RK4, hard=True))
-    own = root_mean_square(errors(nothing, Options())[out.worst.dof] - fine[out.worst.dof])
+    fine = errors(nothing, RunOptions(step / settings.converged, mujoco.mjtIntegrator.mjINT_RK4, hard=True))
+    own = root_mean_square(errors(nothing, RunOptions())[out.worst.dof] - fine[out.worst.dof])
     out = replace(out, own_share=own)
     if _short(found) > settings.short:
         return _remedied(out, figures, settings, progress)
@@ -220,13 +220,15 @@ def _short(found: Sequence[Figure]) -> float:
 
 
 def _less(
-    out: Verification, figures: Callable[[Options], tuple[Figure, ...]], settings: VerificationSettings
+    out: Verification, figures: Callable[[RunOptions], tuple[Figure, ...]], settings: VerificationSettings
 ) -> str:
     """Why a corrected model leaves less than the diagnosis says, in words: its step and integrator, if it leaves as much without them."""
     worst = out.worst
-    converged = figures(Options(out.step / settings.converged, mujoco.mjtIntegrator.mjINT_RK4))
+    converged = figures(RunOptions(out.step / settings.converged, mujoco.mjtIntegrator.mjINT_RK4))
     fine = next(figure for figure in converged if figure.dof == worst.dof)
-    less = f"the corrected model leaves {-100.0 * worst.short:.0f} % less than the diagnosis says at your step"
+    less = (
+        f"the corrected model leaves {-100.0 * worst.short:.0f} % less than the diagnosis says at your step"
+    )
     words = f"{less}, and {fine.after:.3g} converged"
     return (
         f"{words}: with your step and integrator it errs as the records do"
@@ -237,7 +239,7 @@ def _less(
 
 def _remedied(
     out: Verification,
-    figures: Callable[[Options], tuple[Figure, ...]],
+    figures: Callable[[RunOptions], tuple[Figure, ...]],
     settings: VerificationSettings,
     progress: Callable[[str], None],
 ) -> Verification:
@@ -254,7 +256,7 @@ def _remedied(
     for name, step, integrator in trials:
         progress(f"with {name}")
         try:
-            tried = figures(Options(step, integrator))
+            tried = figures(RunOptions(step, integrator))
         except BenchError:
             continue
         if _short(tried) < _short(best):

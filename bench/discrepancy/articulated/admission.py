@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from bench.discrepancy.articulated.against_model import suspicions
 from bench.discrepancy.articulated.against_mujoco import ComparisonSettings, left_out
@@ -30,8 +29,6 @@ from bench.discrepancy.settings import (
     DiagnosisSettings,
 )
 from bench.errors import ModelError, RecordingError, UnitError
-
-Array = NDArray[np.float64]
 
 
 class AdmittedRobot(NamedTuple):

@@ -10,17 +10,15 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.checks.bands import bands_between, common_factor, compare_channels, spectra
 from bench.discrepancy.checks.scales import grossly_apart, model_words, pair_words, shown_noise, suggestion
 from bench.discrepancy.multibody.encoders import encoders_of, input_of
 from bench.discrepancy.multibody.model import ArticulatedModel, Joint
-from bench.discrepancy.multibody.motion import Motion, Moving
+from bench.discrepancy.multibody.motion import JointMotion, Moving
 from bench.discrepancy.settings import ChecksSettings, ScaleSettings
-
-Array = NDArray[np.float64]
 
 
 def suspicions(
@@ -103,7 +101,7 @@ def _against_model(
     yield from (words for _, words in sorted(said, key=lambda entry: entry[0]))
 
 
-def asked_input(model: ArticulatedModel, joint: Joint, j: int, motion: Motion) -> Array:
+def asked_input(model: ArticulatedModel, joint: Joint, j: int, motion: JointMotion) -> Array:
     """The input (n,) of a joint's drive along a motion, by its nominal equation without dry friction."""
     drive = joint.drive
     assert drive is not None
@@ -113,7 +111,7 @@ def asked_input(model: ArticulatedModel, joint: Joint, j: int, motion: Motion) -
     return force / (drive.kp or 1.0)
 
 
-def needed(model: ArticulatedModel, joint: Joint, j: int, motion: Motion) -> Array:
+def needed(model: ArticulatedModel, joint: Joint, j: int, motion: JointMotion) -> Array:
     """Torque (n,) that the nominal equation of a joint asks of its drive, without dry friction."""
     q, v, a = motion.position, motion.velocity, motion.acceleration
     bodies = model.dynamics(q, v, a).torque[:, j]

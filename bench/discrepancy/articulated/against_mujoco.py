@@ -11,15 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench import native
+from bench.arrays import Array
 from bench.discrepancy.articulated.against_model import needed
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.checks.like_mujoco import ITEMS
 from bench.discrepancy.multibody.encoders import input_of
 from bench.discrepancy.multibody.model import ArticulatedModel
-from bench.discrepancy.multibody.motion import Motion, Moving
+from bench.discrepancy.multibody.motion import JointMotion, Moving
 from bench.discrepancy.settings import LikenessSettings
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -79,9 +78,9 @@ def left_out(
     )
 
 
-def _balance(case: Case, model: ArticulatedModel, record: CaseRecord, motion: Motion) -> Array:
+def _balance(case: Case, model: ArticulatedModel, record: CaseRecord, motion: JointMotion) -> Array:
     """Torque asked for less torque of the drive (n, n_joints), by the equations of the joints."""
-    out = np.empty_like(motion.position)
+    out = np.empty((len(motion.position), len(model.joints)))
     for j, joint in enumerate(model.joints):
         drive = joint.drive
         assert drive is not None
@@ -98,7 +97,7 @@ def _balance_of_mujoco(
     compiled: mujoco.MjModel,
     model: ArticulatedModel,
     record: CaseRecord,
-    motion: Motion,
+    motion: JointMotion,
     picked: NDArray[np.intp],
 ) -> tuple[Array, Array]:
     """The same at some samples (n_picked, n_joints) as MuJoCo has it, and the RMS (n_joints,) of what acts on each joint."""
@@ -107,13 +106,14 @@ def _balance_of_mujoco(
     inputs = {joint.name: record.values[input_of(case, joint).name] for joint in model.joints}
     with native.quiet():
         for k, sample in enumerate(picked):
-            for j, joint in enumerate(model.joints):
-                assert joint.drive is not None
+            for j, joint in enumerate(model.moving):
                 data.qpos[joint.dof], data.qvel[joint.dof] = (
                     motion.position[sample, j],
                     motion.velocity[sample, j],
                 )
                 data.qacc[joint.dof] = motion.acceleration[sample, j]
+            for joint in model.joints:
+                assert joint.drive is not None
                 data.ctrl[compiled.actuator(joint.drive.name).id] = inputs[joint.name][sample]
             mujoco.mj_inverse(compiled, data)
             asked = np.array(data.qfrc_inverse)
@@ -139,7 +139,7 @@ def _culprit(
     model: ArticulatedModel,
     compiled: mujoco.MjModel,
     record: CaseRecord,
-    motion: Motion,
+    motion: JointMotion,
     j: int,
     settings: ComparisonSettings,
 ) -> str:

@@ -11,13 +11,13 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bench.discrepancy.articulated.admission import admitted_robot
 from bench.discrepancy.articulated.judgement import kept, ladder, predict
 from bench.discrepancy.articulated.naming import closest_rival, verdict_of
 from bench.discrepancy.articulated.next_test import Trajectory, propose
 from bench.discrepancy.articulated.places import matrix_of
+from bench.discrepancy.articulated.whiteness import coloured
 from bench.discrepancy.articulated_search.catalogue import CATALOGUE
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem, placements
@@ -30,8 +30,6 @@ from bench.discrepancy.verdict import (
     Verdict,
 )
 from bench.errors import UnknownNameError
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +108,10 @@ def diagnose_articulated(
     last, predictions = kept(judging, rungs, judged)
     untouched = predict(judging, None, predictions[0].floor, judged)
     final = rungs[last]
-    verdict = verdict_of(problem, fits, rungs, last, untouched, predictions, judged, rng, stated=stated)
+    left = coloured(judging, final, judged)
+    verdict = verdict_of(
+        problem, fits, rungs, last, untouched, predictions, judged, rng, stated=stated, left=left
+    )
     verdict = replace(verdict, warnings=(*verdict.warnings, *notes), settings=changed(settings))
     rival = closest_rival(fits, final, judged) if verdict.named else None
     proposal = None if rival is None else propose(problem, compiled, final, rival)

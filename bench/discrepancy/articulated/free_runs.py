@@ -9,17 +9,15 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from bench.discrepancy.articulated_search.hypothesis import Hypothesis
+from bench.arrays import Array
+from bench.discrepancy.articulated_search.hypothesis import JointHypothesis
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.multibody.encoders import input_of
 from bench.discrepancy.multibody.motion import clock_of
 from bench.discrepancy.multibody.noise import NoiseDraw, NoiseSettings, draw
 from bench.discrepancy.multibody.records import PreparedRecord
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +30,7 @@ class FreeRuns:
 
     problem: ArticulatedProblem
 
-    def errors(self, j: int, hypothesis: Hypothesis, vector: Array, prepared: PreparedRecord) -> Array:
+    def errors(self, j: int, hypothesis: JointHypothesis, vector: Array, prepared: PreparedRecord) -> Array:
         """Measured less predicted positions (n,) of joint `j`, run without corrections from the measured states of its windows.
 
         What no encoder tells at the start of a window, the winding of an elastic drive, is taken from the run that is corrected. The
@@ -70,7 +68,7 @@ class FreeRuns:
             for prepared in self.problem.records
         )
 
-    def noise(self, j: int, hypothesis: Hypothesis, vector: Array, r: int) -> float:
+    def noise(self, j: int, hypothesis: JointHypothesis, vector: Array, r: int) -> float:
         """RMS error of the position that noise alone leaves in a free run of joint `j` in record `r`, were the hypothesis true."""
         prepared = self.problem.motions(hypothesis, vector)[r]
         record, rng = prepared.joints[j], np.random.default_rng(NoiseSettings().seed + 1 + j)

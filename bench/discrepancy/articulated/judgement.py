@@ -11,19 +11,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.articulated.free_runs import FreeRuns
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
+from bench.discrepancy.articulated_search.hypothesis import PlacedOnJoint
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
+from bench.discrepancy.articulated_search.search import complete
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.settings import ArticulatedJudgementSettings as JudgementSettings
 
-Array = NDArray[np.float64]
-
 
 @dataclass(frozen=True, eq=False)
-class Prediction:
+class PredictedErrors:
     """Squared errors of free runs of the judging records.
 
     Attributes:
@@ -71,7 +71,7 @@ def size_of(problem: ArticulatedProblem, r: int, j: int) -> float:
 
 def predict(
     problem: ArticulatedProblem, found: ArticulatedFit | None, floor: Array, settings: JudgementSettings
-) -> Prediction:
+) -> PredictedErrors:
     """Free runs of a problem's records with a fit's model, with the nominal model as it is where None; `floor` as of `noise_floor`."""
     hypothesis = found.hypothesis if found else ()
     vector = believed(problem, found, settings) if found else np.zeros(len(problem.nominal))
@@ -90,7 +90,7 @@ def predict(
                 [float(np.mean(b**2)) for b in np.array_split(error * factor / size, settings.blocks)]
             )
         rows.append(np.array(columns).T)
-    return Prediction(np.minimum(np.vstack(rows), 1e6), floor)
+    return PredictedErrors(np.minimum(np.vstack(rows), 1e6), floor)
 
 
 def ladder(fits: Sequence[ArticulatedFit]) -> list[ArticulatedFit]:
@@ -105,12 +105,13 @@ def ladder(fits: Sequence[ArticulatedFit]) -> list[ArticulatedFit]:
 
 def kept(
     problem: ArticulatedProblem, rungs: Sequence[ArticulatedFit], settings: JudgementSettings
-) -> tuple[int, list[Prediction]]:
+) -> tuple[int, list[PredictedErrors]]:
     """How many effects of a ladder the judging records bear out, and the predictions of every rung.
 
     Effects are kept up to the last that improves on what was kept before it by more than the standard error allows for, and that takes
-    away more than it leaves. What is complete gets no more but what is certain, and nothing small is added where even then something
-    is left: it stands in for a little of the form of the law that is not right.
+    away more than it leaves; one at a joint or its drive has to improve on that joint, or it stands in for something else. What is
+    complete gets no more but what is certain, and nothing small is added where even then something is left: it stands in for a little
+    of the form of the law that is not right.
     """
     floor = noise_floor(problem, rungs[-1], settings)
     predictions = [predict(problem, rung, floor, settings) for rung in rungs]
@@ -124,12 +125,14 @@ def kept(
         left = float(np.mean(predictions[k].excess))
         small = 0.0 if not last or complete(problem, rungs[k], settings) else settings.small
         least = small * float(np.mean(predictions[0].excess))
-        if gained > max(left if last else 0.0, least) and better(predictions[last], predictions[k], settings):
+        own = _own(rungs[k].hypothesis[-1], predictions[last], predictions[k])
+        improved = own > 0.0 and better(predictions[last], predictions[k], settings)
+        if gained > max(left if last else 0.0, least) and improved:
             last = k
     return last, predictions
 
 
-def better(before: Prediction, after: Prediction, settings: JudgementSettings) -> bool:
+def better(before: PredictedErrors, after: PredictedErrors, settings: JudgementSettings) -> bool:
     """Whether a prediction improves on another by more than the standard error over the blocks.
 
     Where a few blocks hold most of a discrepancy, its mean is uncertain by itself, however much of it is taken away everywhere: what
@@ -146,16 +149,14 @@ def _sure(gains: Array, settings: JudgementSettings) -> bool:
     return float(np.mean(gains)) > settings.sure * float(np.std(gains, ddof=1)) / np.sqrt(len(gains))
 
 
-def complete(problem: ArticulatedProblem, found: ArticulatedFit, settings: JudgementSettings) -> bool:
-    """Whether no joint keeps more than the noise, and no nominal parameter is strained for it."""
-    # the mean square of n residuals is known to sqrt(2 / n)
-    noise = (1.0 + settings.noise_known) ** 2 + settings.sure * np.sqrt(2.0 / found.count)
-    far = np.abs(found.vector[: len(problem.nominal)]) > settings.strained
-    return bool(np.all(found.reduced <= noise) and not far.any())
+def _own(placed: PlacedOnJoint, before: PredictedErrors, after: PredictedErrors) -> float:
+    """What the joint of an effect gains by it; all joints together where it reaches them all."""
+    gained = (before.power - after.power).mean(axis=0)
+    return float(gained[placed.joint] if placed.effect.site in ("joint", "actuator") else gained.sum())
 
 
 def closed(
-    before: Prediction, after: Prediction, first: Prediction, rng: np.random.Generator
+    before: PredictedErrors, after: PredictedErrors, first: PredictedErrors, rng: np.random.Generator
 ) -> tuple[float, tuple[float, float]]:
     """Part of the first discrepancy that lies between two predictions, and its block-bootstrap interval; of the squares of NRMSE."""
     table = np.column_stack([before.excess - after.excess, first.excess])

@@ -6,13 +6,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bench.discrepancy.articulated.judgement import Prediction, closed, complete
+from bench.discrepancy.articulated.judgement import PredictedErrors, closed
 from bench.discrepancy.articulated.places import gaps_of, locations_of, remainder_of
+from bench.discrepancy.articulated.whiteness import Coloured
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.hypothesis import placed_values
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
+from bench.discrepancy.articulated_search.search import complete
 from bench.discrepancy.settings import ArticulatedJudgementSettings as JudgementSettings
-from bench.discrepancy.verdict import Estimate, Kind, NamedEffect, NominalEstimate, Ranked, Verdict
+from bench.discrepancy.verdict import Estimate, NamedEffect, NominalEstimate, Ranked, Verdict, VerdictKind
 
 
 def verdict_of(
@@ -20,12 +22,13 @@ def verdict_of(
     fits: Sequence[ArticulatedFit],
     rungs: Sequence[ArticulatedFit],
     last: int,
-    untouched: Prediction,
-    predictions: Sequence[Prediction],
+    untouched: PredictedErrors,
+    predictions: Sequence[PredictedErrors],
     settings: JudgementSettings,
     rng: np.random.Generator,
     *,
     stated: bool,
+    left: Coloured | None,
 ) -> Verdict:
     """The verdict.
 
@@ -39,11 +42,12 @@ def verdict_of(
         settings: Thresholds.
         rng: For the bootstrap intervals.
         stated: Whether the noise of the responses is stated.
+        left: What the rung that is borne out leaves of a motion beside noise; None where it leaves noise alone.
     """
     final, base = rungs[last], rungs[0]
-    whole = stated and complete(problem, final, settings)
+    whole = stated and left is None and complete(problem, final, settings)
     explained, _ = closed(predictions[0], predictions[last], predictions[0], rng)
-    kind: Kind = "effect" if last else "none"
+    kind: VerdictKind = "effect" if last else "none"
     if not whole and (not last or explained < settings.material):
         kind = "unknown"
     shares = [closed(predictions[k - 1], predictions[k], predictions[0], rng) for k in range(1, last + 1)]
@@ -63,7 +67,13 @@ def verdict_of(
         gap=widest,
         gaps=gaps,
         probabilities=probabilities,
-        explanation=_words(kind, effects, whole, widest.closed if kind == "effect" else explained, final, problem),
+        explanation=_words(
+            kind,
+            effects,
+            whole,
+            widest.closed if kind == "effect" else explained,
+            _left(problem, final, left),
+        ),
         warnings=(),
         complete=whole,
         remainder=remainder_of(problem, final, predictions[last], untouched),
@@ -72,15 +82,10 @@ def verdict_of(
 
 
 def _words(
-    kind: Kind,
-    effects: Sequence[NamedEffect],
-    whole: bool,
-    explained: float,
-    final: ArticulatedFit,
-    problem: ArticulatedProblem,
+    kind: VerdictKind, effects: Sequence[NamedEffect], whole: bool, explained: float, left: str
 ) -> str:
     names = " and ".join(f"{e.name} ({e.where})" for e in effects)
-    left = "" if whole else f" {_left(problem, final)}"
+    left = "" if whole else f" {left}"
     if kind == "none":
         return (
             "The stated uncertainties and the noise explain the records; nothing is missing from the model."
@@ -101,16 +106,21 @@ def _words(
     return f"Something is missing from the model, and no effect of the catalogue improves on the judging records.{left}"
 
 
-def _left(problem: ArticulatedProblem, final: ArticulatedFit) -> str:
+def _left(problem: ArticulatedProblem, final: ArticulatedFit, left: Coloured | None) -> str:
+    """What a fit leaves, in words."""
     j = int(np.argmax(final.reduced))
+    times, where = float(np.sqrt(final.reduced[j])), ""
+    if left is not None:
+        j, times = left.joint, float(np.sqrt(left.power))
+        where = f" below {left.below:.3g} Hz in '{left.record}'"
     return (
-        f"Joint '{problem.joints[j].name}' still leaves {np.sqrt(final.reduced[j]):.3g} times its noise: "
+        f"Joint '{problem.joints[j].name}' still leaves {times:.3g} times its noise{where}: "
         "something more is missing, or the noise is larger than stated."
     )
 
 
 def _probabilities(
-    fits: Sequence[ArticulatedFit], final: ArticulatedFit, kind: Kind, settings: JudgementSettings
+    fits: Sequence[ArticulatedFit], final: ArticulatedFit, kind: VerdictKind, settings: JudgementSettings
 ) -> dict[str, float]:
     known = 1.0 - settings.outside
     if kind == "unknown":

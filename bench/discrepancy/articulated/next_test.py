@@ -13,10 +13,10 @@ from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import norm
 
 from bench import native
+from bench.arrays import Array
 from bench.discrepancy.articulated.free_runs import FreeRuns
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
@@ -24,8 +24,6 @@ from bench.discrepancy.case.case import CaseRecord
 from bench.discrepancy.multibody.encoders import encoders_of, input_of
 from bench.discrepancy.multibody.records import prepare
 from bench.discrepancy.settings import ArticulatedNextTestSettings as NextTestSettings
-
-Array = NDArray[np.float64]
 
 
 class Trajectory(NamedTuple):
@@ -56,7 +54,7 @@ class Trajectory(NamedTuple):
         return text.getvalue()
 
 
-class Proposal(NamedTuple):
+class JointProposal(NamedTuple):
     """A test that would tell two explanations apart: what a verdict says of it, and the trajectories to run."""
 
     told: dict[str, Any]
@@ -65,8 +63,8 @@ class Proposal(NamedTuple):
 
 def propose(
     problem: ArticulatedProblem, compiled: mujoco.MjModel, first: ArticulatedFit, second: ArticulatedFit
-) -> Proposal | None:
-    """The trajectories on which two explanations differ most; None where none is within the limits.
+) -> JointProposal | None:
+    """The trajectories on which two explanations differ most; None where none is within the limits, or a joint is only followed.
 
     Args:
         problem: The records for identification.
@@ -76,6 +74,8 @@ def propose(
     """
     settings = problem.settings.articulated.next_test
     found: list[tuple[float, Trajectory, CaseRecord]] = []
+    if problem.model.followed:  # nobody can say how it would move
+        return None
     for trajectory in _candidates(problem, first, second, settings):
         record = _record(problem, trajectory)
         if not _within_limits(problem, record) or _collides(compiled, problem, trajectory):
@@ -105,7 +105,7 @@ def propose(
             for j, joint in enumerate(problem.joints)
         },
     }
-    return Proposal(told, trajectory)
+    return JointProposal(told, trajectory)
 
 
 def _candidates(

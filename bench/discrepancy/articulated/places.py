@@ -5,22 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from bench.discrepancy.articulated.judgement import Prediction
+from bench.arrays import Array
+from bench.discrepancy.articulated.judgement import PredictedErrors
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.settings import ArticulatedSettings
 from bench.discrepancy.verdict import Gap, Location
 
-Array = NDArray[np.float64]
-
 
 def gaps_of(
     problem: ArticulatedProblem,
     rungs: Sequence[ArticulatedFit],
-    untouched: Prediction,
-    predictions: Sequence[Prediction],
+    untouched: PredictedErrors,
+    predictions: Sequence[PredictedErrors],
     rng: np.random.Generator,
 ) -> tuple[Gap, ...]:
     """NRMSE of the free runs of every joint, as stated, then rung by rung; arguments as of `verdict_of`."""
@@ -111,7 +109,7 @@ def _gathered(
 
 
 def remainder_of(
-    problem: ArticulatedProblem, final: ArticulatedFit, left: Prediction, untouched: Prediction
+    problem: ArticulatedProblem, final: ArticulatedFit, left: PredictedErrors, untouched: PredictedErrors
 ) -> dict[str, object]:
     """What remains at the joint that keeps most over its noise, with its band and interval."""
     j = int(np.argmax(final.reduced))

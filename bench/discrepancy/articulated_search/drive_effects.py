@@ -26,6 +26,20 @@ ON_LINK = FreeParameter("encoder_on_link", fixed=True, signed=True, grid=(0.0, 1
 """Side of the encoder; tried where the channel does not state its ``"side"``."""
 RELATIVE = FreeParameter("relative_error", signed=True, mean=0.0, std=0.3, bounds=(-0.95, 20.0), unit="1")
 
+
+def _time(name: str, middle: float, highest: float) -> FreeParameter:
+    """A delay or time constant [s]: a middle within a factor of seven with 95 %, up to a highest logarithm."""
+    return FreeParameter(
+        name,
+        "1",
+        mean=math.log(middle),
+        std=1.0,
+        bounds=(-9.0, highest),
+        grid=log_grid(0.3 * middle, middle, 3.0 * middle),
+        unit="s",
+    )
+
+
 DRIVE_EFFECTS: tuple[ArticulatedEffect, ...] = (
     ArticulatedEffect(
         "joint_compliance",
@@ -107,17 +121,7 @@ DRIVE_EFFECTS: tuple[ArticulatedEffect, ...] = (
         "actuator_delay",
         "actuator",
         "actuator",
-        (
-            FreeParameter(
-                "delay_s",
-                "1",
-                mean=math.log(0.01),
-                std=1.0,
-                bounds=(-9.0, -1.5),
-                grid=log_grid(0.003, 0.01, 0.03),
-                unit="s",
-            ),
-        ),
+        (_time("delay_s", 0.01, -1.5),),
         "input acts later by a delay",
         written(DELAY="delay_s"),
     ),
@@ -125,17 +129,7 @@ DRIVE_EFFECTS: tuple[ArticulatedEffect, ...] = (
         "actuator_lag",
         "actuator",
         "actuator",
-        (
-            FreeParameter(
-                "time_constant_s",
-                "1",
-                mean=math.log(0.01),
-                std=1.0,
-                bounds=(-9.0, -1.0),
-                grid=log_grid(0.003, 0.01, 0.03),
-                unit="s",
-            ),
-        ),
+        (_time("time_constant_s", 0.01, -1.0),),
         "T f' + f = force of the actuator",
         written(LAG="time_constant_s"),
     ),
@@ -143,17 +137,7 @@ DRIVE_EFFECTS: tuple[ArticulatedEffect, ...] = (
         "target_lag",
         "actuator",
         "actuator",
-        (
-            FreeParameter(
-                "time_constant_s",
-                "1",
-                mean=math.log(0.03),
-                std=1.0,
-                bounds=(-9.0, -0.5),
-                grid=log_grid(0.01, 0.03, 0.1),
-                unit="s",
-            ),
-        ),
+        (_time("time_constant_s", 0.03, -0.5),),
         "T u' + u = target of the servo",
         added(INPUT_LAG="time_constant_s"),
         servo=True,

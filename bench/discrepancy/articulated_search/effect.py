@@ -12,15 +12,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from bench.discrepancy.articulated_search.slot_setters import Values, train
+from bench.arrays import Array
+from bench.discrepancy.articulated_search.slot_setters import SlotValues, train
 from bench.discrepancy.effects.effect import FreeParameter
 from bench.discrepancy.multibody.encoders import Encoder
 
-Array = NDArray[np.float64]
-Site = Literal["joint", "body", "actuator", "sensor"]
+JointSite = Literal["joint", "body", "actuator", "sensor"]
 
 NUMBERS = frozenset({
     "mass_error", "com_error", "armature_error", "damping_error", "force_gain_error", "servo_gain_error", "position_gain_error",
@@ -90,11 +87,11 @@ class ArticulatedEffect:
 
     name: str
     family: str
-    site: Site
+    site: JointSite
     parameters: tuple[FreeParameter, ...]
     equation: str
-    slots: Callable[[Values, Array], None] | None = None
-    encoder: Callable[[Values], Encoder] | None = None
+    slots: Callable[[SlotValues, Array], None] | None = None
+    encoder: Callable[[SlotValues], Encoder] | None = None
     servo: bool | None = None
     needs: str = ""
 
@@ -118,6 +115,6 @@ class ArticulatedEffect:
             "force/velocity/velocity": f"{force} s^2/{position}^2",
         }[parameter.scale]  # fmt: skip
 
-    def values(self, eta: Array, scales: JointScales) -> Values:
+    def values(self, eta: Array, scales: JointScales) -> SlotValues:
         """Physical values by name."""
         return {p.name: p.value(float(e), scales) for p, e in zip(self.parameters, eta, strict=True)}

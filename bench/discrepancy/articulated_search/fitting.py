@@ -8,18 +8,19 @@ else is missing.
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass
+from threading import Lock
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.discrepancy.articulated_search.hypothesis import Hypothesis
+from bench.arrays import Array
+from bench.discrepancy.articulated_search.hypothesis import JointHypothesis
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem, misfit_of
 from bench.discrepancy.numerics.least_squares import Prior, minimise
 from bench.discrepancy.numerics.threads import in_threads
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +36,7 @@ class ArticulatedFit:
         log_posterior: Laplace approximation of the log posterior of the hypothesis, up to a constant.
     """
 
-    hypothesis: Hypothesis
+    hypothesis: JointHypothesis
     vector: Array
     covariance: Array
     chi2: Array
@@ -43,7 +44,7 @@ class ArticulatedFit:
     log_posterior: float
 
     @classmethod
-    def at(cls, problem: ArticulatedProblem, hypothesis: Hypothesis, vector: Array) -> ArticulatedFit:
+    def at(cls, problem: ArticulatedProblem, hypothesis: JointHypothesis, vector: Array) -> ArticulatedFit:
         """A hypothesis as it stands at a vector (whose further entries are left out), not fitted and without a posterior."""
         size = problem.size(hypothesis)
         residuals = [problem.residual(j, hypothesis, vector[:size]) for j in range(len(problem.joints))]
@@ -100,7 +101,7 @@ class Others:
         return cls(base, tuple(f for f, _ in found), tuple(t for _, t in found))
 
 
-def own_entries(problem: ArticulatedProblem, hypothesis: Hypothesis, j: int) -> list[int]:
+def own_entries(problem: ArticulatedProblem, hypothesis: JointHypothesis, j: int) -> list[int]:
     """Entries of a vector that belong to joint `j` alone: its nominal parameters, and the free ones of effects there."""
     out, at = list(problem.locals(j)), len(problem.nominal)
     for placed in hypothesis:
@@ -111,6 +112,33 @@ def own_entries(problem: ArticulatedProblem, hypothesis: Hypothesis, j: int) -> 
     return out
 
 
+class _Runs:
+    """Residuals of joints at vectors of a hypothesis, the last few of every joint kept.
+
+    What one joint has of its own moves no other: most columns of a Jacobian take one run.
+    """
+
+    def __init__(self, problem: ArticulatedProblem, hypothesis: JointHypothesis) -> None:
+        self.problem, self.hypothesis = problem, hypothesis
+        self.entries = [problem.entries(j, hypothesis) for j in range(len(problem.joints))]
+        self.kept: list[OrderedDict[bytes, Array]] = [OrderedDict() for _ in problem.joints]
+        self.lock = Lock()
+
+    def residual(self, j: int, vector: Array) -> Array:
+        """Residual of joint `j`, not to be written to."""
+        key, kept = vector[self.entries[j]].tobytes(), self.kept[j]
+        with self.lock:
+            if key in kept:
+                kept.move_to_end(key)
+                return kept[key]
+        new = self.problem.residual(j, self.hypothesis, vector)
+        with self.lock:
+            kept[key] = new
+            if len(kept) > self.problem.settings.articulated.kept_runs:
+                kept.popitem(last=False)
+        return new
+
+
 def linearised(
     problem: ArticulatedProblem, base: ArticulatedFit, j: int, columns: Sequence[int]
 ) -> tuple[Array, Array]:
@@ -118,8 +146,11 @@ def linearised(
     settings = problem.settings.articulated
     _, std, _, high = problem.prior(base.hypothesis)
     residual = problem.residual(j, base.hypothesis, base.vector) / base.scale[j]
+    felt = set(problem.entries(j, base.hypothesis).tolist())
 
     def column(i: int) -> Array:
+        if i not in felt:
+            return np.zeros_like(residual)
         step = (
             settings.difference * std[i]
             if base.vector[i] + settings.difference * std[i] <= high[i]
@@ -136,7 +167,7 @@ def linearised(
 
 def fit(
     problem: ArticulatedProblem,
-    hypothesis: Hypothesis,
+    hypothesis: JointHypothesis,
     start: Array,
     *,
     scale: Array,
@@ -163,8 +194,10 @@ def fit(
     passive = [j for j in range(n_joints) if j not in active]
     masses = list(problem.masses)
 
+    runs = _Runs(problem, hypothesis)
+
     def residual_at(vector: Array) -> Array:
-        parts = in_threads(lambda j: problem.residual(j, hypothesis, vector) / scale[j], active)
+        parts = in_threads(lambda j: runs.residual(j, vector) / scale[j], active)
         for j in passive:
             assert others is not None
             parts.append(others.factors[j] @ vector[masses] - others.targets[j])
@@ -181,7 +214,7 @@ def fit(
 
 def refitted(
     problem: ArticulatedProblem,
-    hypothesis: Hypothesis,
+    hypothesis: JointHypothesis,
     start: Array,
     *,
     scale: Array,
@@ -216,7 +249,7 @@ def refitted(
 
 
 def free_entries(
-    problem: ArticulatedProblem, hypothesis: Hypothesis, active: Sequence[int] | None = None
+    problem: ArticulatedProblem, hypothesis: JointHypothesis, active: Sequence[int] | None = None
 ) -> NDArray[np.int64]:
     """Entries that a fit moves: all that are free, or those of the active joints and the masses."""
     out = [
@@ -234,7 +267,7 @@ def free_entries(
 
 def _summary(
     problem: ArticulatedProblem,
-    hypothesis: Hypothesis,
+    hypothesis: JointHypothesis,
     vector: Array,
     curvature: Array,
     free: NDArray[np.int64],

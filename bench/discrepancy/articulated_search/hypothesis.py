@@ -6,16 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.articulated_search.effect import ArticulatedEffect, JointScales
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.multibody.joint_run import SLOTS, Slot
 from bench.discrepancy.multibody.model import ArticulatedModel, Joint
 from bench.errors import UnknownNameError
-
-Array = NDArray[np.float64]
-
 
 LOCAL_SLOTS = {
     "damping": Slot.DAMPING,
@@ -30,7 +27,7 @@ LOCAL_SLOTS = {
 
 
 @dataclass(frozen=True)
-class Placed:
+class PlacedOnJoint:
     """An effect at a place: a joint, a body or an actuator.
 
     Attributes:
@@ -54,7 +51,7 @@ class Placed:
         return f"{self.effect.name} ({self.where})"
 
 
-Hypothesis = tuple[Placed, ...]
+JointHypothesis = tuple[PlacedOnJoint, ...]
 
 
 @dataclass(frozen=True)
@@ -114,7 +111,7 @@ def base_slots(joint: Joint, on_link: bool) -> Array:
     return p
 
 
-def placed_values(placed: Placed, eta: Array) -> dict[str, float]:
+def placed_values(placed: PlacedOnJoint, eta: Array) -> dict[str, float]:
     """Physical values of an effect at its place; a stop's position is counted from the zero of the joint."""
     values = placed.effect.values(eta, placed.scales)
     if placed.effect.name == "one_sided_stop":

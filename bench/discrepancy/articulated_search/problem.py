@@ -18,12 +18,13 @@ from threading import Lock
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.articulated_search.effect import ArticulatedEffect, JointScales
 from bench.discrepancy.articulated_search.hypothesis import (
     LOCAL_SLOTS,
-    Hypothesis,
+    JointHypothesis,
     Nominal,
-    Placed,
+    PlacedOnJoint,
     base_slots,
     nominal_parameters,
     placed_values,
@@ -34,8 +35,6 @@ from bench.discrepancy.multibody.joint_run import Slot, predict
 from bench.discrepancy.multibody.model import ArticulatedModel, Joint
 from bench.discrepancy.multibody.records import JointRecord, PreparedRecord, corrected, prepare, relinked
 from bench.discrepancy.settings import DEFAULT, DiagnosisSettings
-
-Array = NDArray[np.float64]
 
 
 @dataclass(eq=False)
@@ -91,11 +90,11 @@ class ArticulatedProblem:
         """Indices of the nominal parameters of joint `j` alone."""
         return tuple(i for i, p in enumerate(self.nominal) if p.kind != "mass" and p.joint == j)
 
-    def size(self, hypothesis: Hypothesis) -> int:
+    def size(self, hypothesis: JointHypothesis) -> int:
         """Length of the vector of a hypothesis."""
         return len(self.nominal) + sum(len(placed.effect.parameters) for placed in hypothesis)
 
-    def etas(self, hypothesis: Hypothesis, vector: Array) -> list[Array]:
+    def etas(self, hypothesis: JointHypothesis, vector: Array) -> list[Array]:
         """The part of a vector that belongs to each effect."""
         out, at = [], len(self.nominal)
         for placed in hypothesis:
@@ -104,7 +103,7 @@ class ArticulatedProblem:
             at = stop
         return out
 
-    def reached(self, hypothesis: Hypothesis) -> tuple[int, ...]:
+    def reached(self, hypothesis: JointHypothesis) -> tuple[int, ...]:
         """Joints whose runs an effect of a hypothesis changes."""
         out: set[int] = set()
         for placed in hypothesis:
@@ -112,7 +111,16 @@ class ArticulatedProblem:
             out |= {placed.joint} if site in ("joint", "actuator") else set(range(len(self.joints)))
         return tuple(sorted(out))
 
-    def motions(self, hypothesis: Hypothesis, vector: Array) -> tuple[PreparedRecord, ...]:
+    def entries(self, j: int, hypothesis: JointHypothesis) -> NDArray[np.int64]:
+        """Entries of the vector of a hypothesis on which the runs of joint `j` depend."""
+        out, at = [*self.masses, *self.locals(j)], len(self.nominal)
+        for placed in hypothesis:
+            stop = at + len(placed.effect.parameters)
+            out += range(at, stop) if j in self.reached((placed,)) else ()
+            at = stop
+        return np.array(out, dtype=np.int64)
+
+    def motions(self, hypothesis: JointHypothesis, vector: Array) -> tuple[PreparedRecord, ...]:
         """The records, their encoders corrected as a hypothesis has it."""
         wrong: dict[str, Encoder] = {}
         for placed, eta in zip(hypothesis, self.etas(hypothesis, vector), strict=True):
@@ -160,7 +168,7 @@ class ArticulatedProblem:
             records.append(replace(prepared, joints=tuple(joints)))
         return ArticulatedProblem(self.case, self.model, tuple(records), self.settings)
 
-    def settled(self, hypothesis: Hypothesis, vector: Array) -> ArticulatedProblem:
+    def settled(self, hypothesis: JointHypothesis, vector: Array) -> ArticulatedProblem:
         """The same problem with the links of elastic joints where a fit has them; itself where there are none behind their motors."""
         elastic = [
             placed.joint
@@ -175,7 +183,7 @@ class ArticulatedProblem:
             records.append(relinked(self.case, self.model, raw, links, settings=self.settings.articulated))
         return ArticulatedProblem(self.case, self.model, tuple(records), self.settings)
 
-    def slots(self, j: int, hypothesis: Hypothesis, vector: Array, *, on_link: bool) -> Array:
+    def slots(self, j: int, hypothesis: JointHypothesis, vector: Array, *, on_link: bool) -> Array:
         """Parameter vector (SLOTS,) of the runs of joint `j`."""
         joint = self.joints[j]
         p = base_slots(joint, on_link)
@@ -188,7 +196,7 @@ class ArticulatedProblem:
         return p
 
     def innovations(
-        self, j: int, hypothesis: Hypothesis, vector: Array, prepared: PreparedRecord
+        self, j: int, hypothesis: JointHypothesis, vector: Array, prepared: PreparedRecord
     ) -> tuple[Array, Array]:
         """Innovations (n, n_measured) and states (n, 4), see `joint_run.run`, of joint `j` in a record; NaN where it diverged."""
         record = prepared.joints[j]
@@ -198,7 +206,7 @@ class ArticulatedProblem:
     def run(
         self,
         j: int,
-        hypothesis: Hypothesis,
+        hypothesis: JointHypothesis,
         vector: Array,
         record: JointRecord,
         gain: Array,
@@ -215,7 +223,7 @@ class ArticulatedProblem:
         )  # fmt: skip
 
     def _coefficients(
-        self, record: JointRecord, hypothesis: Hypothesis, vector: Array
+        self, record: JointRecord, hypothesis: JointHypothesis, vector: Array
     ) -> tuple[Array, Array]:
         bias, inertia = record.bias, record.inertia
         for i in self.masses:
@@ -236,21 +244,21 @@ class ArticulatedProblem:
             bias, inertia = bias + change[0], inertia + change[1]
         return bias, np.maximum(inertia, 1e-3 * record.inertia)
 
-    def residual(self, j: int, hypothesis: Hypothesis, vector: Array) -> Array:
-        """Whitened, weighted innovations of joint `j` over all records; their sum of squares is about `count` where nothing is missing."""
-        settings = self.settings.articulated
+    def residuals(self, j: int, hypothesis: JointHypothesis, vector: Array) -> list[Array]:
+        """Whitened, weighted innovations (n, n_measured) of joint `j` in every record."""
+        most = self.settings.articulated.diverged
         out = []
         for original, prepared in zip(self.records, self.motions(hypothesis, vector), strict=True):
             innovation, _ = self.innovations(j, hypothesis, vector, prepared)
             # a corrected log has another noise; residuals are compared in units of what was logged
             innovation = innovation * (original.joints[j].noise / prepared.joints[j].noise)
             whitened = innovation @ original.joints[j].whitening.T * original.joints[j].weight
-            out.append(
-                np.nan_to_num(
-                    whitened, nan=settings.diverged, posinf=settings.diverged, neginf=-settings.diverged
-                ).ravel()
-            )
-        return np.concatenate(out)
+            out.append(np.nan_to_num(whitened, nan=most, posinf=most, neginf=-most))
+        return out
+
+    def residual(self, j: int, hypothesis: JointHypothesis, vector: Array) -> Array:
+        """Those of all records in one (n,); their sum of squares is about `count` where nothing is missing."""
+        return np.concatenate([r.ravel() for r in self.residuals(j, hypothesis, vector)])
 
     @cached_property
     def count(self) -> Array:
@@ -260,7 +268,7 @@ class ArticulatedProblem:
             [sum(float(np.sum(r.joints[j].weight ** 2)) for r in records) for j in range(len(self.joints))]
         )
 
-    def prior(self, hypothesis: Hypothesis) -> tuple[Array, Array, Array, Array]:
+    def prior(self, hypothesis: JointHypothesis) -> tuple[Array, Array, Array, Array]:
         """Mean, standard deviation, lower and upper bound of a vector."""
         n = len(self.nominal)
         mean, std = [np.zeros(n)], [np.ones(n)]
@@ -310,7 +318,7 @@ def misfit_of(chi2: float, count: float) -> float:
     return count * (mean if mean <= 1.0 else 1.0 + float(np.log(mean)))
 
 
-def placements(problem: ArticulatedProblem, catalogue: Sequence[ArticulatedEffect]) -> list[Placed]:
+def placements(problem: ArticulatedProblem, catalogue: Sequence[ArticulatedEffect]) -> list[PlacedOnJoint]:
     """Every effect at every place where it may sit."""
     out = []
     for j, joint in enumerate(problem.joints):
@@ -326,5 +334,5 @@ def placements(problem: ArticulatedProblem, catalogue: Sequence[ArticulatedEffec
             where = {"joint": joint.name, "sensor": joint.name, "actuator": drive.name, "body": joint.body}[
                 effect.site
             ]
-            out.append(Placed(effect, where, j, scales))
+            out.append(PlacedOnJoint(effect, where, j, scales))
     return out

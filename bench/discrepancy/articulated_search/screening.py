@@ -11,15 +11,12 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit, free_entries, linearised
-from bench.discrepancy.articulated_search.hypothesis import Placed
+from bench.discrepancy.articulated_search.hypothesis import PlacedOnJoint
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem, misfit_of
 from bench.discrepancy.numerics.threads import in_threads
-
-Array = NDArray[np.float64]
-
 
 UNSCALED = ("actuator_saturation", "backlash", "joint_compliance", "one_sided_stop")
 """Effects whose first parameter is no amplitude of the force."""
@@ -36,7 +33,7 @@ class Screened:
         start: The vector from which it is fitted: that of the fit, moved by what the regression says of it.
     """
 
-    placed: Placed
+    placed: PlacedOnJoint
     eta: Array
     gain: float
     start: Array
@@ -98,12 +95,14 @@ class _Ground:
         return np.clip(out, self.low + inside, self.high - inside)
 
 
-def screen(problem: ArticulatedProblem, base: ArticulatedFit, candidates: Sequence[Placed]) -> list[Screened]:
+def screen(
+    problem: ArticulatedProblem, base: ArticulatedFit, candidates: Sequence[PlacedOnJoint]
+) -> list[Screened]:
     """Screen effects on top of a fit; the most promising first."""
     everything = tuple(range(len(problem.joints)))
     grounds = {joints: _Ground(problem, base, joints) for joints in [*((j,) for j in everything), everything]}
 
-    def look(placed: Placed) -> list[Screened]:
+    def look(placed: PlacedOnJoint) -> list[Screened]:
         ground = grounds[tuple(problem.reached((placed,)))]
         hypothesis = (*base.hypothesis, placed)
         before = ground.misfit(ground.left)
@@ -133,7 +132,7 @@ def screen(problem: ArticulatedProblem, base: ArticulatedFit, candidates: Sequen
     return sorted(points, key=lambda p: -p.gain)
 
 
-def _scaled(placed: Placed, eta: Array, along: float) -> Array:
+def _scaled(placed: PlacedOnJoint, eta: Array, along: float) -> Array:
     """A grid point with its amplitude changed by a factor."""
     out, first = eta.copy(), placed.effect.parameters[0]
     if placed.effect.name in UNSCALED:
@@ -146,7 +145,7 @@ def _scaled(placed: Placed, eta: Array, along: float) -> Array:
     return out
 
 
-def grid(placed: Placed, *, servo: bool, sides: Sequence[float]) -> list[Array]:
+def grid(placed: PlacedOnJoint, *, servo: bool, sides: Sequence[float]) -> list[Array]:
     """Values of the parameters that are tried; a small amplitude where the effect is linear in it.
 
     Whether a wrong encoder is in the loop is asked of servos only, and on which side of an elastic drive it sits where nobody says.
@@ -166,7 +165,7 @@ def grid(placed: Placed, *, servo: bool, sides: Sequence[float]) -> list[Array]:
     return [np.array(point) for point in product(*axes)]
 
 
-def _sides(problem: ArticulatedProblem, placed: Placed) -> tuple[float, ...]:
+def _sides(problem: ArticulatedProblem, placed: PlacedOnJoint) -> tuple[float, ...]:
     """Sides of an elastic drive where the encoder of a joint may sit."""
     side = problem.records[0].joints[placed.joint].side
     return {"motor": (0.0,), "link": (1.0,)}.get(side, (0.0, 1.0))

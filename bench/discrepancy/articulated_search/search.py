@@ -10,8 +10,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.articulated_search.fitting import (
     ArticulatedFit,
     Others,
@@ -20,13 +20,20 @@ from bench.discrepancy.articulated_search.fitting import (
     own_entries,
     refitted,
 )
-from bench.discrepancy.articulated_search.hypothesis import Hypothesis, Placed
+from bench.discrepancy.articulated_search.hypothesis import JointHypothesis, PlacedOnJoint
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.articulated_search.screening import Screened, by_effect, screen
 from bench.discrepancy.numerics.threads import in_threads
+from bench.discrepancy.settings import ArticulatedJudgementSettings as JudgementSettings
 from bench.discrepancy.settings import ArticulatedSearchSettings as SearchSettings
 
-Array = NDArray[np.float64]
+
+def complete(problem: ArticulatedProblem, found: ArticulatedFit, settings: JudgementSettings) -> bool:
+    """Whether no joint keeps more than the noise, and no nominal parameter is strained for it."""
+    # the mean square of n residuals is known to sqrt(2 / n)
+    noise = (1.0 + settings.noise_known) ** 2 + settings.sure * np.sqrt(2.0 / found.count)
+    far = np.abs(found.vector[: len(problem.nominal)]) > settings.strained
+    return bool(np.all(found.reduced <= noise) and not far.any())
 
 
 def _strained(problem: ArticulatedProblem, base: ArticulatedFit, settings: SearchSettings) -> set[int]:
@@ -49,13 +56,13 @@ def nominal_fit(problem: ArticulatedProblem) -> ArticulatedFit:
 
 def search(
     problem: ArticulatedProblem,
-    candidates: Sequence[Placed],
+    candidates: Sequence[PlacedOnJoint],
     *,
     settings: SearchSettings | None = None,
     progress: Callable[[str], None] = lambda text: None,
 ) -> list[ArticulatedFit]:
     """All fitted hypotheses: the one that nothing is worth adding to or taking from, then the likeliest first."""
-    settings = settings or problem.settings.articulated.search
+    settings, judged = settings or problem.settings.articulated.search, problem.settings.articulated.judgement
     progress("nominal model")
     current = nominal_fit(problem)
     found, dropped = [current], set[tuple[str, str]]()
@@ -66,7 +73,10 @@ def search(
             problem, current, rest, settings, lambda text, n=count: progress(f"effect {n}: {text}")
         )
         found += fits
-        if best is None or best.log_posterior < current.log_posterior + settings.worth:
+        # to what is complete, the judgement adds nothing but what is certain
+        whole = complete(problem, current, judged)
+        least = judged.certain if whole else settings.worth
+        if best is None or best.log_posterior < current.log_posterior + least:
             break
         problem = problem.settled(best.hypothesis, best.vector)
         current, fits = without_idle(problem, best, settings)
@@ -129,7 +139,7 @@ def _predecessors(
 def _round(
     problem: ArticulatedProblem,
     base: ArticulatedFit,
-    candidates: Sequence[Placed],
+    candidates: Sequence[PlacedOnJoint],
     settings: SearchSettings,
     progress: Callable[[str], None],
 ) -> tuple[ArticulatedFit | None, list[ArticulatedFit]]:
@@ -266,15 +276,17 @@ def _fits(
     """Fits of the most promising effects on top of a fit, on the joints that they change."""
     others = Others.of(problem, base)
     out: list[ArticulatedFit] = []
-    gained = 0.0
+    gained, swapped = 0.0, 0
     strained = _strained(problem, base, settings)
     for k, mine in enumerate(points):
-        # where a number of the model was moved too far, all numbers that may be wrong instead are tried
-        instead = mine[0].placed.effect.number and mine[0].placed.joint in strained
         hopeful = k < settings.fitted and mine[0].gain >= settings.hope * gained
-        if not (k < settings.least or hopeful or instead):
-            continue
-        hypothesis: Hypothesis = (*base.hypothesis, mine[0].placed)
+        if not (k < settings.least or hopeful):
+            # where a number of the model was moved too far, numbers that may be wrong instead are tried, whatever they promise
+            instead = mine[0].placed.effect.number and mine[0].placed.joint in strained
+            if not instead or swapped == settings.fitted:
+                continue
+            swapped += 1
+        hypothesis: JointHypothesis = (*base.hypothesis, mine[0].placed)
         # nominal parameters that stood in for what was missing are also tried where they were stated, and fitted from there:
         # a start of less misfit need not be the nearer one
         untouched = np.concatenate([np.zeros(len(problem.nominal)), base.vector[len(problem.nominal) :]])

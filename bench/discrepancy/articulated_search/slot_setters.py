@@ -5,52 +5,49 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-import numpy as np
-from numpy.typing import NDArray
-
+from bench.arrays import Array
 from bench.discrepancy.multibody.joint_run import Slot
 
-Array = NDArray[np.float64]
-Values = dict[str, float]
+SlotValues = dict[str, float]
 
 
-def written(**entries: str) -> Callable[[Values, Array], None]:
+def written(**entries: str) -> Callable[[SlotValues, Array], None]:
     """Setter of slots from values of the same names."""
 
-    def change(values: Values, p: Array) -> None:
+    def change(values: SlotValues, p: Array) -> None:
         for slot, name in entries.items():
             p[Slot[slot]] = values[name]
 
     return change
 
 
-def added(**entries: str) -> Callable[[Values, Array], None]:
+def added(**entries: str) -> Callable[[SlotValues, Array], None]:
     """Setter that adds values to slots."""
 
-    def change(values: Values, p: Array) -> None:
+    def change(values: SlotValues, p: Array) -> None:
         for slot, name in entries.items():
             p[Slot[slot]] += values[name]
 
     return change
 
 
-def scaled(*slots: Slot) -> Callable[[Values, Array], None]:
+def scaled(*slots: Slot) -> Callable[[SlotValues, Array], None]:
     """Setter of slots that are off by a ``relative_error``."""
 
-    def change(values: Values, p: Array) -> None:
+    def change(values: SlotValues, p: Array) -> None:
         for slot in slots:
             p[slot] *= 1.0 + values["relative_error"]
 
     return change
 
 
-def saturated(values: Values, p: Array) -> None:
+def saturated(values: SlotValues, p: Array) -> None:
     """Limit the force of the actuator to ``limit``."""
     p[Slot.LOW] = max(p[Slot.LOW], -values["limit"])
     p[Slot.HIGH] = min(p[Slot.HIGH], values["limit"])
 
 
-def train(values: Values, p: Array) -> None:
+def train(values: SlotValues, p: Array) -> None:
     """Put an elastic train with play between motor and link."""
     p[Slot.TRAIN] = 1.0
     p[Slot.TRAIN_STIFFNESS] = values["stiffness"]
@@ -60,7 +57,7 @@ def train(values: Values, p: Array) -> None:
     p[Slot.ENCODER] = values["encoder_on_link"]
 
 
-def stop(values: Values, p: Array) -> None:
+def stop(values: SlotValues, p: Array) -> None:
     """Put a stop on one side of the joint."""
     p[Slot.STOP] = values["stiffness"]
     p[Slot.STOP_AT] = values["position"]
@@ -68,7 +65,7 @@ def stop(values: Values, p: Array) -> None:
     p[Slot.STOP_SIDE] = values["side"]
 
 
-def cogging(values: Values, p: Array) -> None:
+def cogging(values: SlotValues, p: Array) -> None:
     """Put a torque that is periodic in the angle."""
     sine, cosine = values["sine"], values["cosine"]
     p[Slot.COGGING] = math.hypot(sine, cosine)

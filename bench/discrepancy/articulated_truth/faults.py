@@ -10,13 +10,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.articulated_truth.robots import Encoding, Robot
 from bench.discrepancy.articulated_truth.time_stepping import ArmMotion, Cell
 from bench.discrepancy.multibody.model import ArticulatedModel
-
-Array = NDArray[np.float64]
 
 
 class Sizes(NamedTuple):

@@ -7,13 +7,12 @@ from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from bench.discrepancy.articulated_truth.time_stepping import CELLS, ArmMotion, Cell, march
+from bench.arrays import Array
+from bench.discrepancy.articulated_truth.time_stepping import CELLS, ArmMotion, Cell, march_bodies
 from bench.discrepancy.multibody.model import ArticulatedModel, compiled_model
 from bench.mjcf import model_path
 
-Array = NDArray[np.float64]
 RobotKind = Literal["arm", "leg", "servo"]
 """Kinds of robots: torque-driven arms, a leg with servos, a desk arm with servos and coarse encoders."""
 MODELS: Mapping[str, tuple[str, ...]] = {"arm": ("two_link", "six_axis"), "leg": ("leg",), "servo": ("desk",)}
@@ -100,7 +99,7 @@ class Robot:
         if not self.servo:  # the loop's own idea of the arm: the model that is handed over
             acceleration = np.gradient(speed, 1.0 / self.rate, axis=0)
             forward = self.nominal.dynamics(reference, speed, acceleration).torque
-        return march(
+        return march_bodies(
             (bodies or self.bodies).model, self.table if table is None else table, servo=self.servo, reference=reference,
             speed=speed, forward=forward, sample=1.0 / self.rate,
         )  # fmt: skip
@@ -174,7 +173,7 @@ def reference_of(robot: Robot, kind: str, duration: float, rng: np.random.Genera
     return middle + amplitude * np.clip(out, -1.0, 1.0)
 
 
-def logged(robot: Robot, motion: ArmMotion, encoding: Mapping[int, Encoding]) -> tuple[Array, Array]:
+def robot_log(robot: Robot, motion: ArmMotion, encoding: Mapping[int, Encoding]) -> tuple[Array, Array]:
     """Positions and velocities (n, n_joints) as the encoders log them, before noise."""
     on_link = robot.side == "link"
     position = np.array(motion.position if on_link else motion.motor_position)

@@ -25,9 +25,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench import native
+from bench.arrays import Array
 from bench.discrepancy.multibody.inverse import call, inverse_address
-
-Array = NDArray[np.float64]
 
 
 class Cell(IntEnum):
@@ -264,7 +263,7 @@ def _rows(model: mujoco.MjModel) -> tuple[NDArray[np.int64], ...]:
 
 
 @native.quiet()
-def march(
+def march_bodies(
     model: mujoco.MjModel,
     table: Array,
     *,

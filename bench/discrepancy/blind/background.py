@@ -13,9 +13,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
+from bench.arrays import Array
 from bench.discrepancy.truth.background_settings import STATED, BackgroundSettings
 from bench.discrepancy.truth.foreign_memory import HIDDEN_RESONATOR
 from bench.discrepancy.truth.foreign_shapes import modulated, resonator, wavy
@@ -24,8 +24,7 @@ from bench.discrepancy.truth.out_of_catalogue import MODULATED_STIFFNESS, POSITI
 from bench.discrepancy.truth.recipe import Recipe, Shape, between
 from bench.discrepancy.truth.rigs import Bench, reach_of
 
-Array = NDArray[np.float64]
-Records = Sequence[dict[str, Array]]
+RecordArrays = Sequence[dict[str, Array]]
 
 
 @dataclass(frozen=True)
@@ -56,7 +55,7 @@ class Background:
         return {"background": names, "background_share": self.share, "noise_stated": self.stated}
 
     def recorded_in(
-        self, clean: Records, *, judged: str, timed: Sequence[str], step: float, rng: np.random.Generator
+        self, clean: RecordArrays, *, judged: str, timed: Sequence[str], step: float, rng: np.random.Generator
     ) -> list[dict[str, Array]]:
         """Records with what comes into them.
 
@@ -124,7 +123,7 @@ GapOf = Callable[[Sequence[WithheldEffect]], float]
 
 
 def draw_background(
-    bench: Bench, bare: Records, rng: np.random.Generator, settings: BackgroundSettings, bisections: int
+    bench: Bench, bare: RecordArrays, rng: np.random.Generator, settings: BackgroundSettings, bisections: int
 ) -> Background | None:
     """Draw a background of a wanted size; None where one of its parts cannot reach it.
 

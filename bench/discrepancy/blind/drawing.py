@@ -17,13 +17,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.blind.background import draw_background
 from bench.discrepancy.blind.detectability import detectability
 from bench.discrepancy.blind.handed_over import (
     HANDED_OVER_SETTINGS,
-    measured,
+    hand_over,
 )
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.truth.ground_truth import ROWS, WithheldEffect
@@ -32,8 +32,6 @@ from bench.discrepancy.truth.recipe import Drawn, Recipe, Shape
 from bench.discrepancy.truth.rigs import Bench, BlindOptions, CasePlan, draw_bench, reach_of
 from bench.discrepancy.truth.withheld_effects import RECIPES
 from bench.errors import ParameterError, SimulationError
-
-Array = NDArray[np.float64]
 
 KINDS = ("none", "single", "double", "foreign")
 
@@ -168,7 +166,7 @@ def _attempt(
         return None
     # both from the coarse runs: the difference of two integrators is no gap
     gaps = bench.gaps(coarse[:-1], bare[:-1]), bench.gaps(coarse[-1:], bare[-1:])
-    case, pure = measured(name, bench, with_effects, rng)
+    case, pure = hand_over(name, bench, with_effects, rng)
     background = None
     if options.background is not None:
         background = draw_background(bench, bare[:-1], rng, options.background, DRAWING_SETTINGS.bisections)
@@ -177,7 +175,7 @@ def _attempt(
         runs = bench.run([*effects, *background.acting])
         if not all(np.isfinite(samples).all() for responses, _ in runs for samples in responses.values()):
             return None
-        case, _ = measured(name, bench, [responses for responses, _ in runs], rng, background)
+        case, _ = hand_over(name, bench, [responses for responses, _ in runs], rng, background)
     odds: dict[str, Any] = {}
     if effects and options.detectability:
         odds = detectability(pure, bench.truth.values, {e.recipe.name: e.where for e in effects})

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.blind.background import Background
 from bench.discrepancy.case.case import Case, CaseChannel, NominalParameter, record_from_arrays
 from bench.discrepancy.truth.ground_truth import (
@@ -15,8 +15,6 @@ from bench.discrepancy.truth.ground_truth import (
     Truth,
 )
 from bench.discrepancy.truth.rigs import Bench
-
-Array = NDArray[np.float64]
 
 UNITS = {
     "force": "N", "torque": "N m", "displacement": "m", "acceleration": "m/s^2", "rotation": "rad",
@@ -77,7 +75,7 @@ def _parameters(truth: Truth, rng: np.random.Generator) -> tuple[NominalParamete
     return tuple(out)
 
 
-def measured(
+def hand_over(
     name: str,
     bench: Bench,
     responses: Sequence[Mapping[str, Array]],

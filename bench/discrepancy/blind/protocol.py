@@ -34,13 +34,12 @@ from bench.discrepancy.case.case import Case, CaseChannel
 from bench.documents import parse_json
 from bench.errors import BenchError, FileFormatError, ParameterError
 from bench.files import together, write_bytes, write_text
+from bench.progress import Tell
 
 __all__ = ["BlindOptions", "draw_case", "make_blind", "run_blind", "write_case"]
 
 SEAL = "answer.sha256"
 PROTOCOL = "protocol.json"
-
-Progress = Callable[[str], None]
 
 
 def make_blind(
@@ -51,7 +50,7 @@ def make_blind(
     rng: np.random.Generator,
     options: BlindOptions | None = None,
     workers: int = 1,
-    progress: Progress = lambda text: None,
+    progress: Tell = lambda text: None,
 ) -> list[str]:
     """Make sealed cases; those that are there and whole are left alone.
 
@@ -181,7 +180,7 @@ def run_blind(
     *,
     again: bool = False,
     workers: int = 1,
-    progress: Progress = lambda text: None,
+    progress: Tell = lambda text: None,
     **options: Any,
 ) -> list[Path]:
     """Diagnose every case of a folder and write one JSON file each; answers are never opened.

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.articulated_truth.faults import (
     FAULTS,
     Fault,
@@ -25,16 +25,14 @@ from bench.discrepancy.articulated_truth.robots import (
     SETTINGS,
     Robot,
     draw_robot,
-    logged,
     reference_of,
+    robot_log,
 )
 from bench.discrepancy.articulated_truth.time_stepping import ArmMotion
 from bench.discrepancy.case.case import Case, CaseChannel, NominalParameter, record_from_arrays
 from bench.discrepancy.truth.rigs import BlindOptions
 from bench.errors import ParameterError
 from bench.mjcf import model_path
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -83,7 +81,7 @@ def draw_robot_case(
         ):
             continue
         if all(_shows(robot, withheld, i, references[-1], noise) for i in range(len(withheld))):
-            logs = [logged(robot, motion, faulty.encoding) for motion in moved]
+            logs = [robot_log(robot, motion, faulty.encoding) for motion in moved]
             case = _handed_over(name, robot, moved, logs, noise, rng)
             return case, _answer(robot, kind, withheld, noise, attempt + 1)
     raise ParameterError(
@@ -122,7 +120,7 @@ def _shows(robot: Robot, withheld: tuple[Withheld, ...], i: int, reference: Arra
     for some in (withheld, withheld[:i] + withheld[i + 1 :]):
         faulty = with_faults(robot, some)
         motion = robot.run(reference, bodies=faulty.bodies, table=faulty.table)
-        runs.append((logged(robot, motion, faulty.encoding), motion.command))
+        runs.append((robot_log(robot, motion, faulty.encoding), motion.command))
     ((q, v), u), ((q_without, v_without), u_without) = runs
 
     def change(a: Array, b: Array) -> float:

@@ -15,7 +15,7 @@ from bench.documents import (
     Label,
     Listed,
     Name,
-    Pair,
+    NumberPair,
     Positive,
     Text,
     refuse,
@@ -62,7 +62,7 @@ class AnswerRegion(_Open):
     """Coordinate."""
     reach: Positive
     """Largest magnitude of the coordinate."""
-    intervals: Listed[Pair]
+    intervals: Listed[NumberPair]
     """Where it acts."""
 
 

@@ -57,7 +57,7 @@ LABELS = {
 }
 
 
-class Table(NamedTuple):
+class CaptionedTable(NamedTuple):
     """A table: caption, header and rows of text."""
 
     caption: str
@@ -65,7 +65,7 @@ class Table(NamedTuple):
     rows: tuple[tuple[str, ...], ...]
 
 
-def tables(score: BlindScore) -> list[Table]:
+def tables(score: BlindScore) -> list[CaptionedTable]:
     """The figures, the bands, the calibration and the confusion, empty ones left out."""
     figures = []
     for name, label in LABELS.items():
@@ -76,14 +76,14 @@ def tables(score: BlindScore) -> list[Table]:
         elif share is None and not (isinstance(value, float) and math.isnan(value)):
             figures.append((label, f"{value:.3g}", "", REQUIRED.get(name, "")))
     out = [
-        Table(
+        CaptionedTable(
             f"Figures over {score.n} cases",
             ("figure", "value (95 % interval)", "cases", "must hold"),
             tuple(figures),
         )
     ]
     out += [
-        Table(
+        CaptionedTable(
             f"Right verdicts by {dimension}",
             (dimension, "right (95 % interval)", "cases"),
             tuple((band, _percent(share), str(share.n)) for band, share in bands.items()),
@@ -93,7 +93,7 @@ def tables(score: BlindScore) -> list[Table]:
     if score.reliability:
         rows = tuple((f"{stated:.3f}", f"{true:.3f}", str(n)) for stated, true, n in score.reliability)
         out.append(
-            Table(
+            CaptionedTable(
                 "Stated probability against truth, named effects",
                 ("stated, mean", "true", "named effects"),
                 rows,
@@ -109,15 +109,19 @@ def tables(score: BlindScore) -> list[Table]:
             )
             for truth, said in score.confusion.items()
         )
-        out.append(Table("What single effects were diagnosed as", ("withheld", "said, and how often"), rows))
+        out.append(
+            CaptionedTable("What single effects were diagnosed as", ("withheld", "said, and how often"), rows)
+        )
     if score.background is not None:
         out += _with_background(score.background)
     if score.wrong:
-        out.append(Table("Cases that are not right", ("case",), tuple((line,) for line in score.wrong)))
+        out.append(
+            CaptionedTable("Cases that are not right", ("case",), tuple((line,) for line in score.wrong))
+        )
     return out
 
 
-def _with_background(score: BackgroundScore) -> list[Table]:
+def _with_background(score: BackgroundScore) -> list[CaptionedTable]:
     """Figures, calibration and faults of the cases with a background."""
     rows = [
         (what, _percent(share), str(share.n), BACKGROUND_REQUIRED.get(what, "≥ 95 %"))
@@ -127,11 +131,15 @@ def _with_background(score: BackgroundScore) -> list[Table]:
     error = f"{score.calibration:.3f} ({low:.3f} to {high:.3f})"
     rows.append(("expected calibration error, named effects", error, "", "≤ 0.05"))
     rows.append(("the same if every probability were exact", f"{score.scatter:.3f}", "", ""))
-    out = [Table("With a background", ("figure", "value (95 % interval)", "cases", "must hold"), tuple(rows))]
+    out = [
+        CaptionedTable(
+            "With a background", ("figure", "value (95 % interval)", "cases", "must hold"), tuple(rows)
+        )
+    ]
     if score.reliability:
         bins = tuple((f"{stated:.3f}", f"{true:.3f}", str(n)) for stated, true, n in score.reliability)
         out.append(
-            Table(
+            CaptionedTable(
                 "Stated probability against truth, with a background",
                 ("stated, mean", "true", "named effects"),
                 bins,
@@ -139,7 +147,7 @@ def _with_background(score: BackgroundScore) -> list[Table]:
         )
     if score.wrong:
         out.append(
-            Table(
+            CaptionedTable(
                 "Cases with a background that are not right",
                 ("case",),
                 tuple((line,) for line in score.wrong),
@@ -165,7 +173,7 @@ def _row(cells: Sequence[str]) -> str:
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
 
-def page(score: BlindScore, *, title: str = "Blind trials", lead: str = "") -> Page:
+def score_page(score: BlindScore, *, title: str = "Blind trials", lead: str = "") -> Page:
     """The tables as a self-contained page, with the bands drawn."""
     from bench.figures import bar_table  # noqa: PLC0415  (matplotlib, for pages only)
 

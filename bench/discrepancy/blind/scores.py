@@ -56,7 +56,7 @@ class BlindScore:
         tellable: Share of right verdicts over all cases whose records can tell: expected log odds of at least `tellable`
             (foreign ones: `tellable_unknown`) against the nearest rival and against none, where the answers state them.
         unknown_tellable: Share of the foreign cases among these that end in "unknown".
-        struck_right: Share of cases with the true effect struck from the catalogue that end in unknown or in its kin.
+        struck_right: Share of cases with the true effect struck from the catalogue that end in unknown or in an effect of its family.
         struck_unknown: Share of them that end in unknown.
         sets_hold_truth: Share of verdicts with a declared indistinguishable set whose names, sets included, hold the truth.
         mean_set: Mean size of the declared sets.

@@ -5,7 +5,7 @@ What counts as right, by the class of a case:
 - none: the verdict *none* (anything else is a false alarm); foreign: the verdict *unknown*.
 - single, double: the verdict *effect*, with the withheld effects and no others, each at its place; one of them may be another
   member of a set that the verdict declares indistinguishable, if the set holds the truth.
-- struck (the true effect was taken out of the catalogue): *unknown*, or an effect of the truth's family: its nearest kin.
+- struck (the true effect was taken out of the catalogue): *unknown*, or an effect of the truth's family.
 - with a background (main, background, unstated, clean): see `background_score`; these have figures of their own.
 """
 
@@ -27,7 +27,7 @@ from bench.discrepancy.blind.background_score import (
     background_right,
     background_summary,
 )
-from bench.discrepancy.blind.proportions import calibration_error, reliability, share_of
+from bench.discrepancy.blind.proportions import Share, calibration_error, reliability, share_of
 from bench.discrepancy.blind.region_overlap import region_scores
 from bench.discrepancy.blind.schema import ANSWER_LIMITS, AnswerDocument
 from bench.discrepancy.blind.scores import BlindScore, Scored
@@ -152,42 +152,8 @@ def summary(scored: Sequence[Scored]) -> BlindScore:
     """Sum up scored cases."""
     every, scored = scored, [s for s in scored if s.kind not in CLASSES]
     beside = [(s.name, s.answer, s.result) for s in every if s.kind in CLASSES]
-    by_kind: dict[str, list[Scored]] = defaultdict(list)
-    confusion: dict[str, dict[str, int]] = defaultdict(lambda: defaultdict(int))
-    for s in scored:
-        by_kind[s.kind].append(s)
-        if s.kind == "single":
-            confusion[s.truth[0][0]][" + ".join(sorted(n for n, _ in s.said)) or s.verdict] += 1
-    singles = by_kind["single"]
-    declared = [s for s in scored if s.kind in {"single", "double"} and s.result.get("indistinguishable")]
-    tellable = [s for s in scored if s.kind != "struck" and _tellable(s)]
-    sizes = [len(entry) for s in declared for entry in s.result["indistinguishable"]]
-    shares = {
-        "exact": share_of(s.right for s in singles),
-        "strict": share_of(set(s.said) == set(s.truth) and s.verdict == "effect" for s in singles),
-        "family": share_of(bool(s.family) for s in singles),
-        "place": share_of(_places(scored)),
-        "false_alarms": share_of(not s.right for s in by_kind["none"]),
-        "unknown_caught": share_of(s.right for s in by_kind["foreign"]),
-        "both_named": share_of(s.right for s in by_kind["double"]),
-        "tellable": share_of(s.right for s in tellable),
-        "unknown_tellable": share_of(s.right for s in tellable if s.kind == "foreign"),
-        "struck_right": share_of(s.right for s in by_kind["struck"]),
-        "struck_unknown": share_of(s.verdict == "unknown" for s in by_kind["struck"]),
-        "sets_hold_truth": share_of(_held(s) for s in declared),
-    }
-    hits = [
-        (float(e["probability"]), e["name"] in {n for n, _ in s.truth})
-        for s in scored
-        if s.kind != "struck"
-        for e in s.result["named"]
-    ]
-    own = {"none": "none", "foreign": "unknown", "single": "effect", "double": "effect"}
-    verdicts = [
-        (float(s.result["probabilities"][s.verdict]), s.verdict == own[s.kind])
-        for s in scored
-        if s.kind in own and s.verdict in (s.result.get("probabilities") or {})
-    ]
+    sizes = [len(entry) for s in _declared(scored) for entry in s.result["indistinguishable"]]
+    shares, hits, verdicts = _shares(scored), _effects_claimed(scored), _verdicts_claimed(scored)
     ratios = [r for s in scored for r in _ratios(s.result)]
     seconds = [float(s.result["seconds"]) for s in every if s.result.get("seconds")]
     f1 = [f for s in scored for f in region_scores(s.result, s.answer)]
@@ -206,10 +172,67 @@ def summary(scored: Sequence[Scored]) -> BlindScore:
         shares=shares,
         bands=by_band((s.bands, s.right) for s in every),
         reliability=tuple(reliability(hits)),
-        confusion={k: dict(v) for k, v in sorted(confusion.items())},
+        confusion=_confusion(scored),
         wrong=tuple(_complaint(s) for s in scored if not s.right),
         background=background_summary(beside) if beside else None,
     )
+
+
+def _declared(scored: Sequence[Scored]) -> list[Scored]:
+    """Cases with sets of effects that their verdicts cannot tell apart."""
+    return [s for s in scored if s.kind in {"single", "double"} and s.result.get("indistinguishable")]
+
+
+def _shares(scored: Sequence[Scored]) -> dict[str, Share]:
+    """Shares of what is right, by the name that the score has for each."""
+    by_kind: dict[str, list[Scored]] = defaultdict(list)
+    for s in scored:
+        by_kind[s.kind].append(s)
+    singles = by_kind["single"]
+    tellable = [s for s in scored if s.kind != "struck" and _tellable(s)]
+    return {
+        "exact": share_of(s.right for s in singles),
+        "strict": share_of(set(s.said) == set(s.truth) and s.verdict == "effect" for s in singles),
+        "family": share_of(bool(s.family) for s in singles),
+        "place": share_of(_places(scored)),
+        "false_alarms": share_of(not s.right for s in by_kind["none"]),
+        "unknown_caught": share_of(s.right for s in by_kind["foreign"]),
+        "both_named": share_of(s.right for s in by_kind["double"]),
+        "tellable": share_of(s.right for s in tellable),
+        "unknown_tellable": share_of(s.right for s in tellable if s.kind == "foreign"),
+        "struck_right": share_of(s.right for s in by_kind["struck"]),
+        "struck_unknown": share_of(s.verdict == "unknown" for s in by_kind["struck"]),
+        "sets_hold_truth": share_of(_held(s) for s in _declared(scored)),
+    }
+
+
+def _confusion(scored: Sequence[Scored]) -> dict[str, dict[str, int]]:
+    """How often each effect was called what, of cases with a single one."""
+    counts: dict[str, dict[str, int]] = defaultdict(lambda: defaultdict(int))
+    for s in scored:
+        if s.kind == "single":
+            counts[s.truth[0][0]][" + ".join(sorted(n for n, _ in s.said)) or s.verdict] += 1
+    return {k: dict(v) for k, v in sorted(counts.items())}
+
+
+def _effects_claimed(scored: Sequence[Scored]) -> list[tuple[float, bool]]:
+    """Probability that each named effect was given, and whether it is there."""
+    return [
+        (float(e["probability"]), e["name"] in {n for n, _ in s.truth})
+        for s in scored
+        if s.kind != "struck"
+        for e in s.result["named"]
+    ]
+
+
+def _verdicts_claimed(scored: Sequence[Scored]) -> list[tuple[float, bool]]:
+    """Probability that each verdict was given, and whether it is the right one."""
+    own = {"none": "none", "foreign": "unknown", "single": "effect", "double": "effect"}
+    return [
+        (float(s.result["probabilities"][s.verdict]), s.verdict == own[s.kind])
+        for s in scored
+        if s.kind in own and s.verdict in (s.result.get("probabilities") or {})
+    ]
 
 
 def _least_odds(answer: Mapping[str, Any]) -> float:

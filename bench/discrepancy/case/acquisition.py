@@ -22,9 +22,8 @@ from numpy.typing import NDArray
 from scipy import fft, signal
 from scipy.interpolate import CubicSpline
 
+from bench.arrays import Array
 from bench.errors import ParameterError, UnknownNameError
-
-Array = NDArray[np.float64]
 
 Interpolation = Literal["linear", "band_limited", "zero_order_hold"]
 INTERPOLATIONS = get_args(Interpolation)

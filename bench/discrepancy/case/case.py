@@ -13,7 +13,7 @@ first two, what is not stated is looked for in the records (`search.load_interpo
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -27,7 +27,7 @@ from bench.recording.outliers import bridged, outliers
 
 
 @dataclass(frozen=True)
-class CaseSettings:
+class CaseLimits:
     """Numbers of `bench.discrepancy.case.case`."""
 
     min_samples: int = 200
@@ -36,7 +36,7 @@ class CaseSettings:
     """Largest value of a sample: its square over a power of the step is still a number."""
 
 
-SETTINGS = CaseSettings()
+SETTINGS = CaseLimits()
 
 
 @dataclass(frozen=True)
@@ -117,6 +117,10 @@ class CaseRecord:
     def time(self) -> NDArray[np.float64]:
         """Sample times (n,) [s]."""
         return np.asarray(self.start + self.step * np.arange(len(self)), dtype=np.float64)
+
+
+Prediction = Callable[[CaseRecord], Mapping[str, NDArray[np.float64]]]
+"""What a model says of the channels of a record (n,), by name."""
 
 
 @dataclass(frozen=True)

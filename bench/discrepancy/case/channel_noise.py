@@ -12,9 +12,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.settings import DEFAULT, CaseSettings
-
-Array = NDArray[np.float64]
 
 
 def noise_floor(x: Array) -> float:

@@ -83,7 +83,7 @@ def _known_unit(unit: str) -> str:
     return unit
 
 
-RigName = Annotated[
+CaseRigName = Annotated[
     Name,
     BeforeValidator(_known_rig),
     Field(json_schema_extra={"anyOf": [{"enum": list(PARAMETERS)}, {"pattern": r"\.xml$"}]}),
@@ -174,7 +174,7 @@ class NominalDocument(Document):
     """The nominal model of a case, and its channels."""
 
     entry_name = "a nominal model"
-    rig: RigName
+    rig: CaseRigName
     """A rig of the bench (sdof, damper, joint), or the path of an MJCF file in the same folder."""
     parameters: Table[ParameterEntry]
     """Nominal parameters by name; of an MJCF as "stiffness:JOINT", "mass:BODY", …"""
@@ -194,8 +194,9 @@ class NominalDocument(Document):
     """Laws of the bench that the model holds besides, see `case.elements`."""
     limits: Table[Positive] = Field(default_factory=dict)
     """Largest magnitude of a channel that the next test may reach; those of the records by default."""
-    joints: Table[Literal["hold"] | Number] = Field(default_factory=dict)
-    """Joints of an MJCF that were held: "hold" where its own zero was, or the coordinate at which they were."""
+    joints: Table[Literal["hold", "follow"] | Number] = Field(default_factory=dict)
+    """Joints of an MJCF that were held: "hold" where its own zero was, or the coordinate at which they were. One that is measured and
+    has no drive that was recorded: "follow", and it moves as it was measured."""
     window_s: Positive | None = None
     """Length of the windows that records of a rig that nothing holds are cut into [s]."""
 

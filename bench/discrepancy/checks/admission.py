@@ -10,7 +10,7 @@ from bench.discrepancy.case.free_decay import is_free_decay, with_no_load
 from bench.discrepancy.case.rig_units import in_coherent_units
 from bench.discrepancy.case.unit_conversion import converted
 from bench.discrepancy.checks.counting import counted_from_rest
-from bench.discrepancy.checks.data_quality import refuse
+from bench.discrepancy.checks.data_quality import refuse_unusable
 from bench.discrepancy.checks.initial_motion import with_starts_found
 from bench.discrepancy.checks.like_mujoco import unlike_mujoco
 from bench.discrepancy.checks.load_limits import within_limits
@@ -70,7 +70,7 @@ def admitted(declared: Case, *, anyway: bool = False, settings: DiagnosisSetting
         said = (*said, *driven, *limited, *shifted, *value_notes(case, rig, settings=settings.model))
     case = with_starts_found(case, settings=settings)
     problem = Problem(case, structure_of(case, settings=settings), case.identification, settings=settings)
-    refuse(problem)
+    refuse_unusable(problem)
     doubts = suspicions(declared, problem)
     for first in doubts:
         if not anyway:

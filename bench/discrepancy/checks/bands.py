@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import signal
 
+from bench.arrays import Array
 from bench.discrepancy.settings import DEFAULT, ScaleSettings
 from bench.recording.units import conversion, read_as
 
-Array = NDArray[np.float64]
 SUSPECTS = {
     "m": ("mm", "cm", "um", "in", "ft"), "rad": ("deg", "rev", "mrad"), "m/s": ("mm/s", "cm/s", "in/s", "km/h"),
     "rad/s": ("deg/s", "rpm"), "m/s^2": ("g", "mm/s^2", "cm/s^2", "in/s^2", "mg"), "rad/s^2": ("deg/s^2",),

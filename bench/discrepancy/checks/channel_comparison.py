@@ -36,7 +36,7 @@ def comparison_notes(problem: Problem) -> list[str]:
     return found if found or problem.driven else list(_against_model(problem))
 
 
-class Comparison(NamedTuple):
+class ChannelComparison(NamedTuple):
     """Two channels of the same motion, over the frequencies at which both are strong.
 
     Attributes:
@@ -54,7 +54,7 @@ class Comparison(NamedTuple):
     steady: float
 
 
-def compare(
+def compare_channels(
     first: Array,
     second: Array,
     *,
@@ -62,7 +62,7 @@ def compare(
     noise: tuple[float, float],
     step: float,
     settings: ChecksSettings = DEFAULT.checks,
-) -> Comparison | None:
+) -> ChannelComparison | None:
     """Compare two channels that measure derivatives of one motion.
 
     Args:
@@ -91,7 +91,7 @@ def compare(
         slope, offset = np.polyfit(x, y, 1)
         drift = float(slope * len(first))
         steady = 1.0 - float(np.var(y - slope * x - offset) / max(np.var(y), 1e-300))
-    return Comparison(factor, correlation, lag, drift, steady)
+    return ChannelComparison(factor, correlation, lag, drift, steady)
 
 
 def _cross(
@@ -136,7 +136,7 @@ def _between_channels(problem: Problem) -> Iterator[str]:
         if first.order == second.order or not np.isclose(abs(parallel(first.row, second.row)), 1.0):
             continue
         for record in problem.records:
-            pair = compare(
+            pair = compare_channels(
                 record.values[first.channel],
                 record.values[second.channel],
                 orders=(first.order, second.order),
@@ -151,7 +151,7 @@ def _between_channels(problem: Problem) -> Iterator[str]:
 
 
 def _pair_notes(
-    first: str, second: str, pair: Comparison, record: CaseRecord, *, settings: ChecksSettings
+    first: str, second: str, pair: ChannelComparison, record: CaseRecord, *, settings: ChecksSettings
 ) -> Iterator[str]:
     if abs(pair.correlation) < settings.shape:
         return

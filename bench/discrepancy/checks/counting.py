@@ -12,10 +12,10 @@ from dataclasses import replace
 import numpy as np
 
 from bench.discrepancy.case.case import Case, CaseRecord
-from bench.discrepancy.checks.reference import Reference
+from bench.discrepancy.checks.reference import MujocoReference
 
 
-def counted_from_rest(case: Case, reference: Reference) -> tuple[Case, tuple[str, ...]]:
+def counted_from_rest(case: Case, reference: MujocoReference) -> tuple[Case, tuple[str, ...]]:
     """A case whose channels count from rest, and which of them did not, in words.
 
     Args:

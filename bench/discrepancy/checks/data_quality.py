@@ -1,6 +1,6 @@
 """Whether a case can be diagnosed at all, and what limits the diagnosis: bad input said plainly, with what to do.
 
-What makes every verdict meaningless is refused (`refuse`). What only limits a verdict becomes a note (`notes`) beside it.
+What makes every verdict meaningless is refused (`refuse_unusable`). What only limits a verdict becomes a note (`notes`) beside it.
 Notes that compare a channel with another, or with the nominal model (`checks.channel_comparison`), look for what no missing force
 does: a constant factor that is that of a unit, a sign, a shift in time. An effect that the diagnosis can name itself may be noted too.
 """
@@ -19,7 +19,7 @@ from bench.discrepancy.settings import DiagnosisSettings
 from bench.errors import IdentificationError, RecordingError
 
 
-def refuse(problem: Problem) -> None:
+def refuse_unusable(problem: Problem) -> None:
     """Refuse records that no diagnosis can use.
 
     Args:

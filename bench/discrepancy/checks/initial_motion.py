@@ -13,27 +13,22 @@ record is explained, an error that is there with the first sample and dies away 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from bench.discrepancy.case.case import Case, CaseRecord
+from bench.arrays import Array
+from bench.discrepancy.case.case import Case, CaseRecord, Prediction
 from bench.discrepancy.case.channel_noise import noise_floor
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.model.structure import Structure
 from bench.discrepancy.response.windows import channels_of, drifts
 from bench.discrepancy.settings import DEFAULT, ChecksSettings, DiagnosisSettings
 from bench.discrepancy.simulation.linear_response import linear_run
-from bench.discrepancy.simulation.stick_slip import LinearStructure
-
-Array = NDArray[np.float64]
+from bench.discrepancy.simulation.stick_slip import StructureMatrices
 
 STATED = "starts_in_motion"
 """Option of a case that says which records start in motion; where it is given, nothing is looked for."""
-
-Prediction = Callable[[CaseRecord], Mapping[str, Array]]
 
 
 def with_starts_found(
@@ -75,7 +70,7 @@ def with_starts_found(
 def _begins_off_rest(
     case: Case,
     structure: Structure,
-    linear: LinearStructure,
+    linear: StructureMatrices,
     record: CaseRecord,
     predict: Prediction | None,
     *,
@@ -154,7 +149,7 @@ def _predicted(structure: Structure, record: CaseRecord, predict: Prediction) ->
     return np.column_stack([free_run[o.channel] for o in structure.observers])
 
 
-def _samples(linear: LinearStructure, record: CaseRecord, *, settings: ChecksSettings) -> int:
+def _samples(linear: StructureMatrices, record: CaseRecord, *, settings: ChecksSettings) -> int:
     """Samples at the beginning that are looked at."""
     squares = np.linalg.eigvals(np.linalg.solve(linear.mass, linear.stiffness)).real
     duration = len(record) * record.step

@@ -15,16 +15,14 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 from mujoco import rollout
-from numpy.typing import NDArray
 
 from bench import native
+from bench.arrays import Array
 from bench.discrepancy.case.acquisition import at_times
 from bench.discrepancy.case.case import CaseRecord
-from bench.discrepancy.checks.reference import Reference
+from bench.discrepancy.checks.reference import MujocoReference
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.settings import LikenessSettings
-
-Array = NDArray[np.float64]
 
 
 class Deviation(NamedTuple):
@@ -97,7 +95,7 @@ ITEMS: dict[str, Callable[[mujoco.MjModel], None]] = {
 
 def unlike_mujoco(
     problem: Problem,
-    reference: Reference,
+    reference: MujocoReference,
     records: Sequence[CaseRecord],
     settings: LikenessSettings | None = None,
 ) -> str:
@@ -133,7 +131,7 @@ def unlike_mujoco(
 
 
 def _deviations(
-    problem: Problem, reference: Reference, model: mujoco.MjModel, record: CaseRecord, length: int, split: int,
+    problem: Problem, reference: MujocoReference, model: mujoco.MjModel, record: CaseRecord, length: int, split: int,
     settings: LikenessSettings,
 ) -> list[Deviation]:  # fmt: skip
     """Channels on which the simulations part."""
@@ -164,7 +162,7 @@ def _deviations(
     return out
 
 
-def _split(reference: Reference, step: float) -> int:
+def _split(reference: MujocoReference, step: float) -> int:
     """MuJoCo's steps a sample: its own step size, or that at which it is accurate, a time constant of the fastest motion."""
     longest = min(reference.model.opt.timestep, 1.0 / max(reference.fastest, 1e-9))
     return max(int(np.ceil(step / longest - 1e-9)), 1)
@@ -176,7 +174,7 @@ def _rms(x: Array) -> float:
 
 @native.quiet()
 def simulated(
-    reference: Reference,
+    reference: MujocoReference,
     model: mujoco.MjModel,
     record: CaseRecord,
     length: int,
@@ -212,7 +210,9 @@ def simulated(
     return np.asarray(readings[:, list(reference.responses.values())] - reference.offsets, dtype=np.float64)
 
 
-def _culprit(problem: Problem, reference: Reference, record: CaseRecord, settings: LikenessSettings) -> str:
+def _culprit(
+    problem: Problem, reference: MujocoReference, record: CaseRecord, settings: LikenessSettings
+) -> str:
     """The item without which MuJoCo comes nearest to the nominal simulation; empty where none helps."""
     split = _split(reference, record.step)
     length = min(len(record), settings.steps // split)

@@ -11,13 +11,11 @@ from dataclasses import replace
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.settings import DEFAULT, ModelSettings
 from bench.rig import Rig
-
-Array = NDArray[np.float64]
 
 
 def within_limits(

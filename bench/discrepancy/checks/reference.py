@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench import native
+from bench.arrays import Array
 from bench.discrepancy.case.case import Case, CaseChannel
 from bench.discrepancy.model.mjcf import plain_rig
 from bench.discrepancy.model.mjcf_channels import loads_and_responses
@@ -23,13 +24,12 @@ from bench.discrepancy.settings import ModelSettings
 from bench.rig import Rig
 from bench.rig.building import parse
 
-Array = NDArray[np.float64]
 PROBES = {"position": mujoco.mjtSensor.mjSENS_JOINTPOS, "velocity": mujoco.mjtSensor.mjSENS_JOINTVEL}
 """Sensors for channels that refer to a joint; MuJoCo has none that reads its acceleration."""
 
 
 @dataclass(frozen=True)
-class Reference:
+class MujocoReference:
     """A model in MuJoCo, and where the channels of a case are in it.
 
     Attributes:
@@ -65,7 +65,7 @@ def actuators_of(case: Case, rig: Rig, *, settings: ModelSettings) -> dict[str, 
 
 
 @native.quiet()
-def reference_of(case: Case, rig: Rig, *, settings: ModelSettings) -> Reference:
+def reference_of(case: Case, rig: Rig, *, settings: ModelSettings) -> MujocoReference:
     """The reference of a case.
 
     Args:
@@ -104,7 +104,7 @@ def reference_of(case: Case, rig: Rig, *, settings: ModelSettings) -> Reference:
     data.qpos[:] = rest
     mujoco.mj_forward(model, data)
     offsets = data.sensordata[list(places.values())].copy()
-    return Reference(model, inputs, places, control, rest, offsets, unsteady, fastest)
+    return MujocoReference(model, inputs, places, control, rest, offsets, unsteady, fastest)
 
 
 def _prescribed(

@@ -12,8 +12,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.case.channel_noise import noise_floor
 from bench.discrepancy.case.single_axis import motion_channels
@@ -31,8 +31,6 @@ from bench.discrepancy.model.nominal_elements import own_force
 from bench.discrepancy.settings import ChecksSettings, ScaleSettings
 from bench.errors import UnitError
 from bench.recording.units import conversion, read_as, si_unit
-
-Array = NDArray[np.float64]
 
 
 class Observed(NamedTuple):

@@ -19,7 +19,7 @@ import numba
 import numpy as np
 
 from bench.discrepancy.effects.effect import Effect, FreeParameter, Scales, Values
-from bench.discrepancy.numerics.cubic_spline import cubic, piece, weights
+from bench.discrepancy.numerics.cubic_spline import cubic, piece, spline_weights
 from bench.laws.base import ForceLaw, Parameter, kernel
 
 _inline: Any = numba.njit(error_model="numpy", nogil=True, forceinline=True)
@@ -144,7 +144,7 @@ def patch_force(t, q, v, z, theta, f):
     y = min(max(v[0] * theta[1], -1.0), 1.0)
     w = _warped(y, PATCHES[1])
     i, j = piece(u, PATCHES[0]), piece(w, PATCHES[1])
-    along, across = weights(u - i), weights(w - j)
+    along, across = spline_weights(u - i), spline_weights(w - j)
     for a in range(4):
         k = 2 + (i + a) * (PATCHES[1] + 3) + j
         row = (

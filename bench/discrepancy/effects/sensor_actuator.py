@@ -28,6 +28,72 @@ class SensorActuatorSettings:
 
 SETTINGS = SensorActuatorSettings()
 
+
+def _time(name: str, *grid: float) -> FreeParameter:
+    """A delay or time constant: eight milliseconds within a factor of seven with 95 %."""
+    bounds = (math.log(1e-4), math.log(1.0))
+    return FreeParameter(name, mean=math.log(0.008), std=1.0, bounds=bounds, grid=log_grid(*grid))
+
+
+def _sensor_delay(
+    channel: str, quantity: str, symbol: str, grid: tuple[float, ...], log_prior: float = 0.0
+) -> Effect:
+    return Effect(
+        f"{channel}_delay",
+        "sensor",
+        "sensor",
+        (_time("delay", *grid),),
+        f"{symbol}(t - tau)",
+        signal=signals.sensor_delay,
+        quantity=quantity,
+        log_prior=log_prior,
+    )
+
+
+def _sensor_gain_error(channel: str, quantity: str, symbol: str, log_prior: float = 0.0) -> Effect:
+    return Effect(
+        f"{channel}_gain_error",
+        "sensor",
+        "sensor",
+        (FreeParameter("relative_error", signed=True, std=0.3, bounds=(-3.0, 5.0)),),
+        f"(1 + e) {symbol}",
+        signal=signals.gain,
+        exact=True,
+        quantity=quantity,
+        log_prior=log_prior,
+    )
+
+
+def _sensor_bias(channel: str, quantity: str, symbol: str, log_prior: float = 0.0) -> Effect:
+    return Effect(
+        f"{channel}_bias",
+        "sensor",
+        "sensor",
+        (FreeParameter("bias", quantity, signed=True, std=0.5),),
+        f"{symbol} + b",
+        signal=signals.offset,
+        exact=True,
+        quantity=quantity,
+        log_prior=log_prior,
+    )
+
+
+def _sensor_clipping(channel: str, quantity: str, symbol: str, log_prior: float = 0.0) -> Effect:
+    level = FreeParameter(
+        "level", quantity, mean=math.log(0.9), std=0.3, bounds=(-2.0, 0.3), grid=log_grid(0.75, 0.97)
+    )
+    return Effect(
+        f"{channel}_clipping",
+        "sensor",
+        "sensor",
+        (level,),
+        f"{symbol} clipped at a level",
+        signal=signals.clip,
+        quantity=quantity,
+        log_prior=log_prior,
+    )
+
+
 CHANNELS: tuple[Effect, ...] = (
     Effect(
         "mass_error",
@@ -62,15 +128,7 @@ CHANNELS: tuple[Effect, ...] = (
         "actuator_delay",
         "actuator",
         "actuator",
-        (
-            FreeParameter(
-                "delay",
-                mean=math.log(0.008),
-                std=1.0,
-                bounds=(math.log(1e-4), math.log(1.0)),
-                grid=log_grid(0.003, 0.01, 0.03),
-            ),
-        ),
+        (_time("delay", 0.003, 0.01, 0.03),),
         "F(t - tau)",
         signal=signals.delay,
         between_samples=True,
@@ -79,15 +137,7 @@ CHANNELS: tuple[Effect, ...] = (
         "actuator_lag",
         "actuator",
         "actuator",
-        (
-            FreeParameter(
-                "time_constant",
-                mean=math.log(0.008),
-                std=1.0,
-                bounds=(math.log(1e-4), math.log(1.0)),
-                grid=log_grid(0.003, 0.01, 0.03),
-            ),
-        ),
+        (_time("time_constant", 0.003, 0.01, 0.03),),
         "tau F' + F = command",
         signal=signals.lag,
     ),
@@ -123,162 +173,17 @@ CHANNELS: tuple[Effect, ...] = (
         exact=True,
         quantity="position",
     ),
-    Effect(
-        "displacement_delay",
-        "sensor",
-        "sensor",
-        (
-            FreeParameter(
-                "delay",
-                mean=math.log(0.008),
-                std=1.0,
-                bounds=(math.log(1e-4), math.log(1.0)),
-                grid=log_grid(0.003, 0.01, 0.03),
-            ),
-        ),
-        "x(t - tau)",
-        signal=signals.sensor_delay,
-        quantity="position",
-    ),
-    Effect(
-        "displacement_gain_error",
-        "sensor",
-        "sensor",
-        (FreeParameter("relative_error", signed=True, std=0.3, bounds=(-3.0, 5.0)),),
-        "(1 + e) x",
-        signal=signals.gain,
-        exact=True,
-        quantity="position",
-    ),
-    Effect(
-        "displacement_bias",
-        "sensor",
-        "sensor",
-        (FreeParameter("bias", "position", signed=True, std=0.5),),
-        "x + b",
-        signal=signals.offset,
-        exact=True,
-        quantity="position",
-        log_prior=-1.0,
-    ),
-    Effect(
-        "displacement_clipping",
-        "sensor",
-        "sensor",
-        (
-            FreeParameter(
-                "level",
-                "position",
-                mean=math.log(0.9),
-                std=0.3,
-                bounds=(-2.0, 0.3),
-                grid=log_grid(0.75, 0.97),
-            ),
-        ),
-        "x clipped at a level",
-        signal=signals.clip,
-        quantity="position",
-        log_prior=-1.0,
-    ),
-    Effect(
-        "acceleration_gain_error",
-        "sensor",
-        "sensor",
-        (FreeParameter("relative_error", signed=True, std=0.3, bounds=(-3.0, 5.0)),),
-        "(1 + e) a",
-        signal=signals.gain,
-        exact=True,
-        quantity="acceleration",
-        log_prior=-1.0,
-    ),
-    Effect(
-        "acceleration_delay",
-        "sensor",
-        "sensor",
-        (
-            FreeParameter(
-                "delay",
-                mean=math.log(0.008),
-                std=1.0,
-                bounds=(math.log(1e-4), math.log(1.0)),
-                grid=log_grid(0.003, 0.01),
-            ),
-        ),
-        "a(t - tau)",
-        signal=signals.sensor_delay,
-        quantity="acceleration",
-        log_prior=-1.0,
-    ),
-    Effect(
-        "acceleration_bias",
-        "sensor",
-        "sensor",
-        (FreeParameter("bias", "acceleration", signed=True, std=0.5),),
-        "a + b",
-        signal=signals.offset,
-        exact=True,
-        quantity="acceleration",
-        log_prior=-1.0,
-    ),
-    Effect(
-        "acceleration_clipping",
-        "sensor",
-        "sensor",
-        (
-            FreeParameter(
-                "level",
-                "acceleration",
-                mean=math.log(0.9),
-                std=0.3,
-                bounds=(-2.0, 0.3),
-                grid=log_grid(0.75, 0.97),
-            ),
-        ),
-        "a clipped at a level",
-        signal=signals.clip,
-        quantity="acceleration",
-        log_prior=EFFECT_SETTINGS.rare,
-    ),
-    Effect(
-        "velocity_gain_error",
-        "sensor",
-        "sensor",
-        (FreeParameter("relative_error", signed=True, std=0.3, bounds=(-3.0, 5.0)),),
-        "(1 + e) v",
-        signal=signals.gain,
-        exact=True,
-        quantity="velocity",
-        log_prior=-1.0,
-    ),
-    Effect(
-        "velocity_delay",
-        "sensor",
-        "sensor",
-        (
-            FreeParameter(
-                "delay",
-                mean=math.log(0.008),
-                std=1.0,
-                bounds=(math.log(1e-4), math.log(1.0)),
-                grid=log_grid(0.003, 0.01),
-            ),
-        ),
-        "v(t - tau)",
-        signal=signals.sensor_delay,
-        quantity="velocity",
-        log_prior=-1.0,
-    ),
-    Effect(
-        "velocity_bias",
-        "sensor",
-        "sensor",
-        (FreeParameter("bias", "velocity", signed=True, std=0.5),),
-        "v + b",
-        signal=signals.offset,
-        exact=True,
-        quantity="velocity",
-        log_prior=-1.0,
-    ),
+    _sensor_delay("displacement", "position", "x", (0.003, 0.01, 0.03)),
+    _sensor_gain_error("displacement", "position", "x"),
+    _sensor_bias("displacement", "position", "x", log_prior=-1.0),
+    _sensor_clipping("displacement", "position", "x", log_prior=-1.0),
+    _sensor_gain_error("acceleration", "acceleration", "a", log_prior=-1.0),
+    _sensor_delay("acceleration", "acceleration", "a", (0.003, 0.01), log_prior=-1.0),
+    _sensor_bias("acceleration", "acceleration", "a", log_prior=-1.0),
+    _sensor_clipping("acceleration", "acceleration", "a", log_prior=EFFECT_SETTINGS.rare),
+    _sensor_gain_error("velocity", "velocity", "v", log_prior=-1.0),
+    _sensor_delay("velocity", "velocity", "v", (0.003, 0.01), log_prior=-1.0),
+    _sensor_bias("velocity", "velocity", "v", log_prior=-1.0),
     *(
         Effect(
             f"{channel}_crosstalk",

@@ -7,13 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.case.case import CaseRecord
 from bench.discrepancy.model.placement import Hypothesis
 from bench.discrepancy.response.initial_states import in_motion
 from bench.discrepancy.response.simulator import Simulator
 from bench.discrepancy.response.windows import cut
-
-Array = NDArray[np.float64]
 
 
 def predict(simulator: Simulator, hypothesis: Hypothesis, vector: Array, record: CaseRecord) -> Array:

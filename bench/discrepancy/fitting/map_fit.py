@@ -15,13 +15,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Hypothesis
 from bench.discrepancy.numerics.least_squares import Prior, minimise
 from bench.discrepancy.response.simulator import Simulator
 from bench.discrepancy.settings import DEFAULT, DiagnosisSettings
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,8 +10,8 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.articulated.recognition import applies
 from bench.discrepancy.case.case import Case, NominalParameter
 from bench.discrepancy.intake.assumptions import Assumptions, assumed_parameters, is_servo
@@ -23,7 +23,6 @@ from bench.files import write_text
 from bench.record_files.column_map import name_and_unit
 from bench.recording.units import conversion, read_as
 
-Array = NDArray[np.float64]
 _TURNING = int(mujoco.mjtJoint.mjJNT_HINGE)
 
 

@@ -9,15 +9,13 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.errors import RecordingError
 from bench.record_files.column_map import ColumnMap, name_and_unit
 from bench.record_files.columns import read_columns
-from bench.record_files.times import clock_of, time_source
+from bench.record_files.times import file_times, time_source
 from bench.recording import Recording
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -158,7 +156,7 @@ def _of_table(columns: Mapping[str, Any], rate: float, name: str) -> Log:
             f"the columns of '{name}' have {sorted(n)} samples; all of one length are expected"
         )
     if heading:
-        clock = clock_of(np.asarray(columns[heading]), "", heading, told=name_and_unit(heading)[1])
+        clock = file_times(np.asarray(columns[heading]), "", heading, told=name_and_unit(heading)[1])
         return Log(name, clock.seconds, arrays, units, clock.notes)
     if not rate > 0.0:
         raise RecordingError(

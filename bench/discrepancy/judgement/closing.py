@@ -1,4 +1,4 @@
-"""What each named effect closes of the gap, whether that is all, and where the nominal parameters have gone.
+"""What each named effect closes of the discrepancy, whether that is all, and where the nominal parameters have gone.
 
 An effect closes the part of the judging records' discrepancy that comes back when it is taken out and everything else is fitted again,
 with an interval from blocks of these records, which chose nothing.

@@ -11,21 +11,21 @@ from bench.discrepancy.fitting.goodness_of_fit import names
 from bench.discrepancy.judgement import posterior as evidence
 from bench.discrepancy.judgement.coarse import Judged, judge
 from bench.discrepancy.judgement.finding import Finding
-from bench.discrepancy.likelihood.model_error import ModelError, crude_error, error_left, own_noise
+from bench.discrepancy.likelihood.model_error import ModelInadequacy, crude_error, error_left, own_noise
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.numerics.deadline import NEVER, Deadline
 from bench.discrepancy.search.explanation import Explanation
 from bench.discrepancy.settings import DiagnosisSettings
-from bench.discrepancy.verdict import Kind, Ranked
+from bench.discrepancy.verdict import Ranked, VerdictKind
 
-Search = Callable[[Case, ModelError, Sequence[Explanation]], tuple[Case, list[Explanation]]]
+SearchByError = Callable[[Case, ModelInadequacy, Sequence[Explanation]], tuple[Case, list[Explanation]]]
 """Searches the explanations of a case, weighed by an error, beside those that are known; the case comes back with what they tell of it."""
 
 
 def coarse_explanations(
     case: Case,
-    search: Search,
+    search: SearchByError,
     known: Sequence[Explanation],
     deadline: Deadline = NEVER,
     *,
@@ -67,13 +67,13 @@ def reference(explanations: Sequence[Explanation]) -> Explanation:
     )
 
 
-def _left(case: Case, explanations: Sequence[Explanation]) -> ModelError:
+def _left(case: Case, explanations: Sequence[Explanation]) -> ModelInadequacy:
     """The error that the best of some explanations leaves."""
     structure, best = structure_of(case, settings=explanations[0].settings), reference(explanations)
     problem = Problem(case, structure, case.identification, settings=explanations[0].settings)
     if problem.windowed:
         before = best.parts[0][0].error
-        return ModelError({}, max(best.reduced * (1.0 if before is None else before.scale), 1.0))
+        return ModelInadequacy({}, max(best.reduced * (1.0 if before is None else before.scale), 1.0))
     return error_left(problem.data, structure, best.predict, problem.settings.likelihood.error)
 
 
@@ -114,18 +114,17 @@ def coarse_finding(
     )
 
 
-def _kind(problem: Problem, judged: Judged) -> Kind:
+def _kind(problem: Problem, judged: Judged) -> VerdictKind:
     """The verdict."""
     if judged.chosen.explanation.hypothesis:
         # that which rivals of other families explain as well is something, and nobody can say what kind of thing
         return "effect" if judged.agreed >= judged.settings.kind else "unknown"
-    # without stated noise a nominal model is as right as a model can be within two standard deviations of what sensors are
-    # calibrated to; noise that is stated and is not all that is left is something that is missing, whatever it be
-    material = judged.nominal > 2.0 * problem.settings.likelihood.error.least
-    return "unknown" if problem.noise_stated or (judged.vetoed and material) else "none"
+    # without stated noise a nominal model is as right as a model can be within what sensors are calibrated to; noise that is stated and
+    # is not all that is left is something that is missing, whatever it be
+    return "unknown" if problem.noise_stated or (judged.vetoed and not judged.calibrated) else "none"
 
 
-def _probabilities(kind: Kind, judged: Judged) -> dict[str, float]:
+def _probabilities(kind: VerdictKind, judged: Judged) -> dict[str, float]:
     """Probabilities of the verdicts."""
     if kind == "unknown":
         return {"effect": judged.settings.outside, "none": 0.0, "unknown": 1.0 - judged.settings.outside}
@@ -166,7 +165,8 @@ def _understated(problem: Problem, best: Explanation) -> Iterator[str]:
 def _marginal(judged: Judged) -> dict[tuple[str, str], float]:
     """Probability that each (name, place) belongs to the truth."""
     total: dict[tuple[str, str], float] = {}
-    outside = judged.settings.outside if judged.vetoed else judged.outside
+    unnamed = judged.vetoed or not judged.chosen.explanation.hypothesis
+    outside = judged.settings.outside if unnamed else judged.outside
     for weight, entry in zip(judged.weights, judged.found, strict=True):
         for key in {(p.effect.name, p.place.name) for p in entry.explanation.hypothesis}:
             total[key] = total.get(key, 0.0) + (1.0 - outside) * float(weight)
@@ -203,7 +203,7 @@ def _other_kinds(judged: Judged) -> list[str]:
     return list(dict.fromkeys(others))
 
 
-def _words(kind: Kind, judged: Judged, nearest: Explanation) -> str:
+def _words(kind: VerdictKind, judged: Judged, nearest: Explanation) -> str:
     chosen = judged.chosen.explanation
     others = _other_kinds(judged)
     if kind == "effect":
@@ -215,6 +215,11 @@ def _words(kind: Kind, judged: Judged, nearest: Explanation) -> str:
                 if others
                 else ""
             )
+        )
+    if kind == "none" and judged.calibrated and len(judged.alike) > 1:
+        return (
+            "The nominal model, its parameters re-estimated, leaves no more than what sensors are calibrated to, and no effect of the "
+            f"catalogue improves on it by two standard errors; nearest comes {names(nearest.hypothesis)}."
         )
     if kind == "none":
         return "No effect of the catalogue predicts the records better than the nominal model does with its parameters re-estimated."

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.judgement.validation_discrepancy import (
     DIVERGED_GAP,
@@ -13,8 +13,6 @@ from bench.discrepancy.judgement.validation_discrepancy import (
 )
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.search.explain import Explanation
-
-Array = NDArray[np.float64]
 
 
 class Discrepancies:

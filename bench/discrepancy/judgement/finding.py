@@ -1,4 +1,4 @@
-"""What was found of a case before its gap is measured: the verdict, what is named, and how it is put into words."""
+"""What was found of a case before its discrepancy is measured: the verdict, what is named, and how it is put into words."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from bench.discrepancy.judgement.nonparametric_rival import Rival
 from bench.discrepancy.search.explanation import Explanation
-from bench.discrepancy.verdict import Kind, NamedEffect, Ranked
+from bench.discrepancy.verdict import NamedEffect, Ranked, VerdictKind
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +29,7 @@ class Finding:
         coarse: Whether the error of the model decided, rather than noise.
     """
 
-    kind: Kind
+    kind: VerdictKind
     probabilities: dict[str, float]
     explanations: tuple[Explanation, ...]
     named: tuple[NamedEffect, ...]

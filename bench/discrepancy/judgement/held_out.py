@@ -23,8 +23,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.fitting.map_fit import Fit, free_entries
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.likelihood.whitening import fast_length
@@ -33,8 +33,6 @@ from bench.discrepancy.numerics.least_squares import (
 )
 from bench.discrepancy.search.explanation import Explanation
 from bench.discrepancy.settings import DEFAULT
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

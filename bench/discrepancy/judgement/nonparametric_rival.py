@@ -1,4 +1,4 @@
-"""Free rivals: one force that promises no law in place of all that an explanation names.
+"""Nonparametric rivals: one force that promises no law in place of all that an explanation names.
 
 Two or three laws together imitate within the noise what no catalogue holds: relaxations the memory of rubber, which reaches over
 decades of time; a stop and a cubic spring the contact of two spheres. But they are more laws, or more finely tuned ones, than what
@@ -38,7 +38,7 @@ from bench.discrepancy.likelihood.problem import Array, Problem
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.model.placements import placements
 from bench.discrepancy.screening.candidates import along
-from bench.discrepancy.screening.linear_amplitudes import Node, products
+from bench.discrepancy.screening.linear_amplitudes import GridPoint, products
 from bench.discrepancy.screening.projection import Ground
 from bench.discrepancy.screening.screen import Screen
 from bench.discrepancy.search.explanation import Explanation
@@ -63,13 +63,13 @@ class _Promise(NamedTuple):
         placed: The force, with its likeliest prior.
         start: Vector (n,) that a fit starts from.
         log_posterior: As `posterior` states it, averaged over the priors.
-        toll: What the average takes from the log posterior with the likeliest prior.
+        penalty: What the average takes from the log posterior with the likeliest prior.
     """
 
     placed: Placed
     start: Array
     log_posterior: float
-    toll: float
+    penalty: float
 
 
 def likelier_force(explanations: Sequence[Explanation]) -> Rival | None:
@@ -108,12 +108,12 @@ def _rival(problem: Problem, fitted: Fit, contacts: Sequence[Fit]) -> Fit | None
     """The fit of a single force alone, where it is likelier than a hypothesis; the likeliest one."""
     settings = problem.settings.search
     best, most = None, posterior(fitted)
-    for placed, start, toll in [*_damped(problem, contacts), *_free(problem, fitted)]:
+    for placed, start, penalty in [*_damped(problem, contacts), *_free(problem, fitted)]:
         rival = fit(
             problem, (placed,), start=start, iterations=settings.thorough, limit=fitted.cost + settings.sight
         )
-        if posterior(rival) + toll > most:
-            best, most = rival, posterior(rival) + toll
+        if posterior(rival) + penalty > most:
+            best, most = rival, posterior(rival) + penalty
     return best
 
 
@@ -141,7 +141,7 @@ def _free(problem: Problem, fitted: Fit) -> Iterator[tuple[Placed, Array, float]
     for promise in promises[: settings.judgement.free_forces]:
         # along a motion that no free run told, evidence is less than there is
         if not consistent(fitted) or promise.log_posterior > posterior(fitted) - settings.search.within_reach:
-            yield promise.placed, promise.start, promise.toll
+            yield promise.placed, promise.start, promise.penalty
 
 
 def damped(contact: Effect) -> Effect:
@@ -159,7 +159,7 @@ def damped(contact: Effect) -> Effect:
     )
 
 
-def _promised(screen: Screen, ground: Ground, node: Node) -> _Promise:
+def _promised(screen: Screen, ground: Ground, node: GridPoint) -> _Promise:
     """The evidence of a free force, linear in its coefficients along a motion that is known."""
     settings = screen.problem.settings.search
     left = ground.left
@@ -175,11 +175,11 @@ def _promised(screen: Screen, ground: Ground, node: Node) -> _Promise:
         occam = float(np.sum(np.log(np.abs(np.diag(factor[0])))))
         found.append((0.5 * float(right @ mixing @ eta) - occam, mixing, eta))
     gain, mixing, eta = max(found, key=lambda entry: entry[0])
-    toll = float(np.logaddexp.reduce([entry[0] for entry in found])) - float(np.log(len(found))) - gain
+    penalty = float(np.logaddexp.reduce([entry[0] for entry in found])) - float(np.log(len(found))) - gain
     prior = settings.log_prior_effect - 0.5 * settings.immaterial * screen.problem.n_residuals
     moved = screen.deviations + ground.moves(node.columns @ (mixing @ eta).astype(np.float32))
     placed = replace(node.placed, effect=mixed(node.placed.effect, mixing))
-    return _Promise(placed, np.concatenate([moved, eta]), alone + gain + toll + prior, toll)
+    return _Promise(placed, np.concatenate([moved, eta]), alone + gain + penalty + prior, penalty)
 
 
 def _mixings(effect: Effect, *, settings: JudgementSettings) -> Iterator[Array]:

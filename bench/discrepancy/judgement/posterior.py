@@ -16,7 +16,7 @@ from bench.discrepancy.judgement.validation_discrepancy import (
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.search.explanation import Explanation, nominal_alone, plainest
 from bench.discrepancy.settings import DEFAULT, JudgementSettings
-from bench.discrepancy.verdict import Estimate, Gap, Kind, NamedEffect, Ranked
+from bench.discrepancy.verdict import Estimate, Gap, NamedEffect, Ranked, VerdictKind
 
 FAILS = "explains the records for identification and fails on those for judging"
 """Doubt about an explanation."""
@@ -98,7 +98,7 @@ def outside_the_catalogue(settings: JudgementSettings) -> dict[str, float]:
     return {"effect": settings.within, "none": 0.0, "unknown": 1.0 - settings.within}
 
 
-def judge(explanations: Sequence[Explanation]) -> tuple[Kind, dict[str, float]]:
+def judge(explanations: Sequence[Explanation]) -> tuple[VerdictKind, dict[str, float]]:
     """Verdict, and the probabilities of "effect", "none" and "unknown"."""
     best = explanations[0]
     if not best.noise_stated:
@@ -117,7 +117,7 @@ def judge(explanations: Sequence[Explanation]) -> tuple[Kind, dict[str, float]]:
     return ("none" if not best.hypothesis else "effect"), probabilities
 
 
-def _judge_unscaled(explanations: Sequence[Explanation]) -> tuple[Kind, dict[str, float]]:
+def _judge_unscaled(explanations: Sequence[Explanation]) -> tuple[VerdictKind, dict[str, float]]:
     """Verdict where the noise is not stated: by the part of the residual power that the best explanation takes away."""
     best = explanations[0]
     nothing = nominal_alone(explanations)
@@ -249,7 +249,7 @@ def _short_of_it(explanations: Sequence[Explanation]) -> str:
     )
 
 
-def plain_words(kind: Kind, explanations: Sequence[Explanation], *, doubt: str = "") -> str:
+def plain_words(kind: VerdictKind, explanations: Sequence[Explanation], *, doubt: str = "") -> str:
     """The verdict in a sentence or two.
 
     Args:

@@ -1,10 +1,10 @@
-"""Contradiction: an explanation that fits the records it was found on and fails on those it was not shown.
+"""Posterior predictive check: an explanation that fits the records it was found on and fails on those it was not shown.
 
 Several wrong laws together can imitate a missing one within the motion of a record; at another amplitude they fall apart. How far
 a right explanation may be off on other records is told by the uncertainty of its parameters: what it was barely shown in
 identification, a stop touched once, say, it predicts poorly without being wrong. So is one that makes much of the noise of a measured
-load: a softening spring near its limit. And so is one whose free run comes by a jump between two motions, which a hair decides: it is no
-more wrong than its parameters if others explain the records of both kinds together.
+load: a softening spring near its limit. And so is one whose free run comes by a jump between two motions, which the smallest difference
+decides: it is no more wrong than its parameters if others explain the records of both kinds together.
 """
 
 from __future__ import annotations

@@ -15,14 +15,14 @@ from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Hypothesis
 from bench.discrepancy.search.closures import close
 from bench.discrepancy.search.explanation import Explanation, nominal_alone
-from bench.discrepancy.verdict import Gap, Kind
+from bench.discrepancy.verdict import Gap, VerdictKind
 
 
 def shrunk(
     case: Case,
     problem: Problem,
     explanations: Sequence[Explanation],
-    kind: Kind,
+    kind: VerdictKind,
     rival: Rival | None,
     rng: np.random.Generator,
     nearest: Explanation,

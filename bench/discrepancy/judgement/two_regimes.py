@@ -8,7 +8,7 @@ stated.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,7 +25,7 @@ from bench.discrepancy.judgement.coarse_finding import (
 from bench.discrepancy.judgement.finding import Finding
 from bench.discrepancy.judgement.nonparametric_rival import Rival, likelier_force
 from bench.discrepancy.judgement.predictive_check import contradicted
-from bench.discrepancy.likelihood.model_error import ModelError
+from bench.discrepancy.likelihood.model_error import ModelInadequacy
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.numerics.deadline import NEVER, Deadline
@@ -33,8 +33,7 @@ from bench.discrepancy.search.explain import explain
 from bench.discrepancy.search.explanation import Explanation
 from bench.discrepancy.search.load_interpolation import promising_readings
 from bench.discrepancy.settings import DEFAULT, DiagnosisSettings
-
-Progress = Callable[[str], None]
+from bench.progress import Tell
 
 
 @dataclass(frozen=True)
@@ -51,7 +50,7 @@ class How:
 
     catalogue: Sequence[Effect]
     most: int = 3
-    progress: Progress = lambda text: None
+    progress: Tell = lambda text: None
     deadline: Deadline = NEVER
     settings: DiagnosisSettings = DEFAULT
 
@@ -70,7 +69,9 @@ def found_of(case: Case, how: How, rng: np.random.Generator) -> tuple[Case, Find
 
     few = replace(how, most=min(how.most, how.settings.judgement.reference_effects))
 
-    def search(case: Case, error: ModelError, known: Sequence[Explanation]) -> tuple[Case, list[Explanation]]:
+    def search(
+        case: Case, error: ModelInadequacy, known: Sequence[Explanation]
+    ) -> tuple[Case, list[Explanation]]:
         return _explained(case, few, error, [e for e in known if len(e.hypothesis) <= few.most])
 
     known: list[Explanation] = []
@@ -137,7 +138,7 @@ def _sharp(case: Case, explanations: list[Explanation], how: How, rng: np.random
 
 
 def _explained(
-    case: Case, how: How, error: ModelError | None = None, seeds: Sequence[Explanation] = ()
+    case: Case, how: How, error: ModelInadequacy | None = None, seeds: Sequence[Explanation] = ()
 ) -> tuple[Case, list[Explanation]]:
     """The explanations of a case, and the case with what they tell of things that nobody stated: its loads and its starts."""
 

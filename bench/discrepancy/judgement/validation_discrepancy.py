@@ -1,6 +1,6 @@
 """How far the discrepancy shrinks: free runs of the judging records before, in between and after.
 
-The gap is rms(simulated - measured) / std(measured) of a position-like channel over whole judging records, simulated
+The discrepancy is rms(simulated - measured) / std(measured) of a position-like channel over whole judging records, simulated
 from rest with the measured loads and nothing else. On the joint it is that of the relative motion of each axis.
 Records that start in motion, and windows of records that would drift, begin at the state estimated from the record itself
 (`fitting.initial_state_fit`), every model's from the same samples; the metric says so.
@@ -8,11 +8,11 @@ Records that start in motion, and windows of records that would drift, begin at 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from bench.discrepancy.case.case import Case, CaseRecord
+from bench.discrepancy.case.case import Case, CaseRecord, Prediction
 from bench.discrepancy.fitting.initial_state_fit import predict as predicted
 from bench.discrepancy.fitting.initial_state_fit import run_kind
 from bench.discrepancy.likelihood.noise_covariance import forces_of_noise
@@ -22,7 +22,6 @@ from bench.discrepancy.model.structure import Structure
 from bench.discrepancy.settings import DEFAULT, JudgementSettings
 from bench.discrepancy.verdict import Gap
 
-Prediction = Callable[[CaseRecord], Mapping[str, Array]]
 DIVERGED_GAP = 1e3
 """Gap that stands for a simulation that diverged."""
 

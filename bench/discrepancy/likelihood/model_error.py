@@ -18,23 +18,20 @@ References:
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from bench.discrepancy.case.case import Case, CaseRecord
+from bench.arrays import Array
+from bench.discrepancy.case.case import Case, Prediction
 from bench.discrepancy.likelihood.whitening import RecordData, fast_length, masked
 from bench.discrepancy.model.structure import Structure
 from bench.discrepancy.settings import DEFAULT, ErrorSettings
 
-Array = NDArray[np.float64]
-Prediction = Callable[[CaseRecord], Mapping[str, Array]]
-
 
 @dataclass(frozen=True, eq=False)
-class ModelError:
+class ModelInadequacy:
     """Error of a model on some records.
 
     Attributes:
@@ -105,7 +102,7 @@ def error_left(
     structure: Structure,
     predict: Prediction,
     settings: ErrorSettings = DEFAULT.likelihood.error,
-) -> ModelError:
+) -> ModelInadequacy:
     """Error of the model that an explanation leaves.
 
     Args:
@@ -124,12 +121,12 @@ def error_left(
         response = smoothed(spectral_power(entry.responses, entry.n_bins, entry.compared), settings)
         beyond = np.maximum(found - own_noise(entry), settings.least**2 * response)
         power.update({(entry.record.name, name): beyond[:, c] for c, name in enumerate(channels)})
-    return ModelError(power, together=_together(structure), settings=settings)
+    return ModelInadequacy(power, together=_together(structure), settings=settings)
 
 
 def crude_error(
     case: Case, structure: Structure, settings: ErrorSettings = DEFAULT.likelihood.error
-) -> ModelError:
+) -> ModelInadequacy:
     """Error of a model of which nothing is known yet: white, a part of each channel."""
     level = {
         (record.name, name): (settings.crude * float(np.std(record.values[name]))) ** 2
@@ -137,7 +134,7 @@ def crude_error(
         for name in structure.channels
     }
     power = {key: np.array([value]) for key, value in level.items()}
-    return ModelError(power, together=_together(structure), crude=True, settings=settings)
+    return ModelInadequacy(power, together=_together(structure), crude=True, settings=settings)
 
 
 def _together(structure: Structure) -> float:

@@ -11,14 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from bench.arrays import Array
 from bench.discrepancy.case.case import CaseRecord
 from bench.discrepancy.likelihood.whitening import fast_length, masked
 from bench.discrepancy.model.placement import Hypothesis
 from bench.discrepancy.response.simulator import Simulator
 from bench.discrepancy.settings import LikelihoodSettings
 from bench.discrepancy.simulation.stick_slip import Motion
-
-Array = NDArray[np.float64]
 
 
 def whitening_behind(

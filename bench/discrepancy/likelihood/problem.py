@@ -14,8 +14,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.case.case import CaseRecord
-from bench.discrepancy.likelihood.model_error import ModelError
+from bench.discrepancy.likelihood.model_error import ModelInadequacy
 from bench.discrepancy.likelihood.noise_covariance import sensor_gains, whitening_behind
 from bench.discrepancy.likelihood.time_varying_noise import whitening_together
 from bench.discrepancy.likelihood.whitening import RecordData, band_bins, projected, timed, without_bridged
@@ -26,8 +27,6 @@ from bench.discrepancy.motion.prescribed import decided
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.response.simulator import Simulator
 from bench.discrepancy.response.windows import cut
-
-Array = NDArray[np.float64]
 
 
 @dataclass
@@ -45,7 +44,7 @@ class Problem(Simulator):
     """
 
     bins: Mapping[str, int] | None = None
-    error: ModelError | None = None
+    error: ModelInadequacy | None = None
     within: float = np.inf
     data: tuple[RecordData, ...] = field(init=False)
     passed: tuple[Hypothesis, Array] = field(init=False)
@@ -133,12 +132,6 @@ class Problem(Simulator):
         out = copy.copy(self)
         out.passed = (hypothesis, vector)
         out.data = tuple(out.prepare(record) for record in self.records)
-        return out
-
-    def bounded(self, within: float) -> Problem:
-        """A copy whose nominal parameters move by so many stated standard deviations at most."""
-        out = copy.copy(self)
-        out.within = within
         return out
 
     def beside(self, records: Sequence[CaseRecord]) -> Problem:

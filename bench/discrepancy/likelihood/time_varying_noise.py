@@ -17,17 +17,15 @@ from collections.abc import Sequence
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_triangular
 
+from bench.arrays import Array
 from bench.discrepancy.case.case import CaseRecord
 from bench.discrepancy.likelihood.whitening import fast_length
 from bench.discrepancy.model.structure import Structure
 from bench.discrepancy.motion.observer import ACCELERATION, Observer
 from bench.discrepancy.response.simulator import Simulator
 from bench.discrepancy.settings import LikelihoodSettings
-
-Array = NDArray[np.float64]
 
 
 def whitening_together(

@@ -10,12 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
+from bench.arrays import Array
 from bench.discrepancy.case.case import CaseRecord
 from bench.discrepancy.likelihood.window_whitening import RestartWindows, orthonormal
 from bench.discrepancy.numerics.spectral_product import whiten
 from bench.discrepancy.settings import DEFAULT, LikelihoodSettings
-
-Array = NDArray[np.float64]
 
 
 class RecordData(NamedTuple):

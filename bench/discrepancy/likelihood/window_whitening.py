@@ -21,13 +21,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_triangular, toeplitz
 
+from bench.arrays import Array
 from bench.discrepancy.model.structure import Structure
 from bench.discrepancy.response.simulator import Simulator
 from bench.discrepancy.response.windows import channels_of
 from bench.discrepancy.settings import LikelihoodSettings
-from bench.discrepancy.simulation.stick_slip import NO_ELEMENTS, LinearStructure, free_run
-
-Array = NDArray[np.float64]
+from bench.discrepancy.simulation.stick_slip import NO_ELEMENTS, StructureMatrices, free_run
 
 
 @numba.njit(cache=True, error_model="numpy", nogil=True, fastmath={"reassoc", "contract"})
@@ -77,7 +76,7 @@ class RestartWindows(NamedTuple):
 
 def window_weights(
     structure: Structure,
-    linear: LinearStructure,
+    linear: StructureMatrices,
     *,
     step: float,
     length: int,

@@ -1,1 +1,1 @@
-"""Where the gap lies: the missing force without any law, its regions of the state, bands, times, and faults of sensors."""
+"""Where the discrepancy lies: the missing force without any law, its regions of the state, bands, times, and faults of sensors."""

@@ -34,7 +34,7 @@ from bench.discrepancy.localisation.augmented_filter import (
 from bench.discrepancy.model.nominal_elements import own_force
 from bench.discrepancy.model.structure import Place, Structure
 from bench.discrepancy.response.simulator import Simulator
-from bench.discrepancy.simulation.stick_slip import LinearStructure, Motion
+from bench.discrepancy.simulation.stick_slip import Motion, StructureMatrices
 
 
 class ForceEstimate(NamedTuple):
@@ -104,7 +104,7 @@ class ForceObserver:
             else loads
         )
 
-    def _inputs(self, linear: LinearStructure) -> Array:
+    def _inputs(self, linear: StructureMatrices) -> Array:
         """How these act (n_dof, n_inputs)."""
         return (
             np.hstack([linear.inputs, np.eye(len(self.dofs))])

@@ -13,7 +13,7 @@ import numpy as np
 from bench.discrepancy.likelihood.problem import Array
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.response.simulator import Simulator
-from bench.discrepancy.screening.motion_response import force_along
+from bench.discrepancy.screening.motion_response import force_along_motion
 from bench.discrepancy.search.explanation import Explanation
 from bench.discrepancy.settings import LocalisationSettings
 
@@ -48,7 +48,7 @@ def _regions(simulator: Simulator, placed: Placed, eta: Array) -> list[dict[str,
     for i in range(len(simulator.records)):
         motion = simulator.motion(i)
         states.append(np.column_stack([motion.position @ row, motion.velocity @ row]))
-        forces.append(force_along(simulator, placed, eta, i) @ row / (row @ row))
+        forces.append(force_along_motion(simulator, placed, eta, i) @ row / (row @ row))
     state, force = np.concatenate(states), np.concatenate(forces)
     acts = np.abs(force) > simulator.settings.localisation.acts * np.abs(force).max()
     total = float(np.sum(force**2))

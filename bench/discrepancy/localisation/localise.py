@@ -1,4 +1,4 @@
-"""Where the gap lies: channels, degrees of freedom, frequency bands, times, and regions of the state space.
+"""Where the discrepancy lies: channels, degrees of freedom, frequency bands, times, and regions of the state space.
 
 Two residuals are split. That of the free run of the nominal model, its parameters re-estimated, is whitened; what its
 power has beyond one is excess, and is split by channel, by frequency band and by time. That of the equations is the force
@@ -39,7 +39,7 @@ STATES = ("displacement", "velocity")
 
 
 class Whereabouts(NamedTuple):
-    """Where the gap lies.
+    """Where the discrepancy lies.
 
     Attributes:
         locations: Channels with an excess, by decreasing share.
@@ -72,7 +72,7 @@ def locate(
         nominal: The explanation without effects, its parameters re-estimated.
         best: The best explanation; where it is down to the noise its nominal parameters serve for the force map.
         borne_out: Whether the records bear out the forces of `best`, so that these tell where they act.
-        unknown: Whether the gap is due to something unknown.
+        unknown: Whether the discrepancy is due to something unknown.
     """
     names = problem.structure.channels
     excess = excess_of(problem, nominal)

@@ -1,4 +1,4 @@
-"""What an explanation leaves of the gap, and where."""
+"""What an explanation leaves of the discrepancy, and where."""
 
 from __future__ import annotations
 

@@ -25,9 +25,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bench import native
+from bench.arrays import Array
 from bench.discrepancy.case.case import Case, CaseChannel
 from bench.discrepancy.case.elements import declared_parameters
 from bench.discrepancy.model.mjcf_channels import PROBE, cells, inputs_of, loads_and_responses, observer_of
@@ -44,8 +44,6 @@ from bench.errors import ModelError, UnknownNameError
 from bench.identification.linear_rig import LinearRig, current
 from bench.rig import Rig
 from bench.rig.building import STRUCTURE
-
-Array = NDArray[np.float64]
 
 
 def mjcf_structure(case: Case, *, settings: DiagnosisSettings) -> Structure:

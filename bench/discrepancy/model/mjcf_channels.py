@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.case.case import Case, CaseChannel
 from bench.discrepancy.case.free_decay import NO_LOAD
 from bench.discrepancy.model.mjcf_prescribed import MOTION, loads_of_motion, prescribed_channels
@@ -17,7 +17,6 @@ from bench.errors import FileFormatError, ModelError, UnknownNameError
 from bench.identification.linear_rig import LinearRig
 from bench.rig import Rig
 
-Array = NDArray[np.float64]
 PROBE = "position of "
 """Beginning of the names of sensors added for channels that refer to joints."""
 

@@ -13,17 +13,16 @@ from dataclasses import replace
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from scipy import linalg
 
 from bench import native
+from bench.arrays import Array
 from bench.discrepancy.model.structure import Place, Structure
 from bench.discrepancy.settings import ModelSettings
 from bench.errors import BenchError, ModelError
 from bench.rig import Rig
 from bench.rig.building import parse
 
-Array = NDArray[np.float64]
 LINK = "coupling "
 """Beginning of the names of tendons that stand for equalities."""
 

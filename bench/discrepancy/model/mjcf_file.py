@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,7 +12,7 @@ import numpy as np
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.case.free_decay import NO_LOAD
 from bench.discrepancy.model.mjcf_prescribed import prescribed_channels, with_prescribed_joints
-from bench.errors import ModelError
+from bench.errors import ModelError, UnknownNameError
 from bench.rig import Rig
 from bench.rig.building import parse
 from bench.rig.held_joints import with_held_joints
@@ -34,17 +35,20 @@ SIZES = (
 
 
 def rig_of(case: Case) -> Rig:
-    """The user's model, held joints welded; with an actuator that exerts nothing for a case without load, and motors for motions.
+    """The user's model, held joints welded; with an actuator that exerts nothing for a case without load, and motors for motions, those
+    of joints that are followed among them.
 
     Raises:
         ModelError: The file cannot be read, holds a number that no force can be computed with, or a joint that cannot be held.
-        UnknownNameError: A prescribed motion, or a joint that was held, is that of nothing in the model.
+        UnknownNameError: A prescribed motion, or a joint that was held or is followed, is that of nothing in the model.
         FileFormatError: A prescribed motion is not that of one joint.
     """
     rig = Rig.from_file(Path(case.folder or ".") / case.rig)
     _refuse_beyond_numbers(rig)
     rig = with_held_joints(rig, case.options.get("joints", {}))
-    rig = with_prescribed_joints(rig, {entry.joint for entry in prescribed_channels(case, rig)})
+    rig = with_prescribed_joints(
+        rig, {entry.joint for entry in prescribed_channels(case, rig)} | _followed(case, rig)
+    )
     if not case.has(NO_LOAD) or NO_LOAD in rig.actuators:
         return rig
     spec = parse(rig.mjcf, rig.folder, rig.name)
@@ -53,6 +57,16 @@ def rig_of(case: Case) -> Rig:
         actuator = spec.add_actuator(name=NO_LOAD, target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
         actuator.set_to_motor()
     return Rig(rig.name, spec.to_xml(), timestep=rig.timestep, folder=rig.folder)
+
+
+def _followed(case: Case, rig: Rig) -> set[str]:
+    """Joints that a case has follow what was measured of them."""
+    joints = case.options.get("joints")
+    wanted = {n for n, how in joints.items() if how == "follow"} if isinstance(joints, Mapping) else set()
+    known = [rig.model.joint(i).name for i in range(rig.model.njnt)]
+    for name in sorted(wanted.difference(known)):
+        raise UnknownNameError("joint that is followed", name, known)
+    return wanted
 
 
 def _refuse_beyond_numbers(rig: Rig) -> None:

@@ -7,12 +7,10 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.model.nominal_forces import NominalFriction
 from bench.discrepancy.settings import SimulationSettings
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

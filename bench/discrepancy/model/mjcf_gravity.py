@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench import native
+from bench.arrays import Array
 from bench.discrepancy.model.nominal_forces import (
     NOMINAL_FORCES_LIMITS,
     NominalSpring,
@@ -27,7 +28,6 @@ from bench.identification.parameter_address import address
 from bench.rig import Rig
 from bench.rig.building import parse
 
-Array = NDArray[np.float64]
 REACH = 2.0 * np.pi
 """Angle either way up to which the torque is tabulated [rad]: a whole turn."""
 MASS = "structure/mass/"

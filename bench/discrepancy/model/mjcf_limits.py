@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench import native
+from bench.arrays import Array
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.case.channel_noise import noise_floor
 from bench.discrepancy.model.structure import Structure
@@ -18,7 +19,6 @@ from bench.errors import ModelError, UnknownNameError
 from bench.rig import Rig
 from bench.rig.building import parse
 
-Array = NDArray[np.float64]
 DISABLED = 0
 
 

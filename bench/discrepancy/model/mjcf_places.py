@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench import native
+from bench.arrays import Array
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.model.mjcf_couplings import LINK
 from bench.discrepancy.model.mjcf_friction import nominal_frictions
@@ -19,8 +20,6 @@ from bench.discrepancy.settings import ModelSettings, SimulationSettings
 from bench.errors import BenchError, FileFormatError, UnknownNameError
 from bench.identification.linear_rig import LinearRig
 from bench.rig import Rig
-
-Array = NDArray[np.float64]
 
 
 def _row(model: mujoco.MjModel, name: str, dofs: NDArray[np.int64]) -> Array:

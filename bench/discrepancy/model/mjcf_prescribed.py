@@ -18,9 +18,9 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from bench import native
+from bench.arrays import Array
 from bench.discrepancy.case.case import Case, CaseChannel
 from bench.discrepancy.model.structure import Structure
 from bench.discrepancy.motion.observer import ACCELERATION, ORDERS, Observer
@@ -28,10 +28,8 @@ from bench.discrepancy.settings import ModelSettings
 from bench.errors import FileFormatError, UnknownNameError
 from bench.rig import Rig
 from bench.rig.building import parse
+from bench.rig.held_joints import MOTION
 
-Array = NDArray[np.float64]
-MOTION = "motion of "
-"""Beginning of the names of the actuators that stand for what prescribes a motion; the joint's name follows."""
 SCALAR = (int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE))
 AXES = ("_x", "_y", "_z")
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.effects.friction_limits import soft_coulomb_limit
 from bench.discrepancy.model.nominal_forces import (
     NOMINAL_FORCES_LIMITS,
@@ -17,8 +17,6 @@ from bench.discrepancy.numerics.cubic_spline import cubic
 from bench.discrepancy.simulation.equations_of_motion import ROW, SCALE, THETA
 from bench.discrepancy.simulation.stick_slip import Elements, Motion, full
 from bench.laws.base import kernel
-
-Array = NDArray[np.float64]
 
 
 @kernel

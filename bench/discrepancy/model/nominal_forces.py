@@ -7,12 +7,10 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.numerics.cubic_spline import spline_of
 from bench.discrepancy.simulation.stick_slip import Motion
-
-Array = NDArray[np.float64]
 
 
 class NominalForcesLimits(NamedTuple):

@@ -6,13 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.simulation.prescribed_response import driven_force, driven_states
 from bench.discrepancy.simulation.stick_slip import Elements, Motion
 from bench.laws import ForceLaw
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from bench.discrepancy.model.nominal_forces import NominalFriction, NominalSpring
 from bench.discrepancy.model.nominal_laws import NominalElement
 from bench.discrepancy.motion.observer import Observer
-from bench.discrepancy.simulation.stick_slip import LinearStructure
+from bench.discrepancy.simulation.stick_slip import StructureMatrices
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ class Structure:
         """Whether the nominal model has forces that no matrix holds."""
         return bool(self.frictions or self.springs or self.elements)
 
-    def at(self, values: NDArray[np.float64]) -> LinearStructure:
+    def at(self, values: NDArray[np.float64]) -> StructureMatrices:
         """Return the matrices at parameter values (n_parameters,)."""
         mass, damping, stiffness = (
             np.tensordot(values, stack, 1) for stack in (self.mass, self.damping, self.stiffness)
@@ -108,7 +108,7 @@ class Structure:
                 damping + self.fixed[1],
                 stiffness + self.fixed[2],
             )
-        return LinearStructure(mass, damping, stiffness, self.inputs)
+        return StructureMatrices(mass, damping, stiffness, self.inputs)
 
     @cached_property
     def channels(self) -> tuple[str, ...]:
@@ -116,7 +116,7 @@ class Structure:
         return tuple(observer.channel for observer in self.observers)
 
     def transfer(
-        self, linear: LinearStructure, omega: NDArray[np.float64], inputs: NDArray[np.float64] | None = None
+        self, linear: StructureMatrices, omega: NDArray[np.float64], inputs: NDArray[np.float64] | None = None
     ) -> NDArray[np.complex128]:
         """Frequency responses (n_frequencies, n_channels, n_inputs) from forces on the structure to its channels."""
         b = linear.inputs if inputs is None else inputs

@@ -6,14 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.polynomial import Polynomial
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.motion.kalman_smoother import smooth_motion
 from bench.discrepancy.motion.observer import Observer
 from bench.discrepancy.settings import MotionSettings
 from bench.discrepancy.simulation.stick_slip import Motion
-
-Array = NDArray[np.float64]
 
 
 def measured_motion(

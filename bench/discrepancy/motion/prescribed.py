@@ -9,14 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from bench.arrays import Array
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.case.channel_noise import noise_floor
 from bench.discrepancy.case.single_axis import motion_channels
 from bench.discrepancy.motion.kalman_smoother import resting, smoother_of
-from bench.discrepancy.settings import DEFAULT, MemorySettings, MotionSettings
+from bench.discrepancy.settings import DEFAULT, MotionSettings, RecordMemorySettings
 from bench.discrepancy.simulation.stick_slip import Motion
-
-Array = NDArray[np.float64]
 
 
 class Prescribed(NamedTuple):
@@ -91,7 +90,7 @@ def _edges(error: Array, *, settings: MotionSettings) -> NDArray[np.bool_]:
     return out
 
 
-def remembering(position: Array, settings: MemorySettings = DEFAULT.motion.memory) -> int:
+def remembering(position: Array, settings: RecordMemorySettings = DEFAULT.motion.memory) -> int:
     """Samples at the start of a prescribed motion during which a component remembers what was before.
 
     Args:

@@ -6,12 +6,10 @@ from typing import NamedTuple
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.motion.kalman_smoother import resting, smoother_of
 from bench.discrepancy.settings import DEFAULT, MotionSettings
-
-Array = NDArray[np.float64]
 
 
 class TrackedAcceleration(NamedTuple):

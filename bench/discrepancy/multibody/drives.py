@@ -10,7 +10,7 @@ import numpy as np
 from bench.errors import ModelError
 
 
-class Drive(NamedTuple):
+class JointDrive(NamedTuple):
     """The actuator of a joint.
 
     Attributes:
@@ -42,7 +42,7 @@ def is_driven(model: mujoco.MjModel, u: int, joint: int) -> bool:
     return int(model.actuator_trntype[u]) in kinds and int(model.actuator_trnid[u, 0]) == joint
 
 
-def drive_of(model: mujoco.MjModel, u: int) -> Drive:
+def drive_of(model: mujoco.MjModel, u: int) -> JointDrive:
     """Actuator `u`.
 
     Raises:
@@ -75,7 +75,7 @@ def drive_of(model: mujoco.MjModel, u: int) -> Drive:
         gear = float(model.actuator_gear[u, 0])
         own = np.sort(np.array(model.jnt_actfrcrange[joint]) / gear)
         forces = (max(forces[0], own[0]), min(forces[1], own[1]))
-    return Drive(
+    return JointDrive(
         name, servo, float(model.actuator_gear[u, 0]), float(gain[0]), float(-bias[2]) if affine else 0.0,
         float(forces[0]), float(forces[1]), float(inputs[0]), float(inputs[1]), lag,
     )  # fmt: skip

@@ -8,13 +8,11 @@ from typing import NamedTuple
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.case.case import Case, CaseChannel, CaseRecord
 from bench.discrepancy.multibody.model import Joint
 from bench.errors import FileFormatError
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -12,12 +12,11 @@ import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic as _numba_intrinsic
-from numpy.typing import NDArray
 
 from bench import native
+from bench.arrays import Array
 from bench.native.library import library
 
-Array = NDArray[np.float64]
 intrinsic: Any = _numba_intrinsic
 
 

@@ -15,27 +15,27 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
-from bench.discrepancy.multibody.drives import Drive, drive_of, is_driven
+from bench.arrays import Array
+from bench.discrepancy.multibody.drives import JointDrive, drive_of, is_driven
 from bench.discrepancy.multibody.inverse import along
 from bench.errors import ModelError, UnknownNameError
 from bench.rig import Rig
+from bench.rig.held_joints import MOTION
 
-Array = NDArray[np.float64]
 MOVING = {int(mujoco.mjtJoint.mjJNT_HINGE): "rad", int(mujoco.mjtJoint.mjJNT_SLIDE): "m"}
 """Types of joint that a model may have, with the unit of their coordinate."""
 
 
 @dataclass(frozen=True)
-class ModelSettings:
+class MultibodySettings:
     """Numbers of `bench.discrepancy.multibody.model`."""
 
     difference: float = 1e-6
     """Step of central differences of the inverse dynamics [rad or m], a cube root of rounding."""
 
 
-SETTINGS = ModelSettings()
+SETTINGS = MultibodySettings()
 
 
 class Joint(NamedTuple):
@@ -61,15 +61,15 @@ class Joint(NamedTuple):
     stiffness: float
     reference: float
     range: tuple[float, float]
-    drive: Drive | None
+    drive: JointDrive | None
 
 
 class Dynamics(NamedTuple):
     """Inverse dynamics along a motion.
 
     Attributes:
-        torque: (n, n_joints) torque that the bodies ask of every joint, armature, damping, springs and friction not counted.
-        inertia: (n, n_joints) of the bodies about every joint, the diagonal of the mass matrix.
+        torque: (n, n_moving) torque that the bodies ask of every joint, armature, damping, springs and friction not counted.
+        inertia: (n, n_moving) of the bodies about every joint, the diagonal of the mass matrix.
     """
 
     torque: Array
@@ -82,14 +82,16 @@ class ArticulatedModel:
 
     Attributes:
         model: The compiled model without damping, friction, springs, armature, limits and contacts.
-        joints: Its joints in the order of its degrees of freedom.
-        bodies: Names of the bodies that move.
+        joints: Its joints in the order of its degrees of freedom, those that are followed left out.
+        followed: Joints that move as measured, whatever moves them: those with a motor that stands for a motion.
+        bodies: Names of the bodies that move, see `body_name`.
         tips: Body to the position of its tip in its own frame, where a payload would sit: a site called ``…tip``, else the joint of
             its only child, else its own centre of mass.
     """
 
     model: mujoco.MjModel
     joints: tuple[Joint, ...]
+    followed: tuple[Joint, ...]
     bodies: tuple[str, ...]
     tips: Mapping[str, Array]
 
@@ -106,10 +108,12 @@ class ArticulatedModel:
     def of(cls, model: mujoco.MjModel, name: str = "model") -> ArticulatedModel:
         """Take a compiled model apart; it is copied."""
         _refuse(model, name)
-        joints = tuple(_joint(model, i) for i in range(model.njnt))
+        every = [_joint(model, i) for i in range(model.njnt)]
+        followed = tuple(j for j in every if j.drive is not None and j.drive.name.startswith(MOTION))
+        joints = tuple(j for j in every if j not in followed)
         bare = _bare(model)
-        bodies = tuple(model.body(i).name for i in range(1, model.nbody) if model.body_dofnum[i] > 0)
-        return cls(bare, joints, bodies, {body: _tip(model, body) for body in bodies})
+        bodies = tuple(body_name(model, i) for i in range(1, model.nbody) if model.body_dofnum[i] > 0)
+        return cls(bare, joints, followed, bodies, {body: _tip(model, body) for body in bodies})
 
     def joint(self, name: str) -> Joint:
         """Return a joint by name.
@@ -122,20 +126,25 @@ class ArticulatedModel:
                 return joint
         raise UnknownNameError("joint", name, [j.name for j in self.joints])
 
+    @property
+    def moving(self) -> tuple[Joint, ...]:
+        """All joints in the order of the columns of a motion: the model's, then those that are followed."""
+        return (*self.joints, *self.followed)
+
     def mass(self, body: str) -> float:
         """Mass of a body [kg]."""
-        return float(self.model.body_mass[self.model.body(body).id])
+        return float(self.model.body_mass[_index(self.model, body)])
 
     def with_mass(self, body: str, mass: float) -> ArticulatedModel:
         """The model with another mass of a body, its centre of mass and inertia about it as they are."""
         out = self._copied()
-        out.model.body_mass[out.model.body(body).id] = mass
+        out.model.body_mass[_index(out.model, body)] = mass
         return out
 
     def with_payload(self, body: str, mass: float, at: Array | None = None) -> ArticulatedModel:
         """The model with a point mass fixed to a body, at its tip where no position (3,) [m] in its frame is given."""
         out = self._copied()
-        i = out.model.body(body).id
+        i = _index(out.model, body)
         _add_point(out.model, i, mass, self.tips[body] if at is None else at)
         return out
 
@@ -149,7 +158,7 @@ class ArticulatedModel:
     def with_centre(self, body: str, shift: Array) -> ArticulatedModel:
         """The model with the centre of mass of a body moved by `shift` (3,) [m] in the body's frame, the inertia about it kept."""
         out = self._copied()
-        out.model.body_ipos[out.model.body(body).id] += shift
+        out.model.body_ipos[_index(out.model, body)] += shift
         return out
 
     def with_gravity_turned(self, turn: Array) -> ArticulatedModel:
@@ -168,19 +177,34 @@ class ArticulatedModel:
         return replace(self, model=copy.copy(self.model))
 
     def dynamics(self, q: Array, v: Array, a: Array) -> Dynamics:
-        """Inverse dynamics along positions, velocities and accelerations (n, n_joints)."""
-        return Dynamics(*along(self.model, q, v, a))
+        """Inverse dynamics along positions, velocities and accelerations (n, n_moving)."""
+        if not self.followed:
+            return Dynamics(*along(self.model, q, v, a))
+        dofs = [joint.dof for joint in self.moving]
+        order = np.argsort(dofs)
+        torque, inertia = along(self.model, q[:, order], v[:, order], a[:, order])
+        return Dynamics(torque[:, dofs], inertia[:, dofs])
 
     def slopes(self, q: Array, v: Array, a: Array) -> Array:
-        """Derivative (n, n_joints) of the torque on every joint by its own position."""
-        out = np.empty_like(q)
-        for j in range(q.shape[1]):
+        """Derivative (n, n_moving) of the torque on every joint by its own position; zero of what is followed."""
+        out = np.zeros_like(q)
+        for j in range(len(self.joints)):
             step = np.zeros(q.shape[1])
             step[j] = SETTINGS.difference
             ahead = self.dynamics(q + step, v, a).torque[:, j]
             behind = self.dynamics(q - step, v, a).torque[:, j]
             out[:, j] = (ahead - behind) / (2.0 * SETTINGS.difference)
         return out
+
+
+def body_name(model: mujoco.MjModel, i: int) -> str:
+    """Name of body `i`; of one without a name, that of what moves it."""
+    first = int(model.body_jntadr[i])
+    return model.body(i).name or (f"body of {model.joint(first).name}" if first >= 0 else f"body {i}")
+
+
+def _index(model: mujoco.MjModel, body: str) -> int:
+    return next(i for i in range(1, model.nbody) if body_name(model, i) == body)
 
 
 def compiled_model(path: str | Path) -> mujoco.MjModel:
@@ -214,7 +238,7 @@ def _joint(model: mujoco.MjModel, i: int) -> Joint:
     return Joint(
         model.joint(i).name,
         dof,
-        model.body(int(model.jnt_bodyid[i])).name,
+        body_name(model, int(model.jnt_bodyid[i])),
         MOVING[int(model.jnt_type[i])],
         float(np.ravel(model.dof_damping[dof])[0]),
         float(model.dof_frictionloss[dof]),
@@ -233,6 +257,11 @@ def _bare(model: mujoco.MjModel) -> mujoco.MjModel:
     bare.dof_frictionloss[:] = 0.0
     bare.dof_armature[:] = 0.0
     bare.jnt_stiffness[:] = 0.0
+    # of a body whose inertia is diagonal in its joints MuJoCo keeps the row of the mass matrix from when it was compiled, armature
+    # included, and of one whose centre of mass is its origin that it is; here masses, centres and armatures change
+    bare.body_simple[:] = 0
+    bare.dof_simplenum[:] = 0
+    bare.body_sameframe[:] = int(mujoco.mjtSameFrame.mjSAMEFRAME_NONE)
     disabled = (
         mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
         | mujoco.mjtDisableBit.mjDSBL_ACTUATION
@@ -243,7 +272,7 @@ def _bare(model: mujoco.MjModel) -> mujoco.MjModel:
 
 
 def _tip(model: mujoco.MjModel, body: str) -> Array:
-    i = model.body(body).id
+    i = _index(model, body)
     for s in range(model.nsite):
         if int(model.site_bodyid[s]) == i and model.site(s).name.endswith("tip"):
             return np.array(model.site_pos[s])

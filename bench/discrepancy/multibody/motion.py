@@ -6,20 +6,18 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from bench.arrays import Array
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.motion.kalman_smoother import Smoother, resting, smoother_of
 from bench.discrepancy.multibody.encoders import TRUE, Encoder, encoders_of
 from bench.discrepancy.multibody.model import ArticulatedModel, Dynamics
 from bench.discrepancy.settings import ArticulatedSettings, MotionSettings
 
-Array = NDArray[np.float64]
 
-
-class Motion(NamedTuple):
-    """Measured motion of all joints, smoothed: positions, velocities, accelerations (n, n_joints) and the smoothers behind them."""
+class JointMotion(NamedTuple):
+    """Measured motion of all joints, smoothed: positions, velocities, accelerations (n, n_moving) and the smoothers behind them."""
 
     position: Array
     velocity: Array
@@ -34,18 +32,18 @@ def motion_of(
     model: ArticulatedModel,
     record: CaseRecord,
     encoders: Mapping[str, Encoder],
-    like: Motion | None = None,
+    like: JointMotion | None = None,
     *,
     settings: MotionSettings,
-) -> Motion:
+) -> JointMotion:
     """Smooth the motion of a record; `encoders` says what is wrong with which joint, `like` has smoothers to be used again.
 
     A delay shifts the smoothed motion. The samples keep theirs: interpolated, they would have less noise than was logged.
     """
     clock = np.arange(len(record)) * record.step
-    out = np.zeros((3, len(record), len(model.joints)))
+    out = np.zeros((3, len(record), len(model.moving)))
     samples, smoothers, noises = [], [], []
-    for j, joint in enumerate(model.joints):
+    for j, joint in enumerate(model.moving):
         measured = encoders_of(case, joint)
         wrong = encoders.get(joint.name, TRUE)
         raw = np.column_stack([record.values[c.name] for c in measured.channels])
@@ -67,21 +65,21 @@ def motion_of(
         samples.append(true)
         smoothers.append(smoother)
         noises.append(noise)
-    return Motion(out[0], out[1], out[2], tuple(samples), tuple(smoothers), tuple(noises))
+    return JointMotion(out[0], out[1], out[2], tuple(samples), tuple(smoothers), tuple(noises))
 
 
-Moving = tuple[CaseRecord, Motion]
+Moving = tuple[CaseRecord, JointMotion]
 """A record and its motion."""
 
 
-class Clock(NamedTuple):
+class JointClock(NamedTuple):
     """Samples of a record, and the middles of the integration steps between them."""
 
     samples: Array
     middles: Array
     n_sub: int
 
-    def later(self, delay: float) -> Clock:
+    def later(self, delay: float) -> JointClock:
         """The middles of steps that lie `delay` [s] earlier, from the first sample on."""
         return self._replace(middles=np.maximum(self.middles - delay, 0.0))
 
@@ -90,12 +88,12 @@ class Clock(NamedTuple):
         return np.ascontiguousarray(CubicSpline(self.samples, samples, axis=0)(self.middles).T)
 
 
-def clock_of(record: CaseRecord, *, settings: ArticulatedSettings) -> Clock:
+def clock_of(record: CaseRecord, *, settings: ArticulatedSettings) -> JointClock:
     """Samples and integration steps of a record."""
     n_sub = max(1, int(np.ceil(record.step / settings.longest_step - 1e-9)))
     middles = (np.arange((len(record) - 1) * n_sub) + 0.5) * (record.step / n_sub)
     samples = np.arange(len(record)) * record.step
-    return Clock(np.asarray(samples, dtype=np.float64), np.asarray(middles, dtype=np.float64), n_sub)
+    return JointClock(np.asarray(samples, dtype=np.float64), np.asarray(middles, dtype=np.float64), n_sub)
 
 
 class Coefficients(NamedTuple):
@@ -107,7 +105,7 @@ class Coefficients(NamedTuple):
     load: Array
 
     @classmethod
-    def of(cls, dynamics: Dynamics, motion: Motion, clock: Clock) -> Coefficients:
+    def of(cls, dynamics: Dynamics, motion: JointMotion, clock: JointClock) -> Coefficients:
         """Coefficients along a motion; the bias is the torque besides that of the joint's own acceleration."""
         bias = clock.between(dynamics.torque - dynamics.inertia * motion.acceleration)
         load = np.abs(clock.between(dynamics.torque))

@@ -10,13 +10,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import welch
 
+from bench.arrays import Array
 from bench.discrepancy.multibody.model import ArticulatedModel
-from bench.discrepancy.multibody.motion import Clock, Motion
-
-Array = NDArray[np.float64]
+from bench.discrepancy.multibody.motion import JointClock, JointMotion
 
 
 @dataclass(frozen=True)
@@ -52,7 +50,9 @@ class NoiseDraw(NamedTuple):
     reference: Array
 
 
-def draw(model: ArticulatedModel, motion: Motion, clock: Clock, rng: np.random.Generator) -> NoiseDraw:
+def draw(
+    model: ArticulatedModel, motion: JointMotion, clock: JointClock, rng: np.random.Generator
+) -> NoiseDraw:
     """One draw of the noise of all encoders."""
     n, nj = motion.position.shape
     noise = np.zeros((3, n, nj))
@@ -67,7 +67,11 @@ def draw(model: ArticulatedModel, motion: Motion, clock: Clock, rng: np.random.G
 
 
 def torque_noise(
-    model: ArticulatedModel, motion: Motion, clock: Clock, step: float, settings: NoiseSettings | None = None
+    model: ArticulatedModel,
+    motion: JointMotion,
+    clock: JointClock,
+    step: float,
+    settings: NoiseSettings | None = None,
 ) -> Array:
     """White torque noise (n_joints,), one-sigma a sample, as strong as what the noise of the measured motion makes of the bias."""
     settings = settings or NoiseSettings()

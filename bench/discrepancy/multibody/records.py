@@ -15,19 +15,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.linalg import expm, solve_discrete_are
 from scipy.signal import butter, sosfiltfilt
 
+from bench.arrays import Array
 from bench.discrepancy.case.case import Case, CaseChannel, CaseRecord
 from bench.discrepancy.multibody.encoders import TRUE, Encoder, encoders_of, input_of, weights_of
 from bench.discrepancy.multibody.model import ArticulatedModel, Dynamics, Joint
-from bench.discrepancy.multibody.motion import Clock, Coefficients, Motion, clock_of, motion_of
+from bench.discrepancy.multibody.motion import Coefficients, JointClock, JointMotion, clock_of, motion_of
 from bench.discrepancy.multibody.noise import torque_noise
 from bench.discrepancy.settings import DEFAULT, ArticulatedSettings, DiagnosisSettings
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,7 +176,7 @@ class PreparedRecord:
     """
 
     record: CaseRecord
-    motion: Motion
+    motion: JointMotion
     joints: tuple[JointRecord, ...]
 
     def read_by(self, encoders: Mapping[str, Encoder]) -> PreparedRecord:
@@ -309,7 +307,7 @@ def relinked(
     return PreparedRecord(prepared.record, prepared.motion, tuple(joints))
 
 
-def _measured(motion: Motion, j: int) -> tuple[Array, Array, Array, Array]:
+def _measured(motion: JointMotion, j: int) -> tuple[Array, Array, Array, Array]:
     """Measured positions, velocities, their noise, and the start of joint `j`."""
     samples = motion.samples[j]
     velocity = np.ascontiguousarray(samples[:, 1]) if samples.shape[1] > 1 else np.zeros(0)
@@ -321,7 +319,7 @@ def _difference(changed: Dynamics, base: Dynamics) -> Dynamics:
     return Dynamics(changed.torque - base.torque, changed.inertia - base.inertia)
 
 
-def _input(case: Case, record: CaseRecord, channel: CaseChannel, clock: Clock) -> Array:
+def _input(case: Case, record: CaseRecord, channel: CaseChannel, clock: JointClock) -> Array:
     """The input at the middle of every step."""
     samples = record.values[channel.name]
     if case.load_interpolation == "zero_order_hold":

@@ -24,10 +24,10 @@ from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.next_test.belief import Belief
 from bench.discrepancy.next_test.distinguishability import why_alike, why_none
 from bench.discrepancy.next_test.feasible_excitations import (
-    Proposal,
+    SizedExcitation,
     candidates,
-    feasible,
     limits_of,
+    scaled_to_limits,
 )
 from bench.discrepancy.next_test.outlook import Outlook, outlook
 from bench.discrepancy.numerics.threads import in_threads
@@ -93,7 +93,9 @@ def told_apart(problem: Problem, kind: str, catalogue: Sequence[Effect]) -> dict
     return {"reason": reason} if reason else {}
 
 
-def propose(problem: Problem, first: Explanation, second: Explanation) -> tuple[Proposal, Outlook] | None:
+def propose(
+    problem: Problem, first: Explanation, second: Explanation
+) -> tuple[SizedExcitation, Outlook] | None:
     """The excitation that separates two explanations best, and what it is expected to say; None where none is feasible."""
     scale = _noise_scale(problem, first)
     return _best_of(problem, Belief.of(first), Belief.of(second), log_odds(first, second), scale)
@@ -101,7 +103,7 @@ def propose(problem: Problem, first: Explanation, second: Explanation) -> tuple[
 
 def _best_of(
     problem: Problem, first: Belief, second: Belief, odds: float, scale: float
-) -> tuple[Proposal, Outlook] | None:
+) -> tuple[SizedExcitation, Outlook] | None:
     """The feasible excitation of the largest expected log odds; None where none is feasible."""
     finalists = _finalists(problem, first, second)
     looks = in_threads(lambda p: outlook(problem, first, second, p.record, odds=odds, scale=scale), finalists)
@@ -131,7 +133,7 @@ def _noise_scale(simulator: Simulator, best: Explanation) -> float:
     )
 
 
-def _finalists(simulator: Simulator, first: Belief, second: Belief) -> list[Proposal]:
+def _finalists(simulator: Simulator, first: Belief, second: Belief) -> list[SizedExcitation]:
     """Feasible excitations by the whitened difference of the rivals' responses, the largest first."""
     settings = simulator.settings.next_test
     limits = limits_of(simulator)
@@ -139,7 +141,7 @@ def _finalists(simulator: Simulator, first: Belief, second: Belief) -> list[Prop
     samples = min(longest, settings.samples // max(1, len(simulator.structure.dofs) // 2))
     loads = _loads(simulator, (*first.explanation.hypothesis, *second.explanation.hypothesis))
 
-    def weigh(entry: tuple[str, Array]) -> list[tuple[float, Proposal]]:
+    def weigh(entry: tuple[str, Array]) -> list[tuple[float, SizedExcitation]]:
         out = []
         for level in settings.levels:
             label, columns = entry
@@ -148,7 +150,7 @@ def _finalists(simulator: Simulator, first: Belief, second: Belief) -> list[Prop
                 load={k: level * v for k, v in limits.load.items()},
                 motion={k: level * v for k, v in limits.motion.items()},
             )
-            found = feasible(
+            found = scaled_to_limits(
                 simulator, shown, columns, at_level,
                 [lambda record, rival=rival: rival.respond(simulator, record) for rival in (first, second)],
             )  # fmt: skip
@@ -175,7 +177,7 @@ def _loads(simulator: Simulator, effects: Sequence[Placed]) -> list[int]:
     return out or list(range(len(structure.loads)))
 
 
-def _described(simulator: Simulator, proposal: Proposal, look: Outlook) -> dict[str, Any]:
+def _described(simulator: Simulator, proposal: SizedExcitation, look: Outlook) -> dict[str, Any]:
     record = proposal.record
     peak = max(proposal.peaks.values())
     return {
@@ -193,7 +195,7 @@ def _described(simulator: Simulator, proposal: Proposal, look: Outlook) -> dict[
 
 
 def _others(
-    problem: Problem, first: Belief, rivals: Sequence[Explanation], proposal: Proposal, scale: float
+    problem: Problem, first: Belief, rivals: Sequence[Explanation], proposal: SizedExcitation, scale: float
 ) -> list[dict[str, Any]]:
     """The same excitation against further rivals that the present records leave open."""
     settings = problem.settings.next_test

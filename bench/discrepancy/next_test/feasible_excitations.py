@@ -17,7 +17,7 @@ from bench.discrepancy.likelihood.problem import Array
 from bench.discrepancy.response.simulator import Simulator
 from bench.signals import BandLimitedNoise, Harmonic, ImpulseTrain, Multisine, Signal, Sweep, Tapered
 
-Simulate = Callable[[CaseRecord], Array]
+FreeRun = Callable[[CaseRecord], Array]
 
 
 class RigLimits(NamedTuple):
@@ -32,7 +32,7 @@ class RigLimits(NamedTuple):
     motion: Mapping[str, float]
 
 
-class Proposal(NamedTuple):
+class SizedExcitation(NamedTuple):
     """An excitation at a size that the rig can do.
 
     Attributes:
@@ -145,9 +145,9 @@ def candidates(simulator: Simulator, loads: Sequence[int], samples: int) -> list
     return out
 
 
-def feasible(
-    simulator: Simulator, label: str, columns: Array, limits: RigLimits, simulate: Sequence[Simulate]
-) -> tuple[Proposal, list[Array]] | None:
+def scaled_to_limits(
+    simulator: Simulator, label: str, columns: Array, limits: RigLimits, simulate: Sequence[FreeRun]
+) -> tuple[SizedExcitation, list[Array]] | None:
     """Scale loads of unit peak to the limits of the rig under every rival.
 
     Args:
@@ -180,6 +180,6 @@ def feasible(
         if ratio <= 1.0:
             peaks = {name: float(np.abs(loads[name]).max()) for name in names}
             motion = dict(zip(simulator.structure.channels, (float(x) for x in largest), strict=True))
-            return Proposal(label, record, peaks, motion), responses
+            return SizedExcitation(label, record, peaks, motion), responses
         scale *= float(np.clip(settings.margin / ratio, 0.2, settings.margin))
     return None

@@ -6,16 +6,15 @@ from typing import Any
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
-Array = NDArray[np.float64]
+from bench.arrays import Array
 
 _inline: Any = numba.njit(error_model="numpy", nogil=True, forceinline=True)
 
 
 @_inline
-def weights(s):
+def spline_weights(s):
     """Weights, times six, of the four coefficients that a piece depends on; `s` runs from 0 to 1 over it."""
     r = 1.0 - s
     first, last = r * r * r, s * s * s
@@ -32,7 +31,7 @@ def piece(u, pieces):
 def cubic(theta, start, pieces, u):
     """Value at `u`, from 0 to `pieces`, of the spline whose pieces + 3 coefficients stand in `theta` from `start` on."""
     k = piece(u, pieces)
-    a, b, c, d = weights(u - k)
+    a, b, c, d = spline_weights(u - k)
     k += start
     return (a * theta[k] + b * theta[k + 1] + c * theta[k + 2] + d * theta[k + 3]) / 6.0
 

@@ -16,10 +16,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.settings import DEFAULT, NumericsSettings
-
-Array = NDArray[np.float64]
 
 
 class Prior(NamedTuple):

@@ -26,7 +26,7 @@ from bench.discrepancy.precheck.samples import sample_doubts
 from bench.discrepancy.precheck.settings import CheckSettings
 from bench.errors import BenchError
 
-Word = Literal["ready", "doubtful", "unusable"]
+Readiness = Literal["ready", "doubtful", "unusable"]
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class Checked:
         seconds: Time it took [s].
     """
 
-    word: Word
+    word: Readiness
     doubts: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     parameters: tuple[Told, ...] = ()

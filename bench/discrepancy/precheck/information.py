@@ -16,8 +16,8 @@ from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.effects.catalogue import CATALOGUE
 from bench.discrepancy.effects.effect import FreeParameter
@@ -27,8 +27,7 @@ from bench.discrepancy.model.placements import placements
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.precheck.settings import CheckSettings
 
-Array = NDArray[np.float64]
-Word = Literal["identifiable", "weak", "not identifiable"]
+Identifiability = Literal["identifiable", "weak", "not identifiable"]
 
 
 @dataclass(frozen=True)
@@ -63,7 +62,7 @@ class Told(NamedTuple):
 
     name: str
     where: str
-    word: Word
+    word: Identifiability
     figure: float
     text: str
 
@@ -149,7 +148,7 @@ def graded_parameter(name: str, width: float, spread: float, settings: CheckSett
         spread: Its stated uncertainty.
         settings: When something counts.
     """
-    word: Word = (
+    word: Identifiability = (
         "identifiable"
         if width <= settings.identifiable
         else "weak"
@@ -182,7 +181,7 @@ def graded_effect(
     left = float(column @ column - along @ inner @ along)
     imitated = 1.0 - left / max(float(column @ column), 1e-300)
     figure = math.sqrt(max(left, 0.0))
-    word: Word = (
+    word: Identifiability = (
         "identifiable"
         if left >= settings.certain
         else "weak"

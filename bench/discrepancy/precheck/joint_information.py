@@ -9,11 +9,11 @@ from __future__ import annotations
 from collections.abc import Collection
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.articulated.free_runs import FreeRuns
 from bench.discrepancy.articulated_search.catalogue import CATALOGUE
-from bench.discrepancy.articulated_search.hypothesis import Placed
+from bench.discrepancy.articulated_search.hypothesis import PlacedOnJoint
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem, placements
 from bench.discrepancy.articulated_search.screening import grid
 from bench.discrepancy.case.case import Case
@@ -29,8 +29,6 @@ from bench.discrepancy.precheck.information import (
     sized,
 )
 from bench.discrepancy.precheck.settings import CheckSettings
-
-Array = NDArray[np.float64]
 
 
 def joints_told(
@@ -60,7 +58,7 @@ def joints_told(
 
     chosen = [effect for effect in CATALOGUE if not only or effect.name in only]
 
-    def told(placed: Placed) -> Told:
+    def told(placed: PlacedOnJoint) -> Told:
         vector = at_size(problem, placed, settings.matters, settings)
         if vector is None:
             return out_of_reach(placed.effect.name, placed.where, settings)
@@ -71,7 +69,7 @@ def joints_told(
 
 
 def at_size(
-    problem: ArticulatedProblem, placed: Placed, size: float, settings: CheckSettings
+    problem: ArticulatedProblem, placed: PlacedOnJoint, size: float, settings: CheckSettings
 ) -> Array | None:
     """The vector of an effect whose amplitude moves a joint otherwise by a part of its standard deviation; None where it reaches none."""
     drive = problem.joints[placed.joint].drive
@@ -99,5 +97,5 @@ def at_size(
     return None if eta is None else np.concatenate([zero, eta])
 
 
-def _residuals(problem: ArticulatedProblem, hypothesis: tuple[Placed, ...], vector: Array) -> Array:
+def _residuals(problem: ArticulatedProblem, hypothesis: tuple[PlacedOnJoint, ...], vector: Array) -> Array:
     return np.concatenate([problem.residual(j, hypothesis, vector) for j in range(len(problem.joints))])

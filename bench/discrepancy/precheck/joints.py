@@ -6,19 +6,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.articulated.admission import admitted_robot
 from bench.discrepancy.case.case import Case, CaseRecord
-from bench.discrepancy.checks.channel_comparison import compare
+from bench.discrepancy.checks.channel_comparison import compare_channels
 from bench.discrepancy.model.mjcf_file import rig_of
 from bench.discrepancy.multibody.channels import bound
 from bench.discrepancy.multibody.encoders import encoders_of, input_of
 from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.precheck.positions import position_doubts
 from bench.errors import BenchError, RecordingError
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -129,7 +127,7 @@ def _derivatives(
     position: str, velocity: str, record: CaseRecord, q: Array, noise_q: float, noise_v: float
 ) -> Iterator[str]:
     v = np.asarray(record.values[velocity])
-    pair = compare(q, v, orders=(0, 1), noise=(noise_q, noise_v), step=record.step)
+    pair = compare_channels(q, v, orders=(0, 1), noise=(noise_q, noise_v), step=record.step)
     if pair is None or abs(pair.correlation) < 0.9:
         return
     if pair.correlation < 0.0:

@@ -6,14 +6,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.case.case import CaseRecord
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.precheck.information import parameter_columns
 from bench.discrepancy.precheck.settings import CheckSettings
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

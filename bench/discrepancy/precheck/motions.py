@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from bench.discrepancy.checks.channel_comparison import compare
+from bench.discrepancy.checks.channel_comparison import compare_channels
 from bench.discrepancy.checks.scales import parallel
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.precheck.settings import CheckSettings
@@ -26,7 +26,7 @@ def motion_doubts(problem: Problem, settings: CheckSettings) -> Iterator[str]:
             if first.order == second.order or not np.isclose(abs(parallel(first.row, second.row)), 1.0):
                 continue
             for record in problem.records:
-                pair = compare(
+                pair = compare_channels(
                     record.values[first.channel],
                     record.values[second.channel],
                     orders=(first.order, second.order),

@@ -19,8 +19,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.application.applying import specification
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.case.reading import GROUPS, read_case
@@ -36,13 +36,12 @@ from bench.discrepancy.precheck.joint_information import joints_told
 from bench.discrepancy.precheck.joints import admitted_joints
 from bench.discrepancy.precheck.settings import CheckSettings
 from bench.discrepancy.rehearsal.placing import SETTINGS as PLACING
-from bench.discrepancy.rehearsal.truth import Laboratory
+from bench.discrepancy.rehearsal.truth import ModelLaboratory
 from bench.discrepancy.settings import DEFAULT
 from bench.errors import BenchError, ParameterError, SimulationError
 from bench.files import together, write_text
 from bench.signals import Multisine
 
-Array = NDArray[np.float64]
 NAMES = ("identification", "identification_2", "validation")
 
 
@@ -111,7 +110,7 @@ class Designed:
         return {"chosen": dict(zip(NAMES, self.chosen, strict=True)), "tried": tried}
 
 
-def design(
+def design_signals(
     folder: Path,
     *,
     seconds: float = 20.0,
@@ -142,7 +141,7 @@ def design(
             f"{seconds:g} s at {1 / step:g} Hz are {samples} samples; give at least 1000, with --seconds or --rate"
         )
     blank = _blank(known, samples, step)
-    laboratory = Laboratory.of(blank)
+    laboratory = ModelLaboratory.of(blank)
     limits = _limits(known, laboratory)
     names = [text.partition(":")[0] for text in effects]
     wanted = names or list(PLACING.articulated if laboratory.articulated else PLACING.linear)
@@ -206,7 +205,7 @@ def _blank(case: Case, samples: int, step: float) -> Case:
     return replace(case, identification=records["identification"], validation=records["validation"])
 
 
-def _limits(case: Case, laboratory: Laboratory) -> RigLimits:
+def _limits(case: Case, laboratory: ModelLaboratory) -> RigLimits:
     """What commands and responses may reach: as stated, as the model limits them, as earlier records bore it."""
     stated: Any = case.options.get("limits", {})
     records = (*case.identification, *case.validation)
@@ -229,7 +228,7 @@ def _limits(case: Case, laboratory: Laboratory) -> RigLimits:
     return RigLimits(load, motion)
 
 
-def _of_model(laboratory: Laboratory) -> dict[str, float]:
+def _of_model(laboratory: ModelLaboratory) -> dict[str, float]:
     """RigLimits that the model itself has: ranges of joints and of controls, by channel."""
     compiled = specification(laboratory.path).compile()
     try:
@@ -258,7 +257,7 @@ def _ramped(columns: Array, step: float) -> Array:
 
 
 def _of_structure(
-    laboratory: Laboratory, limits: RigLimits, samples: int, step: float, seed: int
+    laboratory: ModelLaboratory, limits: RigLimits, samples: int, step: float, seed: int
 ) -> list[tuple[str, dict[str, Array]]]:
     """Shapes around the resonances of a linear structure."""
     rng = np.random.default_rng(seed)
@@ -283,7 +282,7 @@ def _of_structure(
 
 
 def _of_joints(
-    laboratory: Laboratory, limits: RigLimits, samples: int, step: float, seed: int
+    laboratory: ModelLaboratory, limits: RigLimits, samples: int, step: float, seed: int
 ) -> list[tuple[str, dict[str, Array]]]:
     """Shapes in all joints of an arm at once, apart in frequency."""
     compiled = specification(laboratory.path).compile()
@@ -305,7 +304,7 @@ def _of_joints(
 
 
 def _within(
-    laboratory: Laboratory, label: str, commands: dict[str, Array], limits: RigLimits
+    laboratory: ModelLaboratory, label: str, commands: dict[str, Array], limits: RigLimits
 ) -> Tried | None:
     """A signal scaled down until the responses of the nominal model keep their limits; None where it cannot be."""
     scale, settings = 1.0, DEFAULT.next_test
@@ -326,7 +325,7 @@ def _within(
 
 
 def _information(
-    laboratory: Laboratory, records: Sequence[CaseRecord], wanted: Sequence[str], seed: int
+    laboratory: ModelLaboratory, records: Sequence[CaseRecord], wanted: Sequence[str], seed: int
 ) -> float:
     """What records would tell of the parameters and of some effects [nat]."""
     settings, rng = CheckSettings(), np.random.default_rng(seed)

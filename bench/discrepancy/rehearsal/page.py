@@ -56,7 +56,7 @@ def figure(done: Rehearsal) -> Figure:
     return drawn
 
 
-def page(done: Rehearsal) -> Page:
+def rehearsal_page(done: Rehearsal) -> Page:
     """The page."""
     alarms = ", ".join(done.false_alarms)
     lead = (

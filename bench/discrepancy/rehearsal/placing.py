@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bench.discrepancy.articulated_search import hypothesis, problem
 from bench.discrepancy.articulated_search.catalogue import CATALOGUE as JOINTS
@@ -24,8 +23,6 @@ from bench.discrepancy.precheck.settings import CheckSettings
 from bench.discrepancy.verdict import Estimate, NamedEffect
 from bench.errors import ParameterError, UnknownNameError
 
-Array = NDArray[np.float64]
-
 
 @dataclass(frozen=True)
 class PlacingSettings:
@@ -40,7 +37,7 @@ class PlacingSettings:
 SETTINGS = PlacingSettings()
 
 
-class Site(NamedTuple):
+class EffectSite(NamedTuple):
     """An effect at a place.
 
     Attributes:
@@ -61,7 +58,7 @@ class Site(NamedTuple):
         return f"{self.name}:{self.where}" if self.where else self.name
 
 
-def sites(case: Case, wanted: Sequence[str], *, articulated: bool) -> list[Site]:
+def sites(case: Case, wanted: Sequence[str], *, articulated: bool) -> list[EffectSite]:
     """Where effects are put.
 
     Args:
@@ -76,7 +73,7 @@ def sites(case: Case, wanted: Sequence[str], *, articulated: bool) -> list[Site]
     found = _of_joints(case) if articulated else _of_structure(case)
     default = SETTINGS.articulated if articulated else SETTINGS.linear
     asked = wanted or tuple(name for name in default if any(site.name == name for site in found))
-    out: list[Site] = []
+    out: list[EffectSite] = []
     for text in asked:
         name, _, where = text.partition(":")
         mine = [site for site in found if site.name == name]
@@ -89,14 +86,14 @@ def sites(case: Case, wanted: Sequence[str], *, articulated: bool) -> list[Site]
     return out
 
 
-def _of_structure(case: Case) -> list[Site]:
+def _of_structure(case: Case) -> list[EffectSite]:
     told, _ = admitted(case, anyway=True)
     structural = Problem(told, structure_of(told), told.identification)
     settings = CheckSettings()
     # what sits in a record or follows a clock of its own is nothing that a model can hold
     chosen = [e for e in CATALOGUE if e.site != "record" and not e.rare and e.variant == ""]
 
-    def site(placed) -> Site:  # type: ignore[no-untyped-def]
+    def site(placed) -> EffectSite:  # type: ignore[no-untyped-def]
         def at(size: float) -> NamedEffect | None:
             vector = information.at_size(structural, placed, size, settings)
             if vector is None:
@@ -105,19 +102,19 @@ def _of_structure(case: Case) -> list[Site]:
             return named_effect(structural, placed, eta, np.zeros(len(eta)), {})
 
         where = placed.place.site or placed.place.name or placed.target
-        return Site(placed.effect.name, where, frozenset({where, placed.place.name, placed.target}), at)
+        return EffectSite(placed.effect.name, where, frozenset({where, placed.place.name, placed.target}), at)
 
     return [site(p) for p in placements(told, structural.structure, chosen) if not p.source]
 
 
-def _of_joints(case: Case) -> list[Site]:
+def _of_joints(case: Case) -> list[EffectSite]:
     own, model, said = admitted_joints(case)
     if own is None or model is None:
         raise ParameterError(f"the case cannot be rehearsed: {said[0]}")
     found = problem.ArticulatedProblem.of(own, model, own.identification)
     settings = CheckSettings()
 
-    def site(placed: hypothesis.Placed) -> Site:
+    def site(placed: hypothesis.PlacedOnJoint) -> EffectSite:
         joint = found.joints[placed.joint]
 
         def at(size: float) -> NamedEffect | None:
@@ -133,6 +130,6 @@ def _of_joints(case: Case) -> list[Site]:
                 placed.effect.name, placed.where, 1.0, estimates, channel=joint.name, equation=placed.effect.equation
             )  # fmt: skip
 
-        return Site(placed.effect.name, placed.where, frozenset({placed.where, joint.name}), at)
+        return EffectSite(placed.effect.name, placed.where, frozenset({placed.where, joint.name}), at)
 
     return [site(p) for p in problem.placements(found, JOINTS)]

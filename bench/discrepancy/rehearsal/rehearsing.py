@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -14,16 +14,16 @@ import numpy as np
 from bench.discrepancy.application.applying import Findings
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.diagnosis import diagnose
-from bench.discrepancy.rehearsal.placing import Site, sites
-from bench.discrepancy.rehearsal.truth import Laboratory
+from bench.discrepancy.rehearsal.placing import EffectSite, sites
+from bench.discrepancy.rehearsal.truth import ModelLaboratory
 from bench.discrepancy.verdict import NamedEffect, Verdict
 from bench.documents.loading import load_document
 from bench.errors import BenchError, ParameterError
 from bench.files import json_values, write_text
+from bench.progress import ShowProgress
 
 STORE = "rehearsal.json"
 """Name of the file that holds what is done."""
-Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True)
@@ -151,7 +151,7 @@ def rehearse(
     sizes: Sequence[float] = SETTINGS.sizes,
     seed: int = 0,
     again: bool = False,
-    progress: Progress = lambda text, share: None,
+    progress: ShowProgress = lambda text, share: None,
 ) -> Rehearsal:
     """Rehearse a case; what is done is kept, so that a rehearsal that was stopped goes on where it was.
 
@@ -174,7 +174,7 @@ def rehearse(
     if not sizes or min(sizes) <= 0.0 or max(sizes) > 2.0:
         raise ParameterError(f"sizes {tuple(sizes)} came; parts of a response between 0 and 2 are expected")
     ordered = tuple(sorted(set(sizes), reverse=True))
-    laboratory = Laboratory.of(case)
+    laboratory = ModelLaboratory.of(case)
     print_of = _fingerprint(laboratory, ordered, seed)
     done = Rehearsal(case.name, ordered, fingerprint=print_of)
     store = folder / STORE
@@ -216,7 +216,7 @@ def rehearse(
     return Rehearsal(case.name, ordered, tuple(outcomes), print_of, alarms)
 
 
-def _alarms(laboratory: Laboratory, seed: int) -> tuple[str, ...]:
+def _alarms(laboratory: ModelLaboratory, seed: int) -> tuple[str, ...]:
     """What is named where nothing is missing."""
     rng = np.random.default_rng((seed, 2))
     sealed = laboratory.measured(Findings((), laboratory.drawn(rng)), rng)
@@ -226,7 +226,7 @@ def _alarms(laboratory: Laboratory, seed: int) -> tuple[str, ...]:
         return (f"refused: {error}",)
 
 
-def _sealed(laboratory: Laboratory, site: Site, size: float, seed: int) -> Outcome:
+def _sealed(laboratory: ModelLaboratory, site: EffectSite, size: float, seed: int) -> Outcome:
     """Put an effect in, and diagnose what is measured then."""
     effect = site.at(size)
     if effect is None:
@@ -245,7 +245,7 @@ def _sealed(laboratory: Laboratory, site: Site, size: float, seed: int) -> Outco
     )  # fmt: skip
 
 
-def is_found(verdict: Verdict, site: Site) -> bool:
+def is_found(verdict: Verdict, site: EffectSite) -> bool:
     """Whether a verdict names an effect at its place, or one of the set that the records cannot tell from it."""
     for effect in verdict.named:
         alike = {effect.name} | {name for group in verdict.indistinguishable if effect.name in group for name in group}  # fmt: skip
@@ -263,7 +263,7 @@ def _amplitude(effect: NamedEffect) -> str:
     return f"{name} {first.value:.3g} {first.unit}".rstrip()
 
 
-def _fingerprint(laboratory: Laboratory, sizes: Sequence[float], seed: int) -> str:
+def _fingerprint(laboratory: ModelLaboratory, sizes: Sequence[float], seed: int) -> str:
     """Of the model, what is believed of it, the commands and the options."""
     case = laboratory.case
     whole = hashlib.sha256(laboratory.path.read_bytes())

@@ -12,13 +12,13 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from bench import native
-from bench.discrepancy.application.applying import Applied, Findings, Options, apply, specification
+from bench.arrays import Array
+from bench.discrepancy.application.applying import Applied, Findings, RunOptions, apply, specification
 from bench.discrepancy.application.joint_replay import encoders_wrong
 from bench.discrepancy.application.linear_replay import LinearReplay
-from bench.discrepancy.application.running import Window, controls, hook_of, run, sampled
+from bench.discrepancy.application.running import Stretch, controls, hook_of, run, sampled
 from bench.discrepancy.application.target import PREFIX
 from bench.discrepancy.application.verification import VerificationSettings
 from bench.discrepancy.articulated.recognition import applies
@@ -30,7 +30,6 @@ from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.verdict import NamedEffect, NominalEstimate
 from bench.errors import ModelError, ParameterError, SimulationError
 
-Array = NDArray[np.float64]
 Readings = Callable[[Applied, Sequence[NamedEffect], CaseRecord], Mapping[str, Array]]
 
 
@@ -48,7 +47,7 @@ SETTINGS = TruthSettings()
 
 
 @dataclass(frozen=True, eq=False)
-class Laboratory:
+class ModelLaboratory:
     """A laboratory in which the user's model is the machine.
 
     Attributes:
@@ -64,7 +63,7 @@ class Laboratory:
     articulated: bool
 
     @classmethod
-    def of(cls, case: Case) -> Laboratory:
+    def of(cls, case: Case) -> ModelLaboratory:
         """The laboratory of a case.
 
         Raises:
@@ -109,7 +108,7 @@ class Laboratory:
         """
         settings = VerificationSettings()
         step = float(specification(self.path).option.timestep) / settings.converged
-        fine = Options(step, mujoco.mjtIntegrator.mjINT_RK4, hard=True)
+        fine = RunOptions(step, mujoco.mjtIntegrator.mjINT_RK4, hard=True)
         applied = apply(self.path, findings, case=self.case, linear=not self.articulated, options=fine)
         for change in applied.changes:
             if change.form == "none":
@@ -213,7 +212,7 @@ class _OfJoints:
         }
         played = controls(record, columns, compiled, steps, self.case.load_interpolation)
         control = np.vstack([np.repeat(played[:1], settling, axis=0), played])
-        start = Window(0, np.array(compiled.qpos0), np.zeros(compiled.nv))
+        start = Stretch(0, np.array(compiled.qpos0), np.zeros(compiled.nv))
         position, velocity = run(compiled, hook_of(applied), [start], control, len(control), rested=False)
         times = np.asarray(np.arange(len(record)) * record.step, dtype=np.float64)
         motion = sampled(position[0, settling:], velocity[0, settling:], compiled, times)

@@ -30,14 +30,16 @@ class AnswersSettings:
 SETTINGS = AnswersSettings()
 
 
-class Answer(NamedTuple):
+class AnsweredQuestion(NamedTuple):
     """A question, and its answer in a line."""
 
     question: str
     answer: str
 
 
-def answers(verdict: Verdict, *, settings: JudgementSettings = DEFAULT.judgement) -> tuple[Answer, ...]:
+def answers(
+    verdict: Verdict, *, settings: JudgementSettings = DEFAULT.judgement
+) -> tuple[AnsweredQuestion, ...]:
     """Answer the five questions of a diagnosis.
 
     Args:
@@ -45,11 +47,11 @@ def answers(verdict: Verdict, *, settings: JudgementSettings = DEFAULT.judgement
         settings: Those that it was judged with.
     """
     return (
-        Answer("Where", _where(verdict)),
-        Answer("Which", _which(verdict)),
-        Answer("How far", _how_far(verdict, settings)),
-        Answer("How sure", _how_sure(verdict)),
-        Answer("How complete", _how_complete(verdict)),
+        AnsweredQuestion("Where", _where(verdict)),
+        AnsweredQuestion("Which", _which(verdict)),
+        AnsweredQuestion("How far", _how_far(verdict, settings)),
+        AnsweredQuestion("How sure", _how_sure(verdict)),
+        AnsweredQuestion("How complete", _how_complete(verdict)),
     )
 
 
@@ -131,7 +133,7 @@ def _how_complete(verdict: Verdict) -> str:
     return f"not complete. {verdict.left}" if verdict.left else "not complete"
 
 
-class Step(NamedTuple):
+class NextStep(NamedTuple):
     """Something to do next, in words, with a command where there is one."""
 
     text: str
@@ -144,7 +146,7 @@ def model_options(case: Case) -> str:
     return f"--model {folder / case.rig} --case {folder}" if case.rig.endswith(".xml") else ""
 
 
-def next_steps(verdict: Verdict, model: str = "") -> tuple[Step, ...]:
+def next_steps(verdict: Verdict, model: str = "") -> tuple[NextStep, ...]:
     """What to do next, the most useful first.
 
     Args:
@@ -157,21 +159,21 @@ def next_steps(verdict: Verdict, model: str = "") -> tuple[Step, ...]:
         text = "Put it into your model" if verdict.named else "Put what comes nearest into your model"
         if model:
             command = f"jointbench apply verdict.json {model} -o corrected.xml{nearest}"
-            steps.append(Step(f"{text} and run the judging records there:", command))
+            steps.append(NextStep(f"{text} and run the judging records there:", command))
         elif verdict.named:
-            steps.append(Step("Put it into your model, as the end of this page writes it."))
+            steps.append(NextStep("Put it into your model, as the end of this page writes it."))
     if any(p.kind == "simulator" for p in verdict.locations):
-        steps.append(Step("Simulate with a smaller step, RK4 or a harder solreffriction."))
+        steps.append(NextStep("Simulate with a smaller step, RK4 or a harder solreffriction."))
     proposal = verdict.next_excitation
     if proposal.get("separates") and proposal.get("excitation"):
         steps.append(
-            Step(
+            NextStep(
                 f"Measure again, to separate {' from '.join(proposal['separates'])}: {proposal['excitation']}, peak load "
                 f"{proposal['peak_load']:.3g}, {proposal['duration_s']:.3g} s; power {100.0 * proposal['power']:.0f} %."
             )
         )
     elif proposal.get("reason"):
-        steps.append(Step(str(proposal["reason"])))
+        steps.append(NextStep(str(proposal["reason"])))
     if verdict.verdict == "none" and verdict.gap.before > verdict.gap.parameters_only:
-        steps.append(Step("Take the re-estimated parameters over."))
+        steps.append(NextStep("Take the re-estimated parameters over."))
     return tuple(steps)

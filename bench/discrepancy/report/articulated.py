@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis
 from bench.discrepancy.articulated.free_runs import FreeRuns
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
@@ -29,19 +29,18 @@ from bench.page import Page
 from bench.recording import Recording
 from bench.rig import Rig
 
-Array = NDArray[np.float64]
 FINAL = "with what is named"
 
 
 @dataclass(frozen=True)
-class ArticulatedSettings:
+class ArticulatedReportSettings:
     """Numbers of `bench.discrepancy.report.articulated`."""
 
     shown_joints: int = 3
     """Joints whose histories are drawn: those with most of the discrepancy."""
 
 
-SETTINGS = ArticulatedSettings()
+SETTINGS = ArticulatedReportSettings()
 
 
 def simulated_joints(diagnosis: ArticulatedDiagnosis) -> dict[str, Recording]:

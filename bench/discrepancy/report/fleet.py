@@ -35,7 +35,7 @@ class FleetSettings:
 SETTINGS = FleetSettings()
 
 
-class Options(NamedTuple):
+class DiagnosisOptions(NamedTuple):
     """Options of every diagnosis, as of `diagnose`."""
 
     exclude: tuple[str, ...] = ()
@@ -44,7 +44,7 @@ class Options(NamedTuple):
     budget: float = float("inf")
 
 
-def diagnose_one(folder: str, options: Options) -> dict[str, Any]:
+def diagnose_one(folder: str, options: DiagnosisOptions) -> dict[str, Any]:
     """The verdict of a case as a document with its name; an error where it cannot be diagnosed."""
     from bench.discrepancy.diagnosis import diagnose_folder  # noqa: PLC0415  (runs on workers)
 
@@ -56,7 +56,7 @@ def diagnose_one(folder: str, options: Options) -> dict[str, Any]:
 
 def diagnose_cases(
     folders: Sequence[Path],
-    options: Options,
+    options: DiagnosisOptions,
     *,
     scheduler: str = "",
     progress: Callable[[str], None] = lambda text: None,
@@ -99,7 +99,7 @@ def _named(found: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return [{**entry, "case": name} for entry, name in zip(found, names, strict=True)]
 
 
-def rows(found: Sequence[dict[str, Any]]) -> tuple[list[str], list[list[str]]]:
+def fleet_rows(found: Sequence[dict[str, Any]]) -> tuple[list[str], list[list[str]]]:
     """Header and rows of the table of a fleet."""
     lines = []
     for entry in found:
@@ -174,7 +174,7 @@ def fleet_page(found: Sequence[dict[str, Any]]) -> Page:
         section.table("Part of the gap that an effect closes", header, lines)
     else:
         section.text("No effect was named on any of them.")
-    page.section("Verdicts").table("Gap of the judging records, before and after", *rows(found))
+    page.section("Verdicts").table("Gap of the judging records, before and after", *fleet_rows(found))
     grows = page.section("What grows with the order")
     told = trends(found)
     if told:

@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
-from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
+from bench.arrays import Array
 from bench.discrepancy.judgement.shares import probability
 from bench.discrepancy.localisation.state_map import StateMap
 from bench.discrepancy.report.simulated_records import APPLIED, NOMINAL
@@ -23,8 +23,6 @@ from bench.discrepancy.verdict import Gap, Ranked, Split
 from bench.figures.look import COLOURS, thin
 from bench.page import INK, PAPER, RULE
 from bench.recording import Recording
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

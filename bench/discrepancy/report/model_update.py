@@ -16,7 +16,7 @@ FRICTION = ("friction_force", "creep_velocity", "lead_time")
 """Parameters of dry friction, those of its softness where it has any."""
 
 
-class Recipe(NamedTuple):
+class PastedEffect(NamedTuple):
     """An effect, ready to be pasted.
 
     Attributes:
@@ -36,7 +36,7 @@ class Recipe(NamedTuple):
     note: str
 
 
-def recipes(diagnosis: Diagnosis) -> list[Recipe]:
+def recipes(diagnosis: Diagnosis) -> list[PastedEffect]:
     """Return how each named effect goes back into the model."""
     estimates = nominal_estimates(diagnosis)
     return [_recipe(effect, estimates, diagnosis) for effect in diagnosis.verdict.named]
@@ -51,13 +51,13 @@ def nominal_estimates(diagnosis: Diagnosis) -> dict[str, float]:
     return out
 
 
-def _recipe(effect: NamedEffect, estimates: dict[str, float], diagnosis: Diagnosis) -> Recipe:
+def _recipe(effect: NamedEffect, estimates: dict[str, float], diagnosis: Diagnosis) -> PastedEffect:
     joint = _joint(effect, diagnosis)
     where = effect.where or effect.channel
     title = f"{effect.name}{f' ({where})' if where else ''}"
     numbers = ", ".join(f"{n} = {e.value:.5g} {e.unit}".rstrip() for n, e in effect.parameters.items())
     mjcf, note = _mjcf(effect, estimates, diagnosis, joint)
-    return Recipe(
+    return PastedEffect(
         title,
         f"{effect.equation}   with {numbers}",
         element_code(effect.law, effect.theta, joint) if effect.law else "",

@@ -10,13 +10,11 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.case.acquisition import upsampled
 from bench.discrepancy.settings import DiagnosisSettings, ResponseSettings
-from bench.discrepancy.simulation.stick_slip import LinearStructure
-
-Array = NDArray[np.float64]
+from bench.discrepancy.simulation.stick_slip import StructureMatrices
 
 
 class Actuated(NamedTuple):
@@ -35,7 +33,7 @@ class Actuated(NamedTuple):
     between_samples: bool
 
 
-def run_in(linear: LinearStructure, length: int, step: float, *, settings: ResponseSettings) -> int:
+def run_in(linear: StructureMatrices, length: int, step: float, *, settings: ResponseSettings) -> int:
     """Samples of run-in from rest, in whole periods, after which a linear structure is in its steady state.
 
     Args:

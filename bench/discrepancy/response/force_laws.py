@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.case.case import CaseRecord
 from bench.discrepancy.effects.effect import Scales
 from bench.discrepancy.model.placement import Placed
@@ -15,8 +15,6 @@ from bench.discrepancy.settings import SimulationSettings
 from bench.discrepancy.simulation.equations_of_motion import COLUMNS
 from bench.discrepancy.simulation.step_size import rates
 from bench.discrepancy.simulation.stick_slip import Elements
-
-Array = NDArray[np.float64]
 
 
 class ActingLaw(NamedTuple):

@@ -12,13 +12,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.case.case import CaseRecord
 from bench.discrepancy.model.structure import Structure
 from bench.discrepancy.simulation.stick_slip import Motion
-
-Array = NDArray[np.float64]
 
 START = "start "
 """Beginning of the names of initial states among the parameters."""

@@ -8,8 +8,8 @@ from __future__ import annotations
 from dataclasses import KW_ONLY, dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.case.channel_noise import noise_floor, raised_noise
 from bench.discrepancy.effects.effect import Scales
@@ -22,8 +22,6 @@ from bench.discrepancy.response.windows import channels_of, drifts
 from bench.discrepancy.settings import DEFAULT, DiagnosisSettings
 from bench.discrepancy.simulation.step_size import speeds
 from bench.discrepancy.simulation.stick_slip import Motion
-
-Array = NDArray[np.float64]
 
 
 @dataclass
@@ -209,10 +207,13 @@ class MeasuredCase:
             power = [float(np.mean(self.responses_of(record) ** 2)) for record in self.records]
             return float(np.sqrt(np.mean(power))) or 1.0
         group = next(g for g in self.structure.groups() if np.any(row[list(g)] != 0.0))
-        acting = np.abs(self.structure.inputs[list(group)]).sum(axis=0) > 0
+        # a load acts by its gear: a command of a servo is an angle
+        gears = np.abs(self.structure.inputs[list(group)]).max(axis=0)
+        acting = gears > 0
         power = [0.0]
         if acting.any():
-            power = [float(np.mean(self.loads_of(record)[:, acting] ** 2)) for record in self.records]
+            loads = [(self.loads_of(record) * gears)[:, acting] for record in self.records]
+            power = [float(np.mean(own**2)) for own in loads]
         # of a prescribed motion the load is an acceleration
         if not any(power) or self.structure.prescribed:
             moved = [self.motion(i).acceleration @ row for i in range(len(self.records))]

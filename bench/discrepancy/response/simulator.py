@@ -10,6 +10,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.case.case import CaseRecord
 from bench.discrepancy.model.nominal_elements import with_own_forces
 from bench.discrepancy.model.placement import Hypothesis
@@ -21,9 +22,7 @@ from bench.discrepancy.response.windows import cut
 from bench.discrepancy.simulation.prescribed_response import driven_force
 from bench.discrepancy.simulation.restarts import measured_states, restarted
 from bench.discrepancy.simulation.step_size import steps
-from bench.discrepancy.simulation.stick_slip import Elements, LinearStructure, Motion
-
-Array = NDArray[np.float64]
+from bench.discrepancy.simulation.stick_slip import Elements, Motion, StructureMatrices
 
 
 @dataclass
@@ -196,7 +195,7 @@ class Simulator(MeasuredCase):
             )
         return self._own_rates[record.name]
 
-    def _substeps(self, linear: LinearStructure, fastest: Array, record: CaseRecord) -> NDArray[np.int64]:
+    def _substeps(self, linear: StructureMatrices, fastest: Array, record: CaseRecord) -> NDArray[np.int64]:
         """Integration steps of every sample of a record, or (1,) of all of them, by the fastest rate of the laws (n,) or (1,)."""
         if self.substeps is not None:
             return np.array([self.substeps])

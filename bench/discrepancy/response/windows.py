@@ -12,15 +12,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.model.structure import Structure
 from bench.discrepancy.settings import DEFAULT, LikelihoodSettings
-from bench.discrepancy.simulation.stick_slip import LinearStructure, Motion
-
-Array = NDArray[np.float64]
+from bench.discrepancy.simulation.stick_slip import Motion, StructureMatrices
 
 
-def drifts(structure: Structure, linear: LinearStructure, duration: float) -> bool:
+def drifts(structure: Structure, linear: StructureMatrices, duration: float) -> bool:
     """Whether a measured motion is without a stiffness that would bring it back within the record.
 
     Args:

@@ -1,4 +1,4 @@
-"""Nomination: which effects are worth a fit beside a hypothesis, and from which starts."""
+"""Candidates: which effects are worth a fit beside a hypothesis, and from which starts."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ class LinearAmplitudesSettings:
 LINEAR_AMPLITUDES_SETTINGS = LinearAmplitudesSettings()
 
 
-class Node(NamedTuple):
+class GridPoint(NamedTuple):
     """A grid point of an effect.
 
     Attributes:
@@ -108,7 +108,7 @@ def fainter(placed: Placed, eta: Array, share: float) -> Array:
     return out
 
 
-def read(node: Node, gram: Array, right: Array, *, settings: ScreeningSettings) -> Point | None:  # noqa: PLR0912  (one branch a kind of effect)
+def read(node: GridPoint, gram: Array, right: Array, *, settings: ScreeningSettings) -> Point | None:  # noqa: PLR0912  (one branch a kind of effect)
     """Best coefficients of a node, and the parameters they stand for; None where their sign makes no sense."""
     effect = node.placed.effect
     parameters = effect.parameters

@@ -27,7 +27,7 @@ from bench.discrepancy.response.windows import channels_of
 from bench.discrepancy.simulation.linear_response import linear_run
 from bench.discrepancy.simulation.prescribed_response import driven_force
 from bench.discrepancy.simulation.step_size import steps
-from bench.discrepancy.simulation.stick_slip import Elements, LinearStructure
+from bench.discrepancy.simulation.stick_slip import Elements, StructureMatrices
 
 
 class About(NamedTuple):
@@ -59,7 +59,9 @@ class MotionResponse:
                 problem = _moving(problem, about, self._unspoilt)
         self.problem = problem
         linear = problem.structure.at(values)
-        self.linear = LinearStructure(linear.mass, linear.damping, linear.stiffness, np.eye(len(linear.mass)))
+        self.linear = StructureMatrices(
+            linear.mass, linear.damping, linear.stiffness, np.eye(len(linear.mass))
+        )
         for i in range(len(problem.records)):
             problem.motion(i)
         spread = np.where(problem.spread > 0.0, problem.spread, 1.0)
@@ -147,7 +149,7 @@ class MotionResponse:
 
     def effect_response(self, placed: Placed, eta: Array) -> Array:
         """Whitened response to an effect along the measured motion."""
-        return self.response(lambda i: -force_along(self.problem, placed, eta, i))
+        return self.response(lambda i: -force_along_motion(self.problem, placed, eta, i))
 
 
 def _unspoilt(simulator: Simulator, base: Fit, record: CaseRecord) -> Array:
@@ -173,7 +175,7 @@ def _moving(problem: Problem, about: About, unspoilt: Sequence[Array]) -> Proble
     return problem.moving(motions)
 
 
-def force_along(simulator: Simulator, placed: Placed, eta: Array, index: int) -> Array:
+def force_along_motion(simulator: Simulator, placed: Placed, eta: Array, index: int) -> Array:
     """Force of an effect on the degrees of freedom (n, n_dof) along the measured motion of record `index`."""
     motion = simulator.motion(index)
     record = simulator.records[index]

@@ -10,7 +10,7 @@ from bench.discrepancy.likelihood.problem import Array, Problem
 from bench.discrepancy.model.placement import Hypothesis, Placed
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.screening.linear_amplitudes import (
-    Node,
+    GridPoint,
 )
 
 
@@ -45,7 +45,7 @@ def simulated_columns(problem: Problem, hypothesis: Hypothesis, vector: Array, r
 
 def signal_nodes(
     problem: Problem, signals: Sequence[Placed], hypothesis: Hypothesis, vector: Array
-) -> list[Node]:
+) -> list[GridPoint]:
     """Changes that actuator and sensor effects make to the simulated channels of a base.
 
     Args:
@@ -57,7 +57,7 @@ def signal_nodes(
     own = {placed.key for placed in hypothesis}
     base = problem.residual(hypothesis, vector)
 
-    def node(task: tuple[Placed, Array]) -> Node | None:
+    def node(task: tuple[Placed, Array]) -> GridPoint | None:
         placed, eta = task
         point = eta.copy()
         if placed.effect.parameters[0].signed:
@@ -66,7 +66,7 @@ def signal_nodes(
         if changed.shape != base.shape or not np.any(changed != base):
             return None
         column = (base - changed)[:, None]
-        return Node(placed, point, column, column.T @ column)
+        return GridPoint(placed, point, column, column.T @ column)
 
     tasks = [(p, eta) for p in signals if p.key not in own for eta in p.effect.grid()]
     return [found for found in in_threads(node, tasks) if found is not None]

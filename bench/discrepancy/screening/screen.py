@@ -20,7 +20,7 @@ from bench.discrepancy.model.placement import Hypothesis, Placed
 from bench.discrepancy.numerics.least_squares import Prior, minimise
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.screening.linear_amplitudes import (
-    Node,
+    GridPoint,
     Point,
     products,
     read,
@@ -52,7 +52,7 @@ class Screen(MotionResponse):
         self._beside: tuple[bytes, Screen] | None = None
         self.inertia: list[Placed] = []
         self.signals: list[Placed] = []
-        self.nodes: list[Node] = []
+        self.nodes: list[GridPoint] = []
         self.add(candidates)
 
     def add(self, candidates: Sequence[Placed]) -> None:
@@ -85,7 +85,7 @@ class Screen(MotionResponse):
             self._beside = key, Screen(self.problem, self.candidates, about=about)
         return self._beside[1]
 
-    def _node(self, placed: Placed, eta: Array) -> Node | None:
+    def _node(self, placed: Placed, eta: Array) -> GridPoint | None:
         # hundreds of grid points are kept, and a free force has dozens of columns: seven digits are enough
         first, *further = spanning(placed, eta)
         offset = self.effect_response(placed, first)
@@ -104,7 +104,7 @@ class Screen(MotionResponse):
         largest = max(columns.max(), -columns.min())
         if not 0.0 < largest < self.problem.settings.screening.largest:
             return None
-        return Node(placed, eta, columns, products(columns, columns))
+        return GridPoint(placed, eta, columns, products(columns, columns))
 
     def ground(self, base: Fit | None = None, *, simulated: bool = False) -> Ground:
         """What a base hypothesis leaves.
@@ -161,7 +161,7 @@ class Screen(MotionResponse):
         nodes = [node for node in self.nodes if node.placed.key not in own]
         nodes += signal_nodes(self.problem, self.signals, hypothesis, vector)
 
-        def solved(node: Node) -> Point | None:
+        def solved(node: GridPoint) -> Point | None:
             inner = products(ground.head, node.columns)
             return read(
                 node,

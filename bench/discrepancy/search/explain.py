@@ -8,6 +8,7 @@ noise, or a force. Chi-squared and evidence add over groups, so all explanations
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from itertools import product
 
@@ -17,7 +18,7 @@ from bench.discrepancy.case.case import Case
 from bench.discrepancy.effects.effect import Effect
 from bench.discrepancy.fitting.goodness_of_fit import consistent, key_of, names, near
 from bench.discrepancy.fitting.map_fit import Fit
-from bench.discrepancy.likelihood.model_error import ModelError
+from bench.discrepancy.likelihood.model_error import ModelInadequacy
 from bench.discrepancy.likelihood.problem import Problem, band_bins
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.model.placements import placements
@@ -41,7 +42,7 @@ def explain(
     *,
     most: int = 3,
     progress: Callable[[str], None] = lambda text: None,
-    error: ModelError | None = None,
+    error: ModelInadequacy | None = None,
     deadline: Deadline = NEVER,
     seeds: Sequence[Explanation] = (),
     settings: DiagnosisSettings,
@@ -67,7 +68,7 @@ def explain(
             most=most, progress=progress, error=error, deadline=deadline, settings=settings,
         )  # fmt: skip
     search = _attributed(
-        Problem(case, structure, case.identification, error=error, settings=settings),
+        _problem(case, structure, error, settings=settings),
         placements(case, structure, catalogue),
         most=most,
         progress=progress,
@@ -79,6 +80,25 @@ def explain(
     return nothing_left_first(found) if problem.scaled else parsimonious(found)
 
 
+def _problem(
+    case: Case,
+    structure: Structure,
+    error: ModelError | None,
+    *,
+    bins: dict[str, int] | None = None,
+    settings: DiagnosisSettings,
+) -> Problem:
+    """Records and priors of some degrees of freedom.
+
+    Where the error of the model weighs, nominal parameters stay within what is believed of them: one that strays takes the search
+    along, and an effect beside it is judged by a model that nobody has.
+    """
+    within = math.inf if error is None else settings.judgement.coarse.within
+    return Problem(
+        case, structure, case.identification, bins=bins, error=error, within=within, settings=settings
+    )
+
+
 def _in_groups(
     case: Case,
     catalogue: Sequence[Effect],
@@ -87,16 +107,16 @@ def _in_groups(
     *,
     most: int,
     progress: Callable[[str], None],
-    error: ModelError | None,
+    error: ModelInadequacy | None,
     deadline: Deadline,
     settings: DiagnosisSettings,
 ) -> list[Explanation]:
     """Explanations of a rig that falls apart into groups of degrees of freedom, and of effects that couple them."""
     bins = _common_bins(case, structure, settings=settings)
-    whole = Problem(case, structure, case.identification, bins=bins, error=error, settings=settings)
+    whole = _problem(case, structure, error, bins=bins, settings=settings)
     prepared = []
     for part in parts:
-        problem = Problem(case, part, case.identification, bins=bins, error=error, settings=settings)
+        problem = _problem(case, part, error, bins=bins, settings=settings)
         progress(f"screening of {', '.join(part.dofs)}")
         prepared.append(prepare(problem, placements(case, part, catalogue)))
     odd = [entry for entry in prepared if not consistent(entry[0].ranked(0)[0])]

@@ -1,4 +1,4 @@
-"""Challenge: the effects of the best hypothesis against their nearest rivals, and whether each of them is still needed."""
+"""Backward elimination: the effects of the best hypothesis against their nearest rivals, and whether each of them is still needed."""
 
 from __future__ import annotations
 

@@ -18,6 +18,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.effects import friction_limits as limits
 from bench.discrepancy.effects.catalogue import effect_named
 from bench.discrepancy.effects.effect import Effect, FreeParameter, Scales, Values
@@ -30,7 +31,6 @@ from bench.discrepancy.search.fits import Search, Task, converge
 from bench.laws.coulomb import COULOMB
 from bench.laws.soft_friction import SOFT_COULOMB
 
-Array = NDArray[np.float64]
 IDEAL = "coulomb_friction"
 """The effect that the others are variants of."""
 RUBBING = ("friction", "hysteresis")

@@ -18,10 +18,9 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.settings import DEFAULT, SearchSettings
 from bench.discrepancy.simulation.stick_slip import Motion
-
-Array = NDArray[np.float64]
 
 
 class TimeWindows(NamedTuple):

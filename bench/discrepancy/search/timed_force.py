@@ -15,8 +15,8 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.case.case import CaseRecord
 from bench.discrepancy.effects.effect import (
     EFFECT_SETTINGS,
@@ -43,7 +43,6 @@ from bench.discrepancy.search.time_windows import (
 from bench.discrepancy.settings import SearchSettings
 from bench.laws.timed_force import MAX_WINDOWS, timed_force_law
 
-Array = NDArray[np.float64]
 SHIFT = FreeParameter("shift", "step", signed=True, std=1.0, bounds=(-20.0, 20.0), unit="s")
 
 

@@ -8,7 +8,7 @@ from bench.discrepancy.settings.articulated import (
 )
 from bench.discrepancy.settings.case import CaseSettings
 from bench.discrepancy.settings.checks import ChecksSettings, LikenessSettings, ScaleSettings
-from bench.discrepancy.settings.describing import Described, described, setting
+from bench.discrepancy.settings.describing import DescribedSetting, described, setting
 from bench.discrepancy.settings.diagnosis import DEFAULT, DiagnosisSettings, changed, with_values
 from bench.discrepancy.settings.document import SettingsDocument, read_settings, settings_of
 from bench.discrepancy.settings.fitting import FittingSettings
@@ -16,7 +16,7 @@ from bench.discrepancy.settings.judgement import CoarseSettings, HeldOutSettings
 from bench.discrepancy.settings.likelihood import ErrorSettings, LikelihoodSettings
 from bench.discrepancy.settings.localisation import LocalisationSettings
 from bench.discrepancy.settings.model import ModelSettings
-from bench.discrepancy.settings.motion import MemorySettings, MotionSettings
+from bench.discrepancy.settings.motion import MotionSettings, RecordMemorySettings
 from bench.discrepancy.settings.next_test import NextTestSettings
 from bench.discrepancy.settings.numerics import NumericsSettings
 from bench.discrepancy.settings.response import ResponseSettings
@@ -34,7 +34,7 @@ __all__ = [
     "CaseSettings",
     "ChecksSettings",
     "CoarseSettings",
-    "Described",
+    "DescribedSetting",
     "DiagnosisSettings",
     "ErrorSettings",
     "FittingSettings",
@@ -43,11 +43,11 @@ __all__ = [
     "LikelihoodSettings",
     "LikenessSettings",
     "LocalisationSettings",
-    "MemorySettings",
     "ModelSettings",
     "MotionSettings",
     "NextTestSettings",
     "NumericsSettings",
+    "RecordMemorySettings",
     "ResponseSettings",
     "ScaleSettings",
     "ScreeningSettings",

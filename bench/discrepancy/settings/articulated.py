@@ -12,7 +12,11 @@ class ArticulatedSearchSettings:
     """The search on articulated models."""
 
     most: int = setting(3, "Largest number of effects named together.", "Convention.")
-    fitted: int = setting(10, "Screened effects that are fitted in a round, at most.", "Convention.")
+    fitted: int = setting(
+        10,
+        "Screened effects that are fitted in a round, at most; and as many wrong numbers instead of those that the fit has strained.",
+        "Convention.",
+    )
     least: int = setting(3, "Of those, the ones that are fitted whatever they promise.", "Convention.")
     hope: float = setting(
         0.5,
@@ -85,6 +89,16 @@ class ArticulatedJudgementSettings:
         13.8,
         "Log posterior (odds of a million) that a further effect has to add to what is complete within the accuracy of the noise.",
         "A clean model is offered a few hundred effects, and the noise is not quite what its model says.",
+    )
+    ordinates: int = setting(
+        8,
+        "Ordinates of a periodogram below which no power is asked for.",
+        "Fewer of them fluctuate by more than a third.",
+    )
+    draws: int = setting(
+        8,
+        "Draws of the parameters, for what their uncertainty leaves on the judging records.",
+        "It is known to a third then, and added to the noise, which is mostly more.",
     )
     material: float = setting(
         0.5,
@@ -184,6 +198,11 @@ class ArticulatedSettings:
         24,
         "Corrected records kept.",
         "One sensor effect's derivatives over all identification records; memory.",
+    )
+    kept_runs: int = setting(
+        12,
+        "Runs kept of every joint during a fit.",
+        "The masses of an arm, between two columns of a Jacobian that leave a joint as it is; memory.",
     )
     diverged: float = setting(
         1000000.0,

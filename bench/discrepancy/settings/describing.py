@@ -10,7 +10,7 @@ CONVENTION = "Convention."
 """Reason of a value that rests on neither a derivation nor a study."""
 
 
-class Described(NamedTuple):
+class DescribedSetting(NamedTuple):
     """One setting.
 
     Attributes:
@@ -40,7 +40,7 @@ def setting(default: Any, meaning: str, reason: str = CONVENTION, *, unit: str =
     return field(default=default, metadata={"meaning": meaning, "reason": reason, "unit": unit})
 
 
-def described(settings: Any, prefix: str = "") -> Iterator[Described]:
+def described(settings: Any, prefix: str = "") -> Iterator[DescribedSetting]:
     """Every setting of an object of settings and of those within it, in the order they are written.
 
     Args:
@@ -52,6 +52,6 @@ def described(settings: Any, prefix: str = "") -> Iterator[Described]:
         if is_dataclass(value):
             yield from described(value, f"{path}.")
         else:
-            yield Described(
+            yield DescribedSetting(
                 path, value, entry.metadata["meaning"], entry.metadata["reason"], entry.metadata["unit"]
             )

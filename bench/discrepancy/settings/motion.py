@@ -10,7 +10,7 @@ from bench.discrepancy.settings.describing import setting
 
 
 @dataclass(frozen=True)
-class MemorySettings:
+class RecordMemorySettings:
     """How long a component may remember what was before its record."""
 
     width: float = setting(
@@ -69,4 +69,4 @@ class MotionSettings:
         "Cycles a record of the loop that holds the acceleration behind a prescribed position to this position.",
         "What an integral drifts by lies below them; a motion worth diagnosing goes through many more.",
     )
-    memory: MemorySettings = field(default_factory=MemorySettings)
+    memory: RecordMemorySettings = field(default_factory=RecordMemorySettings)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from bench.discrepancy.simulation.equations_of_motion import STICK_SLIP_LIMITS
-from bench.discrepancy.simulation.stick_slip import LinearStructure, Motion
+from bench.discrepancy.simulation.stick_slip import Motion, StructureMatrices
 
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
@@ -60,7 +60,7 @@ def _discrete(rate: bytes, shape: tuple[int, int], step: float) -> tuple[NDArray
 
 
 def linear_run(
-    structure: LinearStructure,
+    structure: StructureMatrices,
     *,
     loads: NDArray[np.float64],
     step: float,

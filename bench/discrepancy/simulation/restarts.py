@@ -5,16 +5,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.simulation.prescribed_response import driven_states
 from bench.discrepancy.simulation.stick_slip import (
     Elements,
-    LinearStructure,
     Motion,
+    StructureMatrices,
     free_run,
     steps_of_each,
 )
-
-Array = NDArray[np.float64]
 
 
 def measured_states(motion: Motion, firsts: NDArray[np.int64]) -> Array:
@@ -23,7 +22,7 @@ def measured_states(motion: Motion, firsts: NDArray[np.int64]) -> Array:
 
 
 def restarted(
-    linear: LinearStructure,
+    linear: StructureMatrices,
     elements: Elements,
     *,
     loads: Array,

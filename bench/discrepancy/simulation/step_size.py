@@ -13,10 +13,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.effects.effect import Effect, Scales, Values
 from bench.discrepancy.settings import SimulationSettings
-
-Array = NDArray[np.float64]
 
 
 def speeds(velocity: Array, *, prescribed: bool, settings: SimulationSettings) -> Array:

@@ -43,7 +43,7 @@ _jit = numba.njit(cache=True, error_model="numpy", nogil=True)
 _inline = numba.njit(cache=True, error_model="numpy", nogil=True, forceinline=True)
 
 
-class LinearStructure(NamedTuple):
+class StructureMatrices(NamedTuple):
     """Matrices of ``M q'' + C q' + K q = B u - (forces of the elements)``.
 
     Attributes:
@@ -285,7 +285,7 @@ def steps_of_each(substeps: int | NDArray[np.int64], n: int) -> NDArray[np.int64
 
 
 def free_run(
-    structure: LinearStructure,
+    structure: StructureMatrices,
     elements: Elements,
     *,
     loads: NDArray[np.float64],

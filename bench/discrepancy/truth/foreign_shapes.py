@@ -7,10 +7,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from bench.discrepancy.truth.recipe import Draw, Drawn, Reach, Shape, between, sign
+from bench.discrepancy.truth.recipe import Drawn, DrawShape, Reach, Shape, between, sign
 
 
-def modulated(frequency_of: Callable[[np.random.Generator, Reach], float]) -> Draw:
+def modulated(frequency_of: Callable[[np.random.Generator, Reach], float]) -> DrawShape:
     """A stiffness that follows the clock with a frequency [Hz] so drawn."""
 
     def draw(rng: np.random.Generator, r: Reach) -> Shape:
@@ -101,7 +101,7 @@ def hertz(rng: np.random.Generator, r: Reach) -> Shape:
     return shape
 
 
-def resonator(frequency: tuple[float, float], damping: tuple[float, float]) -> Draw:
+def resonator(frequency: tuple[float, float], damping: tuple[float, float]) -> DrawShape:
     """A hidden mass on a spring, its frequency as a multiple of that of the motion and its damping ratio drawn between limits."""
 
     def draw(rng: np.random.Generator, r: Reach) -> Shape:
@@ -129,7 +129,7 @@ def stress_softening(rng: np.random.Generator, r: Reach) -> Shape:
     return shape
 
 
-def wavy(shallowest: float) -> Draw:
+def wavy(shallowest: float) -> DrawShape:
     """Friction that comes and goes along the stroke, by a part of it between `shallowest` and all."""
 
     def draw(rng: np.random.Generator, r: Reach) -> Shape:

@@ -16,13 +16,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
+from bench.arrays import Array
 from bench.discrepancy.truth.moreau_time_stepping import Acting, RigMatrices, Stop, TrueMotion, follow, march
 from bench.discrepancy.truth.recipe import Drawn, Recipe
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import bessel, chirp, fftconvolve, sosfilt
 
-Array = NDArray[np.float64]
+from bench.arrays import Array
 
 SIGNALS = ("random", "sweep", "multisine", "stepped", "decaying")
 

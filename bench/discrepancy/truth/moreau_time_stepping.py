@@ -23,10 +23,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.truth.moreau_steps import follow_through, march_through
 from bench.laws.base import ForceLaw, Kernel
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -65,7 +65,7 @@ class Drawn(NamedTuple):
 Shape = Callable[[float], Drawn]
 """Strength, of order one, to the effect."""
 
-Draw = Callable[[np.random.Generator, Reach], Shape]
+DrawShape = Callable[[np.random.Generator, Reach], Shape]
 """Source of randomness and reach to the shape."""
 
 
@@ -88,7 +88,7 @@ class Recipe:
 
     name: str
     site: str
-    draw: Draw
+    draw: DrawShape
     rigs: tuple[str, ...] = ("sdof", "damper", "joint")
     law: ForceLaw | None = None
     limit: Kernel | None = None

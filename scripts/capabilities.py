@@ -1,0 +1,187 @@
+"""What the bench can do, each shown by one command, with the limits that its figures keep."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from capability_figures import (
+    Figures,
+    benchmark,
+    bouc_wen,
+    demo,
+    excitation,
+    graded,
+    localisation,
+    measured,
+    memory_joint,
+    monitoring,
+    pendulum,
+    planted,
+    reproduction,
+    sealed,
+    training,
+)
+
+
+@dataclass(frozen=True)
+class Capability:
+    """Something the bench can do, shown by one command."""
+
+    name: str
+    title: str
+    command: tuple[str, ...]
+    figures: Callable[[Any], Figures] = field(repr=False)
+    data: str = ""  # folder of measured records that it needs and that is not shipped
+    before: tuple[tuple[str, ...], ...] = ()  # commands that make what the command reads
+    hours: bool = False  # run only where it is named
+
+    def shown(self) -> str:
+        """The commands as a person types them."""
+        commands = (*self.before, self.command)
+        return " && ".join(" ".join(command) for command in commands).replace("{data}", "FOLDER")
+
+
+def _excitation_task(task: str, title: str) -> Capability:
+    command = ("python", "scripts/evaluate_excitation.py", task, "--json", "-")
+    return Capability(f"excitation_{task}", title, command, excitation, hours=True)
+
+
+def _benchmark_group(name: str, title: str) -> Capability:
+    return Capability(name, title, ("python", "scripts/benchmark.py", name, "--json"), benchmark)
+
+
+SEALED_SEED = "20261208"
+"""Of the sealed cases that are published: a new one for every set, so that nobody has looked at its cases before."""
+CAPABILITIES: Sequence[Capability] = (
+    Capability("demo", "The main job", ("jointbench", "demo", "--json"), demo),
+    _benchmark_group("native", "Native callbacks"),
+    Capability(
+        "reproduce",
+        "The dissertation ([reproduction.md](reproduction.md) has sources and reasons, [gallery.md](gallery.md) the figures)",
+        ("python", "scripts/make_gallery.py", "--fresh", "--json"),
+        reproduction,
+    ),
+    Capability(
+        "monitoring",
+        "A damper watched in service",
+        ("python", "scripts/monitor_damper.py", "--json"),
+        monitoring,
+    ),
+    _benchmark_group("stream", "Least squares on line, against padasip"),
+    _benchmark_group("accuracy", "Equal error: the joint rig against SciPy's integrators"),
+    _benchmark_group("identify", "Identification against torch, scikit-learn and mujoco.sysid"),
+    _benchmark_group("envs", "Vector environments against gymnasium's own"),
+    Capability(
+        "trials",
+        "Diagnosis of the development trials, made by integrators of others",
+        ("jointbench", "blind", "score", "out/trials", "{data}/../trials/answers", "--json"),
+        sealed,
+        before=(("jointbench", "blind", "run", "{data}/../trials", "out/trials", "--again"),),
+        data="../trials",
+    ),
+    Capability(
+        "sealed",
+        "Diagnosis of own sealed cases ([blind_results.md](blind_results.md) has the bands)",
+        ("python", "scripts/sealed_cases.py", "--n", "300", "--struck", "0", "--seed", SEALED_SEED, "--json"),
+        lambda told: sealed(told["score"]),
+        hours=True,
+    ),
+    Capability(
+        "localisation",
+        "Where the missing force lies",
+        ("python", "scripts/localisation.py", "--json"),
+        localisation,
+    ),
+    Capability(
+        "pendulum",
+        "Diagnosis of a pendulum that swings far, gravity read off its MJCF",
+        ("python", "scripts/pendulum.py", "--json"),
+        pendulum,
+    ),
+    Capability(
+        "measured",
+        "Diagnosis of measured records, the effect never named",
+        ("python", "scripts/diagnose_measured.py", "--data", "{data}", "--json"),
+        measured,
+        data=".",
+    ),
+    Capability(
+        "measured_cases",
+        "Measured records, graded by what was written down before",
+        ("python", "scripts/measured_cases.py", "--data", "{data}", "--json"),
+        graded,
+        data=".",
+    ),
+    Capability(
+        "check",
+        "Faults planted into records of a slide, and what `jointbench check` says",
+        ("python", "scripts/planted_faults.py", "--faults", "200", "--sound", "100"),
+        planted,
+    ),
+    Capability(
+        "unstated",
+        "The same where nothing is said of the acquisition",
+        (
+            *("python", "scripts/diagnose_measured.py", "--data", "{data}", "bouc_wen", "silverbox"),
+            *("--unstated", "--json"),
+        ),
+        measured,
+        data=".",
+    ),
+    _benchmark_group("diagnosis", "Diagnosis against mujoco.sysid and pysindy, side by side"),
+    Capability(
+        "peers",
+        "The same on the development trials of one degree of freedom",
+        (
+            *("python", "scripts/benchmark.py", "diagnosis", "--data", "{data}/../trials"),
+            *("--work", "out/peers", "--json"),
+        ),
+        benchmark,
+        data="../trials",
+        hours=True,
+    ),
+    Capability(
+        "peers_joint",
+        "The same on the development trials of the joint, mujoco.sysid given ten times the diagnosis's time",
+        (
+            *("python", "scripts/benchmark.py", "diagnosis", "--data", "{data}/../trials"),
+            *("--rig", "joint", "--work", "out/peers_joint", "--json"),
+        ),
+        benchmark,
+        data="../trials",
+        hours=True,
+    ),
+    _excitation_task(
+        "sdof", "Excitation on the SDOF rig: trained policy against the baselines, held-out rigs"
+    ),
+    _excitation_task("rivals", "Excitation that tells rivals apart: trained policy against the baselines"),
+    _benchmark_group("campaign", "Campaigns"),
+    *(
+        Capability(
+            f"training_{task}",
+            f"Training from scratch of the policy `{task}`",
+            ("python", "scripts/train_excitation.py", task, *options, "--fresh", "--json"),
+            training,
+        )
+        for task, options in (
+            ("sdof", ()),
+            ("rivals", ("--steps", "2000000", "--n-envs", "96", "--discount", "0.98")),
+        )
+    ),
+    Capability(
+        "memory_joint",
+        "The joint with memory against its rivals ([memory-joint.md](memory-joint.md))",
+        ("python", "scripts/memory_joint.py", "--data", "{data}", "--fresh", "--json"),
+        memory_joint,
+        data="bouc_wen_benchmark",
+    ),
+    Capability(
+        "bouc_wen",
+        "Published Bouc-Wen benchmark, its own parameters",
+        ("python", "scripts/bouc_wen_benchmark.py", "{data}/bouc_wen_benchmark", "--json"),
+        bouc_wen,
+        data="bouc_wen_benchmark",
+    ),
+)
