@@ -86,7 +86,9 @@ def _of_joint(
             f"joint '{joint.name}' does not follow '{channel}' in '{record.name}' (correlation {correlation:.2f} with the target that its "
             "motion asks for): the target of another joint, or another quantity?"
         )
-    elif found is not None:
+    elif (
+        found is not None and found.left < settings.shift
+    ):  # a wrong law lags as well, but no shift takes it away
         yield from _of_clocks(own, joint, record, found)
 
 
