@@ -24,6 +24,11 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path[:0] = [str(ROOT), str(ROOT / "scripts")]
 LIMIT, MOST = 600.0, 3
 """Seconds and commands a machine may take."""
+SO101_JOINTS = {
+    "Rotation": "shoulder_pan", "Pitch": "shoulder_lift", "Elbow": "elbow_flex", "Wrist_Pitch": "wrist_flex", "Wrist_Roll": "wrist_roll",
+    "Jaw": "gripper",
+}  # fmt: skip
+"""What the SO-101's log calls its joints, and what its model does."""
 SO101 = ("chirp_sweep", "friction_gravity", "prbs_excitation")
 """Motions of the SO-101 arm, the last one judging."""
 
@@ -85,9 +90,13 @@ def pendulum(folder: Path) -> list[list[str]]:
 def so101(folder: Path, robots: Path) -> list[list[str]]:
     """Commands for logs of the SO-101 arm."""
     home = robots / "so101"
-    return _from_logs(
-        [home / "motions" / f"{name}.parquet" for name in SO101], home / "model.xml", folder, []
-    )
+    columns = [
+        f"{quantity}_{label}={joint}.{quantity}"
+        for label, joint in SO101_JOINTS.items()
+        for quantity in ("command", "position")
+    ]
+    logs = [home / "motions" / f"{name}.parquet" for name in SO101]
+    return _from_logs(logs, home / "model.xml", folder, ["--map", *columns])
 
 
 def attempt(name: str, commands: list[list[str]], folder: Path) -> dict[str, Any]:

@@ -87,10 +87,12 @@ def _of_joint(
             "motion asks for): the target of another joint, or another quantity?"
         )
     elif found is not None:
-        yield from _of_clocks(own, joint, record, found)
+        yield from _of_clocks(own, joint, record, found, settings)
 
 
-def _of_clocks(own: Case, joint: Joint, record: CaseRecord, found: Timing) -> Iterator[str]:
+def _of_clocks(
+    own: Case, joint: Joint, record: CaseRecord, found: Timing, settings: CheckSettings
+) -> Iterator[str]:
     """A servo that answers far later than the model, or before it, or at a time that runs off."""
     channel, position = input_of(own, joint).name, encoders_of(own, joint).channels[0].name
     assert joint.drive is not None
@@ -108,6 +110,8 @@ def _of_clocks(own: Case, joint: Joint, record: CaseRecord, found: Timing) -> It
             "apart; resample one of them"
         )
         return
+    if found.left > settings.shift:
+        return  # a wrong law lags as well, but no shift takes it away
     if late > max(SETTINGS.latest + unsure, SETTINGS.samples * record.step, least):
         yield (
             f"'{position}' answers '{channel}' {1e3 * late:.3g} ms later than the model does in '{record.name}', more than a drive's own "

@@ -6,9 +6,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bench.discrepancy.case.case import CaseRecord
 from bench.discrepancy.settings import DEFAULT
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -23,6 +26,8 @@ class PositionsSettings:
     """Neighbours on either side."""
     longest: float = 99.0
     """Percentile of the steps that stands for the longest of a motion: lost rows make one such step."""
+    moving: float = 0.3
+    """Step before a reading stands at its end, over the RMS step, from which it was in motion: a drive that stops there slows down."""
     repeated: float = 0.2
     """Part of the steps that are zero from which a reading repeats itself anyway, as that of a coarse encoder."""
 
@@ -61,6 +66,18 @@ def _jumps(name: str, record: CaseRecord, noise: float) -> Iterator[str]:
             return
 
 
+def _runs_into(x: Array, end: float) -> bool:
+    """Whether a reading comes to its end in motion, not as a joint that is stopped there by its drive."""
+    begins = np.flatnonzero((x[2:-1] == end) & (x[3:] == end) & (x[1:-2] != end)) + 2
+    if len(begins) == 0:
+        return False
+    approach, moved = float(np.median(np.abs(x[begins - 1] - x[begins - 2]))), np.abs(np.diff(x))
+    # a coarse encoder that turns slowly goes from one number to the next
+    return approach > max(
+        SETTINGS.moving * float(np.sqrt(np.mean(moved**2))), 1.5 * float(moved[moved > 0.0].min())
+    )
+
+
 def _ends(name: str, record: CaseRecord) -> Iterator[str]:
     """A reading that is at times one and the same largest or smallest number, though it changes with every sample otherwise."""
     x = np.asarray(record.values[name])
@@ -68,7 +85,7 @@ def _ends(name: str, record: CaseRecord) -> Iterator[str]:
         return
     for end in (float(x.max()), float(x.min())):
         share = float(np.mean(x == end))
-        if DEFAULT.checks.levelled < share < DEFAULT.checks.square:
+        if DEFAULT.checks.levelled < share < DEFAULT.checks.square and _runs_into(x, end):
             yield (
                 f"'{name}' in '{record.name}' reads {end:.6g} in {100.0 * share:.2g} % of the samples and never beyond: the end of the "
                 "sensor's range? Measure with a wider one, or move less"

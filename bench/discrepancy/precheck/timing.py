@@ -37,12 +37,14 @@ class Timing(NamedTuple):
         lag: Time by which the first is later than the second, in the middle of the record [s].
         drift: Change of that from start to end [s].
         lag_std, drift_std: Standard errors [s].
+        left: Power that the shifted signal leaves of the first, over what the unshifted one does.
     """
 
     lag: float
     drift: float
     lag_std: float
     drift_std: float
+    left: float
 
 
 def timing(first: Array, second: Array, step: float, beside: Array) -> Timing | None:
@@ -88,7 +90,16 @@ def timing(first: Array, second: Array, step: float, beside: Array) -> Timing | 
     if len(left_out) < SETTINGS.blocks:
         return None
     spread = np.sqrt((SETTINGS.blocks - 1) * np.var(left_out, axis=0))
-    return Timing(lag, drift, float(spread[0]), float(spread[1]))
+    still, moved_on = (
+        _rest(first[inside], np.column_stack([x, np.ones(n), beside])[inside]) for x in (second, now)
+    )
+    return Timing(lag, drift, float(spread[0]), float(spread[1]), moved_on / max(still, 1e-300))
+
+
+def _rest(first: Array, columns: Array) -> float:
+    """Power of a signal (n,) that multiples of others (n, k) leave."""
+    found, *_ = np.linalg.lstsq(columns, first, rcond=None)
+    return float(np.sum((first - columns @ found) ** 2))
 
 
 def _coarse(first: Array, second: Array) -> int:
