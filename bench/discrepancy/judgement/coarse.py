@@ -115,13 +115,15 @@ def judge(
         entry = _borne_out(_steady(own, case, rng), found, known)
         if not entry.explanation.hypothesis or known.pays(entry.explanation, nothing.explanation, part):
             found = _with(entry, own, found)
-            chosen = entry
+            preferred = [other for other in found if known.prefers(other.explanation, entry.explanation)]
             alike = tuple(
                 other
                 for other in found
-                if known.prefers(other.explanation, entry.explanation)
-                or _as_good(other, base, settings, judgement.coarse_alike)
+                if other in preferred or _as_good(other, base, settings, judgement.coarse_alike)
             )
+            # what records of one kind each speak for is as likely, and the simplest and commonest of it is named
+            equals = [e for e in preferred if known.pays(e.explanation, nothing.explanation, part)]
+            chosen = min([entry, *(e for e in equals if _borne_out(e, found, known) is e)], key=_plainness)
             break
         vetoed = True
     calibrated = _calibrated(problem, known, nothing)
