@@ -431,11 +431,3 @@ def test_every_refusal_is_a_line(tmp_path):
         admitted(read_case(made(tmp_path, FEATURES["servo at its limit"])))
     assert "\n" not in str(told.value)
     assert "forcerange" in str(told.value)
-
-
-def test_a_load_counts_by_its_gear_in_the_scale_of_forces(tmp_path):
-    case = read_case(made(tmp_path, FEATURES["gear"]))
-    problem = Problem(case, structure_of(case), case.identification)
-    load = case.identification[0].values[problem.structure.loads[0]]
-    expected = 3.0 * np.sqrt(np.mean(load**2))
-    assert problem.scales(problem.structure.places[0]).force == pytest.approx(expected)

@@ -7,9 +7,6 @@ import pytest
 
 from bench.discrepancy import Case, CaseChannel, NominalParameter, diagnose, record_from_arrays
 from bench.discrepancy.effects.friction_limits import coulomb_limit
-from bench.discrepancy.model.rigs import structure_of
-from bench.discrepancy.response.simulator import Simulator
-from bench.discrepancy.search.friction_by_record import differing, levels_of
 from bench.discrepancy.simulation.prescribed_response import driven_force
 from bench.discrepancy.simulation.stick_slip import Elements, StructureMatrices, free_run
 
@@ -91,20 +88,3 @@ def test_friction_that_differs_from_record_to_record_is_named_as_that():
         0.0 if first[0].effect.in_place else problem.split((), fitted.vector[: len(problem.nominal)])[0][1]
     )
     np.testing.assert_allclose(nominal + values, [28.0, 40.0, 52.0], rtol=0.02)
-    (named,) = diagnosis.verdict.named
-    assert named.probability <= 0.5
-    assert any('role "scheduling"' in note for note in diagnosis.verdict.warnings)
-    # as above: the limit of the judging record is its own
-    assert diagnosis.verdict.gap.after < 2.0 * (24 / 2500) ** 0.5 < diagnosis.verdict.gap.before
-
-
-def test_the_limit_of_friction_is_read_off_every_record():
-    case = component((70.0, 100.0, 130.0, 160.0), tension=False)
-    simulator = Simulator(case, structure_of(case), case.identification)
-    levels = levels_of(simulator, simulator.structure.places[0])
-    assert list(levels) == ["identification_0", "identification_1", "identification_2", "validation"]
-    np.testing.assert_allclose(list(levels.values()), [28.0, 40.0, 52.0, 64.0], rtol=0.02)
-    names, values = list(levels)[:3], np.array([30.0, 40.0, 50.0])
-    effect = differing(names, levels)
-    factors = [effect.schedule(values, record)[-1] for record in (*case.identification, *case.validation)]
-    np.testing.assert_allclose(factors, [0.75, 1.0, 1.25, 1.6], rtol=0.02)

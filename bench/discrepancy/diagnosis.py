@@ -36,7 +36,6 @@ from bench.discrepancy.judgement.closing import complete, nominal_estimates, wit
 from bench.discrepancy.judgement.finding import Finding
 from bench.discrepancy.judgement.stages import shrunk
 from bench.discrepancy.judgement.two_regimes import How, Tell, found_of
-from bench.discrepancy.judgement.untold import not_certain_where_untold
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.localisation.localise import Whereabouts, locate
 from bench.discrepancy.localisation.remainder import remainder
@@ -171,7 +170,6 @@ def _diagnose(case: Case, how: How, rng: np.random.Generator, anyway: bool) -> D
     told, admission = admitted(case, anyway=anyway, settings=how.settings)
     quiet = without_idle_noise(told, settings=how.settings.case)
     case, finding = found_of(quiet, how, rng)
-    finding = not_certain_where_untold(finding, how.settings.judgement.coarse)
     problem = Problem(
         case, structure_of(case, settings=how.settings), case.identification, settings=how.settings
     )

@@ -37,8 +37,7 @@ class Judged:
         within: Those within one standard error of the best.
         alike: Those that the blocks do not tell from the chosen one: two standard errors; and those that the judging records prefer.
         vetoed: Whether the judging records refused what the others would have named.
-        calibrated: Whether no noise is stated, and the nominal model, its parameters re-estimated, leaves no more of the judging records
-            than two standard deviations of what sensors are calibrated to.
+        nominal: Largest judged discrepancy of the nominal model, its parameters re-estimated within their uncertainty.
         left: Part of the power of the judged discrepancy, beyond noise, that the chosen one leaves.
     """
 
@@ -48,7 +47,7 @@ class Judged:
     within: tuple[HeldOut, ...]
     alike: tuple[HeldOut, ...]
     vetoed: bool
-    calibrated: bool
+    nominal: float
     left: float
     settings: CoarseSettings
 
@@ -114,79 +113,47 @@ def judge(
     for own in sorted(within, key=_plainness):
         entry = _borne_out(_steady(own, case, rng), found, known)
         if not entry.explanation.hypothesis or known.pays(entry.explanation, nothing.explanation, part):
-            found = _with(entry, own, found)
-            preferred = [other for other in found if known.prefers(other.explanation, entry.explanation)]
+            found, chosen = _with(entry, own, found), entry
             alike = tuple(
                 other
                 for other in found
-                if other in preferred or _as_good(other, base, settings, judgement.coarse_alike)
+                if known.prefers(other.explanation, entry.explanation)
+                or _as_good(other, base, settings, judgement.coarse_alike)
             )
-            # what records of one kind each speak for is as likely, and the simplest and commonest of it is named
-            equals = [e for e in preferred if known.pays(e.explanation, nothing.explanation, part)]
-            chosen = min([entry, *(e for e in equals if _borne_out(e, found, known) is e)], key=_plainness)
             break
         vetoed = True
-    calibrated = _calibrated(problem, known, nothing)
-    # what is as small as what sensors may be off by takes more than one standard error
-    if calibrated and nothing in alike:
-        chosen = nothing
     weights = shares(found, _log_priors(found), rng, judgement.held_out.draws)
-    if chosen.explanation.hypothesis:
-        weights = _undecided(weights, found, chosen, known)
-    elif calibrated:
-        weights = _at_least_half(weights, found.index(nothing))
+    preferred = [other for other in found if known.prefers(other.explanation, chosen.explanation)]
     return Judged(
         chosen,
         tuple(found),
-        weights,
+        _undecided(weights, found, [chosen, *preferred]) if chosen.explanation.hypothesis else weights,
         within,
         alike,
         vetoed,
-        calibrated,
+        float(np.max(known.of(nothing.explanation, judging=True))),
         known.left(chosen.explanation, nothing.explanation),
         settings,
     )
-
-
-def _calibrated(problem: Problem, known: Discrepancies, nothing: HeldOut) -> bool:
-    """Whether no noise is stated, and the nominal model leaves no more of the judging records than sensors may be off by."""
-    largest = float(np.max(known.of(nothing.explanation, judging=True)))
-    return not problem.noise_stated and largest <= 2.0 * problem.settings.likelihood.error.least
 
 
 def _finalists(
     explanations: Sequence[Explanation], known: Discrepancies, settings: CoarseSettings
 ) -> list[HeldOut]:
     """What is near the likeliest on held-out blocks, the best first, without effects that close nothing material; the nominal model
-    alone among them.
-
-    What loses an effect for that makes room for others: they are near what is left of it.
-    """
-    nothing = held_out(nominal_alone(explanations))
-    pool = [e for e in explanations if e.hypothesis]
-    kept: dict[Explanation, HeldOut] = {}
-    struck: list[HeldOut] = []
-    while True:
-        pool.sort(key=lambda e: -e.log_posterior)
-        near = [e for e in pool if e.log_posterior > pool[0].log_posterior - settings.reach]
-        kept.update((e, held_out(e)) for e in near[: settings.finalists] if e not in kept)
-        found = [*(kept[e] for e in near[: settings.finalists]), nothing]
-        best = min(found, key=_score)
-        base = _pruned(best, [*found, *kept.values()], known, settings)
-        if base is best or not pool or len(struck) == settings.finalists:
-            break
-        struck.append(base)
-        pool = [e for e in pool if kept.get(e) is not best]
-    base = min([base, *struck], key=_score)
-    own = key_of(base.explanation.hypothesis)
-    others = [e for e in found if key_of(e.explanation.hypothesis) != own]
+    alone among them."""
+    nothing = bounded(nominal_alone(explanations), settings.within)
+    with_effects = [e for e in explanations if e.hypothesis][: 2 * settings.finalists]
+    ranked = sorted((bounded(e, settings.within) for e in with_effects), key=lambda e: -e.log_posterior)
+    near = [e for e in ranked if e.log_posterior > ranked[0].log_posterior - settings.reach]
+    found = [held_out(e) for e in [*near[: settings.finalists], nothing]]
+    priors = np.array([_log_prior(entry.explanation) for entry in found])
+    best = found[
+        int(np.argmin([entry.total - 2.0 * prior for entry, prior in zip(found, priors, strict=True)]))
+    ]
+    base = _pruned(best, found, known, settings)
     # what is larger than what is material has been weighed already
-    return [base, *(e for e in others if _no_larger(e.explanation, base.explanation))]
-
-
-def _score(entry: HeldOut) -> float:
-    """What an explanation leaves on held-out blocks, its description paid."""
-    return entry.total - 2.0 * _log_prior(entry.explanation)
+    return [base, *(e for e in found if e is not base and _no_larger(e.explanation, base.explanation))]
 
 
 def _with(entry: HeldOut, own: HeldOut, found: Sequence[HeldOut]) -> list[HeldOut]:
@@ -196,28 +163,11 @@ def _with(entry: HeldOut, own: HeldOut, found: Sequence[HeldOut]) -> list[HeldOu
     return [entry if other is own else other for other in found]
 
 
-def _undecided(weights: Array, found: Sequence[HeldOut], chosen: HeldOut, known: Discrepancies) -> Array:
-    """Weights (n,) of which the chosen explanation and some others have equal parts: the records for finding speak for one of them, those
-    for judging for another, and neither is to be believed more."""
-    own = float(weights[found.index(chosen)])
-    among = np.array(
-        [
-            entry is chosen
-            or known.prefers(entry.explanation, chosen.explanation)
-            or (weight > own and known.prefers(chosen.explanation, entry.explanation))
-            for weight, entry in zip(weights, found, strict=True)
-        ]
-    )
-    return np.where(among, float(weights[among].mean()), weights)
-
-
-def _at_least_half(weights: Array, i: int) -> Array:
-    """Weights (n,) of which entry `i` has no less than all others together."""
-    own = max(float(weights[i]), 0.5)
-    others = np.where(np.arange(len(weights)) == i, 0.0, weights)
-    out = others * (1.0 - own) / max(float(others.sum()), 1e-300)
-    out[i] = own
-    return out
+def _undecided(weights: Array, found: Sequence[HeldOut], among: Sequence[HeldOut]) -> Array:
+    """Weights (n,) of which some explanations have equal parts: the records for finding speak for one of them, those for judging for
+    others, and neither is to be believed more."""
+    own = np.array([entry in among for entry in found])
+    return np.where(own, float(weights[own].mean()), weights)
 
 
 def _steady(entry: HeldOut, case: Case, rng: np.random.Generator) -> HeldOut:
@@ -226,6 +176,28 @@ def _steady(entry: HeldOut, case: Case, rng: np.random.Generator) -> HeldOut:
         return entry
     moved = steadied(entry.explanation, case.validation, rng)
     return entry if moved is None else replace(entry, explanation=moved)
+
+
+def bounded(explanation: Explanation, within: float) -> Explanation:
+    """An explanation whose nominal parameters stay within so many stated standard deviations, fitted again where they do not."""
+    parts = []
+    for problem, fitted in explanation.parts:
+        if np.any(np.abs(fitted.vector[: problem.n_physical]) > within):
+            narrow = problem.bounded(within)
+            parts.append(
+                (
+                    narrow,
+                    fit(
+                        narrow,
+                        fitted.hypothesis,
+                        start=fitted.vector,
+                        iterations=explanation.settings.search.thorough,
+                    ),
+                )
+            )
+        else:
+            parts.append((problem, fitted))
+    return Explanation(tuple(parts))
 
 
 def _log_priors(found: Sequence[HeldOut]) -> Array:
@@ -247,11 +219,9 @@ def _as_good(entry: HeldOut, best: HeldOut, settings: CoarseSettings, errors: fl
     return entry is best or worse <= max(errors * error, settings.telling)
 
 
-def _plainness(entry: HeldOut) -> tuple[float, float, float]:
-    """What comes first is simpler: fewer parameters, fewer and commoner effects; as simple, commoner; and then what predicts better."""
-    hypothesis, settings = entry.explanation.hypothesis, entry.explanation.settings.search
-    plain, common = complexity(hypothesis, settings=settings), log_prior_of(hypothesis, settings=settings)
-    return round(plain, 6), -common, entry.total
+def _plainness(entry: HeldOut) -> tuple[float, float]:
+    """What comes first is simpler: fewer parameters, fewer and commoner effects; and then what predicts better."""
+    return (complexity(entry.explanation.hypothesis, settings=entry.explanation.settings.search), entry.total)
 
 
 def _no_larger(explanation: Explanation, other: Explanation) -> bool:

@@ -119,9 +119,10 @@ def _kind(problem: Problem, judged: Judged) -> VerdictKind:
     if judged.chosen.explanation.hypothesis:
         # that which rivals of other families explain as well is something, and nobody can say what kind of thing
         return "effect" if judged.agreed >= judged.settings.kind else "unknown"
-    # without stated noise a nominal model is as right as a model can be within what sensors are calibrated to; noise that is stated and
-    # is not all that is left is something that is missing, whatever it be
-    return "unknown" if problem.noise_stated or (judged.vetoed and not judged.calibrated) else "none"
+    # without stated noise a nominal model is as right as a model can be within two standard deviations of what sensors are
+    # calibrated to; noise that is stated and is not all that is left is something that is missing, whatever it be
+    material = judged.nominal > 2.0 * problem.settings.likelihood.error.least
+    return "unknown" if problem.noise_stated or (judged.vetoed and material) else "none"
 
 
 def _probabilities(kind: VerdictKind, judged: Judged) -> dict[str, float]:
@@ -165,8 +166,7 @@ def _understated(problem: Problem, best: Explanation) -> Iterator[str]:
 def _marginal(judged: Judged) -> dict[tuple[str, str], float]:
     """Probability that each (name, place) belongs to the truth."""
     total: dict[tuple[str, str], float] = {}
-    unnamed = judged.vetoed or not judged.chosen.explanation.hypothesis
-    outside = judged.settings.outside if unnamed else judged.outside
+    outside = judged.settings.outside if judged.vetoed else judged.outside
     for weight, entry in zip(judged.weights, judged.found, strict=True):
         for key in {(p.effect.name, p.place.name) for p in entry.explanation.hypothesis}:
             total[key] = total.get(key, 0.0) + (1.0 - outside) * float(weight)
@@ -215,11 +215,6 @@ def _words(kind: VerdictKind, judged: Judged, nearest: Explanation) -> str:
                 if others
                 else ""
             )
-        )
-    if kind == "none" and judged.calibrated and len(judged.alike) > 1:
-        return (
-            "The nominal model, its parameters re-estimated, leaves no more than what sensors are calibrated to, and no effect of the "
-            f"catalogue improves on it by two standard errors; nearest comes {names(nearest.hypothesis)}."
         )
     if kind == "none":
         return "No effect of the catalogue predicts the records better than the nominal model does with its parameters re-estimated."

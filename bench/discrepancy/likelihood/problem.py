@@ -134,6 +134,12 @@ class Problem(Simulator):
         out.data = tuple(out.prepare(record) for record in self.records)
         return out
 
+    def bounded(self, within: float) -> Problem:
+        """A copy whose nominal parameters move by so many stated standard deviations at most."""
+        out = copy.copy(self)
+        out.within = within
+        return out
+
     def beside(self, records: Sequence[CaseRecord]) -> Problem:
         """A copy of all records and further ones that start at rest; the scales of the effects stay, and so do vectors."""
         out = copy.copy(self)

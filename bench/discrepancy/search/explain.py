@@ -8,7 +8,6 @@ noise, or a force. Chi-squared and evidence add over groups, so all explanations
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from itertools import product
 
@@ -68,7 +67,7 @@ def explain(
             most=most, progress=progress, error=error, deadline=deadline, settings=settings,
         )  # fmt: skip
     search = _attributed(
-        _problem(case, structure, error, settings=settings),
+        Problem(case, structure, case.identification, error=error, settings=settings),
         placements(case, structure, catalogue),
         most=most,
         progress=progress,
@@ -78,25 +77,6 @@ def explain(
     converge(search, _again(search, seeds))
     found = [Explanation(((problem, fitted),)) for fitted in search.ranked()]
     return nothing_left_first(found) if problem.scaled else parsimonious(found)
-
-
-def _problem(
-    case: Case,
-    structure: Structure,
-    error: ModelInadequacy | None,
-    *,
-    bins: dict[str, int] | None = None,
-    settings: DiagnosisSettings,
-) -> Problem:
-    """Records and priors of some degrees of freedom.
-
-    Where the error of the model weighs, nominal parameters stay within what is believed of them: one that strays takes the search
-    along, and an effect beside it is judged by a model that nobody has.
-    """
-    within = math.inf if error is None else settings.judgement.coarse.within
-    return Problem(
-        case, structure, case.identification, bins=bins, error=error, within=within, settings=settings
-    )
 
 
 def _in_groups(
@@ -113,10 +93,10 @@ def _in_groups(
 ) -> list[Explanation]:
     """Explanations of a rig that falls apart into groups of degrees of freedom, and of effects that couple them."""
     bins = _common_bins(case, structure, settings=settings)
-    whole = _problem(case, structure, error, bins=bins, settings=settings)
+    whole = Problem(case, structure, case.identification, bins=bins, error=error, settings=settings)
     prepared = []
     for part in parts:
-        problem = _problem(case, part, error, bins=bins, settings=settings)
+        problem = Problem(case, part, case.identification, bins=bins, error=error, settings=settings)
         progress(f"screening of {', '.join(part.dofs)}")
         prepared.append(prepare(problem, placements(case, part, catalogue)))
     odd = [entry for entry in prepared if not consistent(entry[0].ranked(0)[0])]

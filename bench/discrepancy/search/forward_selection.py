@@ -30,10 +30,9 @@ from bench.discrepancy.screening.screen import Screen
 from bench.discrepancy.search.extension import contacts, extend
 from bench.discrepancy.search.fits import Search, integrate_finer, multistart
 from bench.discrepancy.search.rivals import challenge, reduce_best, simplify
-from bench.discrepancy.search.scheduled import beside_records_apart, with_schedules
+from bench.discrepancy.search.scheduled import with_schedules
 from bench.discrepancy.search.soft_friction import soften, stand_in
 from bench.discrepancy.search.timed_force import with_timed_force
-from bench.discrepancy.settings import SearchSettings
 
 Prepared = tuple[Search, Screen, list[Point]]
 """A search before its first step: the nominal model fitted, the catalogue screened, its grid points by decreasing gain."""
@@ -84,14 +83,11 @@ def attribute(
             break
         extend(search, screen, bases, count=4 if consistent(best) else 6 - size)
         soften(search, size + 1)
-        beside_records_apart(search, search.ranked(size)[: settings.scheduled], _read_off(candidates))
         reduce_best(search)
     best = search.ranked()[0]
     if not problem.scaled:
         simplify(search, candidates)
-    elif _large(best, problem):
-        simplify(search, [placed for placed in candidates if _plain(placed, settings)])
-    if problem.scaled and (
+    elif (
         near(best)
         and _worth_challenging(best, problem)
         and deadline.allows("rivals of what was found, from further starts")
@@ -124,15 +120,10 @@ def _single(
         extend(search, screen, [nothing], count=6, among={p.key for p in rare})
     stand_in(search)
     if deadline.allows("forces from outside and friction that follows a channel"):
-        asked = _read_off(candidates)
+        asked = {p.effect.name for p in candidates if p.effect.site == "read off"}
         if TIMED in asked:
             with_timed_force(search)
         with_schedules(search, asked)
-
-
-def _read_off(candidates: Sequence[Placed]) -> set[str]:
-    """Names of the effects that are read off the records."""
-    return {p.effect.name for p in candidates if p.effect.site == "read off"}
 
 
 def _bases(search: Search, screen: Screen, size: int, *, best: Fit, nothing: Fit) -> list[Fit]:
@@ -199,22 +190,19 @@ def _plain_bases(search: Search, best: Fit) -> list[Fit]:
     backlash without play, say, whose asymmetry is that of friction beside a constant force.
     """
     settings = search.problem.settings.search
-    if not _large(best, search.problem):
+    largest = 2.0 * settings.plain.parameters + 2.0 * abs(settings.log_prior_effect)
+    if (
+        search.problem.error is None
+        or len(best.hypothesis) != 1
+        or complexity(best.hypothesis, settings=search.problem.settings.search) <= largest
+    ):
         return []
-    plain = [f for f in search.ranked(1) if _plain(f.hypothesis[0], settings) and np.isfinite(f.cost)]
+    plain = [f for f in search.ranked(1) if _free(f) <= settings.plain.parameters and np.isfinite(f.cost)]
     return plain[: settings.plain.bases]
 
 
-def _large(best: Fit, problem: Problem) -> bool:
-    """Whether a single effect, where the error of the model weighs, takes more to be described than two plain ones."""
-    settings = problem.settings.search
-    largest = 2.0 * settings.plain.parameters + 2.0 * abs(settings.log_prior_effect)
-    alone = problem.error is not None and len(best.hypothesis) == 1
-    return alone and complexity(best.hypothesis, settings=settings) > largest
-
-
-def _plain(placed: Placed, settings: SearchSettings) -> bool:
-    return sum(not p.fixed for p in placed.effect.parameters) <= settings.plain.parameters
+def _free(fitted: Fit) -> int:
+    return sum(not p.fixed for placed in fitted.hypothesis for p in placed.effect.parameters)
 
 
 def _promising(screen: Screen, best: Fit) -> bool:

@@ -8,13 +8,14 @@ with s0 the RMS of the channel in the records for identification: in proportion 
 independent of it for zero. Limit and slopes of a law scale alike, as a contact's do with its normal force. A measured channel that
 is no load of one of the bench's rigs counts as scheduling, too.
 
-Where no channel tells, friction may differ from record to record all the same (`friction_by_record`).
+Where no channel tells, friction may differ from record to record all the same. It is then named with its limit in each, which says that
+something has changed between the records and not what; on a record of its own it is the mean of those.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
@@ -32,12 +33,12 @@ from bench.discrepancy.effects.effect import (
 )
 from bench.discrepancy.effects.force_priors import FRICTION
 from bench.discrepancy.effects.read_off import DIFFERS, FOLLOWED, SENSITIVITY, schedulable
-from bench.discrepancy.fitting.goodness_of_fit import consistent
+from bench.discrepancy.fitting.goodness_of_fit import consistent, key_of
 from bench.discrepancy.fitting.map_fit import Fit
 from bench.discrepancy.model.placement import Placed
+from bench.discrepancy.model.structure import Place
 from bench.discrepancy.response.simulator import Simulator
 from bench.discrepancy.search.fits import Search, Task, converge
-from bench.discrepancy.search.friction_by_record import with_friction_by_record
 from bench.discrepancy.search.soft_friction import IDEAL, RUBBING, frictional, nominal_level
 
 LOADS = ("force", "torque")
@@ -68,21 +69,11 @@ def with_schedules(search: Search, asked: Collection[str]) -> None:
     for channel in channels:
         for placed, start in (one for one in _seeds(search) if FOLLOWED + one[0].effect.name in asked):
             tasks += _followed(problem, placed, start, channel)
+    if not channels and len(problem.records) > 1 and DIFFERS in asked:
+        tasks = [
+            t for place in problem.structure.places if len(place.rows) == 1 for t in _differing(search, place)
+        ]
     converge(search, tasks)
-    beside_records_apart(search, search.ranked(0)[:1], asked)
-
-
-def beside_records_apart(search: Search, bases: Sequence[Fit], asked: Collection[str]) -> None:
-    """Fit friction that differs between records beside some hypotheses, where no channel tells by what and nothing explains the records.
-
-    Args:
-        search: Fits so far; the new ones are added.
-        bases: Fitted hypotheses.
-        asked: Names of the effects of the catalogue.
-    """
-    told = scheduling(search.problem.case) or DIFFERS not in asked
-    if not told and not consistent(search.ranked()[0]):
-        with_friction_by_record(search, bases)
 
 
 def _seeds(search: Search) -> list[tuple[Placed, Array]]:
@@ -169,3 +160,41 @@ def scheduled_by(effect: Effect, channel: CaseChannel, simulator: Simulator) -> 
 def _reference(simulator: Simulator, channel: CaseChannel) -> float:
     power = [float(np.mean(record.values[channel.name] ** 2)) for record in simulator.records]
     return math.sqrt(float(np.mean(power))) or 1.0
+
+
+def _differing(search: Search, place: Place) -> list[Task]:
+    """Coulomb friction of another limit in every record, added to the nominal model or in the place of its friction."""
+    problem, names = search.problem, [record.name for record in search.problem.records]
+    effect = differing(names)
+    ideal = search.fits.get(key_of((Placed(effect_named(IDEAL), place),)))
+    vector = search.ranked(0)[0].vector if ideal is None else ideal.vector
+    n = len(problem.nominal)
+    scales = problem.scales_of(Placed(effect, place))
+    level = 0.0 if ideal is None else FRICTION.value(ideal.vector[n], scales)
+    tasks: list[Task] = []
+    loss = nominal_level(problem, Placed(effect, place), problem.split((), vector[:n])[0])
+    replacing = replace(effect, in_place=True, variant="in place")
+    for own, limit in ((effect, level), (replacing, level + (loss or 0.0))):
+        if limit > 0.0 and (loss is not None or not own.in_place):
+            still = np.where(frictional(problem), 0.0, vector[:n]) if own.in_place else vector[:n]
+            start = np.append(still, np.full(len(names), FRICTION.eta(limit, scales)))
+            tasks.append(((Placed(own, place),), start))
+    return tasks
+
+
+def differing(records: list[str]) -> Effect:
+    """Coulomb friction of another limit in every record for identification, and of their mean in any other."""
+    ideal = effect_named(IDEAL)
+    theta = ideal.theta
+    assert theta is not None
+
+    def schedule(values: Values, record: CaseRecord) -> Values:
+        factor = values[records.index(record.name)] / np.mean(values) if record.name in records else 1.0
+        return np.array([0.0, 1.0, 2.0, factor, factor])
+
+    return replace(
+        ideal, name=DIFFERS, equation="f = Fc_i sgn(v) in record i",
+        parameters=tuple(replace(FRICTION, name=f"friction_force_{name}") for name in records),
+        theta=lambda values, scales: theta(np.array([np.mean(values)]), scales), schedule=schedule, log_prior=EFFECT_SETTINGS.rare,
+        n_linear=1,
+    )  # fmt: skip

@@ -58,11 +58,6 @@ class CoarseSettings:
         "Part of the discrepancy's power that small things leave on average.",
         "Backgrounds of 30 % leave 9 % of it.",
     )
-    untold: float = setting(
-        0.5,
-        "Probability, at most, of friction that differs between records where no channel tells by what.",
-        "Whether friction changed, or what acts on it, is open.",
-    )
     kind: float = setting(
         0.5,
         "Probability of a family of effects from which one of it is named.",
