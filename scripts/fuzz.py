@@ -110,6 +110,7 @@ def _work(name: str, first: int, n: int, seed: int, keep: Path | None, made: Pat
     virtual = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (virtual + SPARE, resource.RLIM_INFINITY))
     os.write(out, b"ready\n")
+    held = _peak()
     for number in range(first, n):
         rng = np.random.default_rng([seed, zlib.crc32(name.encode()), number])
         shutil.rmtree(spoilt, ignore_errors=True)
@@ -120,9 +121,9 @@ def _work(name: str, first: int, n: int, seed: int, keep: Path | None, made: Pat
             _keep(kept, spoilt, keep / name / str(number), "did not return")
         _peak(reset=True)
         what = attempt(target, spoilt)
-        peak = _peak()
-        if not what and peak > MEGABYTES:
-            what = f"{peak:.0f} MB"
+        taken = _peak() - held
+        if not what and taken > MEGABYTES:
+            what = f"{taken:.0f} MB"
         left = [path.name for path in spoilt.rglob("*") if path.is_file() and path not in kept]
         if not what and left and name not in MAKES_FILES:
             what = f"left {left[0]} behind"

@@ -154,7 +154,7 @@ GUARDED = """
 import ctypes, mmap
 import numpy as np
 from bench.discrepancy.effects.friction_limits import coulomb_limit
-from bench.discrepancy.simulation.stick_slip import Elements, LinearStructure, free_run
+from bench.discrepancy.simulation.stick_slip import Elements, StructureMatrices, free_run
 
 n, factor = 16384, 32
 size = n * factor * 8
@@ -163,7 +163,7 @@ address = ctypes.addressof(ctypes.c_char.from_buffer(memory))
 ctypes.CDLL(None).mprotect(ctypes.c_void_p(address + size), ctypes.c_size_t(size), 0)
 loads = np.frombuffer(memory, count=n * factor)[factor - 1:][:, None]  # they end where nobody may read
 loads[-len(loads) // 50:] = 20.0  # held until late: an address made of no number then lies far beyond them
-wild = LinearStructure(*(np.array([[x]]) for x in (2.0, -1e160, 900.0, 1.0)))
+wild = StructureMatrices(*(np.array([[x]]) for x in (2.0, -1e160, 900.0, 1.0)))
 table = np.array([[0, 0, coulomb_limit.address, 1, 0, 0, 0, 0]], dtype=np.int64)
 friction = Elements(table, np.ones((1, 1)), np.array([6.0, 0.0]), np.zeros(0))
 motion = free_run(wild, friction, loads=loads, step=1e-3, substeps=4, load_factor=factor)

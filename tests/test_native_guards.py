@@ -142,7 +142,7 @@ class Callbacks(RuleBasedStateMachine):
         if own:
             native.check_registered(model)
         else:
-            start = model.numeric_adr[native.encoding.rows(model)[0]]
+            start = model.numeric_adr[native.encoding.element_rows(model)[0]]
             model.numeric_data[start + 2] += 1.0
             with pytest.raises(NativeError, match="of another process"):
                 native.check_registered(model)
@@ -253,7 +253,7 @@ def test_a_model_of_another_process_shows_nan_and_is_refused_until_bound(tmp_pat
 def test_no_row_is_bound_that_was_changed(entry: int, value: float) -> None:
     rig = Rig("r", CRAFTED.format(actuator="", numeric=""), (Element.of("bouc_wen", "j"),))
     model = mujoco.MjModel.from_xml_string(rig.to_xml())
-    start = int(model.numeric_adr[native.encoding.rows(model)[0]])
+    start = int(model.numeric_adr[native.encoding.element_rows(model)[0]])
     assert model.numeric_data[start + entry] != value
     model.numeric_data[start + entry] = value
     with pytest.raises(NativeError, match="no element with the law 'bouc_wen'"):

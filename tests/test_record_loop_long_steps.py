@@ -87,6 +87,11 @@ def test_records_from_many_starts_are_those_one_by_one():
     for tolerance in (0.0, 1e-6):
         together = rig.simulate_batch(commands, initials=starts, stride=2, tolerance=tolerance, threads=2)
         alone = [rig.simulate(commands, initial=start, stride=2, tolerance=tolerance) for start in starts]
-        np.testing.assert_array_equal(together, alone)
+        # two callers that the same loop is compiled into contract products and sums each in its own way: they part by rounding at
+        # fixed steps, and by no more than the tolerance where rounding decides the size of a step
+        peak = np.abs(alone).max(axis=(0, 1))
+        np.testing.assert_array_less(
+            np.abs(together - alone), np.broadcast_to(max(tolerance, 1e-12) * peak, np.shape(alone))
+        )
     with pytest.raises(ParameterError, match="no initial states came"):
         rig.simulate_batch(commands, initials=[])

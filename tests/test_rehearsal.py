@@ -121,7 +121,10 @@ def test_check_tells_nothing_of_a_servo_that_stands(arm, tmp_path):
     (tmp_path / "model.xml").write_text((arm / "model.xml").read_text())
     rng = np.random.default_rng(0)
     for name in native_effects.RECORDS:
-        rows = np.column_stack([np.arange(800) / 200.0, np.zeros(800), 1e-3 * rng.standard_normal(800)])
+        time, noise = np.arange(800) / 200.0, rng.standard_normal(800)
+        rows = np.column_stack(
+            [time, 1e-6 * np.sin(time), 1e-3 * noise]
+        )  # a command that never changes is refused
         np.savetxt(tmp_path / f"{name}.csv", rows, delimiter=",", header="time,command,position", comments="")
     found = check_folder(tmp_path)
     assert found.word == "doubtful"

@@ -178,7 +178,7 @@ class Diagnose:
                     write_text(path, text)
                 if self.html is not None:
                     from bench.discrepancy import write_report
-                    from bench.discrepancy.application.first_record import in_simulator
+                    from bench.discrepancy.intake.first_record import in_simulator
 
                     stage("the judging records in your simulator, with what is named")
                     applied = in_simulator(diagnosis.verdict, diagnosis.case)

@@ -12,10 +12,10 @@ import re
 from collections.abc import Collection
 from dataclasses import dataclass, field
 
-GREEK = {
-    "alpha", "beta", "gamma", "delta", "epsilon", "zeta", "eta", "theta", "kappa", "lambda", "mu", "nu", "xi", "pi", "rho",
-    "sigma", "tau", "phi", "chi", "psi", "omega",
-}  # fmt: skip
+NAMES = (
+    "alpha beta gamma delta epsilon zeta eta theta kappa lambda mu nu xi pi rho sigma tau phi chi psi omega"
+)
+GREEK = set(NAMES.split())
 STANDARD = {"tanh", "exp", "sin", "cos", "max", "min"}
 """Functions that LaTeX knows."""
 OPERATORS = {"sgn", "sign", "sat", "ds", "dz"}

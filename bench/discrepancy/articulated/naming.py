@@ -45,7 +45,8 @@ def verdict_of(
         left: What the rung that is borne out leaves of a motion beside noise; None where it leaves noise alone.
     """
     final, base = rungs[last], rungs[0]
-    whole = stated and left is None and complete(problem, final, settings)
+    # an octave above the noise tells that what is named is not all; that something is missing takes an effect that predicts
+    whole = stated and (left is None or not last) and complete(problem, final, settings)
     explained, _ = closed(predictions[0], predictions[last], predictions[0], rng)
     kind: VerdictKind = "effect" if last else "none"
     if not whole and (not last or explained < settings.material):

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.arrays import Array
 from bench.discrepancy.articulated.against_model import asked_input
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.multibody.encoders import encoders_of, input_of
@@ -19,8 +19,6 @@ from bench.discrepancy.precheck.settings import CheckSettings
 from bench.discrepancy.precheck.timing import Timing, timing
 from bench.discrepancy.settings import DEFAULT
 from bench.errors import BenchError
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import signal
 from scipy.interpolate import CubicSpline
 
-Array = NDArray[np.float64]
+from bench.arrays import Array
 
 
 @dataclass(frozen=True)
