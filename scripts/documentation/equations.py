@@ -31,12 +31,9 @@ SYMBOL = re.compile("([A-Za-z]|" + "|".join(sorted(GREEK)) + r")([A-Za-z]|\d\w*)
 
 TOKEN = re.compile(
     r"""\s*(?:
-      (?P<rate>d(?P<of>[a-z])/dt\b)
+      (?P<rate>d(?P<of>[a-z])/dt\b) | (?P<number>\d+(?:\.\d+)?)
     | (?P<name>[A-Za-z][A-Za-z0-9]*(?:_[A-Za-z0-9]+)?(?:-[A-Za-z]{2,})*)(?P<primes>'*)(?P<sign>[+-](?![\w(]))?
-    | (?P<number>\d+(?:\.\d+)?)
-    | (?P<relation><=|>=|>>|=|<|>)
-    | (?P<index>\[\d+\]) | (?P<unit>\[[^\]]+\])
-    | (?P<mark>[-+/^(),;:|…])
+    | (?P<relation><=|>=|>>|=|<|>) | (?P<index>\[\d+\]) | (?P<unit>\[[^\]]+\]) | (?P<mark>[-+/^(),;:|…])
     )""",
     re.VERBOSE,
 )
