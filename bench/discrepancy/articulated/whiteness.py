@@ -20,6 +20,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bench.arrays import Array
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
@@ -87,7 +88,7 @@ def _octaves(ordinates: int, least: int) -> list[int]:
 
 def _spectra(
     problem: ArticulatedProblem, found: ArticulatedFit, vector: Array
-) -> dict[tuple[int, int], Array]:
+) -> dict[tuple[int, int], NDArray[np.complex128]]:
     """By record and joint: Fourier transforms (n_ordinates, n_measured) of the weighted innovations, without their mean."""
     joints = range(len(problem.joints))
     residuals = in_threads(lambda j: problem.residuals(j, found.hypothesis, vector), joints)
