@@ -140,19 +140,19 @@ LEFT_OUT = {
         {"</mujoco>": '<equality><joint joint1="shoulder" joint2="elbow"/></equality></mujoco>'},
         "equality",
     ),
-    "a gear of a servo": (
-        {'name="elbow_drive" joint="elbow" kp': 'name="elbow_drive" joint="elbow" gear="3" kp'},
-        "comes into play",
-    ),
 }
+GEARED = {'name="elbow_drive" joint="elbow" kp': 'name="elbow_drive" joint="elbow" gear="3" kp'}
 
 
 @pytest.mark.parametrize("name", LEFT_OUT)
 def test_what_the_equations_of_the_joints_leave_out_is_refused_where_it_acts(clean, tmp_path, name):
     model, word = LEFT_OUT[name]
-    if not clean[1] and name.endswith("servo"):
-        pytest.skip("no servo")
     refused(changed(clean, tmp_path, model=model), ModelError, word)
+
+
+@pytest.mark.parametrize("clean", [True], indirect=True, ids=["servo"])
+def test_a_gear_of_a_servo_is_refused_where_it_acts(clean, tmp_path):
+    refused(changed(clean, tmp_path, model=GEARED), ModelError, "comes into play")
 
 
 def test_commands_beyond_their_range_are_clipped_as_mujoco_clips_them(clean, tmp_path):

@@ -28,6 +28,7 @@ from bench.discrepancy.multibody.motion import JointMotion, motion_of
 from bench.discrepancy.multibody.records import RECORDS_SETTINGS
 from bench.discrepancy.settings import DEFAULT
 from bench.discrepancy.verdict import NamedEffect
+from bench.errors import ModelError
 
 
 @dataclass(frozen=True)
@@ -59,7 +60,17 @@ class JointReplay:
 
     @classmethod
     def of(cls, case: Case, nominal: mujoco.MjModel) -> JointReplay:
-        """Prepare the replay of a case."""
+        """Prepare the replay of a case.
+
+        Raises:
+            ModelError: Joints of the case are held or move as measured, which those of the user's file do not.
+        """
+        if tied := case.options.get("joints"):
+            names = " and ".join(f"'{name}'" for name in sorted(tied))
+            raise ModelError(
+                f"nominal.json has {names} held or moving as measured (\"joints\"), and in '{case.rig}' they would move freely, so that the "
+                "judging records cannot be run in it; weld them there, or write the corrected model without --case"
+            )
         return cls(bound(case, nominal), ArticulatedModel.of(nominal, case.rig))
 
     def readings(self, applied: Applied, effects: Sequence[NamedEffect]) -> dict[str, list[Reading]]:

@@ -45,7 +45,8 @@ def verdict_of(
         left: What the rung that is borne out leaves of a motion beside noise; None where it leaves noise alone.
     """
     final, base = rungs[last], rungs[0]
-    # an octave above the noise tells that what is named is not all; that something is missing takes an effect that predicts
+    # power above the noise at some frequencies shows that what is named is not all; where nothing is named it is no evidence that
+    # something is missing, which takes an effect that predicts the judging records better
     whole = stated and (left is None or not last) and complete(problem, final, settings)
     explained, _ = closed(predictions[0], predictions[last], predictions[0], rng)
     kind: VerdictKind = "effect" if last else "none"

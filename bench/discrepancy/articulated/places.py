@@ -28,7 +28,7 @@ def gaps_of(
         run = f"free runs of {record.window * record.sample:.3g} s" if record.window else "free run"
         first, after = untouched, predictions[-1]
         floor = float(after.floor[j])
-        share, interval = _closed(first.power[:, j], after.power[:, j], floor, rng)
+        share, interval = _closed_of_nrmse(first.power[:, j], after.power[:, j], floor, rng)
         steps = [
             ("nominal", float(first.discrepancy[j])),
             ("parameters only", float(predictions[0].discrepancy[j])),
@@ -47,7 +47,7 @@ def gaps_of(
     return tuple(out)
 
 
-def _closed(
+def _closed_of_nrmse(
     first: Array, after: Array, floor: float, rng: np.random.Generator
 ) -> tuple[float, tuple[float, float]]:
     """Part of an NRMSE beyond that of the noise that is closed, see `Gap`, and its block-bootstrap interval; from powers (n_blocks,)."""

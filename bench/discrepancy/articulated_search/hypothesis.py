@@ -102,9 +102,8 @@ def base_slots(joint: Joint, on_link: bool) -> Array:
     p[Slot.GEAR], p[Slot.SERVO] = drive.gear, float(drive.servo)
     p[Slot.KP], p[Slot.KV] = drive.kp, drive.kv
     p[Slot.LOW], p[Slot.HIGH] = drive.low, drive.high
-    p[Slot.INPUT_LAG] = (
-        drive.lag
-    )  # MuJoCo's activation stands for the control, that of a servo for its target
+    # MuJoCo's activation stands for the control, that of a servo for its target
+    p[Slot.INPUT_LAG] = drive.lag
     p[Slot.DAMPING], p[Slot.LIMIT] = joint.damping, joint.friction
     p[Slot.STIFFNESS], p[Slot.REFERENCE] = joint.stiffness, joint.reference
     p[Slot.MOTOR], p[Slot.ENCODER], p[Slot.STRIBECK], p[Slot.RATIO] = joint.armature, float(on_link), 1.0, 1.0
