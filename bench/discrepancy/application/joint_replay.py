@@ -68,7 +68,7 @@ class JointReplay:
         if tied := case.options.get("joints"):
             names = " and ".join(f"'{name}'" for name in sorted(tied))
             raise ModelError(
-                f"nominal.json has {names} held or moving as measured (\"joints\"), and in '{case.rig}' they would move freely, so that the "
+                f"nominal.json has {names} held or moving as measured (\"joints\"), and in '{case.rig}' they would move freely, so the "
                 "judging records cannot be run in it; weld them there, or write the corrected model without --case"
             )
         return cls(bound(case, nominal), ArticulatedModel.of(nominal, case.rig))
