@@ -22,7 +22,7 @@ lint: .venv/full
 	$(BIN)/ruff format --check .
 
 types: .venv/full
-	$(BIN)/pyright --threads 2
+	$(BIN)/pyrefly check
 
 layers: .venv/full
 	$(BIN)/lint-imports

@@ -243,9 +243,8 @@ def _forces_at(element: Element, states: NDArray[np.float64]) -> NDArray[np.floa
 
 def _identify(data: JointData, kind: str, settings: dict[str, Any], rng: np.random.Generator) -> Element:
     if kind == "polynomial":
-        model = fit_polynomial(
-            data.states, data.forces, **{"orders": 3, "kind": "total", "degree": 3} | settings
-        )
+        total: dict[str, Any] = {"orders": 3, "kind": "total", "degree": 3}
+        model = fit_polynomial(data.states, data.forces, **total | settings)
     elif kind == "network":
         model = fit_network(data.states, data.forces, rng=rng, **settings)
     else:

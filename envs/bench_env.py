@@ -24,7 +24,7 @@ class BenchEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         benches: The bench behind it.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": list(RENDER_MODES), "render_fps": 25}
+    metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 25}  # noqa: RUF012  (as gymnasium declares it)
     kind: ClassVar[str]
 
     def __init__(self, render_mode: str | None = None, **arguments: Any) -> None:
@@ -36,8 +36,8 @@ class BenchEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             **type(self).metadata,
             "render_fps": round(1.0 / (self.benches.n_steps * self.benches.timestep)),
         }
-        self.observation_space = observation_space(self.benches)
-        self.action_space = action_space(self.benches)
+        self.observation_space = observation_space(self.benches)  # pyrefly: ignore[bad-assignment]
+        self.action_space = action_space(self.benches)  # pyrefly: ignore[bad-assignment]
         self._picture: RenderedPicture | None = None
 
     def _make(self, arguments: dict[str, Any]) -> SteppedBenches:

@@ -82,7 +82,12 @@ def main() -> int:
         with console.status(f"running {group}") as status:
             run = importlib.import_module(f"benchmarks.{group}").rows
             taken = inspect.signature(run).parameters
-            settings = {"full": args.full, "data": args.data, "rig": args.rig, "work": args.work}
+            settings: dict[str, Any] = {
+                "full": args.full,
+                "data": args.data,
+                "rig": args.rig,
+                "work": args.work,
+            }
             settings["progress"] = status.update
             rows: list[Row] = run(args.repeats, **{k: v for k, v in settings.items() if k in taken})
         document["groups"][group] = [row.to_dict() for row in rows]

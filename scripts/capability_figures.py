@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
-Figures = list[tuple[str, ...]]
+Figures = Sequence[tuple[str, ...]]
 """(what, figure, what must hold), and the verdict where it cannot be read off these."""
 
 
@@ -74,7 +75,7 @@ def bouc_wen(told: Any) -> Figures:
 def reproduction(told: Any) -> Figures:
     """How many rows of the dissertation hold, and which do not."""
     rows = [(item["identifier"], row) for item in told["items"] for row in item["rows"]]
-    figures: Figures = [
+    figures: list[tuple[str, ...]] = [
         (
             f"{name}: {row['quantity']}" + (f" [{row['unit']}]" if row["unit"] else ""),
             row["ours"]
@@ -91,7 +92,7 @@ def reproduction(told: Any) -> Figures:
 
 def monitoring(told: Any) -> Figures:
     """The damper monitor, line by line."""
-    figures: Figures = []
+    figures: list[tuple[str, ...]] = []
     for number, row in enumerate(told["lines"]):
         sought = number < 3  # the kinds that the requirement names: a fifth of C lost
         figures += [
@@ -193,7 +194,7 @@ def excitation(told: Any) -> Figures:
     """Methods of excitation beside the best open-loop one."""
     # to certainty in half the time; an identification at least a fifth better
     limit = "≤ 0.5" if told["measure"] == "seconds" else "≤ 0.8"
-    figures: Figures = []
+    figures: list[tuple[str, ...]] = []
     for group, methods in told.items():
         if not isinstance(methods, dict):
             continue

@@ -122,7 +122,7 @@ def designed(
         )  # fmt: skip
         commands.append(controls_from(plan))
     with replacing(path) as temporary:
-        np.savez_compressed(temporary, **{f"question_{i}": u for i, u in enumerate(commands)})
+        np.savez_compressed(temporary, **{f"question_{i}": u for i, u in enumerate(commands)})  # pyrefly: ignore[bad-argument-type]
     return commands
 
 

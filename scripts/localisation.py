@@ -165,7 +165,7 @@ def score(case: Planted, over: str) -> dict[str, float]:
 
 def run(repeats: int, progress: Callable[[str], None] = lambda text: None) -> dict[str, Any]:
     """Score all kinds at all places and noise levels."""
-    rows = []
+    rows: list[dict[str, Any]] = []
     for repeat in range(repeats):
         for r, rig in enumerate(RIGS):
             for p, place in enumerate(rig.places):

@@ -45,7 +45,7 @@ def run(path: Path, *, keep: bool) -> None:
     os.environ["PYTHONPATH"] = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
     commands = str(Path(sys.executable).parent)  # where `jointbench` and `python` of this environment are
     os.environ["PATH"] = os.pathsep.join([commands, os.environ.get("PATH", "")])
-    client = NotebookClient(notebook, timeout=600, kernel_name="python3", coalesce_streams=True)
+    client = NotebookClient(notebook, timeout=600, kernel_name="python3", coalesce_streams=True)  # pyrefly: ignore[bad-argument-type]
     client.execute(cwd=str(path.parent))
     if not keep:
         return

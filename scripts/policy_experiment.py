@@ -61,7 +61,7 @@ class Rewards:
             rows = study(
                 setup_of(self.task), self.task, records=self.records, seed=self.seed, tell=status.update
             )
-        numbers = {"task": self.task, "seed": self.seed, "rewards": REWARDS, **ranking(rows)}
+        numbers: dict[str, Any] = {"task": self.task, "seed": self.seed, "rewards": REWARDS, **ranking(rows)}
         if self.rows is not None:
             write_text(self.rows, json.dumps(rows))
         if self.figure is not None:
@@ -109,7 +109,7 @@ class Train:
         with Console(stderr=True).status("") as status:
             policies = trained(self.task, self.rewards, self.seeds, self.steps, self.out, status.update)
             rows = contest(setup, policies, seeds=self.rig_seeds, rigs=self.rigs, tell=status.update)
-        numbers = {"task": self.task, "steps": self.steps, **summary(rows)}
+        numbers: dict[str, Any] = {"task": self.task, "steps": self.steps, **summary(rows)}
         if self.figure is not None:
             contest_figure(numbers, self.figure)
         if _written(numbers, self.json):

@@ -153,7 +153,7 @@ def questions(args: Args, folder: Path) -> dict[str, dict[str, Any]]:
     asked: dict[str, dict[str, Any]] = {str(case): {"folder": str(case.resolve())} for case in args.cases}
     sys.path[:0] = [str(ROOT), str(ROOT / "scripts"), str(ROOT / "examples" / "mismatch")]
     if args.example:
-        import measure  # pyright: ignore[reportMissingImports]  (found in examples/mismatch)
+        import measure  # pyrefly: ignore[missing-import]  (found in examples/mismatch)
 
         asked["example"] = {"folder": str(measure.measure(folder / "example"))}
     for k in range(args.pendulums):

@@ -157,6 +157,6 @@ def test_values_of_another_kind_are_refused(value):
 
 def test_page_of_thresholds_is_that_of_the_classes():
     sys.path.insert(0, str(ROOT / "scripts"))
-    from make_thresholds import PAGE, page  # pyright: ignore[reportMissingImports]
+    from make_thresholds import PAGE, page
 
     assert PAGE.read_text() == page()

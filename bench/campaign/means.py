@@ -54,7 +54,7 @@ def means_of(
         count = threads or cores()
         with ThreadPoolExecutor(count, thread_name_prefix="campaign") as pool:
             yield (
-                (lambda *task: pool.submit(run_part, *task)),
+                (lambda *task: pool.submit(run_part, *task)),  # pyrefly: ignore[bad-argument-type]
                 (lambda: count + 1),  # a thread goes on with the next part while its last one is noted
                 f"{count} thread{'s' * (count > 1)}",
             )

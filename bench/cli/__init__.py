@@ -90,7 +90,7 @@ def main(argv: list[str] | None = None) -> int:
         print(f"jointbench {__version__}")
         return 0
     try:
-        command: Callable[[], None] = tyro.extras.subcommand_cli_from_dict(
+        command: Callable[[], None] = tyro.extras.subcommand_cli_from_dict(  # pyrefly: ignore[no-matching-overload]
             COMMANDS,
             prog="jointbench",
             description="A MuJoCo virtual test bench for nonlinear joints. --version prints the version.",

@@ -84,7 +84,7 @@ def kind_of(hint: Any, own: Own, name: str = "") -> Any:
     if hint in (Any, type(None)) or origin is Literal:
         return hint
     if is_dataclass(hint):
-        return entry_of(hint, own, kind=f"an entry of {name or 'the list'}")  # pyright: ignore[reportArgumentType]
+        return entry_of(hint, own, kind=f"an entry of {name or 'the list'}")
     if origin in {types.UnionType, Union}:
         return any_of(*(kind_of(argument, own, name) for argument in arguments))
     if origin is np.ndarray or hint is np.ndarray:

@@ -135,7 +135,7 @@ def fit_design_model(velocity: ArrayLike, force: ArrayLike) -> DesignFit:
     result = optimize.least_squares(
         lambda p: p[0] * shape(p) - y,
         start,
-        jac=jacobian,  # pyright: ignore[reportArgumentType]  (scipy's stub knows its strings only)
+        jac=jacobian,
         bounds=([0.0, 0.01], [np.inf, 3.0]),
         x_scale="jac",
     )

@@ -88,7 +88,7 @@ _compiled_split = jit(split)
 
 def _views(s):
     """`split` for compiled callers, who hold the state themselves."""
-    return _compiled_split(unowned(s))  # pyright: ignore[reportCallIssue]  (numba passes the typing context)
+    return _compiled_split(unowned(s))  # pyrefly: ignore[missing-argument]  (numba passes the typing context)
 
 
 views: Any = jit(_views)

@@ -30,7 +30,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
-from scipy.linalg.lapack import dpotrf, dpotri
+from scipy.linalg.lapack import dpotrf, dpotri  # pyrefly: ignore[missing-module-attribute]
 
 from bench.errors import IdentificationError
 
@@ -245,11 +245,10 @@ def _step(
         except LinAlgError:
             damping, growth = max(10.0 * damping, 1e-12), 2.0
             continue
-        velocity = -cho_solve(factor, gradient, check_finite=False)
+        velocity = -np.asarray(cho_solve(factor, gradient, check_finite=False))
         length = float((velocity * scale) @ velocity)
-        acceleration = -0.5 * cho_solve(
-            factor, problem.curvature_gradient(weights, velocity), check_finite=False
-        )
+        curvature = problem.curvature_gradient(weights, velocity)
+        acceleration = -0.5 * np.asarray(cho_solve(factor, curvature, check_finite=False))
         if 4.0 * float((acceleration * scale) @ acceleration) <= SETTINGS.most_bending**2 * length:
             trial = weights + velocity + acceleration
             trial_cost = problem.sum_of_squares(trial) + ratio * float(trial @ trial)

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dgeqrf
+from scipy.linalg.lapack import dgeqrf  # pyrefly: ignore[missing-module-attribute]
 from scipy.optimize import nnls
 from threadpoolctl import threadpool_limits
 

@@ -169,7 +169,7 @@ class NetworkModel:
             return cls(
                 weights,
                 ValidityRange.from_dict(values["range"]),
-                NetworkReport(**{**report, **lists}),
+                NetworkReport(**report | lists),
                 *given,
             )
         except (KeyError, TypeError, ValueError) as error:

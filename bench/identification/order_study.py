@@ -124,7 +124,7 @@ def order_study(
         half = linalg.solve_triangular(factor, right, lower=True)
         for order_x in range(size):
             m = 1 + (order_x + 1) * (order_v + 1)
-            c = linalg.solve_triangular(factor[:m, :m].T, half[:m], lower=False)
+            c = np.asarray(linalg.solve_triangular(factor[:m, :m].T, half[:m], lower=False))
             errors[order_x, order_v] = _error(matrix[:m, :m], right[:m], c, y)
             errors_new[order_x, order_v] = _error(matrix_new[:m, :m], right_new[:m], c, y_new)
             mass[order_x, order_v] = c[0] / a_scale

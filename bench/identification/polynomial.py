@@ -147,7 +147,7 @@ class PolynomialModel:
             values = json.loads(text)
             if values["type"] != "polynomial":
                 raise FileFormatError(f"a model of type '{values['type']}' came; 'polynomial' is expected")
-            report = PolynomialReport(**{**values["report"], "nmse": tuple(values["report"]["nmse"])})
+            report = PolynomialReport(**values["report"] | {"nmse": tuple(values["report"]["nmse"])})
             return cls(
                 orders=tuple(int(order) for order in values["orders"]),
                 kind=values["kind"],

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dgeqrf
+from scipy.linalg.lapack import dgeqrf  # pyrefly: ignore[missing-module-attribute]
 from threadpoolctl import threadpool_limits
 
 from bench.laws.polynomial import Basis

@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import nnls
-from scipy.spatial import cKDTree
+from scipy.spatial import cKDTree  # pyrefly: ignore[missing-module-attribute]
 from scipy.stats.qmc import Halton
 
 from bench.arrays import Array

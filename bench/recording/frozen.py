@@ -19,7 +19,7 @@ class FrozenDict(dict[str, Any]):
             "the meta of a recording cannot be changed; make a copy with recording.with_(meta={…})"
         )
 
-    __setitem__ = __delitem__ = clear = pop = popitem = setdefault = update = __ior__ = _refuse  # pyright: ignore
+    __setitem__ = __delitem__ = clear = pop = popitem = setdefault = update = __ior__ = _refuse
 
     def __reduce__(self) -> tuple[Any, ...]:  # the default would refill the copy item by item
         return FrozenDict, (dict(self),)

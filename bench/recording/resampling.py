@@ -68,6 +68,6 @@ def resampled(values: NDArray[np.float64], up: int, down: int) -> NDArray[np.flo
     # transition band of a Kaiser window, (A - 8) / (2.285 (taps - 1)) rad a sample, laid below the Nyquist frequency
     width = (86.0 - 8.0) / (2.285 * 2.0 * half) / np.pi
     cutoff = 1.0 / slower - width / 2.0
-    taps = firwin(2 * half + 1, cutoff, window=("kaiser", SETTINGS.beta))  # pyright: ignore[reportArgumentType]  (stub: names only)
+    taps = firwin(2 * half + 1, cutoff, window=("kaiser", SETTINGS.beta))
     kept = (len(values) - 1) * up // down + 1
     return resample_poly(values, up, down, axis=0, window=taps, padtype="line")[:kept]

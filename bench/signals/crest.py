@@ -88,7 +88,7 @@ def optimised_phases(
     from scipy.fft import next_fast_len  # noqa: PLC0415  (scipy is slow to import, and few signals need it)
     from scipy.optimize import minimize  # noqa: PLC0415
 
-    n: int = next_fast_len(SETTINGS.oversampling * int(harmonics[-1]), real=True)  # pyright: ignore[reportAssignmentType]
+    n: int = next_fast_len(SETTINGS.oversampling * int(harmonics[-1]), real=True)
 
     def peak(candidate: NDArray[np.float64]) -> float:
         return float(np.max(np.abs(waveform(harmonics, amplitudes, candidate, n))))

@@ -54,7 +54,7 @@ class Described:
     def to_dict(self) -> dict[str, Any]:
         """The description as numbers, strings, lists and dictionaries; fields that are None are left out."""
         data: dict[str, Any] = {"type": self.name}
-        for field in fields(self):  # pyright: ignore[reportArgumentType]  (every member is a dataclass)
+        for field in fields(self):  # pyrefly: ignore[bad-argument-type]  (every member is a dataclass)
             value = getattr(self, field.name)
             if value is not None:
                 data[field.name] = _encoded(value)

@@ -92,7 +92,7 @@ def _model(family: type[Described], member: type[Described], own: str, spread: S
         kind,
         kind=f"{family.kind} '{member.name}'",
         name=f"{member.__name__}{family.__name__}",
-        type=(Literal[member.name], Field(description=first_line(member))),
+        type=(Literal[member.name], Field(description=first_line(member))),  # pyrefly: ignore[invalid-literal]
     )
 
 

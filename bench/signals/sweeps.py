@@ -132,7 +132,7 @@ class SteppedSine(Signal, name="stepped_sine"):
         amplitudes = (self.amplitude,) * len(self.frequencies) if single else self.amplitude
         cycles = 10.0 if self.cycles is None else self.cycles
         steps, begin = [], 0.0
-        for frequency, amplitude in zip(self.frequencies, amplitudes, strict=True):  # pyright: ignore[reportArgumentType]
+        for frequency, amplitude in zip(self.frequencies, amplitudes, strict=True):  # pyrefly: ignore[bad-argument-type]
             end = begin + (cycles / frequency if self.dwell is None else self.dwell)
             steps.append(Step(frequency, amplitude, begin, end))
             begin = end

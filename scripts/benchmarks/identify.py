@@ -190,7 +190,7 @@ def _polynomials(repeats: int) -> list[Row]:
 
     def peer() -> None:
         model = make_pipeline(
-            MinMaxScaler((-1.0, 1.0)), PolynomialFeatures(3, include_bias=False), LinearRegression()
+            MinMaxScaler((-1, 1)), PolynomialFeatures(3, include_bias=False), LinearRegression()
         )
         with threadpool_limits(1):
             estimated = model.fit(data.states, data.forces).predict(data.states)

@@ -94,7 +94,7 @@ class _Sysid:
     def _whitened(self, _parameters: Any, predicted: Any, *_rest: Any, **_more: Any) -> Any:
         return (predicted.data[:, self.columns] - self.measured) * self.weights, predicted, predicted
 
-    def fit(self, optimizer: str, **options: Any) -> float:
+    def fit(self, optimizer: Any, **options: Any) -> float:
         """Run it; return the cost reached, half the sum of squares."""
         parameters = self.sysid.ParameterDict()
         for name in FREE:

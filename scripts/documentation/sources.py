@@ -69,7 +69,7 @@ def _imported_from(node: ast.ImportFrom, module: str, package: bool) -> str:
     if not node.level:
         return node.module or ""
     parts = module.split(".") if package else module.split(".")[:-1]
-    return ".".join(filter(None, [*parts[: len(parts) - node.level + 1], node.module]))
+    return ".".join(part for part in [*parts[: len(parts) - node.level + 1], node.module] if part)
 
 
 def _exported(tree: ast.Module) -> list[str]:

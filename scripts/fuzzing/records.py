@@ -102,12 +102,13 @@ def read_record(folder: Path) -> None:
     units = {"force": "N", "displacement": "m"}
     path = next(iter(sorted(folder.glob("record.*"))))
     refused: BenchError | None = None
+    asked: tuple[dict[str, Any], ...] = (
+        {},
+        {"units": units, "columns": {name: name for name in units}, "gaps": "interpolate"},
+    )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        for options in (
-            {},
-            {"units": units, "columns": {name: name for name in units}, "gaps": "interpolate"},
-        ):
+        for options in asked:
             try:
                 recording = read_recording(path, **options)
             except BenchError as error:

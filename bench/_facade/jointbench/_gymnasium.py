@@ -53,7 +53,7 @@ class Waiting:
         sys.meta_path.remove(self)
         spec = find_spec(fullname)
         if spec is not None and spec.loader is not None:
-            spec.loader.exec_module = _followed(spec.loader.exec_module)
+            spec.loader.exec_module = _followed(spec.loader.exec_module)  # pyrefly: ignore[bad-assignment]
         return spec
 
 
@@ -70,7 +70,7 @@ def wait() -> None:
     if REGISTRATION in sys.modules:
         register()
     elif not any(isinstance(finder, Waiting) for finder in sys.meta_path):
-        sys.meta_path.insert(0, Waiting())  # pyright: ignore[reportArgumentType]
+        sys.meta_path.insert(0, Waiting())  # pyrefly: ignore[bad-argument-type]
 
 
 wait()

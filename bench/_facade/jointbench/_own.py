@@ -102,7 +102,7 @@ class _Alias:
             name = f"bench.{part}"
             if find_spec(name) is None:
                 return None
-        return ModuleSpec(fullname, _Existing(name), is_package=True)  # pyright: ignore[reportArgumentType]
+        return ModuleSpec(fullname, _Existing(name), is_package=True)  # pyrefly: ignore[bad-argument-type]
 
 
 class _Existing:

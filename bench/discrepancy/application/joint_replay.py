@@ -65,7 +65,7 @@ class JointReplay:
         Raises:
             ModelError: Joints of the case are held or move as measured, which those of the user's file do not.
         """
-        if tied := case.options.get("joints"):
+        if isinstance(tied := case.options.get("joints"), dict) and tied:
             names = " and ".join(f"'{name}'" for name in sorted(tied))
             raise ModelError(
                 f"nominal.json has {names} held or moving as measured (\"joints\"), and in '{case.rig}' they would move freely, so the "

@@ -198,7 +198,7 @@ def _fir(filtered: Antialias, frequency: Array) -> NDArray[np.complex128]:
         b = signal.firwin(filtered.taps, filtered.cutoff_hz, window=filtered.window, fs=filtered.rate_hz)
     lag = 0.5 * (len(b) - 1) if filtered.zero_phase else 0.0
     omega = 2.0 * np.pi * frequency / filtered.rate_hz
-    return np.exp(1j * omega * lag) * signal.freqz(b, worN=omega)[1]  # pyright: ignore[reportArgumentType]  (no annotation: the default's int)
+    return np.exp(1j * omega * lag) * signal.freqz(b, worN=omega)[1]
 
 
 def _analogue(filtered: Antialias, frequency: Array) -> NDArray[np.complex128]:

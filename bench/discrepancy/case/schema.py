@@ -124,7 +124,7 @@ class ChannelEntry(Entry):
     """What it is; by default the loads of a rig are measured, and everything else is a response."""
     noise_std: NotNegative | None = None
     """One-sigma noise of the channel at rest; left out where it is not known."""
-    antialias: AntialiasEntry | None = None  # pyright: ignore[reportInvalidTypeForm]  (a model made at run time)
+    antialias: AntialiasEntry | None = None
     """Filter that a response passed before it was sampled."""
     sensor: Name | None = None
     """Sensor of your own MJCF that it stands for."""

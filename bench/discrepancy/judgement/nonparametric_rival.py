@@ -171,7 +171,7 @@ def _promised(screen: Screen, ground: Ground, node: GridPoint) -> _Promise:
     for mixing in _mixings(node.placed.effect, settings=screen.problem.settings.judgement):
         curvature = np.eye(mixing.shape[1]) + mixing.T @ gram @ mixing
         factor = cho_factor(curvature)
-        eta = cho_solve(factor, mixing.T @ right)
+        eta = np.asarray(cho_solve(factor, mixing.T @ right))
         occam = float(np.sum(np.log(np.abs(np.diag(factor[0])))))
         found.append((0.5 * float(right @ mixing @ eta) - occam, mixing, eta))
     gain, mixing, eta = max(found, key=lambda entry: entry[0])

@@ -27,7 +27,7 @@ def with_elements(structure: Structure, case: Case) -> Structure:
         UnknownNameError: An element is at a place that the structure has not.
         ParameterError: A value is out of the bounds of the law.
     """
-    added = [_declared(element, structure, case) for element in case.options.get("elements", [])]  # pyright: ignore
+    added = [_declared(element, structure, case) for element in case.options.get("elements", [])]  # pyrefly: ignore[not-iterable]
     one = next((p for p in structure.places if len(p.rows) == 1), None)
     frictions, given = structure.frictions, {p.name for p in case.parameters}
     if one is not None and case.rig in {"sdof", "damper"}:

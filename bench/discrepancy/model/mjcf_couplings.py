@@ -103,7 +103,8 @@ def rows_of(model: mujoco.MjModel, links: Sequence[dict[str, float]], dofs: Sequ
 def stiff_modes(structure: Structure, values: Array, step: float, *, settings: ModelSettings) -> Array:
     """Constraints (n, n_dof) that stand for modes which no record of such a step could show; none where all are so."""
     linear = structure.at(values)
-    squares, modes = linalg.eigh(0.5 * (linear.stiffness + linear.stiffness.T), linear.mass)
+    decomposed = linalg.eigh(0.5 * (linear.stiffness + linear.stiffness.T), linear.mass)
+    squares, modes = np.asarray(decomposed[0]), np.asarray(decomposed[1])
     fast = squares * step**2 > settings.fast**2
     return np.zeros((0, len(squares))) if fast.all() else np.asarray(modes[:, fast].T @ linear.mass)
 

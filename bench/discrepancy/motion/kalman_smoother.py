@@ -93,7 +93,7 @@ def _stationary(
 ) -> tuple[NDArray, NDArray, NDArray]:
     """Return stationary predicted covariance, gain and innovation covariance, by doubling-free iteration."""
     scale = np.sqrt(np.diag(noise))
-    covariance = solve_discrete_are(transition.T, (h / scale[:, None]).T, process, np.eye(len(h)))
+    covariance = np.asarray(solve_discrete_are(transition.T, (h / scale[:, None]).T, process, np.eye(len(h))))
     innovation = h @ covariance @ h.T + noise
     gain = covariance @ h.T @ np.linalg.inv(innovation)
     return covariance, gain, innovation

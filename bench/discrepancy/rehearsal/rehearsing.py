@@ -127,7 +127,7 @@ class Rehearsal:
         document = load_document(path)
         try:
             outcomes = tuple(
-                Outcome(**{**o, "named": tuple(o["named"]), "before": _float(o["before"]), "after": _float(o["after"])})
+                Outcome(**o | {"named": tuple(o["named"]), "before": _float(o["before"]), "after": _float(o["after"])})
                 for o in document["outcomes"]
             )  # fmt: skip
             return cls(

@@ -195,6 +195,6 @@ def differing(records: list[str]) -> Effect:
     return replace(
         ideal, name=DIFFERS, equation="f = Fc_i sgn(v) in record i",
         parameters=tuple(replace(FRICTION, name=f"friction_force_{name}") for name in records),
-        theta=lambda values, scales: theta(np.array([np.mean(values)]), scales), schedule=schedule, log_prior=EFFECT_SETTINGS.rare,
+        theta=lambda values, scales: theta(np.array([values.mean()]), scales), schedule=schedule, log_prior=EFFECT_SETTINGS.rare,
         n_linear=1,
     )  # fmt: skip

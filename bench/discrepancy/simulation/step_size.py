@@ -51,7 +51,7 @@ def rates(
     if not 0.0 < top < math.inf:
         return np.array([top])
     rounded = 2.0 ** (math.ceil(settings.per_octave * math.log2(top)) / settings.per_octave)
-    return np.atleast_1d(effect.fastest(values, scales._replace(velocity=speed)) * (rounded / top))
+    return np.atleast_1d(effect.fastest(values, scales._replace(velocity=speed)) * (rounded / top))  # pyrefly: ignore[bad-argument-type]
 
 
 def steps(

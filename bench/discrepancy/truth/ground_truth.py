@@ -100,7 +100,7 @@ class Truth:
         zero = np.zeros((2, 2))
         inputs = np.zeros((4, 2))
         inputs[0, 0] = inputs[2, 1] = 1.0
-        return RigMatrices(*(np.block([[a, zero], [zero, b]]) for a, b in blocks.values()), inputs)  # pyright: ignore[reportCallIssue]
+        return RigMatrices(*(np.block([[a, zero], [zero, b]]) for a, b in blocks.values()), inputs)  # pyrefly: ignore[bad-argument-count]
 
 
 def _mass_name(rig: str, where: str) -> str:
