@@ -7,6 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import settings
+
+settings.register_profile("jointbench", deadline=None)  # what compiles on its first call takes a second
+settings.load_profile("jointbench")
 
 
 @pytest.fixture(autouse=True)

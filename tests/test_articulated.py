@@ -174,6 +174,14 @@ def test_a_servo_arm_without_fault_is_clean_and_everything_is_written(tmp_path):
     assert not complete(found.problem, moved, JudgementSettings())
 
 
+def test_a_budget_ends_the_search_with_the_best_so_far_and_says_what_was_left_out(tmp_path):
+    folder = write_case(tmp_path, mjcf(servo=True, friction=LIMIT), servo=True)
+    verdict = diagnose(read_case(folder), budget=1e-6).verdict
+    assert verdict.verdict == "unknown"
+    (note,) = (text for text in verdict.warnings if "no time for" in text)
+    assert "a search for effect 1" in note
+
+
 BESIDE = '<body name="more">{joint}<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body></worldbody>'
 REFUSED = {
     "free joint": ("</worldbody>", BESIDE.format(joint='<freejoint name="base"/>')),

@@ -94,11 +94,13 @@ def test_memory_does_not_grow_with_the_data_set(tmp_path: Path) -> None:
         run_campaign(PLAN | {"records": records, "duration": 50.0, "records_per_part": 2}, folder)
         windows = Windows(folder, 1000, buffer=2)
         next(iter(windows))  # imports
-        tracemalloc.start()
-        count = sum(1 for _ in windows)
-        peaks.append(tracemalloc.get_traced_memory()[1])
-        tracemalloc.stop()
-        assert count == 10 * records
+        found = []
+        for _ in range(3):  # other threads allocate too: what they do only adds
+            tracemalloc.start()
+            assert sum(1 for _ in windows) == 10 * records
+            found.append(tracemalloc.get_traced_memory()[1])
+            tracemalloc.stop()
+        peaks.append(min(found))
     # four times the records: the same buffer, give or take the list of row groups
     assert peaks[1] < 1.3 * peaks[0]
     # two records of 120 kB and the next two being read while the old are let go, with Python's own small change

@@ -95,8 +95,8 @@ def diagnose(
         anyway: Whether factors, signs and parts of the model that stand against a diagnosis are noted rather than refused.
         rng: For the bootstrap intervals; a fixed seed where None.
         progress: Called with a line of text at every stage.
-        budget: Seconds after which no further stage of the search is begun; the verdict is then the best one so far, and its
-            warnings say what was not tried.
+        budget: Seconds after which nothing further is screened or fitted and fits end where they are; the verdict is then the best one
+            so far, and its warnings say what was not tried.
         settings: Thresholds, see docs/thresholds.md.
 
     Raises:
@@ -107,13 +107,16 @@ def diagnose(
     """
     if applies(case, settings=settings.articulated):
         with threadpool_limits(1, user_api="blas"):
-            robot = diagnose_articulated(
-                case, exclude=exclude, most=most, anyway=anyway, rng=rng, settings=settings, progress=progress
+            return diagnose_articulated(
+                case,
+                exclude=exclude,
+                most=most,
+                anyway=anyway,
+                rng=rng,
+                deadline=Deadline(budget),
+                settings=settings,
+                progress=progress,
             )
-        if budget == math.inf:
-            return robot
-        unused = "budget is not heeded on an articulated model"
-        return replace(robot, verdict=replace(robot.verdict, warnings=(*robot.verdict.warnings, unused)))
     rng = np.random.default_rng(settings.seed) if rng is None else rng
     known = [effect.name for effect in catalogue]
     for name in exclude:
@@ -153,6 +156,7 @@ def _by_drives(
             most=how.most,
             anyway=anyway,
             rng=rng,
+            deadline=how.deadline,
             settings=how.settings,
             progress=how.progress,
         )
@@ -205,7 +209,7 @@ def _diagnose(case: Case, how: How, rng: np.random.Generator, anyway: bool) -> D
         gaps=found,
         probabilities=probabilities,
         explanation=_told(words, seen),
-        warnings=(*admission, *_untried(how.deadline), *finding.notes, *_warnings(problem, told, quiet)),
+        warnings=(*admission, *how.deadline.untried, *finding.notes, *_warnings(problem, told, quiet)),
         closure=closure,
         next_excitation=_next_excitation(problem, finding, catalogue),
         splits=where.splits,
@@ -243,13 +247,6 @@ def _next_excitation(problem: Problem, finding: Finding, catalogue: Sequence[Eff
     if finding.kind == "effect":
         return separate(problem, finding.explanations)
     return told_apart(problem, finding.kind, catalogue)
-
-
-def _untried(deadline: Deadline) -> tuple[str, ...]:
-    """What there was no time for, in words."""
-    if not deadline.skipped:
-        return ()
-    return (f"there was no time for {'; '.join(deadline.skipped)}: a larger --budget may change the verdict",)
 
 
 def _somewhere(problem: Problem, found: Sequence[_Placed]) -> tuple[_Placed, ...]:

@@ -25,6 +25,7 @@ from bench.discrepancy.articulated_search.search import search
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.effects.catalogue import CATALOGUE as LINEAR
 from bench.discrepancy.multibody.model import ArticulatedModel
+from bench.discrepancy.numerics.deadline import NEVER, Deadline
 from bench.discrepancy.settings import DEFAULT, DiagnosisSettings, changed
 from bench.discrepancy.verdict import (
     Verdict,
@@ -66,6 +67,7 @@ def diagnose_articulated(
     most: int = 3,
     anyway: bool = False,
     rng: np.random.Generator | None = None,
+    deadline: Deadline = NEVER,
     settings: DiagnosisSettings = DEFAULT,
     progress: Callable[[str], None] = lambda text: None,
 ) -> ArticulatedDiagnosis:
@@ -77,6 +79,7 @@ def diagnose_articulated(
         most: Largest number of effects named together.
         anyway: Whether factors, signs and parts of the model that stand against a diagnosis are noted rather than refused.
         rng: For the bootstrap intervals; a fixed seed where None.
+        deadline: When nothing further is screened or fitted and fits end where they are; the warnings of the verdict say what was left out.
         settings: Thresholds, see docs/thresholds.md.
         progress: Called with a line of text at every stage.
 
@@ -100,7 +103,7 @@ def diagnose_articulated(
     stated = all((c.noise_std or 0.0) > 0.0 for c in case.channels if c.role == "response")
     case, compiled, notes = admitted_robot(case, anyway=anyway, settings=settings)
     model = ArticulatedModel.of(compiled, case.rig)
-    problem = ArticulatedProblem.of(case, model, case.identification, settings)
+    problem = ArticulatedProblem.of(case, model, case.identification, settings, deadline)
     judging = ArticulatedProblem.of(case, model, case.validation, settings)
     fits = search(problem, placements(problem, catalogue), settings=how, progress=progress)
     progress("judging records")
@@ -112,9 +115,12 @@ def diagnose_articulated(
     verdict = verdict_of(
         problem, fits, rungs, last, untouched, predictions, judged, rng, stated=stated, left=left
     )
-    verdict = replace(verdict, warnings=(*verdict.warnings, *notes), settings=changed(settings))
+    verdict = replace(
+        verdict, warnings=(*verdict.warnings, *notes, *deadline.untried), settings=changed(settings)
+    )
     rival = closest_rival(fits, final, judged) if verdict.named else None
-    proposal = None if rival is None else propose(problem, compiled, final, rival)
+    told_apart = rival is not None and deadline.allows("the next test")
+    proposal = propose(problem, compiled, final, rival) if told_apart else None
     if proposal is not None:
         verdict = replace(verdict, next_excitation=proposal.told)
     verdict = verdict.timed(time.perf_counter() - began)

@@ -208,7 +208,7 @@ def fit(
     reach = np.where(free < len(problem.nominal), settings.nominal_reach, settings.effect_reach)
     found = minimise(
         residual_at, starts, prior=Prior(mean, std, low, high), free=free, reach=reach, iterations=iterations, limit=limit,
-    settings=problem.settings.numerics)  # fmt: skip
+        deadline=problem.deadline, settings=problem.settings.numerics)  # fmt: skip
     return _summary(problem, hypothesis, found.vector, found.curvature, free, active, others)
 
 

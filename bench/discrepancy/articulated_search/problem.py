@@ -34,6 +34,7 @@ from bench.discrepancy.multibody.encoders import Encoder
 from bench.discrepancy.multibody.joint_run import Slot, predict
 from bench.discrepancy.multibody.model import ArticulatedModel, Joint
 from bench.discrepancy.multibody.records import JointRecord, PreparedRecord, corrected, prepare, relinked
+from bench.discrepancy.numerics.deadline import NEVER, Deadline
 from bench.discrepancy.settings import DEFAULT, DiagnosisSettings
 
 
@@ -46,6 +47,7 @@ class ArticulatedProblem:
         model: The model at its nominal parameters.
         records: Prepared records.
         settings: Thresholds of the diagnosis.
+        deadline: When nothing further is screened or fitted, and fits end where they are.
         nominal: Uncertain nominal parameters: masses first, then joint by joint.
     """
 
@@ -53,6 +55,7 @@ class ArticulatedProblem:
     model: ArticulatedModel
     records: tuple[PreparedRecord, ...]
     settings: DiagnosisSettings = DEFAULT
+    deadline: Deadline = NEVER
     nominal: tuple[Nominal, ...] = field(init=False)
     _corrected: dict[tuple, tuple[PreparedRecord, ...]] = field(init=False, default_factory=dict)
     _correcting: Lock = field(init=False, default_factory=Lock)
@@ -67,6 +70,7 @@ class ArticulatedProblem:
         model: ArticulatedModel,
         records: Sequence[CaseRecord],
         settings: DiagnosisSettings = DEFAULT,
+        deadline: Deadline = NEVER,
     ) -> ArticulatedProblem:
         """Prepare records."""
         return cls(
@@ -74,6 +78,7 @@ class ArticulatedProblem:
             model,
             tuple(prepare(case, model, record, settings=settings) for record in records),
             settings,
+            deadline,
         )
 
     @property

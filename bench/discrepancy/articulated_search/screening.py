@@ -103,6 +103,8 @@ def screen(
     grounds = {joints: _Ground(problem, base, joints) for joints in [*((j,) for j in everything), everything]}
 
     def look(placed: PlacedOnJoint) -> list[Screened]:
+        if not problem.deadline.allows("effects that were not screened"):
+            return []
         ground = grounds[tuple(problem.reached((placed,)))]
         hypothesis = (*base.hypothesis, placed)
         before = ground.misfit(ground.left)

@@ -67,6 +67,8 @@ def search(
     current = nominal_fit(problem)
     found, dropped = [current], set[tuple[str, str]]()
     for count in range(1, 2 * settings.most + 1):
+        if not problem.deadline.allows(f"a search for effect {count}"):
+            break
         taken = {placed.key for placed in current.hypothesis} | dropped
         rest = [c for c in candidates if c.key not in taken]
         best, fits = _round(
@@ -98,6 +100,8 @@ def without_idle(
     """
     made: list[ArticulatedFit] = []
     for placed in found.hypothesis[:-1]:
+        if not problem.deadline.allows("whether the first effects are still needed"):
+            break
         shorter = tuple(other for other in found.hypothesis if other.key != placed.key)
         kept = [*range(len(problem.nominal))]
         at = len(problem.nominal)
@@ -154,6 +158,8 @@ def _round(
         soft = problem.softened(level)
         ground = refitted(soft, base.hypothesis, ground.vector, scale=_scale_of(soft, ground))
         if first:
+            if problem.deadline.over:
+                break
             others = Others.of(soft, ground)
             first = [_again(soft, ground, others, f) for f in first]
             continue
@@ -279,6 +285,8 @@ def _fits(
     gained, swapped = 0.0, 0
     strained = _strained(problem, base, settings)
     for k, mine in enumerate(points):
+        if out and not problem.deadline.allows("fits of effects that promise less"):
+            break
         hopeful = k < settings.fitted and mine[0].gain >= settings.hope * gained
         if not (k < settings.least or hopeful):
             # where a number of the model was moved too far, numbers that may be wrong instead are tried, whatever they promise

@@ -109,6 +109,7 @@ def fit(
         tolerance=tolerance,
         limit=limit,
         exact=exact,
+        deadline=problem.deadline,
         settings=problem.settings.numerics,
     )
     precision, evidence = laplace(problem, hypothesis, found.cost, found.curvature, free)

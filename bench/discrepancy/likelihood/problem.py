@@ -24,6 +24,7 @@ from bench.discrepancy.likelihood.window_whitening import RestartWindows, white_
 from bench.discrepancy.model.placement import Hypothesis
 from bench.discrepancy.motion.observer import ACCELERATION
 from bench.discrepancy.motion.prescribed import decided
+from bench.discrepancy.numerics.deadline import NEVER, Deadline
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.response.simulator import Simulator
 from bench.discrepancy.response.windows import cut
@@ -39,6 +40,7 @@ class Problem(Simulator):
         bins: Frequency bins of every record, where they have to agree with those of another problem.
         error: Error of the model that residuals are weighed by besides their noise; None where noise is all that they hold.
         within: Stated standard deviations that a nominal parameter may move.
+        deadline: When fits end where they are.
         data: Records, prepared.
         passed: Effects and vector of the model that the noise of what drives it passes into the residuals.
     """
@@ -46,6 +48,7 @@ class Problem(Simulator):
     bins: Mapping[str, int] | None = None
     error: ModelInadequacy | None = None
     within: float = np.inf
+    deadline: Deadline = NEVER
     data: tuple[RecordData, ...] = field(init=False)
     passed: tuple[Hypothesis, Array] = field(init=False)
     _weights: dict[tuple[float, int, float, bytes], tuple[Array, Array, Array]] = field(

@@ -25,9 +25,21 @@ class Deadline:
         self.skipped: list[str] = [] if skipped is None else skipped
         self._end = time.monotonic() + seconds
 
+    @property
+    def over(self) -> bool:
+        """Whether there is no time left."""
+        return time.monotonic() >= self._end
+
+    @property
+    def untried(self) -> tuple[str, ...]:
+        """What was left out, in a sentence for the warnings of a verdict; none where nothing was."""
+        if not self.skipped:
+            return ()
+        return (f"there was no time for {'; '.join(self.skipped)}: a larger --budget may change the verdict",)
+
     def allows(self, what: str) -> bool:
         """Whether there is time left; what there is none for is noted."""
-        if time.monotonic() < self._end:
+        if not self.over:
             return True
         if what not in self.skipped:
             self.skipped.append(what)

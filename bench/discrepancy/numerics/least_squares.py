@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.arrays import Array
+from bench.discrepancy.numerics.deadline import NEVER, Deadline
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.settings import DEFAULT, NumericsSettings
 
@@ -73,6 +74,7 @@ class _Task(NamedTuple):
     reach: Array
     tolerance: float
     limit: float
+    deadline: Deadline
     settings: NumericsSettings
 
     def excess(self, state: _State) -> float:
@@ -104,6 +106,7 @@ def minimise(
     tolerance: float = 0.05,
     limit: float = np.inf,
     exact: bool = True,
+    deadline: Deadline = NEVER,
     settings: NumericsSettings = DEFAULT.numerics,
 ) -> Minimum:
     """Minimise squared residuals plus the misfit of a Gaussian prior.
@@ -118,10 +121,11 @@ def minimise(
         tolerance: Decrease of the cost that is not worth a step.
         limit: Cost that has to be within sight; the iteration ends where the linearisation promises much less.
         exact: Whether the curvature is taken anew at the end, where the residuals have come near the noise.
+        deadline: When the iteration ends where it is, once it has the curvature there.
         settings: `NumericsSettings` of the diagnosis.
     """
     own = Prior(prior.mean[free], prior.std[free], prior.low[free], prior.high[free])
-    task = _Task(residual_at, free, *own, reach, tolerance, limit, settings)
+    task = _Task(residual_at, free, *own, reach, tolerance, limit, deadline, settings)
     state = min((task.state(vector.copy()) for vector in np.atleast_2d(start)), key=lambda at: at.cost)
     identity = np.eye(len(free))
     if not np.isfinite(state.cost):
@@ -177,6 +181,8 @@ def _descend(task: _Task, state: _State, difference: float, steps: range) -> _De
             jacobian, fresh = _jacobian(task, state, difference), True
             if jacobian is None:
                 break
+        if not task.deadline.allows("the last steps of fits"):
+            return _Descent(state, jacobian, fresh, False, progressed, step + 1)
         normal = _squared(jacobian)
         if normal is None:
             if fresh:

@@ -67,13 +67,14 @@ def explain(
             most=most, progress=progress, error=error, deadline=deadline, settings=settings,
         )  # fmt: skip
     search = _attributed(
-        Problem(case, structure, case.identification, error=error, settings=settings),
+        Problem(case, structure, case.identification, error=error, deadline=deadline, settings=settings),
         placements(case, structure, catalogue),
         most=most,
         progress=progress,
         deadline=deadline,
     )
     problem = search.problem
+    problem.deadline = NEVER  # what is known already, and what is judged, is fitted to the end
     converge(search, _again(search, seeds))
     found = [Explanation(((problem, fitted),)) for fitted in search.ranked()]
     return nothing_left_first(found) if problem.scaled else parsimonious(found)
@@ -93,10 +94,16 @@ def _in_groups(
 ) -> list[Explanation]:
     """Explanations of a rig that falls apart into groups of degrees of freedom, and of effects that couple them."""
     bins = _common_bins(case, structure, settings=settings)
-    whole = Problem(case, structure, case.identification, bins=bins, error=error, settings=settings)
+
+    def problem_of(structure: Structure) -> Problem:
+        return Problem(
+            case, structure, case.identification, bins=bins, error=error, deadline=deadline, settings=settings
+        )
+
+    whole = problem_of(structure)
     prepared = []
     for part in parts:
-        problem = Problem(case, part, case.identification, bins=bins, error=error, settings=settings)
+        problem = problem_of(part)
         progress(f"screening of {', '.join(part.dofs)}")
         prepared.append(prepare(problem, placements(case, part, catalogue)))
     odd = [entry for entry in prepared if not consistent(entry[0].ranked(0)[0])]
@@ -117,6 +124,8 @@ def _in_groups(
     # what falls apart is doubted better group by group
     known = {key_of(e.hypothesis) for e in found}
     found += [Explanation(((whole, f),)) for f in coupled.ranked() if key_of(f.hypothesis) not in known]
+    for problem in (part for explanation in found for part, _ in explanation.parts):
+        problem.deadline = NEVER  # what is judged is fitted to the end
     return nothing_left_first(sorted(found, key=lambda e: -e.log_posterior))
 
 

@@ -53,8 +53,7 @@ def extend(
     limit = limit_of(search, size)
 
     def fit_all(tasks: Iterable[Task]) -> None:
-        for fitted in in_threads(lambda task: first_fit(search.problem, *task, limit=limit), tasks):
-            search.add(fitted)
+        search.fit_all(lambda task: first_fit(search.problem, *task, limit=limit), tasks)
 
     fit_all(task for found in offers for task in found.tasks)
     for base, _, spare in offers:

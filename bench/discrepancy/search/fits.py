@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -56,6 +56,20 @@ class Search:
         if key not in self.fits or fitted.cost < self.fits[key].cost:
             self.fits[key] = fitted
 
+    def fit_all(self, fit_of: Callable[[Task], Fit], tasks: Iterable[Task]) -> list[Fit]:
+        """Fits of tasks, while there is time; all of them are kept.
+
+        Args:
+            fit_of: Fits one.
+            tasks: What is fitted; all of it before the deadline of the problem.
+        """
+        deadline = self.problem.deadline
+        found = in_threads(lambda task: fit_of(task) if deadline.allows("further fits") else None, tasks)
+        fits = [fitted for fitted in found if fitted is not None]
+        for fitted in fits:
+            self.add(fitted)
+        return fits
+
     def ranked(self, size: int | None = None) -> list[Fit]:
         """Fits by decreasing posterior, of one number of effects or of all."""
         chosen = [f for f in self.fits.values() if size is None or len(f.hypothesis) == size]
@@ -99,8 +113,7 @@ def converge(
             limit=limits[len(task[0])],
         )
 
-    for fitted in in_threads(thorough, tasks):
-        search.add(fitted)
+    for fitted in search.fit_all(thorough, tasks):
         search.converged.add(key_of(fitted.hypothesis))
 
 
