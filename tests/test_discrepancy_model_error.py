@@ -256,6 +256,17 @@ def test_an_effect_is_named_over_a_background_that_no_model_has(noise):
     assert any("larger than stated" in note for note in verdict.warnings) == (noise is UNDERSTATED)
 
 
+def test_what_no_effect_improves_on_is_not_called_right_where_a_free_force_would_improve():
+    """Nothing that may be named here is a spring, and no noise is stated that the spring could be told from."""
+    late = [effect_named("displacement_delay")]
+    stiffening = planted_case(lambda f: motion_with(f, resonating, 2), humming, noise=UNSTATED, n=1500)
+    verdict = diagnose(stiffening, catalogue=late).verdict
+    assert (verdict.verdict, verdict.named) == ("unknown", ())
+    assert verdict.remainder["free_force_gain"] > 0.1
+    clean = planted_case(noise=UNSTATED, n=1500)
+    assert diagnose(clean, catalogue=late).verdict.verdict == "none"
+
+
 def test_what_there_is_no_time_for_is_left_out_and_said():
     case = planted_case(lambda f: motion_with(f, resonating, 2), humming, noise=NOISE, n=1500)
     verdict = diagnose(case, catalogue=FEW, budget=1e-6).verdict

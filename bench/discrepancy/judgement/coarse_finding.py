@@ -122,7 +122,16 @@ def _kind(problem: Problem, judged: Judged) -> VerdictKind:
     # without stated noise a nominal model is as right as a model can be within two standard deviations of what sensors are
     # calibrated to; noise that is stated and is not all that is left is something that is missing, whatever it be
     material = judged.nominal > 2.0 * problem.settings.likelihood.error.least
-    return "unknown" if problem.noise_stated or (judged.vetoed and material) else "none"
+    missing = problem.noise_stated or (material and (judged.vetoed or _forced(judged)))
+    return "unknown" if missing else "none"
+
+
+def _forced(judged: Judged) -> bool:
+    """Whether a force that no law describes tells what the nominal model leaves from chance; not asked of windows."""
+    nothing = next(entry.explanation for entry in judged.found if not entry.explanation.hypothesis)
+    if any(problem.windowed for problem, _ in nothing.parts):
+        return False
+    return any(lack.significant(0.0) for lack in nothing.lacks)
 
 
 def _probabilities(kind: VerdictKind, judged: Judged) -> dict[str, float]:
@@ -220,8 +229,8 @@ def _words(kind: VerdictKind, judged: Judged, nearest: Explanation) -> str:
         return "No effect of the catalogue predicts the records better than the nominal model does with its parameters re-estimated."
     if not nearest.hypothesis:
         return (
-            "The nominal model leaves more than the stated noise, and no effect of the catalogue predicts the records better than it does "
-            "with its parameters re-estimated."
+            "The nominal model leaves more than noise or small errors of a model would, and no effect of the catalogue predicts the "
+            "records better than it does with its parameters re-estimated."
         )
     if chosen.hypothesis:
         return (
