@@ -37,7 +37,8 @@ class Judged:
         within: Those within one standard error of the best.
         alike: Those that the blocks do not tell from the chosen one: two standard errors; and those that the judging records prefer.
         vetoed: Whether the judging records refused what the others would have named.
-        nominal: Largest judged discrepancy of the nominal model, its parameters re-estimated within their uncertainty.
+        missing: Whether something is missing that no effect describes, although no noise is stated that would tell: the nominal model is
+            off by more than sensors are calibrated to, and an effect was vetoed, or what it leaves is larger than the errors of models.
         left: Part of the power of the judged discrepancy, beyond noise, that the chosen one leaves.
     """
 
@@ -47,7 +48,7 @@ class Judged:
     within: tuple[HeldOut, ...]
     alike: tuple[HeldOut, ...]
     vetoed: bool
-    nominal: float
+    missing: bool
     left: float
     settings: CoarseSettings
 
@@ -71,17 +72,21 @@ class Judged:
         return max(weights, default=0.0)
 
 
-def outside(left: float, settings: CoarseSettings = DEFAULT.judgement.coarse) -> float:
+def outside(
+    left: float, settings: CoarseSettings = DEFAULT.judgement.coarse, *, small: float | None = None
+) -> float:
     """Probability that something outside the catalogue is the cause of a discrepancy of which an explanation leaves a part.
 
     What stands outside leaves any part of the power beside the nearest effect, uniformly; the right effect leaves what small things
-    make, a part that falls off exponentially. Bayes' rule does the rest.
+    make, a part that falls off exponentially. Bayes' rule does the rest. Of a nominal model that stands alone, and of which no noise
+    is stated, the parts are those of the power of the response, and what small things make of it is the error of a right model.
 
     Args:
         left: Part of the power of the discrepancy that the explanation leaves.
         settings: Prior probability, and what small things leave.
+        small: What small things leave on average; that of the settings where None.
     """
-    m = settings.background
+    m = settings.background if small is None else small
     odds = settings.outside / (1.0 - settings.outside) * m * float(np.exp(min(left, 1.0) / m))
     return max(odds / (1.0 + odds), settings.unlike)
 
@@ -123,6 +128,12 @@ def judge(
             break
         vetoed = True
     weights = shares(found, _log_priors(found), rng, judgement.held_out.draws)
+    # a nominal model is as right as a model can be within two standard deviations of what sensors are calibrated to
+    error = problem.settings.likelihood.error
+    off = float(np.max(known.of(nothing.explanation, judging=True))) > 2.0 * error.least
+    power = known.beyond_noise(nothing.explanation) ** 2
+    wrong = outside(power, settings, small=error.crude**2) > 0.5  # likelier than not
+    missing = chosen is nothing and not problem.noise_stated and off and (vetoed or wrong)
     preferred = [other for other in found if known.prefers(other.explanation, chosen.explanation)]
     return Judged(
         chosen,
@@ -131,7 +142,7 @@ def judge(
         within,
         alike,
         vetoed,
-        float(np.max(known.of(nothing.explanation, judging=True))),
+        missing,
         known.left(chosen.explanation, nothing.explanation),
         settings,
     )

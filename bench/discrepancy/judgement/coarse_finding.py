@@ -119,19 +119,8 @@ def _kind(problem: Problem, judged: Judged) -> VerdictKind:
     if judged.chosen.explanation.hypothesis:
         # that which rivals of other families explain as well is something, and nobody can say what kind of thing
         return "effect" if judged.agreed >= judged.settings.kind else "unknown"
-    # without stated noise a nominal model is as right as a model can be within two standard deviations of what sensors are
-    # calibrated to; noise that is stated and is not all that is left is something that is missing, whatever it be
-    material = judged.nominal > 2.0 * problem.settings.likelihood.error.least
-    missing = problem.noise_stated or (material and (judged.vetoed or _forced(judged)))
-    return "unknown" if missing else "none"
-
-
-def _forced(judged: Judged) -> bool:
-    """Whether a force that no law describes tells what the nominal model leaves from chance; not asked of windows."""
-    nothing = next(entry.explanation for entry in judged.found if not entry.explanation.hypothesis)
-    if any(problem.windowed for problem, _ in nothing.parts):
-        return False
-    return any(lack.significant(0.0) for lack in nothing.lacks)
+    # noise that is stated and is not all that is left is something that is missing, whatever it be
+    return "unknown" if problem.noise_stated or judged.missing else "none"
 
 
 def _probabilities(kind: VerdictKind, judged: Judged) -> dict[str, float]:

@@ -64,6 +64,10 @@ class Discrepancies:
         widest = int(np.argmax(before))
         return float(min((after[widest] / max(before[widest], 1e-300)) ** 2, 1.0))
 
+    def beyond_noise(self, explanation: Explanation) -> float:
+        """Largest NRMSE of an explanation on the judging records, the noise taken off."""
+        return float(np.max(self._beyond(self.of(explanation, judging=True))))
+
     def prefers(self, rival: Explanation, explanation: Explanation) -> bool:
         """Whether the judging records prefer a rival of other names: it leaves less beyond noise where an explanation leaves most."""
         names, others = ({(p.effect.name, p.place.name) for p in e.hypothesis} for e in (rival, explanation))
