@@ -263,11 +263,20 @@ def test_a_model_that_is_off_by_more_than_models_are_is_not_called_right_because
     verdict = diagnose(stiffening, catalogue=late).verdict
     assert (verdict.verdict, verdict.named) == ("unknown", ())
     assert (
-        "small errors of a model" in verdict.explanation
+        "small errors of a right model" in verdict.explanation
         or "no catalogued effect is it" in verdict.explanation
     )
     clean = planted_case(noise=UNSTATED, n=1500)
     assert diagnose(clean, catalogue=late).verdict.verdict == "none"
+
+
+def test_noise_that_is_larger_than_stated_is_said_and_nothing_is_missing_for_it():
+    stated = {"force": 0.0, **{name: 0.75 * NOISE[name] for name in ("displacement", "acceleration")}}
+    verdict = diagnose(planted_case(noise=stated), catalogue=FEW).verdict
+    assert (verdict.verdict, verdict.named) == ("none", ())
+    said = [note for note in verdict.warnings if "larger than stated" in note]
+    assert [note.split("'")[1] for note in said] == ["displacement", "acceleration"]
+    assert "larger than stated" in verdict.explanation
 
 
 def test_what_there_is_no_time_for_is_left_out_and_said():

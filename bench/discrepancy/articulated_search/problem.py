@@ -171,7 +171,7 @@ class ArticulatedProblem:
                 )
                 joints.append(replace(record, process=torque) if torque > record.process else record)
             records.append(replace(prepared, joints=tuple(joints)))
-        return ArticulatedProblem(self.case, self.model, tuple(records), self.settings)
+        return ArticulatedProblem(self.case, self.model, tuple(records), self.settings, self.deadline)
 
     def settled(self, hypothesis: JointHypothesis, vector: Array) -> ArticulatedProblem:
         """The same problem with the links of elastic joints where a fit has them; itself where there are none behind their motors."""
@@ -186,7 +186,7 @@ class ArticulatedProblem:
         for raw, prepared in zip(self.records, self.motions(hypothesis, vector), strict=True):
             links = {j: self.innovations(j, hypothesis, vector, prepared)[1][:, 2:] for j in elastic}
             records.append(relinked(self.case, self.model, raw, links, settings=self.settings.articulated))
-        return ArticulatedProblem(self.case, self.model, tuple(records), self.settings)
+        return ArticulatedProblem(self.case, self.model, tuple(records), self.settings, self.deadline)
 
     def slots(self, j: int, hypothesis: JointHypothesis, vector: Array, *, on_link: bool) -> Array:
         """Parameter vector (SLOTS,) of the runs of joint `j`."""

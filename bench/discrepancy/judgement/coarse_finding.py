@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from bench.discrepancy.case.case import Case
-from bench.discrepancy.fitting.goodness_of_fit import names
+from bench.discrepancy.fitting.goodness_of_fit import consistent, names
+from bench.discrepancy.fitting.map_fit import fit
 from bench.discrepancy.judgement import posterior as evidence
 from bench.discrepancy.judgement.coarse import Judged, judge
 from bench.discrepancy.judgement.finding import Finding
@@ -15,6 +17,7 @@ from bench.discrepancy.likelihood.model_error import ModelInadequacy, crude_erro
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.numerics.deadline import NEVER, Deadline
+from bench.discrepancy.screening.score_test import lack_of_fit
 from bench.discrepancy.search.explanation import Explanation
 from bench.discrepancy.settings import DiagnosisSettings
 from bench.discrepancy.verdict import Ranked, VerdictKind
@@ -88,11 +91,15 @@ def coarse_finding(
         explanations: Weighed by the error of the model, by decreasing posterior.
         rng: For bootstraps.
     """
-    understated = tuple(_understated(problem, explanations[0]))
+    factors = _noise_over_stated(problem, explanations[0])
+    threshold = problem.settings.judgement.noise_understated
+    understated = _larger_than_stated(factors, threshold)
     judged = judge(case, problem, explanations, rng, trusted=problem.noise_stated and not understated)
     chosen, nearest = judged.chosen.explanation, _nearest(judged)
     probabilities = _marginal(judged)
-    kind = _kind(problem, judged)
+    noise = not chosen.hypothesis and not judged.vetoed and _explained_by_noise(problem, factors)
+    understated = _larger_than_stated(factors, 1.0) if noise else understated
+    kind = "none" if noise else _kind(problem, judged)
     nothing = next(entry for entry in judged.found if not entry.explanation.hypothesis)
     first = judged.chosen if kind == "effect" else nothing
     rest = sorted(
@@ -106,7 +113,7 @@ def coarse_finding(
         named=evidence.effects_of(chosen, probabilities) if kind == "effect" else (),
         ranking=tuple(Ranked(*key, p) for key, p in sorted(probabilities.items(), key=lambda item: -item[1])),
         indistinguishable=_sets(judged),
-        words=_words(kind, judged, nearest),
+        words=NOISE_ALONE if noise else _words(kind, judged, nearest, stated=problem.noise_stated),
         nearest=evidence.effects_of(nearest, probabilities) if kind == "unknown" else (),
         closest=nearest if kind == "unknown" and nearest.hypothesis else None,
         notes=understated,
@@ -140,25 +147,50 @@ def _nearest(judged: Judged) -> Explanation:
     return next((e.explanation for _, e in pairs if e.explanation.hypothesis), judged.chosen.explanation)
 
 
-def _understated(problem: Problem, best: Explanation) -> Iterator[str]:
-    """Channels whose noise is larger than stated, wherever one looks in their spectra."""
+def _noise_over_stated(problem: Problem, best: Explanation) -> dict[str, float]:
+    """Factor by which every channel's noise is at least larger than stated: what is left nearly everywhere in its spectrum."""
     settings = problem.settings.judgement
     error = best.parts[0][0].error
-    for name in problem.structure.channels:
-        stated = problem.case.channel(name).noise_std
-        if error is None or not stated or problem.windowed:
+    factors = {}
+    for c, name in enumerate(problem.structure.channels):
+        if error is None or not problem.case.channel(name).noise_std or problem.windowed:
             continue
-        c = problem.structure.channels.index(name)
         least = [
             np.quantile(error.power[data.record.name, name] / own_noise(data)[:, c], settings.quietest)
             for data in problem.data
         ]
-        factor = float(np.sqrt(1.0 + min(least)))
-        if factor > settings.noise_understated:
-            yield (
-                f"the noise of '{name}' is larger than stated, by a factor of {factor:.2g}: hardly anywhere in its spectrum does an "
-                "explanation leave less; measure it at rest"
-            )
+        factors[name] = float(np.sqrt(1.0 + min(least)))
+    return factors
+
+
+def _larger_than_stated(factors: Mapping[str, float], threshold: float) -> tuple[str, ...]:
+    """Channels whose noise is larger than stated by more than a factor, in words."""
+    return tuple(
+        f"the noise of '{name}' is larger than stated, by a factor of {factor:.2g}: hardly anywhere in its spectrum does an "
+        "explanation leave less; measure it at rest"
+        for name, factor in factors.items()
+        if factor > threshold
+    )
+
+
+def _explained_by_noise(problem: Problem, factors: Mapping[str, float]) -> bool:
+    """Whether the nominal model explains the records once the noise is as large as their spectra show nearly everywhere."""
+    if not problem.noise_stated or not any(factor > 1.0 for factor in factors.values()):
+        return False
+    channels = tuple(
+        replace(c, noise_std=c.noise_std * factors.get(c.name, 1.0)) if c.noise_std else c
+        for c in problem.case.channels
+    )
+    case = replace(problem.case, channels=channels)
+    louder = Problem(case, problem.structure, case.identification, settings=problem.settings)
+    fitted = fit(louder, (), start=np.zeros(len(louder.nominal)), iterations=problem.settings.search.thorough)
+    return consistent(fitted) and not lack_of_fit(louder, fitted).significant(0.0)
+
+
+NOISE_ALONE = (
+    "Nothing is missing from the model: with its parameters re-estimated it leaves what looks like noise all over the spectrum, "
+    "and that noise is larger than stated."
+)
 
 
 def _marginal(judged: Judged) -> dict[tuple[str, str], float]:
@@ -201,7 +233,7 @@ def _other_kinds(judged: Judged) -> list[str]:
     return list(dict.fromkeys(others))
 
 
-def _words(kind: VerdictKind, judged: Judged, nearest: Explanation) -> str:
+def _words(kind: VerdictKind, judged: Judged, nearest: Explanation, *, stated: bool) -> str:
     chosen = judged.chosen.explanation
     others = _other_kinds(judged)
     if kind == "effect":
@@ -217,9 +249,10 @@ def _words(kind: VerdictKind, judged: Judged, nearest: Explanation) -> str:
     if kind == "none":
         return "No effect of the catalogue predicts the records better than the nominal model does with its parameters re-estimated."
     if not nearest.hypothesis:
+        least = "the stated noise" if stated else "noise or the small errors of a right model would"
         return (
-            "The nominal model leaves more than noise or small errors of a model would, and no effect of the catalogue predicts the "
-            "records better than it does with its parameters re-estimated."
+            f"The nominal model leaves more than {least}, and no effect of the catalogue predicts the records better than it does with "
+            "its parameters re-estimated."
         )
     if chosen.hypothesis:
         return (
