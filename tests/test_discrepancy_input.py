@@ -150,6 +150,15 @@ def test_a_model_of_ones_own_gets_the_verdict_of_the_same_sdof_rig(tmp_path):
         assert abs(estimate.value - other.value) < 0.1 * other.std
 
 
+def test_a_load_counts_by_the_gear_that_it_acts_through(tmp_path):
+    def force(actuator):
+        case = read_case(write(tmp_path, model(actuator=actuator)))
+        problem = Problem(case, structure_of(case), case.identification)
+        return problem.scales_of(Placed(effect_named("coulomb_friction"), problem.structure.places[0])).force
+
+    assert force('gear="5"') == pytest.approx(5.0 * force(""))
+
+
 def test_the_simulator_of_the_fits_equals_mujoco_on_a_model_of_ones_own(tmp_path):
     case = read_case(write(tmp_path, model(flag='<flag contact="disable"/>')))
     problem = Problem(case, structure_of(case), case.identification)

@@ -207,10 +207,12 @@ class MeasuredCase:
             power = [float(np.mean(self.responses_of(record) ** 2)) for record in self.records]
             return float(np.sqrt(np.mean(power))) or 1.0
         group = next(g for g in self.structure.groups() if np.any(row[list(g)] != 0.0))
-        acting = np.abs(self.structure.inputs[list(group)]).sum(axis=0) > 0
+        gears = np.abs(self.structure.inputs[list(group)]).max(axis=0)  # of a servo's target, an angle, its gain
+        acting = gears > 0
         power = [0.0]
         if acting.any():
-            power = [float(np.mean(self.loads_of(record)[:, acting] ** 2)) for record in self.records]
+            loads = [(self.loads_of(record) * gears)[:, acting] for record in self.records]
+            power = [float(np.mean(own**2)) for own in loads]
         # of a prescribed motion the load is an acceleration
         if not any(power) or self.structure.prescribed:
             moved = [self.motion(i).acceleration @ row for i in range(len(self.records))]
