@@ -207,7 +207,9 @@ class MeasuredCase:
             power = [float(np.mean(self.responses_of(record) ** 2)) for record in self.records]
             return float(np.sqrt(np.mean(power))) or 1.0
         group = next(g for g in self.structure.groups() if np.any(row[list(g)] != 0.0))
-        gears = np.abs(self.structure.inputs[list(group)]).max(axis=0)  # of a servo's target, an angle, its gain
+        gears = np.abs(self.structure.inputs[list(group)]).max(
+            axis=0
+        )  # of a servo's target, an angle, its gain
         acting = gears > 0
         power = [0.0]
         if acting.any():
