@@ -45,7 +45,7 @@ from bench.discrepancy.numerics.deadline import Deadline
 from bench.discrepancy.search.explanation import Explanation, nominal_alone
 from bench.discrepancy.search.load_interpolation import reading_notes
 from bench.discrepancy.settings import DEFAULT, DiagnosisSettings, changed
-from bench.discrepancy.verdict import NamedEffect, Ranked, Verdict, VerdictKind
+from bench.discrepancy.verdict import NamedEffect, Ranked, Verdict, VerdictKind, far_off
 from bench.errors import BenchError, UnknownNameError
 
 _Placed = TypeVar("_Placed", NamedEffect, Ranked)
@@ -198,7 +198,7 @@ def _diagnose(case: Case, how: How, rng: np.random.Generator, anyway: bool) -> D
     if finding.closest is not None:
         nearest = with_closed(case, problem, nearest, (finding.closest, *explanations), rng)
     ranked = (*(Ranked(e.name, e.where, e.probability) for e in seen), *finding.ranking)
-    stated, sharp = problem.noise_stated, not finding.coarse
+    stated, sharp, nominal = problem.noise_stated, not finding.coarse, nominal_estimates(final)
     verdict = Verdict(
         verdict=kind,
         named=_somewhere(problem, (*named, *seen)) if kind == "effect" else (),
@@ -209,7 +209,13 @@ def _diagnose(case: Case, how: How, rng: np.random.Generator, anyway: bool) -> D
         gaps=found,
         probabilities=probabilities,
         explanation=_told(words, seen),
-        warnings=(*admission, *how.deadline.untried, *finding.notes, *_warnings(problem, told, quiet)),
+        warnings=(
+            *admission,
+            *how.deadline.untried,
+            *finding.notes,
+            *far_off(nominal, how.settings.judgement.far),
+            *_warnings(problem, told, quiet),
+        ),
         closure=closure,
         next_excitation=_next_excitation(problem, finding, catalogue),
         splits=where.splits,
@@ -217,7 +223,7 @@ def _diagnose(case: Case, how: How, rng: np.random.Generator, anyway: bool) -> D
         complete=kind != "unknown"
         and complete(found, sharp=sharp, stated=stated, settings=how.settings.judgement),
         remainder=remainder(problem, final, widest),
-        nominal=nominal_estimates(final),
+        nominal=nominal,
         nearest=nearest,
         settings=changed(how.settings),
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal, NamedTuple
 
@@ -71,6 +71,21 @@ class NominalEstimate:
     stated: float
     stated_std: float
     shift_in_std: float
+
+
+def far_off(estimates: Iterable[NominalEstimate], sigmas: float) -> tuple[str, ...]:
+    """Nominal parameters that an explanation moves far from what was stated, in words.
+
+    Args:
+        estimates: The nominal parameters.
+        sigmas: From so many of their stated standard deviations on.
+    """
+    return tuple(
+        f"'{p.name}' is re-estimated at {p.value:.4g}, {p.shift_in_std:+.1f} of its stated standard deviations from {p.stated:.4g}: "
+        "it was stated too surely, or something that scales like it is wrong, such as the gain of a sensor"
+        for p in estimates
+        if abs(p.shift_in_std) > sigmas
+    )
 
 
 @dataclass(frozen=True)

@@ -27,9 +27,7 @@ from bench.discrepancy.effects.catalogue import CATALOGUE as LINEAR
 from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.numerics.deadline import NEVER, Deadline
 from bench.discrepancy.settings import DEFAULT, DiagnosisSettings, changed
-from bench.discrepancy.verdict import (
-    Verdict,
-)
+from bench.discrepancy.verdict import Verdict, far_off
 from bench.errors import UnknownNameError
 
 
@@ -116,7 +114,14 @@ def diagnose_articulated(
         problem, fits, rungs, last, untouched, predictions, judged, rng, stated=stated, left=left
     )
     verdict = replace(
-        verdict, warnings=(*verdict.warnings, *notes, *deadline.untried), settings=changed(settings)
+        verdict,
+        warnings=(
+            *far_off(verdict.nominal, settings.judgement.far),
+            *verdict.warnings,
+            *notes,
+            *deadline.untried,
+        ),
+        settings=changed(settings),
     )
     rival = closest_rival(fits, final, judged) if verdict.named else None
     told_apart = rival is not None and deadline.allows("the next test")

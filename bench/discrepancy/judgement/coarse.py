@@ -190,24 +190,18 @@ def _steady(entry: HeldOut, case: Case, rng: np.random.Generator) -> HeldOut:
 
 
 def bounded(explanation: Explanation, within: float) -> Explanation:
-    """An explanation whose nominal parameters stay within so many stated standard deviations, fitted again where they do not."""
+    """An explanation whose nominal parameters stay within so many stated standard deviations, fitted again where they do not.
+
+    So do those of whatever is made of it, without one of its effects, say: else a parameter would silently stand in for that.
+    """
     parts = []
     for problem, fitted in explanation.parts:
-        if np.any(np.abs(fitted.vector[: problem.n_physical]) > within):
-            narrow = problem.bounded(within)
-            parts.append(
-                (
-                    narrow,
-                    fit(
-                        narrow,
-                        fitted.hypothesis,
-                        start=fitted.vector,
-                        iterations=explanation.settings.search.thorough,
-                    ),
-                )
-            )
-        else:
-            parts.append((problem, fitted))
+        narrow, iterations = problem.bounded(within), explanation.settings.search.thorough
+        beyond = np.any(np.abs(fitted.vector[: problem.n_physical]) > within)
+        again = (
+            fit(narrow, fitted.hypothesis, start=fitted.vector, iterations=iterations) if beyond else fitted
+        )
+        parts.append((narrow, again))
     return Explanation(tuple(parts))
 
 

@@ -100,6 +100,7 @@ def coarse_finding(
     noise = not chosen.hypothesis and not judged.vetoed and _explained_by_noise(problem, factors)
     understated = _larger_than_stated(factors, 1.0) if noise else understated
     kind = "none" if noise else _kind(problem, judged)
+    least = problem.settings.likelihood.error.least  # the gains of sensors are known to no better
     nothing = next(entry for entry in judged.found if not entry.explanation.hypothesis)
     first = judged.chosen if kind == "effect" else nothing
     rest = sorted(
@@ -110,11 +111,11 @@ def coarse_finding(
         kind=kind,
         probabilities=_probabilities(kind, judged),
         explanations=(first.explanation, *(entry.explanation for _, entry in rest)),
-        named=evidence.effects_of(chosen, probabilities) if kind == "effect" else (),
+        named=evidence.effects_of(chosen, probabilities, least) if kind == "effect" else (),
         ranking=tuple(Ranked(*key, p) for key, p in sorted(probabilities.items(), key=lambda item: -item[1])),
         indistinguishable=_sets(judged),
         words=NOISE_ALONE if noise else _words(kind, judged, nearest, stated=problem.noise_stated),
-        nearest=evidence.effects_of(nearest, probabilities) if kind == "unknown" else (),
+        nearest=evidence.effects_of(nearest, probabilities, least) if kind == "unknown" else (),
         closest=nearest if kind == "unknown" and nearest.hypothesis else None,
         notes=understated,
         coarse=True,

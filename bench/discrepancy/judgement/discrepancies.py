@@ -45,7 +45,7 @@ class Discrepancies:
         """Whether an explanation leaves at most a part of the judging records' discrepancy, beyond noise, on some coordinate and no
         more than all of it on any."""
         before, after = self._judged(nothing, explanation)
-        shrinks = self._beyond(after) <= part * self._beyond(before)
+        shrinks = self._beyond(after) <= part * self._beyond(_at_rest(before))
         return bool(np.any(shrinks) and self.harm(explanation, nothing) <= 1.0)
 
     def harm(self, explanation: Explanation, rest: Explanation) -> float:
@@ -59,8 +59,12 @@ class Discrepancies:
         return float(np.max(np.where(after < DIVERGED_GAP, after / np.maximum(bar, 1e-300), np.inf)))
 
     def left(self, explanation: Explanation, nothing: Explanation) -> float:
-        """Part of the power of the judging records' discrepancy, beyond noise, that an explanation leaves where it is largest."""
-        before, after = (self._beyond(x) for x in self._judged(nothing, explanation))
+        """Part of the power of the judging records' discrepancy, beyond noise, that an explanation leaves where it is largest.
+
+        Of a nominal model that is worse than no motion at all, the part is that of the response.
+        """
+        before, after = self._judged(nothing, explanation)
+        before, after = self._beyond(_at_rest(before)), self._beyond(after)
         widest = int(np.argmax(before))
         return float(min((after[widest] / max(before[widest], 1e-300)) ** 2, 1.0))
 
@@ -82,3 +86,8 @@ class Discrepancies:
 
     def _beyond(self, found: Array) -> Array:
         return np.sqrt(np.maximum(found**2 - self._floor**2, 0.0))
+
+
+def _at_rest(found: Array) -> Array:
+    """NRMSE of a prediction, or of no motion at all where that is nearer."""
+    return np.minimum(found, 1.0)

@@ -181,9 +181,15 @@ def named(explanations: Sequence[Explanation]) -> tuple[NamedEffect, ...]:
 
 
 def effects_of(
-    explanation: Explanation, probabilities: Mapping[tuple[str, str], float]
+    explanation: Explanation, probabilities: Mapping[tuple[str, str], float], least: float = 0.0
 ) -> tuple[NamedEffect, ...]:
-    """Effects of an explanation with their parameters, and their probabilities by (name, place)."""
+    """Effects of an explanation with their parameters, and their probabilities by (name, place).
+
+    Args:
+        explanation: Fitted.
+        probabilities: By (name, place).
+        least: Part of a parameter's value by which it is uncertain besides, whatever the records say: the gains of the sensors.
+    """
     out = []
     for problem, fitted in explanation.parts:
         deviations = np.sqrt(np.diag(fitted.covariance))
@@ -192,7 +198,7 @@ def effects_of(
             stop = start + len(placed.effect.parameters)
             out.append(
                 named_effect(
-                    problem, placed, fitted.vector[start:stop], deviations[start:stop], probabilities
+                    problem, placed, fitted.vector[start:stop], deviations[start:stop], probabilities, least
                 )
             )
             start = stop
@@ -205,8 +211,12 @@ def named_effect(
     eta: np.ndarray,
     std: np.ndarray,
     probabilities: Mapping[tuple[str, str], float],
+    least: float = 0.0,
 ) -> NamedEffect:
-    """An effect at a place with its parameters (n,), their deviations, and its probability by (name, place), one where that is not told."""
+    """An effect at a place with its parameters (n,), their deviations, and its probability by (name, place), one where that is not told.
+
+    For `least`, see `effects_of`.
+    """
     effect, place = placed.effect, placed.place
     scales = problem.scales_of(placed)
     estimates = {}
@@ -214,8 +224,9 @@ def named_effect(
         unit = parameter.unit or unit_of(parameter.scale, place.position_unit, place.force_unit)
         if placed.source:
             unit = "/".join(f"({problem.case.channel(c).unit})" for c in (placed.channel, placed.source))
-        spread = 0.0 if parameter.fixed else abs(parameter.slope(value, scales)) * deviation
-        estimates[parameter.name] = Estimate(parameter.value(value, scales), float(spread), unit)
+        estimate = parameter.value(value, scales)
+        spread = math.hypot(abs(parameter.slope(value, scales)) * deviation, least * estimate)
+        estimates[parameter.name] = Estimate(estimate, 0.0 if parameter.fixed else spread, unit)
     theta = tuple(float(x) for x in effect.kernel_theta(eta, scales)) if effect.law is not None else ()
     return NamedEffect(
         name=effect.name,

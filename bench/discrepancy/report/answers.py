@@ -161,7 +161,7 @@ def next_steps(verdict: Verdict, model: str = "") -> tuple[NextStep, ...]:
             command = f"jointbench apply verdict.json {model} -o corrected.xml{nearest}"
             steps.append(NextStep(f"{text} and run the judging records there:", command))
         elif verdict.named:
-            steps.append(NextStep("Put it into your model, as the end of this page writes it."))
+            steps.append(NextStep("Put it into your model; the end of the report (--html) writes how."))
     if any(p.kind == "simulator" for p in verdict.locations):
         steps.append(NextStep("Simulate with a smaller step, RK4 or a harder solreffriction."))
     proposal = verdict.next_excitation

@@ -87,6 +87,12 @@ class JudgementSettings:
         "Discrepancy over that of noise alone up to which an explanation is complete.",
         "Stated noise is never exact.",
     )
+    far: float = setting(
+        3.0,
+        "Stated standard deviations from which a re-estimated nominal parameter is told besides.",
+        "Three in a thousand of what is stated rightly lie farther off.",
+        unit="sigmas",
+    )
     coarse_alike: float = setting(
         2.0,
         "Standard errors of a difference within which two explanations are declared a set.",
