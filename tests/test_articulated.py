@@ -16,6 +16,7 @@ from bench.discrepancy.articulated.admission import admitted_robot
 from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis
 from bench.discrepancy.articulated.free_runs import FreeRuns
 from bench.discrepancy.articulated.judgement import JudgementSettings
+from bench.discrepancy.articulated.naming import ranking_of
 from bench.discrepancy.articulated.next_test import propose
 from bench.discrepancy.articulated.recognition import applies
 from bench.discrepancy.articulated.whiteness import coloured
@@ -326,6 +327,19 @@ def test_the_next_test_tells_two_explanations_apart_within_what_the_arm_has_show
     lines = trajectory.as_csv(list(KP)).splitlines()
     assert lines[0] == "time,shoulder,elbow"
     assert len(lines) == len(trajectory.time) + 1
+
+
+def test_what_records_cannot_tell_apart_shares_a_probability_and_what_is_left_lowers_it(tmp_path):
+    problem = problem_of(write_case(tmp_path, mjcf(servo=True), servo=True))
+    fits = []
+    for name, eta in (("coulomb_friction", [-3.0]), ("quadratic_damping", [-3.0])):
+        placed = next(p for p in placements(problem, CATALOGUE) if p.key == (name, "elbow"))
+        vector = np.append(np.zeros(len(problem.nominal)), eta)
+        fits.append(replace(ArticulatedFit.at(problem, (placed,), vector), log_posterior=-7.0))
+    judged = JudgementSettings()
+    for foreign in (judged.outside, 0.3):
+        told = ranking_of(fits, fits[0], judged, foreign)
+        assert [entry.probability for entry in told] == pytest.approx([0.5 * (1.0 - foreign)] * 2)
 
 
 def test_what_a_later_effect_makes_superfluous_is_dropped_and_refits_gain(tmp_path):

@@ -506,6 +506,9 @@ def test_regions_are_compared_cell_by_cell():
     assert f1({"dof": "x", "state_region": {"displacement": [-1.0, 1.0]}}) == [
         pytest.approx(2 / 3)
     ]  # twice too much
+    assert f1({"dof": "x", "state_region": {"displacement": None, "share": 1.0}}) == [
+        pytest.approx(2 / 3)
+    ]  # null: without limits
     assert f1({"dof": "x", "state_region": {"displacement": [-0.4, 0.4]}}) == [0.0]
     assert f1() == [0.0]
     # the forces of two effects at one place add up, so they are found together

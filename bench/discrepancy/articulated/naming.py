@@ -13,6 +13,7 @@ from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.hypothesis import placed_values
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.articulated_search.search import complete
+from bench.discrepancy.judgement.coarse import outside
 from bench.discrepancy.settings import ArticulatedJudgementSettings as JudgementSettings
 from bench.discrepancy.verdict import Estimate, NamedEffect, NominalEstimate, Ranked, Verdict, VerdictKind
 
@@ -53,9 +54,15 @@ def verdict_of(
     if not whole and (not last or explained < settings.material):
         kind = "unknown"
     shares = [closed(predictions[k - 1], predictions[k], predictions[0], rng) for k in range(1, last + 1)]
-    probabilities = _probabilities(fits, final, kind, settings)
+    # of what is named beside noise, the part that is left tells how likely something outside the catalogue is
+    foreign = settings.outside
+    if kind == "effect" and not whole:
+        foreign = outside(1.0 - explained, problem.settings.judgement.coarse)
+    probabilities = _probabilities(fits, final, kind, settings, foreign)
+    ranking = ranking_of(fits, final, settings, foreign)
+    sure = {(entry.name, entry.where): entry.probability for entry in ranking}
     effects = tuple(
-        _named(problem, final, k, shares[k], probabilities, settings) for k in range(len(final.hypothesis))
+        _named(problem, final, k, shares[k], sure[placed.key]) for k, placed in enumerate(final.hypothesis)
     )
     effects = tuple(sorted(effects, key=lambda e: -e.closed))
     gaps = gaps_of(problem, rungs[: last + 1], untouched, predictions[: last + 1], rng)
@@ -63,7 +70,7 @@ def verdict_of(
     return Verdict(
         verdict=kind,
         named=effects if kind == "effect" else (),
-        ranking=_ranking(fits, final, settings),
+        ranking=ranking,
         indistinguishable=_sets(fits, final, settings) if kind == "effect" else (),
         locations=locations_of(problem, base),
         gap=widest,
@@ -122,18 +129,23 @@ def _left(problem: ArticulatedProblem, final: ArticulatedFit, left: Coloured | N
 
 
 def _probabilities(
-    fits: Sequence[ArticulatedFit], final: ArticulatedFit, kind: VerdictKind, settings: JudgementSettings
+    fits: Sequence[ArticulatedFit],
+    final: ArticulatedFit,
+    kind: VerdictKind,
+    settings: JudgementSettings,
+    foreign: float,
 ) -> dict[str, float]:
-    known = 1.0 - settings.outside
+    """Probabilities of the verdicts, with that of something outside the catalogue."""
+    known = 1.0 - foreign
     if kind == "unknown":
-        return {"effect": settings.outside, "none": 0.0, "unknown": known}
+        return {"effect": foreign, "none": 0.0, "unknown": known}
     logs = np.array([f.log_posterior for f in fits if len(f.hypothesis) <= len(final.hypothesis)])
     empty = np.array([not f.hypothesis for f in fits if len(f.hypothesis) <= len(final.hypothesis)])
     shares = np.exp(logs - logs.max())
     none = float(shares[empty].sum() / shares.sum())
     if kind == "none":  # what the search would add is not borne out
         none = max(none, 0.95)
-    return {"effect": known * (1.0 - none), "none": known * none, "unknown": settings.outside}
+    return {"effect": known * (1.0 - none), "none": known * none, "unknown": foreign}
 
 
 def _rivals(
@@ -149,12 +161,20 @@ def _rivals(
     return list(out.values())
 
 
-def _ranking(
-    fits: Sequence[ArticulatedFit], final: ArticulatedFit, settings: JudgementSettings
+def ranking_of(
+    fits: Sequence[ArticulatedFit], final: ArticulatedFit, settings: JudgementSettings, foreign: float
 ) -> tuple[Ranked, ...]:
+    """Effects by their probability, shared among explanations that the records hardly tell apart.
+
+    Args:
+        fits: All fitted hypotheses.
+        final: The one that is named.
+        settings: Of the judgement.
+        foreign: Probability that something outside the catalogue is the cause.
+    """
     rivals = _rivals(fits, final, settings)
     weights = np.exp([-behind for _, behind in rivals])
-    weights = (1.0 - settings.outside) * weights / weights.sum()
+    weights = (1.0 - foreign) * weights / weights.sum()
     total: dict[tuple[str, str], float] = {}
     for (f, _), weight in zip(rivals, weights, strict=True):
         for placed in f.hypothesis:
@@ -195,8 +215,7 @@ def _named(
     final: ArticulatedFit,
     k: int,
     share: tuple[float, tuple[float, float]],
-    probabilities: dict[str, float],
-    settings: JudgementSettings,
+    probability: float,
 ) -> NamedEffect:
     placed = final.hypothesis[k]
     at = len(problem.nominal) + sum(len(p.effect.parameters) for p in final.hypothesis[:k])
@@ -215,7 +234,7 @@ def _named(
     return NamedEffect(
         name=placed.effect.name,
         where=placed.where,
-        probability=probabilities["effect"],
+        probability=probability,
         parameters=estimates,
         channel=joint.name,
         equation=placed.effect.equation,

@@ -43,7 +43,7 @@ def region_scores(result: Mapping[str, Any], answer: Mapping[str, Any]) -> list[
                 continue
             for region in location.get("regions") or [location.get("state_region") or {}]:
                 if region:  # a region that does not depend on the coordinate lies everywhere along it
-                    low, high = region.get(coordinate, (None, None))  # null: without a limit
+                    low, high = region.get(coordinate) or (None, None)  # null: without a limit
                     limits = (-reach if low is None else low, reach if high is None else high)
                     found |= _inside(middle, [_widened(limits, 2.0 * reach / SETTINGS.cells)])
         both = np.sum(truth & found)
