@@ -81,7 +81,7 @@ class Benches(SteppedBenches):
     def __init__(self, setup: Setup, options: Options, n: int, threads: int = 1) -> None:
         """Set up benches; each must be `reset` before it is stepped."""
         super().__init__(setup, options, n)
-        self.setup: Setup = setup
+        self.setup: Setup = setup  # pyrefly: ignore[bad-override-mutable-attribute]
         self.threads = threads
         self.channels, self.actuators = self.station.channels, self.station.actuators
         hypotheses = [

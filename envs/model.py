@@ -34,7 +34,7 @@ class ModelBenches(SteppedBenches):
     def __init__(self, setup: ArmSetup, options: Options, n: int, threads: int = 1) -> None:
         """Set up benches; each must be `reset` before it is stepped."""
         super().__init__(setup, options, n)
-        self.setup: ArmSetup = setup
+        self.setup: ArmSetup = setup  # pyrefly: ignore[bad-override-mutable-attribute]
         self._threads, self._fields = threads, setup.fields()
         self._p = len(self._fields)
         self.question = np.zeros(n, dtype=np.int64)

@@ -252,7 +252,7 @@ class PracticeBenches(SteppedBenches):
             ParameterError: The reward is "error" and the questions are of rivals, of which no error is told.
         """
         super().__init__(setup, options, n)
-        self.setup: Setup = setup
+        self.setup: Setup = setup  # pyrefly: ignore[bad-override-mutable-attribute]
         kinds: list[tuple[int, Any]] = []
         for i, asked in enumerate(setup.questions):
             if question is None or i == question:

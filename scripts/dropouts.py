@@ -65,7 +65,7 @@ def record(kind: str, rng: np.random.Generator) -> Array:
                 force[0] -= 20.0 * omega[0] ** 2 * (x[0] - limit)
             v = v + force / (RATE * sub)
             x = x + v / (RATE * sub)
-        out[k] = x[0], force[0]
+        out[k] = x[0], force[0]  # pyrefly: ignore[unbound-name]
     table = np.column_stack([load, out])
     level = rng.choice([1e-3, 1e-2, 3e-2])
     return np.asarray(table + level * table.std(axis=0) * rng.standard_normal(table.shape))

@@ -159,6 +159,19 @@ def test_sysid_is_given_the_same_problem(effect, tolerance):
 
 
 @pytest.mark.slow
+def test_sysid_names_an_effect_of_its_own_when_it_is_plain():
+    from benchmarks import peer_sysid
+
+    from bench.discrepancy.effects.catalogue import effect_named
+
+    # the whole catalogue takes it minutes; in heats, as with less time than all of it would take
+    catalogue = [effect_named(name) for name in ("gap", "cubic_stiffness")]
+    placed, _ = peer_sysid.diagnose(_case("gap", 5), catalogue=catalogue, seconds=1e4)
+    assert placed is not None
+    assert placed.effect.name == "gap"
+
+
+@pytest.mark.slow
 def test_sysid_says_what_it_has_when_its_time_is_over():
     from benchmarks import peer_sysid
 

@@ -77,11 +77,7 @@ def test_friction_of_the_wrong_kind_in_the_model_gives_place_to_the_right_one(sl
     case = with_parameters(
         slipping_case, coulomb=(LIMIT, 0.3), slip_stiffness=(0.5 * STIFFNESS, 30.0), force_offset=(0.8, 0.1)
     )
-    rivals = [
-        effect_named(name)
-        for name in ("presliding_friction", "coulomb_friction", "bouc_wen_hysteresis", "gap")
-    ]
-    verdict = diagnose(case, catalogue=rivals).verdict
+    verdict = diagnose(case).verdict
     assert verdict.gap.after < 1.3 * verdict.gap.noise_floor < verdict.gap.before
 
 

@@ -50,8 +50,8 @@ class Experiment(Instrumented):
     """
 
     question: RigPrior | Rivals
-    noise: Mapping[str, float]
-    limits: Limits
+    noise: Mapping[str, float]  # pyrefly: ignore[bad-override]
+    limits: Limits  # pyrefly: ignore[bad-override]
     draws: tuple[Draw, ...] | tuple[RivalDraws, ...] = field(repr=False)
     threads: int = 1
 

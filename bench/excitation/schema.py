@@ -89,7 +89,7 @@ class ExperimentEntry(LimitsEntry):
 class ExcitationRequest(RigDocument):
     """A rig, and the experiment that an excitation is designed for."""
 
-    experiment: ExperimentEntry | None = None
+    experiment: ExperimentEntry | None = None  # pyrefly: ignore[bad-override]
     """What the test is to find out, may do and measures."""
 
 

@@ -39,9 +39,9 @@ class Station(Instrumented):
         questions: Names of the questions that may be asked; empty where there is one only.
     """
 
-    noise: Mapping[str, float]
+    noise: Mapping[str, float]  # pyrefly: ignore[bad-override]
     scale: Mapping[str, float]
-    limits: Limits
+    limits: Limits  # pyrefly: ignore[bad-override]
     timestep: float
     n_steps: int
     n_windows: int

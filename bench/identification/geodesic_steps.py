@@ -63,7 +63,7 @@ def descend(
         if fall <= 0.0:
             stopped = "stall"
             break
-        point, cost, iterations = trials[chosen], float(costs[chosen]), iterations + 1
+        point, cost, iterations = trials[chosen], float(costs[chosen]), iterations + 1  # pyrefly: ignore[unbound-name]
         damping = max(damping, 1e-12)
         if progress is not None:
             progress(iterations, cost)

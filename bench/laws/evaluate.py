@@ -95,9 +95,8 @@ def _along_motion(force_address, rate_address, theta, time, q, v, n_inputs, subs
                     now = _interpolate(i, (step + fraction) / substeps, n_inputs, time, q, v, q_now, v_now)
                 for k in range(n_states):
                     z_now[k] = states[i + 1, k] + (fraction * h * work[2 + stage, k] if stage > 0 else 0.0)
-                call_kernel(
-                    rate_address, now, q_at, v_at, z_at, theta_at, advance(work_at, (3 + stage) * width)
-                )
+                rate_at = advance(work_at, (3 + stage) * width)
+                call_kernel(rate_address, now, q_at, v_at, z_at, theta_at, rate_at)  # pyrefly: ignore[unbound-name]
             for k in range(n_states):
                 states[i + 1, k] += h / 6.0 * (work[3, k] + 2.0 * (work[4, k] + work[5, k]) + work[6, k])
 

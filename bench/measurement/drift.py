@@ -29,7 +29,7 @@ class Drift(Stage, name="drift"):
         self._real("random_walk", "unit/sqrt(s)", at_least=0.0)
 
     @property
-    def random(self) -> bool:
+    def random(self) -> bool:  # pyrefly: ignore[bad-override]
         """Whether the offset wanders."""
         return self.random_walk > 0.0
 

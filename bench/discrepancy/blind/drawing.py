@@ -80,7 +80,7 @@ def draw_case(name: str, rng: np.random.Generator, options: BlindOptions) -> tup
         if attempt % DRAWING_SETTINGS.persistence == 0:
             plan = draw_plan(rng, options)
         try:
-            made = _attempt(name, plan, rng, options)
+            made = _attempt(name, plan, rng, options)  # pyrefly: ignore[unbound-name]
         except SimulationError:  # a softening spring too strong for the load: drawn again like any other miss
             made = None
         if made is not None:
