@@ -13,6 +13,7 @@ import subprocess
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import tyro
 from rich.console import Console
@@ -39,12 +40,14 @@ class Args:
     """Which part of the cases, of how many."""
     again: bool = False
     """Diagnose cases whose result is there already as well."""
+    json: bool = False
+    """Print the score as JSON."""
 
 
 def main() -> int:
     """Diagnose and score."""
     args = tyro.cli(Args, description=__doc__)
-    console = Console()
+    console = Console(stderr=args.json)
     results = args.out / _commit()
     results.mkdir(parents=True, exist_ok=True)
     folders = sorted(folder for folder in args.cases.iterdir() if (folder / "nominal.json").exists())
@@ -67,8 +70,23 @@ def main() -> int:
             markup=False,
             highlight=False,
         )
-    _tell(console, score_backgrounds(results, args.answers))
+    score = score_backgrounds(results, args.answers)
+    if args.json:
+        print(json.dumps(_document(score), indent=1))
+    else:
+        _tell(console, score)
     return 0
+
+
+def _document(score: BackgroundScore) -> dict[str, Any]:
+    return {
+        "shares": {what: vars(share) for what, share in score.shares.items()},
+        "calibration": score.calibration,
+        "calibration_interval": score.interval,
+        "scatter": score.scatter,
+        "reliability": score.reliability,
+        "wrong": score.wrong,
+    }
 
 
 def _tell(console: Console, score: BackgroundScore) -> None:

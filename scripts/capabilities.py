@@ -8,6 +8,8 @@ from typing import Any
 
 from capability_figures import (
     Figures,
+    applied,
+    background,
     benchmark,
     bouc_wen,
     demo,
@@ -17,10 +19,14 @@ from capability_figures import (
     measured,
     memory_joint,
     monitoring,
+    native_effects,
     pendulum,
     planted,
     reproduction,
+    rewards,
+    robots,
     sealed,
+    ten_minutes,
     training,
 )
 
@@ -86,6 +92,53 @@ CAPABILITIES: Sequence[Capability] = (
         "Diagnosis of own sealed cases ([blind_results.md](blind_results.md) has the bands)",
         ("python", "scripts/sealed_cases.py", "--n", "300", "--struck", "0", "--seed", SEALED_SEED, "--json"),
         lambda told: sealed(told["score"]),
+        hours=True,
+    ),
+    Capability(
+        "background",
+        "Diagnosis of cases of others whose truth holds a background besides",
+        (
+            *("python", "scripts/background_cases.py", "{data}/../trials-background"),
+            *("{data}/../trials-background/answers", "--json"),
+        ),
+        background,
+        data="../trials-background",
+    ),
+    Capability(
+        "arms",
+        "Diagnosis of articulated models, cases of others",
+        ("jointbench", "blind", "score", "out/trials_arms", "{data}/../trials-arms/answers", "--json"),
+        sealed,
+        before=(("jointbench", "blind", "run", "{data}/../trials-arms", "out/trials_arms", "--again"),),
+        data="../trials-arms",
+        hours=True,
+    ),
+    Capability(
+        "robots",
+        "Public records of robots, diagnosed against their public models",
+        ("python", "scripts/robots.py", "--data", "{data}/robots", "--json"),
+        robots,
+        data="robots",
+        hours=True,
+    ),
+    Capability(
+        "native_effects",
+        "Effects that MJCF has attributes for: put in, diagnosed, applied",
+        ("python", "scripts/native_effects.py", "--json"),
+        native_effects,
+    ),
+    Capability(
+        "ten_minutes",
+        "From a log to a corrected model",
+        ("python", "scripts/ten_minutes.py", "--json"),
+        ten_minutes,
+    ),
+    Capability(
+        "applied",
+        "Verdicts of the development trials, applied in plain MuJoCo",
+        ("python", "scripts/applied.py", "{data}/../trials", "out/applied", "--again", "--json"),
+        applied,
+        data="../trials",
         hours=True,
     ),
     Capability(
@@ -157,6 +210,12 @@ CAPABILITIES: Sequence[Capability] = (
         "sdof", "Excitation on the SDOF rig: trained policy against the baselines, held-out rigs"
     ),
     _excitation_task("rivals", "Excitation that tells rivals apart: trained policy against the baselines"),
+    Capability(
+        "rewards",
+        "Which reward of an excitation follows identification",
+        ("python", "scripts/policy_experiment.py", "rewards", "sdof", "--seed", "2006", "--json", "-"),
+        rewards,
+    ),
     _benchmark_group("campaign", "Campaigns"),
     *(
         Capability(

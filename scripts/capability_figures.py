@@ -251,3 +251,95 @@ def planted(told: Any) -> Figures:
         ("seconds a case", f"{told['median_seconds']:.2f}, at most {told['longest_seconds']:.1f}", "< 5")
     )
     return rows
+
+
+BACKGROUND_LIMITS = {
+    "main effect named or in a declared set": "≥ 90 %",
+    "and first": "≥ 85 %",
+    "not none": "100 %",
+    "one other name at most": "≥ 95 %",
+    "clean: no certain name that does not pay on the judging record": "≥ 95 %",
+    "background: no certain name that does not pay on the judging record": "≥ 95 %",
+    "95 % intervals of the main effect's parameters hold the truth": "≥ 85 %",
+    "every number is finite": "100 %",
+    "no nominal parameter beyond 4 stated sigma unsaid": "100 %",
+}
+
+
+def background(told: Any) -> Figures:
+    """Cases whose truth holds a background besides."""
+    rows: list[tuple[str, ...]] = [
+        (
+            what,
+            f"{100.0 * share['value']:.1f} % of {share['n']} ({100.0 * share['low']:.0f} to {100.0 * share['high']:.0f})",
+            BACKGROUND_LIMITS.get(what, ""),
+        )
+        for what, share in told["shares"].items()
+    ]
+    low, high = told["calibration_interval"]
+    figure = f"{told['calibration']:.3f} ({low:.3f} to {high:.3f}; {told['scatter']:.3f} if every probability were exact)"
+    return [*rows, ("expected calibration error of names", figure, "≤ 0.05")]
+
+
+def native_effects(told: Any) -> Figures:
+    """MJCF's own effects, put in, diagnosed, applied."""
+    rows = []
+    for row in told["rows"]:
+        names = " + ".join(row["named"]) or row["verdict"]
+        rows.append((row["effect"], f"{row['word']}: {names}, {100.0 * row['left']:.0f} % left", ""))
+    n = sum(told.get(word, 0) for word in ("closed", "explained"))
+    return [*rows, ("named, applied and closed, or short with its cause", f"{n} of {told['n']}", "all")]
+
+
+def applied(told: Any) -> Figures:
+    """Verdicts applied in plain MuJoCo."""
+    rows = []
+    for row in told["rows"]:
+        names = " + ".join(row.get("named", ())) or row.get("verdict", "")
+        if "error" in row:
+            rows.append((row["case"], row["error"], ""))
+        elif row["within"]:
+            rows.append((row["case"], f"{names}: within 5 %", ""))
+        else:
+            rows.append(
+                (
+                    row["case"],
+                    f"{names}: {100.0 * row['off']:.0f} % off, {row['cause'] or 'no cause known'}",
+                    "",
+                )
+            )
+    told_of = f"{told['within']} within 5 %, {told['explained']} with a cause, of {told['n']}"
+    return [*rows, ("all", told_of, "each within 5 % or with its cause")]
+
+
+def ten_minutes(told: Any) -> Figures:
+    """From a log to a corrected model."""
+    rows = []
+    for row in told:
+        names = ", ".join(row.get("named", ())) or row.get("verdict", "no verdict")
+        figure = f"{row['seconds']:.0f} s, {len(row['steps'])} commands: {names}; {row.get('line', 'no corrected model')}"
+        rows.append((row["machine"], figure, "≤ 600 s", "holds" if row["held"] else "**misses**"))
+    return rows
+
+
+def robots(told: Any) -> Figures:
+    """Public records of robots."""
+    rows = []
+    for row in told:
+        names = ", ".join(f"{name} {100.0 * share:.0f} %" for name, share in row["named"].items())
+        figure = f"{row['before']:.3g} → {row['after']:.3g}, noise {row['floor']:.3g}, {row['seconds']:.0f} s: {names or row['verdict']}"
+        rows.append((f"{row['robot']} ({row['known']}): NRMSE of the worst joint", figure, ""))
+    return rows
+
+
+def rewards(told: Any) -> Figures:
+    """Rank correlation of rewards with what identification leaves."""
+    return [
+        (
+            f"{name}, {where}",
+            f"{row['spearman']:.2f} ({row['interval'][0]:.2f} to {row['interval'][1]:.2f}) of {row['records']} records",
+            "≥ 0.8" if name == "expected error" else "",
+        )
+        for where in ("without background", "with background", "both")
+        for name, row in told[where].items()
+    ]
