@@ -103,7 +103,8 @@ def diagnose_articulated(
     model = ArticulatedModel.of(compiled, case.rig)
     problem = ArticulatedProblem.of(case, model, case.identification, settings, deadline)
     judging = ArticulatedProblem.of(case, model, case.validation, settings)
-    fits = search(problem, placements(problem, catalogue), settings=how, progress=progress)
+    problem, fits = search(problem, placements(problem, catalogue), settings=how, progress=progress)
+    judging = judging.softened(problem.softness)
     progress("judging records")
     rungs = ladder(fits)
     last, predictions = kept(judging, rungs, judged)
@@ -119,6 +120,7 @@ def diagnose_articulated(
             *far_off(verdict.nominal, settings.judgement.far),
             *verdict.warnings,
             *notes,
+            *_followed(problem),
             *deadline.untried,
         ),
         settings=changed(settings),
@@ -133,3 +135,13 @@ def diagnose_articulated(
         case, model, problem, judging, tuple(fits), final, matrix_of(problem, fits), verdict,
         None if proposal is None else proposal.trajectory,
     )  # fmt: skip
+
+
+def _followed(problem: ArticulatedProblem) -> tuple[str, ...]:
+    """What is said where the runs listen to the encoders more than the stated noise asks for."""
+    if not problem.softness:
+        return ()
+    return (
+        f"runs are corrected by the encoder as if {100.0 * problem.softness:.0f} % of the torque were unknown: with a play, small errors "
+        "grow at every impact, and no run follows the joint by itself for long",
+    )

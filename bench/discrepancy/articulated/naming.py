@@ -223,10 +223,15 @@ def _named(
     std = np.sqrt(np.maximum(np.diag(final.covariance)[at : at + len(eta)], 0.0))
     values = placed_values(placed, eta)
     joint = problem.joints[placed.joint]
+    # runs that have to be corrected follow no law as closely as their slope at the best fit says; nor are sensors' gains known to better
+    least = problem.settings.likelihood.error.least if problem.softness else 0.0
     estimates = {
         p.name: Estimate(
             float(values[p.name]),
-            float(abs(p.slope(float(e), placed.scales)) * s),
+            max(
+                float(abs(p.slope(float(e), placed.scales)) * s),
+                0.0 if p.fixed else least * abs(float(values[p.name])),
+            ),
             placed.effect.unit(p, joint.unit),
         )
         for p, e, s in zip(placed.effect.parameters, eta, std, strict=True)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from bench.discrepancy.articulated_search.effect import ArticulatedEffect
 from bench.discrepancy.articulated_search.slot_setters import (
     added,
@@ -18,6 +20,8 @@ from bench.discrepancy.multibody.joint_run import Slot
 
 TEETH = tuple(float(n) for n in range(2, 121))
 """Periods of cogging in a turn that are tried: slots, poles and teeth are whole numbers."""
+PLAYS = log_grid(*np.geomspace(0.003, 0.3, 34))
+"""Half of a clearance that is tried: a run that impacts forgets within a factor of 1.15 of the true one what it has to follow."""
 MOTOR_SHARE = FreeParameter(
     "motor_share", mean=0.0, std=0.5, bounds=(-4.0, -1e-3), grid=(-1e-2, math.log(0.4)), unit="1"
 )
@@ -79,7 +83,7 @@ DRIVE_EFFECTS: tuple[ArticulatedEffect, ...] = (
                 mean=math.log(0.02),
                 std=1.3,
                 bounds=(-9.0, 0.0),
-                grid=log_grid(0.003, 0.01, 0.03, 0.1),
+                grid=PLAYS,
             ),
             FreeParameter(
                 "stiffness",
@@ -95,7 +99,7 @@ DRIVE_EFFECTS: tuple[ArticulatedEffect, ...] = (
                 mean=math.log(0.3),
                 std=1.5,
                 bounds=(-9.0, 5.0),
-                grid=log_grid(0.3),
+                grid=log_grid(0.3, 2.0),
             ),
             MOTOR_SHARE,
             ON_LINK,

@@ -105,6 +105,11 @@ class ArticulatedEffect:
         """Whether it is an elastic drive train between motor and link."""
         return self.slots is train
 
+    @property
+    def play(self) -> bool:
+        """Whether motor and link part and meet again."""
+        return any(p.name == "half_clearance" for p in self.parameters)
+
     def unit(self, parameter: FreeParameter, position: str) -> str:
         """Unit of a parameter on a joint whose coordinate has the unit `position`."""
         force, inertia = ("N m", "kg m^2") if position == "rad" else ("N", "kg")

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from bench.arrays import Array
 from bench.discrepancy.articulated_search.hypothesis import JointHypothesis
-from bench.discrepancy.articulated_search.problem import ArticulatedProblem, misfit_of
+from bench.discrepancy.articulated_search.misfit import misfit_of
+from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.numerics.least_squares import Prior, minimise
 from bench.discrepancy.numerics.threads import in_threads
 

@@ -5,7 +5,7 @@ effects. Only masses are shared by the joints; whatever sits at one joint or dri
 
 What a wrong model leaves is larger than the noise, and differs from joint to joint. Its scale is a parameter too, with the stated
 noise as its lower bound: minus twice the profiled log-likelihood of a joint with n residuals of mean square r is ``n`` times
-``r`` for r <= 1 and ``1 + ln r`` beyond (`misfit_of`).
+``r`` for r <= 1 and ``1 + ln r`` beyond (`bench.discrepancy.articulated_search.misfit`).
 """
 
 from __future__ import annotations
@@ -48,6 +48,7 @@ class ArticulatedProblem:
         records: Prepared records.
         settings: Thresholds of the diagnosis.
         deadline: When nothing further is screened or fitted, and fits end where they are.
+        softness: Noise of the torque that is assumed beyond what is stated, see `softened`.
         nominal: Uncertain nominal parameters: masses first, then joint by joint.
     """
 
@@ -56,6 +57,7 @@ class ArticulatedProblem:
     records: tuple[PreparedRecord, ...]
     settings: DiagnosisSettings = DEFAULT
     deadline: Deadline = NEVER
+    softness: float = 0.0
     nominal: tuple[Nominal, ...] = field(init=False)
     _corrected: dict[tuple, tuple[PreparedRecord, ...]] = field(init=False, default_factory=dict)
     _correcting: Lock = field(init=False, default_factory=Lock)
@@ -171,7 +173,9 @@ class ArticulatedProblem:
                 )
                 joints.append(replace(record, process=torque) if torque > record.process else record)
             records.append(replace(prepared, joints=tuple(joints)))
-        return ArticulatedProblem(self.case, self.model, tuple(records), self.settings, self.deadline)
+        return ArticulatedProblem(
+            self.case, self.model, tuple(records), self.settings, self.deadline, max(level, self.softness)
+        )
 
     def settled(self, hypothesis: JointHypothesis, vector: Array) -> ArticulatedProblem:
         """The same problem with the links of elastic joints where a fit has them; itself where there are none behind their motors."""
@@ -186,7 +190,9 @@ class ArticulatedProblem:
         for raw, prepared in zip(self.records, self.motions(hypothesis, vector), strict=True):
             links = {j: self.innovations(j, hypothesis, vector, prepared)[1][:, 2:] for j in elastic}
             records.append(relinked(self.case, self.model, raw, links, settings=self.settings.articulated))
-        return ArticulatedProblem(self.case, self.model, tuple(records), self.settings, self.deadline)
+        return ArticulatedProblem(
+            self.case, self.model, tuple(records), self.settings, self.deadline, self.softness
+        )
 
     def slots(self, j: int, hypothesis: JointHypothesis, vector: Array, *, on_link: bool) -> Array:
         """Parameter vector (SLOTS,) of the runs of joint `j`."""
@@ -315,12 +321,6 @@ class ArticulatedProblem:
             float(np.linalg.norm(self.model.tips[joint.body])) or 1.0,
             middle,
         )
-
-
-def misfit_of(chi2: float, count: float) -> float:
-    """Minus twice the profiled log-likelihood of `count` residuals of a sum of squares, their scale unknown but at least one."""
-    mean = chi2 / count
-    return count * (mean if mean <= 1.0 else 1.0 + float(np.log(mean)))
 
 
 def placements(problem: ArticulatedProblem, catalogue: Sequence[ArticulatedEffect]) -> list[PlacedOnJoint]:

@@ -15,7 +15,8 @@ import numpy as np
 from bench.arrays import Array
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit, free_entries, linearised
 from bench.discrepancy.articulated_search.hypothesis import PlacedOnJoint
-from bench.discrepancy.articulated_search.problem import ArticulatedProblem, misfit_of
+from bench.discrepancy.articulated_search.misfit import misfit_of
+from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.numerics.threads import in_threads
 
 UNSCALED = ("actuator_saturation", "backlash", "joint_compliance", "one_sided_stop")

@@ -6,7 +6,8 @@ Along the measured motion the equation of joint *j* is that of one degree of fre
 
 with ``b_j`` what the inverse dynamics of the nominal model asks of the joint besides its own acceleration, and ``K_j`` its derivative by
 the angle: both are read off MuJoCo once a record. At every sample the prediction is held against the encoder, and the state is moved by a
-constant gain times the innovation; without noise of the torque that gain is zero and the run is a free one (output error).
+constant gain times the innovation; without noise of the torque that gain is zero and the run is a free one (output error). Motor and link
+of an elastic train are moved alike while they touch; while a play between them is open, only the side that is measured.
 
 The step is a leapfrog one: half a drift, a kick, half a drift. Damping, bristles and a servo's velocity gain are implicit in the kick,
 and dry friction is its proximal map (it truly sticks), so that no stiffness of the friction limits the step.
@@ -249,10 +250,17 @@ def run(
             return
         if i == n - 1:
             break
-        q += gain[0, 0] * out[i, 0] + gain[0, 1] * out[i, 1]
-        ql += gain[0, 0] * out[i, 0] + gain[0, 1] * out[i, 1]
-        v += gain[1, 0] * out[i, 0] + gain[1, 1] * out[i, 1]
-        vl += gain[1, 0] * out[i, 0] + gain[1, 1] * out[i, 1]
+        dq = gain[0, 0] * out[i, 0] + gain[0, 1] * out[i, 1]
+        dv = gain[1, 0] * out[i, 0] + gain[1, 1] * out[i, 1]
+        apart = (
+            train and abs(q - ql) < p[32]
+        )  # across an open play the encoder tells nothing of the other side
+        if not (apart and on_link):
+            q += dq
+            v += dv
+        if not apart or on_link:
+            ql += dq
+            vl += dv
         for k in range(i * n_sub, (i + 1) * n_sub):
             q += 0.5 * step * v
             ql += 0.5 * step * vl

@@ -1,0 +1,269 @@
+"""One round of the search: every effect screened on top of a fit, and the most promising fitted, first where runs forget.
+
+A run that nothing corrects remembers every error of a wrong model to its end; corrected a little at every sample, it forgets. Effects
+are found there, and the best of them fitted again as the stated noise has it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from bench.arrays import Array
+from bench.discrepancy.articulated_search.fitting import ArticulatedFit, Others, fit, own_entries, refitted
+from bench.discrepancy.articulated_search.hypothesis import JointHypothesis, PlacedOnJoint
+from bench.discrepancy.articulated_search.misfit import log_likelihood
+from bench.discrepancy.articulated_search.problem import ArticulatedProblem
+from bench.discrepancy.articulated_search.screening import Screened, by_effect, screen
+from bench.discrepancy.numerics.threads import in_threads
+from bench.discrepancy.settings import ArticulatedSearchSettings as SearchSettings
+
+
+class Corrected(NamedTuple):
+    """Where runs forget, and the likeliest fit there."""
+
+    problem: ArticulatedProblem
+    best: ArticulatedFit
+
+
+class Round(NamedTuple):
+    """One effect more: the best, all joints free, all that were fitted as they are, and what was found where runs forget."""
+
+    best: ArticulatedFit | None
+    fits: list[ArticulatedFit]
+    corrected: Corrected | None
+
+
+def round_of(
+    problem: ArticulatedProblem,
+    base: ArticulatedFit,
+    candidates: Sequence[PlacedOnJoint],
+    settings: SearchSettings,
+    progress: Callable[[str], None],
+) -> Round:
+    """One effect more: screened and fitted where runs forget, the best of them fitted again as they are."""
+    first: list[ArticulatedFit] = []
+    ground, corrected = base, None
+    for level in settings.softening:
+        soft = problem.softened(level)
+        ground = refitted(soft, base.hypothesis, ground.vector, scale=_scale_of(soft, ground))
+        if first:
+            if problem.deadline.over:
+                break
+            others = Others.of(soft, ground)
+            nearby = _plays(soft, ground, first, settings)
+            first = [_again(soft, ground, others, f, nearby.get(f.hypothesis[-1].key, ())) for f in first]
+            corrected = Corrected(soft, max(first, key=lambda f: f.log_posterior))
+            continue
+        progress("screening")
+        points = screen(soft, ground, candidates)
+        if _strained(
+            soft, ground, settings
+        ):  # what stands in for the missing hides it; also from what was stated
+            points += screen(soft, _untouched(soft, ground), candidates)
+        progress("fits")
+        first = _fits(soft, ground, by_effect(points, settings.starts), settings)
+        if soft is problem:  # servos hold every joint: nothing forgets more than it does anyway
+            break
+    others = Others.of(problem, base)
+    first = [f for f in first if sound(problem, f)] or first
+    finalists = sorted(first, key=lambda f: -f.log_posterior)[: settings.finalists]
+    fits = [f for f in (_again(problem, base, others, one) for one in finalists) if sound(problem, f)]
+    fits = [_where_links_are(problem, f) for f in fits]
+    if not fits:
+        return Round(None, fits, corrected)
+    best = max(fits, key=lambda f: f.log_posterior)
+    settled = problem.settled(best.hypothesis, best.vector)
+    whole = refitted(settled, best.hypothesis, best.vector, scale=best.scale)
+    return Round(whole, [*(f for f in fits if f is not best), whole], corrected)
+
+
+def parted(
+    problem: ArticulatedProblem,
+    fits: Sequence[ArticulatedFit],
+    corrected: Corrected,
+    settings: SearchSettings,
+) -> bool:
+    """Whether a play explains the records where runs are corrected at every sample, and nothing does where they go by themselves.
+
+    Every impact multiplies what was wrong before it: after some of them no run that hardly listens to the encoder is where the joint is,
+    be the play the right one. What the two leave is compared by the likelihood of the logs, in which the softer run pays for what it hears.
+    """
+    if problem.softness or not any(placed.effect.play for placed in corrected.best.hypothesis):
+        return False
+    heard = log_likelihood(corrected.problem, corrected.best.chi2)
+    return heard > max((log_likelihood(problem, f.chi2) for f in fits), default=-np.inf) + settings.worth
+
+
+def _strained(problem: ArticulatedProblem, base: ArticulatedFit, settings: SearchSettings) -> set[int]:
+    """Joints one of whose nominal parameters a fit has moved too far."""
+    return {p.joint for p, x in zip(problem.nominal, base.vector, strict=False) if abs(x) > settings.strained}
+
+
+def _untouched(problem: ArticulatedProblem, base: ArticulatedFit) -> ArticulatedFit:
+    """A fit with the nominal parameters as stated."""
+    vector = base.vector.copy()
+    vector[: len(problem.nominal)] = 0.0
+    return ArticulatedFit.at(problem, base.hypothesis, vector)
+
+
+def _where_links_are(problem: ArticulatedProblem, found: ArticulatedFit) -> ArticulatedFit:
+    """A fit once more with the links of its elastic joints where it has them: what the other joints feel is part of the explanation."""
+    settled = problem.settled(found.hypothesis, found.vector)
+    return (
+        found if settled is problem else refitted(settled, found.hypothesis, found.vector, scale=found.scale)
+    )
+
+
+def _plays(
+    problem: ArticulatedProblem,
+    base: ArticulatedFit,
+    fits: Sequence[ArticulatedFit],
+    settings: SearchSettings,
+) -> dict[tuple[str, str], list[Array]]:
+    """Starts of the plays among the last effects of some fits, as screened in this problem on top of a fit."""
+    placed = [f.hypothesis[-1] for f in fits if f.hypothesis[-1].effect.play]
+    found = by_effect(screen(problem, base, placed), settings.starts) if placed else []
+    return {
+        mine[0].placed.key: [np.concatenate([base.vector, point.eta]) for point in mine] for mine in found
+    }
+
+
+def _again(
+    problem: ArticulatedProblem,
+    base: ArticulatedFit,
+    others: Others,
+    found: ArticulatedFit,
+    starts: Sequence[Array] = (),
+) -> ArticulatedFit:
+    """A fit once more in another problem, on the joints that its last effect changes; the other joints as a fit there has them.
+
+    Further starts are tried besides where it was: of a play the softest runs tell little, and those that listen less have a minimum of
+    their own at every clearance.
+    """
+    active = problem.reached(found.hypothesis[len(base.hypothesis) :])
+    vector = found.vector.copy()
+    for j in (j for j in range(len(problem.joints)) if j not in active):
+        own = own_entries(problem, base.hypothesis, j)
+        vector[own] = base.vector[own]
+    scale = _scale_of(problem, replace(found, vector=vector))
+    return refitted(problem, found.hypothesis, np.vstack([vector, *starts]), scale=scale, others=others)
+
+
+def _beside(
+    problem: ArticulatedProblem, found: ArticulatedFit, others: Others, settings: SearchSettings
+) -> ArticulatedFit:
+    """A fit whose last effect is periodic, with the next whole numbers of periods in a turn for as long as they are likelier.
+
+    Over the range of a joint two neighbouring numbers differ by a fraction of a period, which a phase and a wrong gain of the encoder make
+    up for; screened one at a time, with what else is missing still in the residuals, they are hardly told apart.
+    """
+    names = [p.name for p in found.hypothesis[-1].effect.parameters]
+    if PERIODS not in names:
+        return found
+    placed, first = found.hypothesis[-1], len(found.vector) - len(names)
+    sine, cosine, at = (first + names.index(name) for name in ("sine", "cosine", PERIODS))
+    grid = placed.effect.parameters[names.index(PERIODS)].grid
+    while True:
+        starts = []
+        for n in (found.vector[at] + d for d in (-2, -1, 1, 2)):
+            if n in grid:
+                # the same torque in the middle of the range: A sin(n q + phase)
+                turn = (found.vector[at] - n) * placed.scales.middle
+                vector = found.vector.copy()
+                vector[sine] = found.vector[sine] * np.cos(turn) - found.vector[cosine] * np.sin(turn)
+                vector[cosine] = found.vector[sine] * np.sin(turn) + found.vector[cosine] * np.cos(turn)
+                vector[at] = n
+                starts.append(vector)
+        new = fit(
+            problem, found.hypothesis, np.array(starts), scale=found.scale, iterations=settings.iterations, others=others,
+        )  # fmt: skip
+        if new.log_posterior <= found.log_posterior + settings.rise:
+            return found
+        found = new
+
+
+PERIODS = "periods_per_turn"
+"""Whole number among the parameters of a periodic effect."""
+
+
+def sound(problem: ArticulatedProblem, found: ArticulatedFit) -> bool:
+    """Whether a fit is finite and no parameter of its effects sits at a bound."""
+    settings = problem.settings.articulated
+    if not (np.isfinite(found.log_posterior) and np.isfinite(found.vector).all()):
+        return False
+    at = len(problem.nominal)
+    for placed in found.hypothesis:
+        for p in placed.effect.parameters:
+            low, high = p.bounds
+            inside = low + settings.at_bound < found.vector[at] < high - settings.at_bound
+            if not (inside or p.fixed or p.name in BOUNDED):
+                return False
+            at += 1
+    return True
+
+
+BOUNDED = ("motor_share", "position")
+"""Parameters whose bounds are physical: a share is at most one, a stop lies where the joint goes."""
+
+
+def _scale_of(problem: ArticulatedProblem, found: ArticulatedFit) -> Array:
+    """Scale (n_joints,) of the residuals of a fit's model in a problem, at least one."""
+    joints = range(len(problem.joints))
+    left = in_threads(
+        lambda j: float(np.sum(problem.residual(j, found.hypothesis, found.vector) ** 2)), joints
+    )
+    return np.sqrt(np.maximum(np.array(left) / problem.count, 1.0))
+
+
+def _fits(
+    problem: ArticulatedProblem,
+    base: ArticulatedFit,
+    points: Sequence[Sequence[Screened]],
+    settings: SearchSettings,
+) -> list[ArticulatedFit]:
+    """Fits of the most promising effects on top of a fit, on the joints that they change."""
+    others = Others.of(problem, base)
+    out: list[ArticulatedFit] = []
+    gained, swapped = 0.0, 0
+    strained = _strained(problem, base, settings)
+    for k, mine in enumerate(points):
+        if out and not problem.deadline.allows("fits of effects that promise less"):
+            break
+        hopeful = k < settings.fitted and mine[0].gain >= settings.hope * gained
+        if not (k < settings.least or hopeful):
+            # where a number of the model was moved too far, numbers that may be wrong instead are tried, whatever they promise
+            instead = mine[0].placed.effect.number and mine[0].placed.joint in strained
+            if not instead or swapped == settings.fitted:
+                continue
+            swapped += 1
+        hypothesis: JointHypothesis = (*base.hypothesis, mine[0].placed)
+        # nominal parameters that stood in for what was missing are also tried where they were stated, and fitted from there:
+        # a start of less misfit need not be the nearer one
+        untouched = np.concatenate([np.zeros(len(problem.nominal)), base.vector[len(problem.nominal) :]])
+        starts = [
+            np.array([np.concatenate([point.start, point.eta]) for point in mine]),
+            np.array([np.concatenate([at, point.eta]) for point in mine for at in (base.vector, untouched)]),
+        ]
+        new = max(
+            (
+                fit(
+                    problem,
+                    hypothesis,
+                    start,
+                    scale=base.scale,
+                    iterations=settings.iterations,
+                    others=others,
+                )
+                for start in (starts if strained else [np.vstack(starts)])
+            ),
+            key=lambda f: f.log_posterior,
+        )
+        new = refitted(problem, hypothesis, new.vector, scale=new.scale, others=others)
+        new = _beside(problem, new, others, settings)
+        out.append(new)
+        gained = max(gained, 2.0 * (new.log_posterior - base.log_posterior))
+    return out
