@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bench.discrepancy.articulated.admission import admitted_robot
-from bench.discrepancy.articulated.judgement import kept, ladder, predict
+from bench.discrepancy.articulated.judgement import kept, ladder, predict, without_each
 from bench.discrepancy.articulated.naming import closest_rival, verdict_of
 from bench.discrepancy.articulated.next_test import Trajectory, propose
 from bench.discrepancy.articulated.places import matrix_of
@@ -111,8 +111,9 @@ def diagnose_articulated(
     untouched = predict(judging, None, predictions[0].floor, judged)
     final = rungs[last]
     left = coloured(judging, final, judged)
+    without = without_each(judging, fits, final, predictions[0].floor, judged)
     verdict = verdict_of(
-        problem, fits, rungs, last, untouched, predictions, judged, rng, stated=stated, left=left
+        problem, fits, rungs, last, untouched, predictions, without, judged, rng, stated=stated, left=left
     )
     verdict = replace(
         verdict,

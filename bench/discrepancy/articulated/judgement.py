@@ -155,6 +155,23 @@ def _own(placed: PlacedOnJoint, before: PredictedErrors, after: PredictedErrors)
     return float(gained[placed.joint] if placed.effect.site in ("joint", "actuator") else gained.sum())
 
 
+def without_each(
+    problem: ArticulatedProblem,
+    fits: Sequence[ArticulatedFit],
+    final: ArticulatedFit,
+    floor: Array,
+    settings: JudgementSettings,
+) -> list[PredictedErrors | None]:
+    """Predictions of what a fit names without one effect after the other, by the likeliest fit of the others; None where none was made."""
+    out: list[PredictedErrors | None] = []
+    for placed in final.hypothesis:
+        others = {other.key for other in final.hypothesis} - {placed.key}
+        made = [f for f in fits if {other.key for other in f.hypothesis} == others]
+        best = max(made, key=lambda f: f.log_posterior, default=None)
+        out.append(None if best is None else predict(problem, best, floor, settings))
+    return out
+
+
 def closed(
     before: PredictedErrors, after: PredictedErrors, first: PredictedErrors, rng: np.random.Generator
 ) -> tuple[float, tuple[float, float]]:

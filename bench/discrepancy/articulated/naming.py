@@ -25,6 +25,7 @@ def verdict_of(
     last: int,
     untouched: PredictedErrors,
     predictions: Sequence[PredictedErrors],
+    without: Sequence[PredictedErrors | None],
     settings: JudgementSettings,
     rng: np.random.Generator,
     *,
@@ -40,6 +41,7 @@ def verdict_of(
         last: The rung that the judging records bear out.
         untouched: What the nominal model as stated predicts of them.
         predictions: What every rung does.
+        without: What the rung that is borne out predicts without one of its effects after the other.
         settings: Thresholds.
         rng: For the bootstrap intervals.
         stated: Whether the noise of the responses is stated.
@@ -53,7 +55,13 @@ def verdict_of(
     kind: VerdictKind = "effect" if last else "none"
     if not whole and (not last or explained < settings.material):
         kind = "unknown"
-    shares = [closed(predictions[k - 1], predictions[k], predictions[0], rng) for k in range(1, last + 1)]
+    # what comes back where one is taken out; in order of the search where the others were never fitted without it
+    shares = [
+        closed(predictions[k], predictions[k + 1], predictions[0], rng)
+        if others is None
+        else closed(others, predictions[last], predictions[0], rng)
+        for k, others in enumerate(without)
+    ]
     # of what is named beside noise, the part that is left tells how likely something outside the catalogue is
     foreign = settings.outside
     if kind == "effect" and not whole:
