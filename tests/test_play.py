@@ -76,8 +76,8 @@ def folder(tmp_path_factory) -> Path:
     }
     told = {"rig": "model.xml", "parameters": parameter, "channels": channels}
     (path / "nominal.json").write_text(json.dumps(told), encoding="utf-8")
-    measured(path, "identification", 5.0, 1)
-    measured(path, "validation", 4.0, 2)
+    measured(path, "identification", 4.0, 1)
+    measured(path, "validation", 3.0, 2)
     return path
 
 
@@ -118,7 +118,16 @@ def test_runs_listen_to_the_encoder_where_impacts_lose_them_and_nowhere_else(fol
 
 @pytest.mark.slow
 def test_a_play_before_a_link_that_bounces_in_it_is_named_with_its_width(folder):
-    verdict = diagnose(read_case(folder), most=1).verdict
+    others = {
+        "coulomb_friction",
+        "stribeck_friction",
+        "joint_compliance",
+        "actuator_delay",
+        "damping_error",
+        "position_offset",
+    }
+    left_out = {effect.name for effect in CATALOGUE if not effect.play} - others
+    verdict = diagnose(read_case(folder), most=1, exclude=left_out).verdict
     assert [(effect.name, effect.where) for effect in verdict.named] == [("backlash", "hinge")]
     width = verdict.named[0].parameters["half_clearance"]
     assert width.value == pytest.approx(HALF, rel=0.1)  # the contacts of MuJoCo give way

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import pickle
-import subprocess
 import sys
 from dataclasses import replace
 from itertools import pairwise
@@ -293,14 +293,19 @@ def test_a_smoke_training_improves_on_its_start_and_goes_on_where_it_was(tmp_pat
 
 
 @pytest.mark.slow
-def test_evaluation_compares_on_the_same_rigs_and_goes_on_where_it_was(tmp_path: Path) -> None:
-    root = Path(__file__).parent.parent
+def test_evaluation_compares_on_the_same_rigs_and_goes_on_where_it_was(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.syspath_prepend(str(Path(__file__).parent.parent / "scripts"))
+    evaluation = importlib.import_module("evaluate_excitation")
+    monkeypatch.setattr(evaluation, "RESAMPLES", 100)
     command = [
-        sys.executable, str(root / "scripts" / "evaluate_excitation.py"), "sdof", "--methods", "log_sweep", "prbs",
-        "--no-planner", "--seeds", "2", "--rigs", "1", "-o", str(tmp_path), "--json", "-",
+        "evaluate_excitation", "sdof", "--methods", "log_sweep", "prbs", "--no-planner", "--seeds", "2", "--rigs", "1",
+        "--workers", "1", "-o", str(tmp_path), "--json", "-",
     ]  # fmt: skip
-    first = subprocess.run(command, cwd=root, capture_output=True, text=True, check=True).stdout
-    document = json.loads(first)
+    monkeypatch.setattr(sys, "argv", command)
+    assert evaluation.main() == 0
+    document = json.loads(capsys.readouterr().out)
     assert set(document["all"]) == {"log_sweep", "prbs", "policy sdof"}
     row = document["all"]["policy sdof"]
     assert row["rigs"] == 2
@@ -310,8 +315,8 @@ def test_evaluation_compares_on_the_same_rigs_and_goes_on_where_it_was(tmp_path:
     kept = sorted((tmp_path / "sdof").glob("*.json"))
     stamps = [path.stat().st_mtime_ns for path in kept[1:]]
     kept[0].unlink()
-    again = subprocess.run(command, cwd=root, capture_output=True, text=True, check=True).stdout
-    assert json.loads(again) == document
+    assert evaluation.main() == 0
+    assert json.loads(capsys.readouterr().out) == document
     assert [path.stat().st_mtime_ns for path in kept[1:]] == stamps  # only what was missing was made again
 
 

@@ -55,13 +55,7 @@ def verdict_of(
     kind: VerdictKind = "effect" if last else "none"
     if not whole and (not last or explained < settings.material):
         kind = "unknown"
-    # what comes back where one is taken out; in order of the search where the others were never fitted without it
-    shares = [
-        closed(predictions[k], predictions[k + 1], predictions[0], rng)
-        if others is None
-        else closed(others, predictions[last], predictions[0], rng)
-        for k, others in enumerate(without)
-    ]
+    shares = _shares(predictions[: last + 1], without, rng)
     # of what is named beside noise, the part that is left tells how likely something outside the catalogue is
     foreign = settings.outside
     if kind == "effect" and not whole:
@@ -96,6 +90,23 @@ def verdict_of(
         remainder=remainder_of(problem, final, predictions[last], untouched),
         nominal=_nominal(problem, final),
     )
+
+
+def _shares(
+    predictions: Sequence[PredictedErrors],
+    without: Sequence[PredictedErrors | None],
+    rng: np.random.Generator,
+) -> list[tuple[float, tuple[float, float]]]:
+    """What of the discrepancy comes back where one effect after the other is taken out, and the others are fitted without it.
+
+    Where they never were, it is what came back as the search found it, beside those before it.
+    """
+    return [
+        closed(predictions[k], predictions[k + 1], predictions[0], rng)
+        if others is None
+        else closed(others, predictions[-1], predictions[0], rng)
+        for k, others in enumerate(without)
+    ]
 
 
 def _words(
