@@ -15,6 +15,7 @@ from capability_figures import (
     demo,
     excitation,
     graded,
+    kills,
     localisation,
     measured,
     memory_joint,
@@ -217,6 +218,13 @@ CAPABILITIES: Sequence[Capability] = (
         rewards,
     ),
     _benchmark_group("campaign", "Campaigns"),
+    Capability(
+        "kills",
+        "Campaigns killed and resumed",
+        ("python", "scripts/killed_campaigns.py", "--kills", "200", "--json"),
+        kills,
+        hours=True,
+    ),
     *(
         Capability(
             f"training_{task}",

@@ -343,3 +343,9 @@ def rewards(told: Any) -> Figures:
         for where in ("without background", "with background", "both")
         for name, row in told[where].items()
     ]
+
+
+def kills(told: Any) -> Figures:
+    """Campaigns killed and resumed."""
+    figure = f"{told['differ']} of {told['campaigns']} campaigns, {told['kills']} kills"
+    return [("campaigns whose bytes differ from those of an undisturbed one", figure, "≤ 0")]
