@@ -9,7 +9,7 @@ demo: .venv/core
 	$(BIN)/jointbench demo --out out/demo --force
 
 test: .venv/full lint types layers
-	$(BIN)/python -m pytest -n 2 --dist loadfile tests
+	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder tests
 
 # A sample, a file or two for each package that is bound from below.
 MINIMUM := signals recording documents files figures reading record_formats laws rig polynomial settings campaign_plan report native

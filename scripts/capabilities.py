@@ -8,27 +8,29 @@ from typing import Any
 
 from capability_figures import (
     Figures,
-    applied,
-    background,
     benchmark,
     bouc_wen,
     demo,
     excitation,
-    graded,
     kills,
-    localisation,
-    measured,
     memory_joint,
     monitoring,
+    reproduction,
+    rewards,
+    training,
+)
+from diagnosis_figures import (
+    applied,
+    background,
+    graded,
+    localisation,
+    measured,
     native_effects,
     pendulum,
     planted,
-    reproduction,
-    rewards,
     robots,
     sealed,
     ten_minutes,
-    training,
 )
 
 

@@ -1,0 +1,183 @@
+"""Figures of each capability of the diagnosis, read from what its command leaves."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from capability_figures import Figures
+
+
+def measured(told: Any) -> Figures:
+    """Measured records, diagnosed."""
+    figures = [
+        (
+            f"{row['case']}, {row['record']}: error of the nominal model → with "
+            + (" + ".join(row["named"]) or row["verdict"]),
+            f"{row['before']:.3g} → {row['after']:.3g} {row['unit']} ({row['seconds']:.0f} s)",
+            "" if row["limit"] is None else f"≤ {row['limit']:.3g}",
+        )
+        for row in told
+    ]
+    figures += [
+        (
+            f"{row['case']}: {name} against the published value",
+            f"{entry['found']:.4g} against {entry['published']:.4g} ({entry['percent']:+.1f} %)",
+            "within 3 %",
+        )
+        for row in told
+        for name, entry in row.get("published", {}).items()
+    ]
+    return figures
+
+
+def localisation(told: Any) -> Figures:
+    """Where planted forces are found."""
+    figures = [(f"F1 over (degree of freedom, state cell), mean of {told['cases']}", told["f1"], "≥ 0.9")]
+    figures += [(f"F1, {kind}", value, "") for kind, value in told["by_kind"].items()]
+    return [(what, f"{value:.3f}", limit) for what, value, limit in figures]
+
+
+def pendulum(told: Any) -> Figures:
+    """Pendulums through large swings."""
+    return [
+        ("cases, peak swing", f"{told['n']}, {told['degrees']:.0f} degrees", ""),
+        ("missing forces named exactly", f"{100.0 * told['exact']:.1f} %", "≥ 95 %"),
+        ("clean cases: false alarms", f"{100.0 * told['false_alarms']:.1f} %", "≤ 5 %"),
+        ("gap before, median NRMSE", f"{told['before']:.3g}", ""),
+        ("gap after over noise floor, median", f"{told['ratio']:.3g}", "≤ 1.1"),
+        ("seconds a case, median", f"{told['seconds']:.3g}", "≤ 20 s"),
+    ]
+
+
+def sealed(told: Any) -> Figures:
+    """Sealed cases, by class."""
+
+    def share(key: str) -> str:
+        return "–" if told[key] is None else f"{100.0 * told[key]:.1f} %"
+
+    def number(key: str) -> str:
+        return "–" if told[key] is None else f"{told[key]:.3g}"
+
+    return [
+        ("cases", str(told["n"]), ""),
+        ("single effects named exactly, declared sets counted", share("exact"), "≥ 95 %"),
+        ("single effects named exactly, no set helping", share("strict"), ""),
+        ("single effects, family right", share("family"), "≥ 99 %"),
+        ("joint rig: axis right", share("place"), "100 %"),
+        ("clean cases: false alarms", share("false_alarms"), "≤ 5 %"),
+        ("foreign effects called unknown", share("unknown_caught"), "100 %"),
+        ("two effects: both named", share("both_named"), "≥ 80 %"),
+        ("declared indistinguishable sets hold the truth", share("sets_hold_truth"), "≥ 98 %"),
+        ("localisation, F1 on regions of the state", number("region_f1"), "≥ 0.9"),
+        ("expected calibration error", number("calibration_error"), "≤ 0.05"),
+        ("gap after over noise floor, median", number("median_ratio"), "≤ 1.1"),
+        ("gap after over noise floor, 90th percentile", number("p90_ratio"), "≤ 1.5"),
+        ("seconds a case, median", number("median_seconds"), "≤ 20 s sdof, ≤ 60 s joint"),
+        ("seconds a case, 90th percentile", number("p90_seconds"), ""),
+    ]
+
+
+def graded(told: Any) -> Figures:
+    """Measured cases, each right, honest or wrong by what was written down before."""
+    rows = []
+    for case in told:
+        names = " + ".join(f"{name} {p:.2f}" for name, p in case["named"].items())
+        sets = "; ".join(" or ".join(one) for one in case["sets"])
+        figure = f"{case['grade'] or 'not graded'}: {names or case['verdict']}" + (
+            f" (declared: {sets})" if sets else ""
+        )
+        rows.append((case["case"], figure, "right or honest"))
+    count = {grade: sum(case["grade"] == grade for case in told) for grade in ("right", "honest", "wrong")}
+    rows.append(("all", ", ".join(f"{n} {grade}" for grade, n in count.items()), "0 wrong"))
+    return rows
+
+
+def planted(told: Any) -> Figures:
+    """Faults planted into sound records, and what `jointbench check` says of them."""
+    rows = [(fault, found, "") for fault, found in told["found"].items()]
+    rows.append(("all faults", f"{100.0 * told['found_share']:.1f} % found", "≥ 95 %"))
+    doubted, sound = map(int, told["false_alarms"].split("/"))
+    rows.append(("sound records doubted", f"{100.0 * doubted / sound:.1f} % of {sound}", "≤ 2 %"))
+    rows.append(
+        ("seconds a case", f"{told['median_seconds']:.2f}, at most {told['longest_seconds']:.1f}", "< 5")
+    )
+    return rows
+
+
+BACKGROUND_LIMITS = {
+    "main effect named or in a declared set": "≥ 90 %",
+    "and first": "≥ 85 %",
+    "not none": "100 %",
+    "one other name at most": "≥ 95 %",
+    "clean: no certain name that does not pay on the judging record": "≥ 95 %",
+    "background: no certain name that does not pay on the judging record": "≥ 95 %",
+    "95 % intervals of the main effect's parameters hold the truth": "≥ 85 %",
+    "every number is finite": "100 %",
+    "no nominal parameter beyond 4 stated sigma unsaid": "100 %",
+}
+
+
+def background(told: Any) -> Figures:
+    """Cases whose truth holds a background besides."""
+    rows: list[tuple[str, ...]] = [
+        (
+            what,
+            f"{100.0 * share['value']:.1f} % of {share['n']} ({100.0 * share['low']:.0f} to {100.0 * share['high']:.0f})",
+            BACKGROUND_LIMITS.get(what, ""),
+        )
+        for what, share in told["shares"].items()
+    ]
+    low, high = told["calibration_interval"]
+    figure = f"{told['calibration']:.3f} ({low:.3f} to {high:.3f}; {told['scatter']:.3f} if every probability were exact)"
+    return [*rows, ("expected calibration error of names", figure, "≤ 0.05")]
+
+
+def native_effects(told: Any) -> Figures:
+    """MJCF's own effects, put in, diagnosed, applied."""
+    rows = []
+    for row in told["rows"]:
+        names = " + ".join(row["named"]) or row["verdict"]
+        rows.append((row["effect"], f"{row['word']}: {names}, {100.0 * row['left']:.0f} % left", ""))
+    n = sum(told.get(word, 0) for word in ("closed", "explained"))
+    return [*rows, ("named, applied and closed, or short with its cause", f"{n} of {told['n']}", "all")]
+
+
+def applied(told: Any) -> Figures:
+    """Verdicts applied in plain MuJoCo."""
+    rows = []
+    for row in told["rows"]:
+        names = " + ".join(row.get("named", ())) or row.get("verdict", "")
+        if "error" in row:
+            rows.append((row["case"], row["error"], ""))
+        elif row["within"]:
+            rows.append((row["case"], f"{names}: within 5 %", ""))
+        else:
+            rows.append(
+                (
+                    row["case"],
+                    f"{names}: {100.0 * row['off']:.0f} % off, {row['cause'] or 'no cause known'}",
+                    "",
+                )
+            )
+    told_of = f"{told['within']} within 5 %, {told['explained']} with a cause, of {told['n']}"
+    return [*rows, ("all", told_of, "each within 5 % or with its cause")]
+
+
+def ten_minutes(told: Any) -> Figures:
+    """From a log to a corrected model."""
+    rows = []
+    for row in told:
+        names = ", ".join(row.get("named", ())) or row.get("verdict", "no verdict")
+        figure = f"{row['seconds']:.0f} s, {len(row['steps'])} commands: {names}; {row.get('line', 'no corrected model')}"
+        rows.append((row["machine"], figure, "≤ 600 s", "holds" if row["held"] else "**misses**"))
+    return rows
+
+
+def robots(told: Any) -> Figures:
+    """Public records of robots."""
+    rows = []
+    for row in told:
+        names = ", ".join(f"{name} {100.0 * share:.0f} %" for name, share in row["named"].items())
+        figure = f"{row['before']:.3g} → {row['after']:.3g}, noise {row['floor']:.3g}, {row['seconds']:.0f} s: {names or row['verdict']}"
+        rows.append((f"{row['robot']} ({row['known']}): NRMSE of the worst joint", figure, ""))
+    return rows
