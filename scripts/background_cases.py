@@ -79,8 +79,9 @@ def main() -> int:
 
 
 def _document(score: BackgroundScore) -> dict[str, Any]:
+    """A score in JSON values."""
     return {
-        "shares": {what: vars(share) for what, share in score.shares.items()},
+        "shares": {what: share._asdict() for what, share in score.shares.items()},
         "calibration": score.calibration,
         "calibration_interval": score.interval,
         "scatter": score.scatter,

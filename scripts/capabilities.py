@@ -108,15 +108,6 @@ CAPABILITIES: Sequence[Capability] = (
         data="../trials-background",
     ),
     Capability(
-        "arms",
-        "Diagnosis of articulated models, cases of others",
-        ("jointbench", "blind", "score", "out/trials_arms", "{data}/../trials-arms/answers", "--json"),
-        sealed,
-        before=(("jointbench", "blind", "run", "{data}/../trials-arms", "out/trials_arms", "--again"),),
-        data="../trials-arms",
-        hours=True,
-    ),
-    Capability(
         "robots",
         "Public records of robots, diagnosed against their public models",
         ("python", "scripts/robots.py", "--data", "{data}/robots", "--json"),

@@ -164,7 +164,7 @@ def test_sysid_names_an_effect_of_its_own_when_it_is_plain():
 
     from bench.discrepancy.effects.catalogue import effect_named
 
-    # the whole catalogue takes it minutes; in heats, as with less time than all of it would take
+    # the whole catalogue takes it minutes
     catalogue = [effect_named(name) for name in ("gap", "cubic_stiffness")]
     placed, _ = peer_sysid.diagnose(_case("gap", 5), catalogue=catalogue, seconds=1e4)
     assert placed is not None

@@ -21,7 +21,7 @@ from bench.discrepancy.multibody.joint_run import Slot
 TEETH = tuple(float(n) for n in range(2, 121))
 """Periods of cogging in a turn that are tried: slots, poles and teeth are whole numbers."""
 PLAYS = log_grid(*np.geomspace(0.003, 0.3, 34))
-"""Half of a clearance that is tried: a run that impacts forgets within a factor of 1.15 of the true one what it has to follow."""
+"""Half clearances that are tried, a factor of 1.15 apart: the misfit of a link that bounces falls to the true one only from near by."""
 MOTOR_SHARE = FreeParameter(
     "motor_share", mean=0.0, std=0.5, bounds=(-4.0, -1e-3), grid=(-1e-2, math.log(0.4)), unit="1"
 )

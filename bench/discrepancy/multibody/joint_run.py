@@ -252,9 +252,8 @@ def run(
             break
         dq = gain[0, 0] * out[i, 0] + gain[0, 1] * out[i, 1]
         dv = gain[1, 0] * out[i, 0] + gain[1, 1] * out[i, 1]
-        apart = (
-            train and abs(q - ql) < p[32]
-        )  # across an open play the encoder tells nothing of the other side
+        # across an open play the encoder tells nothing of the other side
+        apart = train and abs(q - ql) < p[32]
         if not (apart and on_link):
             q += dq
             v += dv
