@@ -7,7 +7,7 @@ A case is a folder as `jointbench diagnose` reads it. Beside folders: the worked
 here, and measured records by the names that scripts/diagnose_measured.py knows. Each checkout has one process that diagnoses the
 cases one after the other; the two take turns, so that what else the machine does falls on both. Compared is the whole verdict but
 its time: kind, named effects, parameters, locations, discrepancies, words. The time is that of the processor, the least of the repeats.
-The exit status is 1 where anything differs.
+A case in which either checkout ends with an error is told as such. The exit status is 1 where anything differs.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import traceback
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -130,7 +131,9 @@ def _answer(question: dict[str, Any]) -> dict[str, Any]:
             case = diagnose_measured.gather(data, (question["measured"],))[question["measured"]].case
         begun = time.process_time()
         told = diagnose(case).verdict.to_json()
-    except BenchError as error:
+    except Exception as error:  # noqa: BLE001  (a checkout that is broken in one case is compared in the others)
+        if not isinstance(error, BenchError):
+            traceback.print_exc()
         return {"seconds": 0.0, "verdict": {"verdict": "error", "error": f"{type(error).__name__}: {error}"}}
     told.pop("seconds", None)
     return {"seconds": time.process_time() - begun, "verdict": told}

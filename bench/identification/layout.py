@@ -14,10 +14,11 @@ from numba.extending import intrinsic
 from numba.np.arrayobj import make_array
 
 jit = numba.njit(cache=True, error_model="numpy", nogil=True)
-# Array arguments are counted references and nine words each: functions that take many of them go into their callers.
-inlined = numba.njit(cache=True, error_model="numpy", nogil=True, inline="always")
+# Array arguments are nine words each, and counting their references is an atomic step each: functions that take many of them go
+# into their callers, in LLVM rather than in numba, which would type their whole text anew for each caller; they allocate nothing.
+inlined = numba.njit(cache=True, error_model="numpy", nogil=True, forceinline=True, _nrt=False)
 # Sums may be reordered into vector registers; NaN and inf keep their meaning, since samples are checked for them.
-fast = numba.njit(cache=True, error_model="numpy", nogil=True, fastmath={"reassoc", "contract"})
+fast = numba.njit(cache=True, error_model="numpy", nogil=True, _nrt=False, fastmath={"reassoc", "contract"})
 
 # What the header of the state array holds. Settings first, then what changes from sample to sample.
 (
@@ -38,6 +39,7 @@ NOT_FINITE, BACKWARDS, CLOCK_RESET, DROPPED, CONSTANT, MOVING, EXCITATION_LOST, 
     1 << bit for bit in range(9)
 )
 UNUSED, REPORTED, FIRST_CHANNEL = (1 << bit for bit in range(9, 12))
+HALF_IS_OVER = 1 << 16  # of the monitor, told to no one
 REJECTED = NOT_FINITE | BACKWARDS
 
 

@@ -21,6 +21,7 @@ from bench.identification.layout import (
     DROPPED,
     FIRST_CHANNEL,
     GAP,
+    HALF_IS_OVER,
     HELD,
     LAST_VALUE,
     MOVING,
@@ -55,7 +56,7 @@ from bench.identification.layout import (
 )
 from bench.identification.stream_law import learn
 from bench.identification.stream_models import regress, set_step
-from bench.identification.stream_monitor import add_to_gram, monitor
+from bench.identification.stream_monitor import add_to_gram, turn, watch_half
 
 
 @inlined
@@ -121,8 +122,8 @@ def watch_channels(h, force, x, v, a):
 
 
 @inlined
-def take_admitted(h, theta, d, phi, b, level, peak, u, gram, start, pull, z, usable, step):
-    """Learn from an admitted sample and turn the monitor."""
+def take_admitted(h, theta, d, phi, b, u, gram, start, z, usable, step):
+    """Learn from an admitted sample."""
     flags = 0
     if usable and h[HELD] == 0.0:
         add_to_gram(gram[0], phi)
@@ -133,11 +134,11 @@ def take_admitted(h, theta, d, phi, b, level, peak, u, gram, start, pull, z, usa
                 start[i] = theta[i]
     elif not usable:
         flags |= UNUSED
-    return flags | monitor(h, theta, d, u, level, peak, gram, start, pull, step)
+    return flags | watch_half(h, step)
 
 
 @inlined
-def sample(h, theta, d, phi, b, work, inverse, level, peak, y, u, gram, start, pull, t, force, x, v, a):
+def sample(h, theta, d, phi, b, work, inverse, y, u, gram, start, t, force, x, v, a):
     """One sample of the stream; returns the flags it raised."""
     good = not (
         (h[USES_F] > 0.0 and not math.isfinite(force))
@@ -160,7 +161,7 @@ def sample(h, theta, d, phi, b, work, inverse, level, peak, y, u, gram, start, p
         # Overflow in a power of the input has entered the filters: they begin anew with the next sample.
         h[STARTED] = 0.0
         return flags | NOT_FINITE
-    flags |= take_admitted(h, theta, d, phi, b, level, peak, u, gram, start, pull, z, usable, step)
+    flags |= take_admitted(h, theta, d, phi, b, u, gram, start, z, usable, step)
     if flags & RESET and h[RATE] > 0.0:
         # The filters still hold the system of before the change; a new start knows the new one only.
         h[STARTED] = 0.0
@@ -168,7 +169,7 @@ def sample(h, theta, d, phi, b, work, inverse, level, peak, y, u, gram, start, p
 
 
 @inlined
-def sample_given(h, theta, d, phi, b, level, peak, u, gram, start, pull, inverse, t, z, row):
+def sample_given(h, theta, d, phi, b, u, gram, start, inverse, t, z, row):
     """One sample of a model whose regressor the caller forms."""
     good = math.isfinite(z)
     for i in range(phi.size):
@@ -183,23 +184,27 @@ def sample_given(h, theta, d, phi, b, level, peak, u, gram, start, pull, inverse
         if step == 0.0 or flags:
             return flags
     set_step(h, step)
-    return flags | take_admitted(
-        h, theta, d, phi, b, level, peak, u, gram, start, pull, z * h[Z_INVERSE], True, step
-    )
+    return flags | take_admitted(h, theta, d, phi, b, u, gram, start, z * h[Z_INVERSE], True, step)
 
 
 @jit
 def update(s, t, force, x, v, a):
     """`sample` on the flat state."""
     h, theta, d, phi, b, work, inverse, level, peak, y, u, gram, start, pull = views(s)
-    return sample(h, theta, d, phi, b, work, inverse, level, peak, y, u, gram, start, pull, t, force, x, v, a)
+    flag = sample(h, theta, d, phi, b, work, inverse, y, u, gram, start, t, force, x, v, a)
+    if flag & HALF_IS_OVER:
+        flag = flag & ~HALF_IS_OVER | turn(h, theta, d, u, level, peak, gram, start, pull)
+    return flag
 
 
 @jit
 def update_given(s, t, z, row):
     """`sample_given` on the flat state."""
     h, theta, d, phi, b, _, inverse, level, peak, _, u, gram, start, pull = views(s)
-    return sample_given(h, theta, d, phi, b, level, peak, u, gram, start, pull, inverse, t, z, row)
+    flag = sample_given(h, theta, d, phi, b, u, gram, start, inverse, t, z, row)
+    if flag & HALF_IS_OVER:
+        flag = flag & ~HALF_IS_OVER | turn(h, theta, d, u, level, peak, gram, start, pull)
+    return flag
 
 
 @inlined
@@ -214,7 +219,8 @@ def write(h, theta, phi, level, k, flag, every, out_theta, out_phi, out_z, flags
             reports[m, 2] = h[CONDITION]
             reports[m, 3] = h[UNEXCITED]
             reports[m, 4] = h[TRUSTED]
-            reports[m, 5:] = level
+            for i in range(level.size):
+                reports[m, 5 + i] = level[i]
     if k % every == 0:
         row = k // every
         known = (
@@ -236,26 +242,10 @@ def run(s, time, force, x, v, a, every, out_theta, out_phi, out_z, flags, report
     h[REPORTS] = 0.0
     for k in range(time.size):
         flag = sample(
-            h,
-            theta,
-            d,
-            phi,
-            b,
-            work,
-            inverse,
-            level,
-            peak,
-            y,
-            u,
-            gram,
-            start,
-            pull,
-            time[k],
-            force[k],
-            x[k],
-            v[k],
-            a[k],
+            h, theta, d, phi, b, work, inverse, y, u, gram, start, time[k], force[k], x[k], v[k], a[k]
         )
+        if flag & HALF_IS_OVER:
+            flag = flag & ~HALF_IS_OVER | turn(h, theta, d, u, level, peak, gram, start, pull)
         write(h, theta, phi, level, k, flag, every, out_theta, out_phi, out_z, flags, reports)
 
 
@@ -265,7 +255,7 @@ def run_given(s, time, z, rows, every, out_theta, out_phi, out_z, flags, reports
     h, theta, d, phi, b, _, inverse, level, peak, _, u, gram, start, pull = views(s)
     h[REPORTS] = 0.0
     for k in range(time.size):
-        flag = sample_given(
-            h, theta, d, phi, b, level, peak, u, gram, start, pull, inverse, time[k], z[k], rows[k]
-        )
+        flag = sample_given(h, theta, d, phi, b, u, gram, start, inverse, time[k], z[k], rows[k])
+        if flag & HALF_IS_OVER:
+            flag = flag & ~HALF_IS_OVER | turn(h, theta, d, u, level, peak, gram, start, pull)
         write(h, theta, phi, level, k, flag, every, out_theta, out_phi, out_z, flags, reports)

@@ -13,6 +13,7 @@ from bench.identification.layout import (
     EXCITATION_BACK,
     EXCITATION_LOST,
     EXCITED,
+    HALF_IS_OVER,
     HALF_TIME,
     HALF_WINDOW,
     HALVES,
@@ -63,10 +64,18 @@ def judge_prior(h, theta, d, u, level, start, pull):
                 total += (u[j, i] if j > i else 1.0) * (u[j, k] if j > k else 1.0) * d[j]
             weight[i, k] = total * h[PRIOR] / h[P0]
             weight[k, i] = weight[i, k]
-    if not np.linalg.eigvalsh(weight)[n - 1] < 0.5:
+    values, vectors = np.linalg.eigh(weight)
+    if not values[n - 1] < 0.5:
         pull[:] = math.inf
         return False
-    way = np.linalg.solve(np.eye(n) - weight, np.dot(weight, theta - start))
+    way = np.zeros(n)
+    for j in range(n):
+        along = 0.0
+        for i in range(n):
+            along += vectors[i, j] * (theta[i] - start[i])
+        along *= values[j] / (1.0 - values[j])
+        for i in range(n):
+            way[i] += vectors[i, j] * along
     free = True
     for i in range(n):
         floor = h[LEVEL_FLOOR] * largest / level[i] if level[i] > 0.0 else 0.0
@@ -94,7 +103,7 @@ def judge(h, theta, d, u, level, peak, gram, start, pull):
             value = (gram[0, i, j] + gram[1, i, j]) / scale if scale > 0.0 else 0.0
             matrix[i, j] = value
             matrix[j, i] = value
-    values = np.linalg.eigvalsh(matrix)
+    values, _ = np.linalg.eigh(matrix)
     h[SMALLEST] = max(values[0], 0.0)
     h[CONDITION] = values[n - 1] / h[SMALLEST] if h[SMALLEST] > 0.0 else math.inf
     h[UNEXCITED] = unexcited
@@ -112,12 +121,18 @@ def judge(h, theta, d, u, level, peak, gram, start, pull):
 
 
 @inlined
-def monitor(h, theta, d, u, level, peak, gram, start, pull, step):
-    """Turn the half windows; a report comes with every half, the first when the window is full."""
+def watch_half(h, step):
+    """Whether a half window is over, as a flag."""
     h[HALF_TIME] += step
     if h[HALF_TIME] < h[HALF_WINDOW]:
         return 0
     h[HALF_TIME] = 0.0
+    return HALF_IS_OVER
+
+
+@jit
+def turn(h, theta, d, u, level, peak, gram, start, pull):
+    """Turn the half windows; a report comes with every half, the first when the window is full."""
     h[HALVES] += 1.0
     flag = 0
     if h[HALVES] >= 2.0:

@@ -16,6 +16,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numba
+import numpy as np
 
 from bench.laws.calling import advance, call_kernel, load_int
 
@@ -24,6 +25,10 @@ FORCE, RATE, LIMIT, N_ROWS, ROW, THETA, STATE, N_STATES, SCALE = range(9)
 
 COLUMNS = 9
 """Their number."""
+
+STATE_AT, NOT_KNOWN = np.int64(0), np.bool_(False)
+"""Offset of the state in the workspace; that the first slope of a step is not there yet. Of numpy's types, since numba compiles a
+function once for each Python number that it is called with."""
 
 _inline = numba.njit(cache=True, error_model="numpy", nogil=True, forceinline=True)
 
@@ -224,7 +229,7 @@ def rk4(p, t, dt, known):
     load = 7 * n + 3 * STICK_SLIP_LIMITS.max_rows + STICK_SLIP_LIMITS.grips
     n_inputs = p.n_inputs
     if not known:
-        derivative(p, t, 0, 3 * n, load)
+        derivative(p, t, STATE_AT, 3 * n, load)
     for i in range(n):
         work[2 * n + i] = work[i] + 0.5 * dt * work[3 * n + i]
     derivative(p, t + 0.5 * dt, 2 * n, 4 * n, load + n_inputs)

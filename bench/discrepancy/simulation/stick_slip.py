@@ -28,7 +28,9 @@ from numpy.typing import NDArray
 from bench.discrepancy.simulation.equations_of_motion import (
     COLUMNS,
     LIMIT,
+    NOT_KNOWN,
     ROW,
+    STATE_AT,
     STICK_SLIP_LIMITS,
     THETA,
     Workspace,
@@ -99,14 +101,14 @@ NO_ELEMENTS = Elements(np.zeros((0, 8), dtype=np.int64), np.zeros((0, 1)), np.ze
 def _settle(p, e, t, load):
     """Bring friction element `e` to relative rest and choose its mode: hold, or slide the way it is pushed."""
     row = entry(p, e, ROW)
-    velocity = relative_velocity(p, 0, row)
+    velocity = relative_velocity(p, STATE_AT, row)
     compliance = 0.0
     for i in range(p.n_dof):
         compliance += p.rows[row * p.n_dof + i] * p.spread[i * p.n_rows + row]
     for i in range(p.n_dof):
         p.work[p.n_dof + i] -= p.spread[i * p.n_rows + row] * velocity / compliance
     p.mode[e] = 0.0
-    derivative(p, t, 0, 3 * p.n, load)
+    derivative(p, t, STATE_AT, 3 * p.n, load)
     if abs(p.grip[e]) > p.grip[p.n_elements + e]:
         p.mode[e] = 1.0 if p.grip[e] > 0.0 else -1.0
 
@@ -156,7 +158,7 @@ def _first_event(p, t, dt, rest):
             excess = abs(p.grip[e]) - p.grip[p.n_elements + e]
             if excess <= 0.0:
                 continue
-            derivative(p, t, 0, 3 * p.n, load)
+            derivative(p, t, STATE_AT, 3 * p.n, load)
             before = min(abs(p.grip[e]) - p.grip[p.n_elements + e], 0.0)
             derivative(p, t + dt, p.n, 3 * p.n, load + 2 * p.n_inputs)
             crossing = rest * before / (before - excess)
@@ -164,7 +166,7 @@ def _first_event(p, t, dt, rest):
             end = p.mode[e] * relative_velocity(p, p.n, entry(p, e, ROW))
             if end >= 0.0:
                 continue
-            before = max(p.mode[e] * relative_velocity(p, 0, entry(p, e, ROW)), 0.0)
+            before = max(p.mode[e] * relative_velocity(p, STATE_AT, entry(p, e, ROW)), 0.0)
             crossing = rest * before / (before - end)
         if crossing < first or event < 0:
             event = e
@@ -179,10 +181,10 @@ def _pass_event(p, u, k, t, dt, event, fraction, first, rest):
     row = entry(p, event, ROW)
     for _ in range(2 if sliding else 1):
         _fill_loads(p, u, k, fraction, first)
-        rk4(p, t, first * dt, False)
+        rk4(p, t, first * dt, NOT_KNOWN)
         if not sliding:
             break
-        before = p.mode[event] * relative_velocity(p, 0, row)
+        before = p.mode[event] * relative_velocity(p, STATE_AT, row)
         end = p.mode[event] * relative_velocity(p, p.n, row)
         if not (before > end and abs(end) > 1e-9 * before):
             break
@@ -231,7 +233,7 @@ def _free_run(clock, u, start, scratch, n_dof, matrices, table, rows, spread, th
             mode[e] = STICK_SLIP_LIMITS.soft
         elif entry(p, e, LIMIT) != 0:
             frictional = True
-            rate = relative_velocity(p, 0, entry(p, e, ROW))
+            rate = relative_velocity(p, STATE_AT, entry(p, e, ROW))
             if rate != 0.0:
                 mode[e] = 1.0 if rate > 0.0 else -1.0
             else:
@@ -242,7 +244,7 @@ def _free_run(clock, u, start, scratch, n_dof, matrices, table, rows, spread, th
         share = 1.0 / substeps[k]
         for j in range(u.shape[1]):
             work[load + j] = u[k * max(load_factor, 1), j]
-        derivative(p, t, 0, 3 * n, load)
+        derivative(p, t, STATE_AT, 3 * n, load)
         for i in range(n_dof):
             position[k, i] = work[i]
             velocity[k, i] = work[n_dof + i]
@@ -280,8 +282,8 @@ def full(table: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def steps_of_each(substeps: int | NDArray[np.int64], n: int) -> NDArray[np.int64]:
-    """Steps of every sample (n,), where one number may stand for all."""
-    return np.ascontiguousarray(np.broadcast_to(substeps, n), dtype=np.int64)
+    """Steps of every sample (n,), where one number may stand for all; a copy, since a read-only view has loops compiled of its own."""
+    return np.array(np.broadcast_to(substeps, n), dtype=np.int64)
 
 
 def free_run(
