@@ -2,6 +2,8 @@ PYTHON ?= python3
 BIN := .venv/bin
 # pyNastran's metadata asks for numpy < 2; the tests use its bulk-data reader, which runs with numpy 2.
 NASTRAN := pyNastran==1.4.1 cpylog docopt-ng
+# Python compiles what is imported; pip would compile all of it first, which takes a minute.
+PIP := $(BIN)/python -m pip install --quiet --no-compile
 
 .PHONY: demo test test-minimum lint types layers wheel results docs clean
 
@@ -42,12 +44,12 @@ results: .venv/full
 	$(BIN)/python -m pip install --quiet --upgrade pip
 
 .venv/core: pyproject.toml constraints.txt | .venv/bin/python
-	$(BIN)/python -m pip install --quiet -c constraints.txt -e .
+	$(PIP) -c constraints.txt -e .
 	touch $@
 
 .venv/full: pyproject.toml constraints.txt | .venv/bin/python
-	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[rl,scale,io,onnx,peers,docs,test]'
-	$(BIN)/python -m pip install --quiet --no-deps $(NASTRAN)
+	$(PIP) -c constraints.txt -e '.[rl,scale,io,onnx,peers,docs,test]'
+	$(PIP) --no-deps $(NASTRAN)
 	touch $@ .venv/core
 
 # the oldest versions that pyproject.toml states, resolved into a file of constraints

@@ -131,7 +131,7 @@ def _answer(question: dict[str, Any]) -> dict[str, Any]:
             case = diagnose_measured.gather(data, (question["measured"],))[question["measured"]].case
         begun = time.process_time()
         told = diagnose(case).verdict.to_json()
-    except Exception as error:  # noqa: BLE001  (a checkout that is broken in one case is compared in the others)
+    except Exception as error:  # a checkout that is broken in one case is compared in the others
         if not isinstance(error, BenchError):
             traceback.print_exc()
         return {"seconds": 0.0, "verdict": {"verdict": "error", "error": f"{type(error).__name__}: {error}"}}

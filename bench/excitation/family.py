@@ -117,7 +117,7 @@ class Family:
             for name, slope in self._slopes.items()
         }
         same = {
-            name: np.ascontiguousarray(np.broadcast_to(array, (n, *array.shape[1:])))
+            name: np.broadcast_to(array, (n, *array.shape[1:])).copy()
             for name, array in base._asdict().items()
             if name not in {"rows", "columns", *_AFFINE}
         }

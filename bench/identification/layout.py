@@ -13,12 +13,14 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 from numba.np.arrayobj import make_array
 
+# Numba's own option, for functions that allocate nothing: references are not counted.
+_no_count: Any = {"_nrt": False}
 jit = numba.njit(cache=True, error_model="numpy", nogil=True)
 # Array arguments are nine words each, and counting their references is an atomic step each: functions that take many of them go
-# into their callers, in LLVM rather than in numba, which would type their whole text anew for each caller; they allocate nothing.
-inlined = numba.njit(cache=True, error_model="numpy", nogil=True, forceinline=True, _nrt=False)
+# into their callers, in LLVM rather than in numba, which would type their whole text anew for each caller.
+inlined = numba.njit(cache=True, error_model="numpy", nogil=True, forceinline=True, **_no_count)
 # Sums may be reordered into vector registers; NaN and inf keep their meaning, since samples are checked for them.
-fast = numba.njit(cache=True, error_model="numpy", nogil=True, _nrt=False, fastmath={"reassoc", "contract"})
+fast = numba.njit(cache=True, error_model="numpy", nogil=True, fastmath={"reassoc", "contract"}, **_no_count)
 
 # What the header of the state array holds. Settings first, then what changes from sample to sample.
 (
@@ -34,12 +36,12 @@ CONSTANT_RUN, LAST_VALUE, HEADER = 65, 69, 73
 BOUC_WEN, SDOF, DAMPER_LOG, POLYNOMIAL = range(4)
 """Places in `bench.identification.regressors.KINDS`; what is given has no regressor of its own to form."""
 
-# Flag bits of a sample: the kinds of events in the order of `bench.identification.persistence.EVENT_KINDS`, then the rest.
+# Flag bits of a sample: the kinds of events in the order of `bench.identification.persistence.EVENT_KINDS`, then the rest; one for
+# each of four channels, and last the monitor's own, which is told to no one.
 NOT_FINITE, BACKWARDS, CLOCK_RESET, DROPPED, CONSTANT, MOVING, EXCITATION_LOST, EXCITATION_BACK, RESET = (
     1 << bit for bit in range(9)
 )
-UNUSED, REPORTED, FIRST_CHANNEL = (1 << bit for bit in range(9, 12))
-HALF_IS_OVER = 1 << 16  # of the monitor, told to no one
+UNUSED, REPORTED, FIRST_CHANNEL, _, _, _, HALF_IS_OVER = (1 << bit for bit in range(9, 16))
 REJECTED = NOT_FINITE | BACKWARDS
 
 

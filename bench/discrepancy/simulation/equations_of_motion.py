@@ -16,7 +16,6 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numba
-import numpy as np
 
 from bench.laws.calling import advance, call_kernel, load_int
 
@@ -26,15 +25,11 @@ FORCE, RATE, LIMIT, N_ROWS, ROW, THETA, STATE, N_STATES, SCALE = range(9)
 COLUMNS = 9
 """Their number."""
 
-STATE_AT, NOT_KNOWN = np.int64(0), np.bool_(False)
-"""Offset of the state in the workspace; that the first slope of a step is not there yet. Of numpy's types, since numba compiles a
-function once for each Python number that it is called with."""
-
 _inline = numba.njit(cache=True, error_model="numpy", nogil=True, forceinline=True)
 
 
 class StickSlipLimits(NamedTuple):
-    """Numbers that the compiled code holds."""
+    """Numbers that the compiled code holds; numba compiles a function anew for each number that stands in its arguments, for these once."""
 
     max_events: int = 12
     """Most friction events resolved within one step; beyond it the step is completed with the mode it has."""
@@ -44,6 +39,10 @@ class StickSlipLimits(NamedTuple):
     """Most coordinates of an element; `grips` further scratch entries hold what a friction limit writes."""
     grips: int = 3
     """A friction limit, its creep velocity and its lead time, see `friction_limits`."""
+    state: int = 0
+    """Offset of the state in the workspace."""
+    unknown: bool = False
+    """That the first slope of a step is not there yet."""
     soft: float = 2.0
     """Mode of friction that creeps rather than sticks; it has no events."""
     sweeps: int = 12
@@ -229,7 +228,7 @@ def rk4(p, t, dt, known):
     load = 7 * n + 3 * STICK_SLIP_LIMITS.max_rows + STICK_SLIP_LIMITS.grips
     n_inputs = p.n_inputs
     if not known:
-        derivative(p, t, STATE_AT, 3 * n, load)
+        derivative(p, t, STICK_SLIP_LIMITS.state, 3 * n, load)
     for i in range(n):
         work[2 * n + i] = work[i] + 0.5 * dt * work[3 * n + i]
     derivative(p, t + 0.5 * dt, 2 * n, 4 * n, load + n_inputs)

@@ -23,7 +23,7 @@ from bench.discrepancy.simulation.equations_of_motion import (
     THETA,
     scale_at,
 )
-from bench.discrepancy.simulation.stick_slip import Elements, full, steps_of_each
+from bench.discrepancy.simulation.stick_slip import Elements, full, plain, steps_of_each
 from bench.laws.calling import advance, call_kernel, pointer_at
 
 
@@ -112,9 +112,17 @@ def driven_force(
     """Force of elements whose coordinates follow a given motion (n, n_rows); friction takes the sign of the velocity."""
     force = np.zeros_like(position)
     counts = steps_of_each(substeps, len(position))
-    q, v = np.ascontiguousarray(position), np.ascontiguousarray(velocity)
+    q, v = plain(position), plain(velocity)
     _driven(
-        step, start_time, counts, q, v, full(elements.table), elements.theta, elements.start.copy(), force
+        step,
+        start_time,
+        counts,
+        q,
+        v,
+        full(elements.table),
+        plain(elements.theta),
+        elements.start.copy(),
+        force,
     )
     return force
 
@@ -135,11 +143,11 @@ def driven_states(
     before = 0
     counts = steps_of_each(substeps, len(position))
     for i, sample in enumerate(at):
-        q = np.ascontiguousarray(position[before : sample + 1])
-        v = np.ascontiguousarray(velocity[before : sample + 1])
+        q = plain(position[before : sample + 1])
+        v = plain(velocity[before : sample + 1])
         time = start_time + before * step
         own = counts[before : sample + 1]
-        _driven(step, time, own, q, v, full(elements.table), elements.theta, z, np.zeros_like(q))
+        _driven(step, time, own, q, v, full(elements.table), plain(elements.theta), z, np.zeros_like(q))
         out[i] = z
         before = int(sample)
     return out

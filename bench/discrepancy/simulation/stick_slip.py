@@ -19,7 +19,7 @@ References:
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
@@ -28,9 +28,7 @@ from numpy.typing import NDArray
 from bench.discrepancy.simulation.equations_of_motion import (
     COLUMNS,
     LIMIT,
-    NOT_KNOWN,
     ROW,
-    STATE_AT,
     STICK_SLIP_LIMITS,
     THETA,
     Workspace,
@@ -101,14 +99,14 @@ NO_ELEMENTS = Elements(np.zeros((0, 8), dtype=np.int64), np.zeros((0, 1)), np.ze
 def _settle(p, e, t, load):
     """Bring friction element `e` to relative rest and choose its mode: hold, or slide the way it is pushed."""
     row = entry(p, e, ROW)
-    velocity = relative_velocity(p, STATE_AT, row)
+    velocity = relative_velocity(p, STICK_SLIP_LIMITS.state, row)
     compliance = 0.0
     for i in range(p.n_dof):
         compliance += p.rows[row * p.n_dof + i] * p.spread[i * p.n_rows + row]
     for i in range(p.n_dof):
         p.work[p.n_dof + i] -= p.spread[i * p.n_rows + row] * velocity / compliance
     p.mode[e] = 0.0
-    derivative(p, t, STATE_AT, 3 * p.n, load)
+    derivative(p, t, STICK_SLIP_LIMITS.state, 3 * p.n, load)
     if abs(p.grip[e]) > p.grip[p.n_elements + e]:
         p.mode[e] = 1.0 if p.grip[e] > 0.0 else -1.0
 
@@ -158,7 +156,7 @@ def _first_event(p, t, dt, rest):
             excess = abs(p.grip[e]) - p.grip[p.n_elements + e]
             if excess <= 0.0:
                 continue
-            derivative(p, t, STATE_AT, 3 * p.n, load)
+            derivative(p, t, STICK_SLIP_LIMITS.state, 3 * p.n, load)
             before = min(abs(p.grip[e]) - p.grip[p.n_elements + e], 0.0)
             derivative(p, t + dt, p.n, 3 * p.n, load + 2 * p.n_inputs)
             crossing = rest * before / (before - excess)
@@ -166,7 +164,7 @@ def _first_event(p, t, dt, rest):
             end = p.mode[e] * relative_velocity(p, p.n, entry(p, e, ROW))
             if end >= 0.0:
                 continue
-            before = max(p.mode[e] * relative_velocity(p, STATE_AT, entry(p, e, ROW)), 0.0)
+            before = max(p.mode[e] * relative_velocity(p, STICK_SLIP_LIMITS.state, entry(p, e, ROW)), 0.0)
             crossing = rest * before / (before - end)
         if crossing < first or event < 0:
             event = e
@@ -181,10 +179,10 @@ def _pass_event(p, u, k, t, dt, event, fraction, first, rest):
     row = entry(p, event, ROW)
     for _ in range(2 if sliding else 1):
         _fill_loads(p, u, k, fraction, first)
-        rk4(p, t, first * dt, NOT_KNOWN)
+        rk4(p, t, first * dt, STICK_SLIP_LIMITS.unknown)
         if not sliding:
             break
-        before = p.mode[event] * relative_velocity(p, STATE_AT, row)
+        before = p.mode[event] * relative_velocity(p, STICK_SLIP_LIMITS.state, row)
         end = p.mode[event] * relative_velocity(p, p.n, row)
         if not (before > end and abs(end) > 1e-9 * before):
             break
@@ -233,7 +231,7 @@ def _free_run(clock, u, start, scratch, n_dof, matrices, table, rows, spread, th
             mode[e] = STICK_SLIP_LIMITS.soft
         elif entry(p, e, LIMIT) != 0:
             frictional = True
-            rate = relative_velocity(p, STATE_AT, entry(p, e, ROW))
+            rate = relative_velocity(p, STICK_SLIP_LIMITS.state, entry(p, e, ROW))
             if rate != 0.0:
                 mode[e] = 1.0 if rate > 0.0 else -1.0
             else:
@@ -244,7 +242,7 @@ def _free_run(clock, u, start, scratch, n_dof, matrices, table, rows, spread, th
         share = 1.0 / substeps[k]
         for j in range(u.shape[1]):
             work[load + j] = u[k * max(load_factor, 1), j]
-        derivative(p, t, STATE_AT, 3 * n, load)
+        derivative(p, t, STICK_SLIP_LIMITS.state, 3 * n, load)
         for i in range(n_dof):
             position[k, i] = work[i]
             velocity[k, i] = work[n_dof + i]
@@ -278,12 +276,17 @@ def _free_run(clock, u, start, scratch, n_dof, matrices, table, rows, spread, th
 def full(table: NDArray[np.int64]) -> NDArray[np.int64]:
     """An element table with all its columns."""
     missing = COLUMNS - table.shape[1]
-    return np.ascontiguousarray(np.pad(table, ((0, 0), (0, missing))) if missing else table)
+    return plain(np.pad(table, ((0, 0), (0, missing))) if missing else table)
+
+
+def plain(values: NDArray[Any]) -> NDArray[Any]:
+    """The same array, contiguous and writable: numba compiles a loop once for each kind of array that comes."""
+    return np.require(values, requirements=("C", "W"))
 
 
 def steps_of_each(substeps: int | NDArray[np.int64], n: int) -> NDArray[np.int64]:
-    """Steps of every sample (n,), where one number may stand for all; a copy, since a read-only view has loops compiled of its own."""
-    return np.array(np.broadcast_to(substeps, n), dtype=np.int64)
+    """Steps of every sample (n,), where one number may stand for all."""
+    return plain(np.broadcast_to(np.asarray(substeps, dtype=np.int64), n))
 
 
 def free_run(
@@ -317,7 +320,7 @@ def free_run(
     matrices = np.ascontiguousarray(
         np.hstack([inverse @ structure.stiffness, inverse @ structure.damping, inverse @ structure.inputs])
     )
-    rows = np.ascontiguousarray(elements.rows if elements.rows.size else np.zeros((0, n_dof)))
+    rows = plain(elements.rows if elements.rows.size else np.zeros((0, n_dof)))
     y = np.zeros(2 * n_dof + len(elements.start))
     if start is not None:
         y[: 2 * n_dof] = start
@@ -332,8 +335,8 @@ def free_run(
     )
     motion = Motion(np.zeros((n, n_dof)), np.zeros((n, n_dof)), np.zeros((n, n_dof)))
     _free_run(
-        (step, start_time, steps_of_each(substeps, n), load_factor), np.ascontiguousarray(loads), y, scratch, n_dof, matrices,
+        (step, start_time, steps_of_each(substeps, n), load_factor), plain(loads), y, scratch, n_dof, matrices,
         full(elements.table), rows,
-        np.ascontiguousarray(inverse @ rows.T), elements.theta, tuple(motion),
+        np.ascontiguousarray(inverse @ rows.T), plain(elements.theta), tuple(motion),
     )  # fmt: skip
     return motion
