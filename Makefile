@@ -2,7 +2,9 @@ PYTHON ?= python3
 BIN := .venv/bin
 # pyNastran's metadata asks for numpy < 2; the tests use its bulk-data reader, which runs with numpy 2.
 NASTRAN := pyNastran==1.4.1 cpylog docopt-ng
-# Python compiles what is imported; pip would compile all of it first, which takes a minute.
+# Python keeps the bytecode of what it imports, also where it is told not to: the tests start a hundred processes. So pip need not
+# compile everything first, which takes a minute.
+unexport PYTHONDONTWRITEBYTECODE
 PIP := $(BIN)/python -m pip install --quiet --no-compile
 
 .PHONY: demo test test-minimum lint types layers wheel results docs clean

@@ -113,12 +113,12 @@ QUIET = BlindOptions(
 )  # fmt: skip
 
 
-def _case(effect: str, seed: int):
+def _case(effect: str, seed: int, duration: float = QUIET.duration):
     import dataclasses
 
     from bench.discrepancy.blind.protocol import draw_case
 
-    options = dataclasses.replace(QUIET, effects=(effect,))
+    options = dataclasses.replace(QUIET, effects=(effect,), duration=duration)
     return draw_case(effect, np.random.default_rng(seed), options)[0]
 
 
@@ -166,7 +166,7 @@ def test_sysid_names_an_effect_of_its_own_when_it_is_plain():
 
     # the whole catalogue takes it minutes
     catalogue = [effect_named(name) for name in ("gap", "cubic_stiffness")]
-    placed, _ = peer_sysid.diagnose(_case("gap", 5), catalogue=catalogue, seconds=1e4)
+    placed, _ = peer_sysid.diagnose(_case("gap", 5, 2.0), catalogue=catalogue, seconds=1e4)
     assert placed is not None
     assert placed.effect.name == "gap"
 
