@@ -20,17 +20,22 @@ if TYPE_CHECKING:
     )
     from bench.discrepancy.case.reading import read_case
     from bench.discrepancy.diagnosis import Diagnosis, diagnose, diagnose_folder
+    from bench.discrepancy.effects.catalogue import CATALOGUE
+    from bench.discrepancy.effects.effect import Effect, FreeParameter
     from bench.discrepancy.report.html_page import write_report
     from bench.discrepancy.report.rerun_recording import write_rerun
     from bench.discrepancy.verdict import Verdict
 
 _HOMES = {
+    "CATALOGUE": "effects.catalogue",
     "BlindOptions": "blind.protocol",
     "BlindScore": "blind.scoring",
     "Case": "case.case",
     "CaseChannel": "case.case",
     "CaseRecord": "case.case",
     "Diagnosis": "diagnosis",
+    "Effect": "effects.effect",
+    "FreeParameter": "effects.effect",
     "NominalParameter": "case.case",
     "Verdict": "verdict",
     "diagnose": "diagnosis",
@@ -45,12 +50,15 @@ _HOMES = {
 }
 
 __all__ = [
+    "CATALOGUE",
     "BlindOptions",
     "BlindScore",
     "Case",
     "CaseChannel",
     "CaseRecord",
     "Diagnosis",
+    "Effect",
+    "FreeParameter",
     "NominalParameter",
     "Verdict",
     "diagnose",
