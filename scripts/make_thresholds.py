@@ -14,6 +14,7 @@ HEAD = """# Thresholds
 Every threshold of the diagnosis is a field of a small frozen dataclass in `bench.discrepancy.settings`, one a room. This page is
 written from them by `scripts/make_thresholds.py`. Another value is passed as `diagnose(case, settings=…)`, or from a file:
 
+<!-- not run: takes your case and thresholds -->
 ```sh
 jointbench diagnose CASE --settings thresholds.toml
 ```

@@ -12,7 +12,7 @@ from bench.discrepancy.articulated_search.effect import ArticulatedEffect
 from bench.discrepancy.effects.catalogue import CATALOGUE as LINEAR
 from bench.discrepancy.effects.effect import Effect, FreeParameter
 from bench.figures.look import COLOURS, REFERENCE_COLOUR, save, style
-from documentation import equations
+from documentation import equations, looks
 
 LOOKS = {
     "coulomb_friction": "The missing force is a step at every reversal of the velocity, the same at every amplitude. Free decays end after finitely many swings, along straight lines. Small motions are damped most.",
@@ -165,6 +165,16 @@ def page(name: str) -> str:
             f"The law: [`{law}`](../laws/{law}.md).",
             "",
         ]
+    elif name in looks.PICTURED:
+        lines += [f"![A small example with and without {name}](pictures/{name}.png)", ""]
+    elif name.removeprefix("scheduled_") in {e.name for e in LINEAR if e.law is not None}:
+        law = next(
+            e.law.name for e in LINEAR if e.law is not None and e.name == name.removeprefix("scheduled_")
+        )
+        lines += [
+            f"![Force of the law {law}, of which this is a multiple](../laws/pictures/{law}.png)",
+            "",
+        ]
     elif linear is not None and _drawn(linear):
         lines += [f"![What {name} makes of a swept sine](pictures/{name}.png)", ""]
     if linear is not None:
@@ -212,9 +222,11 @@ def pages() -> dict[str, str]:
 
 
 def draw_all(docs: Path) -> None:
-    """Draw the pictures of all effects on channels."""
+    """Draw the pictures of all effects that have no law to show."""
     folder = docs / "reference" / "effects" / "pictures"
     folder.mkdir(parents=True, exist_ok=True)
     for effect in LINEAR:
         if _drawn(effect):
             draw(effect, folder / f"{effect.name}.png")
+    for name in looks.PICTURED:
+        looks.draw(name, folder / f"{name}.png")
