@@ -77,7 +77,7 @@ class Worker:
         path = os.pathsep.join([str(checkout.resolve()), str(checkout.resolve() / "scripts")])
         self.checkout = checkout.resolve()
         self.process = subprocess.Popen(
-            [sys.executable, str(Path(script).resolve()), "--worker"],
+            [sys.executable, "-P", str(Path(script).resolve()), "--worker"],
             env={**os.environ, "PYTHONPATH": path}, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
         )  # fmt: skip
         home = Path(self.ask({})["home"])
