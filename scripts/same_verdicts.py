@@ -77,7 +77,7 @@ class Worker:
         path = os.pathsep.join([str(checkout.resolve()), str(checkout.resolve() / "scripts")])
         self.checkout = checkout.resolve()
         self.process = subprocess.Popen(
-            [sys.executable, "-P", str(Path(script).resolve()), "--worker"],
+            [sys.executable, str(Path(script).resolve()), "--worker"],
             env={**os.environ, "PYTHONPATH": path}, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
         )  # fmt: skip
         home = Path(self.ask({})["home"])
@@ -207,6 +207,7 @@ def compare(args: Args) -> Iterator[Compared]:
 def main() -> int:
     """Compare and print."""
     if sys.argv[1:] == ["--worker"]:
+        sys.path.pop(0)  # the scripts beside this one: those of the checkout are meant
         work(_answer)
         return 0
     import tyro
