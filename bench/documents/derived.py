@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import types
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import MISSING, fields, is_dataclass
@@ -106,15 +107,16 @@ def attributes_of(described: type[Any]) -> dict[str, str]:
     """The description of each attribute in a Google-style docstring."""
     found: dict[str, str] = {}
     name = ""
-    _, _, block = (described.__doc__ or "").partition("Attributes:")
+    # Python 3.13 takes the common indentation off by itself
+    _, _, block = inspect.cleandoc(described.__doc__ or "").partition("Attributes:")
     for line in block.splitlines():
         indent, text = len(line) - len(line.lstrip()), line.strip()
         head, colon, rest = text.partition(": ")
-        if indent == 8 and colon and all(part.strip().isidentifier() for part in head.split(",")):
+        if indent == 4 and colon and all(part.strip().isidentifier() for part in head.split(",")):
             name = head
             found |= {part.strip(): rest for part in head.split(",")}
-        elif indent > 8 and name:
+        elif indent > 4 and name:
             found |= {part.strip(): f"{found[part.strip()]} {text}" for part in name.split(",")}
-        elif text and indent < 8:
+        elif text and indent < 4:
             break
     return found
