@@ -60,6 +60,9 @@ LOOKS = {
 }
 """How an effect looks in records, by name; that of sensors is told by `_sensor_look`."""
 
+LAWS = {effect.name: effect.law.name for effect in LINEAR if effect.law is not None}
+"""Law of an effect, by their names."""
+
 SENSOR = {
     "gain_error": "The channel is off by a factor, at all frequencies; the other channels of the same motion are right.",
     "delay": "The channel lags all others by a constant time.",
@@ -167,14 +170,9 @@ def page(name: str) -> str:
         ]
     elif name in looks.PICTURED:
         lines += [f"![A small example with and without {name}](pictures/{name}.png)", ""]
-    elif name.removeprefix("scheduled_") in {e.name for e in LINEAR if e.law is not None}:
-        law = next(
-            e.law.name for e in LINEAR if e.law is not None and e.name == name.removeprefix("scheduled_")
-        )
-        lines += [
-            f"![Force of the law {law}, of which this is a multiple](../laws/pictures/{law}.png)",
-            "",
-        ]
+    elif name.removeprefix("scheduled_") in LAWS:
+        law = LAWS[name.removeprefix("scheduled_")]
+        lines += [f"![Force of the law {law}, of which this is a multiple](../laws/pictures/{law}.png)", ""]
     elif linear is not None and _drawn(linear):
         lines += [f"![What {name} makes of a swept sine](pictures/{name}.png)", ""]
     if linear is not None:

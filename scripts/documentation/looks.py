@@ -3,78 +3,57 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from bench.arrays import Array
+from bench.discrepancy.multibody.joint_run import SLOTS, Slot, predict
 from bench.figures.look import COLOURS, REFERENCE_COLOUR, save, style
 
 STEP = 1e-3
 
 
-@dataclass(frozen=True)
-class ServoJoint:
-    """A link behind a servo, under gravity; SI units.
+INERTIA, MOTOR, WEIGHT = 0.07, 0.02, 2.0
+"""Of the servo's joint: all inertia, the motor's part of it [kg m^2], and the gravity torque of the level link [N m]."""
 
-    Attributes:
-        inertia, motor: Of link and motor, about the joint.
-        weight, aside: Gravity torque of the link when level, and of a centre of mass beside its axis.
-        kp, damping: Of the servo and the bearing.
-        deadband: Torque below which the drive does nothing.
-        lag: Time constant of a filter of the target; 0 for none.
-        train, clearance: Stiffness between motor and link and half of the play there; stiff where 0.
-    """
-
-    inertia: float = 0.05
-    motor: float = 0.02
-    weight: float = 2.0
-    aside: float = 0.0
-    kp: float = 12.0
-    damping: float = 0.35
-    deadband: float = 0.0
-    lag: float = 0.0
-    train: float = 0.0
-    clearance: float = 0.0
-
-    def follow(self, target: Array) -> Array:
-        """Angle of the link (n,), by semi-implicit Euler steps from rest at the first target."""
-        wanted = q = link = float(target[0])
-        v = w = 0.0
-        out = np.zeros(len(target))
-        for k, goal in enumerate(target):
-            wanted += (goal - wanted) * (1.0 if self.lag == 0.0 else STEP / self.lag)
-            torque = self.kp * (wanted - q)
-            torque = np.sign(torque) * max(abs(torque) - self.deadband, 0.0) - self.damping * v
-            load = -self.weight * np.cos(link) + self.aside * np.sin(link)
-            if self.train == 0.0:
-                v += STEP * (torque + load) / (self.inertia + self.motor)
-                q += STEP * v
-                link = q
-            else:
-                apart = q - link
-                beyond = np.sign(apart) * max(abs(apart) - self.clearance, 0.0)
-                through = self.train * beyond + (0.05 * (v - w) if beyond else 0.0)
-                v += STEP * (torque - through) / self.motor
-                w += STEP * (load + through) / self.inertia
-                q, link = q + STEP * v, link + STEP * w
-            out[k] = link
-        return out
-
-
-SERVOS: dict[str, Callable[[ServoJoint], ServoJoint]] = {
-    "actuator_deadband": lambda joint: replace(joint, deadband=1.2),
-    "armature_error": lambda joint: replace(joint, motor=0.08),
-    "backlash": lambda joint: replace(joint, train=200.0, clearance=0.1),
-    "com_error": lambda joint: replace(joint, aside=1.5),
-    "gravity_compensation": lambda joint: replace(joint, weight=0.6),
-    "joint_compliance": lambda joint: replace(joint, train=12.0),
-    "servo_gain_error": lambda joint: replace(joint, kp=6.0),
-    "target_lag": lambda joint: replace(joint, lag=0.15),
+SERVO = {
+    Slot.GEAR: 1.0,
+    Slot.SERVO: 1.0,
+    Slot.KP: 12.0,
+    Slot.DAMPING: 0.35,
+    Slot.RATIO: 1.0,
+    Slot.LOW: -50.0,
+    Slot.HIGH: 50.0,
 }
-"""The servo's joint with an effect, by its name."""
+"""The servo's joint: a link behind a position servo, under gravity."""
+
+TRAIN = {Slot.TRAIN: 1.0, Slot.MOTOR: MOTOR, Slot.TRAIN_DAMPING: 0.05}
+SERVOS: dict[str, dict[Slot, float]] = {
+    "actuator_deadband": {Slot.DEADBAND: 0.1},
+    "armature_error": {Slot.INERTIA: 0.06},
+    "backlash": {**TRAIN, Slot.TRAIN_STIFFNESS: 200.0, Slot.CLEARANCE: 0.1},
+    "com_error": {Slot.STIFFNESS: 1.5},  # a centre of mass aside turns its torque with the posture
+    "gravity_compensation": {Slot.OFFSET: 1.4},
+    "joint_compliance": {**TRAIN, Slot.TRAIN_STIFFNESS: 12.0},
+    "servo_gain_error": {Slot.KP: 6.0},
+    "target_lag": {Slot.INPUT_LAG: 0.15},
+}
+"""What an effect changes of the servo's joint, by its name."""
+
+
+def follow(target: Array, change: dict[Slot, float], weight: float) -> Array:
+    """Angle of the link (n,) as the simulator of the fits has it, from rest."""
+    n = len(target)
+    p = np.zeros(SLOTS)
+    for slot, value in (SERVO | change).items():
+        p[slot] = value
+    none = np.zeros(n)
+    arrays = np.full(n, INERTIA), np.full(n, weight), none, none, none
+    _, states = predict(p, arrays, target, STEP, 1, (none, np.zeros(0)), np.zeros((2, 2)), np.zeros((1, 2)))
+    return states[:, 2]
+
 
 RESPONSES: dict[str, tuple[float, float, float]] = {
     "damping_error": (1.0, 1.8, 1.0),
@@ -83,9 +62,14 @@ RESPONSES: dict[str, tuple[float, float, float]] = {
 }
 """Factors of mass, damping and stiffness, by the name of the effect."""
 
+
+def _crosstalk(time: Array, x: Array) -> Array:
+    return x + 0.25 * np.sin(2 * np.pi * 6.0 * time)
+
+
 CHANNELS: dict[str, Callable[[Array, Array], Array]] = {
-    "acceleration_crosstalk": lambda time, x: x + 0.25 * np.sin(2 * np.pi * 6.0 * time),
-    "displacement_crosstalk": lambda time, x: x + 0.25 * np.sin(2 * np.pi * 6.0 * time),
+    "acceleration_crosstalk": _crosstalk,
+    "displacement_crosstalk": _crosstalk,
     "position_delay": lambda time, x: np.interp(time - 0.06, time, x),
     "position_gain_error": lambda time, x: 1.35 * x,
     "position_offset": lambda time, x: x + 0.3,
@@ -117,15 +101,9 @@ def _curves(name: str) -> tuple[tuple[str, str], Array, Array, Array]:
     time = np.arange(0.0, 3.0, STEP)
     if name in SERVOS:
         target = 0.5 * np.sin(2 * np.pi * 0.5 * time) + 0.2 * (time > 1.5)
-        joint = (
-            ServoJoint() if name != "backlash" else ServoJoint(weight=0.0)
-        )  # a weight holds a link on one flank
-        return (
-            ("time [s]", "angle of the link [rad]"),
-            time,
-            joint.follow(target),
-            SERVOS[name](joint).follow(target),
-        )
+        weight = 0.0 if name == "backlash" else WEIGHT  # it would hold the link on one flank
+        without, changed = (follow(target, change, weight) for change in ({}, SERVOS[name]))
+        return ("time [s]", "angle of the link [rad]"), time, without, changed
     if name in RESPONSES:
         frequency = np.linspace(1.0, 8.0, 400)
         s = 2j * np.pi * frequency

@@ -113,17 +113,8 @@ def driven_force(
     force = np.zeros_like(position)
     counts = steps_of_each(substeps, len(position))
     q, v = plain(position), plain(velocity)
-    _driven(
-        step,
-        start_time,
-        counts,
-        q,
-        v,
-        full(elements.table),
-        plain(elements.theta),
-        elements.start.copy(),
-        force,
-    )
+    theta, z = plain(elements.theta), elements.start.copy()
+    _driven(step, start_time, counts, q, v, full(elements.table), theta, z, force)
     return force
 
 
