@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -151,9 +152,16 @@ def placed(problem, *names):
     return tuple(Placed(effect_named(name), problem.structure.places[0]) for name in names)
 
 
-def explanation(problem, *names):
+def explanation(problem, *names, near=None):
+    """Fitted from the means of the priors, or from values by name."""
     hypothesis = placed(problem, *names)
-    start = np.concatenate([np.zeros(3), *([p.mean for p in e.effect.parameters] for e in hypothesis)])
+    start = np.zeros(3)
+    for e in hypothesis:
+        values = [p.mean for p in e.effect.parameters]
+        if near is not None:
+            pairs = zip(e.effect.parameters, near[e.effect.name], strict=True)
+            values = [p.eta(value, problem.scales_of(e)) for p, value in pairs]
+        start = np.append(start, values)
     return Explanation(((problem, fit(problem, hypothesis, start=start)),))
 
 
@@ -173,6 +181,35 @@ def test_an_effect_that_makes_the_judging_records_worse_goes():
     assert known.harm(explanations[0], rest) > 1.0 > known.harm(rest, explanations[1])
     named = judge(case, problem, explanations, np.random.default_rng(0)).chosen.explanation.hypothesis
     assert [p.effect.name for p in named] == ["quadratic_damping"]
+
+
+def test_what_accounts_for_all_that_another_effect_leaves_is_named_beside_it():
+    """A stop at the edge of resonance makes so large a discrepancy that friction closes a small part of it."""
+
+    def stopped(friction, pull):
+        def forces(x, v, z):
+            gap = 5e3 * (max(x - 0.005, 0.0) + min(x + 0.005, 0.0))
+            resonator, rates = only_resonating(x, v, z)
+            return gap + friction * math.tanh(v / 1e-3) + pull * resonator, rates
+
+        case = planted_case(lambda f: motion_with(f, forces, hidden=2), n=1500, noise=UNSTATED)
+        problem = problem_of(case, crude_error(case, structure_of(case)))
+        near = {"gap": (5e3, 0.005), "coulomb_friction": (0.6,)}
+        both, gap, nothing = (
+            explanation(problem, *names, near=near) for names in (("gap", "coulomb_friction"), ("gap",), ())
+        )
+        known = Discrepancies(case, problem)
+        assert known.closed(both, gap, nothing) < problem.settings.judgement.coarse.material
+        named = judge(case, problem, [both, gap, nothing], np.random.default_rng(0)).chosen.explanation
+        return known.beside(both, gap), [p.effect.name for p in named.hypothesis]
+
+    (lacking, left), named = stopped(0.6, 0.0)
+    assert lacking > 0.05
+    assert left < 0.05
+    assert named == ["gap", "coulomb_friction"]
+    (_, left), named = stopped(0.0, 1.0)  # a small resonator, which friction does not account for
+    assert left > 0.2
+    assert named == ["gap"]
 
 
 def test_of_a_model_that_is_worse_than_no_motion_only_the_response_is_there_to_be_closed(monkeypatch):

@@ -247,10 +247,24 @@ def _pruned(
             smaller = [(0, nothing.explanation)]
         closed = [known.closed(entry.explanation, rest, nothing.explanation) for _, rest in smaller]
         least = int(np.argmin(closed))
-        if closed[least] >= settings.material:
+        if closed[least] >= settings.material or _accounts_for_it(
+            entry.explanation, smaller[least][1], known
+        ):
             return entry
         entry = _held_out_as(smaller[least][1], found)
     return entry
+
+
+def _accounts_for_it(explanation: Explanation, rest: Explanation, known: Discrepancies) -> bool:
+    """Whether an effect is likelier than not the cause of what the others leave, where that is more than a right model would.
+
+    What they leave may be small beside a large discrepancy and be an effect all the same: friction beside a gap. The rule is that of
+    `outside` at even odds: small things besides are no rarer than a further effect.
+    """
+    settings = explanation.settings
+    lacking, left = known.beside(explanation, rest)
+    m = settings.judgement.coarse.background
+    return lacking > settings.likelihood.error.crude and m * float(np.exp(left / m)) < 1.0
 
 
 def _borne_out(entry: HeldOut, found: Sequence[HeldOut], known: Discrepancies) -> HeldOut:

@@ -21,6 +21,7 @@ class Discrepancies:
     def __init__(self, case: Case, problem: Problem) -> None:
         self.case, self.problem = case, problem
         self._floor = noise_floors(problem, case.validation)
+        self._own_floor = noise_floors(problem, case.identification)
         self._kept: dict[tuple[Explanation, bool], Array] = {}
 
     def of(self, explanation: Explanation, *, judging: bool) -> Array:
@@ -40,6 +41,18 @@ class Discrepancies:
         """Part of the discrepancy of `nothing`, on the records for identification, that goes with what one has and the other lacks."""
         before, left, right = (self.of(e, judging=False) for e in (nothing, without, explanation))
         return float(np.max((left - right) / np.maximum(before, 1e-300)))
+
+    def beside(self, explanation: Explanation, without: Explanation) -> tuple[float, float]:
+        """What one leaves that lacks an effect, and the part of its power that is left with it, on the records for identification.
+
+        Noise is taken off both; of the coordinate where the former, an NRMSE, is largest.
+        """
+        lacking, left = (
+            np.sqrt(np.maximum(self.of(e, judging=False) ** 2 - self._own_floor**2, 0.0))
+            for e in (without, explanation)
+        )
+        widest = int(np.argmax(lacking))
+        return float(lacking[widest]), float((left[widest] / max(lacking[widest], 1e-300)) ** 2)
 
     def pays(self, explanation: Explanation, nothing: Explanation, part: float) -> bool:
         """Whether an explanation leaves at most a part of the judging records' discrepancy, beyond noise, on some coordinate and no
