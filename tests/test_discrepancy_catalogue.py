@@ -22,10 +22,12 @@ from planted_cases import (
     pinched,
     planted_case,
 )
+from scipy.signal import lsim
 
 from bench.discrepancy import diagnose
 from bench.discrepancy.case.channel_noise import quantisation_step, raised_noise
 from bench.discrepancy.effects.catalogue import CATALOGUE, effect_named
+from bench.discrepancy.effects.channel_operators import low_pass
 from bench.discrepancy.effects.effect import unit_of
 from bench.laws import LAWS
 from bench.laws.evaluate import evaluate
@@ -147,12 +149,28 @@ SENSORS = (
     "displacement_crosstalk", "acceleration_crosstalk", "displacement_polarity", "acceleration_polarity",
     "displacement_gain_error", "acceleration_gain_error", "displacement_bias", "acceleration_bias",
     "displacement_clipping", "acceleration_clipping", "displacement_delay", "acceleration_delay",
+    "displacement_lag", "acceleration_lag",
 )  # fmt: skip
+
+
+def filtered(x, tau):
+    """What an amplifier with a low-pass of first order makes of a signal."""
+    return lsim(([1.0], [tau, 1.0]), x, np.arange(len(x)) / SAMPLE_RATE)[1]
+
+
+def test_a_low_pass_starts_at_the_first_sample_and_is_exact_between_samples():
+    x = np.sin(np.arange(500) / 7.0)
+    np.testing.assert_allclose(
+        low_pass(x, np.array([0.006]), 1.0 / SAMPLE_RATE), filtered(x, 0.006), atol=1e-12
+    )
+    np.testing.assert_allclose(low_pass(x + 3.0, np.array([0.006]), 1.0 / SAMPLE_RATE)[:1], x[:1] + 3.0)
 
 
 @pytest.mark.parametrize(
     ("name", "measured"),
     [
+        ("displacement_lag", lambda x, a, f: (filtered(x, 0.01), a)),
+        ("acceleration_lag", lambda x, a, f: (x, filtered(a, 0.01))),
         ("displacement_crosstalk", lambda x, a, f: (x + 5e-5 * f, a)),
         ("acceleration_crosstalk", lambda x, a, f: (x, a + 0.05 * f)),
         ("displacement_polarity", lambda x, a, f: (-x, a)),

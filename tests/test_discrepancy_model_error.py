@@ -29,6 +29,9 @@ from bench.discrepancy.localisation.remainder import free_force
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.search.explanation import Explanation
+from bench.discrepancy.search.extension import _begun_faint, _Offers, first_fit
+from bench.discrepancy.search.fits import Search
+from bench.discrepancy.search.forward_selection import _leaves_much
 from bench.discrepancy.verdict import NominalEstimate, far_off
 
 FEW = [
@@ -347,6 +350,49 @@ def test_noise_that_is_larger_than_stated_is_said_and_nothing_is_missing_for_it(
     said = [note for note in verdict.warnings if "larger than stated" in note]
     assert [note.split("'")[1] for note in said] == ["displacement", "acceleration"]
     assert "larger than stated" in verdict.explanation
+
+
+def test_a_law_that_is_bent_to_what_no_catalogue_holds_is_not_named():
+    """Spheres that touch, and a catalogue of cubic springs."""
+    few = [effect_named("cubic_stiffness"), effect_named("quadratic_stiffness")]
+
+    def verdict(force):
+        case = planted_case(lambda f: motion_with(f, lambda x, v, z: (force(x), [])), n=1500, noise=UNSTATED)
+        return diagnose(case, catalogue=few).verdict
+
+    touching = verdict(lambda x: 1e4 * max(x, 0.0) ** 1.5)
+    assert (touching.verdict, touching.closure) == ("unknown", "free_displacement")
+    assert "a single smooth force of the displacement" in touching.explanation
+    assert [e.name for e in touching.nearest] == ["cubic_stiffness"]
+    assert [e.name for e in verdict(lambda x: 4e5 * x**3).named] == ["cubic_stiffness"]
+
+
+def test_a_further_effect_that_made_it_worse_is_begun_again_faint():
+    case = planted_case(lambda f: motion_with(f, lambda x, v, z: (4e5 * x**3, [])), n=1500, noise=UNSTATED)
+    problem = problem_of(case, crude_error(case, structure_of(case)))
+    search, base = Search(problem), explanation(problem, "cubic_stiffness").parts[0][1]
+    stopped = (*base.hypothesis, *placed(problem, "gap"))
+    eta = np.array([1.0, -1.5])  # stiff and tight: another motion
+    task = (stopped, np.append(base.vector, eta))
+    worse = first_fit(problem, *task)
+    search.add(worse)
+    (again,) = _begun_faint(search, _Offers(base, [task], []))
+    assert np.all(again[1][:, -2] < eta[0])
+    found = first_fit(problem, *again)
+    assert found.cost < min(worse.cost, 1.01 * base.cost)
+    # what is better than its base already is left alone, and so is everything where noise decides
+    search.add(replace(found, cost=0.5 * base.cost))
+    assert not list(_begun_faint(search, _Offers(base, [task], [])))
+    assert not list(_begun_faint(Search(problem_of(case)), _Offers(base, [task], [])))
+
+
+def test_a_hypothesis_weighed_by_what_itself_leaves_may_leave_much():
+    case = planted_case(lambda f: motion_with(f, lambda x, v, z: (4e5 * x**3, [])), n=1500, noise=UNSTATED)
+    problem = problem_of(case, crude_error(case, structure_of(case)))
+    nothing, right = (explanation(problem, *names).parts[0][1] for names in ((), ("cubic_stiffness",)))
+    assert _leaves_much(problem, nothing)
+    assert not _leaves_much(problem, right)
+    assert not _leaves_much(problem_of(case), nothing)
 
 
 def test_what_there_is_no_time_for_is_left_out_and_said():

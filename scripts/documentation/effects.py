@@ -66,6 +66,7 @@ LAWS = {effect.name: effect.law.name for effect in LINEAR if effect.law is not N
 SENSOR = {
     "gain_error": "The channel is off by a factor, at all frequencies; the other channels of the same motion are right.",
     "delay": "The channel lags all others by a constant time.",
+    "lag": "The channel lags all others and fades with the frequency: an amplifier, or a filter that nobody stated.",
     "bias": "The channel is off by a constant.",
     "offset": "The channel is off by a constant. Where a servo acts on it, the joint is.",
     "drift": "The channel runs away along the record.",

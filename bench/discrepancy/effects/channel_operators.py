@@ -60,6 +60,18 @@ def lag(x: Samples, values: Samples, step: float) -> Samples:
     return np.asarray(lfilter([share], [1.0, share - 1.0], x))
 
 
+def low_pass(x: Samples, values: Samples, step: float) -> Samples:
+    """Return the reading of `x` through an analogue low-pass of first order, ``tau y' + y = x``, exact for lines between samples.
+
+    It begins at the first sample, as a sensor that was on before the record.
+    """
+    ratio = step / values[0]
+    kept = np.exp(-ratio)
+    mean = -np.expm1(-ratio) / ratio  # of the kept part over a sample
+    rise = lfilter([1.0 - mean, mean - kept], [1.0, -kept], x - x[0])
+    return np.asarray(x[0] + rise)
+
+
 def gain(x: Samples, values: Samples, step: float) -> Samples:
     """Return ``(1 + e) x``."""
     return (1.0 + values[0]) * x

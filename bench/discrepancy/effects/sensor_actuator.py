@@ -50,6 +50,19 @@ def _sensor_delay(
     )
 
 
+def _sensor_lag(channel: str, quantity: str, symbol: str) -> Effect:
+    return Effect(
+        f"{channel}_lag",
+        "sensor",
+        "sensor",
+        (_time("time_constant", 0.003, 0.01),),
+        f"tau y' + y = {symbol}, y what is read",
+        signal=signals.low_pass,
+        quantity=quantity,
+        log_prior=-1.0,
+    )
+
+
 def _sensor_gain_error(channel: str, quantity: str, symbol: str, log_prior: float = 0.0) -> Effect:
     return Effect(
         f"{channel}_gain_error",
@@ -174,15 +187,18 @@ CHANNELS: tuple[Effect, ...] = (
         quantity="position",
     ),
     _sensor_delay("displacement", "position", "x", (0.003, 0.01, 0.03)),
+    _sensor_lag("displacement", "position", "x"),
     _sensor_gain_error("displacement", "position", "x"),
     _sensor_bias("displacement", "position", "x", log_prior=-1.0),
     _sensor_clipping("displacement", "position", "x", log_prior=-1.0),
     _sensor_gain_error("acceleration", "acceleration", "a", log_prior=-1.0),
     _sensor_delay("acceleration", "acceleration", "a", (0.003, 0.01), log_prior=-1.0),
+    _sensor_lag("acceleration", "acceleration", "a"),
     _sensor_bias("acceleration", "acceleration", "a", log_prior=-1.0),
     _sensor_clipping("acceleration", "acceleration", "a", log_prior=EFFECT_SETTINGS.rare),
     _sensor_gain_error("velocity", "velocity", "v", log_prior=-1.0),
     _sensor_delay("velocity", "velocity", "v", (0.003, 0.01), log_prior=-1.0),
+    _sensor_lag("velocity", "velocity", "v"),
     _sensor_bias("velocity", "velocity", "v", log_prior=-1.0),
     *(
         Effect(

@@ -12,7 +12,9 @@ from bench.discrepancy.fitting.goodness_of_fit import consistent, names
 from bench.discrepancy.fitting.map_fit import fit
 from bench.discrepancy.judgement import posterior as evidence
 from bench.discrepancy.judgement.coarse import Judged, judge
+from bench.discrepancy.judgement.discrepancies import Discrepancies
 from bench.discrepancy.judgement.finding import Finding
+from bench.discrepancy.judgement.nonparametric_rival import Rival, likelier_force
 from bench.discrepancy.likelihood.model_error import ModelInadequacy, crude_error, error_left, own_noise
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.rigs import structure_of
@@ -81,7 +83,11 @@ def _left(case: Case, explanations: Sequence[Explanation]) -> ModelInadequacy:
 
 
 def coarse_finding(
-    case: Case, problem: Problem, explanations: Sequence[Explanation], rng: np.random.Generator
+    case: Case,
+    problem: Problem,
+    explanations: Sequence[Explanation],
+    rng: np.random.Generator,
+    deadline: Deadline = NEVER,
 ) -> Finding:
     """Weigh explanations by prediction and say what is missing.
 
@@ -90,6 +96,7 @@ def coarse_finding(
         problem: Its problem on all degrees of freedom.
         explanations: Weighed by the error of the model, by decreasing posterior.
         rng: For bootstraps.
+        deadline: When nothing is doubted any more.
     """
     factors = _noise_over_stated(problem, explanations[0])
     threshold = problem.settings.judgement.noise_understated
@@ -100,8 +107,11 @@ def coarse_finding(
     noise = not chosen.hypothesis and not judged.vetoed and _explained_by_noise(problem, factors)
     understated = _larger_than_stated(factors, 1.0) if noise else understated
     kind = "none" if noise else _kind(problem, judged)
-    least = problem.settings.likelihood.error.least  # the gains of sensors are known to no better
+    doubted = kind == "effect" and deadline.allows("free forces in place of the laws")
     nothing = next(entry for entry in judged.found if not entry.explanation.hypothesis)
+    rival = _rival(Discrepancies(case, problem), chosen, nothing.explanation) if doubted else None
+    kind = "unknown" if rival else kind
+    least = problem.settings.likelihood.error.least  # the gains of sensors are known to no better
     first = judged.chosen if kind == "effect" else nothing
     rest = sorted(
         (pair for pair in zip(judged.weights, judged.found, strict=True) if pair[1] is not first),
@@ -114,7 +124,8 @@ def coarse_finding(
         named=evidence.effects_of(chosen, probabilities, least) if kind == "effect" else (),
         ranking=tuple(Ranked(*key, p) for key, p in sorted(probabilities.items(), key=lambda item: -item[1])),
         indistinguishable=_sets(judged),
-        words=NOISE_ALONE if noise else _words(kind, judged, nearest, stated=problem.noise_stated),
+        words=NOISE_ALONE if noise else _words(kind, judged, nearest, rival, stated=problem.noise_stated),
+        rival=rival,
         nearest=evidence.effects_of(nearest, probabilities, least) if kind == "unknown" else (),
         closest=nearest if kind == "unknown" and nearest.hypothesis else None,
         notes=understated,
@@ -129,6 +140,17 @@ def _kind(problem: Problem, judged: Judged) -> VerdictKind:
         return "effect" if judged.agreed >= judged.settings.kind else "unknown"
     # noise that is stated and is not all that is left is something that is missing, whatever it be
     return "unknown" if problem.noise_stated or judged.missing else "none"
+
+
+def _rival(known: Discrepancies, chosen: Explanation, nothing: Explanation) -> Rival | None:
+    """A free force in place of what would be named, where that leaves more of the judging records than a right model does: laws may be
+    bent to what no catalogue holds. It has to be plainly likelier, and to shrink the judging records' discrepancy as a name has to."""
+    settings = chosen.settings
+    if known.beyond_noise(chosen) <= settings.likelihood.error.crude:
+        return None
+    rival = likelier_force([chosen], margin=settings.judgement.coarse.telling)
+    part = settings.judgement.coarse.pays
+    return rival if rival is not None and known.pays(rival.explanation, nothing, part) else None
 
 
 def _probabilities(kind: VerdictKind, judged: Judged) -> dict[str, float]:
@@ -234,7 +256,9 @@ def _other_kinds(judged: Judged) -> list[str]:
     return list(dict.fromkeys(others))
 
 
-def _words(kind: VerdictKind, judged: Judged, nearest: Explanation, *, stated: bool) -> str:
+def _words(
+    kind: VerdictKind, judged: Judged, nearest: Explanation, rival: Rival | None, *, stated: bool
+) -> str:
     chosen = judged.chosen.explanation
     others = _other_kinds(judged)
     if kind == "effect":
@@ -255,13 +279,15 @@ def _words(kind: VerdictKind, judged: Judged, nearest: Explanation, *, stated: b
             f"The nominal model leaves more than {least}, and no effect of the catalogue predicts the records better than it does with "
             "its parameters re-estimated."
         )
-    if chosen.hypothesis:
+    if chosen.hypothesis and rival is None:
         return (
             "Something is missing from the model, and what kind of thing it is stays open: no family of effects is likelier than all "
             f"others together. Nearest come {', and '.join([names(chosen.hypothesis), *others])}."
         )
     fate = (
-        "but does not shrink the discrepancy of the judging records"
+        evidence.likelier(rival.closure)
+        if rival
+        else "but does not shrink the discrepancy of the judging records"
         if judged.vetoed
         else "but does not predict the records better than the nominal model does with its parameters re-estimated"
     )

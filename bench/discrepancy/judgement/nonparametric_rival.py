@@ -72,22 +72,23 @@ class _Promise(NamedTuple):
     penalty: float
 
 
-def likelier_force(explanations: Sequence[Explanation]) -> Rival | None:
+def likelier_force(explanations: Sequence[Explanation], *, margin: float = 0.0) -> Rival | None:
     """The best explanation with one free force in place of all effects of a group of degrees of freedom, where that is likelier.
 
     Args:
         explanations: By effects of the catalogue, the best first.
+        margin: By how much the log posterior has to be higher.
 
     Returns:
         The likelier explanation; None where the laws are likelier, in every group.
     """
     best = explanations[0]
-    if not best.noise_stated or any(problem.windowed for problem, _ in best.parts):
+    if not best.scaled or any(problem.windowed for problem, _ in best.parts):
         return None
     parts, free = [], []
     for problem, fitted in best.parts:
         contacts = _contacts(problem, explanations) if fitted.hypothesis else []
-        rival = _rival(problem, fitted, contacts) if fitted.hypothesis else None
+        rival = _rival(problem, fitted, contacts, margin) if fitted.hypothesis else None
         parts.append((problem, rival or fitted))
         free += [rival.hypothesis[0].effect.name] if rival else []
     return Rival(Explanation(tuple(parts)), " + ".join(dict.fromkeys(free))) if free else None
@@ -104,10 +105,10 @@ def _contacts(problem: Problem, explanations: Sequence[Explanation]) -> list[Fit
     return list(dict.fromkeys(found.values()))
 
 
-def _rival(problem: Problem, fitted: Fit, contacts: Sequence[Fit]) -> Fit | None:
+def _rival(problem: Problem, fitted: Fit, contacts: Sequence[Fit], margin: float) -> Fit | None:
     """The fit of a single force alone, where it is likelier than a hypothesis; the likeliest one."""
     settings = problem.settings.search
-    best, most = None, posterior(fitted)
+    best, most = None, posterior(fitted) + margin
     for placed, start, penalty in [*_damped(problem, contacts), *_free(problem, fitted)]:
         rival = fit(
             problem, (placed,), start=start, iterations=settings.thorough, limit=fitted.cost + settings.sight

@@ -36,6 +36,11 @@ def outdone(closure: str) -> str:
     return f"explains the records, but {_forces(closure)}, which no law of the catalogue describes, does so better"
 
 
+def likelier(closure: str) -> str:
+    """What speaks against the nearest explanation, weighed by the error of the model, if closures are likelier."""
+    return f"but {_forces(closure)}, which no law of the catalogue describes, is likelier"
+
+
 def enough(closure: str) -> str:
     """What closures, their names joined by " + ", do where no explanation by the catalogue reaches the noise."""
     return f" But {_forces(closure)} would: with nothing else it leaves nothing but noise."

@@ -92,7 +92,7 @@ def found_of(case: Case, how: How, rng: np.random.Generator) -> tuple[Case, Find
     problem = Problem(
         case, structure_of(case, settings=how.settings), case.identification, settings=how.settings
     )
-    return case, coarse_finding(case, problem, explanations, rng)
+    return case, coarse_finding(case, problem, explanations, rng, how.deadline)
 
 
 def strained(explanation: Explanation, within: float) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +20,7 @@ from bench.discrepancy.screening.candidates import (
     refined,
     tells_motion,
 )
-from bench.discrepancy.screening.linear_amplitudes import Point
+from bench.discrepancy.screening.linear_amplitudes import Point, fainter
 from bench.discrepancy.screening.screen import Screen
 from bench.discrepancy.search.fits import Search, Task, carry_on, converge, limit_of
 
@@ -56,6 +56,7 @@ def extend(
         search.fit_all(lambda task: first_fit(search.problem, *task, limit=limit), tasks)
 
     fit_all(task for found in offers for task in found.tasks)
+    fit_all(task for found in offers for task in _begun_faint(search, found))
     for base, _, spare in offers:
         kept = _kept(search, base)
         fit_all(task for p, task in spare if p.gain > kept and search.start(base.hypothesis, p))
@@ -112,6 +113,25 @@ def _offers(
         ((*base.hypothesis, p.placed), np.append(base.vector, p.eta)) for p in inertia if p.gain > least
     ]
     return _Offers(base, tasks, spare)
+
+
+def _begun_faint(search: Search, offers: _Offers) -> Iterator[Task]:
+    """Fits of effects that left more than their base does, from the base and a faint effect: more is never worse, if fitted well.
+
+    At the size that a screening promises along one motion, friction or a stop may make another one, which no small step leads away from.
+    Where noise decides, three laws that are fitted so well soon imitate what no catalogue holds.
+    """
+    base = offers.base
+    n = len(base.vector)
+    weighed = base.hypothesis and search.problem.error is not None
+    for hypothesis, starts in offers.tasks if weighed else ():
+        placed, known = hypothesis[-1], search.fits.get(key_of(hypothesis))
+        if placed.effect.site != "joint" or (known is not None and known.cost < base.cost):
+            continue
+        etas = np.atleast_2d(starts)[:, n:]
+        parts = search.problem.settings.search.faint
+        faint = [fainter(placed, eta, part) for eta in etas for part in parts]
+        yield hypothesis, np.array([np.append(base.vector, eta) for eta in faint])
 
 
 def _kept(search: Search, base: Fit) -> float:

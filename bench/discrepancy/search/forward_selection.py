@@ -142,7 +142,7 @@ def _bases(search: Search, screen: Screen, size: int, *, best: Fit, nothing: Fit
         nothing.chi2 - best.chi2, effects=settings.several
     )
     plain = _plain_bases(search, best)
-    if not lacks and not plain and not _promising(screen, best):
+    if not lacks and not plain and not _promising(screen, best) and not _leaves_much(problem, best):
         return []
     return worth_extending(search, screen, size, 4 - size) if lacks else plain or [best]
 
@@ -154,6 +154,21 @@ def _worth_challenging(best: Fit, problem: Problem) -> bool:
     the error is a guess yet and what is found serves for no more than a better one.
     """
     return problem.error is None or (len(best.hypothesis) == 1 and not problem.error.crude)
+
+
+def _leaves_much(problem: Problem, fitted: Fit) -> bool:
+    """Whether a hypothesis leaves more of a response than a right model does, where what such a one leaves is how it is weighed.
+
+    What is weighed by what itself leaves is consistent by construction.
+    """
+    if problem.error is None or problem.windowed:
+        return False
+    for data in problem.data:
+        left = data.responses - problem.simulate(fitted.hypothesis, fitted.vector, data.record)
+        power = np.mean(left**2, axis=0) - problem.noise**2
+        if np.any(power > problem.error.settings.crude**2 * np.var(data.responses, axis=0)):
+            return True
+    return False
 
 
 def worth_extending(search: Search, screen: Screen, size: int, most: int) -> list[Fit]:

@@ -37,6 +37,11 @@ class SearchSettings:
         "Chance goes there once in 30 000.",
         unit="sigmas",
     )
+    faint: tuple[float, ...] = setting(
+        (0.3, 0.1, 0.03, 0.01),
+        "Parts of the promised size from which an effect that made its base worse is begun again; the fit takes the best.",
+        "Of a cubic spring and a stop four times too stiff, a tenth is another motion still, a hundredth is not.",
+    )
     immaterial: float = setting(
         1e-3,
         "Relative improvement of chi-squared that one more effect has to pay for.",
