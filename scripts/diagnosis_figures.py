@@ -79,16 +79,19 @@ def sealed(told: Any) -> Figures:
 
 def graded(told: Any) -> Figures:
     """Measured cases, each right, honest or wrong by what was written down before."""
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for case in told:
         names = " + ".join(f"{name} {p:.2f}" for name, p in case["named"].items())
         sets = "; ".join(" or ".join(one) for one in case["sets"])
         figure = f"{case['grade'] or 'not graded'}: {names or case['verdict']}" + (
             f" (declared: {sets})" if sets else ""
         )
-        rows.append((case["case"], figure, "right or honest"))
+        verdict = "holds" if case["grade"] in {"right", "honest"} else "does not hold"
+        rows.append((case["case"], figure, "right or honest", verdict if case["grade"] else ""))
     count = {grade: sum(case["grade"] == grade for case in told) for grade in ("right", "honest", "wrong")}
-    rows.append(("all", ", ".join(f"{n} {grade}" for grade, n in count.items()), "0 wrong"))
+    rows.append(
+        ("wrong", f"{count['wrong']} ({count['right']} right, {count['honest']} honest)", "at most 0")
+    )
     return rows
 
 
