@@ -257,10 +257,20 @@ def test_a_family_is_as_likely_as_what_has_an_effect_of_it():
         (),
     )
     found = tuple(HeldOut(explanation(problem, *names), np.ones(12)) for names in rivals)
+    known = Discrepancies(problem.case, problem)
     weights = np.array([0.2, 0.25, 0.3, 0.15, 0.1])
     for chosen, agreed in ((0, 0.45), (2, 0.45), (3, 0.45), (4, 0.0)):
         told = Judged(
-            found[chosen], found, weights, found, found, False, False, 0.0, problem.settings.judgement.coarse
+            found[chosen],
+            found,
+            weights,
+            found,
+            found,
+            False,
+            False,
+            0.0,
+            problem.settings.judgement.coarse,
+            known,
         )
         assert told.agreed == pytest.approx(agreed)
 

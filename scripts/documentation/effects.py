@@ -58,7 +58,7 @@ LOOKS = {
     "joint_compliance": "The link swings on behind its motor: a resonance that the motor's encoder hardly sees.",
     "backlash": "After each reversal of the torque the motor runs free for the width of the play, then strikes.",
 }
-"""How an effect looks in records, by name; that of sensors is told by `_sensor_look`."""
+"""How an effect looks in records, by name; that of sensors is told by `SENSOR`."""
 
 LAWS = {effect.name: effect.law.name for effect in LINEAR if effect.law is not None}
 """Law of an effect, by their names."""

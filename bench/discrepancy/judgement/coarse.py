@@ -40,6 +40,8 @@ class Judged:
         missing: Whether something is missing that no effect describes, although no noise is stated that would tell: the nominal model is
             off by more than sensors are calibrated to, and an effect was vetoed, or what it leaves is larger than the errors of models.
         left: Part of the power of the judged discrepancy, beyond noise, that the chosen one leaves.
+        settings: Thresholds.
+        known: What explanations leave of the records.
     """
 
     chosen: HeldOut
@@ -51,6 +53,7 @@ class Judged:
     missing: bool
     left: float
     settings: CoarseSettings
+    known: Discrepancies
 
     @property
     def outside(self) -> float:
@@ -145,6 +148,7 @@ def judge(
         missing,
         known.left(chosen.explanation, nothing.explanation),
         settings,
+        known,
     )
 
 
@@ -263,8 +267,9 @@ def _accounts_for_it(explanation: Explanation, rest: Explanation, known: Discrep
     """
     settings = explanation.settings
     lacking, left = known.beside(explanation, rest)
-    m = settings.judgement.coarse.background
-    return lacking > settings.likelihood.error.crude and m * float(np.exp(left / m)) < 1.0
+    if lacking <= settings.likelihood.error.crude:
+        return False
+    return outside(left, replace(settings.judgement.coarse, outside=0.5)) < 0.5
 
 
 def _borne_out(entry: HeldOut, found: Sequence[HeldOut], known: Discrepancies) -> HeldOut:

@@ -109,7 +109,7 @@ def coarse_finding(
     kind = "none" if noise else _kind(problem, judged)
     doubted = kind == "effect" and deadline.allows("free forces in place of the laws")
     nothing = next(entry for entry in judged.found if not entry.explanation.hypothesis)
-    rival = _rival(Discrepancies(case, problem), chosen, nothing.explanation) if doubted else None
+    rival = _rival(judged.known, chosen, nothing.explanation) if doubted else None
     kind = "unknown" if rival else kind
     least = problem.settings.likelihood.error.least  # the gains of sensors are known to no better
     first = judged.chosen if kind == "effect" else nothing

@@ -18,10 +18,10 @@ from bench.discrepancy.screening.candidates import (
     refined,
     tells_motion,
 )
-from bench.discrepancy.screening.linear_amplitudes import Point, fainter
+from bench.discrepancy.screening.linear_amplitudes import Point
 from bench.discrepancy.screening.projection import Ground
 from bench.discrepancy.screening.screen import Screen
-from bench.discrepancy.search.extension import first_fit
+from bench.discrepancy.search.extension import faint_starts, first_fit
 from bench.discrepancy.search.fits import Search, converge
 from bench.discrepancy.search.rivals import reduce_best
 
@@ -93,8 +93,8 @@ def _one_more(kept: Search, screen: Screen, coupling: Keys, progress: Callable[[
     def extended(point: Point) -> Fit:
         starts = local.starts(point, ground, base)
         if point.placed.effect.site == "joint":
-            faint = [fainter(point.placed, point.eta, share) for share in settings.search.coupled.faint]
-            starts = np.vstack([starts, *(np.append(base.vector, eta) for eta in faint)])
+            faint = faint_starts(base, point.placed, point.eta, settings.search.coupled.faint)
+            starts = np.vstack([starts, faint])
         return first_fit(kept.problem, (*base.hypothesis, point.placed), starts)
 
     least = settings.screening.trusted * worth[0].gain if along else settings.screening.worth_a_fit

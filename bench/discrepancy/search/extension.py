@@ -128,10 +128,16 @@ def _begun_faint(search: Search, offers: _Offers) -> Iterator[Task]:
         placed, known = hypothesis[-1], search.fits.get(key_of(hypothesis))
         if placed.effect.site != "joint" or (known is not None and known.cost < base.cost):
             continue
-        etas = np.atleast_2d(starts)[:, n:]
         parts = search.problem.settings.search.faint
-        faint = [fainter(placed, eta, part) for eta in etas for part in parts]
-        yield hypothesis, np.array([np.append(base.vector, eta) for eta in faint])
+        yield (
+            hypothesis,
+            np.vstack([faint_starts(base, placed, eta, parts) for eta in np.atleast_2d(starts)[:, n:]]),
+        )
+
+
+def faint_starts(base: Fit, placed: Placed, eta: np.ndarray, parts: Sequence[float]) -> np.ndarray:
+    """Starts (k, n) of a fit of one more effect: a base as it is, and parts (k,) of the effect's force with the parameters `eta`."""
+    return np.array([np.append(base.vector, fainter(placed, eta, part)) for part in parts])
 
 
 def _kept(search: Search, base: Fit) -> float:
