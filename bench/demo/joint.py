@@ -38,6 +38,8 @@ class JointSetup:
     rate: float = 1000.0
     cutoff: float = 12.0
     unseen_seed: int = 2006
+    network_samples: int = 6000
+    """Samples of the networks' last stage: enough for the errors promised here, in half the time of the default."""
 
 
 JOINT_SETUP = JointSetup()
@@ -157,10 +159,18 @@ def joint_models(
             data.states[thin], data.forces[thin], orders=(5, 5, 5, 5), kind="total"
         ),
         "network (30)": lambda: fit_network(
-            data.states, data.forces, n_hidden=30, rng=np.random.default_rng(30)
+            data.states,
+            data.forces,
+            n_hidden=30,
+            max_samples=JOINT_SETUP.network_samples,
+            rng=np.random.default_rng(30),
         ),
         "network (40)": lambda: fit_network(
-            data.states, data.forces, n_hidden=40, rng=np.random.default_rng(40)
+            data.states,
+            data.forces,
+            n_hidden=40,
+            max_samples=JOINT_SETUP.network_samples,
+            rng=np.random.default_rng(40),
         ),
     }
     for number, (label, fit) in enumerate(fits.items()):
