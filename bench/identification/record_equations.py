@@ -64,7 +64,7 @@ def row_times(matrix, row, y):
     return total
 
 
-@contracted_inline
+@contracted
 def state_derivative(p, t, y, u, slope):
     """Write dy/dt at pointer `slope` for the state at pointer `y` and the commands at pointer `u`."""
     width = 2 * p.n_dof

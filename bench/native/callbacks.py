@@ -40,7 +40,7 @@ from bench.native.table import (
     M_NV,
     RATE,
     TOKEN,
-    table_address,
+    words_address,
 )
 
 NOT_A_NUMBER = float("nan")
@@ -119,7 +119,7 @@ def _subtract_force(row, f, qfrc):
 @numba.cfunc(types.void(types.int64, types.int64), cache=True, error_model="numpy")
 def passive(model, data):
     """Subtract the restoring forces of all elements of the model from `qfrc_passive`."""
-    table = table_address()
+    table = words_address()
     count = _word(table, model, M_NNUMERIC)
     if count == 0:
         return
@@ -159,7 +159,7 @@ def passive(model, data):
 @numba.cfunc(types.float64(types.int64, types.int64, types.int32), cache=True, error_model="numpy")
 def act_dyn(model, data, actuator):
     """Rates of the hidden states of the element behind a user actuator: written to `act_dot`, the first one returned."""
-    table = table_address()
+    table = words_address()
     prm = advance(_pointer(table, model, M_ACTUATOR_DYNPRM), DYNPRM * actuator)
     if prm[0] != MAGIC:
         return 0.0

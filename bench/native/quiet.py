@@ -17,7 +17,7 @@ from numba import types
 
 from bench.laws.calling import call_with_address, load_int, load_int32
 from bench.native.library import set_log_handler
-from bench.native.table import LOG_NEXT, RUNNING, read_word, table_address, write_word
+from bench.native.table import LOG_NEXT, RUNNING, read_word, words_address, write_word
 
 WARNING = 2  # mjLOG_WARNING, the level at the start of mjLogMessage
 
@@ -25,7 +25,7 @@ WARNING = 2  # mjLOG_WARNING, the level at the start of mjLogMessage
 @numba.cfunc(types.void(types.int64), cache=True, error_model="numpy")
 def log_handler(message):
     """Drop a warning while the bench runs MuJoCo; hand anything else on."""
-    table = table_address()
+    table = words_address()
     if load_int32(message) == WARNING and load_int(table + 8 * RUNNING) > 0:
         return
     following = load_int(table + 8 * LOG_NEXT)

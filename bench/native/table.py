@@ -2,7 +2,7 @@
 
 A flat array of 64-bit words: first MuJoCo's struct offsets, then what `bench.native.quiet` counts, then, from `FIRST_LAW` on,
 three words (force address, rate address, token) for each law registered in this process. The callbacks find it through the C
-symbol `jointbench_table`, so that their machine code can be cached between processes.
+symbol `jointbench_words`, so that their machine code can be cached between processes.
 
 The token is a random number drawn when the law is registered, and stands beside the law's number in every model that uses it. A
 model from another process, or a file in which somebody wrote a number, has a number but not its token. Two processes that forked
@@ -15,12 +15,13 @@ import secrets
 import threading
 
 import llvmlite.binding as llvm
-import numba
 import numpy as np
+from llvmlite import ir
 from numba import types
 
 from bench.errors import NativeError
 from bench.laws.base import ForceLaw
+from bench.laws.calling import intrinsic
 from bench.native.layout import offsets
 
 CAPACITY = 1024
@@ -58,22 +59,20 @@ _laws: list[ForceLaw] = []  # keeps the compiled kernels alive
 _lock = threading.Lock()
 
 
-def _publish() -> object:
-    address = int(_words.ctypes.data)
-
-    @numba.cfunc(types.int64())
-    def table_address():
-        return address
-
-    llvm.add_symbol("jointbench_table", table_address.address)
-    return table_address
-
-
-_symbol = _publish()
+_SYMBOL = "jointbench_words"
+llvm.add_symbol(_SYMBOL, int(_words.ctypes.data))
 _words[: len(offsets())] = list(offsets().values())
 
-table_address = types.ExternalFunction("jointbench_table", types.int64())
-"""For compiled code: the address of the table."""
+
+@intrinsic
+def words_address(typingctx):
+    """For compiled code: the address of the table."""
+    word = ir.IntType(64)
+
+    def codegen(context, builder, signature, args):
+        return builder.ptrtoint(context.get_c_value(builder, word, _SYMBOL), word)
+
+    return types.int64(), codegen
 
 
 def read_word(place: int) -> int:

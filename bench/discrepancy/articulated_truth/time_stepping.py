@@ -166,9 +166,12 @@ def _actuators(t, servo, command, q, v, lagged, step, drive):
 def _held(inverse, limit, free, step, impulse):
     """Velocities after dry friction, `free` those before it; `impulse` is overwritten."""
     n = free.shape[0]
-    out = free.copy()
-    impulse[:] = 0.0
-    largest = np.max(np.abs(free)) + 1e-12
+    out = np.empty(n)
+    largest = 0.0
+    for i in range(n):
+        out[i], impulse[i] = free[i], 0.0
+        largest = max(largest, abs(free[i]))
+    largest += 1e-12
     for _ in range(TIME_STEPPING.sweeps):
         moved = 0.0
         for i in range(n):
@@ -188,18 +191,28 @@ def _held(inverse, limit, free, step, impulse):
 
 
 @_jit
-def _march(function, model, data, views, rows, t, servo, clock, plan, start, out):  # noqa: PLR0912  (one compiled loop)
+def _drift(q, v, step):
+    for i in range(q.shape[1]):
+        q[0, i] += step * v[0, i]
+        q[1, i] += step * v[1, i]
+
+
+@_jit
+def _march(function, model, data, views, rows, t, servo, clock, plan, start, out):  # noqa: PLR0912, PLR0915  (one compiled loop)
+    # loops rather than expressions of arrays, which take as long to compile as all the rest
     qpos, qvel, qacc, bias, matrix = views
     adr, ids, ends = rows
     step, n_sub = clock
     reference, speed, forward = plan
     n = qpos.shape[0]
     q, v = np.empty((2, n)), np.zeros((2, n))
-    q[0], q[1] = start, start
-    lagged, drive, carried = np.full(n, math.nan), np.zeros(n), np.zeros(n)
-    bristle, slack = np.zeros(n), start.copy()
+    lagged, drive, carried = np.empty(n), np.zeros(n), np.zeros(n)
+    bristle, slack = np.zeros(n), np.empty(n)
+    for i in range(n):
+        q[0, i], q[1, i], slack[i], lagged[i] = start[i], start[i], start[i], math.nan
     force, limit, impulse = np.zeros((2, n)), np.zeros(n), np.zeros(n)
     mass, command, delayed = np.zeros((n, n)), np.zeros(n), np.zeros(n)
+    net, unheld, on_link, acceleration = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
     history = np.zeros((reference.shape[0] * n_sub + 1, n))
     for k in range(reference.shape[0]):
         for i in range(n):
@@ -223,7 +236,7 @@ def _march(function, model, data, views, rows, t, servo, clock, plan, start, out
             for i in range(n):
                 history[now, i] = command[i]
                 delayed[i] = history[max(now - round(t[i, 24] / step), 0), i]
-            q += 0.5 * step * v
+            _drift(q, v, 0.5 * step)
             for i in range(n):
                 qpos[i], qvel[i], qacc[i] = q[0, i], v[0, i], 0.0
             call(function, model, data)
@@ -233,13 +246,24 @@ def _march(function, model, data, views, rows, t, servo, clock, plan, start, out
             for i in range(n):
                 mass[i, i] += t[i, 1] * (1.0 - t[i, 19] if t[i, 16] > 0.0 else 1.0)
             _actuators(t, servo, delayed, q, v, lagged, step, drive)
-            force[:] = 0.0
+            for i in range(n):
+                force[0, i], force[1, i] = 0.0, 0.0
             _forces(t, q, v, drive, carried, bristle, slack, force, limit)
             inverse = np.linalg.inv(mass)
-            before = v[0].copy()
-            on_link = np.where(t[:, 16] > 0.0, 0.0, limit)
-            v[0] = _held(inverse, on_link, v[0] + step * (inverse @ (force[0] - bias)), step, impulse)
             for i in range(n):
+                net[i] = force[0, i] - bias[i]
+                on_link[i] = 0.0 if t[i, 16] > 0.0 else limit[i]
+            gained = inverse @ net
+            for i in range(n):
+                unheld[i] = v[0, i] + step * gained[i]
+            after = _held(inverse, on_link, unheld, step, impulse)
+            for i in range(n):
+                # what the gear carries is the bodies' torque without the armature's
+                acceleration[i] = (after[i] - v[0, i]) / step
+                v[0, i] = after[i]
+            torque = mass @ acceleration
+            for i in range(n):
+                carried[i] = bias[i] + torque[i] - t[i, 1] * acceleration[i]
                 if t[i, 16] > 0.0:
                     inertia = t[i, 1] * t[i, 19]
                     free = v[1, i] + step * force[1, i] / inertia
@@ -250,10 +274,7 @@ def _march(function, model, data, views, rows, t, servo, clock, plan, start, out
                     bristle[i] += step * (v[1, i] - t[i, 9] * abs(v[1, i]) * bristle[i] / t[i, 8])
                 if t[i, 33] > 0.0:
                     slack[i] += step * (q[0, i] - slack[i]) / t[i, 34]
-            # what the gear carries: the bodies' torque without the armature's
-            acceleration = (v[0] - before) / step
-            carried[:] = bias + mass @ acceleration - t[:, 1] * acceleration
-            q += 0.5 * step * v
+            _drift(q, v, 0.5 * step)
 
 
 def _rows(model: mujoco.MjModel) -> tuple[NDArray[np.int64], ...]:

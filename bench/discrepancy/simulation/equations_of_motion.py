@@ -1,7 +1,8 @@
 """The right-hand side of structures with force laws, compiled: accelerations, and the friction forces that hold or creep.
 
-The functions are inlined into the loops that call them (`simulation.stick_slip`, `simulation.prescribed_response`). Numba keeps the
-machine code of a loop by the file that the loop stands in: after a change here, remove what is kept of those two.
+The functions become part of the loops that call them (`simulation.stick_slip`, `simulation.prescribed_response`), the small ones inlined,
+the right-hand side once: a loop that held a copy for each stage of each step ran no faster and took 24 s to compile instead of 10.
+Numba keeps the machine code of a loop by the file that the loop stands in: after a change here, remove what is kept of those two.
 
 Friction that creeps, as MuJoCo's does, is ``f = limit sat((v + tau a) / vc)``, saturated at one either way, with a
 creep velocity vc and a lead time tau (`bench.laws.soft_friction`). The acceleration holds the force itself, so that with a0, the
@@ -25,6 +26,7 @@ FORCE, RATE, LIMIT, N_ROWS, ROW, THETA, STATE, N_STATES, SCALE = range(9)
 COLUMNS = 9
 """Their number."""
 
+_jit = numba.njit(cache=True, error_model="numpy", nogil=True)
 _inline = numba.njit(cache=True, error_model="numpy", nogil=True, forceinline=True)
 
 
@@ -93,7 +95,7 @@ def scale_at(schedule, t):
     return schedule[3 + whole] + share * (schedule[4 + whole] - schedule[3 + whole])
 
 
-@_inline
+@_jit
 def derivative(p, t, y, slope, load):  # noqa: PLR0912, PLR0915  (one compiled loop)
     """Write dy/dt at workspace offset `slope` for the state at offset `y` and the loads at offset `load`.
 

@@ -221,7 +221,8 @@ def _free_run(clock, u, start, scratch, n_dof, matrices, table, rows, spread, th
         pointer_at(rows.ctypes.data), pointer_at(spread.ctypes.data), base, advance(base, n_elements),
         pointer_at(theta.ctypes.data), advance(base, 5 * n_elements),
     )  # fmt: skip
-    work[:n] = start
+    for i in range(n):
+        work[i] = start[i]
     load = 7 * n + 3 * STICK_SLIP_LIMITS.max_rows + STICK_SLIP_LIMITS.grips
     frictional = False
     for j in range(u.shape[1]):
@@ -248,7 +249,9 @@ def _free_run(clock, u, start, scratch, n_dof, matrices, table, rows, spread, th
             velocity[k, i] = work[n_dof + i]
             acceleration[k, i] = work[3 * n + n_dof + i]
         if not abs(work[0]) < STICK_SLIP_LIMITS.diverged:
-            position[k:] = np.nan
+            for later in range(k, n_samples):
+                for i in range(n_dof):
+                    position[later, i] = np.nan
             return
         if k == n_samples - 1:
             return
