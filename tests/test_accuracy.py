@@ -74,14 +74,19 @@ def _reference(law: ForceLaw, theta: NDArray, normal_force: float) -> NDArray:
     moving = n - law.n_inputs
     force, rate = law.force.compiled.ctypes, law.rate.compiled.ctypes if law.rate else None
 
+    q, v, f = np.zeros(n), np.zeros(n), np.zeros(n)
+    q[moving:] = normal_force
+    z, zdot = np.zeros(len(law.states)), np.zeros(len(law.states))
+    arguments = [_pointer(a) for a in (q, v, z, theta)]
+    forces, rates = _pointer(f), _pointer(zdot)
+
     def field(t: float, y: NDArray) -> NDArray:
-        q, v = np.zeros(n), np.zeros(n)
-        q[:moving], v[:moving] = y[:moving], y[moving : 2 * moving]
-        q[moving:] = normal_force
-        z, f, zdot = y[2 * moving :].copy(), np.zeros(n), np.zeros(len(y) - 2 * moving)
-        force(t, *(_pointer(a) for a in (q, v, z, theta, f)))
+        q[:moving], v[:moving], z[:] = y[:moving], y[moving : 2 * moving], y[2 * moving :]
+        f[:] = 0.0
+        zdot[:] = 0.0
+        force(t, *arguments, forces)
         if rate is not None:
-            rate(t, *(_pointer(a) for a in (q, v, z, theta, zdot)))
+            rate(t, *arguments, rates)
         return np.concatenate([v[:moving], -(STIFFNESS * q[:moving] + f[:moving]) / MASS, zdot])
 
     start = np.zeros(2 * moving + len(law.states))

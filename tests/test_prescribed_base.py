@@ -62,16 +62,12 @@ class Shaken:
         parts = [ramp**4 * (35 - 84 * ramp + 70 * ramp**2 - 20 * ramp**3), 140 * ramp**3 * (1 - ramp) ** 3,
                  420 * ramp**2 * (1 - ramp) ** 2 * (1 - 2 * ramp)]  # fmt: skip
         angle = np.multiply.outer(t, self.omega) + self.phase
-        course = [
-            np.sin(angle) @ self.size,
-            np.cos(angle) @ (self.size * self.omega),
-            -np.sin(angle) @ (self.size * self.omega**2),
-        ]
-        terms = {
-            0: parts[0] * course[0],
-            2: parts[0] * course[2] + 2 * parts[1] * course[1] + parts[2] * course[0],
-        }
-        return terms[order]
+        displacement = np.sin(angle) @ self.size
+        if order == 0:
+            return parts[0] * displacement
+        velocity = np.cos(angle) @ (self.size * self.omega)
+        acceleration = -np.sin(angle) @ (self.size * self.omega**2)
+        return parts[0] * acceleration + 2 * parts[1] * velocity + parts[2] * displacement
 
     def relative(self, t, z, cubic):
         force = STIFFNESS * z[0] + DAMPING * z[1] + cubic * z[0] ** 3
