@@ -164,3 +164,33 @@ def test_a_motion_that_stands_still_is_said_to_excite_nothing(
     still = replace(record, values=record.values | {"displacement": np.full(len(TIME), position)})
     with pytest.raises(RecordingError, match="'displacement' never changes"):
         diagnose(replace(known, identification=(still,)))
+
+
+def test_hysteresis_that_a_weak_spring_does_not_measure_is_found(rng: np.random.Generator) -> None:
+    """A magnetorheological damper: its hysteresis is two hundred times as stiff as the spring beside it."""
+    A, beta, gamma, spring = 120000.0, 900.0, 500.0, 600.0
+    records = []
+    for name, x in (("identification", strokes(0.8, 0.3)), ("validation", strokes(1.1, 0.5))):
+        v, z, force = np.gradient(x, STEP), 0.0, np.zeros(len(x))
+        for k in range(len(x)):
+            force[k] = z + spring * x[k] + DAMPING * v[k]
+            for _ in range(20):  # a yield within 1 mm at 0.1 m/s takes 10 ms
+                z += STEP / 20 * (A * v[k] - beta * abs(v[k]) * z - gamma * v[k] * abs(z))
+        noisy = {
+            "displacement": x + 2e-5 * rng.standard_normal(len(x)),
+            "force": force + rng.standard_normal(len(x)),
+        }
+        records.append(record_from_arrays(name, TIME, noisy))
+    channels = (CaseChannel("displacement", "m", "prescribed"), CaseChannel("force", "N", "response"))
+    parameters = (
+        NominalParameter("stiffness", 1.05 * spring, 0.1 * spring, "N/m"),
+        NominalParameter("damping", 0.9 * DAMPING, 0.3 * DAMPING, "N s/m"),
+    )
+    own = Case("damper", "damper", parameters, channels, (records[0],), (records[1],))
+    names = ("bouc_wen_hysteresis", "backlash_friction", "coulomb_friction", "force_offset")
+    verdict = diagnose(own, catalogue=[effect_named(name) for name in names]).verdict
+    (effect,) = verdict.named
+    assert effect.name == "bouc_wen_hysteresis"
+    stiffness = effect.parameters["A"]
+    assert abs(stiffness.value - A) < 3.0 * stiffness.std < A
+    assert verdict.gap.closed > 0.9

@@ -16,7 +16,7 @@ from bench.discrepancy import Case, diagnose, read_case, record_from_arrays
 from bench.discrepancy.blind.protocol import write_case
 from bench.discrepancy.case.schema import check_units
 from bench.discrepancy.checks.channel_comparison import compare_channels, unit_factor
-from bench.discrepancy.checks.data_quality import notes, refuse_unusable
+from bench.discrepancy.checks.data_quality import notes, refuse_unusable, untried_points
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.rigs import structure_of
 from bench.errors import BenchError, IdentificationError, RecordingError, UnitError
@@ -55,6 +55,40 @@ def test_nothing_is_noted_of_a_good_case():
 
 def scaled(channel: str, factor: float):
     return lambda values: values | {channel: factor * values[channel]}
+
+
+BODY = """<body name="{0}"><joint name="{0}" type="slide" axis="1 0 0" stiffness="900" damping="2"/>
+<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>{1}</body>"""
+CHAIN = f"""<mujoco><option gravity="0 0 0"/><worldbody>{BODY.format("q1", BODY.format("q2", '<site name="tip"/>'))}</worldbody>
+<tendon>TENDON</tendon><actuator><motor name="shaker" joint="q1"/></actuator>
+<sensor><jointpos name="base" joint="q1"/><accelerometer name="tip" site="tip"/></sensor></mujoco>"""
+
+
+@pytest.mark.parametrize(
+    ("tendon", "told"),
+    [("", 1), ('<fixed name="reach"><joint joint="q1" coef="2"/><joint joint="q2" coef="2"/></fixed>', 0)],
+)
+def test_a_point_that_no_place_of_an_effect_moves_along_is_told(tendon, told, tmp_path):
+    nominal = {
+        "rig": "model.xml",
+        "parameters": {"stiffness:q1": {"value": 900.0, "std": 20.0}},
+        "channels": {
+            "shaker": {"unit": "N", "role": "measured"},
+            "base": {"unit": "m"},
+            "tip": {"unit": "m/s^2"},
+        },
+    }
+    (tmp_path / "model.xml").write_text(CHAIN.replace("TENDON", tendon))
+    (tmp_path / "nominal.json").write_text(json.dumps(nominal))
+    rng = np.random.default_rng(1)
+    for name in ("identification", "validation"):
+        table = np.column_stack([np.arange(800) * 0.004, rng.standard_normal((800, 3))])
+        np.savetxt(tmp_path / f"{name}.csv", table, delimiter=",", header="time,shaker,base,tip", comments="")
+    case = read_case(tmp_path)
+    found = untried_points(Problem(case, structure_of(case), case.identification))
+    assert [("'tip' moves with q1 and q2" in note, "fixed tendon" in note) for note in found] == [
+        (True, True)
+    ] * told
 
 
 @pytest.mark.parametrize(

@@ -25,7 +25,7 @@ from bench.discrepancy.case.case import Case
 from bench.discrepancy.case.idle_loads import idle_notes, without_idle_noise
 from bench.discrepancy.case.reading import read_case
 from bench.discrepancy.checks.admission import admitted
-from bench.discrepancy.checks.data_quality import notes
+from bench.discrepancy.checks.data_quality import notes, untried_points
 from bench.discrepancy.checks.quantisation import recorded
 from bench.discrepancy.effects.catalogue import CATALOGUE
 from bench.discrepancy.effects.effect import Effect
@@ -199,6 +199,7 @@ def _diagnose(case: Case, how: How, rng: np.random.Generator, anyway: bool) -> D
         nearest = with_closed(case, problem, nearest, (finding.closest, *explanations), rng)
     ranked = (*(Ranked(e.name, e.where, e.probability) for e in seen), *finding.ranking)
     stated, sharp, nominal = problem.noise_stated, not finding.coarse, nominal_estimates(final)
+    judged = complete(found, sharp=sharp, stated=stated, settings=how.settings.judgement)
     verdict = Verdict(
         verdict=kind,
         named=_somewhere(problem, (*named, *seen)) if kind == "effect" else (),
@@ -214,14 +215,13 @@ def _diagnose(case: Case, how: How, rng: np.random.Generator, anyway: bool) -> D
             *how.deadline.untried,
             *finding.notes,
             *far_off(nominal, how.settings.judgement.far),
-            *_warnings(problem, told, quiet),
+            *_warnings(problem, told, quiet, open_end=kind == "unknown" or (kind == "effect" and not judged)),
         ),
         closure=closure,
         next_excitation=_next_excitation(problem, finding, catalogue),
         splits=where.splits,
         seconds=time.perf_counter() - began,
-        complete=kind != "unknown"
-        and complete(found, sharp=sharp, stated=stated, settings=how.settings.judgement),
+        complete=kind != "unknown" and judged,
         remainder=remainder(problem, final, widest),
         nominal=nominal,
         nearest=nearest,
@@ -237,14 +237,16 @@ def _kind(finding: Finding, seen: Sequence[NamedEffect]) -> tuple[VerdictKind, d
     return "effect", finding.probabilities | {"effect": 1.0 - finding.probabilities["unknown"], "none": 0.0}
 
 
-def _warnings(problem: Problem, told: Case, quiet: Case) -> tuple[str, ...]:
-    """What the reader should know about the records: as told, without the noise of idle loads, and as they were read in the end."""
+def _warnings(problem: Problem, told: Case, quiet: Case, *, open_end: bool) -> tuple[str, ...]:
+    """What the reader should know about the records: as told, without the noise of idle loads, and as they were read in the end; and
+    where nothing was tried, if something is left."""
     case = problem.case
     return (
         *notes(case, problem),
         *idle_notes(told, quiet),
         *reading_notes(quiet, case),
         *start_warnings(problem, (*case.identification, *case.validation)),
+        *(untried_points(problem) if open_end else ()),
     )
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.case.channel_noise import noise_floor, quantisation_step, quiet_noise
+from bench.discrepancy.case.schema import RIGS
 from bench.discrepancy.checks.channel_comparison import comparison_notes, quoted
 from bench.discrepancy.likelihood.problem import Array, Problem
 from bench.discrepancy.settings import DiagnosisSettings
@@ -74,6 +75,31 @@ def notes(case: Case, problem: Problem) -> tuple[str, ...]:
         found += check(case, problem)
     found += comparison_notes(problem)
     return tuple(dict.fromkeys(found))
+
+
+def untried_points(problem: Problem) -> tuple[str, ...]:
+    """Sensors of a model of one's own that move with several joints and along no place where effects were tried, a sentence each.
+
+    Args:
+        problem: Its records and nominal model on all degrees of freedom.
+    """
+    structure = problem.structure
+    if problem.case.rig in RIGS or problem.driven:
+        return ()
+    rows = [place.rows[0] for place in structure.places if len(place.rows) == 1]
+    places = [row / np.linalg.norm(row) for row in rows]
+    found: dict[str, str] = {}
+    for observer in structure.observers:
+        along = observer.row / (np.linalg.norm(observer.row) or 1.0)
+        # one and the same coordinate, but for a factor and rounding
+        if np.count_nonzero(along) > 1 and not any(np.isclose(abs(along @ place), 1.0) for place in places):
+            moving = [dof for dof, share in zip(structure.dofs, along, strict=True) if share != 0.0]
+            found[observer.channel] = f"{', '.join(moving[:-1])} and {moving[-1]}"
+    return tuple(
+        f"'{channel}' moves with {dofs} together, and effects were tried along joints and fixed tendons only: for a force between that "
+        "point and the frame, add a fixed tendon over these joints to the model"
+        for channel, dofs in found.items()
+    )
 
 
 def doubts(case: Case, problem: Problem) -> tuple[str, ...]:

@@ -46,7 +46,7 @@ class Scales(NamedTuple):
         force: RMS load, over the identification records.
         position: Largest displacement along the coordinate.
         velocity: Largest velocity along the coordinate.
-        stiffness: Nominal stiffness, or force / position where there is none.
+        stiffness: Nominal stiffness, or force / position where there is none; the larger of both along a prescribed motion.
         duration: Length of the record [s].
         step: Time between samples [s].
         force2, position2, velocity2: The same for the last coordinate of the place; equal to the first on one coordinate.

@@ -182,9 +182,13 @@ class MeasuredCase:
         position[position == 0.0] = 1.0
         velocity[velocity == 0.0] = 1.0
         force = np.array([self._loading(row) for row in place.rows])
-        stiffness = force[0] / position[0]
+        secant = stiffness = force[0] / position[0]
         if place.stiffness in self.structure.parameters:
             stiffness = self.nominal[self.structure.parameters.index(place.stiffness)] or stiffness
+        if (
+            self.driven
+        ):  # the force is the component's own: a weak spring in it is no measure of what else it holds
+            stiffness = max(stiffness, secant)
         damping = 0.0
         if place.damping in self.structure.parameters:
             damping = self.nominal[self.structure.parameters.index(place.damping)]
