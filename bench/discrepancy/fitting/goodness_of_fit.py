@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bench.discrepancy.fitting.map_fit import Fit
+from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Hypothesis
 from bench.discrepancy.settings import DEFAULT, SearchSettings
 
@@ -61,3 +62,19 @@ def names(hypothesis: Hypothesis) -> str:
 def sticks(fitted: Fit) -> bool:
     """Whether a hypothesis holds friction that is set-valued at rest."""
     return any(placed.effect.sticks for placed in fitted.hypothesis)
+
+
+def leaves_much(problem: Problem, fitted: Fit) -> bool:
+    """Whether a hypothesis leaves more of a response than a right model does.
+
+    Args:
+        problem: Records and priors.
+        fitted: Of these.
+    """
+    crude = problem.settings.likelihood.error.crude
+    for data in problem.data:
+        left = data.responses - problem.simulate(fitted.hypothesis, fitted.vector, data.record)
+        power = np.mean(left**2, axis=0) - problem.noise**2
+        if np.any(power > crude**2 * np.var(data.responses, axis=0)):
+            return True
+    return False

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,7 @@ from bench.discrepancy.numerics.deadline import NEVER, Deadline
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.response.simulator import Simulator
 from bench.discrepancy.response.windows import cut
+from bench.discrepancy.simulation.stick_slip import Motion
 
 
 @dataclass
@@ -141,6 +142,26 @@ class Problem(Simulator):
         """A copy whose nominal parameters move by so many stated standard deviations at most."""
         out = copy.copy(self)
         out.within = within
+        return out
+
+    def beginnings(self, samples: Sequence[int]) -> Problem:
+        """A copy of the first samples of every record, by their noise alone; the scales of the effects stay, and so do vectors.
+
+        Args:
+            samples: Number of samples of each record.
+        """
+        out = copy.copy(self)
+        short = [
+            replace(r, name=f"{r.name}, {n} samples", values={k: v[:n] for k, v in r.values.items()})
+            for r, n in zip(self.records, samples, strict=True)
+        ]
+        kept = [
+            Motion(*(part[:n] for part in self.motion_of(r)))
+            for r, n in zip(self.records, samples, strict=True)
+        ]
+        out.records, out.error = tuple(short), None
+        out.motions = self.motions | {record.name: motion for record, motion in zip(short, kept, strict=True)}
+        out.data = tuple(out.prepare(record) for record in short)
         return out
 
     def beside(self, records: Sequence[CaseRecord]) -> Problem:

@@ -3,9 +3,10 @@
 Screening proposes, output-error fits decide, and hypotheses are compared by their evidence. Effects are added one at
 a time as long as the residuals do not look like noise: to the best few hypotheses so far and to those that promise most together
 with another effect, the screening conditioned on each. What promised most and was not kept by its fit makes room for the next.
-An effect that a larger hypothesis does not need any more loses to the smaller one by its Occam factor. In the end every effect
-of the best hypothesis is challenged by those that do nearly as well along the motion it explains, each fitted from several
-starts, so that no flexible law wins because a simpler one was fitted carelessly.
+Where nothing explains enough, the motion may be too sensitive for a free run over whole records, and hypotheses are fitted over
+beginnings of them first (`horizons`). An effect that a larger hypothesis does not need any more loses to the smaller one by its Occam
+factor. In the end every effect of the best hypothesis is challenged by those that do nearly as well along the motion it explains, each
+fitted from several starts, so that no flexible law wins because a simpler one was fitted carelessly.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from bench.discrepancy.effects.read_off import TIMED
-from bench.discrepancy.fitting.goodness_of_fit import complexity, consistent, names, near
+from bench.discrepancy.fitting.goodness_of_fit import complexity, consistent, leaves_much, names, near
 from bench.discrepancy.fitting.map_fit import Fit, fit
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Placed
@@ -29,6 +30,7 @@ from bench.discrepancy.screening.score_test import lack_of_fit
 from bench.discrepancy.screening.screen import Screen
 from bench.discrepancy.search.extension import contacts, extend
 from bench.discrepancy.search.fits import Search, integrate_finer, multistart
+from bench.discrepancy.search.horizons import lengthen
 from bench.discrepancy.search.rivals import challenge, reduce_best, simplify
 from bench.discrepancy.search.scheduled import with_schedules
 from bench.discrepancy.search.soft_friction import soften, stand_in
@@ -83,6 +85,7 @@ def attribute(
             break
         extend(search, screen, bases, count=4 if consistent(best) else 6 - size)
         soften(search, size + 1)
+        lengthen(search, size + 1, candidates)
         reduce_best(search)
     best = search.ranked()[0]
     if not problem.scaled:
@@ -119,6 +122,7 @@ def _single(
         screen.add(rare)
         extend(search, screen, [nothing], count=6, among={p.key for p in rare})
     stand_in(search)
+    lengthen(search, 1, candidates)
     if deadline.allows("forces from outside and friction that follows a channel"):
         asked = {p.effect.name for p in candidates if p.effect.site == "read off"}
         if TIMED in asked:
@@ -142,7 +146,7 @@ def _bases(search: Search, screen: Screen, size: int, *, best: Fit, nothing: Fit
         nothing.chi2 - best.chi2, effects=settings.several
     )
     plain = _plain_bases(search, best)
-    if not lacks and not plain and not _promising(screen, best) and not _leaves_much(problem, best):
+    if not lacks and not plain and not _promising(screen, best) and not _weighed_by_itself(problem, best):
         return []
     return worth_extending(search, screen, size, 4 - size) if lacks else plain or [best]
 
@@ -156,19 +160,9 @@ def _worth_challenging(best: Fit, problem: Problem) -> bool:
     return problem.error is None or (len(best.hypothesis) == 1 and not problem.error.crude)
 
 
-def _leaves_much(problem: Problem, fitted: Fit) -> bool:
-    """Whether a hypothesis leaves more of a response than a right model does, where what such a one leaves is how it is weighed.
-
-    What is weighed by what itself leaves is consistent by construction.
-    """
-    if problem.error is None or problem.windowed:
-        return False
-    for data in problem.data:
-        left = data.responses - problem.simulate(fitted.hypothesis, fitted.vector, data.record)
-        power = np.mean(left**2, axis=0) - problem.noise**2
-        if np.any(power > problem.error.settings.crude**2 * np.var(data.responses, axis=0)):
-            return True
-    return False
+def _weighed_by_itself(problem: Problem, fitted: Fit) -> bool:
+    """Whether what a hypothesis leaves is how it is weighed, and more than a right model leaves: that is consistent by construction."""
+    return problem.error is not None and not problem.windowed and leaves_much(problem, fitted)
 
 
 def worth_extending(search: Search, screen: Screen, size: int, most: int) -> list[Fit]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from bench.discrepancy.settings.describing import setting
 from bench.discrepancy.settings.search_parts import (
     CoupledSettings,
+    HorizonSettings,
     LoadReadingSettings,
     PlainSettings,
     RestartSettings,
@@ -182,6 +183,7 @@ class SearchSettings:
     )
     plain: PlainSettings = field(default_factory=PlainSettings)
     restarts: RestartSettings = field(default_factory=RestartSettings)
+    horizons: HorizonSettings = field(default_factory=HorizonSettings)
     coupled: CoupledSettings = field(default_factory=CoupledSettings)
     readings: LoadReadingSettings = field(default_factory=LoadReadingSettings)
     soft: SoftFrictionSettings = field(default_factory=SoftFrictionSettings)

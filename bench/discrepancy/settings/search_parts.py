@@ -55,6 +55,22 @@ class RestartSettings:
 
 
 @dataclass(frozen=True)
+class HorizonSettings:
+    """Fits over the beginnings of records, where a free run over the whole is too sensitive to begin with."""
+
+    parts: tuple[float, ...] = setting(
+        (1.0 / 16.0, 1.0 / 8.0, 1.0 / 4.0, 1.0 / 2.0),
+        "Parts of the records that are fitted one after the other before the whole.",
+        "Errors of a sensitive motion grow in proportion to themselves: doubling keeps what one part has found a start for the next.",
+        unit="part of a record",
+    )
+    hypotheses: int = setting(4, "Hypotheses of a size that are fitted so, at most.", "A cost cut-off.")
+    shortest: int = setting(
+        64, "Samples of a beginning, at least.", "Some periods of what is sampled well.", unit="samples"
+    )
+
+
+@dataclass(frozen=True)
 class CoupledSettings:
     """Effects that couple degrees of freedom."""
 
