@@ -188,22 +188,6 @@ def test_faults_of_a_sensor_are_named(name, measured):
 
 
 @pytest.mark.parametrize(
-    ("name", "acting", "mass", "reading", "error"),
-    [
-        ("load_cell_gain_error", 0.87, 1.0, 1.0, -0.13),
-        ("mass_error", 1.0, 1.15, 1.0, 0.15),
-        ("displacement_gain_error", 1.0, 1.0, 1.15, 0.15),
-    ],
-)
-def test_a_load_cell_that_is_off_is_told_from_a_mass_and_from_a_sensor(name, acting, mass, reading, error):
-    """One factor between the load and everything that answers is the load cell's; one of a term or a channel is its own."""
-    case = planted_case(lambda f: linear_motion(acting * f, mass * MASS), lambda x, a, f: (reading * x, a))
-    verdict = named(case, "load_cell_gain_error", "mass_error", "stiffness_error", *SENSORS)
-    assert [e.name for e in verdict.named] == [name]
-    assert estimate(verdict, "relative_error") == pytest.approx(error, abs=0.02)
-
-
-@pytest.mark.parametrize(
     ("name", "driven"),
     [
         ("force_polarity", lambda f: linear_motion(-f)),

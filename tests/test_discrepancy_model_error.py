@@ -11,7 +11,7 @@ from planted_cases import MASS, NOISE, STIFFNESS, linear_motion, motion_with, pl
 
 from bench.discrepancy import diagnose
 from bench.discrepancy.effects.catalogue import effect_named
-from bench.discrepancy.fitting.goodness_of_fit import complexity
+from bench.discrepancy.fitting.goodness_of_fit import complexity, leaves_much
 from bench.discrepancy.fitting.map_fit import fit
 from bench.discrepancy.judgement.coarse import Judged, bounded, judge, outside, without
 from bench.discrepancy.judgement.discrepancies import Discrepancies
@@ -31,7 +31,6 @@ from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.search.explanation import Explanation
 from bench.discrepancy.search.extension import _begun_faint, _Offers, first_fit
 from bench.discrepancy.search.fits import Search
-from bench.discrepancy.search.forward_selection import _leaves_much
 from bench.discrepancy.verdict import NominalEstimate, far_off
 
 FEW = [
@@ -400,9 +399,8 @@ def test_a_hypothesis_weighed_by_what_itself_leaves_may_leave_much():
     case = planted_case(lambda f: motion_with(f, lambda x, v, z: (4e5 * x**3, [])), n=1500, noise=UNSTATED)
     problem = problem_of(case, crude_error(case, structure_of(case)))
     nothing, right = (explanation(problem, *names).parts[0][1] for names in ((), ("cubic_stiffness",)))
-    assert _leaves_much(problem, nothing)
-    assert not _leaves_much(problem, right)
-    assert not _leaves_much(problem_of(case), nothing)
+    assert leaves_much(problem, nothing)
+    assert not leaves_much(problem, right)
 
 
 def test_what_there_is_no_time_for_is_left_out_and_said():

@@ -52,7 +52,6 @@ LOOKS = {
     "actuator_lag": "The response lags and fades with the frequency.",
     "target_lag": "A servo answers steps of its target as if they were rounded off; disturbances it meets as before.",
     "force_gain_error": "All responses are off by one factor.",
-    "load_cell_gain_error": "All responses are off by one factor against the load that was read: a load cell's calibration.",
     "servo_gain_error": "The servo follows more tightly or more loosely; gravity sags differ in inverse proportion.",
     "actuator_saturation": "Right while the load is small; a plateau at its peaks.",
     "actuator_deadband": "Nothing happens around zero load.",

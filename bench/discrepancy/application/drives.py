@@ -163,5 +163,5 @@ DRIVES: dict[str, Callable[[Target, NamedEffect], Change]] = {
     "actuator_deadband": deadband,
 }
 """Effects of actuators."""
-LOGGED = ("displacement_", "acceleration_", "position_", "velocity_", "load_cell_")
-"""Beginnings of the names of effects of a sensor, a load cell among them."""
+LOGGED = ("displacement_", "acceleration_", "position_", "velocity_")
+"""Beginnings of the names of effects of a sensor."""

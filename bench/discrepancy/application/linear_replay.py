@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import mujoco
 import numpy as np
@@ -66,7 +66,7 @@ class LinearReplay:
         model = applied.compiled()
         player = _Player(self, applied, model)
         records = self.case.validation
-        runs = [_read(effects, player.channels(_played(effects, record)), record) for record in records]
+        runs = [_read(effects, player.channels(record), record) for record in records]
         out = {}
         for name, channels in coordinates(self.structure):
             measured = [_sum(record.values, channels) for record in records]
@@ -86,8 +86,7 @@ class LinearReplay:
         self, applied: Applied, effects: Sequence[NamedEffect], record: CaseRecord
     ) -> dict[str, Array]:
         """What the response channels read (n,) when a model plays a record's loads; of wrong sensors what they say."""
-        player = _Player(self, applied, applied.compiled())
-        return _read(effects, player.channels(_played(effects, record)), record)
+        return _read(effects, _Player(self, applied, applied.compiled()).channels(record), record)
 
 
 def _sum(values: Mapping[str, Array], channels: Sequence[tuple[str, float]]) -> Array:
@@ -99,25 +98,20 @@ def _read(
 ) -> dict[str, Array]:
     """Readings of wrong sensors."""
     out = dict(channels)
+    known = {entry.name: entry for entry in CATALOGUE}
     for effect in effects:
-        if effect.name.startswith(LOGGED) and effect.channel in out:
-            out[effect.channel] = _as_it_is(effect, out[effect.channel], record.step)
+        entry = known.get(effect.name)
+        if (
+            entry is None
+            or entry.signal is None
+            or not effect.name.startswith(LOGGED)
+            or effect.channel not in out
+        ):
+            continue
+        out[effect.channel] = entry.signal(
+            out[effect.channel], np.array(list(values_of(effect).values())), record.step
+        )
     return out
-
-
-def _played(effects: Sequence[NamedEffect], record: CaseRecord) -> CaseRecord:
-    """A record whose loads are what acted where their cell was wrong."""
-    wrong = [e for e in effects if e.name.startswith("load_cell_") and e.channel in record.values]
-    loads = {e.channel: _as_it_is(e, np.asarray(record.values[e.channel]), record.step) for e in wrong}
-    return replace(record, values={**record.values, **loads})
-
-
-def _as_it_is(effect: NamedEffect, samples: Array, step: float) -> Array:
-    """Samples (n,) with what an effect of the catalogue makes of them."""
-    entry = next((entry for entry in CATALOGUE if entry.name == effect.name), None)
-    if entry is None or entry.signal is None:
-        return samples
-    return entry.signal(samples, np.array(list(values_of(effect).values())), step)
 
 
 class _Player:

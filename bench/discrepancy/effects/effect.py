@@ -170,8 +170,7 @@ class Effect:
         between_samples: That operation moves samples in time, and needs what the channel does between them.
         exact: A free run with it is as exact as one of the nominal model: a number is wrong, and nothing is smoothed, switched or
             interpolated.
-        quantity: For sensor effects the kind of channel ("position", "acceleration"); for inertia the parameter kind; "measured" where
-            an actuator's is the reading of a load and no command.
+        quantity: For sensor effects the kind of channel ("position", "acceleration"); for inertia the parameter kind.
         pickup: The sensor adds a share of another measured channel: a load, or the response of the other axis.
         log_prior: Log prior odds against an effect of the README's list.
         rate_bound: Parameter values and scales to the fastest rate of the law [1/s]; the structure's own where None.

@@ -164,17 +164,6 @@ CHANNELS: tuple[Effect, ...] = (
         exact=True,
     ),
     Effect(
-        "load_cell_gain_error",
-        "sensor",
-        "actuator",
-        (FreeParameter("relative_error", signed=True, std=0.3, bounds=(-3.0, 5.0), grid=(0.0,)),),
-        "F = (1 + e) F_read",
-        signal=signals.gain,
-        exact=True,
-        quantity="measured",
-        log_prior=-1.0,
-    ),
-    Effect(
         "actuator_saturation",
         "actuator",
         "actuator",

@@ -152,7 +152,12 @@ class Problem(Simulator):
         """
         out = copy.copy(self)
         short = [
-            replace(r, name=f"{r.name}, {n} samples", values={k: v[:n] for k, v in r.values.items()})
+            replace(
+                r,
+                name=f"{r.name}, {n} samples",
+                values={k: v[:n] for k, v in r.values.items()},
+                bridged=tuple(i for i in r.bridged if i < n),
+            )
             for r, n in zip(self.records, samples, strict=True)
         ]
         kept = [

@@ -11,12 +11,14 @@ from bench.discrepancy.effects.effect import Effect
 from bench.discrepancy.model.placement import FROM, Placed
 from bench.discrepancy.model.structure import Place, Structure
 
-_AXES = (
-    ("displacement", "rotation"),
-    ("velocity", "angular_velocity"),
-    ("acceleration", "angular_acceleration"),
-)
-OTHER_AXIS = {one: other for pair in _AXES for one, other in (pair, pair[::-1])}
+OTHER_AXIS = {
+    "displacement": "rotation",
+    "rotation": "displacement",
+    "velocity": "angular_velocity",
+    "angular_velocity": "velocity",
+    "acceleration": "angular_acceleration",
+    "angular_acceleration": "acceleration",
+}
 """Channels of the joint rig that one sensor measures along its two axes."""
 
 
@@ -37,27 +39,25 @@ def placements(case: Case, structure: Structure, catalogue: Iterable[Effect]) ->
 
 def _targets(case: Case, effect: Effect, structure: Structure, place: Place) -> list[str]:
     if effect.site == "inertia":
-        names = {"mass": place.mass, "stiffness": (place.stiffness,), "damping": (place.damping,)}
-        return [name for name in names[effect.quantity] if name in structure.parameters]
-    dofs = np.any(place.rows, axis=0)
+        names = {"mass": place.mass, "stiffness": (place.stiffness,), "damping": (place.damping,)}[
+            effect.quantity
+        ]
+        return [name for name in names if name in structure.parameters]
+    dofs = np.abs(place.rows).sum(axis=0) > 0
     if effect.site == "actuator":
-        driven = np.any(structure.inputs[dofs], axis=0)
-        loads = _loads(case, structure, effect.quantity or "command")
-        return [name for name in loads if driven[structure.loads.index(name)]]
+        commanded = [name for name in structure.loads if case.channel(name).role == "command"]
+        return [
+            name
+            for name in commanded
+            if np.abs(structure.inputs[dofs, structure.loads.index(name)]).sum() > 0
+        ]
     if effect.site == "sensor":
         order = {"position": 0, "velocity": 1, "acceleration": 2}[effect.quantity]
-        channels = [o.channel for o in structure.observers if o.order == order and np.any(o.row[dofs])]
+        channels = [
+            o.channel for o in structure.observers if o.order == order and np.abs(o.row[dofs]).sum() > 0
+        ]
         return _pickups(case, structure, channels) if effect.pickup else channels
     return []
-
-
-def _loads(case: Case, structure: Structure, role: str) -> list[str]:
-    """Loads of a role; measured ones that act and that two sensors answer: with one, its error is the inverse of that sensor's own."""
-    loads = [name for name in structure.loads if case.channel(name).role == role]
-    if role == "command":
-        return loads
-    told = len({observer.channel for observer in structure.observers}) > 1
-    return [x for x in loads if told and any(np.any(record.values[x]) for record in case.identification)]
 
 
 def _pickups(case: Case, structure: Structure, channels: Sequence[str]) -> list[str]:
