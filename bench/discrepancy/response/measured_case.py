@@ -185,9 +185,8 @@ class MeasuredCase:
         secant = stiffness = force[0] / position[0]
         if place.stiffness in self.structure.parameters:
             stiffness = self.nominal[self.structure.parameters.index(place.stiffness)] or stiffness
-        if (
-            self.driven
-        ):  # the force is the component's own: a weak spring in it is no measure of what else it holds
+        if self.driven:
+            # the force is the component's own: a weak spring in it is no measure of what else it holds
             stiffness = max(stiffness, secant)
         damping = 0.0
         if place.damping in self.structure.parameters:

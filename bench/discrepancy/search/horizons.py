@@ -42,6 +42,8 @@ def lengthen(search: Search, size: int, candidates: Sequence[Placed]) -> None:
         return
     settings = problem.settings.search
     tasks = list(_tasks(search, size, candidates))
+    for placed in (placed for hypothesis, _ in tasks for placed in hypothesis):
+        problem.scales_of(placed)  # kept: those of the whole records
     longest = [len(record) for record in problem.records]
     for part in settings.horizons.parts if tasks else ():
         samples = [max(round(part * n), min(settings.horizons.shortest, n)) for n in longest]
