@@ -1,6 +1,6 @@
 """Equations of motion that the compiled record loop integrates, and the channels read off a state.
 
-The functions are inlined into the loops of `bench.identification.record_loop` and `bench.identification.dormand_prince_8`. Numba keeps
+The functions become part of the loops of `bench.identification.record_loop` and `bench.identification.dormand_prince_8`. Numba keeps
 the machine code of a loop by the file that the loop stands in: after a change here, remove what is kept of those two.
 """
 

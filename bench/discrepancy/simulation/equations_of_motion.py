@@ -1,7 +1,7 @@
 """The right-hand side of structures with force laws, compiled: accelerations, and the friction forces that hold or creep.
 
 The functions become part of the loops that call them (`simulation.stick_slip`, `simulation.prescribed_response`), the small ones inlined,
-the right-hand side once: a loop that held a copy for each stage of each step ran no faster and took 24 s to compile instead of 10.
+the right-hand side once: a copy of it for each stage of each step makes a loop take longer to compile and no less to run.
 Numba keeps the machine code of a loop by the file that the loop stands in: after a change here, remove what is kept of those two.
 
 Friction that creeps, as MuJoCo's does, is ``f = limit sat((v + tau a) / vc)``, saturated at one either way, with a
