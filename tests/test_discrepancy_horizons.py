@@ -11,12 +11,12 @@ from planted_cases import linear_motion, motion_with, planted_case
 
 from bench.discrepancy import Case
 from bench.discrepancy.effects.catalogue import effect_named
+from bench.discrepancy.fitting.fits import Search
 from bench.discrepancy.fitting.goodness_of_fit import names, near
 from bench.discrepancy.fitting.map_fit import fit
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.model.rigs import structure_of
-from bench.discrepancy.search.fits import Search
 from bench.discrepancy.search.horizons import lengthen
 
 STIFFNESS, CLEARANCE, FRICTION, HARD = 5000.0, 0.004, 1.0, 4.0

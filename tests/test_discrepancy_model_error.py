@@ -11,6 +11,7 @@ from planted_cases import MASS, NOISE, STIFFNESS, linear_motion, motion_with, pl
 
 from bench.discrepancy import diagnose
 from bench.discrepancy.effects.catalogue import effect_named
+from bench.discrepancy.fitting.fits import Search
 from bench.discrepancy.fitting.goodness_of_fit import complexity, leaves_much
 from bench.discrepancy.fitting.map_fit import fit
 from bench.discrepancy.judgement.coarse import Judged, bounded, judge, outside, without
@@ -30,7 +31,6 @@ from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.search.explanation import Explanation
 from bench.discrepancy.search.extension import _begun_faint, _Offers, first_fit
-from bench.discrepancy.search.fits import Search
 from bench.discrepancy.verdict import NominalEstimate, far_off
 
 FEW = [

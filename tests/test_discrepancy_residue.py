@@ -13,20 +13,20 @@ from bench.discrepancy import diagnose
 from bench.discrepancy.effects.catalogue import CATALOGUE, effect_named
 from bench.discrepancy.effects.channel_operators import delay, sensor_delay
 from bench.discrepancy.effects.nonparametric import CLOSURES
+from bench.discrepancy.fitting.fits import Search, integrate_finer
 from bench.discrepancy.fitting.goodness_of_fit import consistent
 from bench.discrepancy.fitting.map_fit import fit
+from bench.discrepancy.fitting.starts import Point
 from bench.discrepancy.judgement.predictive_check import contradicted
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.likelihood.whitening import timed
 from bench.discrepancy.model.placements import placements
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.screening.candidates import tells_motion
-from bench.discrepancy.screening.linear_amplitudes import Point
 from bench.discrepancy.screening.score_test import LackOfFit, lack_of_fit
 from bench.discrepancy.screening.screen import Screen
 from bench.discrepancy.search.closures import close
 from bench.discrepancy.search.explanation import Explanation
-from bench.discrepancy.search.fits import Search, integrate_finer
 from bench.discrepancy.search.forward_selection import attribute
 from bench.discrepancy.search.rivals import challenge
 from bench.discrepancy.settings import DEFAULT

@@ -6,9 +6,15 @@ import numpy as np
 import pytest
 
 from bench.discrepancy import Case, CaseChannel, NominalParameter, diagnose, record_from_arrays
+from bench.discrepancy.effects.catalogue import effect_named
 from bench.discrepancy.effects.friction_limits import coulomb_limit
+from bench.discrepancy.likelihood.problem import Problem
+from bench.discrepancy.model.placement import Placed
+from bench.discrepancy.model.rigs import structure_of
+from bench.discrepancy.settings import DEFAULT
 from bench.discrepancy.simulation.prescribed_response import driven_force
 from bench.discrepancy.simulation.stick_slip import Elements, StructureMatrices, free_run
+from bench.discrepancy.unscreened.scheduled import differing
 
 RATE = 500.0
 
@@ -61,6 +67,27 @@ def component(limits, tension: bool) -> Case:
         NominalParameter("coulomb", 40.0, 4.0, "N"),
     )
     return Case("component", "damper", parameters, (*channels, *more), tuple(records[:-1]), (records[-1],))
+
+
+def test_a_law_that_differs_between_records_is_that_law_times_a_number_in_each():
+    case = component((60.0, 120.0, 90.0), tension=False)
+    structure = structure_of(case, settings=DEFAULT)
+    problem = Problem(case, structure, case.identification, settings=DEFAULT)
+    place = structure.places[0]
+    plain = Placed(effect_named("bouc_wen_hysteresis"), place)
+    varied = Placed(differing(plain.effect, [record.name for record in problem.records]), place)
+    assert varied.effect.name == "record_dependent_bouc_wen_hysteresis"
+    still, eta, apart = np.zeros(len(problem.nominal)), plain.effect.grid()[0], np.log([0.5, 1.5])
+    for record, factor in zip((*problem.records, *case.validation), (0.5, 1.5, 1.0), strict=True):
+        force = {}
+        for name, hypothesis, shape in (
+            ("none", (), []),
+            ("plain", (plain,), eta),
+            ("varied", (varied,), [*(eta[0] + apart), *eta[1:]]),
+        ):
+            force[name] = problem.simulate(hypothesis, np.append(still, shape), record)[:, 0]
+        own, of_plain = force["varied"] - force["none"], force["plain"] - force["none"]
+        np.testing.assert_allclose(own, factor * of_plain, atol=1e-9 * np.abs(of_plain).max())
 
 
 @pytest.mark.slow

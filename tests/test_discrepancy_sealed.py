@@ -10,6 +10,7 @@ from bench.discrepancy import BlindOptions, Case, diagnose
 from bench.discrepancy.blind.drawing import draw_case
 from bench.discrepancy.case.idle_loads import without_idle_noise
 from bench.discrepancy.effects.catalogue import effect_named
+from bench.discrepancy.fitting.fits import Search, multistart
 from bench.discrepancy.fitting.goodness_of_fit import consistent
 from bench.discrepancy.fitting.map_fit import fit
 from bench.discrepancy.judgement.nonparametric_rival import likelier_force
@@ -21,7 +22,6 @@ from bench.discrepancy.screening.score_test import lack_of_fit
 from bench.discrepancy.screening.screen import Screen
 from bench.discrepancy.search.coupled_effects import coupled_fits
 from bench.discrepancy.search.explanation import Explanation
-from bench.discrepancy.search.fits import Search, multistart
 from bench.discrepancy.search.forward_selection import attribute, prepare, worth_extending
 from bench.discrepancy.search.rivals import challenge
 

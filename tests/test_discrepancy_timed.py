@@ -10,7 +10,7 @@ from planted_cases import NOISE, SAMPLE_RATE, linear_motion, load, planted_case
 
 from bench.discrepancy import diagnose, record_from_arrays
 from bench.discrepancy.report.model_update import recipes
-from bench.discrepancy.search.time_windows import windows_of
+from bench.discrepancy.unscreened.time_windows import windows_of
 from bench.laws import find_law
 
 N = 4000

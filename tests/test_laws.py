@@ -100,7 +100,7 @@ def test_compiled_equals_source(law):
             np.testing.assert_allclose(fast, slow, rtol=1e-15, atol=1e-15 * max(1.0, np.abs(slow).max()))
 
 
-STATED_AT_REST = {"constant_force": 1.0}
+STATED_AT_REST = {"constant_force": 1.0, "harmonic_force": -5.0}
 
 
 @ALL
@@ -197,6 +197,7 @@ NOT_ODD = {
     "quadratic_stiffness",
     "constant_force",
     "timed_force",
+    "harmonic_force",
     "asymmetric_coulomb",
     "printed_coupling",
 }
@@ -232,7 +233,8 @@ NOT_PASSIVE = {
     "stiffness_drift",
     "printed_coupling",
     "timed_force",
-}  # time-dependent spring and force; the printed form may feed energy in
+    "harmonic_force",
+}  # time-dependent spring and forces; the printed form may feed energy in
 
 
 @ALL

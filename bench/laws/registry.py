@@ -29,6 +29,7 @@ from bench.laws.coupling import AXIAL_TORSIONAL_JOINT, CROSS_STIFFNESS, GAP_COUP
 from bench.laws.dahl import DAHL
 from bench.laws.damping import ASYMMETRIC_DAMPING, LINEAR_DAMPING, POWER_LAW_DAMPING, QUADRATIC_DAMPING
 from bench.laws.gap import ASYMMETRIC_GAP, GAP, ONE_SIDED_STOP
+from bench.laws.harmonic_force import HARMONIC_FORCE
 from bench.laws.jenkins import IWAN, JENKINS, iwan_law
 from bench.laws.jenkins_backlash import JENKINS_BACKLASH
 from bench.laws.linear import LINEAR
@@ -61,6 +62,7 @@ LAWS: Mapping[str, ForceLaw] = MappingProxyType(
             COGGING,
             CONSTANT_FORCE,
             TIMED_FORCE,
+            HARMONIC_FORCE,
             LINEAR_DAMPING,
             ASYMMETRIC_DAMPING,
             QUADRATIC_DAMPING,

@@ -36,6 +36,7 @@ LOOKS = {
     "stiffness_drift": "The frequency changes along the record; begun anew it is as before or has stayed.",
     "force_offset": "A constant force: the rest position is off, the motion about it is right.",
     "timed_force": "A force that is switched on and off by a clock and not by the motion.",
+    "harmonic_force": "A line in the spectrum of all responses at a frequency that is none of the load's: the response without a load, too.",
     "gap_coupling": "One axis is damped only while the other is far out.",
     "cross_stiffness": "A load of one axis moves the other, at once and in proportion.",
     "cogging": "A force that repeats along the stroke or turn, whatever the speed: in slow motion a ripple, in fast motion a tone that rises with it.",
@@ -78,12 +79,27 @@ SENSOR = {
 """How a fault of a sensor looks, by the end of its name."""
 
 
+VARIED = {
+    "scheduled_": "Its size follows the scheduling channel.",
+    "record_dependent_": "Its size differs from record to record, and is steady within each.",
+}
+"""What the beginning of a name adds to how an effect looks."""
+
+
+def _plain(name: str) -> str:
+    """Name of the effect that another one varies; its own where it varies none."""
+    for beginning in VARIED:
+        name = name.removeprefix(beginning)
+    return name
+
+
 def look_of(name: str) -> str:
     """How an effect looks in a record."""
     if name in LOOKS:
         return LOOKS[name]
-    if name.startswith("scheduled_"):
-        return LOOKS[name.removeprefix("scheduled_")] + " Its size follows the scheduling channel."
+    varied = next((text for beginning, text in VARIED.items() if name.startswith(beginning)), "")
+    if varied:
+        return f"{LOOKS[_plain(name)]} {varied}"
     return next((text for end, text in SENSOR.items() if name.endswith(end)), "")
 
 
@@ -171,8 +187,8 @@ def page(name: str) -> str:
         ]
     elif name in looks.PICTURED:
         lines += [f"![A small example with and without {name}](pictures/{name}.png)", ""]
-    elif name.removeprefix("scheduled_") in LAWS:
-        law = LAWS[name.removeprefix("scheduled_")]
+    elif (plain := _plain(name)) in LAWS:
+        law = LAWS[plain]
         lines += [f"![Force of the law {law}, of which this is a multiple](../laws/pictures/{law}.png)", ""]
     elif linear is not None and _drawn(linear):
         lines += [f"![What {name} makes of a swept sine](pictures/{name}.png)", ""]

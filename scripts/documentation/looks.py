@@ -76,7 +76,7 @@ CHANNELS: dict[str, Callable[[Array, Array], Array]] = {
 }
 """What an effect makes of a channel, by its name."""
 
-PICTURED = (*SERVOS, *RESPONSES, *CHANNELS, "record_dependent_friction", "timed_force")
+PICTURED = (*SERVOS, *RESPONSES, *CHANNELS, "record_dependent_friction", "timed_force", "harmonic_force")
 
 
 def draw(name: str, path: Path) -> None:
@@ -117,6 +117,10 @@ def _curves(name: str) -> tuple[tuple[str, str], Array, Array, Array]:
     if name == "timed_force":
         pushed = np.where((time > 1.0) & (time < 1.6), 1.0, 0.0)
         return ("time [s]", "missing force"), time, np.zeros_like(time), pushed
+    if name == "harmonic_force":
+        frequency, power = np.linspace(1.0, 8.0, 400), np.full(400, 1.0)
+        line = 30.0 / (1.0 + ((frequency - 5.3) / 0.02) ** 2)
+        return ("frequency [Hz]", "spectrum of the missing force"), frequency, power, power + line
     # two records, one after the other
     sign = np.sign(np.cos(2 * np.pi * 1.5 * time))
     return (

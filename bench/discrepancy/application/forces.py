@@ -281,6 +281,14 @@ def _read_link(target: Target, joint: str, link: str) -> None:
             sensor.type, sensor.objtype, sensor.objname = kinds[sensor.type], mujoco.mjtObj.mjOBJ_TENDON, link
 
 
+OF_A_RECORD = {
+    "timed_force": "its windows are those of the first record, others have their own",
+    "harmonic_force": "its phase is that of the first record, others have their own",
+    "record_dependent_": "its size is the mean of that in the records",
+}
+"""What is a record's own in an effect, by the beginning of its name."""
+
+
 def element(target: Target, effect: NamedEffect) -> Change:
     """A law of the bench as a native callback, for what MuJoCo has no form of that is exact enough."""
     v, name = values_of(effect), target.named(effect.where)
@@ -299,6 +307,8 @@ def element(target: Target, effect: NamedEffect) -> Change:
         if target.at_rest(name)
         else ""
     )
+    own = (text for beginning, text in OF_A_RECORD.items() if effect.name.startswith(beginning))
+    note += next((f"; {text}" for text in own), "")
     return Change(
         effect.name, name, "callback", f"the law '{law}' as a native callback, in the snippet: {effect.equation}{note}",
         (("joint", name),), (law, (name,), tuple(theta)),

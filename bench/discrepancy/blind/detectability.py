@@ -24,8 +24,8 @@ from bench.errors import BenchError
 
 if TYPE_CHECKING:
     from bench.discrepancy.fitting.map_fit import Fit
+    from bench.discrepancy.fitting.starts import Point
     from bench.discrepancy.model.structure import Structure
-    from bench.discrepancy.screening.linear_amplitudes import Point
 
 
 @dataclass(frozen=True)

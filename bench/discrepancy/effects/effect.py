@@ -178,6 +178,7 @@ class Effect:
         creeps: Its friction creeps at rest, so that `limit` writes how (`friction_limits`).
         of_record: Parameter values and the name of a record to the theta of `law` in that record; the same in all where None.
         schedule: Parameter values and a record to the schedule of its force there (`equations_of_motion.scale_at`); none where None.
+        varies: Name of the effect that this one is with a size that follows something; empty for others.
         in_place: It takes the place of the nominal model's own dry friction along its coordinate.
     """
 
@@ -202,6 +203,7 @@ class Effect:
     rate_bound: Callable[[Values, Scales], float] | None = None
     variant: str = ""
     creeps: bool = False
+    varies: str = ""
     in_place: bool = False
     of_record: Callable[[Values, str], Values] | None = None
     schedule: Callable[[Values, CaseRecord], Values] | None = None

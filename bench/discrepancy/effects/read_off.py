@@ -1,7 +1,7 @@
 """Effects that no grid can hold: what they are is read off the records before they are fitted, so that each record has one of its own.
 
 They stand in the catalogue by name, family and equation, so that they can be asked for, left out and scored like any other; what a fit
-is made of comes from `search.timed_force` and `search.scheduled`.
+is made of comes from `unscreened.timed_force`, `unscreened.harmonic_force` and `unscreened.scheduled`.
 """
 
 from __future__ import annotations
@@ -17,17 +17,33 @@ from bench.discrepancy.effects.effect import (
 )
 
 TIMED = "timed_force"
-DIFFERS = "record_dependent_friction"
+HARMONIC = "harmonic_force"
 FOLLOWED = "scheduled_"
 """What the name of an effect whose force follows a channel begins with."""
+DIFFERS = "record_dependent_"
+"""What the name of an effect whose force differs from record to record begins with."""
 SENSITIVITY = FreeParameter("sensitivity", signed=True, mean=1.0, std=0.5, bounds=(-4.0, 6.0))
+AMPLITUDE = FreeParameter("force", "force", mean=math.log(0.2), std=1.5, bounds=(-9.0, 5.0))
 FORCE = FreeParameter("force", "force", signed=True, std=2.0, bounds=(-50.0, 50.0))
-LIMIT = FreeParameter("friction_force", "force", mean=math.log(0.2), std=1.5, bounds=(-9.0, 5.0))
 
 
 def schedulable(effect: Effect) -> bool:
     """Whether the force of an effect may follow a channel."""
     return effect.site == "joint" and effect.n_coordinates == 1 and not effect.modulated
+
+
+def differs(effect: Effect) -> bool:
+    """Whether the force of an effect may differ from record to record: one that dissipates, as its normal force or its current may."""
+    return (
+        schedulable(effect)
+        and effect.family in ("friction", "hysteresis", "damping")
+        and not effect.parameters[0].signed
+    )
+
+
+def differing_name(effect: Effect) -> str:
+    """Name of an effect whose force differs from record to record; Coulomb friction is called friction there, of whatever limit."""
+    return DIFFERS + ("friction" if effect.name == "coulomb_friction" else effect.name)
 
 
 def read_off(forces: Iterable[Effect]) -> tuple[Effect, ...]:
@@ -36,13 +52,21 @@ def read_off(forces: Iterable[Effect]) -> tuple[Effect, ...]:
     Args:
         forces: Those of the catalogue, of which some may follow a channel.
     """
+    forces = tuple(forces)
     scheduled = (
         replace(
-            effect, name=FOLLOWED + effect.name, site="read off", parameters=(*effect.parameters, SENSITIVITY),
+            effect, name=FOLLOWED + effect.name, varies=effect.name, site="read off", parameters=(*effect.parameters, SENSITIVITY),
             equation=f"(1 - kappa + kappa s/s0) f, s a channel; {effect.equation}", log_prior=effect.log_prior + 0.5 * EFFECT_SETTINGS.rare,
             law=None, limit=None, theta=None, rate_bound=None,
         )
         for effect in forces if schedulable(effect)
+    )  # fmt: skip
+    differing = (
+        replace(
+            effect, name=differing_name(effect), varies=effect.name, site="read off", equation=f"c_i f in record i; {effect.equation}",
+            log_prior=effect.log_prior + EFFECT_SETTINGS.rare, law=None, limit=None, theta=None, rate_bound=None,
+        )
+        for effect in forces if differs(effect)
     )  # fmt: skip
     return (
         Effect(
@@ -54,12 +78,13 @@ def read_off(forces: Iterable[Effect]) -> tuple[Effect, ...]:
             log_prior=EFFECT_SETTINGS.rare,
         ),
         Effect(
-            DIFFERS,
-            "friction",
+            HARMONIC,
+            "external",
             "read off",
-            (LIMIT,),
-            "f = Fc_i sgn(v) in record i",
+            (AMPLITUDE,),
+            "f = -F cos(2 pi nu t + phi), nu of its own",
             log_prior=EFFECT_SETTINGS.rare,
         ),
+        *differing,
         *scheduled,
     )

@@ -1,1 +1,1 @@
-"""Fits of given sets of effects: maximum a posteriori, and initial states."""
+"""Fits of given sets of effects: where they begin, maximum a posteriori, which have been made, and initial states."""

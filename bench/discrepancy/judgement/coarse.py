@@ -167,8 +167,24 @@ def _finalists(
         int(np.argmin([entry.total - 2.0 * prior for entry, prior in zip(found, priors, strict=True)]))
     ]
     base = _pruned(best, found, known, settings)
+    found = [own for own in found if own is base or not _varied_in_vain(own, found, settings)]
     # what is larger than what is material has been weighed already
     return [base, *(e for e in found if e is not base and _no_larger(e.explanation, base.explanation))]
+
+
+def _varied_in_vain(entry: HeldOut, found: Sequence[HeldOut], settings: CoarseSettings) -> bool:
+    """Whether the size of an effect is let follow something, and without it what is found predicts as well: that is no rival of it."""
+
+    def plain(own: HeldOut) -> frozenset[tuple[str, str]]:
+        return frozenset((p.effect.varies or p.effect.name, p.place.name) for p in own.explanation.hypothesis)
+
+    def varied(own: HeldOut) -> int:
+        return sum(bool(p.effect.varies) for p in own.explanation.hypothesis)
+
+    return any(
+        varied(other) < varied(entry) and plain(other) == plain(entry) and _as_good(other, entry, settings)
+        for other in found
+    )
 
 
 def _with(entry: HeldOut, own: HeldOut, found: Sequence[HeldOut]) -> list[HeldOut]:

@@ -121,8 +121,8 @@ def log_odds(first: Explanation, second: Explanation) -> float:
 
 
 def _is_rival(best: Explanation, other: Explanation) -> bool:
-    """Whether another explanation says something else, rather than the same and one thing more."""
-    own, theirs = ({p.key for p in e.hypothesis} for e in (best, other))
+    """Whether another explanation names something else, rather than the same, in another variant or with one thing more."""
+    own, theirs = ({(p.effect.name, p.place.name, p.target) for p in e.hypothesis} for e in (best, other))
     return not own <= theirs
 
 

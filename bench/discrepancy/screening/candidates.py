@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from bench.discrepancy.effects.effect import Effect
 from bench.discrepancy.fitting.goodness_of_fit import consistent, near, sticks
 from bench.discrepancy.fitting.map_fit import Fit
+from bench.discrepancy.fitting.starts import Point
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.response.simulator import Simulator
-from bench.discrepancy.screening.linear_amplitudes import Point
 from bench.discrepancy.screening.projection import Ground
 from bench.discrepancy.screening.screen import Screen
 from bench.discrepancy.settings import DiagnosisSettings

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.discrepancy.fitting.starts import Point
 from bench.discrepancy.likelihood.problem import Array
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.settings import ScreeningSettings
@@ -41,20 +42,6 @@ class GridPoint(NamedTuple):
     eta: Array
     columns: NDArray[np.floating]
     gram: Array
-
-
-class Point(NamedTuple):
-    """A grid point, solved.
-
-    Attributes:
-        placed: The effect.
-        gain: Decrease of chi-squared, nominal deviations and the base's parameters re-estimated.
-        eta: Start for a fit.
-    """
-
-    placed: Placed
-    gain: float
-    eta: Array
 
 
 def amplitudes(placed: Placed) -> list[int]:

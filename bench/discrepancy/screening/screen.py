@@ -15,13 +15,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from bench.discrepancy.fitting.map_fit import Fit
+from bench.discrepancy.fitting.starts import Point
 from bench.discrepancy.likelihood.problem import Array, Problem
 from bench.discrepancy.model.placement import Hypothesis, Placed
 from bench.discrepancy.numerics.least_squares import Prior, minimise
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.screening.linear_amplitudes import (
     GridPoint,
-    Point,
     products,
     read,
     spanning,

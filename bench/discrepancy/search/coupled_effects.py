@@ -7,8 +7,10 @@ from collections.abc import Callable, Collection, Sequence
 import numpy as np
 
 from bench.discrepancy.effects.effect import Effect
+from bench.discrepancy.fitting.fits import Search, converge
 from bench.discrepancy.fitting.goodness_of_fit import names
 from bench.discrepancy.fitting.map_fit import Fit
+from bench.discrepancy.fitting.starts import Point
 from bench.discrepancy.model.placements import placements
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.screening.candidates import (
@@ -18,11 +20,9 @@ from bench.discrepancy.screening.candidates import (
     refined,
     tells_motion,
 )
-from bench.discrepancy.screening.linear_amplitudes import Point
 from bench.discrepancy.screening.projection import Ground
 from bench.discrepancy.screening.screen import Screen
 from bench.discrepancy.search.extension import faint_starts, first_fit
-from bench.discrepancy.search.fits import Search, converge
 from bench.discrepancy.search.rivals import reduce_best
 
 Keys = Collection[tuple[str, str, str]]

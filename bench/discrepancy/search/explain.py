@@ -15,6 +15,7 @@ import numpy as np
 
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.effects.effect import Effect
+from bench.discrepancy.fitting.fits import Search, Task, converge
 from bench.discrepancy.fitting.goodness_of_fit import consistent, key_of, names, near
 from bench.discrepancy.fitting.map_fit import Fit
 from bench.discrepancy.likelihood.model_error import ModelInadequacy
@@ -26,7 +27,6 @@ from bench.discrepancy.model.structure import Structure
 from bench.discrepancy.numerics.deadline import NEVER, Deadline
 from bench.discrepancy.search.coupled_effects import coupled_fits
 from bench.discrepancy.search.explanation import Explanation, leaves_nothing, nothing_left_first, parsimonious
-from bench.discrepancy.search.fits import Search, Task, converge
 from bench.discrepancy.search.forward_selection import (
     Prepared,
     attribute,

@@ -8,8 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from bench.discrepancy.effects.effect import Effect
+from bench.discrepancy.fitting.fits import Search, Task, carry_on, converge, limit_of
 from bench.discrepancy.fitting.goodness_of_fit import consistent, key_of
 from bench.discrepancy.fitting.map_fit import Fit, fit
+from bench.discrepancy.fitting.starts import Point
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Hypothesis, Placed
 from bench.discrepancy.numerics.threads import in_threads
@@ -20,9 +22,8 @@ from bench.discrepancy.screening.candidates import (
     refined,
     tells_motion,
 )
-from bench.discrepancy.screening.linear_amplitudes import Point, fainter
+from bench.discrepancy.screening.linear_amplitudes import fainter
 from bench.discrepancy.screening.screen import Screen
-from bench.discrepancy.search.fits import Search, Task, carry_on, converge, limit_of
 
 
 class _Offers(NamedTuple):

@@ -15,9 +15,11 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from bench.discrepancy.effects.read_off import TIMED
+from bench.discrepancy.effects.read_off import HARMONIC, TIMED
+from bench.discrepancy.fitting.fits import Search, integrate_finer, multistart
 from bench.discrepancy.fitting.goodness_of_fit import complexity, consistent, leaves_much, names, near
 from bench.discrepancy.fitting.map_fit import Fit, fit
+from bench.discrepancy.fitting.starts import Point
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.numerics.deadline import NEVER, Deadline
@@ -25,16 +27,15 @@ from bench.discrepancy.screening.candidates import (
     about,
     tells_motion,
 )
-from bench.discrepancy.screening.linear_amplitudes import Point
 from bench.discrepancy.screening.score_test import lack_of_fit
 from bench.discrepancy.screening.screen import Screen
 from bench.discrepancy.search.extension import contacts, extend
-from bench.discrepancy.search.fits import Search, integrate_finer, multistart
 from bench.discrepancy.search.horizons import lengthen
 from bench.discrepancy.search.rivals import challenge, reduce_best, simplify
-from bench.discrepancy.search.scheduled import with_schedules
-from bench.discrepancy.search.soft_friction import soften, stand_in
-from bench.discrepancy.search.timed_force import with_timed_force
+from bench.discrepancy.unscreened.harmonic_force import with_harmonic_force
+from bench.discrepancy.unscreened.scheduled import with_schedules
+from bench.discrepancy.unscreened.soft_friction import soften, stand_in
+from bench.discrepancy.unscreened.timed_force import with_timed_force
 
 Prepared = tuple[Search, Screen, list[Point]]
 """A search before its first step: the nominal model fitted, the catalogue screened, its grid points by decreasing gain."""
@@ -127,6 +128,8 @@ def _single(
         asked = {p.effect.name for p in candidates if p.effect.site == "read off"}
         if TIMED in asked:
             with_timed_force(search)
+        if HARMONIC in asked:
+            with_harmonic_force(search)
         with_schedules(search, asked)
 
 

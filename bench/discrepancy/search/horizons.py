@@ -16,12 +16,12 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from bench.arrays import Array
+from bench.discrepancy.fitting.fits import Search, Task
 from bench.discrepancy.fitting.goodness_of_fit import key_of, leaves_much, near
 from bench.discrepancy.fitting.map_fit import Fit, fit
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Hypothesis, Placed
 from bench.discrepancy.numerics.threads import in_threads
-from bench.discrepancy.search.fits import Search, Task
 
 
 def lengthen(search: Search, size: int, candidates: Sequence[Placed]) -> None:

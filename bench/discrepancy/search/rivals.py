@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from bench.discrepancy.effects.effect import Effect
+from bench.discrepancy.fitting.fits import Search, Task, carry_on, converge
 from bench.discrepancy.fitting.goodness_of_fit import consistent, key_of
 from bench.discrepancy.fitting.map_fit import Fit
 from bench.discrepancy.model.placement import Hypothesis, Placed
@@ -19,7 +20,6 @@ from bench.discrepancy.screening.candidates import (
     tells_motion,
 )
 from bench.discrepancy.screening.screen import Screen
-from bench.discrepancy.search.fits import Search, Task, carry_on, converge
 
 PLAINER = {"hysteresis": "friction", "damping": "friction"}
 """Families whose laws become those of another one at the limits of their parameters."""

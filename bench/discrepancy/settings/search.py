@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from bench.discrepancy.settings.describing import setting
 from bench.discrepancy.settings.search_parts import (
     CoupledSettings,
+    HarmonicForceSettings,
     HorizonSettings,
     LoadReadingSettings,
     PlainSettings,
@@ -188,3 +189,4 @@ class SearchSettings:
     readings: LoadReadingSettings = field(default_factory=LoadReadingSettings)
     soft: SoftFrictionSettings = field(default_factory=SoftFrictionSettings)
     timed: TimedForceSettings = field(default_factory=TimedForceSettings)
+    harmonic: HarmonicForceSettings = field(default_factory=HarmonicForceSettings)

@@ -143,6 +143,34 @@ class SoftFrictionSettings:
 
 
 @dataclass(frozen=True)
+class HarmonicForceSettings:
+    """A harmonic force of a frequency of its own: its line in the spectrum of what the records lack."""
+
+    false_alarm: float = setting(
+        0.01,
+        "Probability that noise alone shows such a line somewhere in the spectrum of a record.",
+        "Convention; a fit decides afterwards.",
+    )
+    neighbours: int = setting(
+        24,
+        "Bins on either side whose medians tell what lies about a line.",
+        "Their median is right to a quarter; a resonance of 1 % damping is as wide at 50 Hz in 10 s.",
+        unit="bins",
+    )
+    lobe: int = setting(
+        3,
+        "Bins on either side that belong to the line.",
+        "The main lobe of the Hann window, and one.",
+        unit="bins",
+    )
+    drawn: float = setting(
+        4.0,
+        "Bounds of the frequency, in resolutions of the record, about the line.",
+        "Its phase would turn by more than four times over the record.",
+    )
+
+
+@dataclass(frozen=True)
 class TimedForceSettings:
     """A force that acts at certain times: its windows."""
 

@@ -17,7 +17,6 @@ from typing import NamedTuple
 import numpy as np
 
 from bench.arrays import Array
-from bench.discrepancy.case.case import CaseRecord
 from bench.discrepancy.effects.effect import (
     EFFECT_SETTINGS,
     Effect,
@@ -26,21 +25,21 @@ from bench.discrepancy.effects.effect import (
     Values,
 )
 from bench.discrepancy.effects.read_off import FORCE, TIMED
+from bench.discrepancy.fitting.fits import Search, converge
 from bench.discrepancy.fitting.goodness_of_fit import consistent, key_of
 from bench.discrepancy.fitting.map_fit import Fit
 from bench.discrepancy.likelihood.problem import Problem
-from bench.discrepancy.model.nominal_elements import own_force
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.model.structure import Place
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.response.simulator import Simulator
-from bench.discrepancy.search.fits import Search, converge
-from bench.discrepancy.search.time_windows import (
+from bench.discrepancy.settings import SearchSettings
+from bench.discrepancy.unscreened.missing_force import missing_force
+from bench.discrepancy.unscreened.time_windows import (
     TimeWindows,
     follows_motion,
     windows_of,
 )
-from bench.discrepancy.settings import SearchSettings
 from bench.laws.timed_force import MAX_WINDOWS, timed_force_law
 
 SHIFT = FreeParameter("shift", "step", signed=True, std=1.0, bounds=(-20.0, 20.0), unit="s")
@@ -138,18 +137,6 @@ def _moved(
             break
         before, edges = min(better, key=lambda one: float(one[0] @ one[0]))
     return edges
-
-
-def missing_force(simulator: Simulator, record: CaseRecord, place: Place) -> Array:
-    """External force (n,) along a coordinate that the nominal model lacks along the measured motion of a record."""
-    motion, linear = simulator.motion_of(record), simulator.structure.at(simulator.nominal)
-    held = motion.position @ linear.stiffness.T + motion.velocity @ linear.damping.T
-    held = held + own_force(simulator.structure, simulator.nominal, motion, record.step)
-    if simulator.driven:
-        return held[:, 0] - record.values[simulator.structure.channels[0]]
-    loads = np.column_stack([record.values[name] for name in simulator.structure.loads])
-    left = motion.acceleration @ linear.mass.T + held - loads @ simulator.structure.inputs.T
-    return np.asarray(np.linalg.lstsq(place.rows.T, left.T, rcond=None)[0][0], dtype=np.float64)
 
 
 def _at(simulator: Simulator, place: Place) -> _Found | None:

@@ -23,11 +23,11 @@ from bench.discrepancy.effects import friction_limits as limits
 from bench.discrepancy.effects.catalogue import effect_named
 from bench.discrepancy.effects.effect import Effect, FreeParameter, Scales, Values
 from bench.discrepancy.effects.force_priors import FRICTION
+from bench.discrepancy.fitting.fits import Search, Task, converge
 from bench.discrepancy.fitting.goodness_of_fit import consistent
 from bench.discrepancy.fitting.map_fit import Fit
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.response.simulator import Simulator
-from bench.discrepancy.search.fits import Search, Task, converge
 from bench.laws.coulomb import COULOMB
 from bench.laws.soft_friction import SOFT_COULOMB
 

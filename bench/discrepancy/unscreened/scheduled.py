@@ -8,14 +8,15 @@ with s0 the RMS of the channel in the records for identification: in proportion 
 independent of it for zero. Limit and slopes of a law scale alike, as a contact's do with its normal force. A measured channel that
 is no load of one of the bench's rigs counts as scheduling, too.
 
-Where no channel tells, friction may differ from record to record all the same. It is then named with its limit in each, which says that
-something has changed between the records and not what; on a record of its own it is the mean of those.
+Where no channel tells, what dissipates may differ from record to record all the same: friction with the normal force, a
+magnetorheological damper with its current. It is then named with its size in each, which says that something has changed between the
+records and not what; on a record of its own it is the mean of those.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -32,14 +33,19 @@ from bench.discrepancy.effects.effect import (
     Values,
 )
 from bench.discrepancy.effects.force_priors import FRICTION
-from bench.discrepancy.effects.read_off import DIFFERS, FOLLOWED, SENSITIVITY, schedulable
-from bench.discrepancy.fitting.goodness_of_fit import consistent, key_of
+from bench.discrepancy.effects.read_off import (
+    FOLLOWED,
+    SENSITIVITY,
+    differing_name,
+    differs,
+    schedulable,
+)
+from bench.discrepancy.fitting.fits import Search, Task, converge
+from bench.discrepancy.fitting.goodness_of_fit import consistent
 from bench.discrepancy.fitting.map_fit import Fit
 from bench.discrepancy.model.placement import Placed
-from bench.discrepancy.model.structure import Place
 from bench.discrepancy.response.simulator import Simulator
-from bench.discrepancy.search.fits import Search, Task, converge
-from bench.discrepancy.search.soft_friction import IDEAL, RUBBING, frictional, nominal_level
+from bench.discrepancy.unscreened.soft_friction import IDEAL, RUBBING, frictional, nominal_level
 
 LOADS = ("force", "torque")
 """Load channels of the bench's own rigs."""
@@ -55,7 +61,7 @@ def scheduling(case: Case) -> list[CaseChannel]:
 
 
 def with_schedules(search: Search, asked: Collection[str]) -> None:
-    """Fit the foremost effects with a schedule, or friction that differs between records where no channel tells.
+    """Fit the foremost effects with a schedule, or with a size that differs between records where no channel tells.
 
     Args:
         search: Fits so far; the new ones are added.
@@ -66,18 +72,18 @@ def with_schedules(search: Search, asked: Collection[str]) -> None:
         return
     channels = scheduling(problem.case)
     tasks: list[Task] = []
-    for channel in channels:
-        for placed, start in (one for one in _seeds(search) if FOLLOWED + one[0].effect.name in asked):
-            tasks += _followed(problem, placed, start, channel)
-    if not channels and len(problem.records) > 1 and DIFFERS in asked:
-        tasks = [
-            t for place in problem.structure.places if len(place.rows) == 1 for t in _differing(search, place)
-        ]
+    for placed, start in _seeds(search):
+        effect = placed.effect
+        if FOLLOWED + effect.name in asked:
+            for channel in channels:
+                tasks += _followed(problem, placed, start, channel)
+        if not channels and len(problem.records) > 1 and differs(effect) and differing_name(effect) in asked:
+            tasks += _differing(problem, placed, start)
     converge(search, tasks)
 
 
 def _seeds(search: Search) -> list[tuple[Placed, Array]]:
-    """Effects that are tried with a schedule, and vectors to start from: those that come nearest alone, and Coulomb friction.
+    """Effects that are tried so, and vectors to start from: those that come nearest alone, and Coulomb friction.
 
     Friction of the mean limit may be in the nominal model already, so that no fit has asked for any.
     """
@@ -105,14 +111,44 @@ def _schedulable(fitted: Fit) -> bool:
 
 
 def _followed(simulator: Simulator, placed: Placed, start: Array, channel: CaseChannel) -> list[Task]:
-    """Fits of an effect whose force follows a channel: added to the nominal model, and in the place of its friction."""
+    """Fits of an effect whose force follows a channel."""
+    effect, reference = scheduled_by(placed.effect, channel, simulator), _reference(simulator, channel)
+
+    def shapes(eta: Array) -> list[Array]:
+        return [np.append(eta, [kappa, reference]) for kappa in (0.5, 1.0)]
+
+    return _tasks(simulator, placed, start, Placed(effect, placed.place, channel.name), shapes)
+
+
+def _differing(simulator: Simulator, placed: Placed, start: Array) -> list[Task]:
+    """Fits of an effect whose force differs from record to record, the same in all at the start."""
+    names = [record.name for record in simulator.records]
+
+    def shapes(eta: Array) -> list[Array]:
+        return [np.append(np.full(len(names), eta[0]), eta[1:])]
+
+    return _tasks(simulator, placed, start, Placed(differing(placed.effect, names), placed.place), shapes)
+
+
+def _tasks(
+    simulator: Simulator,
+    placed: Placed,
+    start: Array,
+    varied: Placed,
+    shapes: Callable[[Array], list[Array]],
+) -> list[Task]:
+    """Fits of a varied effect: added to the nominal model, and in the place of its friction.
+
+    Args:
+        simulator: Records and nominal model.
+        placed: The effect as it is.
+        start: Vector of a fit with it.
+        varied: The effect as it is varied.
+        shapes: Parameters of the effect to starts of the varied one.
+    """
     values, (eta,) = simulator.split((placed,), start)
     n = len(simulator.nominal)
-    effect = scheduled_by(placed.effect, channel, simulator)
-    reference = _reference(simulator, channel)
-    shapes = [np.append(eta, [kappa, reference]) for kappa in (0.5, 1.0)]
-    new = Placed(effect, placed.place, channel.name)
-    tasks: list[Task] = [((new,), np.array([np.append(start[:n], shape) for shape in shapes]))]
+    tasks: list[Task] = [((varied,), np.array([np.append(start[:n], shape) for shape in shapes(eta)]))]
     loss = nominal_level(simulator, placed, values)
     if loss is not None and placed.effect.family in RUBBING:
         scales = simulator.scales_of(placed)
@@ -121,15 +157,9 @@ def _followed(simulator: Simulator, placed: Placed, start: Array, channel: CaseC
         if first.name == FRICTION.name:
             whole[0] = first.eta(first.value(eta[0], scales) + loss, scales)
         still = np.where(frictional(simulator), 0.0, start[:n])
-        starts = [
-            np.concatenate([still, own, [kappa, reference]]) for kappa in (0.5, 1.0) for own in (whole, eta)
-        ]
-        tasks.append(
-            (
-                (Placed(replace(effect, in_place=True, variant="in place"), placed.place, channel.name),),
-                np.array(starts),
-            )
-        )
+        instead = replace(varied, effect=replace(varied.effect, in_place=True, variant="in place"))
+        starts = [np.append(still, shape) for own in (whole, eta) for shape in shapes(own)]
+        tasks.append(((instead,), np.array(starts)))
     return tasks
 
 
@@ -150,7 +180,7 @@ def scheduled_by(effect: Effect, channel: CaseChannel, simulator: Simulator) -> 
         return values[:count] if theta is None else theta(values[:count], scales)
 
     return replace(
-        effect, name=FOLLOWED + effect.name, equation=f"(1 - kappa + kappa s/s0) f, s = {name}; {effect.equation}",
+        effect, name=FOLLOWED + effect.name, varies=effect.name, equation=f"(1 - kappa + kappa s/s0) f, s = {name}; {effect.equation}",
         parameters=(*effect.parameters, SENSITIVITY, FreeParameter("reference", signed=True, fixed=True, unit=channel.unit or "1")),
         theta=own_theta, schedule=schedule, log_prior=effect.log_prior + 0.5 * EFFECT_SETTINGS.rare,
         rate_bound=None if bound is None else lambda values, scales: bound(values[:count], scales),
@@ -162,39 +192,29 @@ def _reference(simulator: Simulator, channel: CaseChannel) -> float:
     return math.sqrt(float(np.mean(power))) or 1.0
 
 
-def _differing(search: Search, place: Place) -> list[Task]:
-    """Coulomb friction of another limit in every record, added to the nominal model or in the place of its friction."""
-    problem, names = search.problem, [record.name for record in search.problem.records]
-    effect = differing(names)
-    ideal = search.fits.get(key_of((Placed(effect_named(IDEAL), place),)))
-    vector = search.ranked(0)[0].vector if ideal is None else ideal.vector
-    n = len(problem.nominal)
-    scales = problem.scales_of(Placed(effect, place))
-    level = 0.0 if ideal is None else FRICTION.value(ideal.vector[n], scales)
-    tasks: list[Task] = []
-    loss = nominal_level(problem, Placed(effect, place), problem.split((), vector[:n])[0])
-    replacing = replace(effect, in_place=True, variant="in place")
-    for own, limit in ((effect, level), (replacing, level + (loss or 0.0))):
-        if limit > 0.0 and (loss is not None or not own.in_place):
-            still = np.where(frictional(problem), 0.0, vector[:n]) if own.in_place else vector[:n]
-            start = np.append(still, np.full(len(names), FRICTION.eta(limit, scales)))
-            tasks.append(((Placed(own, place),), start))
-    return tasks
+def differing(effect: Effect, records: Sequence[str]) -> Effect:
+    """An effect whose force is of another size in every record for identification, and of their mean in any other.
 
+    Args:
+        effect: The effect, of the same size in all.
+        records: Names of the records for identification.
+    """
+    count, first, bound = len(records), effect.parameters[0], effect.rate_bound
 
-def differing(records: list[str]) -> Effect:
-    """Coulomb friction of another limit in every record for identification, and of their mean in any other."""
-    ideal = effect_named(IDEAL)
-    theta = ideal.theta
-    assert theta is not None
+    def mean(values: Values) -> Values:
+        return np.concatenate([[values[:count].mean()], values[count:]])
 
     def schedule(values: Values, record: CaseRecord) -> Values:
-        factor = values[records.index(record.name)] / np.mean(values) if record.name in records else 1.0
+        known = record.name in records
+        factor = values[records.index(record.name)] / np.mean(values[:count]) if known else 1.0
         return np.array([0.0, 1.0, 2.0, factor, factor])
 
+    def own_theta(values: Values, scales: Scales) -> Values:
+        return mean(values) if effect.theta is None else effect.theta(mean(values), scales)
+
     return replace(
-        ideal, name=DIFFERS, equation="f = Fc_i sgn(v) in record i",
-        parameters=tuple(replace(FRICTION, name=f"friction_force_{name}") for name in records),
-        theta=lambda values, scales: theta(np.array([values.mean()]), scales), schedule=schedule, log_prior=EFFECT_SETTINGS.rare,
-        n_linear=1,
+        effect, name=differing_name(effect), varies=effect.name, equation=f"c_i f in record i; {effect.equation}",
+        parameters=(*(replace(first, name=f"{first.name}_{name}") for name in records), *effect.parameters[1:]),
+        theta=own_theta, schedule=schedule, log_prior=effect.log_prior + EFFECT_SETTINGS.rare,
+        rate_bound=None if bound is None else lambda values, scales: bound(mean(values), scales), n_linear=1,
     )  # fmt: skip

@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from bench.discrepancy.fitting.goodness_of_fit import consistent, key_of, near, posterior, sticks
 from bench.discrepancy.fitting.map_fit import Fit, fit, free_entries, laplace
+from bench.discrepancy.fitting.starts import Point
 from bench.discrepancy.likelihood.problem import Array, Problem
 from bench.discrepancy.model.placement import Hypothesis
 from bench.discrepancy.numerics.least_squares import (
     differences,
 )
 from bench.discrepancy.numerics.threads import in_threads
-from bench.discrepancy.screening.linear_amplitudes import Point
 
 Task = tuple[Hypothesis, np.ndarray]
 """Effects, and the vector or vectors that a fit of them starts from."""

@@ -1,0 +1,94 @@
+"""A harmonic force from outside: its line, its fit, and a rotor whose speed differs between the records."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from planted_cases import NOISE, SAMPLE_RATE, linear_motion, load, planted_case
+
+from bench.discrepancy import Case, diagnose, record_from_arrays
+from bench.discrepancy.unscreened.harmonic_force import line_of
+from bench.laws import find_law
+
+N = 4000
+TIME = np.arange(N) / SAMPLE_RATE
+
+
+def harmonic(force: float, frequency: float, phase: float) -> np.ndarray:
+    return force * np.cos(2.0 * np.pi * frequency * TIME + phase)
+
+
+def case_with(*forces: np.ndarray) -> Case:
+    """A planted case on whose records forces act that no channel tells, one a record; the last one is for judging."""
+    case, rng = planted_case(n=N), np.random.default_rng(5)
+    records = []
+    for seed, extra in enumerate(forces):
+        known = load(seed, N)
+        x, a = linear_motion(known + extra)
+        values = {
+            "force": known,
+            "displacement": x + NOISE["displacement"] * rng.standard_normal(N),
+            "acceleration": a + NOISE["acceleration"] * rng.standard_normal(N),
+        }
+        records.append(record_from_arrays(f"record_{seed}", TIME, values))
+    return replace(case, identification=tuple(records[:-1]), validation=(records[-1],))
+
+
+def test_the_kernel_pushes_towards_positive_displacement_at_its_phase():
+    law = find_law("harmonic_force")
+    for time, expected in ((0.0, -3.0 * np.cos(0.4)), (0.1, -3.0 * np.cos(0.2 * np.pi * 2.5 + 0.4))):
+        f = np.zeros(1)
+        law.force(time, np.zeros(1), np.zeros(1), np.zeros(1), law.theta([3.0, 2.5, 0.4]), f)
+        assert f[0] == pytest.approx(expected)
+
+
+def test_a_line_is_found_to_a_part_of_the_resolution_and_noise_has_none():
+    rng = np.random.default_rng(0)
+    noise = rng.standard_normal(N)
+    coloured = np.convolve(rng.standard_normal(N), np.exp(-np.arange(60) / 12.0), mode="same")
+    for background in (noise, coloured, load(3, N)):
+        assert line_of(TIME, background) is None
+        found = line_of(TIME, background + harmonic(2.0 * np.std(background), 16.713, 0.7))
+        assert found is not None
+        # a frequency is known to the resolution over the ratio of the line's power to that of a bin of noise, here hundreds
+        assert abs(found.frequency - 16.713) < 0.03 * SAMPLE_RATE / N
+        assert found.amplitude == pytest.approx(2.0 * np.std(background), rel=0.06)
+        assert found.phase == pytest.approx(0.7, abs=0.15)
+
+
+def test_lines_at_multiples_of_a_harmonic_load_are_left_to_the_load():
+    square = np.sign(harmonic(1.0, 3.04, 0.2)) + 1e-3 * np.random.default_rng(1).standard_normal(N)
+    own = harmonic(0.05, 20.3, 0.0)
+    assert line_of(TIME, square) is not None
+    found = line_of(TIME, square + own, [harmonic(1.0, 3.04, 1.1)])
+    assert found is not None
+    # the sampled square wave has lines at multiples that are folded back, too; the largest that is no multiple is the one added
+    assert found.frequency == pytest.approx(20.3, abs=0.03)
+
+
+@pytest.mark.slow
+def test_a_hum_that_no_channel_tells_is_named_with_its_frequency_and_force():
+    diagnosis = diagnose(case_with(harmonic(3.0, 9.27, 0.8), harmonic(3.0, 9.27, -2.1)))
+    verdict = diagnosis.verdict
+    assert [effect.name for effect in verdict.named] == ["harmonic_force"]
+    found = verdict.named[0].parameters
+    assert abs(found["force"].value - 3.0) < 5 * found["force"].std
+    assert abs(found["frequency"].value - 9.27) < 5 * found["frequency"].std + 1e-4
+    assert found["phase_record_0"].value == pytest.approx(0.8, abs=0.05)
+    # the phase of the judging record is its own; its force is that of the other one
+    assert verdict.gap.after < 1.3 * verdict.gap.noise_floor < 0.3 * verdict.gap.before
+
+
+@pytest.mark.slow
+def test_the_force_of_a_rotor_at_other_speeds_grows_with_their_square():
+    unbalance = 3.0 / 9.27**2
+    speeds = (9.27, 7.4, 8.31)
+    forces = [harmonic(unbalance * f**2, f, phase) for f, phase in zip(speeds, (0.8, -2.1, 0.3), strict=True)]
+    verdict = diagnose(case_with(*forces)).verdict
+    assert [effect.name for effect in verdict.named] == ["harmonic_force"]
+    found = verdict.named[0].parameters
+    assert abs(found["force"].value - 3.0) < 5 * found["force"].std
+    assert found["frequency_record_1"].value == pytest.approx(7.4, abs=1e-3)
+    assert verdict.gap.after < 1.3 * verdict.gap.noise_floor < 0.3 * verdict.gap.before
