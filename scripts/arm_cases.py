@@ -3,7 +3,8 @@
     python scripts/arm_cases.py CASES RESULTS [--only arm2 leg3-037 …] [--again]
 
 CASES holds one folder a case (`nominal.json`, records, MJCF), RESULTS gets `NAME.json` and a line in `ladders.txt`. Cases that already
-have a result are skipped, so that a run can be stopped and taken up again. Seconds are those of the processor (all threads).
+have a result are skipped, so that a run can be stopped and taken up again. Seconds in `ladders.txt` are those of the processor (all
+threads). `jointbench blind score RESULTS ANSWERS` scores them.
 """
 
 from __future__ import annotations
@@ -66,8 +67,7 @@ def main() -> None:
             print(f"{folder.name}: {error}", flush=True)
             continue
         used = time.process_time() - began
-        written = found.verdict.to_json() | {"cpu_seconds": round(used, 1)}
-        write_text(answer, json.dumps(written, indent=1))
+        write_text(answer, json.dumps(found.verdict.to_json(), indent=1))
         line = f"{folder.name}: {told(found)} {used:.0f} s of processor"
         print(line, flush=True)
         with (options.results / "ladders.txt").open("a") as file:

@@ -21,6 +21,7 @@ from capability_figures import (
 )
 from diagnosis_figures import (
     applied,
+    arms,
     background,
     graded,
     localisation,
@@ -106,6 +107,15 @@ CAPABILITIES: Sequence[Capability] = (
         ),
         background,
         data="../trials-background",
+    ),
+    Capability(
+        "arms",
+        "Diagnosis of arms, legs and servos of others",
+        ("jointbench", "blind", "score", "out/arms", "{data}/../trials-arms/answers", "--json"),
+        arms,
+        before=(("jointbench", "blind", "run", "{data}/../trials-arms", "out/arms", "--again"),),
+        data="../trials-arms",
+        hours=True,
     ),
     Capability(
         "robots",

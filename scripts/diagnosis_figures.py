@@ -77,6 +77,35 @@ def sealed(told: Any) -> Figures:
     ]
 
 
+def arms(told: Any) -> Figures:
+    """Sealed cases of arms, legs and servos of others."""
+
+    def share(key: str) -> str:
+        return f"{100.0 * told[key]:.1f} %"
+
+    return [
+        ("cases", str(told["n"]), ""),
+        ("single effects named exactly, declared sets counted", share("exact"), "≥ 90 %"),
+        ("single effects, family right", share("family"), "≥ 95 %"),
+        ("joint, body or drive right", share("place"), "≥ 90 %"),
+        ("clean cases: false alarms", share("false_alarms"), "≤ 5 %"),
+        (
+            "foreign effects called unknown; those named, but not complete, are not counted",
+            share("unknown_caught"),
+            "",
+        ),
+        ("two effects: both named", share("both_named"), "≥ 70 %"),
+        ("discrepancy after over noise floor, median", f"{told['median_ratio']:.3g}", "≤ 1.15"),
+        (
+            "discrepancy after over noise floor, 90th percentile, foreign cases included",
+            f"{told['p90_ratio']:.3g}",
+            "",
+        ),
+        ("seconds a case, median", f"{told['median_seconds']:.3g}", "≤ 60"),
+        ("seconds a case, 90th percentile", f"{told['p90_seconds']:.3g}", ""),
+    ]
+
+
 def graded(told: Any) -> Figures:
     """Measured cases, each right, honest or wrong by what was written down before."""
     rows: list[tuple[str, ...]] = []

@@ -100,8 +100,8 @@ class AnswerDocument(Document, _Open):
     """Gap of the records for finding."""
     gap_nrmse_validation: AnyNumber | Numbers | None = None
     """Gap of the judging record."""
-    noise: AnyNumber | None = None
-    """Noise over the standard deviation of a channel."""
+    noise: AnyNumber | dict[str, AnyNumber | None] | None = None
+    """Noise over the standard deviation of a channel; or noise by channel, which no score asks for."""
     sensors: Text | Listed[Name] | None = None
     """Kind of sensors, or the response channels."""
     signals: Listed[Name] = ()

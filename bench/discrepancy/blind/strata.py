@@ -38,7 +38,7 @@ def bands_of(name: str, answer: Mapping[str, Any], kind: str) -> dict[str, str]:
     odds = answer.get("detectability") or {}
     numbers = {
         "gap": None if gap is None or kind == "none" else float(np.max(gap)),
-        "noise": answer.get("noise"),
+        "noise": None if isinstance(answer.get("noise"), dict) else answer.get("noise"),
         "log odds against the nearest rival": odds.get("log_odds_rival"),
         "log odds against none": odds.get("log_odds_none"),
     }

@@ -228,7 +228,7 @@ def _past_local_minima(fitted: Fit, problem: Problem, free: NDArray[np.int64]) -
     settings = fitted.settings.numerics
     _, std, _, high = problem.prior(fitted.hypothesis)
     changes = differences(
-        lambda vector: problem.residual(fitted.hypothesis, vector),
+        problem.residual_near(fitted.hypothesis, fitted.vector),
         fitted.vector,
         problem.residual(fitted.hypothesis, fitted.vector),
         free=free,

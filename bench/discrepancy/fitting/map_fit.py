@@ -111,6 +111,7 @@ def fit(
         exact=exact,
         deadline=problem.deadline,
         settings=problem.settings.numerics,
+        near=lambda vector: problem.residual_near(hypothesis, vector),
     )
     precision, evidence = laplace(problem, hypothesis, found.cost, found.curvature, free)
     with np.errstate(over="ignore"):  # a run on its way to divergence

@@ -55,9 +55,16 @@ def coarse_explanations(
         settled = bool(known) and reference(explanations).reduced > settings.judgement.error_settled
         if settled or not deadline.allows("a further estimate of the error of the model"):
             break
-        known = explanations
-        case, explanations = search(case, _left(case, known), known)
+        known, weighed, error = explanations, error, _left(case, explanations)
+        if not weighed.crude and _same(weighed, error):
+            break
+        case, explanations = search(case, error, known)
     return case, explanations
+
+
+def _same(error: ModelInadequacy, other: ModelInadequacy) -> bool:
+    """Whether two errors weigh residuals alike, so that a search would find what is known: those of records in windows are one number."""
+    return not error.power and not other.power and error.scale == other.scale
 
 
 def reference(explanations: Sequence[Explanation]) -> Explanation:

@@ -101,9 +101,10 @@ def _changes(problem: Problem, fitted: Fit, residual: Array) -> Array:
     """Changes (n, n_free) of the residuals by one prior standard deviation of each free entry; none where a run diverges."""
     _, std, _, high = problem.prior(fitted.hypothesis)
     free = free_entries(problem, fitted.hypothesis)
+    near = problem.residual_near(fitted.hypothesis, fitted.vector)
     for step in problem.settings.numerics.differences:
         found = differences(
-            lambda vector: problem.residual(fitted.hypothesis, vector),
+            near,
             fitted.vector,
             residual,
             free=free,

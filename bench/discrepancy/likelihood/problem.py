@@ -8,7 +8,7 @@ and leaves residuals at the resonance, correlated between channels, which a plai
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -19,7 +19,14 @@ from bench.discrepancy.case.case import CaseRecord
 from bench.discrepancy.likelihood.model_error import ModelInadequacy
 from bench.discrepancy.likelihood.noise_covariance import sensor_gains, whitening_behind
 from bench.discrepancy.likelihood.time_varying_noise import whitening_together
-from bench.discrepancy.likelihood.whitening import RecordData, band_bins, projected, timed, without_bridged
+from bench.discrepancy.likelihood.whitening import (
+    RecordData,
+    band_bins,
+    projected,
+    reached,
+    timed,
+    without_bridged,
+)
 from bench.discrepancy.likelihood.window_whitening import RestartWindows, white_force, window_weights
 from bench.discrepancy.model.placement import Hypothesis
 from bench.discrepancy.motion.observer import ACCELERATION
@@ -178,18 +185,63 @@ class Problem(Simulator):
 
     def residual(self, hypothesis: Hypothesis, vector: Array) -> Array:
         """Whitened residuals of all records, real and imaginary parts stacked; their sum of squares is chi-squared."""
-        parts = in_threads(lambda data: self.residual_of(data, hypothesis, vector), self.data)
+        return self._residual(hypothesis, vector, [None] * len(self.data))
+
+    def residual_near(self, hypothesis: Hypothesis, vector: Array) -> Callable[..., Array]:
+        """`residual` as a function of vectors near one, for differences by them, and of effects of channels beside the hypothesis.
+
+        What other starts of windows would change is that at the one vector. It moves with the vector, too, and with it the residuals by
+        the product of that and of how wrong the starts are, which noise alone makes them; L. Kaufman, A variable projection method for
+        solving separable nonlinear least squares problems, BIT 15 (1975) 49-57. So a column of differences takes one free run, not one
+        more for each entry of a start.
+        """
+        bases: list[Sequence[Array] | None] = (
+            in_threads(lambda data: self._reached(data, hypothesis, vector), self.data)
+            if self.windowed
+            else [None] * len(self.data)
+        )
+        return lambda moved, *beside: self._residual((*hypothesis, *beside), moved, bases)
+
+    def _residual(
+        self, hypothesis: Hypothesis, vector: Array, bases: Sequence[Sequence[Array] | None]
+    ) -> Array:
+        parts = in_threads(
+            lambda task: self.residual_of(task[0], hypothesis, vector, bases=task[1]),
+            list(zip(self.data, bases, strict=True)),
+        )
         finite = [part for part in parts if part is not None]
         return np.concatenate(finite) if len(finite) == len(parts) else np.array([np.inf])
 
+    def _reached(
+        self, data: RecordData, hypothesis: Hypothesis, vector: Array, predicted: Array | None = None
+    ) -> Sequence[Array] | None:
+        """What other starts of the windows would change, see `reached`; nothing for other records, None where a run diverged."""
+        if not self.windowed:
+            return ()
+        predicted = self.simulate(hypothesis, vector, data.record) if predicted is None else predicted
+        moved = self.start_responses(hypothesis, vector, data.record, predicted)
+        finite = all(np.isfinite(change).all() for change in moved)
+        return reached(moved, data, settings=self.settings.likelihood) if finite else None
+
     def residual_of(
-        self, data: RecordData, hypothesis: Hypothesis, vector: Array, *, lenient: bool = True
+        self,
+        data: RecordData,
+        hypothesis: Hypothesis,
+        vector: Array,
+        *,
+        lenient: bool = True,
+        bases: Sequence[Array] | None = None,
     ) -> Array | None:
-        """Whitened residuals of one record, jumps that come a little early or late excused if `lenient`; None where it diverged."""
+        """Whitened residuals of one record, jumps that come a little early or late excused if `lenient`; None where it diverged.
+
+        What other starts of windows would change is `bases`, where these are given.
+        """
         predicted = self.simulate(hypothesis, vector, data.record)
         if not np.isfinite(predicted).all():
             return None
-        moved = self.start_responses(hypothesis, vector, data.record, predicted) if self.windowed else ()
+        bases = self._reached(data, hypothesis, vector, predicted) if bases is None else bases
+        if bases is None:
+            return None
         residual = data.responses - predicted
         excused = lenient and hypothesis and not self.driven
         for c, observer in enumerate(self.structure.observers if excused else ()):
@@ -197,7 +249,7 @@ class Problem(Simulator):
                 residual[:, c] = timed(
                     residual[:, c], predicted[:, c], self.noise[c], settings=self.settings.likelihood
                 )
-        return projected(residual, moved, data, settings=self.settings.likelihood)
+        return projected(residual, bases, data)
 
     @property
     def scaled(self) -> bool:

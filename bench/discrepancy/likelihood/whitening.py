@@ -115,23 +115,31 @@ def whitened(residual: Array, data: RecordData) -> Array:
     return (white - (white @ data.windows.reachable) @ data.windows.reachable.T).ravel()
 
 
-def projected(
-    residual: Array, moved: Sequence[Array], data: RecordData, *, settings: LikelihoodSettings
-) -> Array:
-    """Whitened residuals (n, n_channels) of a record in windows, without what other starts would have changed.
+def reached(moved: Sequence[Array], data: RecordData, *, settings: LikelihoodSettings) -> list[Array]:
+    """Orthonormal bases (n_rows, rank), one a window, of what other starts would change of the whitened residuals of a record.
+
+    Args:
+        moved: Change of the channels (n, n_channels) with each entry of the starts.
+        data: The record, in windows.
+        settings: `LikelihoodSettings` of the diagnosis.
+    """
+    assert data.windows is not None
+    responses = np.stack([data.windows.whitened(change) for change in moved], axis=-1)
+    return [orthonormal(columns, settings=settings) for columns in responses]
+
+
+def projected(residual: Array, bases: Sequence[Array], data: RecordData) -> Array:
+    """Whitened residuals of a record (n, n_channels), in windows without what other starts would have changed.
 
     Args:
         residual: Residuals.
-        moved: Change of the channels (n, n_channels) with each entry of the starts.
+        bases: Those of `reached`, where there are windows.
         data: The record.
-        settings: `LikelihoodSettings` of the diagnosis.
     """
     if data.windows is None:
         return whitened(residual, data)
     white = data.windows.whitened(residual)
-    responses = np.stack([data.windows.whitened(change) for change in moved], axis=-1)
-    for w, columns in enumerate(responses):
-        basis = orthonormal(columns, settings=settings)
+    for w, basis in enumerate(bases):
         white[w] -= basis @ (basis.T @ white[w])
     return white.ravel()
 

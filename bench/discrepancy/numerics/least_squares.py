@@ -76,6 +76,7 @@ class _Task(NamedTuple):
     limit: float
     deadline: Deadline
     settings: NumericsSettings
+    near: Callable[[Array], Callable[[Array], Array]] | None
 
     def excess(self, state: _State) -> float:
         """Cost beyond that from which a minimisation is carried to its end."""
@@ -108,6 +109,7 @@ def minimise(
     exact: bool = True,
     deadline: Deadline = NEVER,
     settings: NumericsSettings = DEFAULT.numerics,
+    near: Callable[[Array], Callable[[Array], Array]] | None = None,
 ) -> Minimum:
     """Minimise squared residuals plus the misfit of a Gaussian prior.
 
@@ -123,9 +125,10 @@ def minimise(
         exact: Whether the curvature is taken anew at the end, where the residuals have come near the noise.
         deadline: When the iteration ends where it is, once it has the curvature there.
         settings: `NumericsSettings` of the diagnosis.
+        near: Vector to cheaper residuals of vectors near it, for differences; `residual_at` itself where None.
     """
     own = Prior(prior.mean[free], prior.std[free], prior.low[free], prior.high[free])
-    task = _Task(residual_at, free, *own, reach, tolerance, limit, deadline, settings)
+    task = _Task(residual_at, free, *own, reach, tolerance, limit, deadline, settings, near)
     state = min((task.state(vector.copy()) for vector in np.atleast_2d(start)), key=lambda at: at.cost)
     identity = np.eye(len(free))
     if not np.isfinite(state.cost):
@@ -301,7 +304,7 @@ def differences(
 def _jacobian(task: _Task, state: _State, difference: float) -> Array | None:
     """Finite differences (n_residuals, n_free) by prior standard deviations; None where a run diverged."""
     changes = differences(
-        task.residual_at,
+        task.residual_at if task.near is None else task.near(state.vector),
         state.vector,
         state.residual,
         free=task.free,

@@ -26,6 +26,7 @@ def simulated_columns(problem: Problem, hypothesis: Hypothesis, vector: Array, r
     _, std, _, high = problem.prior(hypothesis)
     shapes = [p.fixed for placed in hypothesis for p in placed.effect.parameters]
     held = [False] * len(problem.nominal) + shapes
+    near = problem.residual_near(hypothesis, vector)
 
     def column(entry: int) -> Array:
         """Response (n,) to one entry; zero where a step either way lets the run diverge."""
@@ -35,7 +36,7 @@ def simulated_columns(problem: Problem, hypothesis: Hypothesis, vector: Array, r
             moved[entry] += change
             if moved[entry] > high[entry]:
                 continue
-            away = problem.residual(hypothesis, moved)
+            away = near(moved)
             if away.shape == residual.shape:
                 return np.asarray((residual - away) / change, dtype=np.float64)
         return np.zeros_like(residual)
@@ -55,14 +56,14 @@ def signal_nodes(
         vector: See `Simulator.simulate`.
     """
     own = {placed.key for placed in hypothesis}
-    base = problem.residual(hypothesis, vector)
+    base, near = problem.residual(hypothesis, vector), problem.residual_near(hypothesis, vector)
 
     def node(task: tuple[Placed, Array]) -> GridPoint | None:
         placed, eta = task
         point = eta.copy()
         if placed.effect.parameters[0].signed:
             point[0] = problem.settings.screening.signal_step
-        changed = problem.residual((*hypothesis, placed), np.concatenate([vector, point]))
+        changed = near(np.concatenate([vector, point]), placed)
         if changed.shape != base.shape or not np.any(changed != base):
             return None
         column = (base - changed)[:, None]
