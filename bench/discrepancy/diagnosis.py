@@ -184,7 +184,7 @@ def _diagnose(case: Case, how: How, rng: np.random.Generator, anyway: bool) -> D
     closest = finding.closest or evidence.nearest(explanations)
     final, closure, found = shrunk(case, problem, explanations, kind, rival, rng, closest)
     widest = max(found, key=lambda gap: gap.before / max(gap.noise_floor, 1e-12))
-    if kind == "unknown" and not finding.doubt:
+    if kind == "unknown" and not finding.doubt and closest.hypothesis:
         words += evidence.closes(names(closest.hypothesis), widest, settings=how.settings.judgement)
     where = locate(
         problem,

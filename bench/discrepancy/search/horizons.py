@@ -48,8 +48,10 @@ def lengthen(search: Search, size: int, candidates: Sequence[Placed]) -> None:
     for part in settings.horizons.parts if tasks else ():
         samples = [max(round(part * n), min(settings.horizons.shortest, n)) for n in longest]
         if samples != longest:
-            fits = _over(problem.beginnings(samples), tasks)
-            left = sorted((f for f in fits if np.isfinite(f.cost)), key=lambda f: f.cost)
+            beginning = problem.beginnings(samples)
+            left = sorted((f for f in _over(beginning, tasks) if np.isfinite(f.cost)), key=lambda f: f.cost)
+            if not left or not _too_sensitive(beginning, left[0], search):
+                return
             most = max(settings.horizons.hypotheses, len(left) // 2)
             tasks = [(f.hypothesis, f.vector) for f in left[:most]]
     search.fit_all(
@@ -111,6 +113,16 @@ def _told_by_beginnings(hypothesis: Hypothesis) -> bool:
 def _leaves_too_much(problem: Problem, best: Fit) -> bool:
     """Whether the best explanation is off by more than its noise, or by more than right models are where their error weighs."""
     return leaves_much(problem, best) if problem.error is not None else not near(best)
+
+
+def _too_sensitive(beginning: Problem, fitted: Fit, search: Search) -> bool:
+    """Whether the best fit over the whole records misses their beginning by far more than a fit over that does: not if it only lacks
+    something, which the beginning lacks as well."""
+    told = (f for f in search.ranked() if not f.hypothesis or _told_by_beginnings(f.hypothesis))
+    whole = next(told)
+    residual = beginning.residual(whole.hypothesis, whole.vector)
+    missed = float(residual @ residual) - fitted.n_residuals
+    return fitted.chi2 - fitted.n_residuals < beginning.settings.search.horizons.missed * missed
 
 
 def _begun_anew(problem: Problem, fitted: Fit) -> Iterator[Array]:

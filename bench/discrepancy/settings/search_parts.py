@@ -68,6 +68,11 @@ class HorizonSettings:
     shortest: int = setting(
         64, "Samples of a beginning, at least.", "Some periods of what is sampled well.", unit="samples"
     )
+    missed: float = setting(
+        0.5,
+        "Part of what the best fit over the whole records leaves of a beginning, beyond noise, below which fits over beginnings go on.",
+        "Half of it. A sensitive motion is missed by all of itself, and fitted down to the noise over a beginning.",
+    )
 
 
 @dataclass(frozen=True)
