@@ -9,7 +9,7 @@ import pytest
 from planted_cases import NOISE, SAMPLE_RATE, linear_motion, load, planted_case
 
 from bench.discrepancy import Case, diagnose, record_from_arrays
-from bench.discrepancy.unscreened.harmonic_force import line_of
+from bench.discrepancy.unscreened.harmonic_force import lines_of
 from bench.laws import find_law
 
 N = 4000
@@ -49,9 +49,8 @@ def test_a_line_is_found_to_a_part_of_the_resolution_and_noise_has_none():
     noise = rng.standard_normal(N)
     coloured = np.convolve(rng.standard_normal(N), np.exp(-np.arange(60) / 12.0), mode="same")
     for background in (noise, coloured, load(3, N)):
-        assert line_of(TIME, background) is None
-        found = line_of(TIME, background + harmonic(2.0 * np.std(background), 16.713, 0.7))
-        assert found is not None
+        assert lines_of(TIME, background) == []
+        (found,) = lines_of(TIME, background + harmonic(2.0 * np.std(background), 16.713, 0.7))
         # a frequency is known to the resolution over the ratio of the line's power to that of a bin of noise, here hundreds
         assert abs(found.frequency - 16.713) < 0.03 * SAMPLE_RATE / N
         assert found.amplitude == pytest.approx(2.0 * np.std(background), rel=0.06)
@@ -61,11 +60,17 @@ def test_a_line_is_found_to_a_part_of_the_resolution_and_noise_has_none():
 def test_lines_at_multiples_of_a_harmonic_load_are_left_to_the_load():
     square = np.sign(harmonic(1.0, 3.04, 0.2)) + 1e-3 * np.random.default_rng(1).standard_normal(N)
     own = harmonic(0.05, 20.3, 0.0)
-    assert line_of(TIME, square) is not None
-    found = line_of(TIME, square + own, [harmonic(1.0, 3.04, 1.1)])
-    assert found is not None
+    assert lines_of(TIME, square)[0].frequency == pytest.approx(3.04, abs=0.01)
+    found = lines_of(TIME, square + own, [harmonic(1.0, 3.04, 1.1)])[0]
     # the sampled square wave has lines at multiples that are folded back, too; the largest that is no multiple is the one added
     assert found.frequency == pytest.approx(20.3, abs=0.03)
+
+
+def test_ripples_in_the_spectrum_of_a_swept_sine_are_no_lines_of_a_load():
+    swept = np.sin(2.0 * np.pi * (2.0 + 1.5 * TIME) * TIME)
+    friction = np.sign(np.cos(2.0 * np.pi * (2.0 + 1.5 * TIME) * TIME))
+    found = lines_of(TIME, friction + harmonic(1.0, 29.3, 0.0), [swept])[0]
+    assert found.frequency == pytest.approx(29.3, abs=0.03)
 
 
 @pytest.mark.slow

@@ -221,10 +221,26 @@ def test_of_a_model_that_is_worse_than_no_motion_only_the_response_is_there_to_b
     monkeypatch.setattr(
         Discrepancies, "of", lambda self, e, *, judging: np.array([3.0 if e is nothing else 0.65])
     )
+    monkeypatch.setattr(Discrepancies, "as_stated", np.array([2.0]))
     known = Discrepancies(case, problem)
     assert known.left(found, nothing) == pytest.approx(0.65**2, rel=0.01)
     assert not known.pays(found, nothing, 0.5)
     assert known.pays(found, nothing, 0.7)
+
+
+def test_an_effect_has_to_be_nearer_than_the_nominal_model_as_it_was_stated(monkeypatch):
+    case = planted_case(n=600)
+    problem = problem_of(case)
+    nothing, found = explanation(problem), explanation(problem, "gap")
+    monkeypatch.setattr(
+        Discrepancies, "of", lambda self, e, *, judging: np.array([0.6 if e is nothing else 0.1])
+    )
+    for stated, pays in (
+        (0.5, True),
+        (0.12, False),
+    ):  # parameters re-estimated without the effect had made it worse
+        monkeypatch.setattr(Discrepancies, "as_stated", np.array([stated]))
+        assert Discrepancies(case, problem).pays(found, nothing, 0.7) == pays
 
 
 def test_nominal_parameters_stay_within_what_is_believed_whatever_is_taken_from_an_explanation():

@@ -33,6 +33,8 @@ LOOKS = {
     "load_dependent_friction": "A step at every reversal whose height grows with the force carried: a bow tie of force over displacement.",
     "time_varying_friction": "A step at every reversal whose height beats with a period of its own.",
     "record_dependent_friction": "Friction of a different height in each record, steady within each.",
+    "record_dependent_stiffness": "The frequency differs from record to record, and is steady within each.",
+    "record_dependent_damping": "The height of peaks differs from record to record, their frequency does not.",
     "stiffness_drift": "The frequency changes along the record; begun anew it is as before or has stayed.",
     "force_offset": "A constant force: the rest position is off, the motion about it is right.",
     "timed_force": "A force that is switched on and off by a clock and not by the motion.",

@@ -10,11 +10,14 @@ import math
 from collections.abc import Iterable
 from dataclasses import replace
 
+import numpy as np
+
 from bench.discrepancy.effects.effect import (
     EFFECT_SETTINGS,
     Effect,
     FreeParameter,
 )
+from bench.laws.linear import LINEAR
 
 TIMED = "timed_force"
 HARMONIC = "harmonic_force"
@@ -32,13 +35,24 @@ def schedulable(effect: Effect) -> bool:
     return effect.site == "joint" and effect.n_coordinates == 1 and not effect.modulated
 
 
-def differs(effect: Effect) -> bool:
-    """Whether the force of an effect may differ from record to record: one that dissipates, as its normal force or its current may."""
-    return (
-        schedulable(effect)
-        and effect.family in ("friction", "hysteresis", "damping")
-        and not effect.parameters[0].signed
+CHANGES: tuple[Effect, ...] = tuple(
+    Effect(
+        name, name, "joint", (FreeParameter(f"{name}_change", scale, signed=True, std=0.3, bounds=(-10.0, 10.0)),), equation,
+        law=LINEAR, theta=theta,
     )
+    for name, scale, equation, theta in (
+        ("stiffness", "stiffness", "f = dk q", lambda values, scales: np.array([values[0], 0.0])),
+        ("damping", "force/velocity", "f = dc v", lambda values, scales: np.array([0.0, values[0]])),
+    )
+)  # fmt: skip
+"""Changes of a spring and of a damper, which are errors of the nominal model if they are the same in all records."""
+
+
+def differs(effect: Effect) -> bool:
+    """Whether the force of an effect may differ from record to record: a spring or a damper, with the temperature, say; and what
+    dissipates otherwise, with its normal force or its current."""
+    dissipates = effect.family in ("friction", "hysteresis", "damping") and not effect.parameters[0].signed
+    return effect in CHANGES or (schedulable(effect) and dissipates)
 
 
 def differing_name(effect: Effect) -> str:
@@ -66,7 +80,7 @@ def read_off(forces: Iterable[Effect]) -> tuple[Effect, ...]:
             effect, name=differing_name(effect), varies=effect.name, site="read off", equation=f"c_i f in record i; {effect.equation}",
             log_prior=effect.log_prior + EFFECT_SETTINGS.rare, law=None, limit=None, theta=None, rate_bound=None,
         )
-        for effect in forces if differs(effect)
+        for effect in (*forces, *CHANGES) if differs(effect)
     )  # fmt: skip
     return (
         Effect(

@@ -167,13 +167,14 @@ def _finalists(
         int(np.argmin([entry.total - 2.0 * prior for entry, prior in zip(found, priors, strict=True)]))
     ]
     base = _pruned(best, found, known, settings)
-    found = [own for own in found if own is base or not _varied_in_vain(own, found, settings)]
+    base = _unvaried(base, found, settings) or base
+    found = [own for own in found if own is base or _unvaried(own, found, settings) is None]
     # what is larger than what is material has been weighed already
     return [base, *(e for e in found if e is not base and _no_larger(e.explanation, base.explanation))]
 
 
-def _varied_in_vain(entry: HeldOut, found: Sequence[HeldOut], settings: CoarseSettings) -> bool:
-    """Whether the size of an effect is let follow something, and without it what is found predicts as well: that is no rival of it."""
+def _unvaried(entry: HeldOut, found: Sequence[HeldOut], settings: CoarseSettings) -> HeldOut | None:
+    """The same effects, fewer of them of a size that follows something, where they predict as well: then nothing says that it does."""
 
     def plain(own: HeldOut) -> frozenset[tuple[str, str]]:
         return frozenset((p.effect.varies or p.effect.name, p.place.name) for p in own.explanation.hypothesis)
@@ -181,10 +182,12 @@ def _varied_in_vain(entry: HeldOut, found: Sequence[HeldOut], settings: CoarseSe
     def varied(own: HeldOut) -> int:
         return sum(bool(p.effect.varies) for p in own.explanation.hypothesis)
 
-    return any(
-        varied(other) < varied(entry) and plain(other) == plain(entry) and _as_good(other, entry, settings)
+    alike = [
+        other
         for other in found
-    )
+        if varied(other) < varied(entry) and plain(other) == plain(entry) and _as_good(other, entry, settings)
+    ]
+    return min(alike, key=lambda other: other.total, default=None)
 
 
 def _with(entry: HeldOut, own: HeldOut, found: Sequence[HeldOut]) -> list[HeldOut]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 
 from bench.arrays import Array
@@ -10,6 +12,7 @@ from bench.discrepancy.judgement.validation_discrepancy import (
     DIVERGED_GAP,
     errors_by_block,
     noise_floors,
+    nominal_prediction,
 )
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.search.explain import Explanation
@@ -23,6 +26,12 @@ class Discrepancies:
         self._floor = noise_floors(problem, case.validation)
         self._own_floor = noise_floors(problem, case.identification)
         self._kept: dict[tuple[Explanation, bool], Array] = {}
+
+    @cached_property
+    def as_stated(self) -> Array:
+        """NRMSE (n_coordinates,) of the nominal model with its parameters as stated, on the judging records."""
+        errors = errors_by_block(self.problem, self.case.validation, nominal_prediction(self.problem), 1)
+        return np.minimum(np.sqrt(errors.sum(axis=1)), DIVERGED_GAP)
 
     def of(self, explanation: Explanation, *, judging: bool) -> Array:
         """NRMSE (n_coordinates,) of an explanation, on the judging records or on those for identification."""
@@ -56,18 +65,25 @@ class Discrepancies:
 
     def pays(self, explanation: Explanation, nothing: Explanation, part: float) -> bool:
         """Whether an explanation leaves at most a part of the judging records' discrepancy, beyond noise, on some coordinate and no
-        more than all of it on any."""
+        more than all of it on any.
+
+        The discrepancy is that of the nominal model, its parameters re-estimated or as stated: without what is missing, to re-estimate
+        them may make it worse.
+        """
         before, after = self._judged(nothing, explanation)
+        before = np.minimum(before, self.as_stated)
         shrinks = self._beyond(after) <= part * self._beyond(_at_rest(before))
-        return bool(np.any(shrinks) and self.harm(explanation, nothing) <= 1.0)
+        return bool(np.any(shrinks) and self._harm(before, after, explanation) <= 1.0)
 
     def harm(self, explanation: Explanation, rest: Explanation) -> float:
         """By what factor, beyond what is no change, an explanation leaves more of the judging records than a part of it does.
 
         Of the coordinate where that is most; at most one where both leave nothing but noise.
         """
+        return self._harm(*self._judged(rest, explanation), explanation)
+
+    def _harm(self, before: Array, after: Array, explanation: Explanation) -> float:
         settings = explanation.settings.judgement
-        before, after = self._judged(rest, explanation)
         bar = np.maximum(before, settings.about_noise * self._floor) * settings.unchanged
         return float(np.max(np.where(after < DIVERGED_GAP, after / np.maximum(bar, 1e-300), np.inf)))
 
@@ -77,6 +93,7 @@ class Discrepancies:
         Of a nominal model that is worse than no motion at all, the part is that of the response.
         """
         before, after = self._judged(nothing, explanation)
+        before = np.minimum(before, self.as_stated)
         before, after = self._beyond(_at_rest(before)), self._beyond(after)
         widest = int(np.argmax(before))
         return float(min((after[widest] / max(before[widest], 1e-300)) ** 2, 1.0))

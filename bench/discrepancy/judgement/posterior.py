@@ -185,6 +185,10 @@ def named(explanations: Sequence[Explanation]) -> tuple[NamedEffect, ...]:
     return effects_of(explanations[0], marginal(explanations))
 
 
+BY_THE_CLOCK = ("s", "Hz")
+"""Units of what the clock of a record tells, which is right to parts of a million."""
+
+
 def effects_of(
     explanation: Explanation, probabilities: Mapping[tuple[str, str], float], least: float = 0.0
 ) -> tuple[NamedEffect, ...]:
@@ -193,7 +197,8 @@ def effects_of(
     Args:
         explanation: Fitted.
         probabilities: By (name, place).
-        least: Part of a parameter's value by which it is uncertain besides, whatever the records say: the gains of the sensors.
+        least: Part of a parameter's value by which it is uncertain besides, whatever the records say: the gains of the sensors, which no
+            time and no frequency depends on.
     """
     out = []
     for problem, fitted in explanation.parts:
@@ -230,7 +235,8 @@ def named_effect(
         if placed.source:
             unit = "/".join(f"({problem.case.channel(c).unit})" for c in (placed.channel, placed.source))
         estimate = parameter.value(value, scales)
-        spread = math.hypot(abs(parameter.slope(value, scales)) * deviation, least * estimate)
+        besides = 0.0 if unit in BY_THE_CLOCK else least * estimate
+        spread = math.hypot(abs(parameter.slope(value, scales)) * deviation, besides)
         estimates[parameter.name] = Estimate(estimate, 0.0 if parameter.fixed else spread, unit)
     theta = tuple(float(x) for x in effect.kernel_theta(eta, scales)) if effect.law is not None else ()
     return NamedEffect(

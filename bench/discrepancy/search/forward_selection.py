@@ -86,6 +86,8 @@ def attribute(
             break
         extend(search, screen, bases, count=4 if consistent(best) else 6 - size)
         soften(search, size + 1)
+        if any(p.effect.name == HARMONIC for p in candidates):
+            with_harmonic_force(search, size + 1)
         lengthen(search, size + 1, candidates)
         reduce_best(search)
     best = search.ranked()[0]

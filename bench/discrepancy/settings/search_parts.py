@@ -168,6 +168,11 @@ class HarmonicForceSettings:
         "The main lobe of the Hann window, and one.",
         unit="bins",
     )
+    harmonic: float = setting(
+        0.5,
+        "Part of the power of a load above which its lines hold that it is harmonic, and lines at their multiples are laid to it.",
+        "Most of it. The ripples in the spectrum of a swept sine hold little.",
+    )
     drawn: float = setting(
         4.0,
         "Bounds of the frequency, in resolutions of the record, about the line.",

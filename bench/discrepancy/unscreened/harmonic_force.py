@@ -54,11 +54,12 @@ class SpectralLine(NamedTuple):
     phase: float
 
 
-def with_harmonic_force(search: Search) -> None:
-    """Fit a harmonic force alone, at the place where it takes most away, where there is one and nothing explains the records yet.
+def with_harmonic_force(search: Search, size: int = 1) -> None:
+    """Fit a harmonic force, at the place where it takes most away, where there is one and nothing explains the records yet.
 
     Args:
         search: Fits so far; the new one is added.
+        size: Number of effects: it stands alone, or beside the best that are one fewer.
     """
     problem = search.problem
     if consistent(search.ranked()[0]):
@@ -66,49 +67,57 @@ def with_harmonic_force(search: Search) -> None:
     found = [
         (place, lines)
         for place in problem.structure.places
-        if len(place.rows) == 1 and (lines := _lines_at(problem, place))
+        if len(place.rows) == 1
+        for lines in _lines_at(problem, place)
     ]
     if not found:
         return
-    place, lines = max(found, key=lambda one: sum(line.amplitude**2 for line in one[1].values()))
-    effect = _effect(problem, place, lines)
-    placed = Placed(effect, place)
-    first = next(iter(lines.values()))
-    eta = [AMPLITUDE.eta(first.amplitude, problem.scales_of(placed))]
-    eta += [p.mean for p in effect.parameters if p.name.startswith("frequency")]
+    best = max(found, key=lambda one: sum(line.amplitude**2 for line in one[1].values()))[0]
+    bases = [f for f in search.ranked(size - 1) if all(p.effect.name != HARMONIC for p in f.hypothesis)]
+    for base in bases[:1]:
+        still = base.vector if size > 1 else np.zeros(len(problem.nominal))
+        for placed, eta in (_begun(problem, *one) for one in found if one[0] is best):
+            converge(search, [((*base.hypothesis, placed), np.concatenate([still, eta]))])
+
+
+def _begun(problem: Problem, place: Place, lines: Mapping[str, SpectralLine]) -> tuple[Placed, Array]:
+    """The effect with the lines that were found, and its parameters to start from."""
+    placed = Placed(_effect(problem, place, lines), place)
+    force = next(iter(lines.values())).amplitude
+    eta = [AMPLITUDE.eta(force, problem.scales_of(placed))]
+    eta += [p.mean for p in placed.effect.parameters if p.name.startswith("frequency")]
     eta += [line.phase for line in lines.values()]
-    converge(search, [((placed,), np.concatenate([np.zeros(len(problem.nominal)), eta]))])
+    return placed, np.array(eta)
 
 
-def line_of(
+def lines_of(
     time: Array,
     signal: Array,
     loads: Sequence[Array] = (),
     *,
     settings: HarmonicForceSettings = DEFAULT.search.harmonic,
-) -> SpectralLine | None:
-    """The strongest line in the spectrum of a signal that stands out of what lies about it.
+) -> list[SpectralLine]:
+    """The lines in the spectrum of a signal that stand out of what lies about them, the largest first.
 
     Args:
         time: (n,), uniform.
         signal: (n,) the signal.
-        loads: (n,) each: signals whose own lines, and multiples of these, do not count.
+        loads: (n,) each: where they are harmonic, their own lines and multiples of these do not count.
         settings: `HarmonicForceSettings` of the diagnosis.
-
-    Returns:
-        The line; None where there is none.
     """
     resolution = 1.0 / (len(signal) * float(time[1] - time[0]))
-    loaded = [frequency for load in loads for frequency, _ in _lines(time, load, settings)]
+    loaded = [frequency for load in loads for frequency in _harmonics(time, load, settings)]
 
     def by_a_load(frequency: float) -> bool:
         multiples = [max(round(frequency / own), 1) * own for own in loaded]
         return any(abs(frequency - multiple) < settings.lobe * resolution for multiple in multiples)
 
     free = [
-        (power, frequency) for frequency, power in _lines(time, signal, settings) if not by_a_load(frequency)
+        _part(time, signal, frequency)
+        for frequency, _ in _lines(time, signal, settings)
+        if not by_a_load(frequency)
     ]
-    return _part(time, signal, max(free)[1]) if free else None
+    return sorted(free, key=lambda line: -line.amplitude)
 
 
 def _lines(time: Array, signal: Array, settings: HarmonicForceSettings) -> list[tuple[float, float]]:
@@ -135,6 +144,13 @@ def _lines(time: Array, signal: Array, settings: HarmonicForceSettings) -> list[
     return [(refined(int(peak)), float(power[peak])) for peak in peaks]
 
 
+def _harmonics(time: Array, load: Array, settings: HarmonicForceSettings) -> list[float]:
+    """Frequencies of the lines of a load that is made of them for the most part; none of any other."""
+    lines = _lines(time, load, settings)
+    held = sum(_part(time, load, frequency).amplitude ** 2 / 2.0 for frequency, _ in lines)
+    return [frequency for frequency, _ in lines] if held > settings.harmonic * float(np.var(load)) else []
+
+
 def _part(time: Array, signal: Array, frequency: float) -> SpectralLine:
     """The harmonic part (least squares) of a signal at a frequency."""
     angle = 2.0 * math.pi * frequency * time
@@ -156,21 +172,29 @@ def _heights(windowed: Array, settings: HarmonicForceSettings) -> tuple[Array, A
     return height, power
 
 
-def _lines_at(problem: Problem, place: Place) -> dict[str, SpectralLine]:
-    """The line of every record for identification at a place, by record; empty where one has none."""
-    lines = {}
-    for record in problem.records:
-        line = _line_in(problem, record, place)
-        if line is None:
-            return {}
-        lines[record.name] = line
-    return lines
+def _lines_at(problem: Problem, place: Place) -> list[dict[str, SpectralLine]]:
+    """Lines at a place, one for each record for identification: the largest that all have at one frequency, and the largest of each."""
+    found = {record.name: _lines_in(problem, record, place) for record in problem.records}
+    if not all(found.values()):
+        return []
+    resolution = max(1.0 / (len(record) * record.step) for record in problem.records)
+    groups = []
+    for line in next(iter(found.values())):
+        nearest = {
+            name: min(lines, key=lambda own: abs(own.frequency - line.frequency))
+            for name, lines in found.items()
+        }
+        if all(abs(own.frequency - line.frequency) < resolution for own in nearest.values()):
+            groups.append(nearest)
+    common = sorted(groups, key=lambda group: -sum(own.amplitude**2 for own in group.values()))[:1]
+    largest = {name: lines[0] for name, lines in found.items()}
+    return [*common, largest] if largest not in common else common
 
 
-def _line_in(problem: Problem, record: CaseRecord, place: Place) -> SpectralLine | None:
+def _lines_in(problem: Problem, record: CaseRecord, place: Place) -> list[SpectralLine]:
     drives = problem.structure.channels if problem.driven else problem.structure.loads
     loads = [record.values[name] for name in drives if name in record.values]
-    return line_of(
+    return lines_of(
         record.time, missing_force(problem, record, place), loads, settings=problem.settings.search.harmonic
     )
 
@@ -196,7 +220,7 @@ def _effect(problem: Problem, place: Place, lines: Mapping[str, SpectralLine]) -
         for name in lines
     ]
     judging = {
-        record.name: (record.time, missing_force(problem, record, place), _line_in(problem, record, place))
+        record.name: (record.time, missing_force(problem, record, place), _lines_in(problem, record, place))
         for record in problem.case.validation
     }
     order, count, tried = list(lines), len(frequencies), sum(len(r.time) // 2 for r in records.values())
@@ -207,8 +231,8 @@ def _effect(problem: Problem, place: Place, lines: Mapping[str, SpectralLine]) -
             i = order.index(record)
             frequency, phase = values[1 + i % count], values[1 + count + i]
         elif record in judging:
-            time, lacking, line = judging[record]
-            frequency = first if one or line is None else line.frequency
+            time, lacking, own_lines = judging[record]
+            frequency = first if one or not own_lines else own_lines[0].frequency
             phase = _part(time, lacking, frequency).phase
         else:
             frequency, phase = first, 0.0

@@ -34,6 +34,7 @@ from bench.discrepancy.effects.effect import (
 )
 from bench.discrepancy.effects.force_priors import FRICTION
 from bench.discrepancy.effects.read_off import (
+    CHANGES,
     FOLLOWED,
     SENSITIVITY,
     differing_name,
@@ -79,7 +80,21 @@ def with_schedules(search: Search, asked: Collection[str]) -> None:
                 tasks += _followed(problem, placed, start, channel)
         if not channels and len(problem.records) > 1 and differs(effect) and differing_name(effect) in asked:
             tasks += _differing(problem, placed, start)
+    if not channels and len(problem.records) > 1:
+        tasks += _changing(search, asked)
     converge(search, tasks)
+
+
+def _changing(search: Search, asked: Collection[str]) -> list[Task]:
+    """Fits of a spring and of a damper that differ from record to record, from the same change of all."""
+    problem, still = search.problem, search.ranked(0)[0].vector
+    return [
+        task
+        for place in problem.structure.places
+        for effect in CHANGES
+        if len(place.rows) == 1 and differing_name(effect) in asked
+        for task in _differing(problem, Placed(effect, place), np.append(still, effect.parameters[0].std))
+    ]
 
 
 def _seeds(search: Search) -> list[tuple[Placed, Array]]:
@@ -201,20 +216,21 @@ def differing(effect: Effect, records: Sequence[str]) -> Effect:
     """
     count, first, bound = len(records), effect.parameters[0], effect.rate_bound
 
-    def mean(values: Values) -> Values:
-        return np.concatenate([[values[:count].mean()], values[count:]])
+    def typical(values: Values) -> Values:
+        size = math.sqrt(float(np.mean(values[:count] ** 2)))
+        return np.concatenate([[max(size, np.finfo(float).tiny)], values[count:]])
 
     def schedule(values: Values, record: CaseRecord) -> Values:
-        known = record.name in records
-        factor = values[records.index(record.name)] / np.mean(values[:count]) if known else 1.0
+        own = values[records.index(record.name)] if record.name in records else values[:count].mean()
+        factor = own / typical(values)[0]
         return np.array([0.0, 1.0, 2.0, factor, factor])
 
     def own_theta(values: Values, scales: Scales) -> Values:
-        return mean(values) if effect.theta is None else effect.theta(mean(values), scales)
+        return typical(values) if effect.theta is None else effect.theta(typical(values), scales)
 
     return replace(
         effect, name=differing_name(effect), varies=effect.name, equation=f"c_i f in record i; {effect.equation}",
         parameters=(*(replace(first, name=f"{first.name}_{name}") for name in records), *effect.parameters[1:]),
         theta=own_theta, schedule=schedule, log_prior=effect.log_prior + EFFECT_SETTINGS.rare,
-        rate_bound=None if bound is None else lambda values, scales: bound(mean(values), scales), n_linear=1,
+        rate_bound=None if bound is None else lambda values, scales: bound(typical(values), scales), n_linear=1,
     )  # fmt: skip
