@@ -216,7 +216,9 @@ def _effect(problem: Problem, place: Place, lines: Mapping[str, SpectralLine]) -
             FreeParameter(parameter, mean=math.log(middle), std=spread, bounds=ends, unit="Hz")
         )
     phases = [
-        FreeParameter(f"phase_{name}", signed=True, std=math.pi, bounds=(-9.5, 9.5), unit="rad")
+        FreeParameter(
+            f"phase_{name}", signed=True, std=math.pi, bounds=(-3.0 * math.pi, 3.0 * math.pi), unit="rad"
+        )
         for name in lines
     ]
     judging = {
