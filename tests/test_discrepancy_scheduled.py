@@ -8,9 +8,12 @@ import pytest
 from bench.discrepancy import Case, CaseChannel, NominalParameter, diagnose, record_from_arrays
 from bench.discrepancy.effects.catalogue import effect_named
 from bench.discrepancy.effects.friction_limits import coulomb_limit
+from bench.discrepancy.fitting.map_fit import fit
+from bench.discrepancy.judgement.varied_size import differs_in_vain
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.model.rigs import structure_of
+from bench.discrepancy.search.explanation import Explanation
 from bench.discrepancy.settings import DEFAULT
 from bench.discrepancy.simulation.prescribed_response import driven_force
 from bench.discrepancy.simulation.stick_slip import Elements, StructureMatrices, free_run
@@ -88,6 +91,29 @@ def test_a_law_that_differs_between_records_is_that_law_times_a_number_in_each()
             force[name] = problem.simulate(hypothesis, np.append(still, shape), record)[:, 0]
         own, of_plain = force["varied"] - force["none"], force["plain"] - force["none"]
         np.testing.assert_allclose(own, factor * of_plain, atol=1e-9 * np.abs(of_plain).max())
+
+
+def test_sizes_that_hardly_differ_between_records_are_no_rival_of_one_size():
+    case = component((60.0, 120.0, 90.0), tension=False)
+    structure = structure_of(case, settings=DEFAULT)
+    problem = Problem(case, structure, case.identification, settings=DEFAULT)
+    plain = Placed(effect_named("coulomb_friction"), structure.places[0])
+    varied = Placed(differing(plain.effect, [record.name for record in problem.records]), plain.place)
+    still = np.zeros(len(problem.nominal))
+
+    def explanation(placed, *sizes):
+        start = np.append(still, np.log(sizes))
+        return Explanation(((problem, fit(problem, (placed,), start=start, iterations=0)),))
+
+    one, hardly, plainly = (
+        explanation(plain, 1.0),
+        explanation(varied, 0.97, 1.03),
+        explanation(varied, 0.8, 1.2),
+    )
+    assert differs_in_vain(hardly, [one, hardly])
+    assert not differs_in_vain(hardly, [hardly, plainly])  # nothing stands in for it
+    assert not differs_in_vain(plainly, [one, plainly])
+    assert not differs_in_vain(one, [one, hardly])
 
 
 @pytest.mark.slow

@@ -21,6 +21,7 @@ from bench.discrepancy.fitting.map_fit import fit
 from bench.discrepancy.judgement.discrepancies import Discrepancies
 from bench.discrepancy.judgement.held_out import HeldOut, held_out, shares
 from bench.discrepancy.judgement.steady import diverges, steadied
+from bench.discrepancy.judgement.varied_size import differs_in_vain, steadier
 from bench.discrepancy.likelihood.problem import Array, Problem
 from bench.discrepancy.search.explanation import Explanation, nominal_alone
 from bench.discrepancy.settings import DEFAULT, CoarseSettings
@@ -158,7 +159,8 @@ def _finalists(
     """What is near the likeliest on held-out blocks, the best first, without effects that close nothing material; the nominal model
     alone among them."""
     nothing = bounded(nominal_alone(explanations), settings.within)
-    with_effects = [e for e in explanations if e.hypothesis][: 2 * settings.finalists]
+    told = [e for e in explanations if e.hypothesis and not differs_in_vain(e, explanations)]
+    with_effects = told[: 2 * settings.finalists]
     ranked = sorted((bounded(e, settings.within) for e in with_effects), key=lambda e: -e.log_posterior)
     near = [e for e in ranked if e.log_posterior > ranked[0].log_posterior - settings.reach]
     found = [held_out(e) for e in [*near[: settings.finalists], nothing]]
@@ -175,19 +177,10 @@ def _finalists(
 
 def _unvaried(entry: HeldOut, found: Sequence[HeldOut], settings: CoarseSettings) -> HeldOut | None:
     """The same effects, fewer of them of a size that follows something, where they predict as well: then nothing says that it does."""
-
-    def plain(own: HeldOut) -> frozenset[tuple[str, str]]:
-        return frozenset((p.effect.varies or p.effect.name, p.place.name) for p in own.explanation.hypothesis)
-
-    def varied(own: HeldOut) -> int:
-        return sum(bool(p.effect.varies) for p in own.explanation.hypothesis)
-
-    alike = [
-        other
-        for other in found
-        if varied(other) < varied(entry) and plain(other) == plain(entry) and _as_good(other, entry, settings)
-    ]
-    return min(alike, key=lambda other: other.total, default=None)
+    alike = (other for other in found if steadier(other.explanation, entry.explanation))
+    return min(
+        (o for o in alike if _as_good(o, entry, settings)), key=lambda other: other.total, default=None
+    )
 
 
 def _with(entry: HeldOut, own: HeldOut, found: Sequence[HeldOut]) -> list[HeldOut]:

@@ -25,6 +25,7 @@ from bench.discrepancy.judgement.coarse_finding import (
 from bench.discrepancy.judgement.finding import Finding
 from bench.discrepancy.judgement.nonparametric_rival import Rival, likelier_force
 from bench.discrepancy.judgement.predictive_check import contradicted
+from bench.discrepancy.judgement.varied_size import differs_in_vain
 from bench.discrepancy.likelihood.model_error import ModelInadequacy
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.rigs import structure_of
@@ -72,7 +73,8 @@ def found_of(case: Case, how: How, rng: np.random.Generator) -> tuple[Case, Find
     def search(
         case: Case, error: ModelInadequacy, known: Sequence[Explanation]
     ) -> tuple[Case, list[Explanation]]:
-        return _explained(case, few, error, [e for e in known if len(e.hypothesis) <= few.most])
+        small = [e for e in known if len(e.hypothesis) <= few.most and not differs_in_vain(e, known)]
+        return _explained(case, few, error, small)
 
     known: list[Explanation] = []
     if Problem(

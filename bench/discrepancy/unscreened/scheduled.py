@@ -16,7 +16,7 @@ records and not what; on a record of its own it is the mean of those.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -35,6 +35,7 @@ from bench.discrepancy.effects.effect import (
 from bench.discrepancy.effects.force_priors import FRICTION
 from bench.discrepancy.effects.read_off import (
     CHANGES,
+    DIFFERS,
     FOLLOWED,
     SENSITIVITY,
     differing_name,
@@ -83,6 +84,23 @@ def with_schedules(search: Search, asked: Collection[str]) -> None:
     if not channels and len(problem.records) > 1:
         tasks += _changing(search, asked)
     converge(search, tasks)
+    converge(search, list(_of_one_size(search)))
+
+
+def _of_one_size(search: Search) -> Iterator[Task]:
+    """Fits of effects of one size from where those ended whose size differs between records: alone they may have ended elsewhere."""
+    for fitted in search.ranked(1):
+        (placed,) = fitted.hypothesis
+        effect = placed.effect
+        if not effect.name.startswith(DIFFERS) or effect.parameters[0].signed or not np.isfinite(fitted.cost):
+            continue
+        plain = replace(effect_named(effect.varies), in_place=effect.in_place, variant=effect.variant)
+        first, count = len(search.problem.nominal), len(search.problem.records)
+        size = float(np.mean(fitted.vector[first : first + count]))
+        yield (
+            (Placed(plain, placed.place),),
+            np.concatenate([fitted.vector[:first], [size], fitted.vector[first + count :]]),
+        )
 
 
 def _changing(search: Search, asked: Collection[str]) -> list[Task]:
