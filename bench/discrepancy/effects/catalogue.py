@@ -124,6 +124,7 @@ FORCES: tuple[Effect, ...] = (
                 std=1.3,
                 bounds=(math.log(1e-3), math.log(20.0)),
                 grid=log_grid(0.01, 0.03, 0.1, 0.3, 1.0),
+                unit="s",
             ),
         ),
         "f = k z, z' = v - z / tau",

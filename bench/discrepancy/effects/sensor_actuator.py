@@ -32,7 +32,7 @@ SETTINGS = SensorActuatorSettings()
 def _time(name: str, *grid: float) -> FreeParameter:
     """A delay or time constant: eight milliseconds within a factor of seven with 95 %."""
     bounds = (math.log(1e-4), math.log(1.0))
-    return FreeParameter(name, mean=math.log(0.008), std=1.0, bounds=bounds, grid=log_grid(*grid))
+    return FreeParameter(name, mean=math.log(0.008), std=1.0, bounds=bounds, grid=log_grid(*grid), unit="s")
 
 
 def _sensor_delay(

@@ -235,8 +235,9 @@ def differing(effect: Effect, records: Sequence[str]) -> Effect:
     count, first, bound = len(records), effect.parameters[0], effect.rate_bound
 
     def typical(values: Values) -> Values:
-        size = math.sqrt(float(np.mean(values[:count] ** 2)))
-        return np.concatenate([[max(size, np.finfo(float).tiny)], values[count:]])
+        mean, size = float(values[:count].mean()), float(np.abs(values[:count]).max())
+        # changes of both signs may have a mean of nothing, which nothing is a multiple of
+        return np.append(mean if abs(mean) > 1e-6 * size else max(size, np.finfo(float).tiny), values[count:])
 
     def schedule(values: Values, record: CaseRecord) -> Values:
         own = values[records.index(record.name)] if record.name in records else values[:count].mean()
