@@ -344,6 +344,18 @@ def free_slide(friction: float, push: float = 0.0) -> Case:
     )  # fmt: skip
 
 
+def test_differences_of_a_record_in_windows_hardly_change_where_what_starts_reach_is_held():
+    problem = Problem(case := free_slide(friction=3.0), structure_of(case), case.identification)
+    hypothesis = (Placed(effect_named("coulomb_friction"), problem.structure.places[0]),)
+    vector = fit(problem, hypothesis, start=np.array([0.0, 0.0, -1.0]), iterations=20).vector
+    here, near = problem.residual(hypothesis, vector), problem.residual_near(hypothesis, vector)
+    np.testing.assert_array_equal(near(vector), here)
+    for step in 0.01 * np.eye(len(vector)):
+        whole, held = problem.residual(hypothesis, vector + step) - here, near(vector + step) - here
+        # what is left out is of the order of the starts' noise over the motion
+        assert np.linalg.norm(held - whole) < 0.1 * np.linalg.norm(whole)
+
+
 def test_a_free_slide_is_judged_on_windows_and_its_friction_found_again():
     case = free_slide(friction=3.0)
     problem = Problem(case, structure_of(case), case.identification)

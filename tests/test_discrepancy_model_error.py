@@ -214,33 +214,30 @@ def test_what_accounts_for_all_that_another_effect_leaves_is_named_beside_it():
     assert named == ["gap"]
 
 
-def test_of_a_model_that_is_worse_than_no_motion_only_the_response_is_there_to_be_closed(monkeypatch):
-    case = planted_case(n=600)
-    problem = problem_of(case)
+@pytest.fixture
+def judged(monkeypatch):
+    """`left` and `pays` of an explanation, from what it and the nominal model (re-estimated, as stated) leave of the judging records."""
+    problem = problem_of(case := planted_case(n=600))
     nothing, found = explanation(problem), explanation(problem, "gap")
-    monkeypatch.setattr(
-        Discrepancies, "of", lambda self, e, *, judging: np.array([3.0 if e is nothing else 0.65])
-    )
-    monkeypatch.setattr(Discrepancies, "as_stated", np.array([2.0]))
-    known = Discrepancies(case, problem)
-    assert known.left(found, nothing) == pytest.approx(0.65**2, rel=0.01)
-    assert not known.pays(found, nothing, 0.5)
-    assert known.pays(found, nothing, 0.7)
 
-
-def test_an_effect_has_to_be_nearer_than_the_nominal_model_as_it_was_stated(monkeypatch):
-    case = planted_case(n=600)
-    problem = problem_of(case)
-    nothing, found = explanation(problem), explanation(problem, "gap")
-    monkeypatch.setattr(
-        Discrepancies, "of", lambda self, e, *, judging: np.array([0.6 if e is nothing else 0.1])
-    )
-    for stated, pays in (
-        (0.5, True),
-        (0.12, False),
-    ):  # parameters re-estimated without the effect had made it worse
+    def left_and_pays(re_estimated, stated, after, part):
+        of = lambda self, e, *, judging: np.array([re_estimated if e is nothing else after])  # noqa: E731
+        monkeypatch.setattr(Discrepancies, "of", of)
         monkeypatch.setattr(Discrepancies, "as_stated", np.array([stated]))
-        assert Discrepancies(case, problem).pays(found, nothing, 0.7) == pays
+        known = Discrepancies(case, problem)
+        return known.left(found, nothing), known.pays(found, nothing, part)
+
+    return left_and_pays
+
+
+def test_of_a_model_that_is_worse_than_no_motion_only_the_response_is_there_to_be_closed(judged):
+    assert judged(3.0, 2.0, 0.65, 0.5) == (pytest.approx(0.65**2, rel=0.01), False)
+    assert judged(3.0, 2.0, 0.65, 0.7)[1]
+
+
+def test_an_effect_has_to_be_nearer_than_the_nominal_model_as_it_was_stated(judged):
+    assert judged(0.6, 0.5, 0.1, 0.7)[1]
+    assert not judged(0.6, 0.12, 0.1, 0.7)[1]  # parameters re-estimated without the effect had made it worse
 
 
 def test_nominal_parameters_stay_within_what_is_believed_whatever_is_taken_from_an_explanation():

@@ -86,7 +86,7 @@ def attribute(
             break
         extend(search, screen, bases, count=4 if consistent(best) else 6 - size)
         soften(search, size + 1)
-        if any(p.effect.name == HARMONIC for p in candidates):
+        if HARMONIC in _read_off(candidates):
             with_harmonic_force(search, size + 1)
         lengthen(search, size + 1, candidates)
         reduce_best(search)
@@ -127,12 +127,17 @@ def _single(
     stand_in(search)
     lengthen(search, 1, candidates)
     if deadline.allows("forces from outside and friction that follows a channel"):
-        asked = {p.effect.name for p in candidates if p.effect.site == "read off"}
+        asked = _read_off(candidates)
         if TIMED in asked:
             with_timed_force(search)
         if HARMONIC in asked:
             with_harmonic_force(search)
         with_schedules(search, asked)
+
+
+def _read_off(candidates: Sequence[Placed]) -> set[str]:
+    """Names of the effects that are read off the records, of those that are asked for."""
+    return {p.effect.name for p in candidates if p.effect.site == "read off"}
 
 
 def _bases(search: Search, screen: Screen, size: int, *, best: Fit, nothing: Fit) -> list[Fit]:

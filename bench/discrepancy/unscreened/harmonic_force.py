@@ -174,7 +174,7 @@ def _heights(windowed: Array, settings: HarmonicForceSettings) -> tuple[Array, A
 
 def _lines_at(problem: Problem, place: Place) -> list[dict[str, SpectralLine]]:
     """Lines at a place, one for each record for identification: the largest that all have at one frequency, and the largest of each."""
-    found = {record.name: _lines_in(problem, record, place) for record in problem.records}
+    found = {r.name: _lines_in(problem, r, missing_force(problem, r, place)) for r in problem.records}
     if not all(found.values()):
         return []
     resolution = max(1.0 / (len(record) * record.step) for record in problem.records)
@@ -191,12 +191,11 @@ def _lines_at(problem: Problem, place: Place) -> list[dict[str, SpectralLine]]:
     return [*common, largest] if largest not in common else common
 
 
-def _lines_in(problem: Problem, record: CaseRecord, place: Place) -> list[SpectralLine]:
+def _lines_in(problem: Problem, record: CaseRecord, lacking: Array) -> list[SpectralLine]:
+    """Lines of the force (n,) that a record lacks, but for those that its loads, or the motion prescribed, make."""
     drives = problem.structure.channels if problem.driven else problem.structure.loads
     loads = [record.values[name] for name in drives if name in record.values]
-    return lines_of(
-        record.time, missing_force(problem, record, place), loads, settings=problem.settings.search.harmonic
-    )
+    return lines_of(record.time, lacking, loads, settings=problem.settings.search.harmonic)
 
 
 def _effect(problem: Problem, place: Place, lines: Mapping[str, SpectralLine]) -> Effect:
@@ -221,10 +220,10 @@ def _effect(problem: Problem, place: Place, lines: Mapping[str, SpectralLine]) -
         )
         for name in lines
     ]
-    judging = {
-        record.name: (record.time, missing_force(problem, record, place), _lines_in(problem, record, place))
-        for record in problem.case.validation
-    }
+    judging = {}
+    for record in problem.case.validation:
+        lacking = missing_force(problem, record, place)
+        judging[record.name] = (record.time, lacking, _lines_in(problem, record, lacking))
     order, count, tried = list(lines), len(frequencies), sum(len(r.time) // 2 for r in records.values())
 
     def of_record(values: Values, record: str) -> Values:
