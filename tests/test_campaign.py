@@ -393,6 +393,25 @@ def test_damage_is_found(tmp_path: Path) -> None:
     ]
 
 
+@pytest.mark.parametrize(
+    ("entries", "told"),
+    [
+        ({"records": 1e308}, "more than 100000000 records"),
+        ({"records": 10**8, "records_per_part": 1}, "more than 40000 parts"),
+    ],
+)
+def test_a_manifest_of_more_than_a_plan_can_ask_for_is_damaged(
+    reference: Path, tmp_path: Path, entries: dict[str, float], told: str
+) -> None:
+    folder = tmp_path / "endless"
+    folder.mkdir()
+    manifest = json.loads((reference / "manifest.json").read_text())
+    manifest["plan"] |= entries
+    (folder / "manifest.json").write_text(json.dumps(manifest))
+    with pytest.raises(FileFormatError, match=told):
+        verify(folder)
+
+
 @pytest.mark.slow
 def test_a_cluster_gives_the_same_bytes_though_a_worker_is_killed(tmp_path: Path) -> None:
     from distributed import Client, LocalCluster

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from bench.campaign.plan import Plan
+from bench.campaign.plan import PLAN_LIMITS, Plan
 from bench.errors import FileFormatError
 
 FOLDERS = ("samples", "records", "answers")
@@ -80,6 +80,9 @@ class Layout:
             )
             if min(made.records, made.records_per_part, made.n_samples) < 1:
                 raise ValueError("numbers of records and samples are positive")
+            exceeded = PLAN_LIMITS.exceeded(made.records, made.n_samples, made.n_parts)
+            if exceeded is not None:
+                raise ValueError(f"more than {exceeded[1]} {exceeded[0]}, which no plan can ask for")
         except (KeyError, TypeError, ValueError, OverflowError) as error:
             raise FileFormatError(f"the manifest is damaged: {error!r} in its plan") from error
         return made

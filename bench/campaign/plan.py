@@ -52,6 +52,22 @@ class PlanLimits:
     samples: int = BASE_SETTINGS.max_samples
     parts: int = 40_000
 
+    def exceeded(self, records: int, samples: float, parts: int) -> tuple[str, int, str] | None:
+        """The first of the limits that a campaign exceeds: what is too many, how many it may be, what to do; None where it keeps all.
+
+        Example:
+            >>> PlanLimits().exceeded(10**9, 1000, 1000)[:2]
+            ('records', 100000000)
+        """
+        for what, value, most, todo in (
+            ("records", records, self.records, "make several campaigns, each with a seed of its own"),
+            ("samples a record", samples, self.samples, "shorten the records, or lower the sample rate"),
+            ("parts", parts, self.parts, "raise records_per_part"),
+        ):
+            if value > most:
+                return what, most, todo
+        return None
+
 
 PLAN_LIMITS = PlanLimits()
 
@@ -128,18 +144,15 @@ class Plan:
     def _check_size(self, limits: PlanLimits) -> None:
         samples = self.duration * self.sample_rate
         parts = -(-self.records // self.records_per_part) if self.records_per_part else 0
-        for what, value, most, todo in (
-            ("records", self.records, limits.records, "make several campaigns, each with a seed of its own"),
-            ("samples a record", samples, limits.samples, "shorten the records, or lower the sample rate"),
-            ("parts", parts, limits.parts, "raise records_per_part"),
-        ):
-            if value > most:
-                width = 4 if self.precision == "float32" else 8
-                terabytes = min(self.records, 10**30) * samples * width / 1e12
-                raise ParameterError(
-                    f"the campaign is too large: {_short(self.records)} records of {_short(samples)} samples are "
-                    f"{terabytes:.3g} TB a channel, and at most {most} {what} can be asked for; {todo}"
-                )
+        exceeded = limits.exceeded(self.records, samples, parts)
+        if exceeded is not None:
+            what, most, todo = exceeded
+            width = 4 if self.precision == "float32" else 8
+            terabytes = min(self.records, 10**30) * samples * width / 1e12
+            raise ParameterError(
+                f"the campaign is too large: {_short(self.records)} records of {_short(samples)} samples are "
+                f"{terabytes:.3g} TB a channel, and at most {most} {what} can be asked for; {todo}"
+            )
 
     def _check_members(self) -> None:
         names = [rig.name for rig in self.rigs]
