@@ -13,7 +13,7 @@ import time
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -26,6 +26,7 @@ from bench.discrepancy.case.idle_loads import idle_notes, without_idle_noise
 from bench.discrepancy.case.reading import read_case
 from bench.discrepancy.checks.admission import admitted
 from bench.discrepancy.checks.data_quality import notes, untried_points
+from bench.discrepancy.checks.long_records import long_record_notes, thinned, with_beginnings
 from bench.discrepancy.checks.quantisation import recorded
 from bench.discrepancy.effects.catalogue import CATALOGUE
 from bench.discrepancy.effects.effect import Effect
@@ -34,6 +35,7 @@ from bench.discrepancy.fitting.initial_state_fit import start_warnings
 from bench.discrepancy.judgement import posterior as evidence
 from bench.discrepancy.judgement.closing import complete, nominal_estimates, with_closed
 from bench.discrepancy.judgement.finding import Finding
+from bench.discrepancy.judgement.run_on import rest_of_records
 from bench.discrepancy.judgement.stages import shrunk
 from bench.discrepancy.judgement.two_regimes import How, Tell, found_of
 from bench.discrepancy.likelihood.problem import Problem
@@ -171,9 +173,8 @@ def _by_drives(
 def _diagnose(case: Case, how: How, rng: np.random.Generator, anyway: bool) -> Diagnosis:
     began, progress, catalogue = time.perf_counter(), how.progress, how.catalogue
     progress("looking at the records")
-    told, admission = admitted(case, anyway=anyway, settings=how.settings)
-    quiet = without_idle_noise(told, settings=how.settings.case)
-    case, finding = found_of(quiet, how, rng)
+    told = _told_records(case, anyway=anyway, settings=how.settings)
+    case, finding = found_of(with_beginnings(told.whole, settings=how.settings), how, rng)
     problem = Problem(
         case, structure_of(case, settings=how.settings), case.identification, settings=how.settings
     )
@@ -211,11 +212,11 @@ def _diagnose(case: Case, how: How, rng: np.random.Generator, anyway: bool) -> D
         probabilities=probabilities,
         explanation=_told(words, seen),
         warnings=(
-            *admission,
+            *told.admission,
             *how.deadline.untried,
             *finding.notes,
             *far_off(nominal, how.settings.judgement.far),
-            *_warnings(problem, told, quiet, open_end=kind == "unknown" or (kind == "effect" and not judged)),
+            *_warnings(problem, told, final, open_end=kind == "unknown" or (kind == "effect" and not judged)),
         ),
         closure=closure,
         next_excitation=_next_excitation(problem, finding, catalogue),
@@ -237,14 +238,38 @@ def _kind(finding: Finding, seen: Sequence[NamedEffect]) -> tuple[VerdictKind, d
     return "effect", finding.probabilities | {"effect": 1.0 - finding.probabilities["unknown"], "none": 0.0}
 
 
-def _warnings(problem: Problem, told: Case, quiet: Case, *, open_end: bool) -> tuple[str, ...]:
-    """What the reader should know about the records: as told, without the noise of idle loads, and as they were read in the end; and
-    where nothing was tried, if something is left."""
+class _ToldRecords(NamedTuple):
+    """A case on its way to the search.
+
+    Attributes:
+        admitted: As it was admitted.
+        admission: What was said of it then.
+        quiet: Without the noise of idle loads.
+        whole: Its long records thinned, but not cut.
+    """
+
+    admitted: Case
+    admission: tuple[str, ...]
+    quiet: Case
+    whole: Case
+
+
+def _told_records(case: Case, *, anyway: bool, settings: DiagnosisSettings) -> _ToldRecords:
+    told, admission = admitted(case, anyway=anyway, settings=settings)
+    quiet = without_idle_noise(told, settings=settings.case)
+    return _ToldRecords(told, tuple(admission), quiet, thinned(quiet, settings=settings))
+
+
+def _warnings(problem: Problem, told: _ToldRecords, final: Explanation, *, open_end: bool) -> tuple[str, ...]:
+    """What the reader should know about the records, as they came and as they were read in the end; and where nothing was tried, if
+    something is left."""
     case = problem.case
     return (
+        *long_record_notes(told.admitted, case, settings=problem.settings),
+        *rest_of_records(told.whole, problem, final),
         *notes(case, problem),
-        *idle_notes(told, quiet),
-        *reading_notes(quiet, case),
+        *idle_notes(told.admitted, told.quiet),
+        *reading_notes(told.quiet, case),
         *start_warnings(problem, (*case.identification, *case.validation)),
         *(untried_points(problem) if open_end else ()),
     )

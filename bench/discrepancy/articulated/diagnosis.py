@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from bench.arrays import Array
 from bench.discrepancy.articulated.admission import admitted_robot
 from bench.discrepancy.articulated.judgement import kept, ladder, predict, without_each
 from bench.discrepancy.articulated.naming import closest_rival, verdict_of
@@ -23,6 +24,7 @@ from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem, placements
 from bench.discrepancy.articulated_search.search import search
 from bench.discrepancy.case.case import Case
+from bench.discrepancy.checks.long_records import after, long_record_notes, thinned, with_beginnings
 from bench.discrepancy.effects.catalogue import CATALOGUE as LINEAR
 from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.numerics.deadline import NEVER, Deadline
@@ -99,8 +101,9 @@ def diagnose_articulated(
     catalogue = [effect for effect in CATALOGUE if effect.name not in exclude]
     progress("reading the model and the records")
     stated = all((c.noise_std or 0.0) > 0.0 for c in case.channels if c.role == "response")
-    case, compiled, notes = admitted_robot(case, anyway=anyway, settings=settings)
+    told, compiled, notes = admitted_robot(case, anyway=anyway, settings=settings)
     model = ArticulatedModel.of(compiled, case.rig)
+    case = with_beginnings(thinned(told, settings=settings), settings=settings)
     problem = ArticulatedProblem.of(case, model, case.identification, settings, deadline)
     judging = ArticulatedProblem.of(case, model, case.validation, settings)
     problem, fits = search(problem, placements(problem, catalogue), settings=how, progress=progress)
@@ -121,6 +124,7 @@ def diagnose_articulated(
             *far_off(verdict.nominal, settings.judgement.far),
             *verdict.warnings,
             *notes,
+            *_of_long_records(told, problem, final, predictions[0].floor),
             *_followed(problem),
             *deadline.untried,
         ),
@@ -136,6 +140,29 @@ def diagnose_articulated(
         case, model, problem, judging, tuple(fits), final, matrix_of(problem, fits), verdict,
         None if proposal is None else proposal.trajectory,
     )  # fmt: skip
+
+
+def _of_long_records(
+    told: Case, problem: ArticulatedProblem, final: ArticulatedFit, floor: Array
+) -> tuple[str, ...]:
+    """What is said of records of which only the beginning was fitted: how the explanation does over what follows."""
+    case, settings = problem.case, problem.settings
+    found = long_record_notes(told, case, settings=settings)
+    whole = thinned(told, settings=settings).identification if found else ()
+    rests = [
+        rest
+        for record, fitted in zip(whole, case.identification, strict=bool(whole))
+        if (rest := after(record, fitted)) is not None
+    ]
+    if not rests:
+        return found
+    later = ArticulatedProblem.of(case, problem.model, rests, settings).softened(problem.softness)
+    judged = settings.articulated.judgement
+    off = [float(np.max(predict(p, final, floor, judged).discrepancy)) for p in (problem, later)]
+    return (
+        *found,
+        f"what was found is {off[0]:.3g} off where it was fitted (NRMSE), {off[1]:.3g} in what follows",
+    )
 
 
 def _followed(problem: ArticulatedProblem) -> tuple[str, ...]:

@@ -14,7 +14,7 @@ first two, what is not stated is looked for in the records (`search.load_interpo
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -117,6 +117,30 @@ class CaseRecord:
     def time(self) -> NDArray[np.float64]:
         """Sample times (n,) [s]."""
         return np.asarray(self.start + self.step * np.arange(len(self)), dtype=np.float64)
+
+
+def beginning(record: CaseRecord, samples: int, *, first: int = 0) -> CaseRecord:
+    """Some samples of a record, its first ones unless told otherwise.
+
+    Args:
+        record: The record; a periodic one is no longer periodic then, and starts in motion.
+        samples: Their number.
+        first: The sample that they begin with.
+
+    Returns:
+        The record itself where it holds no more.
+    """
+    last = first + samples
+    if first == 0 and last >= len(record):
+        return record
+    return replace(
+        record,
+        start=record.start + first * record.step,
+        values={name: values[first:last] for name, values in record.values.items()},
+        bridged=tuple(i - first for i in record.bridged if first <= i < last),
+        periodic=False,
+        at_rest=record.at_rest and not record.periodic,
+    )
 
 
 Prediction = Callable[[CaseRecord], Mapping[str, NDArray[np.float64]]]

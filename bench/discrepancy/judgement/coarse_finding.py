@@ -63,8 +63,19 @@ def coarse_explanations(
 
 
 def _same(error: ModelInadequacy, other: ModelInadequacy) -> bool:
-    """Whether two errors weigh residuals alike, so that a search would find what is known: those of records in windows are one number."""
-    return not error.power and not other.power and error.scale == other.scale
+    """Whether two errors weigh residuals alike, so that a search would find what is known.
+
+    Those of records in windows are one number. A spectrum is the variance of so many independent samples an octave, itself known to no
+    better than their number tells; a tenth of that is no other error.
+    """
+    if error.scale != other.scale or error.power.keys() != other.power.keys():
+        return False
+    alike = 0.1 * np.sqrt(2.0 / error.settings.samples)
+    pairs = [(own, other.power[key]) for key, own in error.power.items()]
+    return all(
+        len(a) == len(b) and float(np.mean(np.abs(a - b) / np.maximum(np.maximum(a, b), 1e-300))) < alike
+        for a, b in pairs
+    )
 
 
 def reference(explanations: Sequence[Explanation]) -> Explanation:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.arrays import Array
-from bench.discrepancy.case.case import CaseRecord
+from bench.discrepancy.case.case import CaseRecord, beginning
 from bench.discrepancy.likelihood.model_error import ModelInadequacy
 from bench.discrepancy.likelihood.noise_covariance import sensor_gains, whitening_behind
 from bench.discrepancy.likelihood.time_varying_noise import whitening_together
@@ -159,12 +159,7 @@ class Problem(Simulator):
         """
         out = copy.copy(self)
         short = [
-            replace(
-                r,
-                name=f"{r.name}, {n} samples",
-                values={k: v[:n] for k, v in r.values.items()},
-                bridged=tuple(i for i in r.bridged if i < n),
-            )
+            replace(beginning(r, n), name=f"{r.name}, {n} samples")
             for r, n in zip(self.records, samples, strict=True)
         ]
         kept = [

@@ -97,6 +97,48 @@ class LikenessSettings:
 
 
 @dataclass(frozen=True)
+class LongRecordSettings:
+    """Records for identification of more samples than a search makes use of."""
+
+    record: int = setting(
+        32_768,
+        "Samples of a record that a search makes use of.",
+        (
+            "The longest of the records on which its figures were measured has 28 674; the likelihood weighs 2500 frequencies of a record, "
+            "which would be ever lower ones."
+        ),
+        unit="samples",
+    )
+    together: int = setting(
+        65_536,
+        "Samples of all records together.",
+        "The cases on which its figures were measured hold 60 000 at most.",
+        unit="samples",
+    )
+    samples_a_period: float = setting(
+        10.0,
+        "Samples a period of the highest frequency above the noise that a record keeps when it is thinned.",
+        "Straight lines between so many are off by a twentieth of what is as small as the noise there.",
+        unit="samples",
+    )
+    above_noise: float = setting(
+        2.0,
+        "Smoothed spectrum of a channel over its noise down to which a frequency is kept.",
+        "Of so long a record noise alone, smoothed over a two hundredth of its band, scatters by a seventh.",
+    )
+    unstated: float = setting(
+        1e-3,
+        "Part of its standard deviation that counts as the noise of a channel where none is stated.",
+        "A tenth of the least error that a model is granted.",
+    )
+    quiet: float = setting(
+        0.1,
+        "Part of the RMS change of a channel below which a record that is cut has not begun to move.",
+        "A hundredth of its power; noise of more than that is no silence.",
+    )
+
+
+@dataclass(frozen=True)
 class ChecksSettings:
     """What a record and its model are checked for before the diagnosis."""
 
@@ -221,4 +263,5 @@ class ChecksSettings:
         "Errors of calibration and estimation leave as much.",
     )
     scales: ScaleSettings = field(default_factory=ScaleSettings)
+    long_records: LongRecordSettings = field(default_factory=LongRecordSettings)
     likeness: LikenessSettings = field(default_factory=LikenessSettings)
