@@ -9,7 +9,7 @@ Stopped, it goes on where it was. The verdicts of a commit are kept by its hash;
 from __future__ import annotations
 
 import json
-import subprocess
+import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,12 +18,15 @@ from typing import Any
 import tyro
 from rich.console import Console
 
-from bench.discrepancy import diagnose_folder
-from bench.discrepancy.blind.background_score import BackgroundScore, score_backgrounds
-from bench.errors import BenchError
-from bench.files import write_text
-
 ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT / "scripts"))
+
+from checkout import commit  # noqa: E402
+
+from bench.discrepancy import diagnose_folder  # noqa: E402
+from bench.discrepancy.blind.background_score import BackgroundScore, score_backgrounds  # noqa: E402
+from bench.errors import BenchError  # noqa: E402
+from bench.files import write_text  # noqa: E402
 
 
 @dataclass
@@ -48,7 +51,7 @@ def main() -> int:
     """Diagnose and score."""
     args = tyro.cli(Args, description=__doc__)
     console = Console(stderr=args.json)
-    results = args.out / _commit()
+    results = args.out / commit()
     results.mkdir(parents=True, exist_ok=True)
     folders = sorted(folder for folder in args.cases.iterdir() if (folder / "nominal.json").exists())
     for folder in folders[args.part[0] :: args.part[1]]:
@@ -105,13 +108,6 @@ def _tell(console: Console, score: BackgroundScore) -> None:
     )
     for stated, right, n in score.reliability:
         console.print(f"  stated {stated:.2f}, right {right:.2f}, of {n}")
-
-
-def _commit() -> str:
-    """Hash of the checkout, marked where it holds changes."""
-    return subprocess.run(
-        ["git", "describe", "--always", "--dirty"], cwd=ROOT, capture_output=True, text=True, check=True
-    ).stdout.strip()
 
 
 if __name__ == "__main__":

@@ -13,7 +13,6 @@ a commit are kept by its hash, and `--again` diagnoses anew.
 from __future__ import annotations
 
 import json
-import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -28,6 +27,7 @@ from rich.table import Table
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "scripts"))
 
+from checkout import commit  # noqa: E402
 from diagnose_measured import gather  # noqa: E402
 from measured.acceptance import Acceptance, acceptance_of, acceptances  # noqa: E402
 
@@ -90,7 +90,7 @@ def main() -> int:
     """Diagnose, grade and print."""
     args = tyro.cli(Args, description=__doc__)
     console = Console(stderr=True)
-    results = args.out / _commit()
+    results = args.out / commit()
     rows = []
     for name, load, acceptance in _wanted(args):
         kept = results / f"{name}.json"
@@ -191,13 +191,6 @@ def table(rows: list[Row]) -> Table:
         peer = f"{row.peer} ({row.peer_grade})" if row.peer_grade else row.peer
         out.add_row(row.case, row.grade, row.verdict, named, sets, before, after, f"{row.seconds:.0f}", peer)
     return out
-
-
-def _commit() -> str:
-    """Hash of the checkout, marked where it holds changes."""
-    return subprocess.run(
-        ["git", "describe", "--always", "--dirty"], cwd=ROOT, capture_output=True, text=True, check=True
-    ).stdout.strip()
 
 
 if __name__ == "__main__":

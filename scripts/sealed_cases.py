@@ -10,7 +10,6 @@ Stopped, it goes on where it was: what is made and diagnosed stays in the work f
 from __future__ import annotations
 
 import json
-import subprocess
 import sys
 import time
 from dataclasses import dataclass
@@ -25,6 +24,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "scripts"))
 
 from benchmark import machine  # noqa: E402
+from checkout import commit  # noqa: E402
 
 from bench.discrepancy import BlindOptions, BlindScore, make_blind, run_blind  # noqa: E402
 from bench.discrepancy.blind.score_report import markdown, score_page  # noqa: E402
@@ -90,10 +90,7 @@ def _commits(cases: Path, results: Path, *, again: bool) -> set[str]:
     told = set() if again or not kept.exists() else set(kept.read_text(encoding="utf-8").split())
     made = (path.parent.name for path in cases.glob("*/nominal.json"))
     if again or any(not (results / f"{name}.json").exists() for name in made):
-        present = subprocess.run(
-            ("git", "describe", "--always", "--dirty"), cwd=ROOT, capture_output=True, text=True, check=False
-        )
-        told.add(present.stdout.strip() or "unknown")
+        told.add(commit())
         write_text(kept, "\n".join(sorted(told)))
     return told or {"unknown"}
 
