@@ -133,7 +133,7 @@ def deadband(target: Target, effect: NamedEffect) -> Change:
 
 
 def logged(target: Target, effect: NamedEffect) -> Change:
-    """A sensor that is wrong: the log is corrected, the model is not; a servo that acts on the wrong reading keeps it."""
+    """A sensor or a clock that is wrong: the log is corrected, the model is not; a servo that acts on the wrong reading keeps it."""
     v, name = values_of(effect), effect.where or effect.channel
     numbers = ", ".join(f"{key} {value:.6g}" for key, value in v.items() if key != "in_loop")
     channel = effect.channel or effect.where
@@ -163,5 +163,5 @@ DRIVES: dict[str, Callable[[Target, NamedEffect], Change]] = {
     "actuator_deadband": deadband,
 }
 """Effects of actuators."""
-LOGGED = ("displacement_", "acceleration_", "position_", "velocity_")
-"""Beginnings of the names of effects of a sensor."""
+LOGGED = ("displacement_", "acceleration_", "position_", "velocity_", "clock_")
+"""Beginnings of the names of effects of what was logged."""

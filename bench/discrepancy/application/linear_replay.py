@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
@@ -66,7 +66,7 @@ class LinearReplay:
         model = applied.compiled()
         player = _Player(self, applied, model)
         records = self.case.validation
-        runs = [_read(effects, player.channels(record), record) for record in records]
+        runs = [_read(effects, player.channels(_driven(effects, record)), record) for record in records]
         out = {}
         for name, channels in coordinates(self.structure):
             measured = [_sum(record.values, channels) for record in records]
@@ -86,7 +86,8 @@ class LinearReplay:
         self, applied: Applied, effects: Sequence[NamedEffect], record: CaseRecord
     ) -> dict[str, Array]:
         """What the response channels read (n,) when a model plays a record's loads; of wrong sensors what they say."""
-        return _read(effects, _Player(self, applied, applied.compiled()).channels(record), record)
+        driven = _driven(effects, record)
+        return _read(effects, _Player(self, applied, applied.compiled()).channels(driven), record)
 
 
 def _sum(values: Mapping[str, Array], channels: Sequence[tuple[str, float]]) -> Array:
@@ -96,22 +97,23 @@ def _sum(values: Mapping[str, Array], channels: Sequence[tuple[str, float]]) -> 
 def _read(
     effects: Sequence[NamedEffect], channels: Mapping[str, Array], record: CaseRecord
 ) -> dict[str, Array]:
-    """Readings of wrong sensors."""
+    """Channels (n,) of a record with what is wrong with their sensors or their clock."""
     out = dict(channels)
     known = {entry.name: entry for entry in CATALOGUE}
     for effect in effects:
         entry = known.get(effect.name)
-        if (
-            entry is None
-            or entry.signal is None
-            or not effect.name.startswith(LOGGED)
-            or effect.channel not in out
-        ):
+        if entry is None or entry.signal is None or not effect.name.startswith(LOGGED):
             continue
-        out[effect.channel] = entry.signal(
-            out[effect.channel], np.array(list(values_of(effect).values())), record.step
-        )
+        if effect.channel in out:
+            values = np.array(list(values_of(effect).values()))
+            out[effect.channel] = entry.signal(out[effect.channel], values, record.step)
     return out
+
+
+def _driven(effects: Sequence[NamedEffect], record: CaseRecord) -> CaseRecord:
+    """A record whose loads are those that acted: what was logged by another clock is put onto that of the responses."""
+    logged = {entry.name for entry in CATALOGUE if entry.logged}
+    return replace(record, values=_read([e for e in effects if e.name in logged], record.values, record))
 
 
 class _Player:

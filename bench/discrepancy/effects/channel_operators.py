@@ -50,6 +50,12 @@ def delay(x: Samples, values: Samples, step: float) -> Samples:
     return (1.0 - fraction) * padded[1 : n + 1] + fraction * padded[:n]
 
 
+def skew(x: Samples, values: Samples, step: float) -> Samples:
+    """Return the load ``x(t (1 + s))``, linear between samples as loads are: another clock wrote it; the end is held."""
+    k = np.arange(len(x))
+    return np.interp(k * (1.0 + values[0]), k, x)
+
+
 def lag(x: Samples, values: Samples, step: float) -> Samples:
     """Return `x` through a first-order lag of time constant tau, updated once a sample.
 

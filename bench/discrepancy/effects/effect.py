@@ -168,6 +168,7 @@ class Effect:
         affine: The force is affine in parameter 1.
         signal: For actuator and sensor effects, the operation on a channel.
         between_samples: That operation moves samples in time, and needs what the channel does between them.
+        logged: For actuator effects, what was logged is wrong rather than what follows a command: a measured load has it, too.
         exact: A free run with it is as exact as one of the nominal model: a number is wrong, and nothing is smoothed, switched or
             interpolated.
         quantity: For sensor effects the kind of channel ("position", "acceleration"); for inertia the parameter kind.
@@ -196,6 +197,7 @@ class Effect:
     affine: bool = False
     signal: Callable[[Values, Values, float], Values] | None = None
     between_samples: bool = False
+    logged: bool = False
     exact: bool = False
     quantity: str = ""
     pickup: bool = False

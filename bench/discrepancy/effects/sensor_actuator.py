@@ -147,6 +147,28 @@ CHANNELS: tuple[Effect, ...] = (
         between_samples=True,
     ),
     Effect(
+        "clock_skew",
+        "actuator",
+        "actuator",
+        # another clock is off by some samples at the end of a record: some ten parts in a million between two quartzes, more by software
+        (
+            FreeParameter(
+                "rate_error",
+                "step/duration",
+                signed=True,
+                std=3.0,
+                bounds=(-100.0, 100.0),
+                grid=(0.0,),
+                unit="1",
+            ),
+        ),
+        "F(t (1 + s)), the load logged by a clock of its own",
+        signal=signals.skew,
+        between_samples=True,
+        logged=True,
+        log_prior=EFFECT_SETTINGS.rare,
+    ),
+    Effect(
         "actuator_lag",
         "actuator",
         "actuator",

@@ -45,7 +45,9 @@ def _targets(case: Case, effect: Effect, structure: Structure, place: Place) -> 
         return [name for name in names if name in structure.parameters]
     dofs = np.abs(place.rows).sum(axis=0) > 0
     if effect.site == "actuator":
-        commanded = [name for name in structure.loads if case.channel(name).role == "command"]
+        commanded = [
+            name for name in structure.loads if effect.logged or case.channel(name).role == "command"
+        ]
         return [
             name
             for name in commanded
