@@ -1,4 +1,4 @@
-"""Loads that were logged by another clock than the responses."""
+"""Loads that were logged late or by another clock than the responses, and drives that follow commands while these are held."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 from planted_cases import SAMPLE_RATE, load, planted_case
 
 from bench.discrepancy import Case, CaseRecord, diagnose
-from bench.discrepancy.effects.channel_operators import skew
+from bench.discrepancy.effects.channel_operators import advance, held_lag, skew
 
 
 def test_a_load_is_read_at_the_times_of_the_other_clock():
@@ -18,13 +18,36 @@ def test_a_load_is_read_at_the_times_of_the_other_clock():
     assert skew(ramp, np.array([0.5]), 0.5)[80:] == pytest.approx(99.0)  # nothing is known behind the end
 
 
-def logged_fast(rate: float) -> Case:
-    """A planted case with nothing missing, its load logged by a clock that runs fast by a part `rate`."""
+def test_a_load_that_was_logged_late_is_put_back():
+    ramp = np.arange(100.0)
+    assert advance(ramp, np.array([1.2]), 0.5)[:90] == pytest.approx(ramp[:90] + 2.4)
+    assert advance(ramp, np.array([1.2]), 0.5)[98:] == pytest.approx(99.0)
+
+
+def test_a_lag_of_held_samples_is_the_mean_of_a_finer_one():
+    step, fine, tau = 0.01, 200, 0.013
+    x = np.random.default_rng(2).standard_normal(30)
+    y, means = 0.0, []
+    for held in x:
+        t = (np.arange(fine) + 0.5) * step / fine
+        means.append(np.mean(held + (y - held) * np.exp(-t / tau)))
+        y = held + (y - held) * np.exp(-step / tau)
+    assert held_lag(x, np.array([tau]), step) == pytest.approx(means, abs=1e-5)
+
+
+def logged_otherwise(rate: float, late: float) -> Case:
+    """A planted case with nothing missing, its load logged by a clock that runs fast by a part `rate`, `late` seconds late."""
 
     def logged(record: CaseRecord, seed: int) -> CaseRecord:
         n = len(record)
-        later = np.interp(np.arange(n) * (1.0 + rate), np.arange(n + 200), np.pad(load(seed, n), (0, 200)))
-        return replace(record, values={**record.values, "force": later})
+        times = np.arange(n) * (1.0 + rate) - late * SAMPLE_RATE
+        return replace(
+            record,
+            values={
+                **record.values,
+                "force": np.interp(times, np.arange(n + 200), np.pad(load(seed, n), (0, 200))),
+            },
+        )
 
     case = planted_case(n=4000)
     (identification,), (validation,) = case.identification, case.validation
@@ -34,9 +57,16 @@ def logged_fast(rate: float) -> Case:
 @pytest.mark.slow
 @pytest.mark.parametrize("rate", [6e-4, -6e-4])
 def test_a_clock_that_runs_fast_or_slow_is_named_with_its_rate(rate: float):
-    verdict = diagnose(logged_fast(rate)).verdict
+    verdict = diagnose(logged_otherwise(rate, 0.0)).verdict
     assert [(effect.name, effect.channel) for effect in verdict.named] == [("clock_skew", "force")]
     # the load is put back onto the clock of the responses; over 8 s that is a good two samples at the end
-    assert len(logged_fast(rate).identification[0]) / SAMPLE_RATE == 8.0
     assert verdict.named[0].parameters["rate_error"].value == pytest.approx(-rate, rel=0.05)
+    assert verdict.complete
+
+
+@pytest.mark.slow
+def test_a_load_that_was_logged_late_is_named_with_its_delay():
+    verdict = diagnose(logged_otherwise(0.0, 0.0041)).verdict
+    assert [(effect.name, effect.channel) for effect in verdict.named] == [("force_delay", "force")]
+    assert verdict.named[0].parameters["delay"].value == pytest.approx(0.0041, rel=0.02)
     assert verdict.complete

@@ -52,6 +52,7 @@ LOOKS = {
     "damping_error": "Peaks are too high or too low, at every amplitude alike.",
     "armature_error": "As a mass, but gravity is right.",
     "actuator_delay": "The response lags by a constant time: a phase in proportion to the frequency, all responses alike.",
+    "force_delay": "The response comes before its load: a phase lead in proportion to the frequency, all responses alike.",
     "clock_skew": "The response lags or leads by a time that grows along the record: a phase in proportion to frequency and time.",
     "actuator_lag": "The response lags and fades with the frequency.",
     "target_lag": "A servo answers steps of its target as if they were rounded off; disturbances it meets as before.",

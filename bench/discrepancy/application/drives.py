@@ -163,5 +163,5 @@ DRIVES: dict[str, Callable[[Target, NamedEffect], Change]] = {
     "actuator_deadband": deadband,
 }
 """Effects of actuators."""
-LOGGED = ("displacement_", "acceleration_", "position_", "velocity_", "clock_")
+LOGGED = ("displacement_", "acceleration_", "position_", "velocity_", "force_delay", "clock_")
 """Beginnings of the names of effects of what was logged."""

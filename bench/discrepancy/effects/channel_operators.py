@@ -56,6 +56,12 @@ def skew(x: Samples, values: Samples, step: float) -> Samples:
     return np.interp(k * (1.0 + values[0]), k, x)
 
 
+def advance(x: Samples, values: Samples, step: float) -> Samples:
+    """Return the load ``x(t + tau)``, linear between samples as loads are: its log was late; the end is held."""
+    k = np.arange(len(x))
+    return np.interp(k + values[0] / step, k, x)
+
+
 def lag(x: Samples, values: Samples, step: float) -> Samples:
     """Return `x` through a first-order lag of time constant tau, updated once a sample.
 
@@ -64,6 +70,17 @@ def lag(x: Samples, values: Samples, step: float) -> Samples:
     """
     share = 1.0 - np.exp(-step / values[0])
     return np.asarray(lfilter([share], [1.0, share - 1.0], x))
+
+
+def held_lag(x: Samples, values: Samples, step: float) -> Samples:
+    """Return the means over each sample of a lag of time constant tau, ``tau y' + y = x``, of samples that are held until the next.
+
+    A drive works at a faster rate than the log of its commands, and follows a command while it is held.
+    """
+    ratio = step / values[0]
+    kept = np.exp(-ratio)
+    reached = lfilter([0.0, 1.0 - kept], [1.0, -kept], x)  # where each sample begins
+    return np.asarray(x + (reached - x) * (1.0 - kept) / ratio)
 
 
 def low_pass(x: Samples, values: Samples, step: float) -> Samples:

@@ -168,6 +168,7 @@ class Effect:
         affine: The force is affine in parameter 1.
         signal: For actuator and sensor effects, the operation on a channel.
         between_samples: That operation moves samples in time, and needs what the channel does between them.
+        held: The same on samples that are held until the next, the means over these; `signal` where None.
         logged: For actuator effects, what was logged is wrong rather than what follows a command: a measured load has it, too.
         exact: A free run with it is as exact as one of the nominal model: a number is wrong, and nothing is smoothed, switched or
             interpolated.
@@ -196,6 +197,7 @@ class Effect:
     modulated: bool = False
     affine: bool = False
     signal: Callable[[Values, Values, float], Values] | None = None
+    held: Callable[[Values, Values, float], Values] | None = None
     between_samples: bool = False
     logged: bool = False
     exact: bool = False
@@ -209,6 +211,11 @@ class Effect:
     in_place: bool = False
     of_record: Callable[[Values, str], Values] | None = None
     schedule: Callable[[Values, CaseRecord], Values] | None = None
+
+    def operation(self, interpolation: str) -> Callable[[Values, Values, float], Values] | None:
+        """What an actuator effect makes of loads that run so between samples, see `Case.load_interpolation`; None of other effects."""
+        held = self.held if interpolation == "zero_order_hold" else None
+        return held or self.signal
 
     @property
     def sticks(self) -> bool:

@@ -147,6 +147,17 @@ CHANNELS: tuple[Effect, ...] = (
         between_samples=True,
     ),
     Effect(
+        "force_delay",
+        "sensor",
+        "actuator",
+        (_time("delay", 0.001, 0.003, 0.01),),
+        "F(t + tau), the load logged late",
+        signal=signals.advance,
+        between_samples=True,
+        logged=True,
+        log_prior=EFFECT_SETTINGS.rare,
+    ),
+    Effect(
         "clock_skew",
         "actuator",
         "actuator",
@@ -175,6 +186,7 @@ CHANNELS: tuple[Effect, ...] = (
         (_time("time_constant", 0.003, 0.01, 0.03),),
         "tau F' + F = command",
         signal=signals.lag,
+        held=signals.held_lag,
     ),
     Effect(
         "force_gain_error",

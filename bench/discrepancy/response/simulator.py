@@ -245,12 +245,13 @@ class Simulator(MeasuredCase):
         acting = [
             Actuated(
                 self.structure.loads.index(placed.target),
-                placed.effect.signal,
+                operation,
                 placed.effect.values(eta, self.scales_of(placed)),
                 placed.effect.between_samples,
             )
             for placed, eta in zip(hypothesis, etas, strict=True)
-            if placed.effect.site == "actuator" and placed.effect.signal is not None
+            if placed.effect.site == "actuator"
+            and (operation := placed.effect.operation(self.case.load_interpolation)) is not None
         ]
         lead = self.lead_in(record)
         # a proposed test may bear the name of a record, but be no period of anything
