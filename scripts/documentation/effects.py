@@ -123,7 +123,7 @@ def _range(parameter: FreeParameter) -> str:
 def _table(parameters: tuple[FreeParameter, ...]) -> list[str]:
     rows = ["| parameter | in units of | expected there (one sigma) |", "|---|---|---|"]
     rows += [
-        f"| `{p.name}` | {'1' if p.scale == '1' and not p.unit else p.unit or p.scale} | {_range(p)} |"
+        f"| `{p.name}` | {p.scale if p.scale != '1' else p.unit or '1'} | {_range(p)} |"
         for p in parameters
     ]
     return rows
@@ -136,6 +136,7 @@ def draw(effect: Effect, path: Path) -> None:
     signal = (0.3 + 0.35 * time) * np.sin(2 * np.pi * (1.0 + 0.5 * time) * time)
     size = {
         "delay": 0.06,
+        "rate_error": 0.04,
         "lag": 0.08,
         "time_constant": 0.08,
         "level": 0.6,
