@@ -9,7 +9,14 @@ import pytest
 from planted_cases import SAMPLE_RATE, load, planted_case
 
 from bench.discrepancy import Case, CaseRecord, diagnose
+from bench.discrepancy.effects.catalogue import CATALOGUE
 from bench.discrepancy.effects.channel_operators import advance, held_lag, skew
+from bench.discrepancy.fitting.fits import Search
+from bench.discrepancy.fitting.map_fit import fit
+from bench.discrepancy.likelihood.problem import Problem
+from bench.discrepancy.model.placements import placements
+from bench.discrepancy.model.rigs import structure_of
+from bench.discrepancy.settings import DEFAULT
 
 
 def test_a_load_is_read_at_the_times_of_the_other_clock():
@@ -33,6 +40,28 @@ def test_a_lag_of_held_samples_is_the_mean_of_a_finer_one():
         means.append(np.mean(held + (y - held) * np.exp(-t / tau)))
         y = held + (y - held) * np.exp(-step / tau)
     assert held_lag(x, np.array([tau]), step) == pytest.approx(means, abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "told"),
+    [
+        ("clock_skew", 4e-5, True),  # over ten seconds a fifth of a sample of 2 ms
+        ("clock_skew", -4e-5, True),
+        ("clock_skew", 1e-5, False),
+        ("force_delay", 4e-4, True),
+        ("force_delay", 1e-4, False),
+    ],
+)
+def test_times_are_told_from_a_tenth_of_a_sample_on(name: str, value: float, told: bool):
+    case = planted_case(n=5000)
+    structure = structure_of(case, settings=DEFAULT)
+    problem = Problem(case, structure, case.identification, settings=DEFAULT)
+    (placed,) = placements(case, structure, [effect for effect in CATALOGUE if effect.name == name])
+    eta = placed.effect.parameters[0].eta(value, problem.scales_of(placed))
+    start = np.append(np.zeros(len(problem.nominal)), eta)
+    search = Search(problem)
+    search.add(fit(problem, (placed,), start=start, iterations=0))
+    assert bool(search.fits) == told
 
 
 def logged_otherwise(rate: float, late: float) -> Case:

@@ -170,6 +170,7 @@ class Effect:
         between_samples: That operation moves samples in time, and needs what the channel does between them.
         held: The same on samples that are held until the next, the means over these; `signal` where None.
         logged: For actuator effects, what was logged is wrong rather than what follows a command: a measured load has it, too.
+        tells: Parameter values and scales to whether they are more than the clocks of any log are uncertain by; of other effects None.
         exact: A free run with it is as exact as one of the nominal model: a number is wrong, and nothing is smoothed, switched or
             interpolated.
         quantity: For sensor effects the kind of channel ("position", "acceleration"); for inertia the parameter kind.
@@ -200,6 +201,7 @@ class Effect:
     held: Callable[[Values, Values, float], Values] | None = None
     between_samples: bool = False
     logged: bool = False
+    tells: Callable[[Values, Scales], bool] | None = None
     exact: bool = False
     quantity: str = ""
     pickup: bool = False

@@ -22,6 +22,9 @@ REVERSAL = FreeParameter("reversal", grid=(0.0,), fixed=True)
 class SensorActuatorSettings:
     """Numbers of `bench.discrepancy.effects.sensor_actuator`."""
 
+    jitter: float = 0.1
+    """Part of a sample by which logs are uncertain of their times: a tenth by convention; the channels of one logger are often read one
+    after the other within each sample."""
     reversed: float = -1.5
     """Log prior odds of a reversed channel; not so rare that a gain of minus one would be tried first."""
 
@@ -155,6 +158,7 @@ CHANNELS: tuple[Effect, ...] = (
         signal=signals.advance,
         between_samples=True,
         logged=True,
+        tells=lambda values, scales: values[0] >= SETTINGS.jitter * scales.step,
         log_prior=EFFECT_SETTINGS.rare,
     ),
     Effect(
@@ -177,6 +181,7 @@ CHANNELS: tuple[Effect, ...] = (
         signal=signals.skew,
         between_samples=True,
         logged=True,
+        tells=lambda values, scales: abs(values[0]) * scales.duration >= SETTINGS.jitter * scales.step,
         log_prior=EFFECT_SETTINGS.rare,
     ),
     Effect(

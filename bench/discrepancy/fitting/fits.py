@@ -51,7 +51,9 @@ class Search:
         return True
 
     def add(self, fitted: Fit) -> None:
-        """Keep a fit if it is the best of its hypothesis."""
+        """Keep a fit if it is the best of its hypothesis, unless times move in it by less than those of any log are uncertain by."""
+        if not _tells(self.problem, fitted):
+            return
         key = key_of(fitted.hypothesis)
         if key not in self.fits or fitted.cost < self.fits[key].cost:
             self.fits[key] = fitted
@@ -74,6 +76,18 @@ class Search:
         """Fits by decreasing posterior, of one number of effects or of all."""
         chosen = [f for f in self.fits.values() if size is None or len(f.hypothesis) == size]
         return sorted(chosen, key=lambda f: -posterior(f))
+
+
+def _tells(problem: Problem, fitted: Fit) -> bool:
+    """Whether every effect of times is more than the clocks of any log are uncertain by."""
+    _, etas = problem.split(fitted.hypothesis, fitted.vector)
+    return all(
+        placed.effect.tells is None
+        or placed.effect.tells(
+            placed.effect.values(eta, problem.scales_of(placed)), problem.scales_of(placed)
+        )
+        for placed, eta in zip(fitted.hypothesis, etas, strict=True)
+    )
 
 
 def carry_on(search: Search, size: int, *, most: int) -> None:

@@ -45,14 +45,8 @@ def _targets(case: Case, effect: Effect, structure: Structure, place: Place) -> 
         return [name for name in names if name in structure.parameters]
     dofs = np.abs(place.rows).sum(axis=0) > 0
     if effect.site == "actuator":
-        commanded = [
-            name for name in structure.loads if effect.logged or case.channel(name).role == "command"
-        ]
-        return [
-            name
-            for name in commanded
-            if np.abs(structure.inputs[dofs, structure.loads.index(name)]).sum() > 0
-        ]
+        loads = [name for name in structure.loads if effect.logged or case.channel(name).role == "command"]
+        return [n for n in loads if np.abs(structure.inputs[dofs, structure.loads.index(n)]).sum() > 0]
     if effect.site == "sensor":
         order = {"position": 0, "velocity": 1, "acceleration": 2}[effect.quantity]
         channels = [
