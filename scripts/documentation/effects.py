@@ -123,8 +123,7 @@ def _range(parameter: FreeParameter) -> str:
 def _table(parameters: tuple[FreeParameter, ...]) -> list[str]:
     rows = ["| parameter | in units of | expected there (one sigma) |", "|---|---|---|"]
     rows += [
-        f"| `{p.name}` | {p.scale if p.scale != '1' else p.unit or '1'} | {_range(p)} |"
-        for p in parameters
+        f"| `{p.name}` | {p.scale if p.scale != '1' else p.unit or '1'} | {_range(p)} |" for p in parameters
     ]
     return rows
 
