@@ -15,7 +15,7 @@ from bench.discrepancy.application.verification import replay_of
 from bench.discrepancy.articulated.admission import admitted_robot
 from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis
 from bench.discrepancy.articulated.free_runs import FreeRuns
-from bench.discrepancy.articulated.judgement import JudgementSettings
+from bench.discrepancy.articulated.judgement import JudgementSettings, PredictedErrors, closed_of_nominal
 from bench.discrepancy.articulated.naming import ranking_of
 from bench.discrepancy.articulated.next_test import propose
 from bench.discrepancy.articulated.recognition import applies
@@ -424,3 +424,19 @@ def test_a_free_run_behind_a_late_encoder_starts_on_the_clock_of_its_log(tmp_pat
     for j in range(2):
         left = np.sqrt(np.mean(runs.errors(j, (placed,), vector, motion) ** 2))
         assert left < 1.6 * runs.noise(j, (placed,), vector, 0)
+
+
+def test_a_name_has_to_beat_the_nominal_model_as_it_was_stated_too():
+    rng, floor = np.random.default_rng(0), np.array([0.01])
+
+    def predicted(nrmse: float) -> PredictedErrors:
+        return PredictedErrors(np.full((6, 1), nrmse**2), floor)
+
+    # of squares beyond the noise, of the better of the two
+    assert closed_of_nominal(predicted(0.5), predicted(0.9), predicted(0.3), rng) == pytest.approx(
+        1.0 - (0.09 - 1e-4) / (0.25 - 1e-4)
+    )
+    assert closed_of_nominal(predicted(0.9), predicted(0.5), predicted(0.3), rng) == pytest.approx(
+        1.0 - (0.09 - 1e-4) / (0.25 - 1e-4)
+    )
+    assert closed_of_nominal(predicted(0.15), predicted(0.9), predicted(0.35), rng) < 0.0

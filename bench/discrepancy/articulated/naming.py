@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bench.discrepancy.articulated.judgement import PredictedErrors, closed
+from bench.discrepancy.articulated.judgement import PredictedErrors, closed, closed_of_nominal
 from bench.discrepancy.articulated.places import gaps_of, locations_of, remainder_of
 from bench.discrepancy.articulated.whiteness import Coloured
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
@@ -51,7 +51,7 @@ def verdict_of(
     # power above the noise at some frequencies shows that what is named is not all; where nothing is named it is no evidence that
     # something is missing, which takes an effect that predicts the judging records better
     whole = stated and (left is None or not last) and complete(problem, final, settings)
-    explained, _ = closed(predictions[0], predictions[last], predictions[0], rng)
+    explained = closed_of_nominal(untouched, predictions[0], predictions[last], rng)
     kind: VerdictKind = "effect" if last else "none"
     if not whole and (not last or explained < settings.material):
         kind = "unknown"
