@@ -103,7 +103,7 @@ def diagnose_articulated(
     stated = all((c.noise_std or 0.0) > 0.0 for c in case.channels if c.role == "response")
     told, compiled, notes = admitted_robot(case, anyway=anyway, settings=settings)
     model = ArticulatedModel.of(compiled, case.rig)
-    case = with_beginnings(thinned(told, settings=settings), settings=settings)
+    case = with_beginnings(whole := thinned(told, settings=settings), settings=settings)
     problem = ArticulatedProblem.of(case, model, case.identification, settings, deadline)
     judging = ArticulatedProblem.of(case, model, case.validation, settings)
     problem, fits = search(problem, placements(problem, catalogue), settings=how, progress=progress)
@@ -124,7 +124,7 @@ def diagnose_articulated(
             *far_off(verdict.nominal, settings.judgement.far),
             *verdict.warnings,
             *notes,
-            *_of_long_records(told, problem, final, predictions[0].floor),
+            *_of_long_records(told, whole, problem, final, predictions[0].floor),
             *_followed(problem),
             *deadline.untried,
         ),
@@ -143,17 +143,13 @@ def diagnose_articulated(
 
 
 def _of_long_records(
-    told: Case, problem: ArticulatedProblem, final: ArticulatedFit, floor: Array
+    told: Case, whole: Case, problem: ArticulatedProblem, final: ArticulatedFit, floor: Array
 ) -> tuple[str, ...]:
-    """What is said of records of which only the beginning was fitted: how the explanation does over what follows."""
+    """What is said of records that were thinned or cut, and how the explanation does over what follows the cut."""
     case, settings = problem.case, problem.settings
     found = long_record_notes(told, case, settings=settings)
-    whole = thinned(told, settings=settings).identification if found else ()
-    rests = [
-        rest
-        for record, fitted in zip(whole, case.identification, strict=bool(whole))
-        if (rest := after(record, fitted)) is not None
-    ]
+    pairs = zip(whole.identification, case.identification, strict=True)
+    rests = [rest for record, fitted in pairs if (rest := after(record, fitted)) is not None]
     if not rests:
         return found
     later = ArticulatedProblem.of(case, problem.model, rests, settings).softened(problem.softness)
