@@ -14,7 +14,7 @@ from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.next_test.belief import Belief
 from bench.discrepancy.next_test.discriminating_excitation import propose, separate, told_apart
 from bench.discrepancy.next_test.distinguishability import why_none
-from bench.discrepancy.next_test.feasible_excitations import limits_of
+from bench.discrepancy.next_test.feasible_excitations import limits_of, shapes
 from bench.discrepancy.next_test.outlook import outlook
 from bench.discrepancy.report.model_update import element_code, element_toml
 from bench.discrepancy.search.explanation import Explanation
@@ -155,3 +155,13 @@ def test_a_found_effect_is_valid_code_and_configuration():
     exec(element_code("gap", theta, ("carriage",)).replace("rig = rig.with_element(element)", ""), scope)
     assert isinstance(scope["element"], Element)
     np.testing.assert_allclose(scope["element"].theta, theta)
+
+
+@pytest.mark.parametrize("periods", [2.0, 2.7, 4.0, 30.0])
+def test_every_shape_fits_into_a_record_of_a_few_periods(periods):
+    """What lasts too long for the record of a user would end the diagnosis and lose its verdict."""
+    rate, samples = 500.0, 300
+    for label, signal in shapes(periods * rate / samples, samples / rate):
+        x = signal.sample(samples, rate, np.random.default_rng(1))
+        assert np.isfinite(x).all(), label
+        assert np.ptp(x) > 0.0, label

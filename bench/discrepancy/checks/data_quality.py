@@ -27,10 +27,15 @@ def refuse_unusable(problem: Problem) -> None:
         problem: Records and nominal model on all degrees of freedom.
 
     Raises:
-        RecordingError: Nothing moves the rig, nothing is measured, or two channels are one and the same.
+        RecordingError: A record is too short, nothing moves the rig, nothing is measured, or two channels are one and the same.
         IdentificationError: The nominal model diverges.
     """
-    records = problem.records
+    records, least = problem.records, problem.settings.checks.shortest
+    for record in (*problem.case.identification, *problem.case.validation):
+        if len(record) < least:
+            raise RecordingError(
+                f"record '{record.name}' has {len(record)} samples; at least {least} are needed: give a longer record"
+            )
     for record in records:
         names = list(record.values)
         for i, first in enumerate(names):

@@ -77,7 +77,8 @@ def resonance(simulator: Simulator, load: int) -> float:
     duration = max(len(r) for r in simulator.records) * step
     if simulator.driven:
         motion = simulator.motion(0)
-        return float(np.std(motion.velocity) / np.std(motion.position) / (2.0 * np.pi))
+        rate = float(np.std(motion.velocity) / np.std(motion.position) / (2.0 * np.pi))
+        return float(np.clip(rate, 2.0 / duration, 0.1 / step))
     frequency = np.geomspace(2.0 / duration, 0.1 / step, 400)
     rows = np.vstack([p.rows for p in simulator.structure.places])
     linear = simulator.structure.at(simulator.nominal)
@@ -103,7 +104,7 @@ def shapes(centre: float, duration: float) -> list[tuple[str, Signal]]:
     """Signals around a resonance [Hz], with what they are in words."""
     slow, pulse = 0.2 * centre, 0.5 / centre
     return [
-        (f"slow sine at {slow:.3g} Hz", Tapered(Harmonic(slow), fade_in=0.5 / slow)),
+        (f"slow sine at {slow:.3g} Hz", Tapered(Harmonic(slow), fade_in=min(0.5 / slow, 0.9 * duration))),
         (
             f"sine at the resonance, {centre:.3g} Hz, growing from zero",
             Tapered(Harmonic(centre), fade_in=0.9 * duration),

@@ -142,6 +142,12 @@ class LongRecordSettings:
 class ChecksSettings:
     """What a record and its model are checked for before the diagnosis."""
 
+    shortest: int = setting(
+        200,
+        "Shortest record of a structure.",
+        "Of a hundred, effects were named with which the judging record was worse: too few ordinates tell a law from its neighbours.",
+        unit="samples",
+    )
     shape: float = setting(
         0.9,
         "Correlation from which two signals count as the same but for a factor.",
