@@ -180,7 +180,7 @@ def test_a_budget_ends_the_search_with_the_best_so_far_and_says_what_was_left_ou
     verdict = diagnose(read_case(folder), budget=1e-6).verdict
     assert verdict.verdict == "unknown"
     (note,) = (text for text in verdict.warnings if "no time for" in text)
-    assert "a search for effect 1" in note
+    assert "a search for effects (round 1)" in note
 
 
 BESIDE = '<body name="more">{joint}<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body></worldbody>'
@@ -356,7 +356,7 @@ def test_what_a_later_effect_makes_superfluous_is_dropped_and_refits_gain(tmp_pa
     assert np.sum(again.chi2) <= np.sum(once.chi2)
     # what it is known to, and so its evidence, is that of the noise and no more that of where it started
     assert np.trace(again.covariance) < 0.5 * np.trace(once.covariance)
-    assert again.scale.max() < 1.1
+    assert again.scale.max() < 2.0
     kept, tried = without_idle(problem, again, problem.settings.articulated.search)
     assert [placed.key for placed in kept.hypothesis] == [friction.key]
     assert tried

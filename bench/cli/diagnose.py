@@ -56,7 +56,7 @@ class Diagnose:
     exclude: tuple[str, ...] = ()
     """Effects to leave out of the catalogue."""
     most: int = 3
-    """Largest number of effects named together."""
+    """Largest number of effects named together; of a robot, at one joint."""
     anyway: bool = False
     """Go on where a unit, a sign or a part of the model stands against the diagnosis; what it was becomes a note."""
     budget: float = float("inf")

@@ -93,7 +93,7 @@ def diagnose(
         case: Nominal model and records.
         catalogue: Effects to consider.
         exclude: Names of effects to leave out of the catalogue.
-        most: Largest number of effects named together.
+        most: Largest number of effects named together; of an articulated model, at one joint.
         anyway: Whether factors, signs and parts of the model that stand against a diagnosis are noted rather than refused.
         rng: For the bootstrap intervals; a fixed seed where None.
         progress: Called with a line of text at every stage.
@@ -165,8 +165,9 @@ def _by_drives(
     except BenchError:  # admitted as a linear structure, with parts that the equations of drives leave out
         return None
     left, theirs = found.verdict.gap, other.verdict.gap
-    # free runs of one kind in both: parts of what each began with are compared
-    nearer = theirs.after * left.before < how.settings.judgement.coarse.most * left.after * theirs.before
+    # free runs of one kind in both: parts of what each began with are compared; a name is left for one that is nearer by far
+    least = how.settings.judgement.coarse.most if found.verdict.named else 1.0
+    nearer = theirs.after * left.before < least * left.after * theirs.before
     return other if other.verdict.verdict == "effect" and (other.verdict.complete or nearer) else None
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from bench.arrays import Array
 from bench.discrepancy.articulated.admission import admitted_robot
-from bench.discrepancy.articulated.judgement import kept, ladder, predict, without_each
+from bench.discrepancy.articulated.judgement import kept, predict, without_each
 from bench.discrepancy.articulated.naming import closest_rival, verdict_of
 from bench.discrepancy.articulated.next_test import Trajectory, propose
 from bench.discrepancy.articulated.places import matrix_of
@@ -76,7 +76,7 @@ def diagnose_articulated(
     Args:
         case: Nominal model and records.
         exclude: Names of effects to leave out of the catalogue.
-        most: Largest number of effects named together.
+        most: Largest number of effects named together at one joint.
         anyway: Whether factors, signs and parts of the model that stand against a diagnosis are noted rather than refused.
         rng: For the bootstrap intervals; a fixed seed where None.
         deadline: When nothing further is screened or fitted and fits end where they are; the warnings of the verdict say what was left out.
@@ -109,8 +109,8 @@ def diagnose_articulated(
     problem, fits = search(problem, placements(problem, catalogue), settings=how, progress=progress)
     judging = judging.softened(problem.softness)
     progress("judging records")
-    rungs = ladder(fits)
-    last, predictions = kept(judging, rungs, judged)
+    rungs, last, predictions, more = kept(problem, judging, fits, judged)
+    fits += more
     untouched = predict(judging, None, predictions[0].floor, judged)
     final = rungs[last]
     left = coloured(judging, final, judged)

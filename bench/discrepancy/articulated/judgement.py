@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from bench.discrepancy.articulated.free_runs import FreeRuns
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.hypothesis import PlacedOnJoint
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
-from bench.discrepancy.articulated_search.search import complete
+from bench.discrepancy.articulated_search.search import complete, predecessors, shortened
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.settings import ArticulatedJudgementSettings as JudgementSettings
 
@@ -43,6 +44,10 @@ class PredictedErrors:
     def excess(self) -> Array:
         """Excess over the noise, block by block (n_blocks,), summed over the joints."""
         return np.asarray((self.power - self.floor**2).sum(axis=1))
+
+    def of(self, joints: slice) -> PredictedErrors:
+        """Those of some joints."""
+        return PredictedErrors(self.power[:, joints], self.floor[joints])
 
 
 def believed(problem: ArticulatedProblem, found: ArticulatedFit, settings: JudgementSettings) -> Array:
@@ -103,33 +108,94 @@ def ladder(fits: Sequence[ArticulatedFit]) -> list[ArticulatedFit]:
     return out
 
 
-def kept(
-    problem: ArticulatedProblem, rungs: Sequence[ArticulatedFit], settings: JudgementSettings
-) -> tuple[int, list[PredictedErrors]]:
-    """How many effects of a ladder the judging records bear out, and the predictions of every rung.
+class Kept(NamedTuple):
+    """What the judging records bear out of a ladder.
 
-    Effects are kept up to the last that improves on what was kept before it by more than the standard error allows for, and that takes
-    away more than it leaves; one at a joint or its drive has to improve on that joint, or it stands in for something else. What is
-    complete gets no more but what is certain, and nothing small is added where even then something is left: it stands in for a little
-    of the form of the law that is not right.
+    Attributes:
+        rungs: The ladder.
+        last: How many of its effects are kept.
+        predictions: Of every rung.
+        fits: Further fits that were made.
     """
-    floor = noise_floor(problem, rungs[-1], settings)
-    predictions = [predict(problem, rung, floor, settings) for rung in rungs]
-    last = 0
+
+    rungs: list[ArticulatedFit]
+    last: int
+    predictions: list[PredictedErrors]
+    fits: list[ArticulatedFit]
+
+
+def kept(
+    problem: ArticulatedProblem,
+    judging: ArticulatedProblem,
+    fits: Sequence[ArticulatedFit],
+    settings: JudgementSettings,
+) -> Kept:
+    """What the judging records bear out of the best of some fits.
+
+    Effects are kept up to the last that improves on what was kept before it. One before it that did not improve when it was added is
+    kept if the explanation is worse without it.
+
+    Args:
+        problem: Records for identification.
+        judging: Records for judging.
+        fits: All fitted hypotheses, the best first.
+        settings: Thresholds.
+    """
+    found, rungs = list(fits), ladder(fits)
+    floor = noise_floor(judging, rungs[-1], settings)
+    while True:
+        predictions = [predict(judging, rung, floor, settings) for rung in rungs]
+        last, doubtful = _climbed(judging, rungs, predictions, settings)
+        for placed in doubtful:
+            shorter = shortened(problem, rungs[last], (placed,))
+            found.append(shorter)
+            without = predict(judging, shorter, floor, settings).of(_at(placed))
+            if not better(without, predictions[last].of(_at(placed)), settings):
+                break
+        else:
+            return Kept(rungs, last, predictions, found[len(fits) :])
+        # what was added after it is asked again without it, since the one may have spoilt the other
+        best = shortened(problem, rungs[-1], (placed,))
+        found += [best, *predecessors(problem, best, found)]
+        rungs = ladder([best, *found])
+
+
+def _at(placed: PlacedOnJoint) -> slice:
+    """The joint at which an effect sits, or whose drive; all where it reaches them all."""
+    local = placed.effect.site in ("joint", "actuator")
+    return slice(placed.joint, placed.joint + 1) if local else slice(None)
+
+
+def _climbed(
+    problem: ArticulatedProblem,
+    rungs: Sequence[ArticulatedFit],
+    predictions: Sequence[PredictedErrors],
+    settings: JudgementSettings,
+) -> tuple[int, list[PlacedOnJoint]]:
+    """How many effects of a ladder the judging records bear out, and which of them did not improve when they were added.
+
+    An effect improves if it takes off more than the standard error allows for, and more than it leaves; one at a joint or its drive is
+    asked about that joint, or it stands in for something else. What is complete gets no more but what is certain, and nothing small is
+    added where even then something is left: it stands in for a little of the form of the law that is not right.
+    """
+    last, waiting, doubtful = 0, list[PlacedOnJoint](), list[PlacedOnJoint]()
     for k in range(1, len(rungs)):
         # of what is complete to the accuracy of the stated noise, records may still tell more than that accuracy
         likelier = rungs[k].log_posterior - rungs[last].log_posterior
         if complete(problem, rungs[last], settings) and likelier < settings.certain:
             break
-        gained = float(np.mean(predictions[last].excess - predictions[k].excess))
-        left = float(np.mean(predictions[k].excess))
+        placed = rungs[k].hypothesis[-1]
+        first, before, after = (
+            p.of(_at(placed)) for p in (predictions[0], predictions[last], predictions[k])
+        )
+        gained, left = float(np.mean(before.excess - after.excess)), float(np.mean(after.excess))
         small = 0.0 if not last or complete(problem, rungs[k], settings) else settings.small
-        least = small * float(np.mean(predictions[0].excess))
-        own = _own(rungs[k].hypothesis[-1], predictions[last], predictions[k])
-        improved = own > 0.0 and better(predictions[last], predictions[k], settings)
-        if gained > max(left if last else 0.0, least) and improved:
-            last = k
-    return last, predictions
+        least = max(left if last else 0.0, small * float(np.mean(first.excess)))
+        if gained > least and better(before, after, settings):
+            last, doubtful, waiting = k, [*doubtful, *waiting], []
+        else:
+            waiting.append(placed)
+    return last, doubtful
 
 
 def better(before: PredictedErrors, after: PredictedErrors, settings: JudgementSettings) -> bool:
@@ -147,12 +213,6 @@ def better(before: PredictedErrors, after: PredictedErrors, settings: JudgementS
 
 def _sure(gains: Array, settings: JudgementSettings) -> bool:
     return float(np.mean(gains)) > settings.sure * float(np.std(gains, ddof=1)) / np.sqrt(len(gains))
-
-
-def _own(placed: PlacedOnJoint, before: PredictedErrors, after: PredictedErrors) -> float:
-    """What the joint of an effect gains by it; all joints together where it reaches them all."""
-    gained = (before.power - after.power).mean(axis=0)
-    return float(gained[placed.joint] if placed.effect.site in ("joint", "actuator") else gained.sum())
 
 
 def without_each(

@@ -61,7 +61,7 @@ def _closed_of_nrmse(
 
 def locations_of(problem: ArticulatedProblem, base: ArticulatedFit) -> tuple[Location, ...]:
     """Joints by their share of what the nominal model leaves beyond the noise, its parameters re-estimated."""
-    excess = np.maximum(base.chi2 - base.count, 0.0)
+    excess = np.maximum((base.chi2 - base.octaves.count).sum(axis=1), 0.0)
     total = float(excess.sum())
     out = []
     for j in np.argsort(-excess):
@@ -139,8 +139,8 @@ def matrix_of(problem: ArticulatedProblem, fits: Sequence[ArticulatedFit]) -> di
     for f in fits:
         if len(f.hypothesis) == 1:
             placed = f.hypothesis[0]
-            before = float(np.maximum(base.chi2 - base.count, 1e-9)[placed.joint])
-            after = float((f.chi2 - f.count)[placed.joint])
+            before = max(float((base.chi2 - base.octaves.count)[placed.joint].sum()), 1e-9)
+            after = float((f.chi2 - f.octaves.count)[placed.joint].sum())
             share = float(np.clip(1.0 - after / before, 0.0, 1.0))
             mine = out[problem.joints[placed.joint].name]
             mine[placed.effect.name] = max(share, mine.get(placed.effect.name, 0.0))

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from bench.arrays import Array
 from bench.discrepancy.articulated_search.hypothesis import JointHypothesis
-from bench.discrepancy.articulated_search.misfit import misfit_of
+from bench.discrepancy.articulated_search.misfit import Octaves
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.numerics.least_squares import Prior, minimise
 from bench.discrepancy.numerics.threads import in_threads
@@ -31,9 +31,9 @@ class ArticulatedFit:
     Attributes:
         hypothesis: Its effects.
         vector: Estimates.
-        covariance: Of the vector; the residuals' scale is that which they leave, at least one.
-        chi2: (n_joints,) sums of squared whitened innovations.
-        count: (n_joints,) their numbers.
+        covariance: Of the vector; the residuals' scales are those which they leave, at least one.
+        chi2: (n_joints, n_octaves) sums of squared whitened innovations.
+        octaves: In which they are weighed.
         log_posterior: Laplace approximation of the log posterior of the hypothesis, up to a constant.
     """
 
@@ -41,7 +41,7 @@ class ArticulatedFit:
     vector: Array
     covariance: Array
     chi2: Array
-    count: Array
+    octaves: Octaves
     log_posterior: float
 
     @classmethod
@@ -49,19 +49,19 @@ class ArticulatedFit:
         """A hypothesis as it stands at a vector (whose further entries are left out), not fitted and without a posterior."""
         size = problem.size(hypothesis)
         residuals = [problem.residual(j, hypothesis, vector[:size]) for j in range(len(problem.joints))]
-        chi2 = np.array([float(r @ r) for r in residuals])
+        chi2 = np.array([problem.octaves.power(j, r) for j, r in enumerate(residuals)])
         _, std, _, _ = problem.prior(hypothesis)
-        return cls(hypothesis, vector[:size], np.diag(std**2), chi2, problem.count, -np.inf)
+        return cls(hypothesis, vector[:size], np.diag(std**2), chi2, problem.octaves, -np.inf)
 
     @property
     def reduced(self) -> Array:
-        """Mean squared whitened innovation of every joint; one where nothing is missing."""
-        return self.chi2 / self.count
+        """Mean squared whitened innovation (n_joints,) of every joint; one where nothing is missing."""
+        return np.asarray(self.chi2.sum(axis=1) / self.octaves.count.sum(axis=1))
 
     @property
     def scale(self) -> Array:
-        """Scale (n_joints,) of the residuals, at least one."""
-        return np.sqrt(np.maximum(self.reduced, 1.0))
+        """Scale (n_joints, n_octaves) of the residuals, at least one."""
+        return self.octaves.scale(self.chi2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,10 +143,11 @@ class _Runs:
 def linearised(
     problem: ArticulatedProblem, base: ArticulatedFit, j: int, columns: Sequence[int]
 ) -> tuple[Array, Array]:
-    """Jacobian (n, n_columns) and residual (n,) of joint `j` at a fit, in units of the scale that it leaves there."""
+    """Jacobian (n, n_columns) and residual (n,) of joint `j` at a fit, in units of the scales that it leaves there."""
     settings = problem.settings.articulated
+    scale = base.scale[j][problem.octaves.index[j]]
     _, std, _, high = problem.prior(base.hypothesis)
-    residual = problem.residual(j, base.hypothesis, base.vector) / base.scale[j]
+    residual = problem.residual(j, base.hypothesis, base.vector) / scale
     felt = set(problem.entries(j, base.hypothesis).tolist())
 
     def column(i: int) -> Array:
@@ -159,7 +160,7 @@ def linearised(
         )
         moved = base.vector.copy()
         moved[i] += step
-        return (problem.residual(j, base.hypothesis, moved) / base.scale[j] - residual) / step
+        return (problem.residual(j, base.hypothesis, moved) / scale - residual) / step
 
     return np.column_stack([column(i) for i in columns]) if len(columns) else np.zeros(
         (len(residual), 0)
@@ -182,7 +183,7 @@ def fit(
         problem: Records and priors.
         hypothesis: Effects.
         start: Vector to start from, or several (k, n).
-        scale: (n_joints,) of the residuals.
+        scale: (n_joints, n_octaves) of the residuals.
         iterations: Most steps.
         others: What is known of the joints that the hypothesis does not change beyond its base's; they are all run where None.
         limit: Cost that has to be within sight.
@@ -196,9 +197,10 @@ def fit(
     masses = list(problem.masses)
 
     runs = _Runs(problem, hypothesis)
+    units = [scale[j][problem.octaves.index[j]] for j in range(n_joints)]
 
     def residual_at(vector: Array) -> Array:
-        parts = in_threads(lambda j: runs.residual(j, vector) / scale[j], active)
+        parts = in_threads(lambda j: runs.residual(j, vector) / units[j], active)
         for j in passive:
             assert others is not None
             parts.append(others.factors[j] @ vector[masses] - others.targets[j])
@@ -231,7 +233,7 @@ def refitted(
         problem: Records and priors.
         hypothesis: Effects.
         start: Vector to start from, or several (k, n).
-        scale: (n_joints,) of the residuals at the start.
+        scale: (n_joints, n_octaves) of the residuals at the start.
         others: As of `fit`.
 
     References:
@@ -275,20 +277,20 @@ def _summary(
     active: Sequence[int],
     others: Others | None,
 ) -> ArticulatedFit:
-    n_joints = len(problem.joints)
-    chi2, count = np.zeros(n_joints), problem.count
-    for j in range(n_joints):
+    octaves = problem.octaves
+    chi2 = np.zeros_like(octaves.count)
+    for j in range(len(problem.joints)):
         if j in active or others is None:
-            residual = problem.residual(j, hypothesis, vector)
-            chi2[j] = float(residual @ residual)
+            chi2[j] = octaves.power(j, problem.residual(j, hypothesis, vector))
         else:
             # what the other joints lose by masses that suit this one
             masses = list(problem.masses)
             base = others.base
             now = others.factors[j] @ vector[masses] - others.targets[j]
             then = others.factors[j] @ base.vector[masses] - others.targets[j]
-            chi2[j] = base.chi2[j] + base.scale[j] ** 2 * float(now @ now - then @ then)
-    total = sum(misfit_of(c, n) for c, n in zip(chi2, count, strict=True))
+            whole = float(np.sum(base.chi2[j] / base.scale[j] ** 2))
+            chi2[j] = base.chi2[j] * max(1.0 + float(now @ now - then @ then) / whole, 0.0)
+    total = sum(octaves.misfit(j, chi2[j]) for j in range(len(chi2)))
     mean, std, _, _ = problem.prior(hypothesis)
     covariance = np.zeros((len(vector), len(vector)))
     inverse = np.linalg.pinv(curvature)
@@ -300,7 +302,7 @@ def _summary(
     if others is not None and len(free) < len(every):
         occam += _occam_of_rest(others, set(free.tolist()), std)
     log_posterior = -0.5 * total - 0.5 * float(deviation @ deviation) + occam
-    return ArticulatedFit(hypothesis, vector, covariance, chi2, count, log_posterior)
+    return ArticulatedFit(hypothesis, vector, covariance, chi2, octaves, log_posterior)
 
 
 def _occam_of_rest(others: Others, moved: set[int], std: Array) -> float:

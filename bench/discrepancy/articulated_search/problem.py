@@ -3,9 +3,8 @@
 The vector of a hypothesis holds the deviations of the nominal parameters in units of their standard uncertainty, then the parameters of its
 effects. Only masses are shared by the joints; whatever sits at one joint or drive changes that joint's runs alone.
 
-What a wrong model leaves is larger than the noise, and differs from joint to joint. Its scale is a parameter too, with the stated
-noise as its lower bound: minus twice the profiled log-likelihood of a joint with n residuals of mean square r is ``n`` times
-``r`` for r <= 1 and ``1 + ln r`` beyond (`bench.discrepancy.articulated_search.misfit`).
+What a wrong model leaves is larger than the noise, differs from joint to joint, and lies where the robot moves, at low frequencies. Its
+scale in every octave is a parameter too, with the stated noise as its lower bound (`bench.discrepancy.articulated_search.misfit`).
 """
 
 from __future__ import annotations
@@ -29,6 +28,7 @@ from bench.discrepancy.articulated_search.hypothesis import (
     nominal_parameters,
     placed_values,
 )
+from bench.discrepancy.articulated_search.misfit import Octaves, transformed
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.multibody.encoders import Encoder
 from bench.discrepancy.multibody.joint_run import Slot, predict
@@ -171,7 +171,9 @@ class ArticulatedProblem:
                     if drive is None or drive.servo
                     else level * float(np.std(record.command)) * abs(drive.gear * drive.kp)
                 )
-                joints.append(replace(record, process=torque) if torque > record.process else record)
+                joints.append(
+                    replace(record, process=torque, filter=None) if torque > record.process else record
+                )
             records.append(replace(prepared, joints=tuple(joints)))
         return ArticulatedProblem(
             self.case, self.model, tuple(records), self.settings, self.deadline, max(level, self.softness)
@@ -268,16 +270,13 @@ class ArticulatedProblem:
         return out
 
     def residual(self, j: int, hypothesis: JointHypothesis, vector: Array) -> Array:
-        """Those of all records in one (n,); their sum of squares is about `count` where nothing is missing."""
-        return np.concatenate([r.ravel() for r in self.residuals(j, hypothesis, vector)])
+        """Their cosine transforms, all records in one (n,); the squares of an octave sum to about its count where nothing is missing."""
+        return transformed(self.residuals(j, hypothesis, vector))
 
     @cached_property
-    def count(self) -> Array:
-        """Number (n_joints,) of independent residuals of every joint: of readings that stay the same in a row, about one."""
-        records = self.records
-        return np.array(
-            [sum(float(np.sum(r.joints[j].weight ** 2)) for r in records) for j in range(len(self.joints))]
-        )
+    def octaves(self) -> Octaves:
+        """The octaves of the residuals, in which what is left is weighed."""
+        return Octaves.of(self.records, self.settings)
 
     def prior(self, hypothesis: JointHypothesis) -> tuple[Array, Array, Array, Array]:
         """Mean, standard deviation, lower and upper bound of a vector."""

@@ -29,6 +29,10 @@ class Corrected(NamedTuple):
     best: ArticulatedFit
 
 
+Grounds = list[tuple[ArticulatedProblem, ArticulatedFit]]
+"""Problems where runs forget, and a fit in each."""
+
+
 class Round(NamedTuple):
     """One effect more: the best, all joints free, all that were fitted as they are, and what was found where runs forget."""
 
@@ -37,19 +41,41 @@ class Round(NamedTuple):
     corrected: Corrected | None
 
 
-def round_of(
+def grounds_of(problem: ArticulatedProblem, base: ArticulatedFit, settings: SearchSettings) -> Grounds:
+    """Where runs forget, and a fit there, level by level; where servos hold every joint, nothing forgets more than it does anyway."""
+    out, ground = [], base
+    for level in settings.softening:
+        soft = problem.softened(level)
+        if out and soft is problem:
+            break
+        ground = refitted(soft, base.hypothesis, ground.vector, scale=scale_of(soft, ground))
+        out.append((soft, ground))
+    return out
+
+
+def best_of(
     problem: ArticulatedProblem,
     base: ArticulatedFit,
+    grounds: Grounds,
     candidates: Sequence[PlacedOnJoint],
     settings: SearchSettings,
     progress: Callable[[str], None],
+    gained: float = 0.0,
 ) -> Round:
-    """One effect more: screened and fitted where runs forget, the best of them fitted again as they are."""
+    """One effect more: screened and fitted where runs forget (`grounds_of`), the best of them fitted again as they are.
+
+    Args:
+        problem: Records and priors.
+        base: What it is added to.
+        grounds: Of the base.
+        candidates: Effects.
+        settings: Of the search.
+        progress: Called with a line of text at every stage.
+        gained: Twice the log posterior that others have gained already, to which what an effect promises is compared.
+    """
     first: list[ArticulatedFit] = []
-    ground, corrected = base, None
-    for level in settings.softening:
-        soft = problem.softened(level)
-        ground = refitted(soft, base.hypothesis, ground.vector, scale=_scale_of(soft, ground))
+    corrected = None
+    for soft, ground in grounds:
         if first:
             if problem.deadline.over:
                 break
@@ -60,14 +86,12 @@ def round_of(
             continue
         progress("screening")
         points = screen(soft, ground, candidates)
-        if _strained(
+        if strained(
             soft, ground, settings
         ):  # what stands in for the missing hides it; also from what was stated
             points += screen(soft, _untouched(soft, ground), candidates)
         progress("fits")
-        first = _fits(soft, ground, by_effect(points, settings.starts), settings)
-        if soft is problem:  # servos hold every joint: nothing forgets more than it does anyway
-            break
+        first = _fits(soft, ground, by_effect(points, settings.starts), settings, gained)
     others = Others.of(problem, base)
     first = [f for f in first if sound(problem, f)] or first
     finalists = sorted(first, key=lambda f: -f.log_posterior)[: settings.finalists]
@@ -94,11 +118,13 @@ def parted(
     """
     if problem.softness or not any(placed.effect.play for placed in corrected.best.hypothesis):
         return False
-    heard = log_likelihood(corrected.problem, corrected.best.chi2)
-    return heard > max((log_likelihood(problem, f.chi2) for f in fits), default=-np.inf) + settings.worth
+    soft = corrected.problem
+    heard = log_likelihood(soft.records, soft.octaves, corrected.best.chi2)
+    told = (log_likelihood(problem.records, problem.octaves, f.chi2) for f in fits)
+    return heard > max(told, default=-np.inf) + settings.worth
 
 
-def _strained(problem: ArticulatedProblem, base: ArticulatedFit, settings: SearchSettings) -> set[int]:
+def strained(problem: ArticulatedProblem, base: ArticulatedFit, settings: SearchSettings) -> set[int]:
     """Joints one of whose nominal parameters a fit has moved too far."""
     return {p.joint for p, x in zip(problem.nominal, base.vector, strict=False) if abs(x) > settings.strained}
 
@@ -149,7 +175,7 @@ def _again(
     for j in (j for j in range(len(problem.joints)) if j not in active):
         own = own_entries(problem, base.hypothesis, j)
         vector[own] = base.vector[own]
-    scale = _scale_of(problem, replace(found, vector=vector))
+    scale = scale_of(problem, replace(found, vector=vector))
     return refitted(problem, found.hypothesis, np.vstack([vector, *starts]), scale=scale, others=others)
 
 
@@ -210,13 +236,13 @@ BOUNDED = ("motor_share", "position")
 """Parameters whose bounds are physical: a share is at most one, a stop lies where the joint goes."""
 
 
-def _scale_of(problem: ArticulatedProblem, found: ArticulatedFit) -> Array:
-    """Scale (n_joints,) of the residuals of a fit's model in a problem, at least one."""
-    joints = range(len(problem.joints))
+def scale_of(problem: ArticulatedProblem, found: ArticulatedFit) -> Array:
+    """Scale (n_joints, n_octaves) of the residuals of a fit's model in a problem, at least one."""
     left = in_threads(
-        lambda j: float(np.sum(problem.residual(j, found.hypothesis, found.vector) ** 2)), joints
+        lambda j: problem.octaves.power(j, problem.residual(j, found.hypothesis, found.vector)),
+        range(len(problem.joints)),
     )
-    return np.sqrt(np.maximum(np.array(left) / problem.count, 1.0))
+    return problem.octaves.scale(np.array(left))
 
 
 def _fits(
@@ -224,19 +250,21 @@ def _fits(
     base: ArticulatedFit,
     points: Sequence[Sequence[Screened]],
     settings: SearchSettings,
+    gained: float,
 ) -> list[ArticulatedFit]:
     """Fits of the most promising effects on top of a fit, on the joints that they change."""
     others = Others.of(problem, base)
     out: list[ArticulatedFit] = []
-    gained, swapped = 0.0, 0
-    strained = _strained(problem, base, settings)
+    # beside what others have gained already, what promises little is not looked at
+    least, swapped = 0 if gained else settings.least, 0
+    moved = strained(problem, base, settings)
     for k, mine in enumerate(points):
         if out and not problem.deadline.allows("fits of effects that promise less"):
             break
         hopeful = k < settings.fitted and mine[0].gain >= settings.hope * gained
-        if not (k < settings.least or hopeful):
+        if not (hopeful or k < least):
             # where a number of the model was moved too far, numbers that may be wrong instead are tried, whatever they promise
-            instead = mine[0].placed.effect.number and mine[0].placed.joint in strained
+            instead = mine[0].placed.effect.number and mine[0].placed.joint in moved
             if not instead or swapped == settings.fitted:
                 continue
             swapped += 1
@@ -258,7 +286,7 @@ def _fits(
                     iterations=settings.iterations,
                     others=others,
                 )
-                for start in (starts if strained else [np.vstack(starts)])
+                for start in (starts if moved else [np.vstack(starts)])
             ),
             key=lambda f: f.log_posterior,
         )

@@ -15,7 +15,6 @@ import numpy as np
 from bench.arrays import Array
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit, free_entries, linearised
 from bench.discrepancy.articulated_search.hypothesis import PlacedOnJoint
-from bench.discrepancy.articulated_search.misfit import misfit_of
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.numerics.threads import in_threads
 
@@ -45,7 +44,8 @@ class _Ground:
 
     def __init__(self, problem: ArticulatedProblem, base: ArticulatedFit, joints: Sequence[int]) -> None:
         self.joints = tuple(joints)
-        self.count = problem.count
+        self.octaves = problem.octaves
+        self.units = {j: base.scale[j][problem.octaves.index[j]] for j in joints}
         self.base = base
         free = set(free_entries(problem, base.hypothesis).tolist())
         columns = [i for i in range(len(base.vector)) if i in free and self._moves(problem, base, i)]
@@ -82,8 +82,7 @@ class _Ground:
         """Minus twice the log-likelihood of residuals in units of the scales, those of the prior included."""
         total = float(left[self.slices[-1].stop :] @ left[self.slices[-1].stop :])
         for j, part in zip(self.joints, self.slices, strict=True):
-            chi2 = float(left[part] @ left[part]) * float(self.base.scale[j]) ** 2
-            total += misfit_of(chi2, float(self.count[j]))
+            total += self.octaves.misfit(j, self.octaves.power(j, left[part] * self.units[j]))
         return total
 
     def moved(self, change: Array) -> Array:
@@ -100,8 +99,9 @@ def screen(
     problem: ArticulatedProblem, base: ArticulatedFit, candidates: Sequence[PlacedOnJoint]
 ) -> list[Screened]:
     """Screen effects on top of a fit; the most promising first."""
-    everything = tuple(range(len(problem.joints)))
-    grounds = {joints: _Ground(problem, base, joints) for joints in [*((j,) for j in everything), everything]}
+    grounds = {
+        joints: _Ground(problem, base, joints) for joints in {problem.reached((c,)) for c in candidates}
+    }
 
     def look(placed: PlacedOnJoint) -> list[Screened]:
         if not problem.deadline.allows("effects that were not screened"):
@@ -114,7 +114,7 @@ def screen(
         for eta in grid(placed, servo=bool(drive and drive.servo), sides=_sides(problem, placed)):
             vector = np.concatenate([base.vector, eta])
             raw = np.concatenate([
-                *(problem.residual(j, hypothesis, vector) / base.scale[j] - ground.residuals[j] for j in ground.joints),
+                *(problem.residual(j, hypothesis, vector) / ground.units[j] - ground.residuals[j] for j in ground.joints),
                 np.zeros(ground.n_prior),
             ])  # fmt: skip
             change = ground.without(raw)

@@ -6,24 +6,38 @@ parameters could do as well, is regressed on the residuals: what that takes away
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections import Counter
+from collections.abc import Callable, Collection, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
-from bench.discrepancy.articulated_search.fitting import ArticulatedFit, fit, free_entries, refitted
-from bench.discrepancy.articulated_search.hypothesis import PlacedOnJoint
+from bench.arrays import Array
+from bench.discrepancy.articulated_search.fitting import (
+    ArticulatedFit,
+    fit,
+    free_entries,
+    own_entries,
+    refitted,
+)
+from bench.discrepancy.articulated_search.hypothesis import JointHypothesis, PlacedOnJoint
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
-from bench.discrepancy.articulated_search.rounds import parted, round_of, sound
+from bench.discrepancy.articulated_search.rounds import Round, best_of, grounds_of, parted, sound, strained
 from bench.discrepancy.settings import ArticulatedJudgementSettings as JudgementSettings
 from bench.discrepancy.settings import ArticulatedSearchSettings as SearchSettings
 
 
+def quiet(found: ArticulatedFit, settings: JudgementSettings) -> NDArray[np.bool_]:
+    """Whether each joint (n_joints,) keeps no more than the noise."""
+    # the mean square of n residuals is known to sqrt(2 / n)
+    noise = (1.0 + settings.noise_known) ** 2 + settings.sure * np.sqrt(2.0 / found.octaves.count.sum(axis=1))
+    return np.asarray(found.reduced <= noise)
+
+
 def complete(problem: ArticulatedProblem, found: ArticulatedFit, settings: JudgementSettings) -> bool:
     """Whether no joint keeps more than the noise, and no nominal parameter is strained for it."""
-    # the mean square of n residuals is known to sqrt(2 / n)
-    noise = (1.0 + settings.noise_known) ** 2 + settings.sure * np.sqrt(2.0 / found.count)
     far = np.abs(found.vector[: len(problem.nominal)]) > settings.strained
-    return bool(np.all(found.reduced <= noise) and not far.any())
+    return bool(quiet(found, settings).all() and not far.any())
 
 
 def nominal_fit(problem: ArticulatedProblem) -> ArticulatedFit:
@@ -44,64 +58,169 @@ def search(
     Returns:
         The problem in which they are fitted, softened where runs that nothing corrects lose a play (`parted`), and the fits.
     """
-    settings, judged = settings or problem.settings.articulated.search, problem.settings.articulated.judgement
+    settings = settings or problem.settings.articulated.search
     progress("nominal model")
     asked, current = problem, nominal_fit(problem)
     found, dropped = [current], set[tuple[str, str]]()
     for count in range(1, 2 * settings.most + 1):
-        if not problem.deadline.allows(f"a search for effect {count}"):
+        if not problem.deadline.allows(f"a search for effects (round {count})"):
             break
-        taken = {placed.key for placed in current.hypothesis} | dropped
-        rest = [c for c in candidates if c.key not in taken]
+        rest = _open(current, candidates, dropped, settings)
         best, fits, corrected = round_of(
-            problem, current, rest, settings, lambda text, n=count: progress(f"effect {n}: {text}")
+            problem, current, rest, settings, lambda text, n=count: progress(f"round {n}: {text}")
         )
         if corrected is not None and parted(problem, fits, corrected, settings):
             return search(corrected.problem, candidates, settings=settings, progress=progress)
         found += fits
-        # to what is complete, the judgement adds nothing but what is certain
-        whole = complete(problem, current, judged)
-        least = judged.certain if whole else settings.worth
-        if best is None or best.log_posterior < current.log_posterior + least:
+        if best is None or best.log_posterior < current.log_posterior + _needed(problem, current, settings):
+            break
+        if not _material(problem, found[0], current, best):
             break
         problem = problem.settled(best.hypothesis, best.vector)
-        current, fits = without_idle(problem, best, settings)
+        added = len(best.hypothesis) - len(current.hypothesis)
+        current, fits = without_idle(problem, best, settings, added=added)
         found += fits
         dropped |= {placed.key for placed in best.hypothesis} - {placed.key for placed in current.hypothesis}
-        if len(current.hypothesis) == settings.most:
-            break
-    found += _predecessors(problem, current, found)
+        progress(f"round {count}: " + ", ".join(f"{p.effect.name} ({p.where})" for p in current.hypothesis))
+    found += predecessors(problem, current, found)
     return asked, sorted(found, key=lambda f: (f is not current, -f.log_posterior))
 
 
+def _needed(problem: ArticulatedProblem, found: ArticulatedFit, settings: SearchSettings) -> float:
+    """Log posterior that a further effect has to add to a fit: to what is complete, the judgement adds nothing but what is certain."""
+    judged = problem.settings.articulated.judgement
+    return judged.certain if complete(problem, found, judged) else settings.worth
+
+
+def _material(
+    problem: ArticulatedProblem, nominal: ArticulatedFit, before: ArticulatedFit, after: ArticulatedFit
+) -> bool:
+    """Whether a round takes what counts off some joint's misfit beyond noise, as the judgement asks, or completes the explanation."""
+    judged = problem.settings.articulated.judgement
+    first, old, new = (np.maximum(f.reduced - 1.0, 0.0) for f in (nominal, before, after))
+    return complete(problem, after, judged) or bool(np.any(old - new > judged.small * first))
+
+
+def _open(
+    current: ArticulatedFit,
+    candidates: Sequence[PlacedOnJoint],
+    dropped: Collection[tuple[str, str]],
+    settings: SearchSettings,
+) -> list[PlacedOnJoint]:
+    """Candidates that a fit may still be given: not taken, not dropped, at joints with fewer effects than are named of one."""
+    taken = {placed.key for placed in current.hypothesis} | set(dropped)
+    full = Counter(placed.joint for placed in current.hypothesis)
+    return [c for c in candidates if c.key not in taken and full[c.joint] < settings.most]
+
+
+def round_of(
+    problem: ArticulatedProblem,
+    current: ArticulatedFit,
+    candidates: Sequence[PlacedOnJoint],
+    settings: SearchSettings,
+    progress: Callable[[str], None],
+) -> Round:
+    """One round: an effect more at every joint that misses one, or one that reaches them all if that explains more.
+
+    What sits at one joint changes the runs of that joint alone. So what joints miss of their own is looked for joint by joint, and all is
+    then fitted together; what they gain in sum is held against what one effect common to them gains.
+    """
+    grounds = grounds_of(problem, current, settings)
+    judged = problem.settings.articulated.judgement
+    open_joints = {j for j, still in enumerate(quiet(current, judged)) if not still}
+    open_joints |= strained(problem, current, settings)
+    # behind an elastic drive the link is elsewhere, and all that hangs on it
+    shared = [c for c in candidates if len(problem.reached((c,))) > 1 or c.effect.train or not open_joints]
+    own = {j: [c for c in candidates if c.joint == j and c not in shared] for j in sorted(open_joints)}
+    rounds, parts = list[Round](), list[ArticulatedFit]()
+    for j, mine in own.items():
+        name = problem.joints[j].name
+        if not problem.deadline.allows(f"effects at joint '{name}'"):
+            break
+        told = best_of(
+            problem,
+            current,
+            grounds,
+            mine,
+            settings,
+            lambda text, name=name: progress(f"joint '{name}': {text}"),
+        )
+        rounds.append(told)
+        if told.best is not None and told.best.log_posterior >= current.log_posterior + settings.worth:
+            parts.append(told.best)
+    gained = sum(part.log_posterior - current.log_posterior for part in parts)
+    if shared and problem.deadline.allows("effects that reach several joints"):
+        rounds.append(best_of(problem, current, grounds, shared, settings, progress, gained=2.0 * gained))
+    fits = [f for told in rounds for f in told.fits]
+    heard = [told.corrected for told in rounds if told.corrected is not None]
+    corrected = max(heard, key=lambda one: one.best.log_posterior, default=None)
+    best = max((told.best for told in rounds if told.best), key=lambda f: f.log_posterior, default=None)
+    if len(parts) > 1 and best is not None and best.log_posterior < current.log_posterior + gained:
+        together = _joined(problem, current, sorted(parts, key=lambda part: -part.log_posterior))
+        fits.append(together)
+        best = max(best, together, key=lambda f: f.log_posterior)
+    return Round(best, fits, corrected)
+
+
+def _joined(
+    problem: ArticulatedProblem, current: ArticulatedFit, parts: Sequence[ArticulatedFit]
+) -> ArticulatedFit:
+    """A fit with the last effects of several, each about a joint of its own, on top of what they have in common."""
+    vector, last = parts[0].vector[: problem.size(current.hypothesis)].copy(), list[Array]()
+    for part in parts:
+        (j,) = problem.reached(part.hypothesis[-1:])
+        own = own_entries(problem, current.hypothesis, j)
+        vector[own] = part.vector[own]
+        last.append(part.vector[len(vector) :])
+    hypothesis = (*current.hypothesis, *(part.hypothesis[-1] for part in parts))
+    vector = np.concatenate([vector, *last])
+    settled = problem.settled(hypothesis, vector)
+    return refitted(settled, hypothesis, vector, scale=ArticulatedFit.at(settled, hypothesis, vector).scale)
+
+
 def without_idle(
-    problem: ArticulatedProblem, found: ArticulatedFit, settings: SearchSettings
+    problem: ArticulatedProblem, found: ArticulatedFit, settings: SearchSettings, *, added: int = 1
 ) -> tuple[ArticulatedFit, list[ArticulatedFit]]:
-    """A fit without the effects that its last one has made superfluous, and all fits made for that.
+    """A fit without the effects that its last ones, `added` of them, have made superfluous, and all fits made for that.
 
     What was taken first may have stood in for what was found later: it stays if without it the explanation loses what a further effect
     has to add.
     """
     made: list[ArticulatedFit] = []
-    for placed in found.hypothesis[:-1]:
+    for placed in found.hypothesis[:-added]:
         if not problem.deadline.allows("whether the first effects are still needed"):
             break
-        shorter = tuple(other for other in found.hypothesis if other.key != placed.key)
-        kept = [*range(len(problem.nominal))]
-        at = len(problem.nominal)
-        for other in found.hypothesis:
-            more = range(at, at + len(other.effect.parameters))
-            kept += more if other.key != placed.key else ()
-            at = more.stop
-        start, scale = found.vector[kept], found.scale
+        shorter, start = _without(problem, found, (placed,))
+        scale = found.scale
         within = float(np.sum(found.chi2 / scale**2)) + _surprise(problem, found) + 2.0 * settings.sight
         new = fit(problem, shorter, start, scale=scale, iterations=settings.iterations, limit=within)
         if new.log_posterior > found.log_posterior - settings.sight:
             new = refitted(problem, shorter, new.vector, scale=new.scale)
         made.append(new)
-        if new.log_posterior > found.log_posterior - settings.worth and sound(problem, new):
+        least = _needed(problem, new, settings)
+        if new.log_posterior > found.log_posterior - least and sound(problem, new):
             found = new
     return found, made
+
+
+def _without(
+    problem: ArticulatedProblem, found: ArticulatedFit, dropped: Collection[PlacedOnJoint]
+) -> tuple[JointHypothesis, Array]:
+    """The hypothesis of a fit without some of its effects, and its vector without their entries."""
+    keys = {placed.key for placed in dropped}
+    stays = [placed.key not in keys for placed in found.hypothesis]
+    etas = problem.etas(found.hypothesis, found.vector)
+    left = [eta for eta, stay in zip(etas, stays, strict=True) if stay]
+    hypothesis = tuple(placed for placed, stay in zip(found.hypothesis, stays, strict=True) if stay)
+    return hypothesis, np.concatenate([found.vector[: len(problem.nominal)], *left])
+
+
+def shortened(
+    problem: ArticulatedProblem, found: ArticulatedFit, dropped: Collection[PlacedOnJoint]
+) -> ArticulatedFit:
+    """A fit once more without some of its effects."""
+    hypothesis, start = _without(problem, found, dropped)
+    return refitted(problem, hypothesis, start, scale=ArticulatedFit.at(problem, hypothesis, start).scale)
 
 
 def _surprise(problem: ArticulatedProblem, found: ArticulatedFit) -> float:
@@ -110,7 +229,7 @@ def _surprise(problem: ArticulatedProblem, found: ArticulatedFit) -> float:
     return float(np.sum(((found.vector - mean) / std)[free_entries(problem, found.hypothesis)] ** 2))
 
 
-def _predecessors(
+def predecessors(
     problem: ArticulatedProblem, best: ArticulatedFit, found: Sequence[ArticulatedFit]
 ) -> list[ArticulatedFit]:
     """Fits with the first effects of a fit alone, where there is none among those found."""

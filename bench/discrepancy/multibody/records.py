@@ -52,11 +52,11 @@ class JointRecord:
         payloads: The same for a kilogram at its tip.
         centres: The same (3, 2, n_steps) for a metre of its centre of mass along each axis.
         weights: Body to the change of bias (n_steps,) by its weight.
-        gain: (2, 2) of the innovations.
-        whitening: (n_measured, n_measured) of the innovations.
         sample: Time between samples [s].
         encoder: What is wrong with its encoder.
         weight: (n, n_measured) of the innovations, one where every reading tells something new, see `weight_of_readings`.
+        filter: Gain (2, 2) and whitening (n_measured, n_measured) of the innovations; made for the joint about its mean inertia where None.
+            A corrected log keeps those of the log: they are what innovations are compared by.
     """
 
     joint: Joint
@@ -81,13 +81,16 @@ class JointRecord:
     sample: float
     weight: Array
     encoder: Encoder = TRUE
+    filter: tuple[Array, Array] | None = None
     gain: Array = field(init=False)
     whitening: Array = field(init=False)
 
     def __post_init__(self) -> None:
-        gain, whitening = self._filter()
-        object.__setattr__(self, "gain", gain)
-        object.__setattr__(self, "whitening", whitening)
+        if self.filter is None:
+            object.__setattr__(self, "filter", self._filter())
+        assert self.filter is not None
+        object.__setattr__(self, "gain", self.filter[0])
+        object.__setattr__(self, "whitening", self.filter[1])
 
     @property
     def servo_command(self) -> Array:

@@ -11,7 +11,11 @@ from bench.discrepancy.settings.describing import setting
 class ArticulatedSearchSettings:
     """The search on articulated models."""
 
-    most: int = setting(3, "Largest number of effects named together.", "Convention.")
+    most: int = setting(
+        3,
+        "Largest number of effects named together at one joint; twice as many rounds are made at most.",
+        "Convention.",
+    )
     fitted: int = setting(
         10,
         "Screened effects that are fitted in a round, at most; and as many wrong numbers instead of those that the fit has strained.",
@@ -170,6 +174,11 @@ class ArticulatedSettings:
     )
     shown: float = setting(
         0.01, "Share of the excess below which a joint counts as clean.", "A resolution of the picture."
+    )
+    octave: int = setting(
+        32,
+        "Ordinates of a record that the lowest octave of its spectrum holds at least; what is below counts with it.",
+        "Their mean square is known to a quarter.",
     )
     holds: tuple[float, ...] = setting(
         (0.05, 0.95),

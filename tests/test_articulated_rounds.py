@@ -1,0 +1,114 @@
+"""What is left of a robot's log is weighed octave by octave, and every joint is given what it misses in one round."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from test_articulated import LIMIT, NOISE, mjcf, problem_of, write_case
+
+from bench.discrepancy import diagnose, read_case
+from bench.discrepancy.articulated.judgement import kept
+from bench.discrepancy.articulated_search.catalogue import CATALOGUE
+from bench.discrepancy.articulated_search.fitting import ArticulatedFit, refitted
+from bench.discrepancy.articulated_search.misfit import Octaves, transformed
+from bench.discrepancy.articulated_search.problem import ArticulatedProblem, placements
+from bench.discrepancy.articulated_search.search import nominal_fit
+
+
+def octaves(n: float, samples: float) -> Octaves:
+    """One joint, one octave of n ordinates."""
+    count = np.array([[float(n)]])
+    return Octaves((np.zeros(int(n), dtype=np.int64),), count, samples, 1.0 + 2.0 * np.sqrt(2.0 / count))
+
+
+@pytest.mark.parametrize(("n", "samples"), [(500, 16.0), (30, 16.0), (20, 40.0)])
+def test_model_error_counts_as_few_samples_and_noise_as_all(n, samples):
+    known, few = octaves(n, samples), min(samples, n)
+    chance = float(known.chance[0, 0])
+
+    def misfit(r: float) -> float:
+        return known.misfit(0, np.array([n * r]))
+
+    assert misfit(0.5) == pytest.approx(0.5 * n)
+    for r in (chance + 0.2, 3.0, 1e3):
+        u = r - chance
+        told, _ = quad(lambda s: (1 + s) / ((1 + 2 * s) / n + s**2 / few), 0.0, u, limit=200, points=[min(u, 1.0)])  # fmt: skip
+        assert misfit(r) == pytest.approx(n * chance + told, rel=1e-6)
+        step = 1e-5 * r
+        slope = (misfit(r + step) - misfit(r - step)) / (2 * step)
+        # what a fit with these scales minimises has the slope of the misfit
+        assert slope == pytest.approx(n / known.scale(np.array([[n * r]]))[0, 0] ** 2, rel=1e-4)
+    # ten times as much model error is as surprising as `few` samples make it
+    assert misfit(1e5) - misfit(1e4) == pytest.approx(few * np.log(10.0), rel=2e-2)
+
+
+def test_the_transform_of_white_noise_is_white_in_every_octave(tmp_path):
+    problem = problem_of(write_case(tmp_path, mjcf(servo=True), servo=True))
+    known, rng = problem.octaves, np.random.default_rng(3)
+    powers = []
+    for _ in range(200):
+        noise = [rng.standard_normal(r.joints[0].weight.shape) * r.joints[0].weight for r in problem.records]
+        residual = transformed(noise)
+        assert residual @ residual == pytest.approx(sum(float(np.sum(one**2)) for one in noise))
+        powers.append(known.power(0, residual))
+    assert np.mean(powers, axis=0) == pytest.approx(known.count[0], rel=0.05)
+    assert (
+        np.diff(known.count[0])[:-1] < 0.0
+    ).all()  # the highest octave first, the lowest with what is below it
+
+
+def test_priors_hold_against_a_wrong_law_however_finely_it_was_logged(tmp_path):
+    problem = problem_of(write_case(tmp_path, mjcf(servo=True, friction=LIMIT), servo=True))
+    found = nominal_fit(problem)
+    assert found.reduced.max() > 10.0
+    assert np.abs(found.vector).max() < 4.0
+
+
+def rubbing(friction: float) -> str:
+    """The arm with friction at both joints."""
+    whole = mjcf(servo=True, friction=friction)
+    return whole.replace('frictionloss="0.0"', f'frictionloss="{0.75 * friction}"')
+
+
+@pytest.mark.slow
+def test_every_joint_is_given_what_it_misses_though_one_effect_is_asked_for(tmp_path):
+    folder = write_case(tmp_path, rubbing(LIMIT), servo=True)
+    left_out = {e.name for e in CATALOGUE} - {
+        "coulomb_friction",
+        "damping_error",
+        "mass_error",
+        "actuator_delay",
+    }
+    verdict = diagnose(read_case(folder), most=1, exclude=left_out).verdict
+    found = {effect.where: effect for effect in verdict.named}
+    assert {(e.name, e.where) for e in verdict.named} == {
+        ("coulomb_friction", j) for j in ("shoulder", "elbow")
+    }
+    assert found["elbow"].parameters["limit"].value == pytest.approx(LIMIT, rel=0.05)
+    assert found["shoulder"].parameters["limit"].value == pytest.approx(0.75 * LIMIT, rel=0.05)
+
+
+def test_what_showed_nothing_when_it_was_added_is_taken_out_again(tmp_path):
+    folder = write_case(tmp_path, mjcf(servo=True, friction=LIMIT), servo=True)
+    problem = problem_of(folder)
+    judging = ArticulatedProblem.of(problem.case, problem.model, problem.case.validation)
+    places = {p.key: p for p in placements(problem, CATALOGUE)}
+    lag, friction = places["actuator_lag", "elbow_drive"], places["coulomb_friction", "elbow"]
+    start = np.zeros(len(problem.nominal))
+    fits = [nominal_fit(problem)]
+    for hypothesis, eta in (((lag,), [-6.0]), ((lag, friction), [-6.0, -2.0])):
+        vector = np.concatenate([start, eta])
+        scale = ArticulatedFit.at(problem, hypothesis, vector).scale
+        fits.insert(0, refitted(problem, hypothesis, vector, scale=scale))
+    told = kept(problem, judging, fits, problem.settings.articulated.judgement)
+    assert [placed.key for placed in told.rungs[told.last].hypothesis] == [friction.key]
+    assert told.predictions[told.last].discrepancy.max() < 100.0 * NOISE
+    assert told.fits
+
+
+def test_a_short_log_of_a_servo_is_diagnosed(tmp_path):
+    folder = write_case(tmp_path, mjcf(servo=True, friction=LIMIT), servo=True, length=1.0)
+    left_out = {e.name for e in CATALOGUE} - {"coulomb_friction", "damping_error"}
+    verdict = diagnose(read_case(folder), exclude=left_out).verdict
+    assert {(e.name, e.where) for e in verdict.named} == {("coulomb_friction", "elbow")}
