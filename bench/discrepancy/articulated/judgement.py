@@ -142,10 +142,10 @@ def kept(
         settings: Thresholds.
     """
     found, rungs = list(fits), ladder(fits)
-    floor = noise_floor(judging, rungs[-1], settings)
+    floor, motion = noise_floor(judging, rungs[-1], settings), _motion(problem, judging)
     while True:
         predictions = [predict(judging, rung, floor, settings) for rung in rungs]
-        last, doubtful = _climbed(judging, rungs, predictions, settings)
+        last, doubtful = _climbed(judging, rungs, predictions, motion, settings)
         for placed in doubtful:
             shorter = shortened(problem, rungs[last], (placed,))
             found.append(shorter)
@@ -160,6 +160,17 @@ def kept(
         rungs = ladder([best, *found])
 
 
+def _motion(problem: ArticulatedProblem, judging: ArticulatedProblem) -> Array:
+    """How far every joint (n_joints,) moves in the records where it moves most, over what errors of the judging records are divided by."""
+
+    def sizes(asked: ArticulatedProblem) -> Array:
+        rows = [[size_of(asked, r, j) for j in range(len(asked.joints))] for r in range(len(asked.records))]
+        return np.array(rows)
+
+    judged = sizes(judging)
+    return np.asarray(np.vstack([sizes(problem), judged]).max(axis=0) / judged.max(axis=0))
+
+
 def _at(placed: PlacedOnJoint) -> slice:
     """The joint at which an effect sits, or whose drive; all where it reaches them all."""
     local = placed.effect.site in ("joint", "actuator")
@@ -170,13 +181,16 @@ def _climbed(
     problem: ArticulatedProblem,
     rungs: Sequence[ArticulatedFit],
     predictions: Sequence[PredictedErrors],
+    motion: Array,
     settings: JudgementSettings,
 ) -> tuple[int, list[PlacedOnJoint]]:
     """How many effects of a ladder the judging records bear out, and which of them did not improve when they were added.
 
     An effect improves if it takes off more than the standard error allows for, and more than it leaves; one at a joint or its drive is
-    asked about that joint, or it stands in for something else. What is complete gets no more but what is certain, and nothing small is
-    added where even then something is left: it stands in for a little of the form of the law that is not right.
+    asked about that joint, or it stands in for something else. What it leaves of a joint is less than the joint moves (`motion`, over what
+    the records are divided by): a run that is further off than no motion at all has explained nothing, however much worse it was before.
+    What is complete gets no more but what is certain, and nothing small is added where even then something is left: it stands in for a
+    little of the form of the law that is not right.
     """
     last, waiting, doubtful = 0, list[PlacedOnJoint](), list[PlacedOnJoint]()
     for k in range(1, len(rungs)):
@@ -191,7 +205,8 @@ def _climbed(
         gained, left = float(np.mean(before.excess - after.excess)), float(np.mean(after.excess))
         small = 0.0 if not last or complete(problem, rungs[k], settings) else settings.small
         least = max(left if last else 0.0, small * float(np.mean(first.excess)))
-        if gained > least and better(before, after, settings):
+        follows = bool(np.all(after.discrepancy < motion[_at(placed)]))
+        if follows and gained > least and better(before, after, settings):
             last, doubtful, waiting = k, [*doubtful, *waiting], []
         else:
             waiting.append(placed)

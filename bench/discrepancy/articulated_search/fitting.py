@@ -86,7 +86,9 @@ class Others:
         def eliminated(j: int) -> tuple[Array, Array]:
             own = own_entries(problem, base.hypothesis, j)
             columns = own + masses
-            jacobian, residual = linearised(problem, base, j, columns)
+            jacobian, residual = linearised(
+                problem, base, j, columns, base.scale[j][problem.octaves.index[j]]
+            )
             _, std, _, _ = problem.prior(base.hypothesis)
             mean, _, _, _ = problem.prior(base.hypothesis)
             rows = np.zeros((len(own), len(columns)))
@@ -141,11 +143,10 @@ class _Runs:
 
 
 def linearised(
-    problem: ArticulatedProblem, base: ArticulatedFit, j: int, columns: Sequence[int]
+    problem: ArticulatedProblem, base: ArticulatedFit, j: int, columns: Sequence[int], scale: Array | float
 ) -> tuple[Array, Array]:
-    """Jacobian (n, n_columns) and residual (n,) of joint `j` at a fit, in units of the scales that it leaves there."""
+    """Jacobian (n, n_columns) and residual (n,) of joint `j` at a fit, over a scale (n,)."""
     settings = problem.settings.articulated
-    scale = base.scale[j][problem.octaves.index[j]]
     _, std, _, high = problem.prior(base.hypothesis)
     residual = problem.residual(j, base.hypothesis, base.vector) / scale
     felt = set(problem.entries(j, base.hypothesis).tolist())

@@ -255,14 +255,13 @@ def _fits(
     """Fits of the most promising effects on top of a fit, on the joints that they change."""
     others = Others.of(problem, base)
     out: list[ArticulatedFit] = []
-    # beside what others have gained already, what promises little is not looked at
-    least, swapped = 0 if gained else settings.least, 0
+    swapped = 0
     moved = strained(problem, base, settings)
     for k, mine in enumerate(points):
         if out and not problem.deadline.allows("fits of effects that promise less"):
             break
         hopeful = k < settings.fitted and mine[0].gain >= settings.hope * gained
-        if not (hopeful or k < least):
+        if not (hopeful or k < settings.least):
             # where a number of the model was moved too far, numbers that may be wrong instead are tried, whatever they promise
             instead = mine[0].placed.effect.number and mine[0].placed.joint in moved
             if not instead or swapped == settings.fitted:

@@ -1,7 +1,8 @@
 """Screening: what every effect at every place promises on top of a fit, by one linearised run of the joints that it changes.
 
 The change that an effect makes, less what the nominal parameters could do as well, is regressed on the residuals: what that takes away
-is what it promises.
+is what it promises. All residuals of a joint count alike here: what takes away most of their power is fitted first, and the fits weigh
+what is left octave by octave.
 """
 
 from __future__ import annotations
@@ -44,13 +45,13 @@ class _Ground:
 
     def __init__(self, problem: ArticulatedProblem, base: ArticulatedFit, joints: Sequence[int]) -> None:
         self.joints = tuple(joints)
-        self.octaves = problem.octaves
-        self.units = {j: base.scale[j][problem.octaves.index[j]] for j in joints}
+        self.count = problem.octaves.count.sum(axis=1)
+        self.units = {j: float(np.sqrt(max(base.reduced[j], 1.0))) for j in joints}
         self.base = base
         free = set(free_entries(problem, base.hypothesis).tolist())
         columns = [i for i in range(len(base.vector)) if i in free and self._moves(problem, base, i)]
         self.columns = columns
-        parts = in_threads(lambda j: linearised(problem, base, j, columns), self.joints)
+        parts = in_threads(lambda j: linearised(problem, base, j, columns, self.units[j]), self.joints)
         mean, std, _, _ = problem.prior(base.hypothesis)
         rows = np.zeros((len(columns), len(columns)))
         rows[np.arange(len(columns)), np.arange(len(columns))] = 1.0 / std[columns]
@@ -82,7 +83,8 @@ class _Ground:
         """Minus twice the log-likelihood of residuals in units of the scales, those of the prior included."""
         total = float(left[self.slices[-1].stop :] @ left[self.slices[-1].stop :])
         for j, part in zip(self.joints, self.slices, strict=True):
-            total += self.octaves.misfit(j, self.octaves.power(j, left[part] * self.units[j]))
+            mean = float(left[part] @ left[part]) * self.units[j] ** 2 / float(self.count[j])
+            total += float(self.count[j]) * (mean if mean <= 1.0 else 1.0 + float(np.log(mean)))
         return total
 
     def moved(self, change: Array) -> Array:

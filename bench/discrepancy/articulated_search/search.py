@@ -95,10 +95,20 @@ def _needed(problem: ArticulatedProblem, found: ArticulatedFit, settings: Search
 def _material(
     problem: ArticulatedProblem, nominal: ArticulatedFit, before: ArticulatedFit, after: ArticulatedFit
 ) -> bool:
-    """Whether a round takes what counts off some joint's misfit beyond noise, as the judgement asks, or completes the explanation."""
+    """Whether a round takes what counts off what some joint keeps beyond noise, its power or its misfit, or completes the explanation."""
     judged = problem.settings.articulated.judgement
-    first, old, new = (np.maximum(f.reduced - 1.0, 0.0) for f in (nominal, before, after))
-    return complete(problem, after, judged) or bool(np.any(old - new > judged.small * first))
+    fits = (nominal, before, after)
+    power = (np.maximum(f.reduced - 1.0, 0.0) for f in fits)
+    misfit = (_misfit_beyond_noise(f) for f in fits)
+    return complete(problem, after, judged) or any(
+        bool(np.any(old - new > judged.small * first)) for first, old, new in (power, misfit)
+    )
+
+
+def _misfit_beyond_noise(found: ArticulatedFit) -> Array:
+    octaves = found.octaves
+    misfit = [octaves.misfit(j, power) for j, power in enumerate(found.chi2)]
+    return np.maximum(np.array(misfit) - octaves.count.sum(axis=1), 0.0)
 
 
 def _open(
