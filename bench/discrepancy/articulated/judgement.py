@@ -45,9 +45,9 @@ class PredictedErrors:
         """Excess over the noise, block by block (n_blocks,), summed over the joints."""
         return np.asarray((self.power - self.floor**2).sum(axis=1))
 
-    def of(self, joints: slice) -> PredictedErrors:
+    def of(self, joints: Sequence[int]) -> PredictedErrors:
         """Those of some joints."""
-        return PredictedErrors(self.power[:, joints], self.floor[joints])
+        return PredictedErrors(self.power[:, list(joints)], self.floor[list(joints)])
 
 
 def believed(problem: ArticulatedProblem, found: ArticulatedFit, settings: JudgementSettings) -> Array:
@@ -149,8 +149,9 @@ def kept(
         for placed in doubtful:
             shorter = shortened(problem, rungs[last], (placed,))
             found.append(shorter)
-            without = predict(judging, shorter, floor, settings).of(_at(placed))
-            if not better(without, predictions[last].of(_at(placed)), settings):
+            at = judging.reached((placed,))
+            without = predict(judging, shorter, floor, settings).of(at)
+            if not better(without, predictions[last].of(at), settings):
                 break
         else:
             return Kept(rungs, last, predictions, found[len(fits) :])
@@ -169,12 +170,6 @@ def _motion(problem: ArticulatedProblem, judging: ArticulatedProblem) -> Array:
 
     judged = sizes(judging)
     return np.asarray(np.vstack([sizes(problem), judged]).max(axis=0) / judged.max(axis=0))
-
-
-def _at(placed: PlacedOnJoint) -> slice:
-    """The joint at which an effect sits, or whose drive; all where it reaches them all."""
-    local = placed.effect.site in ("joint", "actuator")
-    return slice(placed.joint, placed.joint + 1) if local else slice(None)
 
 
 def _climbed(
@@ -199,13 +194,12 @@ def _climbed(
         if complete(problem, rungs[last], settings) and likelier < settings.certain:
             break
         placed = rungs[k].hypothesis[-1]
-        first, before, after = (
-            p.of(_at(placed)) for p in (predictions[0], predictions[last], predictions[k])
-        )
+        at = problem.reached((placed,))
+        first, before, after = (p.of(at) for p in (predictions[0], predictions[last], predictions[k]))
         gained, left = float(np.mean(before.excess - after.excess)), float(np.mean(after.excess))
         small = 0.0 if not last or complete(problem, rungs[k], settings) else settings.small
         least = max(left if last else 0.0, small * float(np.mean(first.excess)))
-        follows = bool(np.all(after.discrepancy < motion[_at(placed)]))
+        follows = bool(np.all(after.discrepancy < motion[list(at)]))
         if follows and gained > least and better(before, after, settings):
             last, doubtful, waiting = k, [*doubtful, *waiting], []
         else:

@@ -57,6 +57,8 @@ class JointRecord:
         weight: (n, n_measured) of the innovations, one where every reading tells something new, see `weight_of_readings`.
         filter: Gain (2, 2) and whitening (n_measured, n_measured) of the innovations; made for the joint about its mean inertia where None.
             A corrected log keeps those of the log: they are what innovations are compared by.
+        gain: (2, 2) of the innovations.
+        whitening: (n_measured, n_measured) of the innovations.
     """
 
     joint: Joint
