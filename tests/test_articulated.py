@@ -430,7 +430,7 @@ def test_a_name_has_to_beat_the_nominal_model_as_it_was_stated_too():
     rng, floor = np.random.default_rng(0), np.array([0.01])
 
     def predicted(nrmse: float) -> PredictedErrors:
-        return PredictedErrors(np.full((6, 1), nrmse**2), floor)
+        return PredictedErrors(np.full((6, 1), nrmse**2), floor, np.ones(1))
 
     # of squares beyond the noise, of the better of the two
     assert closed_of_nominal(predicted(0.5), predicted(0.9), predicted(0.3), rng) == pytest.approx(

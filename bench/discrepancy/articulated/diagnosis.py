@@ -23,12 +23,14 @@ from bench.discrepancy.articulated_search.catalogue import CATALOGUE
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem, placements
 from bench.discrepancy.articulated_search.search import search
+from bench.discrepancy.articulated_search.torque_error import TorqueProblem, along_motion
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.checks.long_records import after, long_record_notes, thinned, with_beginnings
 from bench.discrepancy.effects.catalogue import CATALOGUE as LINEAR
 from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.numerics.deadline import NEVER, Deadline
 from bench.discrepancy.settings import DEFAULT, DiagnosisSettings, changed
+from bench.discrepancy.settings import ArticulatedJudgementSettings as JudgementSettings
 from bench.discrepancy.verdict import Verdict, far_off
 from bench.errors import UnknownNameError
 
@@ -106,7 +108,11 @@ def diagnose_articulated(
     case = with_beginnings(whole := thinned(told, settings=settings), settings=settings)
     problem = ArticulatedProblem.of(case, model, case.identification, settings, deadline)
     judging = ArticulatedProblem.of(case, model, case.validation, settings)
-    problem, fits = search(problem, placements(problem, catalogue), settings=how, progress=progress)
+    candidates = placements(problem, catalogue)
+    if away := _run_away(problem, judged):
+        problem = TorqueProblem.like(problem)
+        candidates = along_motion(candidates)
+    problem, fits = search(problem, candidates, settings=how, progress=progress)
     judging = judging.softened(problem.softness)
     progress("judging records")
     rungs, last, predictions, more = kept(problem, judging, fits, judged)
@@ -116,7 +122,17 @@ def diagnose_articulated(
     left = coloured(judging, final, judged)
     without = without_each(judging, fits, final, predictions[0].floor, judged)
     verdict = verdict_of(
-        problem, fits, rungs, last, untouched, predictions, without, judged, rng, stated=stated, left=left
+        problem,
+        fits,
+        rungs,
+        last,
+        untouched,
+        predictions,
+        without,
+        judged,
+        rng,
+        stated=stated and not away,
+        left=left,
     )
     verdict = replace(
         verdict,
@@ -126,6 +142,7 @@ def diagnose_articulated(
             *notes,
             *_of_long_records(told, whole, problem, final, predictions[0].floor),
             *_followed(problem),
+            *_torques(problem, away),
             *deadline.untried,
         ),
         settings=changed(settings),
@@ -168,4 +185,22 @@ def _followed(problem: ArticulatedProblem) -> tuple[str, ...]:
     return (
         f"runs are corrected by the encoder as if {100.0 * problem.softness:.0f} % of the torque were unknown: with a play, small errors "
         "grow at every impact, and no run follows the joint by itself for long",
+    )
+
+
+def _run_away(problem: ArticulatedProblem, settings: JudgementSettings) -> list[int]:
+    """Joints whose torque was logged and whose free runs, as the model is stated, end further off than they move."""
+    off = predict(problem, None, np.zeros(len(problem.joints)), settings).discrepancy
+    driven = [j.drive is not None and not j.drive.servo for j in problem.joints]
+    return [j for j, (error, torque) in enumerate(zip(off, driven, strict=True)) if torque and error > 1.0]
+
+
+def _torques(problem: ArticulatedProblem, away: list[int]) -> tuple[str, ...]:
+    """What is said of joints that run away."""
+    if not away:
+        return ()
+    names = ", ".join(f"'{problem.joints[j].name}'" for j in away)
+    return (
+        f"the model as stated runs further off within half a second than it moves (joint {names}): what it misses was read off the torque "
+        "along the measured motion, for whose parameters the smoothed motion was taken to be right",
     )

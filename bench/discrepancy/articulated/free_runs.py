@@ -15,6 +15,7 @@ from bench.arrays import Array
 from bench.discrepancy.articulated_search.hypothesis import JointHypothesis
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.multibody.encoders import input_of
+from bench.discrepancy.multibody.joint_run import Slot
 from bench.discrepancy.multibody.motion import clock_of
 from bench.discrepancy.multibody.noise import NoiseDraw, NoiseSettings, draw
 from bench.discrepancy.multibody.records import PreparedRecord
@@ -49,6 +50,23 @@ class FreeRuns:
             starts = np.hstack([starts, states[::every, 2:] - states[::every, :2]])
         out, _ = self.problem.run(j, hypothesis, vector, record, np.zeros((2, 2)), starts, every)
         return out[every if len(starts) > 1 else 0 :, 0]
+
+    def weight(self, j: int, hypothesis: JointHypothesis, vector: Array) -> float:
+        """How far a torque moves joint `j` within a window with the inertia as stated, over how far with that of a hypothesis.
+
+        A joint made heavier errs less by any torque that it misses, and explains no more of it. One where a servo holds it.
+        """
+        inertias, damping, window = list[tuple[float, float]](), 0.0, 0.0
+        for prepared in self.problem.records:
+            record = prepared.joints[j]
+            p = self.problem.slots(j, hypothesis, vector, on_link=record.on_link)
+            _, inertia = self.problem.coefficients(record, hypothesis, vector)
+            inertias.append((float(np.mean(record.inertia)), float(np.mean(inertia)) + p[Slot.INERTIA]))
+            damping, window = max(float(p[Slot.DAMPING]), 0.0), record.window * record.sample
+        if not window:
+            return 1.0
+        stated, found = np.mean(inertias, axis=0)
+        return _moved(stated, damping, window) / _moved(found, damping, window)
 
     @cached_property
     def draws(self) -> tuple[tuple[NoiseDraw, ...], ...]:
@@ -90,3 +108,11 @@ class FreeRuns:
             loud = self.errors(j, hypothesis, vector, replace(prepared, joints=joints, motion=motion))
             total.append(np.mean((loud - quiet) ** 2))
         return float(np.sqrt(np.mean(total) + record.noise[0] ** 2))
+
+
+def _moved(inertia: float, damping: float, time: float) -> float:
+    """How far a unit force moves a damped inertia from rest within a time."""
+    x = damping * time / inertia
+    # (x - 1 + exp(-x)) / x^2 of T^2 / M, a half where nothing damps
+    part = 0.5 - x / 6.0 if x < 1e-3 else (x - 1.0 + np.exp(-x)) / x**2
+    return float(time**2 / inertia * part)

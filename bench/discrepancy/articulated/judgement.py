@@ -19,6 +19,7 @@ from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.hypothesis import PlacedOnJoint
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.articulated_search.search import complete, predecessors, shortened
+from bench.discrepancy.multibody.encoders import encoders_of
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.settings import ArticulatedJudgementSettings as JudgementSettings
 
@@ -30,10 +31,12 @@ class PredictedErrors:
     Attributes:
         power: (n_blocks, n_joints) mean squares over those of the joint's own motion.
         floor: (n_joints,) what noise alone leaves.
+        weight: (n_joints,) of the errors where explanations are compared, see `FreeRuns.weight`.
     """
 
     power: Array
     floor: Array
+    weight: Array
 
     @property
     def discrepancy(self) -> Array:
@@ -41,13 +44,19 @@ class PredictedErrors:
         return np.sqrt(self.power.mean(axis=0))
 
     @property
+    def compared(self) -> Array:
+        """What explanations are compared by (n_blocks, n_joints): a run further off than the joint moves tells no more than that it is."""
+        return np.minimum(self.power * self.weight**2, 1.0)
+
+    @property
     def excess(self) -> Array:
         """Excess over the noise, block by block (n_blocks,), summed over the joints."""
-        return np.asarray((self.power - self.floor**2).sum(axis=1))
+        return np.asarray((self.compared - self.floor**2).sum(axis=1))
 
     def of(self, joints: Sequence[int]) -> PredictedErrors:
         """Those of some joints."""
-        return PredictedErrors(self.power[:, list(joints)], self.floor[list(joints)])
+        mine = list(joints)
+        return PredictedErrors(self.power[:, mine], self.floor[mine], self.weight[mine])
 
 
 def believed(problem: ArticulatedProblem, found: ArticulatedFit, settings: JudgementSettings) -> Array:
@@ -63,15 +72,22 @@ def noise_floor(problem: ArticulatedProblem, found: ArticulatedFit, settings: Ju
     runs = FreeRuns(problem.settled(found.hypothesis, vector))
     jobs = [(j, r) for r in range(len(problem.records)) for j in range(len(problem.joints))]
     left = in_threads(lambda job: runs.noise(job[0], found.hypothesis, vector, job[1]), jobs)
-    sizes = [size_of(problem, r, j) for j, r in jobs]
-    table = np.reshape(np.array(left) / np.array(sizes), (len(problem.records), -1))
+    table = np.reshape(np.array(left), (len(problem.records), -1)) / sizes_of(problem)
     return np.asarray(np.sqrt(np.mean(table**2, axis=0)), dtype=np.float64)
 
 
-def size_of(problem: ArticulatedProblem, r: int, j: int) -> float:
-    """What errors of joint `j` in record `r` are divided by: its motion, at least its noise."""
-    record = problem.records[r].joints[j]
-    return max(float(np.std(record.position)), float(np.max(record.noise)))
+def sizes_of(problem: ArticulatedProblem) -> Array:
+    """What errors of the joints (n_joints,) are divided by: their motion, RMS over all records of the case, at least the noise.
+
+    A joint that rests in one record is not off by more for that.
+    """
+    case, sizes = problem.case, list[float]()
+    for j, joint in enumerate(problem.joints):
+        (channel, *_) = encoders_of(case, joint).channels
+        moved = [np.var(r.values[channel.name]) for r in (*case.identification, *case.validation)]
+        noise = max(float(np.max(r.joints[j].noise)) for r in problem.records)
+        sizes.append(max(float(np.sqrt(np.mean(moved))), noise))
+    return np.array(sizes)
 
 
 def predict(
@@ -84,18 +100,21 @@ def predict(
     jobs = [(j, r) for r in range(len(problem.records)) for j in range(len(problem.joints))]
     motions = runs.problem.motions(hypothesis, vector)
     errors = in_threads(lambda job: runs.errors(job[0], hypothesis, vector, motions[job[1]]), jobs)
-    rows = []
+    sizes, rows = sizes_of(problem), []
     for r in range(len(problem.records)):
         columns = []
-        for j in range(len(problem.joints)):
-            size = size_of(problem, r, j)
+        for j, size in enumerate(sizes):
             error = np.nan_to_num(errors[jobs.index((j, r))], nan=1e3 * size)
             factor = 1.0 + motions[r].joints[j].encoder.gain
             columns.append(
                 [float(np.mean(b**2)) for b in np.array_split(error * factor / size, settings.blocks)]
             )
         rows.append(np.array(columns).T)
-    return PredictedErrors(np.minimum(np.vstack(rows), 1e6), floor)
+    return PredictedErrors(
+        np.minimum(np.vstack(rows), 1e6),
+        floor,
+        np.array([runs.weight(j, hypothesis, vector) for j in range(len(sizes))]),
+    )
 
 
 def ladder(fits: Sequence[ArticulatedFit]) -> list[ArticulatedFit]:
@@ -142,10 +161,10 @@ def kept(
         settings: Thresholds.
     """
     found, rungs = list(fits), ladder(fits)
-    floor, motion = noise_floor(judging, rungs[-1], settings), _motion(problem, judging)
+    floor = noise_floor(judging, rungs[-1], settings)
     while True:
         predictions = [predict(judging, rung, floor, settings) for rung in rungs]
-        last, doubtful = _climbed(judging, rungs, predictions, motion, settings)
+        last, doubtful = _climbed(judging, rungs, predictions, settings)
         for placed in doubtful:
             shorter = shortened(problem, rungs[last], (placed,))
             found.append(shorter)
@@ -161,29 +180,17 @@ def kept(
         rungs = ladder([best, *found])
 
 
-def _motion(problem: ArticulatedProblem, judging: ArticulatedProblem) -> Array:
-    """How far every joint (n_joints,) moves in the records where it moves most, over what errors of the judging records are divided by."""
-
-    def sizes(asked: ArticulatedProblem) -> Array:
-        rows = [[size_of(asked, r, j) for j in range(len(asked.joints))] for r in range(len(asked.records))]
-        return np.array(rows)
-
-    judged = sizes(judging)
-    return np.asarray(np.vstack([sizes(problem), judged]).max(axis=0) / judged.max(axis=0))
-
-
 def _climbed(
     problem: ArticulatedProblem,
     rungs: Sequence[ArticulatedFit],
     predictions: Sequence[PredictedErrors],
-    motion: Array,
     settings: JudgementSettings,
 ) -> tuple[int, list[PlacedOnJoint]]:
     """How many effects of a ladder the judging records bear out, and which of them did not improve when they were added.
 
     An effect improves if it takes off more than the standard error allows for, and more than it leaves; one at a joint or its drive is
-    asked about that joint, or it stands in for something else. What it leaves of a joint is less than the joint moves (`motion`, over what
-    the records are divided by): a run that is further off than no motion at all has explained nothing, however much worse it was before.
+    asked about that joint, or it stands in for something else. What it leaves of a joint is less than the joint moves: a run that is
+    further off than no motion at all has explained nothing, however much worse it was before.
     What is complete gets no more but what is certain, and nothing small is added where even then something is left: it stands in for a
     little of the form of the law that is not right.
     """
@@ -197,9 +204,9 @@ def _climbed(
         at = problem.reached((placed,))
         first, before, after = (p.of(at) for p in (predictions[0], predictions[last], predictions[k]))
         gained, left = float(np.mean(before.excess - after.excess)), float(np.mean(after.excess))
-        small = 0.0 if not last or complete(problem, rungs[k], settings) else settings.small
+        small = 0.0 if not last or complete(problem, rungs[k], settings) else settings.small**2
         least = max(left if last else 0.0, small * float(np.mean(first.excess)))
-        follows = bool(np.all(after.discrepancy < motion[list(at)]))
+        follows = bool(np.all(after.discrepancy < 1.0))
         if follows and gained > least and better(before, after, settings):
             last, doubtful, waiting = k, [*doubtful, *waiting], []
         else:
@@ -216,7 +223,7 @@ def better(before: PredictedErrors, after: PredictedErrors, settings: JudgementS
     gained = before.excess - after.excess
     if _sure(gained, settings):
         return True
-    factors = np.log(before.power.sum(axis=1) / np.maximum(after.power.sum(axis=1), 1e-300))
+    factors = np.log(before.compared.sum(axis=1) / np.maximum(after.compared.sum(axis=1), 1e-300))
     return float(np.mean(gained)) > float(np.mean(after.excess)) and _sure(factors, settings)
 
 

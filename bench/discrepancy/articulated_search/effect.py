@@ -101,6 +101,11 @@ class ArticulatedEffect:
         return self.name in NUMBERS
 
     @property
+    def free(self) -> int:
+        """Number of parameters that a fit moves."""
+        return sum(not p.fixed for p in self.parameters)
+
+    @property
     def train(self) -> bool:
         """Whether it is an elastic drive train between motor and link."""
         return self.slots is train
@@ -119,6 +124,16 @@ class ArticulatedEffect:
             "force/position": f"{force}/{position}", "force/velocity": f"{force} s/{position}",
             "force/velocity/velocity": f"{force} s^2/{position}^2",
         }[parameter.scale]  # fmt: skip
+
+    def works(self, eta: Array, scales: JointScales) -> bool:
+        """Whether it does within the travel of the joint what it is called for: bristles that never let go, and a stop that is never left,
+        are springs."""
+        values = self.values(eta, scales)
+        if "side" in values:
+            return values["side"] * values["position"] > -scales.position
+        if self.family == "friction" and "stiffness" in values:
+            return values["limit"] < values["stiffness"] * scales.position
+        return True
 
     def values(self, eta: Array, scales: JointScales) -> SlotValues:
         """Physical values by name."""

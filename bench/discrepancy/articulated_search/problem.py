@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from threading import Lock
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,7 +74,7 @@ class ArticulatedProblem:
         records: Sequence[CaseRecord],
         settings: DiagnosisSettings = DEFAULT,
         deadline: Deadline = NEVER,
-    ) -> ArticulatedProblem:
+    ) -> Self:
         """Prepare records."""
         return cls(
             case,
@@ -227,7 +228,7 @@ class ArticulatedProblem:
         every: int | None,
     ) -> tuple[Array, Array]:
         """Innovations (n, 2) and states (n, 4) of joint `j` from `starts`, set anew after `every` samples, see `joint_run.predict`."""
-        bias, inertia = self._coefficients(record, hypothesis, vector)
+        bias, inertia = self.coefficients(record, hypothesis, vector)
         p = self.slots(j, hypothesis, vector, on_link=record.on_link)
         p[Slot.RATIO] = record.servo_ratio
         return predict(
@@ -235,9 +236,10 @@ class ArticulatedProblem:
             record.n_sub, (record.position, record.velocity), gain, starts, every,
         )  # fmt: skip
 
-    def _coefficients(
+    def coefficients(
         self, record: JointRecord, hypothesis: JointHypothesis, vector: Array
     ) -> tuple[Array, Array]:
+        """Bias and inertia (n_steps,) of a joint's equation as a hypothesis has the masses."""
         bias, inertia = record.bias, record.inertia
         for i in self.masses:
             if vector[i] != 0.0:

@@ -11,6 +11,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bench.arrays import Array
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit, Others, fit, own_entries, refitted
@@ -19,6 +20,7 @@ from bench.discrepancy.articulated_search.misfit import log_likelihood
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.articulated_search.screening import Screened, by_effect, screen
 from bench.discrepancy.numerics.threads import in_threads
+from bench.discrepancy.settings import ArticulatedJudgementSettings as JudgementSettings
 from bench.discrepancy.settings import ArticulatedSearchSettings as SearchSettings
 
 
@@ -99,10 +101,30 @@ def best_of(
     fits = [_where_links_are(problem, f) for f in fits]
     if not fits:
         return Round(None, fits, corrected)
-    best = max(fits, key=lambda f: f.log_posterior)
+    best = _simplest(problem, fits)
     settled = problem.settled(best.hypothesis, best.vector)
     whole = refitted(settled, best.hypothesis, best.vector, scale=best.scale)
     return Round(whole, [*(f for f in fits if f is not best), whole], corrected)
+
+
+def _simplest(problem: ArticulatedProblem, fits: Sequence[ArticulatedFit]) -> ArticulatedFit:
+    """The likeliest fit; of several that are too wrong to be told apart the one whose last effect has the fewest parameters.
+
+    Where a law is not the right one, a more general one fits a little better whatever is right.
+    """
+    judged = problem.settings.articulated.judgement
+    best = max(fits, key=lambda f: f.log_posterior)
+    if quiet(best, judged)[list(problem.reached(best.hypothesis[-1:]))].all():
+        return best
+    alike = [f for f in fits if f.log_posterior > best.log_posterior - judged.rival]
+    return min(alike, key=lambda f: (f.hypothesis[-1].effect.free, -f.log_posterior))
+
+
+def quiet(found: ArticulatedFit, settings: JudgementSettings) -> NDArray[np.bool_]:
+    """Whether each joint (n_joints,) keeps no more than the noise."""
+    # the mean square of n residuals is known to sqrt(2 / n)
+    noise = (1.0 + settings.noise_known) ** 2 + settings.sure * np.sqrt(2.0 / found.octaves.count.sum(axis=1))
+    return np.asarray(found.reduced <= noise)
 
 
 def parted(
@@ -217,9 +239,12 @@ PERIODS = "periods_per_turn"
 
 
 def sound(problem: ArticulatedProblem, found: ArticulatedFit) -> bool:
-    """Whether a fit is finite and no parameter of its effects sits at a bound."""
+    """Whether a fit is finite, no parameter of its effects sits at a bound, and its effects do what they are called for."""
     settings = problem.settings.articulated
     if not (np.isfinite(found.log_posterior) and np.isfinite(found.vector).all()):
+        return False
+    etas = problem.etas(found.hypothesis, found.vector)
+    if not all(p.effect.works(eta, p.scales) for p, eta in zip(found.hypothesis, etas, strict=True)):
         return False
     at = len(problem.nominal)
     for placed in found.hypothesis:

@@ -10,7 +10,6 @@ from collections import Counter
 from collections.abc import Callable, Collection, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bench.arrays import Array
 from bench.discrepancy.articulated_search.fitting import (
@@ -22,16 +21,17 @@ from bench.discrepancy.articulated_search.fitting import (
 )
 from bench.discrepancy.articulated_search.hypothesis import JointHypothesis, PlacedOnJoint
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
-from bench.discrepancy.articulated_search.rounds import Round, best_of, grounds_of, parted, sound, strained
+from bench.discrepancy.articulated_search.rounds import (
+    Round,
+    best_of,
+    grounds_of,
+    parted,
+    quiet,
+    sound,
+    strained,
+)
 from bench.discrepancy.settings import ArticulatedJudgementSettings as JudgementSettings
 from bench.discrepancy.settings import ArticulatedSearchSettings as SearchSettings
-
-
-def quiet(found: ArticulatedFit, settings: JudgementSettings) -> NDArray[np.bool_]:
-    """Whether each joint (n_joints,) keeps no more than the noise."""
-    # the mean square of n residuals is known to sqrt(2 / n)
-    noise = (1.0 + settings.noise_known) ** 2 + settings.sure * np.sqrt(2.0 / found.octaves.count.sum(axis=1))
-    return np.asarray(found.reduced <= noise)
 
 
 def complete(problem: ArticulatedProblem, found: ArticulatedFit, settings: JudgementSettings) -> bool:

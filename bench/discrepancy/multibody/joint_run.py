@@ -89,11 +89,11 @@ class JointRunLimits(NamedTuple):
 
 JOINT_RUN_LIMITS = JointRunLimits()
 
-_inlined = numba.njit(cache=True, error_model="numpy", nogil=True, inline="always")
+inlined = numba.njit(cache=True, error_model="numpy", nogil=True, inline="always")
 
 
-@_inlined
-def _input(u, k, shift):
+@inlined
+def delayed_input(u, k, shift):
     """Input at the middle of step `k`, delayed by `shift` steps."""
     at = k - shift
     if at <= 0.0:
@@ -104,8 +104,8 @@ def _input(u, k, shift):
     return u[low] + (at - low) * (u[low + 1] - u[low])
 
 
-@_inlined
-def _beyond(x, width):
+@inlined
+def beyond_band(x, width):
     """What of `x` lies beyond a dead band of half width `width`."""
     if x > width:
         return x - width
@@ -114,15 +114,15 @@ def _beyond(x, width):
     return 0.0
 
 
-@_inlined
-def _actuator(p, command, q, v, lagged, keep):
+@inlined
+def actuator_force(p, command, q, v, lagged, keep):
     """Force of the actuator at the joint, the part of its velocity gain that the step may take implicitly, and the state of its lag."""
     implicit = 0.0
     if p[1] > 0.5:  # a servo
-        wanted = p[2] * _beyond(command - p[36] * q, p[26]) - p[3] * p[36] * v
+        wanted = p[2] * beyond_band(command - p[36] * q, p[26]) - p[3] * p[36] * v
         implicit = p[3] * p[36]
     else:
-        wanted = p[2] * _beyond(command, p[26])
+        wanted = p[2] * beyond_band(command, p[26])
     if p[27] > 0.0:
         lagged = wanted if math.isnan(lagged) else wanted + (lagged - wanted) * keep
         wanted = lagged
@@ -137,8 +137,8 @@ def _actuator(p, command, q, v, lagged, keep):
     return p[0] * wanted, p[0] * implicit, lagged
 
 
-@_inlined
-def _stop(p, x, w):
+@inlined
+def stop_force(p, x, w):
     """Force of the one-sided stop on the joint; it only pushes."""
     depth = p[25] * (x - p[23])
     if p[22] > 0.0 and depth > 0.0:
@@ -146,8 +146,8 @@ def _stop(p, x, w):
     return 0.0
 
 
-@_inlined
-def _friction_limit(p, v, load):
+@inlined
+def friction_limit(p, v, load):
     """Limit of the dry friction."""
     limit = p[10]
     if p[11] != 0.0:
@@ -156,8 +156,8 @@ def _friction_limit(p, v, load):
     return limit + p[13] * load
 
 
-@_inlined
-def _bristles(p, v, z):
+@inlined
+def bristle_force_of(p, v, z):
     """Force of the bristles at velocity `v`, and the damping that the step may take implicitly."""
     if p[16] <= 0.0:
         return 0.0, 0.0
@@ -166,8 +166,8 @@ def _bristles(p, v, z):
     return -p[17] * z - (damping - implicit) * v, implicit
 
 
-@_inlined
-def _slid(p, z, v, step):
+@inlined
+def bristles_slid(p, z, v, step):
     """The bristles after a step of sliding at velocity `v`; exact where that is constant."""
     if p[16] <= 0.0:
         return z
@@ -175,12 +175,12 @@ def _slid(p, z, v, step):
     return steady + (z - steady) * math.exp(-p[17] * abs(v) * step / p[16])
 
 
-@_inlined
+@inlined
 def _kick_train(p, mass, step, motor_force, link_force, damping, implicit, bristle, limit, q, v, ql, vl):
     """New velocities of motor and link: implicit in the damping of the train, dry friction on the motor by its proximal map."""
     motor, link = p[33] + p[9], mass - p[33]
     on_motor, on_link = (0.0, damping) if p[37] > 0.5 else (damping, 0.0)
-    beyond = _beyond(q - ql, p[32])
+    beyond = beyond_band(q - ql, p[32])
     torque = p[30] * beyond
     grip = p[31] if beyond != 0.0 else 0.0
     a11 = motor / step + 0.5 * (on_motor + implicit) + grip + bristle
@@ -193,7 +193,7 @@ def _kick_train(p, mass, step, motor_force, link_force, damping, implicit, brist
     return new, (b2 + grip * new) / a22
 
 
-@_inlined
+@inlined
 def _set_anew(p, bias, start, on_link):
     """Positions and velocities of motor and link at the start of a window, see `run`."""
     q, v, wound, whirl = start[0], start[1], 0.0, 0.0
@@ -263,15 +263,15 @@ def run(
         for k in range(i * n_sub, (i + 1) * n_sub):
             q += 0.5 * step * v
             ql += 0.5 * step * vl
-            command = _input(u, k, p[28] / step)
+            command = delayed_input(u, k, p[28] / step)
             target = command + (target - command) * half  # in the middle of the step, where the force acts
-            force, implicit, lagged = _actuator(p, target, q, v, lagged, keep)
+            force, implicit, lagged = actuator_force(p, target, q, v, lagged, keep)
             target = command + (target - command) * half
-            bristle_force, bristle = _bristles(p, v, z)
+            bristle_force, bristle = bristle_force_of(p, v, z)
             own = force + bristle_force - p[19] * math.sin(p[20] * q + p[21])
             x, w = (ql, vl) if train else (q, v)
-            rest = p[15] - bias[k] - slope[k] * (x - reference[k]) - p[7] * (x - p[8]) + _stop(p, x, w)
-            limit = _friction_limit(p, v, abs(force) if p[38] > 0.5 else load[k])
+            rest = p[15] - bias[k] - slope[k] * (x - reference[k]) - p[7] * (x - p[8]) + stop_force(p, x, w)
+            limit = friction_limit(p, v, abs(force) if p[38] > 0.5 else load[k])
             damping = p[6] + p[14] * abs(v)
             before = v
             if train:
@@ -284,7 +284,7 @@ def run(
                 free = (inertia * v + own + rest - 0.5 * (damping - implicit) * v) / a
                 v = math.copysign(max(abs(free) - limit / a, 0.0), free)
                 vl = v
-            z = _slid(p, z, 0.5 * (before + v), step)
+            z = bristles_slid(p, z, 0.5 * (before + v), step)
             q += 0.5 * step * v
             ql += 0.5 * step * vl
 

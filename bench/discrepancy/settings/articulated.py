@@ -241,6 +241,14 @@ class ArticulatedSettings:
         "What a robot is driven with lies below, and a second derivative lives on what lies above.",
         unit="Hz",
     )
+    averaged: float = setting(
+        1.0,
+        "Interval over which a missing torque is averaged, in periods of the highest frequency that is followed.",
+        "Shorter ones hold what smoothing leaves of the encoder's noise, longer ones average the motion away.",
+    )
+    segments: int = setting(
+        8, "Segments of a log for its spectrum.", "Its power is known to a third; half overlap."
+    )
     shift: float = setting(
         1e-4, "Shift of a centre of mass for its derivative.", "The equations are linear in it.", unit="m"
     )
