@@ -110,17 +110,17 @@ def diagnose_articulated(
     judging = ArticulatedProblem.of(case, model, case.validation, settings)
     candidates = placements(problem, catalogue)
     if away := _run_away(problem, judged):
-        problem = TorqueProblem.like(problem)
-        candidates = along_motion(candidates)
+        problem, candidates = TorqueProblem.like(problem), along_motion(candidates)
     problem, fits = search(problem, candidates, settings=how, progress=progress)
     judging = judging.softened(problem.softness)
+    told_by = _like(problem, judging)
     progress("judging records")
-    rungs, last, predictions, more = kept(problem, judging, fits, judged)
+    rungs, last, predictions, more = kept(problem, told_by, fits, judged)
     fits += more
-    untouched = predict(judging, None, predictions[0].floor, judged)
+    untouched = predict(told_by, None, predictions[0].floor, judged)
     final = rungs[last]
     left = coloured(judging, final, judged)
-    without = without_each(judging, fits, final, predictions[0].floor, judged)
+    without = without_each(told_by, fits, final, predictions[0].floor, judged)
     verdict = verdict_of(
         problem,
         fits,
@@ -169,7 +169,9 @@ def _of_long_records(
     rests = [rest for record, fitted in pairs if (rest := after(record, fitted)) is not None]
     if not rests:
         return found
-    later = ArticulatedProblem.of(case, problem.model, rests, settings).softened(problem.softness)
+    later = _like(
+        problem, ArticulatedProblem.of(case, problem.model, rests, settings).softened(problem.softness)
+    )
     judged = settings.articulated.judgement
     off = [float(np.max(predict(p, final, floor, judged).discrepancy)) for p in (problem, later)]
     return (
@@ -186,6 +188,11 @@ def _followed(problem: ArticulatedProblem) -> tuple[str, ...]:
         f"runs are corrected by the encoder as if {100.0 * problem.softness:.0f} % of the torque were unknown: with a play, small errors "
         "grow at every impact, and no run follows the joint by itself for long",
     )
+
+
+def _like(problem: ArticulatedProblem, other: ArticulatedProblem) -> ArticulatedProblem:
+    """Other records, asked as those of a problem are."""
+    return TorqueProblem.like(other) if isinstance(problem, TorqueProblem) else other
 
 
 def _run_away(problem: ArticulatedProblem, settings: JudgementSettings) -> list[int]:

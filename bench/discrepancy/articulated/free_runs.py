@@ -14,7 +14,7 @@ from scipy.interpolate import CubicSpline
 from bench.arrays import Array
 from bench.discrepancy.articulated_search.hypothesis import JointHypothesis
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
-from bench.discrepancy.multibody.encoders import input_of
+from bench.discrepancy.multibody.encoders import encoders_of, input_of
 from bench.discrepancy.multibody.joint_run import Slot
 from bench.discrepancy.multibody.motion import clock_of
 from bench.discrepancy.multibody.noise import NoiseDraw, NoiseSettings, draw
@@ -32,7 +32,7 @@ class FreeRuns:
     problem: ArticulatedProblem
 
     def errors(self, j: int, hypothesis: JointHypothesis, vector: Array, prepared: PreparedRecord) -> Array:
-        """Measured less predicted positions (n,) of joint `j`, run without corrections from the measured states of its windows.
+        """Logged less predicted positions (n,) of joint `j`, run without corrections from the measured states of its windows.
 
         What no encoder tells at the start of a window, the winding of an elastic drive, is taken from the run that is corrected. The
         first of several windows is left out: at the end of a record its velocity is told from one side alone, several times worse.
@@ -49,7 +49,27 @@ class FreeRuns:
             _, states = self.problem.innovations(j, hypothesis, vector, prepared)
             starts = np.hstack([starts, states[::every, 2:] - states[::every, :2]])
         out, _ = self.problem.run(j, hypothesis, vector, record, np.zeros((2, 2)), starts, every)
-        return out[every if len(starts) > 1 else 0 :, 0]
+        return (1.0 + record.encoder.gain) * out[every if len(starts) > 1 else 0 :, 0]
+
+    @cached_property
+    def sizes(self) -> Array:
+        """What errors of the joints (n_joints,) are divided by: their motion, RMS over all records of the case, at least the noise.
+
+        A joint that rests in one record is not off by more for that.
+        """
+        case, sizes = self.problem.case, list[float]()
+        for j, joint in enumerate(self.problem.joints):
+            (channel, *_) = encoders_of(case, joint).channels
+            moved = [np.var(r.values[channel.name]) for r in (*case.identification, *case.validation)]
+            noise = max(float(np.max(r.joints[j].noise)) for r in self.problem.records)
+            sizes.append(max(float(np.sqrt(np.mean(moved))), noise))
+        return np.array(sizes)
+
+    def metric(self, j: int) -> str:
+        """What is told of joint `j`, in words."""
+        joint, record = self.problem.joints[j], self.problem.records[0].joints[j]
+        run = f"free runs of {record.window * record.sample:.3g} s" if record.window else "free run"
+        return f"validation {joint.name} position NRMSE, {run}, other joints as measured"
 
     def weight(self, j: int, hypothesis: JointHypothesis, vector: Array) -> float:
         """How far a torque moves joint `j` within a window with the inertia as stated, over how far with that of a hypothesis.

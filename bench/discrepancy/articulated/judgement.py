@@ -15,21 +15,22 @@ import numpy as np
 
 from bench.arrays import Array
 from bench.discrepancy.articulated.free_runs import FreeRuns
+from bench.discrepancy.articulated.torque_runs import TorqueRuns
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.hypothesis import PlacedOnJoint
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.articulated_search.search import complete, predecessors, shortened
-from bench.discrepancy.multibody.encoders import encoders_of
+from bench.discrepancy.articulated_search.torque_error import TorqueProblem
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.settings import ArticulatedJudgementSettings as JudgementSettings
 
 
 @dataclass(frozen=True, eq=False)
 class PredictedErrors:
-    """Squared errors of free runs of the judging records.
+    """Squared errors in the judging records, of free runs or of torques (`runs_of`).
 
     Attributes:
-        power: (n_blocks, n_joints) mean squares over those of the joint's own motion.
+        power: (n_blocks, n_joints) mean squares over those of the joint's own motion or torque.
         floor: (n_joints,) what noise alone leaves.
         weight: (n_joints,) of the errors where explanations are compared, see `FreeRuns.weight`.
     """
@@ -66,55 +67,40 @@ def believed(problem: ArticulatedProblem, found: ArticulatedFit, settings: Judge
     return vector
 
 
+def runs_of(problem: ArticulatedProblem) -> FreeRuns | TorqueRuns:
+    """What explanations are judged by: free runs, or the torque where the model as stated runs away."""
+    return TorqueRuns(problem) if isinstance(problem, TorqueProblem) else FreeRuns(problem)
+
+
 def noise_floor(problem: ArticulatedProblem, found: ArticulatedFit, settings: JudgementSettings) -> Array:
-    """NRMSE (n_joints,) that noise alone leaves in free runs, were the model of a fit right."""
+    """NRMSE (n_joints,) that noise alone leaves, were the model of a fit right."""
     vector = believed(problem, found, settings)
-    runs = FreeRuns(problem.settled(found.hypothesis, vector))
+    runs = runs_of(problem.settled(found.hypothesis, vector))
     jobs = [(j, r) for r in range(len(problem.records)) for j in range(len(problem.joints))]
     left = in_threads(lambda job: runs.noise(job[0], found.hypothesis, vector, job[1]), jobs)
-    table = np.reshape(np.array(left), (len(problem.records), -1)) / sizes_of(problem)
+    table = np.reshape(np.array(left), (len(problem.records), -1)) / runs.sizes
     return np.asarray(np.sqrt(np.mean(table**2, axis=0)), dtype=np.float64)
-
-
-def sizes_of(problem: ArticulatedProblem) -> Array:
-    """What errors of the joints (n_joints,) are divided by: their motion, RMS over all records of the case, at least the noise.
-
-    A joint that rests in one record is not off by more for that.
-    """
-    case, sizes = problem.case, list[float]()
-    for j, joint in enumerate(problem.joints):
-        (channel, *_) = encoders_of(case, joint).channels
-        moved = [np.var(r.values[channel.name]) for r in (*case.identification, *case.validation)]
-        noise = max(float(np.max(r.joints[j].noise)) for r in problem.records)
-        sizes.append(max(float(np.sqrt(np.mean(moved))), noise))
-    return np.array(sizes)
 
 
 def predict(
     problem: ArticulatedProblem, found: ArticulatedFit | None, floor: Array, settings: JudgementSettings
 ) -> PredictedErrors:
-    """Free runs of a problem's records with a fit's model, with the nominal model as it is where None; `floor` as of `noise_floor`."""
+    """Errors in a problem's records with a fit's model, with the nominal model as it is where None; `floor` as of `noise_floor`."""
     hypothesis = found.hypothesis if found else ()
     vector = believed(problem, found, settings) if found else np.zeros(len(problem.nominal))
-    runs = FreeRuns(problem.settled(hypothesis, vector))
-    jobs = [(j, r) for r in range(len(problem.records)) for j in range(len(problem.joints))]
-    motions = runs.problem.motions(hypothesis, vector)
-    errors = in_threads(lambda job: runs.errors(job[0], hypothesis, vector, motions[job[1]]), jobs)
-    sizes, rows = sizes_of(problem), []
-    for r in range(len(problem.records)):
-        columns = []
-        for j, size in enumerate(sizes):
-            error = np.nan_to_num(errors[jobs.index((j, r))], nan=1e3 * size)
-            factor = 1.0 + motions[r].joints[j].encoder.gain
-            columns.append(
-                [float(np.mean(b**2)) for b in np.array_split(error * factor / size, settings.blocks)]
-            )
-        rows.append(np.array(columns).T)
-    return PredictedErrors(
-        np.minimum(np.vstack(rows), 1e6),
-        floor,
-        np.array([runs.weight(j, hypothesis, vector) for j in range(len(sizes))]),
-    )
+    runs = runs_of(problem.settled(hypothesis, vector))
+    joints = range(len(problem.joints))
+    jobs = [(j, prepared) for prepared in runs.problem.motions(hypothesis, vector) for j in joints]
+    errors = in_threads(lambda job: runs.errors(job[0], hypothesis, vector, job[1]), jobs)
+
+    def blocks(j: int, error: Array) -> list[float]:
+        over = np.nan_to_num(error / runs.sizes[j], nan=1e3)
+        return [float(np.mean(part**2)) for part in np.array_split(over, settings.blocks)]
+
+    table = np.array([blocks(j, error) for (j, _), error in zip(jobs, errors, strict=True)])
+    power = np.vstack([table[k : k + len(joints)].T for k in range(0, len(table), len(joints))])
+    weight = np.array([runs.weight(j, hypothesis, vector) for j in joints])
+    return PredictedErrors(np.minimum(power, 1e6), floor, weight)
 
 
 def ladder(fits: Sequence[ArticulatedFit]) -> list[ArticulatedFit]:

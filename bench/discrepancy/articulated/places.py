@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from bench.arrays import Array
-from bench.discrepancy.articulated.judgement import PredictedErrors
+from bench.discrepancy.articulated.judgement import PredictedErrors, runs_of
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.settings import ArticulatedSettings
@@ -21,11 +21,9 @@ def gaps_of(
     predictions: Sequence[PredictedErrors],
     rng: np.random.Generator,
 ) -> tuple[Gap, ...]:
-    """NRMSE of the free runs of every joint, as stated, then rung by rung; arguments as of `verdict_of`."""
-    out = []
+    """NRMSE of every joint, as stated, then rung by rung; arguments as of `verdict_of`."""
+    out, told = [], runs_of(problem)
     for j, joint in enumerate(problem.joints):
-        record = problem.records[0].joints[j]
-        run = f"free runs of {record.window * record.sample:.3g} s" if record.window else "free run"
         first, after = untouched, predictions[-1]
         floor = float(after.floor[j])
         share, interval = _closed_of_nrmse(first.power[:, j], after.power[:, j], floor, rng)
@@ -39,7 +37,7 @@ def gaps_of(
         ]
         out.append(
             Gap(
-                f"validation {joint.name} position NRMSE, {run}, other joints as measured", float(first.discrepancy[j]),
+                told.metric(j), float(first.discrepancy[j]),
                 float(predictions[0].discrepancy[j]), float(after.discrepancy[j]), floor, share, interval, tuple(steps),
                 joint.name,
             )

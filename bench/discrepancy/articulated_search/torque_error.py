@@ -116,25 +116,31 @@ class TorqueProblem(ArticulatedProblem):
             out.append(_Level(np.maximum(torque, 1e-12), speed))
         return tuple(out)
 
+    def missing(
+        self, j: int, hypothesis: JointHypothesis, vector: Array, r: int, prepared: PreparedRecord
+    ) -> Array:
+        """Mean torque (n_intervals,) that joint `j` misses in record `r`, whose encoders are as `prepared` has them."""
+        record = prepared.joints[j]
+        p = self.slots(j, hypothesis, vector, on_link=record.on_link)
+        p[Slot.RATIO] = record.servo_ratio
+        stated = base_slots(self.joints[j], record.on_link)
+        # a drive that gives a part of what was logged is off by as much of what was logged
+        part = p[Slot.GEAR] * p[Slot.KP] / (stated[Slot.GEAR] * stated[Slot.KP])
+        bias, inertia = self.coefficients(record, hypothesis, vector)
+        motion, still = self.moved(prepared)[j], self.levels[r].speed[j]
+        torque = missing_torque(
+            p, (inertia, bias, record.load), record.servo_command, record.step, motion, still
+        )
+        steps = self.intervals[r] * record.n_sub
+        whole = torque[: len(torque) // steps * steps].reshape(-1, steps)
+        return np.asarray(whole.mean(axis=1) / part)
+
     def residuals(self, j: int, hypothesis: JointHypothesis, vector: Array) -> list[Array]:
         """Missing torque (n_intervals, 1) of joint `j` over that of noise, in every record."""
-        out = []
-        motions = self.motions(hypothesis, vector)
-        for level, n, prepared in zip(self.levels, self.intervals, motions, strict=True):
-            record = prepared.joints[j]
-            p = self.slots(j, hypothesis, vector, on_link=record.on_link)
-            p[Slot.RATIO] = record.servo_ratio
-            stated = base_slots(self.joints[j], record.on_link)
-            # a drive that gives a part of what was logged is off by as much of what was logged
-            part = p[Slot.GEAR] * p[Slot.KP] / (stated[Slot.GEAR] * stated[Slot.KP])
-            bias, inertia = self.coefficients(record, hypothesis, vector)
-            missing = missing_torque(
-                p, (inertia, bias, record.load), record.servo_command, record.step, self.moved(prepared)[j], level.speed[j]
-            )  # fmt: skip
-            steps = n * record.n_sub
-            whole = missing[: len(missing) // steps * steps].reshape(-1, steps)
-            out.append(whole.mean(axis=1)[:, None] / (part * level.torque[j]))
-        return out
+        return [
+            self.missing(j, hypothesis, vector, r, prepared)[:, None] / self.levels[r].torque[j]
+            for r, prepared in enumerate(self.motions(hypothesis, vector))
+        ]
 
     def residual(self, j: int, hypothesis: JointHypothesis, vector: Array) -> Array:
         """All records in one (n,)."""

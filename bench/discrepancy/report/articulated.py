@@ -67,9 +67,8 @@ def _errors(diagnosis: ArticulatedDiagnosis, fit: ArticulatedFit | None) -> Arra
     vector = fit.vector if fit else np.zeros(len(judging.nominal))
     runs = FreeRuns(judging.settled(hypothesis, vector))
     prepared = runs.problem.motions(hypothesis, vector)[0]
-    factors = [1.0 + record.encoder.gain for record in prepared.joints]
     return np.column_stack([
-        factors[j] * runs.errors(j, hypothesis, vector, prepared) for j in range(len(judging.joints))
+        runs.errors(j, hypothesis, vector, prepared) for j in range(len(judging.joints))
     ])  # fmt: skip
 
 
@@ -97,8 +96,10 @@ def articulated_page(
 
 def _how_far(out: Page, diagnosis: ArticulatedDiagnosis, runs: Mapping[str, Recording]) -> None:
     section = out.section("How far the discrepancy shrinks")
+    what, how = diagnosis.verdict.gap.metric.split(" NRMSE, ")
+    quantity = what.split()[-1]
     section.table(
-        "NRMSE of the position on the judging records: " + diagnosis.verdict.gap.metric.split("NRMSE, ")[-1],
+        f"NRMSE of the {quantity} on the judging records: {how}",
         ("joint", "nominal model", "parameters only", "with what is named", "noise alone", "closed"),
         [
             (
