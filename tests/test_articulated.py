@@ -22,7 +22,8 @@ from bench.discrepancy.articulated.recognition import applies
 from bench.discrepancy.articulated.whiteness import coloured
 from bench.discrepancy.articulated_search.catalogue import CATALOGUE
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit, fit, refitted
-from bench.discrepancy.articulated_search.problem import ArticulatedProblem, placements
+from bench.discrepancy.articulated_search.placements import placements
+from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.articulated_search.search import complete, without_idle
 from bench.discrepancy.multibody.channels import bound
 from bench.discrepancy.multibody.encoders import weight_of_readings

@@ -15,7 +15,8 @@ from bench.discrepancy.articulated_search.catalogue import CATALOGUE
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.hypothesis import JointHypothesis
 from bench.discrepancy.articulated_search.misfit import log_likelihood
-from bench.discrepancy.articulated_search.problem import ArticulatedProblem, placements
+from bench.discrepancy.articulated_search.placements import placements
+from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.multibody.joint_run import SLOTS, Slot, predict
 from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.settings import DEFAULT

@@ -18,6 +18,7 @@ LOOKS = {
     "coulomb_friction": "The missing force is a step at every reversal of the velocity, the same at every amplitude. Free decays end after finitely many swings, along straight lines. Small motions are damped most.",
     "soft_coulomb_friction": "As Coulomb friction, but the force turns round before or after the velocity does, and a resting joint creeps.",
     "stribeck_friction": "A step at every reversal that falls off with the velocity. Slow motion stutters.",
+    "coupled_friction": "The missing torque of each of two joints is a step at reversals of the sum, or the difference, of their velocities: a joint at rest is pulled along by its neighbour.",
     "presliding_friction": "The step at a reversal is rounded over a displacement that does not depend on the frequency; below it the joint is a spring.",
     "bouc_wen_hysteresis": "Loops of force over displacement with round corners; the stiffness falls with the amplitude, the loss a cycle grows with it, the frequency does not matter.",
     "backlash_friction": "A loop whose flanks are broken by a dead space: after a reversal the friction stays away for the length of the clearance, then builds up over the slip displacement.",

@@ -18,6 +18,7 @@ from bench.discrepancy.application.target import (
     as_mujoco,
     mobility,
 )
+from bench.discrepancy.articulated_search.placements import AND
 from bench.discrepancy.model.mjcf_friction import frictionloss_of
 from bench.discrepancy.verdict import NamedEffect
 
@@ -80,6 +81,17 @@ def harden(spec: mujoco.MjSpec) -> None:
             )
             item.solref_friction = [float(x) for x in found["solreffriction"].split()]
             item.solimp_friction = (*(float(x) for x in found["solimpfriction"].split()), 0.001, 0.5, 2.0)
+
+
+def coupled_friction(target: Target, effect: NamedEffect) -> Change:
+    """Friction and damping of a fixed tendon that moves with both joints."""
+    v, (first, second) = values_of(effect), effect.where.split(AND)
+    tendon = target.tendon_on(first, effect.name)
+    tendon.wrap_joint(second, v["sense"])
+    tendon.damping = np.append(v["damping"], np.zeros(np.size(tendon.damping) - 1))
+    _set_friction(target, tendon, v["limit"])
+    text = f"a tendon over '{first}' and '{second}' with a frictionloss of {v['limit']:.6g} and a damping of {v['damping']:.6g}"
+    return Change(effect.name, tendon.name, "native", text, (("fixed", tendon.name),))
 
 
 def _modulated(limit: Callable[[dict[str, float]], str]) -> Callable[[Target, NamedEffect], Change]:
@@ -317,6 +329,7 @@ def element(target: Target, effect: NamedEffect) -> Change:
 
 FORCES: dict[str, Callable[[Target, NamedEffect], Change]] = {
     "coulomb_friction": coulomb_friction,
+    "coupled_friction": coupled_friction,
     "stribeck_friction": _modulated(_stribeck_limit),
     "load_dependent_friction": _modulated(_carried_limit),
     "time_varying_friction": _modulated(_timed_limit),

@@ -21,7 +21,8 @@ from bench.discrepancy.articulated.places import matrix_of
 from bench.discrepancy.articulated.whiteness import coloured
 from bench.discrepancy.articulated_search.catalogue import CATALOGUE
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
-from bench.discrepancy.articulated_search.problem import ArticulatedProblem, placements
+from bench.discrepancy.articulated_search.placements import placements
+from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.articulated_search.search import search
 from bench.discrepancy.articulated_search.torque_error import TorqueProblem, along_motion
 from bench.discrepancy.case.case import Case

@@ -35,12 +35,19 @@ class PlacedOnJoint:
         where: Name of the joint, body or actuator.
         joint: Index of the joint whose runs it changes, or whose encoder it is; of the joint that carries the body.
         scales: Scales of that joint.
+        partner: Index of the neighbour that shares it, if any.
     """
 
     effect: ArticulatedEffect
     where: str
     joint: int
     scales: JointScales
+    partner: int | None = None
+
+    @property
+    def joints(self) -> tuple[int, ...]:
+        """The joint, and the neighbour that shares it."""
+        return (self.joint,) if self.partner is None else (self.joint, self.partner)
 
     @property
     def key(self) -> tuple[str, str]:

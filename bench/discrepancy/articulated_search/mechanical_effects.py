@@ -87,6 +87,18 @@ MECHANICAL_EFFECTS: tuple[ArticulatedEffect, ...] = (
         written(LIMIT="limit_0", CARRIED="mu", CARRIED_BY="of_actuator"),
     ),
     ArticulatedEffect(
+        "coupled_friction",
+        "friction",
+        "pair",
+        (
+            LIMIT,
+            FreeParameter("damping", "force/velocity", mean=math.log(0.1), std=1.5, bounds=(-8.0, 3.0)),
+            FreeParameter("sense", fixed=True, signed=True, grid=(1.0, -1.0), unit="1"),
+        ),
+        "f = Fc sgn(w) + c w on both joints, w = v1 + sense v2: one motor or gear turns with both",
+        written(PAIR_LIMIT="limit", PAIR_DAMPING="damping", PAIR_SENSE="sense"),
+    ),
+    ArticulatedEffect(
         "force_offset",
         "offset",
         "joint",

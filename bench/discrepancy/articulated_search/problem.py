@@ -19,12 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.arrays import Array
-from bench.discrepancy.articulated_search.effect import ArticulatedEffect, JointScales
+from bench.discrepancy.articulated_search.effect import JointScales
 from bench.discrepancy.articulated_search.hypothesis import (
     LOCAL_SLOTS,
     JointHypothesis,
     Nominal,
-    PlacedOnJoint,
     base_slots,
     nominal_parameters,
     placed_values,
@@ -116,7 +115,7 @@ class ArticulatedProblem:
         out: set[int] = set()
         for placed in hypothesis:
             site = placed.effect.site
-            out |= {placed.joint} if site in ("joint", "actuator") else set(range(len(self.joints)))
+            out |= set(placed.joints if site in ("joint", "pair", "actuator") else range(len(self.joints)))
         return tuple(sorted(out))
 
     def entries(self, j: int, hypothesis: JointHypothesis) -> NDArray[np.int64]:
@@ -205,7 +204,7 @@ class ArticulatedProblem:
             entry = self.nominal[i]
             p[LOCAL_SLOTS[entry.kind]] += entry.std * vector[i]
         for placed, eta in zip(hypothesis, self.etas(hypothesis, vector), strict=True):
-            if placed.effect.slots is not None and placed.joint == j:
+            if placed.effect.slots is not None and j in placed.joints:
                 placed.effect.slots(placed_values(placed, eta), p)
         return p
 
@@ -233,8 +232,16 @@ class ArticulatedProblem:
         p[Slot.RATIO] = record.servo_ratio
         return predict(
             p, (inertia, bias, record.slope, record.reference, record.load), record.servo_command, record.step,
-            record.n_sub, (record.position, record.velocity), gain, starts, every,
+            record.n_sub, (record.position, record.velocity), gain, starts, every, self.beside(j, hypothesis, record),
         )  # fmt: skip
+
+    def beside(self, j: int, hypothesis: JointHypothesis, record: JointRecord) -> Array | None:
+        """Velocity (n_steps,) of the neighbour with which joint `j` shares a drive in a hypothesis, if it does."""
+        for placed in hypothesis:
+            if placed.partner is not None and j in placed.joints:
+                (other,) = (i for i in placed.joints if i != j)
+                return record.beside[self.joints[other].name]
+        return None
 
     def coefficients(
         self, record: JointRecord, hypothesis: JointHypothesis, vector: Array
@@ -322,23 +329,3 @@ class ArticulatedProblem:
             float(np.linalg.norm(self.model.tips[joint.body])) or 1.0,
             middle,
         )
-
-
-def placements(problem: ArticulatedProblem, catalogue: Sequence[ArticulatedEffect]) -> list[PlacedOnJoint]:
-    """Every effect at every place where it may sit."""
-    out = []
-    for j, joint in enumerate(problem.joints):
-        scales = problem.scales(j)
-        drive = joint.drive
-        assert drive is not None
-        velocity = problem.records[0].joints[j].n_measured > 1
-        for effect in catalogue:
-            if effect.servo is not None and effect.servo != drive.servo:
-                continue
-            if effect.needs == "velocity" and not velocity:
-                continue
-            where = {"joint": joint.name, "sensor": joint.name, "actuator": drive.name, "body": joint.body}[
-                effect.site
-            ]
-            out.append(PlacedOnJoint(effect, where, j, scales))
-    return out

@@ -20,6 +20,7 @@ from bench.discrepancy.articulated_search.fitting import (
     refitted,
 )
 from bench.discrepancy.articulated_search.hypothesis import JointHypothesis, PlacedOnJoint
+from bench.discrepancy.articulated_search.placements import apart
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.articulated_search.rounds import (
     Round,
@@ -120,7 +121,8 @@ def _open(
     """Candidates that a fit may still be given: not taken, not dropped, at joints with fewer effects than are named of one."""
     taken = {placed.key for placed in current.hypothesis} | set(dropped)
     full = Counter(placed.joint for placed in current.hypothesis)
-    return [c for c in candidates if c.key not in taken and full[c.joint] < settings.most]
+    free = [c for c in candidates if c.key not in taken and full[c.joint] < settings.most]
+    return apart(free, current.hypothesis)
 
 
 def round_of(

@@ -129,8 +129,9 @@ class TorqueProblem(ArticulatedProblem):
         bias, inertia = self.coefficients(record, hypothesis, vector)
         motion, still = self.moved(prepared)[j], self.levels[r].speed[j]
         torque = missing_torque(
-            p, (inertia, bias, record.load), record.servo_command, record.step, motion, still
-        )
+            p, (inertia, bias, record.load), record.servo_command, record.step, motion, still,
+            self.beside(j, hypothesis, record),
+        )  # fmt: skip
         steps = self.intervals[r] * record.n_sub
         whole = torque[: len(torque) // steps * steps].reshape(-1, steps)
         return np.asarray(whole.mean(axis=1) / part)

@@ -75,6 +75,9 @@ class Slot(IntEnum):
     ON_LINK = 37  # 1: damping acts on the link's side of a train
     CARRIED_BY = 38  # 0: friction grows with the torque on the link, 1: with that of the actuator
     INPUT_LAG = 39  # time constant of a filter of the input [s], of a servo that of its target
+    PAIR_LIMIT = 40  # dry friction and damping in what this joint and a neighbour turn together: limit, damping, sense of the neighbour
+    PAIR_DAMPING = 41
+    PAIR_SENSE = 42
 
 
 SLOTS = len(Slot)
@@ -157,6 +160,12 @@ def friction_limit(p, v, load):
 
 
 @inlined
+def pair_friction(p, w):
+    """Friction on what two joints turn together at velocity `w`."""
+    return p[41] * w + (math.copysign(p[40], w) if w != 0.0 else 0.0)
+
+
+@inlined
 def bristle_force_of(p, v, z):
     """Force of the bristles at velocity `v`, and the damping that the step may take implicitly."""
     if p[16] <= 0.0:
@@ -173,6 +182,19 @@ def bristles_slid(p, z, v, step):
         return z
     steady = math.copysign(p[16] / p[17], v)
     return steady + (z - steady) * math.exp(-p[17] * abs(v) * step / p[16])
+
+
+@inlined
+def _kick(p, mass, step, force, damping, implicit, bristle, limit, v, shared):
+    """New velocity of a joint: implicit in what damps it, dry friction by its proximal map, that shared with a neighbour after its own."""
+    inertia = (mass + p[9]) / step
+    a = inertia + 0.5 * (damping + p[41] + implicit) + bristle
+    free = (inertia * v + force - 0.5 * (damping + p[41] - implicit) * v - p[41] * shared) / a
+    new = math.copysign(max(abs(free) - limit / a, 0.0), free)
+    if p[40] > 0.0:
+        both = new + shared
+        new = math.copysign(max(abs(both) - p[40] / a, 0.0), both) - shared
+    return new
 
 
 @inlined
@@ -209,8 +231,8 @@ def _set_anew(p, bias, start, on_link):
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
 def run(
-    p, mass, bias, slope, reference, load, u, step, n_sub, y, v_measured, gain, starts, every, out, states
-):
+    p, mass, bias, slope, reference, load, beside, u, step, n_sub, y, v_measured, gain, starts, every, out, states
+):  # fmt: skip
     """Predict the encoder of one joint sample by sample.
 
     Args:
@@ -220,6 +242,7 @@ def run(
         slope: (n_steps,) its derivative by the position.
         reference: (n_steps,) the position at which it was taken.
         load: (n_steps,) torque that the gear carries (magnitude), for friction that grows with it.
+        beside: (n_steps,) velocity of the neighbour with which the joint shares a drive.
         u: (n_steps,) input.
         step: Length of a step [s].
         n_sub: Steps a sample.
@@ -273,16 +296,14 @@ def run(
             rest = p[15] - bias[k] - slope[k] * (x - reference[k]) - p[7] * (x - p[8]) + stop_force(p, x, w)
             limit = friction_limit(p, v, abs(force) if p[38] > 0.5 else load[k])
             damping = p[6] + p[14] * abs(v)
-            before = v
+            before, shared = v, p[42] * beside[k]
             if train:
+                rest -= pair_friction(p, w + shared)
                 v, vl = _kick_train(
                     p, mass[k], step, own, rest, damping, implicit, bristle, limit, q, v, ql, vl
                 )
             else:
-                inertia = (mass[k] + p[9]) / step
-                a = inertia + 0.5 * (damping + implicit) + bristle
-                free = (inertia * v + own + rest - 0.5 * (damping - implicit) * v) / a
-                v = math.copysign(max(abs(free) - limit / a, 0.0), free)
+                v = _kick(p, mass[k], step, own + rest, damping, implicit, bristle, limit, v, shared)
                 vl = v
             z = bristles_slid(p, z, 0.5 * (before + v), step)
             q += 0.5 * step * v
@@ -299,6 +320,7 @@ def predict(
     gain: NDArray[np.float64],
     starts: NDArray[np.float64],
     every: int | None = None,
+    beside: NDArray[np.float64] | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Run `run`; return innovations (n, 2) and states (n, 4). NaN where it diverged.
 
@@ -312,14 +334,16 @@ def predict(
         gain: (2, 2).
         starts: (n_windows, 2) states at the beginning of every window, or (n_windows, 4), see `run`.
         every: Samples a window; one window where None.
+        beside: Velocity (n_steps,) of the neighbour with which the joint shares a drive; at rest where None.
     """
     n = len(measured[0])
     out, states = np.zeros((n, 2)), np.zeros((n, 4))
     mass, bias, slope, reference, load = arrays
     position, velocity = measured
+    beside = np.zeros(len(u)) if beside is None else beside
     at = np.full((len(np.atleast_2d(starts)), 4), np.nan)
     at[:, : np.shape(starts)[-1]] = starts
     run(
-        p, mass, bias, slope, reference, load, u, step, n_sub, position, velocity, gain, at, every or n, out, states
+        p, mass, bias, slope, reference, load, beside, u, step, n_sub, position, velocity, gain, at, every or n, out, states
     )  # fmt: skip
     return out, states

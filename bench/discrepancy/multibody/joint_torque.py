@@ -20,6 +20,7 @@ from bench.discrepancy.multibody.joint_run import (
     bristles_slid,
     delayed_input,
     friction_limit,
+    pair_friction,
     stop_force,
 )
 
@@ -35,7 +36,7 @@ JOINT_TORQUE_LIMITS = JointTorqueLimits()
 
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
-def _missing(p, mass, bias, load, u, step, motion, still, least, out):
+def _missing(p, mass, bias, load, beside, u, step, motion, still, least, out):
     """Fill `out` (n_steps,), see `missing_torque`."""
     lagged, target, z = math.nan, u[0], 0.0
     keep = math.exp(-step / p[27]) if p[27] > 0.0 else 0.0
@@ -49,6 +50,7 @@ def _missing(p, mass, bias, load, u, step, motion, still, least, out):
         bristles, implicit = bristle_force_of(p, v, z)
         own = force + bristles - implicit * v - p[19] * math.sin(p[20] * q + p[21])
         rest = p[15] - bias[k] - p[7] * (q - p[8]) + stop_force(p, q, v)
+        rest -= pair_friction(p, v + p[42] * beside[k])
         free = own + rest - (p[6] + p[14] * abs(v)) * v - (mass[k] + p[9]) * a
         limit = friction_limit(p, v, abs(force) if p[38] > 0.5 else load[k])
         held = abs(free) if abs(v) < still else limit
@@ -68,6 +70,7 @@ def missing_torque(
     step: float,
     motion: NDArray[np.float64],
     still: float,
+    beside: NDArray[np.float64] | None = None,
 ) -> NDArray[np.float64]:
     """Torque (n_steps,) by which the drive exceeds what the motion takes.
 
@@ -78,10 +81,12 @@ def missing_torque(
         step: Length of a step [s].
         motion: (n_steps, 3) measured position, velocity, acceleration there.
         still: Speed below which a direction is not known.
+        beside: Velocity (n_steps,) of the neighbour with which the joint shares a drive; at rest where None.
     """
     mass, bias, load = arrays
+    beside = np.zeros(len(motion)) if beside is None else beside
     out = np.empty(len(motion))
     _missing(
-        p, mass, bias, load, u, step, np.ascontiguousarray(motion), still, JOINT_TORQUE_LIMITS.least, out
-    )
+        p, mass, bias, load, beside, u, step, np.ascontiguousarray(motion), still, JOINT_TORQUE_LIMITS.least, out
+    )  # fmt: skip
     return out

@@ -8,7 +8,7 @@ apart, since runs of single joints carry them themselves.
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
@@ -125,6 +125,23 @@ class ArticulatedModel:
             if joint.name == name:
                 return joint
         raise UnknownNameError("joint", name, [j.name for j in self.joints])
+
+    def neighbours(self, j: int) -> tuple[str, ...]:
+        """Joints next to joint `j` in the tree: that which carries it, and those that it carries."""
+        bodies = [_index(self.model, joint.body) for joint in self.joints]
+        carriers = [self._carrier(body, bodies) for body in bodies]
+        return tuple(
+            other.name
+            for i, other in enumerate(self.joints)
+            if i != j and (carriers[i] == bodies[j] or carriers[j] == bodies[i])
+        )
+
+    def _carrier(self, body: int, bodies: Sequence[int]) -> int:
+        """The next body with a joint towards the base; zero where there is none."""
+        body = int(self.model.body_parentid[body])
+        while body and body not in bodies:
+            body = int(self.model.body_parentid[body])
+        return body
 
     @property
     def moving(self) -> tuple[Joint, ...]:

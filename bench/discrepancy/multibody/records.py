@@ -52,6 +52,7 @@ class JointRecord:
         payloads: The same for a kilogram at its tip.
         centres: The same (3, 2, n_steps) for a metre of its centre of mass along each axis.
         weights: Body to the change of bias (n_steps,) by its weight.
+        beside: Neighbour in the tree to its velocity (n_steps,).
         sample: Time between samples [s].
         encoder: What is wrong with its encoder.
         weight: (n, n_measured) of the innovations, one where every reading tells something new, see `weight_of_readings`.
@@ -80,6 +81,7 @@ class JointRecord:
     payloads: Mapping[str, Array]
     centres: Mapping[str, Array]
     weights: Mapping[str, Array]
+    beside: Mapping[str, Array]
     sample: float
     weight: Array
     encoder: Encoder = TRUE
@@ -223,7 +225,7 @@ def prepare(
         for body in model.bodies
     }
     weights = {body: clock.between(model.weight(body, motion.position)) for body in model.bodies}
-    slope = clock.between(model.slopes(*moved))
+    slope, speeds = clock.between(model.slopes(*moved)), clock.between(motion.velocity)
     process = torque_noise(model, motion, clock, record.step)
     joints = []
     for j, joint in enumerate(model.joints):
@@ -236,7 +238,8 @@ def prepare(
                 base.reference[j], base.load[j], _input(case, record, channel, clock), *_measured(motion, j),
                 encoders_of(case, joint).channels[0].side, float(np.hypot(stated, process[j])),
                 {b: c[j] for b, c in masses.items()}, {b: c[j] for b, c in payloads.items()},
-                {b: np.ascontiguousarray(c[:, j]) for b, c in centres.items()}, {b: c[j] for b, c in weights.items()}, record.step,
+                {b: np.ascontiguousarray(c[:, j]) for b, c in centres.items()}, {b: c[j] for b, c in weights.items()},
+                beside_of(model, j, speeds), record.step,
                 weights_of(case, record, joint),
             )
         )  # fmt: skip
@@ -255,7 +258,7 @@ def corrected(
     motion = motion_of(case, model, prepared.record, encoders, prepared.motion, settings=settings.motion)
     clock = clock_of(prepared.record, settings=settings.articulated)
     dynamics = model.dynamics(motion.position, motion.velocity, motion.acceleration)
-    now = Coefficients.of(dynamics, motion, clock)
+    now, speeds = Coefficients.of(dynamics, motion, clock), clock.between(motion.velocity)
     joints = []
     for j, old in enumerate(prepared.joints):
         position, velocity, noise, start = _measured(motion, j)
@@ -269,6 +272,7 @@ def corrected(
             replace(
                 old, inertia=new.inertia[j] + old.joint.armature, bias=new.bias[j], reference=new.reference[j], load=new.load[j],
                 command=command, position=position, velocity=velocity, noise=noise, start=start, encoder=wrong,
+                beside=beside_of(model, j, speeds),
             )
         )  # fmt: skip
     return PreparedRecord(prepared.record, motion, tuple(joints))
@@ -310,6 +314,12 @@ def relinked(
         for j, old in enumerate(prepared.joints)
     ]  # fmt: skip
     return PreparedRecord(prepared.record, prepared.motion, tuple(joints))
+
+
+def beside_of(model: ArticulatedModel, j: int, speeds: Array) -> dict[str, Array]:
+    """Velocities (n_steps,) of the neighbours of joint `j`, from those of all (n_joints, n_steps)."""
+    names = model.neighbours(j)
+    return {name: speeds[i] for i, joint in enumerate(model.joints) if (name := joint.name) in names}
 
 
 def _measured(motion: JointMotion, j: int) -> tuple[Array, Array, Array, Array]:

@@ -14,7 +14,8 @@ from bench.arrays import Array
 from bench.discrepancy.articulated.free_runs import FreeRuns
 from bench.discrepancy.articulated_search.catalogue import CATALOGUE
 from bench.discrepancy.articulated_search.hypothesis import PlacedOnJoint
-from bench.discrepancy.articulated_search.problem import ArticulatedProblem, placements
+from bench.discrepancy.articulated_search.placements import placements
+from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.articulated_search.screening import grid
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.multibody.model import ArticulatedModel

@@ -1,0 +1,49 @@
+"""Every effect at every place of an articulated model where it may sit."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+from bench.discrepancy.articulated_search.effect import ArticulatedEffect, JointScales
+from bench.discrepancy.articulated_search.hypothesis import PlacedOnJoint
+from bench.discrepancy.articulated_search.problem import ArticulatedProblem
+
+AND = "+"
+"""Between the names of two joints that share an effect."""
+
+
+def placements(problem: ArticulatedProblem, catalogue: Sequence[ArticulatedEffect]) -> list[PlacedOnJoint]:
+    """Every effect at every place where it may sit: joints, neighbours, bodies, drives, encoders."""
+    out = list[PlacedOnJoint]()
+    for j in range(len(problem.joints)):
+        scales = problem.scales(j)
+        for effect in catalogue:
+            out += _at(problem, effect, j, scales)
+    return out
+
+
+def _at(
+    problem: ArticulatedProblem, effect: ArticulatedEffect, j: int, scales: JointScales
+) -> list[PlacedOnJoint]:
+    """The places of an effect at joint `j`; of two neighbours it belongs to the first."""
+    joint = problem.joints[j]
+    drive = joint.drive
+    assert drive is not None
+    if effect.servo is not None and effect.servo != drive.servo:
+        return []
+    if effect.needs == "velocity" and problem.records[0].joints[j].n_measured < 2:
+        return []
+    if effect.site == "pair":
+        near = problem.model.neighbours(j)
+        later = [i for i, other in enumerate(problem.joints) if i > j and other.name in near]
+        return [
+            PlacedOnJoint(effect, f"{joint.name}{AND}{problem.joints[i].name}", j, scales, i) for i in later
+        ]
+    names = {"joint": joint.name, "sensor": joint.name, "actuator": drive.name, "body": joint.body}
+    return [PlacedOnJoint(effect, names[effect.site], j, scales)]
+
+
+def apart(candidates: Sequence[PlacedOnJoint], taken: Collection[PlacedOnJoint]) -> list[PlacedOnJoint]:
+    """Candidates without the pairs of joints one of which shares a drive already."""
+    shared = {j for placed in taken if placed.partner is not None for j in placed.joints}
+    return [c for c in candidates if c.partner is None or not shared & set(c.joints)]
