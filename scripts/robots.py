@@ -15,9 +15,10 @@ import json
 import sys
 import tempfile
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
+import numpy as np
 import tyro
 from rich.console import Console
 from rich.table import Table
@@ -25,11 +26,14 @@ from rich.table import Table
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "scripts"))
 
-from robot_records.case_folders import write_folder  # noqa: E402
+from robot_records.case_folders import Records, write_folder  # noqa: E402
 from robot_records.robots import ROBOTS  # noqa: E402
 
 from bench.discrepancy import read_case  # noqa: E402
-from bench.discrepancy.articulated.diagnosis import diagnose_articulated  # noqa: E402
+from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis, diagnose_articulated  # noqa: E402
+from bench.discrepancy.articulated.free_runs import FreeRuns  # noqa: E402
+from bench.discrepancy.articulated_search.hypothesis import JointHypothesis  # noqa: E402
+from bench.discrepancy.articulated_search.problem import ArticulatedProblem  # noqa: E402
 from bench.errors import BenchError, UnknownNameError  # noqa: E402
 from bench.files import json_values, write_text  # noqa: E402
 
@@ -62,6 +66,8 @@ class Row:
         complete: Whether nothing more is missing.
         seconds: Processor time [s].
         known: What is published.
+        further: Joint to the RMS errors [rad, m] of free runs of records that neither found nor judged, as stated and with what is named,
+            a pair for every record.
     """
 
     robot: str
@@ -75,6 +81,7 @@ class Row:
     complete: bool
     seconds: float
     known: str
+    further: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
 
 
 def row_of(name: str, data: Path) -> Row:
@@ -84,20 +91,48 @@ def row_of(name: str, data: Path) -> Row:
     with tempfile.TemporaryDirectory() as folder:
         write_folder(records, Path(folder))
         try:
-            verdict = diagnose_articulated(read_case(folder), anyway=True, most=records.most).verdict
+            found = diagnose_articulated(read_case(folder), anyway=True, most=records.most)
         except BenchError as error:
             nan = float("nan")
             return Row(
                 name, str(error), {}, {}, nan, nan, nan, {}, False, time.process_time() - began, records.known
             )
+        verdict = found.verdict
+        further = _further(records, found) if records.further else {}
     labels = [f"{e.name} ({e.where})" for e in verdict.named]
     return Row(
         name, verdict.verdict, dict(zip(labels, (float(e.closed) for e in verdict.named), strict=True)),
         {label: {k: float(x.value) for k, x in e.parameters.items()} for label, e in zip(labels, verdict.named, strict=True)},
         verdict.gap.before, verdict.gap.after, verdict.gap.noise_floor,
         {g.dof: (g.before, g.after, g.noise_floor) for g in verdict.gaps}, verdict.complete, time.process_time() - began,
-        records.known,
+        records.known, further,
     )  # fmt: skip
+
+
+def _further(records: Records, found: ArticulatedDiagnosis) -> dict[str, list[tuple[float, float]]]:
+    """Errors in further records, see `Row.further`."""
+    with tempfile.TemporaryDirectory() as folder:
+        write_folder(replace(records, validation=records.further), Path(folder))
+        case = read_case(folder)
+        problem = ArticulatedProblem.of(case, found.model, case.validation)
+        nominal = np.zeros(len(problem.nominal))
+        runs = [
+            errors_of(problem, h, v) for h, v in (((), nominal), (found.final.hypothesis, found.final.vector))
+        ]
+    return {
+        joint.name: [(float(a[j]), float(b[j])) for a, b in zip(*runs, strict=True)]
+        for j, joint in enumerate(problem.joints)
+    }
+
+
+def errors_of(problem: ArticulatedProblem, hypothesis: JointHypothesis, vector: np.ndarray) -> np.ndarray:
+    """RMS errors (n_records, n_joints) of free runs."""
+    runs = FreeRuns(problem.settled(hypothesis, vector))
+    motions = runs.problem.motions(hypothesis, vector)
+    joints = range(len(problem.joints))
+    return np.array(
+        [[np.sqrt(np.mean(runs.errors(j, hypothesis, vector, m) ** 2)) for j in joints] for m in motions]
+    )
 
 
 def main(args: Args) -> None:
@@ -123,7 +158,14 @@ def main(args: Args) -> None:
         named = ", ".join(f"{k} {100.0 * share:.0f} %" for k, share in row.named.items())
         numbers = [f"{x:.3g}" for x in (row.before, row.after, row.floor)]
         shown.add_row(row.robot, row.verdict, named, *numbers, f"{row.seconds:.0f}", row.known)
-    Console(width=180).print(shown)
+    console = Console(width=180)
+    console.print(shown)
+    for row in rows:
+        for joint, pairs in row.further.items():
+            before, after = (1e3 * np.median([pair[k] for pair in pairs]) for k in (0, 1))
+            console.print(
+                f"{row.robot}, {joint}: {before:.1f} -> {after:.1f} mrad, median over {len(pairs)} further records"
+            )
 
 
 if __name__ == "__main__":

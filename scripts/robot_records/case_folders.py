@@ -56,6 +56,7 @@ class Records:
         held: Joints that are held, see ``"joints"`` of nominal.json.
         known: What is published or was seen of the robot, a sentence.
         most: Most effects named together.
+        further: Tables that neither find nor judge, on which the model is run as stated and with what was named.
     """
 
     model: str
@@ -70,6 +71,7 @@ class Records:
     )
     held: Mapping[str, float | str] = field(default_factory=dict)
     most: int = 3
+    further: Sequence[Mapping[str, Array]] = ()
 
 
 def table(path: Path) -> dict[str, Array]:

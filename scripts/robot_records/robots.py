@@ -21,12 +21,10 @@ SO101_FINDING = (
     "single_joint_wrist_pitch", "reach_and_return", "figure_eight", "pick_place", "diagonal_sweep",
 )  # fmt: skip
 SO101_JUDGING = (
-    "boundary_exploration",
-    "hold_under_gravity",
-    "coupled_joints",
-    "square_pattern",
-    "spiral_motion",
-)
+    "boundary_exploration", "hold_under_gravity", "coupled_joints", "square_pattern", "spiral_motion", "chirp_sweep",
+    "dual_joint_rotation_pitch", "inertia_coupling", "oscillation_med_freq", "prbs_excitation", "ramp_motion", "sinusoidal_sweep",
+    "slow_precision", "triangle_wave", "velocity_ramp",
+)  # fmt: skip
 LONGEST = 12.0
 """Seconds of a motion that are used: a minute of each would take an hour."""
 
@@ -52,7 +50,7 @@ def so101(data: Path) -> Records:
     return Records(
         (folder / "model_joints_properties.xml").read_text(), axes, [read[n] for n in SO101_FINDING[:3]],
         [read[n] for n in SO101_JUDGING[:2]], 50.0, True, "friction against gravity, play of a degree, a zero that is off",
-        held={"gripper": "hold"},
+        held={"gripper": "hold"}, further=[short(table(folder / "motions" / f"{n}.parquet"), 1e3, 5.0) for n in SO101_JUDGING],
     )  # fmt: skip
 
 
