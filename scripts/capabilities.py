@@ -29,10 +29,10 @@ from diagnosis_figures import (
     native_effects,
     pendulum,
     planted,
-    robots,
     sealed,
     ten_minutes,
 )
+from robot_figures import robots
 
 
 @dataclass(frozen=True)

@@ -203,17 +203,3 @@ def ten_minutes(told: Any) -> Figures:
         figure = f"{row['seconds']:.0f} s, {len(row['steps'])} commands: {names}; {row.get('line', 'no corrected model')}"
         rows.append((row["machine"], figure, "≤ 600 s", "holds" if row["held"] else "**misses**"))
     return rows
-
-
-def robots(told: Any) -> Figures:
-    """Public records of robots."""
-    rows = []
-    for row in told:
-        what = f"{row['robot']} ({row['known']}): NRMSE of the worst joint"
-        if row["before"] is None:  # refused: the verdict says why
-            rows.append((what, row["verdict"], ""))
-            continue
-        names = ", ".join(f"{name} {100.0 * share:.0f} %" for name, share in row["named"].items())
-        figure = f"{row['before']:.3g} → {row['after']:.3g}, noise {row['floor']:.3g}, {row['seconds']:.0f} s: {names or row['verdict']}"
-        rows.append((what, figure, ""))
-    return rows

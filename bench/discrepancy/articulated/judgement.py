@@ -209,7 +209,8 @@ def better(before: PredictedErrors, after: PredictedErrors, settings: JudgementS
     gained = before.excess - after.excess
     if _sure(gained, settings):
         return True
-    factors = np.log(before.compared.sum(axis=1) / np.maximum(after.compared.sum(axis=1), 1e-300))
+    first, last = (np.maximum(p.compared.sum(axis=1), 1e-300) for p in (before, after))
+    factors = np.log(first / last)
     return float(np.mean(gained)) > float(np.mean(after.excess)) and _sure(factors, settings)
 
 
