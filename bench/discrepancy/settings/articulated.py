@@ -130,10 +130,10 @@ class ArticulatedJudgementSettings:
     small: float = setting(
         0.05,
         (
-            "Part of the discrepancy that a further effect has to close where it does not complete the explanation, the "
-            "accuracy to which laws of friction hold on real joints."
+            "Accuracy to which laws of friction hold on real joints: a further effect that does not complete the explanation has to "
+            "close more of the judging records' NRMSE, and in the search more of the power or of the misfit."
         ),
-        "Convention.",
+        "A few per cent of the friction is what published fits leave.",
     )
 
 
