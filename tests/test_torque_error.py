@@ -12,6 +12,8 @@ from scipy.signal import butter, sosfiltfilt
 from test_articulated import KP, RATE, mjcf, problem_of, write_case
 
 from bench.discrepancy import read_case
+from bench.discrepancy.application.applying import Findings
+from bench.discrepancy.application.verification import verify
 from bench.discrepancy.articulated.diagnosis import diagnose_articulated
 from bench.discrepancy.articulated.free_runs import FreeRuns
 from bench.discrepancy.articulated.judgement import predict
@@ -22,6 +24,7 @@ from bench.discrepancy.articulated_search.rounds import sound
 from bench.discrepancy.articulated_search.torque_error import TorqueProblem, along_motion
 from bench.discrepancy.multibody.joint_run import SLOTS, Slot
 from bench.discrepancy.multibody.joint_torque import missing_torque
+from bench.discrepancy.report.answers import answers, level
 
 FRICTION, DAMPING, STATED = 1.5, 0.8, 0.1
 """Of the elbow, beside a weight of 0.6 N m: Coulomb friction, damping, and the damping as stated."""
@@ -89,6 +92,15 @@ def test_friction_and_damping_of_a_model_that_runs_away_are_found_with_their_siz
     assert gap.before > 0.8
     assert gap.after < 0.1
     assert not verdict.complete
+    # what free runs miss is told beside it, and is what the corrected model misses in MuJoCo
+    before, after, _ = gap.free_runs
+    assert before > 1.0
+    assert f"free runs {level(before)} → {level(after)}" in dict(answers(verdict))["How far"]
+    put = verify(
+        stiff / "model.xml", Findings(verdict.named, verdict.nominal), verdict.gaps, read_case(stiff)
+    )
+    assert put.worst.dof == "elbow"
+    assert abs(put.worst.short) < 0.1
 
 
 def test_a_joint_made_heavier_explains_no_torque(stiff):

@@ -166,6 +166,8 @@ class Gap:
         closed_ci95: Block-bootstrap interval of `closed`.
         steps: The gap after each effect in turn: (name, gap).
         dof: Degree of freedom.
+        free_runs: NRMSE of the position in free runs before and after, and what noise leaves of it, where the gap is one of the torque;
+            else empty.
     """
 
     metric: str
@@ -177,6 +179,13 @@ class Gap:
     closed_ci95: tuple[float, float]
     steps: tuple[tuple[str, float], ...] = ()
     dof: str = ""
+    free_runs: tuple[float, ...] = ()
+
+
+def of_runs(gap: Gap) -> tuple[float, float, float]:
+    """What free runs miss before and after, and what noise leaves of them: a gap's own numbers where it is one of free runs."""
+    before, after, floor = gap.free_runs or (gap.before, gap.after, gap.noise_floor)
+    return before, after, floor
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from bench.discrepancy.application.target import PREFIX, as_mujoco
 from bench.discrepancy.articulated_search.catalogue import CATALOGUE
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.multibody.channels import bound
-from bench.discrepancy.multibody.encoders import Encoder, input_of
+from bench.discrepancy.multibody.encoders import Encoder, input_of, travel
 from bench.discrepancy.multibody.model import ArticulatedModel, Joint
 from bench.discrepancy.multibody.motion import JointMotion, motion_of
 from bench.discrepancy.multibody.records import RECORDS_SETTINGS
@@ -94,15 +94,15 @@ class JointReplay:
         for j, joint in enumerate(self.model.joints):
             held = _held(applied, joint.name, reference)
             factor = 1.0 + wrong.get(joint.name, Encoder()).gain
+            size = travel(self.case, joint, max(float(np.max(logged.noise[j])) for logged in raw))
             for record, motion, logged in zip(self.case.validation, motions, raw, strict=True):
                 error = self._error(applied, held, j, record, motion, wrong)
-                size = max(float(np.std(logged.samples[j][:, 0])), float(np.max(logged.noise[j])))
                 measured = logged.samples[j][:, 0]
                 found[joint.name].append(Reading(measured, measured - factor * error, size))
         return found
 
     def errors(self, applied: Applied, effects: Sequence[NamedEffect]) -> dict[str, Array]:
-        """Simulated less measured positions over the standard deviation of the measured, by joint, all judging records in a row."""
+        """Simulated less measured positions over the travel of the joint, by joint, all judging records in a row."""
         far = SETTINGS.far_off
         return {
             name: np.clip(

@@ -15,7 +15,7 @@ from bench.discrepancy.application.verification import (
     root_mean_square,
 )
 from bench.discrepancy.case.case import Case
-from bench.discrepancy.verdict import Location, Verdict
+from bench.discrepancy.verdict import Location, Verdict, of_runs
 from bench.errors import BenchError
 
 SIMULATOR = "simulator"
@@ -51,19 +51,20 @@ def with_simulator(verdict: Verdict, case: Case, settings: VerificationSettings 
         return verdict
     worst = max(
         (gap for gap in verdict.gaps if gap.dof in runs[0]),
-        key=lambda gap: gap.before / max(gap.noise_floor, 1e-12),
+        key=lambda gap: of_runs(gap)[0] / max(of_runs(gap)[2], 1e-12),
         default=None,
     )
     if worst is None:
         return verdict
+    before, _, floor = of_runs(worst)
     share = root_mean_square(runs[0][worst.dof] - runs[1][worst.dof])
-    if not share > max(own.matters * worst.before, worst.noise_floor):
+    if not share > max(own.matters * before, floor):
         return verdict
     record = case.validation[0]
     place = Location(
         SIMULATOR,
         worst.dof,
-        min(share / max(worst.before, 1e-12), 1.0),
+        min(share / max(before, 1e-12), 1.0),
         (0.0, 0.5 / record.step),
         (0.0, record.step * (len(record) - 1)),
         p_value=0.0,
@@ -71,7 +72,7 @@ def with_simulator(verdict: Verdict, case: Case, settings: VerificationSettings 
     )
     text = (
         f"the simulator itself: your model run with its step of {step:.3g} s, {integrator} and its soft friction moves otherwise by "
-        f"{share:.3g} (NRMSE) than the same model converged, of a gap of {worst.before:.3g}: what is named here is missing from the "
+        f"{share:.3g} (NRMSE) than the same model converged, of a gap of {before:.3g}: what is named here is missing from the "
         "converged model; use a smaller step or RK4, or a harder solreffriction"
     )
     return replace(verdict, locations=(*verdict.locations, place), warnings=(text, *verdict.warnings))

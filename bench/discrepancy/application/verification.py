@@ -27,7 +27,7 @@ from bench.discrepancy.case.case import Case
 from bench.discrepancy.checks.initial_motion import with_starts_found
 from bench.discrepancy.effects.catalogue import CATALOGUE as LINEAR
 from bench.discrepancy.model.rigs import structure_of
-from bench.discrepancy.verdict import Gap
+from bench.discrepancy.verdict import Gap, of_runs
 from bench.errors import BenchError, ModelError
 
 
@@ -184,9 +184,7 @@ def verify(
     def figures(options: RunOptions) -> tuple[Figure, ...]:
         before, after = errors(nothing, options), errors(findings, options)
         return tuple(
-            Figure(
-                g.dof, root_mean_square(before[g.dof]), root_mean_square(after[g.dof]), g.after, g.noise_floor
-            )
+            Figure(g.dof, root_mean_square(before[g.dof]), root_mean_square(after[g.dof]), *of_runs(g)[1:])
             for g in gaps
             if g.dof in before
         )

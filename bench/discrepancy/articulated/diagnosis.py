@@ -14,7 +14,7 @@ import numpy as np
 
 from bench.arrays import Array
 from bench.discrepancy.articulated.admission import admitted_robot
-from bench.discrepancy.articulated.judgement import kept, predict, without_each
+from bench.discrepancy.articulated.judgement import kept, noise_floor, predict, without_each
 from bench.discrepancy.articulated.naming import closest_rival, verdict_of
 from bench.discrepancy.articulated.next_test import Trajectory, propose
 from bench.discrepancy.articulated.places import matrix_of
@@ -136,7 +136,7 @@ def diagnose_articulated(
         left=left,
     )
     verdict = replace(
-        verdict,
+        _with_free_runs(verdict, judging, final, judged) if away else verdict,
         warnings=(
             *far_off(verdict.nominal, settings.judgement.far),
             *verdict.warnings,
@@ -201,6 +201,20 @@ def _run_away(problem: ArticulatedProblem, settings: JudgementSettings) -> list[
     off = predict(problem, None, np.zeros(len(problem.joints)), settings).discrepancy
     driven = [j.drive is not None and not j.drive.servo for j in problem.joints]
     return [j for j, (error, torque) in enumerate(zip(off, driven, strict=True)) if torque and error > 1.0]
+
+
+def _with_free_runs(
+    verdict: Verdict, judging: ArticulatedProblem, final: ArticulatedFit, settings: JudgementSettings
+) -> Verdict:
+    """The verdict with what free runs miss beside what the torque does."""
+    floor = noise_floor(judging, final, settings)
+    before, after = (predict(judging, found, floor, settings).discrepancy for found in (None, final))
+    told = {
+        joint.name: (float(before[j]), float(after[j]), float(floor[j]))
+        for j, joint in enumerate(judging.joints)
+    }
+    gaps = tuple(replace(gap, free_runs=told[gap.dof]) for gap in verdict.gaps)
+    return replace(verdict, gaps=gaps, gap=next(gap for gap in gaps if gap.dof == verdict.gap.dof))
 
 
 def _torques(problem: ArticulatedProblem, away: list[int]) -> tuple[str, ...]:

@@ -14,7 +14,7 @@ from scipy.interpolate import CubicSpline
 from bench.arrays import Array
 from bench.discrepancy.articulated_search.hypothesis import JointHypothesis
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
-from bench.discrepancy.multibody.encoders import encoders_of, input_of
+from bench.discrepancy.multibody.encoders import input_of, travel
 from bench.discrepancy.multibody.joint_run import Slot
 from bench.discrepancy.multibody.motion import clock_of
 from bench.discrepancy.multibody.noise import NoiseDraw, NoiseSettings, draw
@@ -53,17 +53,14 @@ class FreeRuns:
 
     @cached_property
     def sizes(self) -> Array:
-        """What errors of the joints (n_joints,) are divided by: their motion, RMS over all records of the case, at least the noise.
-
-        A joint that rests in one record is not off by more for that.
-        """
-        case, sizes = self.problem.case, list[float]()
-        for j, joint in enumerate(self.problem.joints):
-            (channel, *_) = encoders_of(case, joint).channels
-            moved = [np.var(r.values[channel.name]) for r in (*case.identification, *case.validation)]
-            noise = max(float(np.max(r.joints[j].noise)) for r in self.problem.records)
-            sizes.append(max(float(np.sqrt(np.mean(moved))), noise))
-        return np.array(sizes)
+        """What errors of the joints (n_joints,) are divided by, see `travel`."""
+        problem = self.problem
+        noise = [
+            max(float(np.max(r.joints[j].noise)) for r in problem.records) for j in range(len(problem.joints))
+        ]
+        return np.array(
+            [travel(problem.case, joint, one) for joint, one in zip(problem.joints, noise, strict=True)]
+        )
 
     def metric(self, j: int) -> str:
         """What is told of joint `j`, in words."""

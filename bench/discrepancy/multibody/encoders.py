@@ -72,6 +72,16 @@ class Encoders(NamedTuple):
     noise: Array
 
 
+def travel(case: Case, joint: Joint, noise: float) -> float:
+    """What errors of a joint's position are divided by: its motion, RMS over all records of the case, at least the noise.
+
+    A joint that rests in one record is not off by more for that.
+    """
+    (channel, *_) = encoders_of(case, joint).channels
+    moved = [np.var(r.values[channel.name]) for r in (*case.identification, *case.validation)]
+    return max(float(np.sqrt(np.mean(moved))), noise)
+
+
 def encoders_of(case: Case, joint: Joint) -> Encoders:
     """The channels that measure a joint.
 

@@ -112,9 +112,13 @@ def _which(verdict: Verdict) -> str:
 def _how_far(verdict: Verdict, settings: JudgementSettings) -> str:
     gap = verdict.gap
     place = f" of {gap.dof}" if gap.dof else ""
+    runs = ""
+    if gap.free_runs:
+        before, after, _ = gap.free_runs
+        place, runs = f" of the torque of {gap.dof}", f"; free runs {level(before)} → {level(after)}"
     return (
         f"{level(gap.before)} → {level(gap.after)} (NRMSE{place}; noise alone {level(gap.noise_floor)}); "
-        f"closed: {closed_words(gap, settings=settings)}"
+        f"closed: {closed_words(gap, settings=settings)}{runs}"
     )
 
 
