@@ -181,6 +181,8 @@ def _climbed(
     little of the form of the law that is not right.
     """
     last, waiting, doubtful = 0, list[PlacedOnJoint](), list[PlacedOnJoint]()
+    # of a torque, a law that is off by a part leaves the square of it; what it makes of a free run piles up
+    least_part = settings.small**2 if isinstance(problem, TorqueProblem) else settings.small
     for k in range(1, len(rungs)):
         # of what is complete to the accuracy of the stated noise, records may still tell more than that accuracy
         likelier = rungs[k].log_posterior - rungs[last].log_posterior
@@ -190,7 +192,7 @@ def _climbed(
         at = problem.reached((placed,))
         first, before, after = (p.of(at) for p in (predictions[0], predictions[last], predictions[k]))
         gained, left = float(np.mean(before.excess - after.excess)), float(np.mean(after.excess))
-        small = 0.0 if not last or complete(problem, rungs[k], settings) else settings.small**2
+        small = 0.0 if not last or complete(problem, rungs[k], settings) else least_part
         least = max(left if last else 0.0, small * float(np.mean(first.excess)))
         follows = bool(np.all(after.discrepancy < 1.0))
         if follows and gained > least and better(before, after, settings):

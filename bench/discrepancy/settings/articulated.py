@@ -131,7 +131,7 @@ class ArticulatedJudgementSettings:
         0.05,
         (
             "Accuracy to which laws of friction hold on real joints: a further effect that does not complete the explanation has to "
-            "close more of the judging records' NRMSE, and in the search more of the power or of the misfit."
+            "close more of a torque, or of the squared error of free runs; in the search more of the power or of the misfit."
         ),
         "A few per cent of the friction is what published fits leave.",
     )
