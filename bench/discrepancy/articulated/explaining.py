@@ -1,0 +1,170 @@
+"""An articulated model's records explained: by runs of its joints, or by their torque where runs tell nothing.
+
+Runs of a model that is nearly right tell most. One without the friction of its gears runs away within half a second, and of a slow or badly
+timed log the timing errors are larger than what friction makes of a run. There the torque along the measured motion is asked
+(`bench.discrepancy.articulated_search.torque_error`), first or after runs have named nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bench.discrepancy.articulated.judgement import (
+    PredictedErrors,
+    kept,
+    noise_floor,
+    predict,
+    without_each,
+)
+from bench.discrepancy.articulated.naming import verdict_of
+from bench.discrepancy.articulated.whiteness import coloured
+from bench.discrepancy.articulated_search.fitting import ArticulatedFit
+from bench.discrepancy.articulated_search.hypothesis import PlacedOnJoint
+from bench.discrepancy.articulated_search.problem import ArticulatedProblem
+from bench.discrepancy.articulated_search.search import search
+from bench.discrepancy.articulated_search.torque_error import TorqueProblem, along_motion
+from bench.discrepancy.settings import ArticulatedSearchSettings as SearchSettings
+from bench.discrepancy.verdict import Verdict
+
+
+@dataclass(frozen=True, eq=False)
+class Explained:
+    """What the records say.
+
+    Attributes:
+        problem: Records for identification, as they were asked.
+        judging: Records for judging, for free runs.
+        fits: All fitted hypotheses, the likeliest first.
+        final: The one behind the verdict.
+        predictions: Of the ladder that leads to it.
+        verdict: The verdict, without what is said of the case.
+    """
+
+    problem: ArticulatedProblem
+    judging: ArticulatedProblem
+    fits: list[ArticulatedFit]
+    final: ArticulatedFit
+    predictions: Sequence[PredictedErrors]
+    verdict: Verdict
+
+
+def explained(
+    problem: ArticulatedProblem,
+    judging: ArticulatedProblem,
+    candidates: Sequence[PlacedOnJoint],
+    settings: SearchSettings,
+    rng: np.random.Generator,
+    *,
+    stated: bool,
+    progress: Callable[[str], None],
+) -> Explained:
+    """Explain records by runs, by the torque where the model as stated runs away, and where runs have named nothing.
+
+    Args:
+        problem: Records for identification.
+        judging: Records for judging.
+        candidates: Effects at places.
+        settings: Of the search.
+        rng: For the bootstrap intervals.
+        stated: Whether the noise of the responses is stated.
+        progress: Called with a line of text at every stage.
+    """
+
+    def asked(how: ArticulatedProblem, mine: Sequence[PlacedOnJoint]) -> Explained:
+        return _explained(how, judging, mine, settings, rng, stated=stated, progress=progress)
+
+    away = _run_away(problem)
+    found = None if away else asked(problem, candidates)
+    if found is not None and not _asks_torque(found):
+        return found
+    progress("the torque along the measured motion")
+    by_torque = asked(TorqueProblem.like(problem), along_motion(candidates))
+    if found is not None and by_torque.verdict.verdict != "effect":
+        return found
+    told = _with_free_runs(by_torque, judging)
+    return replace(by_torque, verdict=replace(told, warnings=(*told.warnings, _words(away))))
+
+
+def _explained(
+    problem: ArticulatedProblem,
+    judging: ArticulatedProblem,
+    candidates: Sequence[PlacedOnJoint],
+    settings: SearchSettings,
+    rng: np.random.Generator,
+    *,
+    stated: bool,
+    progress: Callable[[str], None],
+) -> Explained:
+    """The same by runs, or by the torque of a `TorqueProblem`, whose explanations are never complete."""
+    judged = problem.settings.articulated.judgement
+    problem, fits = search(problem, candidates, settings=settings, progress=progress)
+    judging = judging.softened(problem.softness)
+    told_by = like(problem, judging)
+    progress("judging records")
+    rungs, last, predictions, more = kept(problem, told_by, fits, judged)
+    fits = [*fits, *more]
+    floor, final = predictions[0].floor, rungs[last]
+    verdict = verdict_of(
+        problem, fits, rungs, last, predict(told_by, None, floor, judged), predictions,
+        without_each(told_by, fits, final, floor, judged), judged, rng,
+        stated=stated and told_by is judging, left=coloured(judging, final, judged),
+    )  # fmt: skip
+    return Explained(problem, judging, fits, final, predictions, verdict)
+
+
+def _asks_torque(found: Explained) -> bool:
+    """Whether runs have named nothing of a robot whose torques were logged, and time is left to ask these."""
+    driven = all(joint.drive is not None and not joint.drive.servo for joint in found.problem.joints)
+    unknown = found.verdict.verdict == "unknown"
+    return (
+        driven
+        and unknown
+        and found.problem.deadline.allows("what the torque along the measured motion tells")
+    )
+
+
+def like(problem: ArticulatedProblem, other: ArticulatedProblem) -> ArticulatedProblem:
+    """Other records, asked as those of a problem are."""
+    return TorqueProblem.like(other) if isinstance(problem, TorqueProblem) else other
+
+
+def _run_away(problem: ArticulatedProblem) -> list[str]:
+    """Joints whose torque was logged and whose free runs, as the model is stated, end further off than they move."""
+    judged = problem.settings.articulated.judgement
+    off = predict(problem, None, np.zeros(len(problem.joints)), judged).discrepancy
+    return [
+        joint.name
+        for joint, error in zip(problem.joints, off, strict=True)
+        if joint.drive is not None and not joint.drive.servo and error > 1.0
+    ]
+
+
+def _with_free_runs(found: Explained, judging: ArticulatedProblem) -> Verdict:
+    """The verdict with what free runs miss beside what the torque does."""
+    judged = judging.settings.articulated.judgement
+    floor = noise_floor(judging, found.final, judged)
+    before, after = (predict(judging, fit, floor, judged).discrepancy for fit in (None, found.final))
+    told = {
+        joint.name: (float(before[j]), float(after[j]), float(floor[j]))
+        for j, joint in enumerate(judging.joints)
+    }
+    gaps = tuple(replace(gap, free_runs=told[gap.dof]) for gap in found.verdict.gaps)
+    widest = next(gap for gap in gaps if gap.dof == found.verdict.gap.dof)
+    return replace(found.verdict, gaps=gaps, gap=widest)
+
+
+def _words(away: list[str]) -> str:
+    """Why the torque was asked."""
+    names = ", ".join(f"'{name}'" for name in away)
+    why = (
+        f"the model as stated runs further off within half a second than it moves (joint {names})"
+        if away
+        else "free runs tell of no effect that is missing"
+    )
+    return (
+        f"{why}: what it misses was read off the torque along the measured motion, for whose parameters the smoothed motion was taken to "
+        "be right"
+    )
