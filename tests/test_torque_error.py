@@ -17,11 +17,11 @@ from bench.discrepancy.application.verification import verify
 from bench.discrepancy.articulated.diagnosis import diagnose_articulated
 from bench.discrepancy.articulated.free_runs import FreeRuns
 from bench.discrepancy.articulated.judgement import predict
+from bench.discrepancy.articulated.torque_error import TorqueProblem, along_motion
 from bench.discrepancy.articulated_search.catalogue import CATALOGUE
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.placements import placements
 from bench.discrepancy.articulated_search.rounds import sound
-from bench.discrepancy.articulated_search.torque_error import TorqueProblem, along_motion
 from bench.discrepancy.multibody.joint_run import SLOTS, Slot
 from bench.discrepancy.multibody.joint_torque import missing_torque
 from bench.discrepancy.report.answers import answers, level

@@ -2,7 +2,7 @@
 
 Runs of a model that is nearly right tell most. One without the friction of its gears runs away within half a second, and of a slow or badly
 timed log the timing errors are larger than what friction makes of a run. There the torque along the measured motion is asked
-(`bench.discrepancy.articulated_search.torque_error`), first or after runs have named nothing.
+(`bench.discrepancy.articulated.torque_error`), first or after runs have named nothing.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from bench.discrepancy.articulated.judgement import (
     without_each,
 )
 from bench.discrepancy.articulated.naming import verdict_of
+from bench.discrepancy.articulated.torque_error import TorqueProblem, along_motion
 from bench.discrepancy.articulated.whiteness import coloured
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.hypothesis import PlacedOnJoint
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.articulated_search.search import search
-from bench.discrepancy.articulated_search.torque_error import TorqueProblem, along_motion
 from bench.discrepancy.settings import ArticulatedSearchSettings as SearchSettings
 from bench.discrepancy.verdict import Verdict
 

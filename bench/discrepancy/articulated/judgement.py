@@ -15,12 +15,12 @@ import numpy as np
 
 from bench.arrays import Array
 from bench.discrepancy.articulated.free_runs import FreeRuns
+from bench.discrepancy.articulated.torque_error import TorqueProblem
 from bench.discrepancy.articulated.torque_runs import TorqueRuns
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.hypothesis import PlacedOnJoint
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.articulated_search.search import complete, predecessors, shortened
-from bench.discrepancy.articulated_search.torque_error import TorqueProblem
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.settings import ArticulatedJudgementSettings as JudgementSettings
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from bench.discrepancy.articulated_search import hypothesis, problem
 from bench.discrepancy.articulated_search.catalogue import CATALOGUE as JOINTS
+from bench.discrepancy.articulated_search.placements import placements as placements_on_joints
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.checks.admission import admitted
 from bench.discrepancy.effects.catalogue import CATALOGUE
@@ -132,4 +133,4 @@ def _of_joints(case: Case) -> list[EffectSite]:
 
         return EffectSite(placed.effect.name, placed.where, frozenset({placed.where, joint.name}), at)
 
-    return [site(p) for p in problem.placements(found, JOINTS)]
+    return [site(p) for p in placements_on_joints(found, JOINTS)]
