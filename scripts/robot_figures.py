@@ -87,7 +87,10 @@ def _so101(row: Any) -> Figures:
 
 
 def _both_joints(row: Any) -> Figures:
-    joints = {key.split(" (")[1][:-1] for key in row["named"] if key.startswith(FRICTION)}
+    named = [key[:-1].split(" (") for key in row["named"]]
+    joints = {
+        one for kind, where in named if kind in (*FRICTION, "coupled_friction") for one in where.split("+")
+    }
     gone = min(1.0 - after / before for before, after, _ in row["joints"].values())
     return [
         (
