@@ -68,10 +68,7 @@ class Slot(IntEnum):
     MOTOR = 33  # inertia of the motor, at the joint
     ENCODER = 34  # 0: on the motor, 1: on the link
     SPEED_LIMIT = 35  # speed at which the force available has fallen to zero; 0: no such limit
-    RATIO = (
-        36  # reading of the encoder that a servo acts on over the true position; one where nothing is wrong
-    )
-
+    RATIO = 36  # reading of a servo's encoder over the true position; one where nothing is wrong
     ON_LINK = 37  # 1: damping acts on the link's side of a train
     CARRIED_BY = 38  # 0: friction grows with the torque on the link, 1: with that of the actuator
     INPUT_LAG = 39  # time constant of a filter of the input [s], of a servo that of its target
@@ -185,16 +182,19 @@ def bristles_slid(p, z, v, step):
 
 
 @inlined
-def _kick(p, mass, step, force, damping, implicit, bristle, limit, v, shared):
-    """New velocity of a joint: implicit in what damps it, dry friction by its proximal map, that shared with a neighbour after its own."""
-    inertia = (mass + p[9]) / step
-    a = inertia + 0.5 * (damping + p[41] + implicit) + bristle
-    free = (inertia * v + force - 0.5 * (damping + p[41] - implicit) * v - p[41] * shared) / a
-    new = math.copysign(max(abs(free) - limit / a, 0.0), free)
-    if p[40] > 0.0:
-        both = new + shared
-        new = math.copysign(max(abs(both) - p[40] / a, 0.0), both) - shared
-    return new
+def _kick(inertia, force, damping, implicit, bristle, limit, v):
+    """New velocity of a joint of this inertia over the step: implicit in what damps it, dry friction by its proximal map."""
+    a = inertia + 0.5 * (damping + implicit) + bristle
+    free = (inertia * v + force - 0.5 * (damping - implicit) * v) / a
+    return math.copysign(max(abs(free) - limit / a, 0.0), free)
+
+
+@inlined
+def _kick_shared(p, inertia, force, damping, implicit, bristle, limit, v, shared):
+    """The same with friction shared with a neighbour, which moves by `shared`; its proximal map follows that of the joint's own."""
+    new = _kick(inertia, force - p[41] * shared, damping + p[41], implicit, bristle, limit, v)
+    held = p[40] / (inertia + 0.5 * (damping + p[41] + implicit) + bristle)
+    return math.copysign(max(abs(new + shared) - held, 0.0), new + shared) - shared
 
 
 @inlined
@@ -257,7 +257,7 @@ def run(
     """
     n = y.shape[0]
     train = p[29] > 0.5
-    on_link = train and p[34] > 0.5
+    on_link, alone = train and p[34] > 0.5, p[40] == 0.0 and p[41] == 0.0
     q, v, ql, vl, z = 0.0, 0.0, 0.0, 0.0, 0.0
     lagged, target = math.nan, u[0]
     keep = math.exp(-step / p[27]) if p[27] > 0.0 else 0.0
@@ -296,15 +296,15 @@ def run(
             rest = p[15] - bias[k] - slope[k] * (x - reference[k]) - p[7] * (x - p[8]) + stop_force(p, x, w)
             limit = friction_limit(p, v, abs(force) if p[38] > 0.5 else load[k])
             damping = p[6] + p[14] * abs(v)
-            before, shared = v, p[42] * beside[k]
+            before, inertia = v, (mass[k] + p[9]) / step
             if train:
-                rest -= pair_friction(p, w + shared)
-                v, vl = _kick_train(
-                    p, mass[k], step, own, rest, damping, implicit, bristle, limit, q, v, ql, vl
-                )
+                rest -= pair_friction(p, w + p[42] * beside[k])
+                v, vl = _kick_train(p, mass[k], step, own, rest, damping, implicit, bristle, limit, q, v, ql, vl)  # fmt: skip
+            elif alone:
+                v = vl = _kick(inertia, own + rest, damping, implicit, bristle, limit, v)
             else:
-                v = _kick(p, mass[k], step, own + rest, damping, implicit, bristle, limit, v, shared)
-                vl = v
+                shared = p[42] * beside[k]
+                v = vl = _kick_shared(p, inertia, own + rest, damping, implicit, bristle, limit, v, shared)
             z = bristles_slid(p, z, 0.5 * (before + v), step)
             q += 0.5 * step * v
             ql += 0.5 * step * vl
