@@ -89,7 +89,7 @@ def propose(
     loads = {input_of(problem.case, joint).name: joint for joint in problem.joints}
     peaks = {name: float(np.abs(record.values[name]).max()) for name in loads}
     told = {
-        "separates": [" and ".join(map(str, f.hypothesis)) for f in (first, second)],
+        "separates": [beyond(first, second), beyond(second, first)],
         "reason": "",
         "log_odds_now": first.log_posterior - second.log_posterior,
         "excitation": trajectory.words,
@@ -208,3 +208,10 @@ def _expected(
         ]
         total += 0.5 * float(np.sum((errors[0] - errors[1]) ** 2)) / noise**2
     return total
+
+
+def beyond(found: ArticulatedFit, other: ArticulatedFit) -> str:
+    """What an explanation names that another does not; all that it names where that is nothing."""
+    theirs = {placed.key for placed in other.hypothesis}
+    own = [placed for placed in found.hypothesis if placed.key not in theirs]
+    return " and ".join(map(str, own or found.hypothesis))

@@ -72,6 +72,12 @@ def _places(effect: NamedEffect) -> str:
     return ", ".join(_distinct((effect.where, effect.channel)))
 
 
+def _called(effect: NamedEffect, verdict: Verdict) -> str:
+    """Name of an effect, with its place where another of the same name is named."""
+    alike = [e for e in verdict.named if e.name == effect.name]
+    return f"{effect.name} ({effect.where})" if len(alike) > 1 and effect.where else effect.name
+
+
 def _distinct(texts: Iterable[str]) -> list[str]:
     return list(dict.fromkeys(text for text in texts if text))
 
@@ -98,7 +104,8 @@ def _place(location: Location) -> str:
 
 def _which(verdict: Verdict) -> str:
     if verdict.named:
-        own = "; ".join(f"{e.name}: {estimates(e)}" if e.parameters else e.name for e in verdict.named)
+        called = [(_called(e, verdict), e) for e in verdict.named]
+        own = "; ".join(f"{name}: {estimates(e)}" if e.parameters else name for name, e in called)
     elif verdict.verdict == "none":
         own = "no effect is missing"
     else:
@@ -125,7 +132,7 @@ def _how_far(verdict: Verdict, settings: JudgementSettings) -> str:
 def _how_sure(verdict: Verdict) -> str:
     own = f"probability of “{verdict.verdict}” {probability(verdict.probabilities.get(verdict.verdict))}"
     parts = [
-        f"{e.name} {probability(e.probability)}, without it {interval(e.closed, e.closed_ci95)} comes back"
+        f"{_called(e, verdict)} {probability(e.probability)}, without it {interval(e.closed, e.closed_ci95)} comes back"
         for e in verdict.named
     ]
     return "; ".join((own, *parts))
