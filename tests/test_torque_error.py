@@ -17,6 +17,7 @@ from bench.discrepancy.application.verification import verify
 from bench.discrepancy.articulated.diagnosis import diagnose_articulated
 from bench.discrepancy.articulated.free_runs import FreeRuns
 from bench.discrepancy.articulated.judgement import predict
+from bench.discrepancy.articulated.next_test import beyond
 from bench.discrepancy.articulated.torque_error import TorqueProblem, along_motion
 from bench.discrepancy.articulated_search.catalogue import CATALOGUE
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
@@ -96,6 +97,11 @@ def test_friction_and_damping_of_a_model_that_runs_away_are_found_with_their_siz
     before, after, _ = gap.free_runs
     assert before > 1.0
     assert f"free runs {level(before)} → {level(after)}" in dict(answers(verdict))["How far"]
+    first = verdict.named[0]
+    twice = replace(verdict, named=(first, replace(first, where="shoulder")))
+    told = dict(answers(twice))
+    for line in ("Which", "How sure"):
+        assert all(f"{first.name} ({joint})" in told[line] for joint in ("elbow", "shoulder"))
     put = verify(
         stiff / "model.xml", Findings(verdict.named, verdict.nominal), verdict.gaps, read_case(stiff)
     )
@@ -119,6 +125,21 @@ def test_a_joint_made_heavier_explains_no_torque(stiff):
         for h, v in (((), np.zeros(len(torque.nominal))), ((placed,), vector))
     ]
     assert left[1] > 0.9 * left[0]
+
+
+def test_a_next_test_names_what_two_explanations_do_not_share(stiff):
+    problem = problem_of(stiff)
+    places = {p.key: p for p in placements(problem, CATALOGUE)}
+    names = ("coulomb_friction", "damping_error", "quadratic_damping")
+    friction, damping, drag = (places[name, "elbow"] for name in names)
+
+    def fit(*hypothesis):
+        return ArticulatedFit.at(problem, hypothesis, np.zeros(problem.size(hypothesis)))
+
+    ours, theirs = fit(friction, damping), fit(friction, drag)
+    assert beyond(ours, theirs) == "damping_error (elbow)"
+    assert beyond(theirs, ours) == "quadratic_damping (elbow)"
+    assert beyond(fit(friction), ours) == "coulomb_friction (elbow)"
 
 
 def test_errors_are_over_the_motion_of_all_records(stiff):
