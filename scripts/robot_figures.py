@@ -8,7 +8,10 @@ from typing import Any
 import numpy as np
 from capability_figures import Figures
 
-FRICTION = ("coulomb_friction", "load_dependent_friction", "stribeck_friction", "presliding_friction")
+from bench.discrepancy.articulated_search.catalogue import effect
+from bench.discrepancy.articulated_search.effect import ArticulatedEffect
+from bench.discrepancy.articulated_search.placements import AND
+
 PUBLISHED_TX40 = {"joint_1": 7.14, "joint_2": 8.26, "joint_3": 6.34, "joint_4": 2.48}
 """Dry friction of the TX40 [N m] in the configuration of figaroh-plus's example."""
 
@@ -17,13 +20,19 @@ def _held(good: bool) -> str:
     return "holds" if good else "**misses**"
 
 
+def _joints(row: Any, wanted: Callable[[ArticulatedEffect], bool]) -> set[str]:
+    """Joints at which effects of a kind are named; both of those that share one."""
+    named = [key[:-1].split(" (") for key in row["named"]]
+    return {joint for name, where in named if wanted(effect(name)) for joint in where.split(AND)}
+
+
+def _frictional(one: ArticulatedEffect) -> bool:
+    return one.family == "friction"
+
+
 def _ur10(row: Any) -> Figures:
-    places = {
-        kind: {key.split(" (")[1][:-1] for key in row["named"] if key.startswith(kind)}
-        for kind in (*FRICTION, "damping_error")
-    }
-    dry = set().union(*(places[kind] for kind in FRICTION))
-    both = len(dry & places["damping_error"])
+    dry, damped = _joints(row, _frictional), _joints(row, lambda one: one.name == "damping_error")
+    both = len(dry & damped)
     left = float(np.median([after for _, after, _ in row["joints"].values()]))
     n = len(row["joints"])
     return [
@@ -72,7 +81,7 @@ def _so101(row: Any) -> Figures:
     n = len(next(iter(after.values())))
     return [
         (
-            f"SO-101: RMS error over {n} whole motions left out, median over the joints",
+            f"SO-101: RMS error over {n} whole motions that it was not learned from, median over the joints",
             f"{middle:.1f} mrad",
             "≤ 8 mrad",
             _held(middle <= 8.0),
@@ -87,10 +96,7 @@ def _so101(row: Any) -> Figures:
 
 
 def _both_joints(row: Any) -> Figures:
-    named = [key[:-1].split(" (") for key in row["named"]]
-    joints = {
-        one for kind, where in named if kind in (*FRICTION, "coupled_friction") for one in where.split("+")
-    }
+    joints = _joints(row, _frictional)
     gone = min(1.0 - after / before for before, after, _ in row["joints"].values())
     return [
         (

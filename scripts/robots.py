@@ -66,8 +66,8 @@ class Row:
         complete: Whether nothing more is missing.
         seconds: Processor time [s].
         known: What is published.
-        further: Joint to the RMS errors [rad, m] of free runs of records that neither found nor judged, as stated and with what is named,
-            a pair for every record.
+        further: Joint to the RMS errors [rad, m] of free runs of records that nothing was learned from, as stated and with what is named, a
+            pair for every record. Of the SO-101, the first seconds of two of them judged.
     """
 
     robot: str

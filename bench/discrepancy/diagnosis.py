@@ -47,7 +47,7 @@ from bench.discrepancy.numerics.deadline import Deadline
 from bench.discrepancy.search.explanation import Explanation, nominal_alone
 from bench.discrepancy.search.load_interpolation import reading_notes
 from bench.discrepancy.settings import DEFAULT, DiagnosisSettings, changed
-from bench.discrepancy.verdict import NamedEffect, Ranked, Verdict, VerdictKind, far_off
+from bench.discrepancy.verdict import NamedEffect, Ranked, Verdict, VerdictKind, far_off, of_runs
 from bench.errors import BenchError, UnknownNameError
 
 _Placed = TypeVar("_Placed", NamedEffect, Ranked)
@@ -164,10 +164,10 @@ def _by_drives(
         )
     except BenchError:  # admitted as a linear structure, with parts that the equations of drives leave out
         return None
-    left, theirs = found.verdict.gap, other.verdict.gap
+    left, (before, after, _) = found.verdict.gap, of_runs(other.verdict.gap)
     # free runs of one kind in both: parts of what each began with are compared; a name is left for one that is nearer by far
     least = how.settings.judgement.coarse.most if found.verdict.named else 1.0
-    nearer = theirs.after * left.before < least * left.after * theirs.before
+    nearer = after * left.before < least * left.after * before
     return other if other.verdict.verdict == "effect" and (other.verdict.complete or nearer) else None
 
 

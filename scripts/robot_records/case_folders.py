@@ -56,7 +56,7 @@ class Records:
         held: Joints that are held, see ``"joints"`` of nominal.json.
         known: What is published or was seen of the robot, a sentence.
         most: Most effects named together.
-        further: Tables that neither find nor judge, on which the model is run as stated and with what was named.
+        further: Tables that do not find, on which the model is run as stated and with what was named; beginnings of some may judge.
     """
 
     model: str

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bench.discrepancy.articulated.admission import admitted_robot
-from bench.discrepancy.articulated.explaining import Explained, explained, like
+from bench.discrepancy.articulated.explaining import Explained, Question, asked_as, explained
 from bench.discrepancy.articulated.judgement import predict
 from bench.discrepancy.articulated.naming import closest_rival
 from bench.discrepancy.articulated.next_test import Trajectory, propose
@@ -105,9 +105,8 @@ def diagnose_articulated(
     case = with_beginnings(whole := thinned(told, settings=settings), settings=settings)
     problem = ArticulatedProblem.of(case, model, case.identification, settings, deadline)
     judging = ArticulatedProblem.of(case, model, case.validation, settings)
-    found = explained(
-        problem, judging, placements(problem, catalogue), how, rng, stated=stated, progress=progress
-    )
+    question = Question(judging, how, rng, stated, progress)
+    found = explained(problem, placements(problem, catalogue), question)
     problem, fits, final, verdict = found.problem, found.fits, found.final, found.verdict
     verdict = replace(
         verdict,
@@ -146,7 +145,7 @@ def _of_long_records(told: Case, whole: Case, found: Explained) -> tuple[str, ..
     judged = settings.articulated.judgement
     off = [
         float(np.max(predict(p, found.final, floor, judged).discrepancy))
-        for p in (problem, like(problem, later))
+        for p in (problem, asked_as(problem, later))
     ]
     return (
         *notes,

@@ -51,99 +51,93 @@ class Explained:
     verdict: Verdict
 
 
-def explained(
-    problem: ArticulatedProblem,
-    judging: ArticulatedProblem,
-    candidates: Sequence[PlacedOnJoint],
-    settings: SearchSettings,
-    rng: np.random.Generator,
-    *,
-    stated: bool,
-    progress: Callable[[str], None],
-) -> Explained:
-    """Explain records by runs, by the torque where the model as stated runs away, and where runs have named nothing.
+@dataclass(frozen=True, eq=False)
+class Question:
+    """What records are explained with.
 
-    Args:
-        problem: Records for identification.
-        judging: Records for judging.
-        candidates: Effects at places.
+    Attributes:
+        judging: Records for judging, for free runs.
         settings: Of the search.
         rng: For the bootstrap intervals.
         stated: Whether the noise of the responses is stated.
         progress: Called with a line of text at every stage.
     """
 
-    def asked(how: ArticulatedProblem, mine: Sequence[PlacedOnJoint]) -> Explained:
-        return _explained(how, judging, mine, settings, rng, stated=stated, progress=progress)
+    judging: ArticulatedProblem
+    settings: SearchSettings
+    rng: np.random.Generator
+    stated: bool
+    progress: Callable[[str], None]
 
+
+def explained(
+    problem: ArticulatedProblem, candidates: Sequence[PlacedOnJoint], question: Question
+) -> Explained:
+    """Explain records by runs, by the torque where the model as stated runs away, and where runs have named nothing.
+
+    Args:
+        problem: Records for identification.
+        candidates: Effects at places.
+        question: What they are explained with.
+    """
     away = _run_away(problem)
-    found = None if away else asked(problem, candidates)
+    found = None if away else _explained(problem, candidates, question)
     if found is not None and not _asks_torque(found):
         return found
-    progress("the torque along the measured motion")
-    by_torque = asked(TorqueProblem.like(problem), along_motion(candidates))
+    question.progress("the torque along the measured motion")
+    by_torque = _explained(TorqueProblem.like(problem), along_motion(candidates), question)
     if found is not None and by_torque.verdict.verdict != "effect":
         return found
-    told = _with_free_runs(by_torque, judging)
+    told = _with_free_runs(by_torque)
     return replace(by_torque, verdict=replace(told, warnings=(*told.warnings, _words(away))))
 
 
 def _explained(
-    problem: ArticulatedProblem,
-    judging: ArticulatedProblem,
-    candidates: Sequence[PlacedOnJoint],
-    settings: SearchSettings,
-    rng: np.random.Generator,
-    *,
-    stated: bool,
-    progress: Callable[[str], None],
+    problem: ArticulatedProblem, candidates: Sequence[PlacedOnJoint], question: Question
 ) -> Explained:
-    """The same by runs, or by the torque of a `TorqueProblem`, whose explanations are never complete."""
-    judged = problem.settings.articulated.judgement
-    problem, fits = search(problem, candidates, settings=settings, progress=progress)
-    judging = judging.softened(problem.softness)
-    told_by = like(problem, judging)
-    progress("judging records")
-    rungs, last, predictions, more = kept(problem, told_by, fits, judged)
+    """Explain by runs, or by the torque of a `TorqueProblem`, whose explanations are never complete."""
+    judged, rng = problem.settings.articulated.judgement, question.rng
+    problem, fits = search(problem, candidates, settings=question.settings, progress=question.progress)
+    judging = question.judging.softened(problem.softness)
+    judged_by = asked_as(problem, judging)
+    question.progress("judging records")
+    rungs, last, predictions, more = kept(problem, judged_by, fits, judged)
     fits = [*fits, *more]
     floor, final = predictions[0].floor, rungs[last]
     verdict = verdict_of(
-        problem, fits, rungs, last, predict(told_by, None, floor, judged), predictions,
-        without_each(told_by, fits, final, floor, judged), judged, rng,
-        stated=stated and told_by is judging, left=coloured(judging, final, judged),
+        problem, fits, rungs, last, predict(judged_by, None, floor, judged), predictions,
+        without_each(judged_by, fits, final, floor, judged), judged, rng,
+        stated=question.stated and judged_by is judging, left=coloured(judging, final, judged),
     )  # fmt: skip
     return Explained(problem, judging, fits, final, predictions, verdict)
 
 
 def _asks_torque(found: Explained) -> bool:
     """Whether runs have named nothing of a robot whose torques were logged, and time is left to ask these."""
-    driven = all(joint.drive is not None and not joint.drive.servo for joint in found.problem.joints)
-    unknown = found.verdict.verdict == "unknown"
-    return (
-        driven
-        and unknown
-        and found.problem.deadline.allows("what the torque along the measured motion tells")
-    )
+    problem = found.problem
+    if found.verdict.verdict != "unknown" or not all(joint.torque_driven for joint in problem.joints):
+        return False
+    return problem.deadline.allows("what the torque along the measured motion tells")
 
 
-def like(problem: ArticulatedProblem, other: ArticulatedProblem) -> ArticulatedProblem:
+def asked_as(problem: ArticulatedProblem, other: ArticulatedProblem) -> ArticulatedProblem:
     """Other records, asked as those of a problem are."""
     return TorqueProblem.like(other) if isinstance(problem, TorqueProblem) else other
 
 
 def _run_away(problem: ArticulatedProblem) -> list[str]:
     """Joints whose torque was logged and whose free runs, as the model is stated, end further off than they move."""
+    if not any(joint.torque_driven for joint in problem.joints):
+        return []
     judged = problem.settings.articulated.judgement
     off = predict(problem, None, np.zeros(len(problem.joints)), judged).discrepancy
-    return [
-        joint.name
-        for joint, error in zip(problem.joints, off, strict=True)
-        if joint.drive is not None and not joint.drive.servo and error > 1.0
-    ]
+    pairs = zip(problem.joints, off, strict=True)
+    return [joint.name for joint, error in pairs if joint.torque_driven and error > 1.0]
 
 
-def _with_free_runs(found: Explained, judging: ArticulatedProblem) -> Verdict:
+def _with_free_runs(found: Explained) -> Verdict:
     """The verdict with what free runs miss beside what the torque does."""
+    judging = found.judging
     judged = judging.settings.articulated.judgement
     floor = noise_floor(judging, found.final, judged)
     before, after = (predict(judging, fit, floor, judged).discrepancy for fit in (None, found.final))

@@ -55,9 +55,8 @@ def _missing(p, mass, bias, load, beside, u, step, motion, still, least, out):
         limit = friction_limit(p, v, abs(force) if p[38] > 0.5 else load[k])
         held = abs(free) if abs(v) < still else limit
         error = free - math.copysign(min(limit, held), free if abs(v) < still else v)
-        if (
-            p[38] > 0.5
-        ):  # of what is added to the drive, this friction takes a part, or as much when it is driven back
+        # of what is added to the drive, friction that carries it takes a part, or adds as much where it is driven back
+        if p[38] > 0.5:
             error /= max(1.0 - p[13] * math.copysign(1.0, force) * math.copysign(1.0, v), least)
         out[k] = error
         z = bristles_slid(p, z, v, step)

@@ -63,6 +63,11 @@ class Joint(NamedTuple):
     range: tuple[float, float]
     drive: JointDrive | None
 
+    @property
+    def torque_driven(self) -> bool:
+        """Whether its drive takes a torque, not a target."""
+        return self.drive is not None and not self.drive.servo
+
 
 class Dynamics(NamedTuple):
     """Inverse dynamics along a motion.

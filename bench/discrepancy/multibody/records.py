@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -58,8 +58,6 @@ class JointRecord:
         weight: (n, n_measured) of the innovations, one where every reading tells something new, see `weight_of_readings`.
         filter: Gain (2, 2) and whitening (n_measured, n_measured) of the innovations; made for the joint about its mean inertia where None.
             A corrected log keeps those of the log: they are what innovations are compared by.
-        gain: (2, 2) of the innovations.
-        whitening: (n_measured, n_measured) of the innovations.
     """
 
     joint: Joint
@@ -86,15 +84,22 @@ class JointRecord:
     weight: Array
     encoder: Encoder = TRUE
     filter: tuple[Array, Array] | None = None
-    gain: Array = field(init=False)
-    whitening: Array = field(init=False)
 
     def __post_init__(self) -> None:
         if self.filter is None:
             object.__setattr__(self, "filter", self._filter())
+
+    @property
+    def gain(self) -> Array:
+        """Gain (2, 2) of the innovations."""
         assert self.filter is not None
-        object.__setattr__(self, "gain", self.filter[0])
-        object.__setattr__(self, "whitening", self.filter[1])
+        return self.filter[0]
+
+    @property
+    def whitening(self) -> Array:
+        """Whitening (n_measured, n_measured) of the innovations."""
+        assert self.filter is not None
+        return self.filter[1]
 
     @property
     def servo_command(self) -> Array:
