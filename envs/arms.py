@@ -12,11 +12,11 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.discrepancy.multibody.drives import JointDrive
 from bench.discrepancy.multibody.model import ArticulatedModel, Joint
 from bench.errors import ModelError, ParameterError, UnknownNameError
 from bench.excitation import Limits, RigHypothesis, RigPrior, Uncertain
 from bench.rig import Rig
+from bench.rig.actuators import JointDrive
 from bench.rig.building import parse
 
 from .places import StationSetup

@@ -22,7 +22,7 @@ from typing import Any
 from bench.discrepancy import diagnose, read_case
 from bench.discrepancy.application.applying import apply
 from bench.discrepancy.application.reading import findings_of, read_verdict
-from bench.discrepancy.application.verification import VerificationSettings, is_articulated, verify
+from bench.discrepancy.replay.verification import VerificationSettings, is_articulated, verify
 from bench.errors import BenchError
 from bench.files import json_values, write_text
 

@@ -36,7 +36,7 @@ from bench.arrays import Array
 from bench.discrepancy import diagnose, read_case
 from bench.discrepancy.application.applying import apply
 from bench.discrepancy.application.reading import findings_of
-from bench.discrepancy.application.verification import VerificationSettings, is_articulated, verify
+from bench.discrepancy.replay.verification import VerificationSettings, is_articulated, verify
 from bench.discrepancy.verdict import Verdict
 
 Change = Callable[[Any], None]

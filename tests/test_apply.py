@@ -18,9 +18,9 @@ import pytest
 from bench.cli import main
 from bench.discrepancy import Case, CaseChannel, record_from_arrays
 from bench.discrepancy.application.applying import Findings, apply
-from bench.discrepancy.application.verification import verify
 from bench.discrepancy.application.writing import model_text, ranges, snippet, write_model
 from bench.discrepancy.case.case import NominalParameter
+from bench.discrepancy.replay.verification import verify
 from bench.discrepancy.verdict import Estimate, Gap, NamedEffect, NominalEstimate
 
 STAGE = """
@@ -299,6 +299,16 @@ ARM_EFFECTS = {
         lambda model, data: model.dof_frictionloss.__setitem__(1, 0.2 + 0.9 * abs(carried(model, data))),
         effect("load_dependent_friction", "elbow", "elbow", limit_0=0.2, mu=0.9),
     ),
+    "load_dependent_friction of the drive": (
+        friction("elbow", 0.2),
+        lambda model, data: model.dof_frictionloss.__setitem__(1, 0.2 + 0.4 * abs(data.qfrc_actuator[1])),
+        effect("load_dependent_friction", "elbow", "elbow", limit_0=0.2, mu=0.4, of_actuator=1.0),
+    ),
+    "gear_friction": (
+        friction("elbow", 0.2),
+        lambda model, data: model.dof_frictionloss.__setitem__(1, in_gear(model, data)),
+        effect("gear_friction", "elbow", "elbow", limit_0=0.2, mu_drive=0.1, mu_weight=0.1, mu_rest=0.2, velocity=0.4, growth=0.005),
+    ),
     "cogging": (
         None, pushed(lambda t, q, v: -1.2 * math.sin(7.0 * q + math.atan2(0.5, 1.0)) , "elbow"),
         effect("cogging", "elbow", "elbow", sine=1.2 / math.hypot(1.0, 0.5), cosine=0.6 / math.hypot(1.0, 0.5), periods_per_turn=7.0),
@@ -311,6 +321,16 @@ def carried(model, data):
     full = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, full)
     return (full @ data.qacc)[1] - model.dof_armature[1] * data.qacc[1] + data.qfrc_bias[1]
+
+
+def in_gear(model, data):
+    """Limit of the friction in the gear of the elbow."""
+    full = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, full)
+    weight = carried(model, data) - (full[1, 1] - model.dof_armature[1]) * data.qacc[1]
+    drive = data.qfrc_actuator[1]
+    at_rest = 0.2 * abs(weight) * math.exp(-((data.qvel[1] / 0.4) ** 2))
+    return 0.2 + abs(0.1 * drive + 0.1 * weight) + at_rest + 0.005 * drive**2
 
 
 @pytest.mark.parametrize("name", ARM_EFFECTS)

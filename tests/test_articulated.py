@@ -11,7 +11,6 @@ import pytest
 from browser import CHROMIUM, shown_whole
 
 from bench.discrepancy import diagnose, read_case
-from bench.discrepancy.application.verification import replay_of
 from bench.discrepancy.articulated.admission import admitted_robot
 from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis
 from bench.discrepancy.articulated.free_runs import FreeRuns
@@ -28,6 +27,7 @@ from bench.discrepancy.articulated_search.search import complete, without_idle
 from bench.discrepancy.multibody.channels import bound
 from bench.discrepancy.multibody.encoders import weight_of_readings
 from bench.discrepancy.multibody.model import ArticulatedModel, compiled_model
+from bench.discrepancy.replay.verification import replay_of
 from bench.discrepancy.report.html_page import write_report
 from bench.discrepancy.report.rerun_recording import write_rerun
 from bench.errors import BenchError

@@ -11,6 +11,7 @@ from test_articulated import KP, mjcf, write_case
 from bench.discrepancy import diagnose, read_case
 from bench.discrepancy.articulated.admission import admitted_robot
 from bench.discrepancy.articulated.recognition import applies
+from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.errors import BenchError, ModelError, RecordingError, UnitError
 
 DEGREES = 180.0 / np.pi
@@ -151,8 +152,18 @@ def test_what_the_equations_of_the_joints_leave_out_is_refused_where_it_acts(cle
 
 
 @pytest.mark.parametrize("clean", [True], indirect=True, ids=["servo"])
-def test_a_gear_of_a_servo_is_refused_where_it_acts(clean, tmp_path):
-    refused(changed(clean, tmp_path, model=GEARED), ModelError, "comes into play")
+def test_a_servo_behind_a_gear_is_what_mujoco_makes_of_it(clean, tmp_path):
+    def document(entries):
+        for number in ("value", "std"):
+            entries["parameters"]["kp:elbow_drive"][number] /= 9.0
+
+    case = changed(clean, tmp_path, model=GEARED, columns={"elbow_in": 3.0}, document=document)
+    (shoulder, elbow) = ArticulatedModel.of(admitted_robot(case).compiled).joints
+    assert elbow.drive.gear == 3.0
+    assert elbow.drive.stiffness == pytest.approx(KP["elbow"])
+    assert shoulder.drive.stiffness == KP["shoulder"]
+    # the target of a gear that is not there is off by its factor
+    refused(changed(clean, tmp_path, columns={"elbow_in": 3.0}), UnitError, "elbow_in")
 
 
 def test_commands_beyond_their_range_are_clipped_as_mujoco_clips_them(clean, tmp_path):

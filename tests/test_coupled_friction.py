@@ -11,7 +11,8 @@ from bench.discrepancy import diagnose, read_case
 from bench.discrepancy.application.applying import Findings, apply
 from bench.discrepancy.articulated_search.catalogue import CATALOGUE, effect
 from bench.discrepancy.articulated_search.placements import apart, placements
-from bench.discrepancy.multibody.joint_run import SLOTS, Slot, predict
+from bench.discrepancy.multibody.joint_forces import SLOTS, Slot
+from bench.discrepancy.multibody.joint_run import predict
 
 LIMIT, DAMPING = 0.12, 0.06
 TENDON = (

@@ -17,7 +17,8 @@ from bench.discrepancy.articulated_search.hypothesis import JointHypothesis
 from bench.discrepancy.articulated_search.misfit import log_likelihood
 from bench.discrepancy.articulated_search.placements import placements
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
-from bench.discrepancy.multibody.joint_run import SLOTS, Slot, predict
+from bench.discrepancy.multibody.joint_forces import SLOTS, Slot
+from bench.discrepancy.multibody.joint_run import predict
 from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.settings import DEFAULT
 

@@ -24,7 +24,7 @@ PLAIN = {
 }  # fmt: skip
 OURS = {name for name in settings_room.__all__ if name.endswith("Settings")}
 """Classes of settings that belong to those of a diagnosis."""
-UNTHREADED = {"application", "blind", "intake", "precheck", "rehearsal", "report"}
+UNTHREADED = {"application", "blind", "intake", "precheck", "rehearsal", "replay", "report"}
 """Rooms that make or check cases rather than diagnose them; they work by the defaults."""
 ADMITTING = {"admission.py", "against_model.py", "against_mujoco.py"}
 """Files of the room of arms that do so, too."""

@@ -13,7 +13,6 @@ from test_articulated import KP, RATE, mjcf, problem_of, write_case
 
 from bench.discrepancy import read_case
 from bench.discrepancy.application.applying import Findings
-from bench.discrepancy.application.verification import verify
 from bench.discrepancy.articulated.diagnosis import diagnose_articulated
 from bench.discrepancy.articulated.free_runs import FreeRuns
 from bench.discrepancy.articulated.judgement import predict
@@ -23,8 +22,9 @@ from bench.discrepancy.articulated_search.catalogue import CATALOGUE
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.placements import placements
 from bench.discrepancy.articulated_search.rounds import sound
-from bench.discrepancy.multibody.joint_run import SLOTS, Slot
+from bench.discrepancy.multibody.joint_forces import SLOTS, Slot
 from bench.discrepancy.multibody.joint_torque import missing_torque
+from bench.discrepancy.replay.verification import verify
 from bench.discrepancy.report.answers import answers, level
 
 FRICTION, DAMPING, STATED = 1.5, 0.8, 0.1
@@ -36,7 +36,7 @@ def swung(n=4000, step=1e-3):
     t = np.arange(n) * step
     q, v, a = np.sin(3.0 * t), 3.0 * np.cos(3.0 * t), -9.0 * np.sin(3.0 * t)
     inertia, bias = 0.3 + 0.1 * np.cos(t), 2.0 * np.sin(q)
-    return np.column_stack([q, v, a]), inertia, bias, np.abs(inertia * a + bias)
+    return np.column_stack([q, v, a]), inertia, bias, inertia * a + bias
 
 
 @pytest.mark.parametrize("of_actuator", [0.0, 1.0])
@@ -46,12 +46,12 @@ def test_nothing_is_missing_where_every_term_is_known(of_actuator):
     p = np.zeros(SLOTS)
     p[[Slot.GEAR, Slot.KP, Slot.RATIO, Slot.STRIBECK]] = 1.0
     p[Slot.LOW], p[Slot.HIGH] = -np.inf, np.inf
-    p[Slot.INERTIA], p[Slot.DAMPING], p[Slot.LIMIT], p[Slot.CARRIED] = 0.05, 0.4, 0.7, mu
-    p[Slot.CARRIED_BY] = of_actuator
+    p[Slot.INERTIA], p[Slot.DAMPING], p[Slot.LIMIT] = 0.05, 0.4, 0.7
+    p[Slot.DRIVEN if of_actuator else Slot.CARRIED] = mu
     asked = (inertia + 0.05) * motion[:, 2] + bias + 0.4 * v + 0.7 * np.sign(v)
     direction = np.sign(v) * np.sign(asked)
     # of the actuator's own torque, friction that carries it takes a part where it drives, and adds one where it is driven
-    drive = asked / (1.0 - mu * direction) if of_actuator else asked + mu * load * np.sign(v)
+    drive = asked / (1.0 - mu * direction) if of_actuator else asked + mu * np.abs(load) * np.sign(v)
     still = 1e-6
 
     def missing(torque):

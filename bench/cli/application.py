@@ -14,8 +14,8 @@ from bench.cli.console import emit
 
 if TYPE_CHECKING:
     from bench.discrepancy.application.applying import Applied, Findings
-    from bench.discrepancy.application.verification import Verification
     from bench.discrepancy.case.case import Case
+    from bench.discrepancy.replay.verification import Verification
 
 PRINTED = Path("-")
 """Stands for standard output."""
@@ -46,8 +46,8 @@ class Apply:
         """Run the command."""
         from bench.discrepancy.application.applying import apply
         from bench.discrepancy.application.reading import findings_of, read_verdict
-        from bench.discrepancy.application.verification import is_articulated, verify
         from bench.discrepancy.application.writing import snippet
+        from bench.discrepancy.replay.verification import is_articulated, verify
         from bench.targets import check_targets
 
         code = self.output.with_suffix(".py")

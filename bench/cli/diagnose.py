@@ -237,8 +237,8 @@ def _diagnosed(asked: Diagnose, case: Case, stage: Callable[[str], None]) -> Dia
     import numpy as np
 
     from bench.discrepancy import diagnose
-    from bench.discrepancy.application.own_share import with_simulator
     from bench.discrepancy.precheck.checking import check
+    from bench.discrepancy.replay.own_share import with_simulator
     from bench.discrepancy.settings import DEFAULT, read_settings
     from bench.errors import IdentificationError
 

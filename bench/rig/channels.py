@@ -5,6 +5,7 @@ from __future__ import annotations
 import mujoco
 
 from bench.recording import Channel
+from bench.rig.actuators import commanded
 from bench.rig.building import Built, PlacedElement
 
 _VECTOR_UNITS = {
@@ -67,17 +68,13 @@ def _sensor_quantity(model: mujoco.MjModel, sensor: int) -> tuple[str, str]:
 
 
 def _command_quantity(model: mujoco.MjModel, actuator: int) -> tuple[str, str]:
-    """A motor's command is a force; a servo's is the position or velocity it tracks."""
+    """A motor's command is a force or a voltage; a servo's is the position or velocity it tracks."""
     dof = _first_dof(model, int(mujoco.mjtObj.mjOBJ_ACTUATOR), actuator)
     if dof < 0:
         return "", "1"
     position, velocity, force = _motion(model, dof)
-    if int(model.actuator_biastype[actuator]) == int(mujoco.mjtBias.mjBIAS_AFFINE):
-        if model.actuator_biasprm[actuator, 1] != 0.0:
-            return position
-        if model.actuator_biasprm[actuator, 2] != 0.0:
-            return velocity
-    return force
+    known = {"position": position, "velocity": velocity, "voltage": ("voltage", "V")}
+    return known.get(commanded(model, actuator), force)
 
 
 def rig_channels(built: Built) -> list[Channel]:

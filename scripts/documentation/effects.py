@@ -32,6 +32,7 @@ LOOKS = {
     "asymmetric_damping": "One direction is damped more than the other: the mean of the motion moves.",
     "viscoelastic_relaxation": "Stiffer at high than at low frequency, and loss in between; a step of the load creeps.",
     "load_dependent_friction": "A step at every reversal whose height grows with the force carried: a bow tie of force over displacement.",
+    "gear_friction": "A servo holds a load with far less current than it lifts it with, and its current may fall by half before anything moves. The step at reversals grows faster than the torque of the motor, and slow motion stutters under load.",
     "time_varying_friction": "A step at every reversal whose height beats with a period of its own.",
     "record_dependent_friction": "Friction of a different height in each record, steady within each.",
     "record_dependent_stiffness": "The frequency differs from record to record, and is steady within each.",

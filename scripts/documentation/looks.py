@@ -9,7 +9,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from bench.arrays import Array
-from bench.discrepancy.multibody.joint_run import SLOTS, Slot, predict
+from bench.discrepancy.multibody.joint_forces import SLOTS, Slot
+from bench.discrepancy.multibody.joint_run import predict
 from bench.figures.look import COLOURS, REFERENCE_COLOUR, save, style
 
 STEP = 1e-3

@@ -12,6 +12,7 @@ import numpy as np
 import pyarrow.parquet as pq
 
 from bench.arrays import Array
+from bench.rig.actuators import drive_value
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,7 @@ class Records:
         validation: For judging.
         rate: Samples a second, on which the tables are put.
         servo: Whether the commands are position targets.
-        spreads: Relative one-sigma uncertainty of masses, damping, armature and kp, where the model has them.
+        spreads: Relative one-sigma uncertainty of masses, damping, armature and of numbers of the drives, where the model has them.
         held: Joints that are held, see ``"joints"`` of nominal.json.
         known: What is published or was seen of the robot, a sentence.
         most: Most effects named together.
@@ -147,12 +148,12 @@ def _parameters(records: Records) -> dict[str, dict[str, object]]:
             value = float(np.ravel(values[dof])[0])
             if value > 0.0:
                 out[f"{kind}:{name}"] = {"value": value, "std": records.spreads[kind] * value, "unit": unit}
+    units = {"kp": "N m/rad", "kv": "N m s/rad", "forcerange": "N m"}
     for axis in records.axes if records.servo else ():
         u = model.actuator(axis.actuator or axis.joint).id
-        value = float(model.actuator_gainprm[u, 0])
-        out[f"kp:{model.actuator(u).name}"] = {
-            "value": value,
-            "std": records.spreads["kp"] * value,
-            "unit": "N m/rad",
-        }
+        for kind in units.keys() & records.spreads.keys():
+            value = drive_value(model, u, kind)
+            out[f"{kind}:{model.actuator(u).name}"] = {
+                "value": value, "std": records.spreads[kind] * value, "unit": units[kind],
+            }  # fmt: skip
     return out

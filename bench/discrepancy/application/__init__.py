@@ -1,1 +1,1 @@
-"""From a verdict to the user's own model: every named effect in MuJoCo's own terms, verified in the user's own simulator."""
+"""From a verdict to the user's own model: every named effect in MuJoCo's own terms."""

@@ -14,7 +14,8 @@ from scipy.optimize import least_squares
 from bench import native
 from bench.arrays import Array
 from bench.discrepancy.application.drives import DRIVES, LOGGED, logged
-from bench.discrepancy.application.forces import FORCES, element, harden
+from bench.discrepancy.application.forces import FORCES, element
+from bench.discrepancy.application.friction import FRICTION, harden
 from bench.discrepancy.application.numbers import nominal_parameter, wrong_number
 from bench.discrepancy.application.target import Change, Target
 from bench.discrepancy.case.case import Case
@@ -220,4 +221,4 @@ def _one(target: Target, effect: NamedEffect, nominal: set[str]) -> Change:
         return DRIVES[effect.name](target, effect)
     if effect.name.startswith(LOGGED):
         return logged(target, effect)
-    return FORCES.get(effect.name, element)(target, effect)
+    return (FORCES | FRICTION).get(effect.name, element)(target, effect)

@@ -12,6 +12,7 @@ import numpy as np
 from bench.discrepancy.application.forces import values_of
 from bench.discrepancy.application.target import Change, Target
 from bench.discrepancy.verdict import NamedEffect
+from bench.rig.actuators import commanded
 
 
 def _actuator(target: Target, effect: NamedEffect) -> Any:
@@ -54,7 +55,7 @@ def lag(target: Target, effect: NamedEffect) -> Change:
     actuator.dynprm[0] = before + constant
     actuator.actdim = 1
     actuator.actearly = True
-    other = actuator.biasprm[1] and effect.name == "actuator_lag"
+    other = _servo(target, actuator) and effect.name == "actuator_lag"
     servo = " (of the servo's target; the diagnosis lags its force)" if other else ""
     return _done(effect, actuator, f"a first-order filter of {before + constant:.6g} s{servo}")
 
@@ -64,15 +65,39 @@ def gain(target: Target, effect: NamedEffect) -> Change:
     actuator = _actuator(target, effect)
     v = values_of(effect)
     factor = 1.0 + v["relative_error"] if "relative_error" in v else -v.get("reversal", 1.0)
-    before = float(actuator.gainprm[0])
-    _freeze_damping(target, actuator)
-    actuator.gainprm[0] *= factor
-    actuator.biasprm[:3] = np.asarray(actuator.biasprm[:3]) * factor
+    if _electric(actuator):
+        if factor <= 0.0:
+            return Change(
+                effect.name,
+                actuator.name,
+                "none",
+                "a dcmotor does not turn the other way; exchange its wires in the gear",
+            )
+        for index, times in (
+            (0, 1.0 / factor),
+            (4, factor),
+            (6, factor),
+        ):  # resistance, and what its controller asks for
+            actuator.gainprm[index] *= times
+        text = f"resistance {actuator.gainprm[0] * factor:.6g} -> {actuator.gainprm[0]:.6g}, kp and kd times {factor:.6g}"
+    else:
+        before = float(actuator.gainprm[0])
+        _freeze_damping(target, actuator)
+        actuator.gainprm[0] *= factor
+        actuator.biasprm[:3] = np.asarray(actuator.biasprm[:3]) * factor
+        text = f"gain {before:.6g} -> {actuator.gainprm[0]:.6g}, and all of its force with it"
     if "relative_error" in v and _limited(target, actuator):
         actuator.forcerange = np.sort(np.asarray(actuator.forcerange) * factor)
-    return _done(
-        effect, actuator, f"gain {before:.6g} -> {actuator.gainprm[0]:.6g}, and all of its force with it"
-    )
+    return _done(effect, actuator, text)
+
+
+def _electric(actuator: Any) -> bool:
+    return bool(actuator.gaintype == mujoco.mjtGain.mjGAIN_DCMOTOR)
+
+
+def _servo(target: Target, actuator: Any) -> bool:
+    """Whether the control is a position target."""
+    return commanded(target.nominal, target.nominal.actuator(actuator.name).id) == "position"
 
 
 def _freeze_damping(target: Target, actuator: Any) -> None:
@@ -92,18 +117,43 @@ def servo_gain(target: Target, effect: NamedEffect) -> Change:
     return _done(
         effect,
         actuator,
-        set_kp(target, actuator, float(actuator.gainprm[0]) * (1.0 + values_of(effect)["relative_error"])),
+        set_kp(
+            target,
+            actuator,
+            float(actuator.gainprm[_kp(actuator)]) * (1.0 + values_of(effect)["relative_error"]),
+        ),
     )
+
+
+def _kp(actuator: Any) -> int:
+    return 4 if _electric(actuator) else 0
 
 
 def set_kp(target: Target, actuator: Any, kp: float) -> str:
     """Set the position gain of a servo, or the gain of another actuator; return what was done."""
-    before = float(actuator.gainprm[0])
-    _freeze_damping(target, actuator)
-    if actuator.biasprm[1]:
-        actuator.biasprm[1] = -kp
-    actuator.gainprm[0] = kp
+    before = float(actuator.gainprm[_kp(actuator)])
+    if not _electric(actuator):
+        _freeze_damping(target, actuator)
+        if actuator.biasprm[1]:
+            actuator.biasprm[1] = -kp
+    actuator.gainprm[_kp(actuator)] = kp
     return f"kp {before:.6g} -> {kp:.6g}"
+
+
+def set_kv(actuator: Any, kv: float) -> None:
+    """Set the velocity gain of a servo."""
+    if _electric(actuator):
+        actuator.gainprm[6] = kv
+    else:
+        actuator.biasprm[2] = -kv
+
+
+def set_limit(actuator: Any, force: float) -> None:
+    """Set the largest force of an actuator, of a dcmotor that of its full voltage at standstill."""
+    if _electric(actuator) and actuator.gainprm[7] > 0.0:
+        actuator.gainprm[7] = force * float(actuator.gainprm[0]) / float(actuator.gainprm[1])
+    else:
+        actuator.forcerange = np.asarray(actuator.forcerange) * (force / float(actuator.forcerange[1]))
 
 
 def saturation(target: Target, effect: NamedEffect) -> Change:
@@ -123,7 +173,7 @@ def deadband(target: Target, effect: NamedEffect) -> Change:
     """No force within a band: the control is moved by as much before every step."""
     actuator = _actuator(target, effect)
     width = values_of(effect)["half_width"]
-    read = "data.actuator_length[u]" if actuator.biasprm[1] else "0.0"
+    read = "data.actuator_length[u]" if _servo(target, actuator) else "0.0"
     lines = (
         f"u = model.actuator({actuator.name!r}).id; error = data.ctrl[u] - {read}",
         f"data.ctrl[u] = {read} + math.copysign(max(abs(error) - {width:.8g}, 0.0), error)",
@@ -140,12 +190,19 @@ def logged(target: Target, effect: NamedEffect) -> Change:
     text = f"changes the log, not the model: {effect.equation} on '{channel}', with {numbers}"
     if v.get("in_loop", 0.0) < 0.5:
         return Change(effect.name, name, "log", text)
-    servo = next((a for a in target.spec.actuators if a.target == name and a.biasprm[1]), None)
+    servo = next((a for a in target.spec.actuators if a.target == name and _servo(target, a)), None)
     if servo is None:
         return Change(effect.name, name, "log", text)
+    wrong = float(servo.gear[0]) * v.get("offset", 0.0)
+    if _electric(servo):
+        off = f"{wrong:.8g}" if "offset" in v else f"{v['relative_error']:.8g} * data.actuator_length[u]"
+        servo.gainprm[6] *= 1.0 + v.get("relative_error", 0.0)
+        lines = (f"u = model.actuator({servo.name!r}).id; data.ctrl[u] -= {off}",)
+        text += "; the servo acts on that reading, by before_step in the snippet"
+        return Change(effect.name, name, "log", text, (("actuator", servo.name),), lines=lines)
     _freeze_damping(target, servo)
     if "offset" in v:
-        servo.biasprm[0] += float(servo.biasprm[1]) * v["offset"]
+        servo.biasprm[0] += float(servo.biasprm[1]) * wrong
     else:
         servo.biasprm[1:3] = np.asarray(servo.biasprm[1:3]) * (1.0 + v["relative_error"])
     text += "; the servo acts on that reading, which its biasprm now says"

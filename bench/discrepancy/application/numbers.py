@@ -8,7 +8,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from bench.discrepancy.application.drives import set_kp
+from bench.discrepancy.application.drives import set_kp, set_kv, set_limit
 from bench.discrepancy.application.forces import damping_error, values_of
 from bench.discrepancy.application.target import Change, Target
 from bench.discrepancy.multibody.model import ArticulatedModel
@@ -50,26 +50,16 @@ def _set(target: Target, kind: str, name: str, value: float, label: str) -> tupl
     if kind == "kp":
         set_kp(target, actuator, value)
     elif kind == "kv":
-        actuator.biasprm[2] = -value
+        set_kv(actuator, value)
     elif kind == "gear":
-        _set_gear(actuator, value)
+        actuator.gear[0] = value
+    elif kind == "forcerange":
+        set_limit(actuator, value)
     else:
         raise UnknownNameError(
             "parameter of the verdict", label, ["mass:BODY", "stiffness:JOINT", "kp:ACTUATOR"]
         )
     return "actuator", actuator.name
-
-
-def _set_gear(actuator: Any, value: float) -> None:
-    """Another gear of the force; of a servo, whose length the gear scales too, by its gains."""
-    before = float(actuator.gear[0])
-    if actuator.biasprm[1]:
-        factor = value / before
-        actuator.gainprm[0] *= factor
-        actuator.biasprm[:3] = np.asarray(actuator.biasprm[:3]) * factor
-        actuator.forcerange = np.asarray(actuator.forcerange) * factor
-    else:
-        actuator.gear[0] = value
 
 
 def _only_body(target: Target) -> str:

@@ -33,6 +33,14 @@ def carried(model, data):
     return torque - model.dof_armature * data.qacc + data.qfrc_bias
 """
 """Part of a snippet for friction that grows with the load."""
+WEIGHED = """
+def weighed(model, data, dof):
+    \"\"\"Of that torque on one joint what its own acceleration does not ask for.\"\"\"
+    matrix = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, matrix)
+    return carried(model, data)[dof] - (matrix[dof, dof] - model.dof_armature[dof]) * data.qacc[dof]
+"""
+"""The same for friction in a gear."""
 
 
 @native.quiet()
@@ -100,7 +108,9 @@ def hook_text(applied: Applied) -> str:
     """Python of the function that runs before every step; empty where there is none."""
     if not applied.lines:
         return ""
-    used = CARRIED if any("carried(" in line for line in applied.lines) else ""
+    weighed = any("weighed(" in line for line in applied.lines)
+    used = CARRIED if weighed or any("carried(" in line for line in applied.lines) else ""
+    used += WEIGHED if weighed else ""
     body = "\n".join(f"    {line}" for line in applied.lines)
     return f'{used}\n\ndef before_step(model, data):\n    """Call it before every mujoco.mj_step, controls set."""\n{body}\n'
 

@@ -105,10 +105,7 @@ def asked_input(model: ArticulatedModel, joint: Joint, j: int, motion: JointMoti
     """The input (n,) of a joint's drive along a motion, by its nominal equation without dry friction."""
     drive = joint.drive
     assert drive is not None
-    force = needed(model, joint, j, motion) / (drive.gear or 1.0)
-    if drive.servo:
-        return motion.position[:, j] + (force + drive.kv * motion.velocity[:, j]) / drive.kp
-    return force / (drive.kp or 1.0)
+    return drive.command(needed(model, joint, j, motion), motion.position[:, j], motion.velocity[:, j])
 
 
 def needed(model: ArticulatedModel, joint: Joint, j: int, motion: JointMotion) -> Array:

@@ -85,10 +85,8 @@ def _balance(case: Case, model: ArticulatedModel, record: CaseRecord, motion: Jo
         drive = joint.drive
         assert drive is not None
         command = record.values[input_of(case, joint).name]
-        force = drive.kp * command
-        if drive.servo:
-            force = drive.kp * (command - motion.position[:, j]) - drive.kv * motion.velocity[:, j]
-        out[:, j] = needed(model, joint, j, motion) - drive.gear * np.clip(force, drive.low, drive.high)
+        torque = drive.torque(command, motion.position[:, j], motion.velocity[:, j])
+        out[:, j] = needed(model, joint, j, motion) - torque
     return out
 
 

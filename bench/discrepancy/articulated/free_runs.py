@@ -15,7 +15,7 @@ from bench.arrays import Array
 from bench.discrepancy.articulated_search.hypothesis import JointHypothesis
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.multibody.encoders import input_of, travel
-from bench.discrepancy.multibody.joint_run import Slot
+from bench.discrepancy.multibody.joint_forces import Slot
 from bench.discrepancy.multibody.motion import clock_of
 from bench.discrepancy.multibody.noise import NoiseDraw, NoiseSettings, draw
 from bench.discrepancy.multibody.records import PreparedRecord

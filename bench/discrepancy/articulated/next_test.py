@@ -156,8 +156,7 @@ def _record(problem: ArticulatedProblem, trajectory: Trajectory) -> CaseRecord:
         assert drive is not None
         needed = torque[:, j] + joint.armature * a[:, j] + joint.damping * v[:, j]
         needed = needed + joint.stiffness * (q[:, j] - joint.reference)
-        force = needed / (drive.gear or 1.0)
-        command = q[:, j] if drive.servo else force / (drive.kp or 1.0)
+        command = drive.gear * q[:, j] if drive.servo else drive.command(needed, q[:, j], v[:, j])
         values[input_of(problem.case, joint).name] = np.ascontiguousarray(command)
         measured = encoders_of(problem.case, joint)
         for channel, order in zip(measured.channels, measured.orders, strict=True):

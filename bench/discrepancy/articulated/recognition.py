@@ -14,9 +14,9 @@ from bench.discrepancy.model.mjcf_file import rig_of
 from bench.discrepancy.multibody.channels import bound
 from bench.discrepancy.multibody.encoders import encoders_of, input_of
 from bench.discrepancy.multibody.model import ArticulatedModel
-from bench.discrepancy.multibody.nominal_values import DRIVES
 from bench.discrepancy.settings import DEFAULT, ArticulatedSettings
 from bench.errors import BenchError
+from bench.rig.actuators import DRIVES, commanded
 
 
 def applies(case: Case, *, settings: ArticulatedSettings = DEFAULT.articulated) -> bool:
@@ -31,8 +31,8 @@ def applies(case: Case, *, settings: ArticulatedSettings = DEFAULT.articulated) 
     except BenchError:
         return False  # refused where the model is read for a diagnosis
     # one joint on its own is a linear structure first: forces on it have a larger catalogue there
-    servos = model.nv > 1 and model.nu and np.any(np.asarray(model.actuator_biasprm)[:, 1] != 0.0)
-    return bool(servos) or _posture_matters(model, settings=settings)
+    servos = model.nv > 1 and any(commanded(model, u) == "position" for u in range(model.nu))
+    return servos or _posture_matters(model, settings=settings)
 
 
 def drives_only(case: Case) -> bool:

@@ -34,7 +34,7 @@ from bench.discrepancy.articulated_search.hypothesis import JointHypothesis, Pla
 from bench.discrepancy.articulated_search.misfit import Octaves
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.multibody.encoders import input_of
-from bench.discrepancy.multibody.joint_run import Slot
+from bench.discrepancy.multibody.joint_forces import Slot
 from bench.discrepancy.multibody.joint_torque import missing_torque
 from bench.discrepancy.multibody.motion import clock_of
 from bench.discrepancy.multibody.noise import NoiseSettings, draw
@@ -122,7 +122,7 @@ class TorqueProblem(ArticulatedProblem):
         """Mean torque (n_intervals,) that joint `j` misses in record `r`, whose encoders are as `prepared` has them."""
         record = prepared.joints[j]
         p = self.slots(j, hypothesis, vector, on_link=record.on_link)
-        p[Slot.RATIO] = record.servo_ratio
+        p[Slot.RATIO] *= record.servo_ratio
         stated = base_slots(self.joints[j], record.on_link)
         # a drive that gives a part of what was logged is off by as much of what was logged
         part = p[Slot.GEAR] * p[Slot.KP] / (stated[Slot.GEAR] * stated[Slot.KP])

@@ -16,7 +16,7 @@ from bench.discrepancy.articulated_search.slot_setters import (
     written,
 )
 from bench.discrepancy.effects.effect import FreeParameter, log_grid
-from bench.discrepancy.multibody.joint_run import Slot
+from bench.discrepancy.multibody.joint_forces import Slot
 
 TEETH = tuple(float(n) for n in range(2, 121))
 """Periods of cogging in a turn that are tried: slots, poles and teeth are whole numbers."""

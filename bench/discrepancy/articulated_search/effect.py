@@ -1,6 +1,6 @@
 """An effect of articulated models: where it may sit, its parameters, and how it enters the runs of a joint.
 
-An effect at a joint or a drive sets entries of the parameter vector of that joint's runs (`joint_run.Slot`); one of a body changes the
+An effect at a joint or a drive sets entries of the parameter vector of that joint's runs (`joint_forces.Slot`); one of a body changes the
 torque of the inverse dynamics of all joints; one of an encoder corrects the log. Parameters are of order one, as in the catalogue of
 linear structures (`bench.discrepancy.effects.effect`), with the scales of the joint's own records.
 """
@@ -122,7 +122,7 @@ class ArticulatedEffect:
             "force": force, "peak": force, "input": force if self.servo is False else "input", "position": position,
             "velocity": f"{position}/s", "inertia": inertia, "mass": "kg", "reach": "m", "1": "1",
             "force/position": f"{force}/{position}", "force/velocity": f"{force} s/{position}",
-            "force/velocity/velocity": f"{force} s^2/{position}^2",
+            "force/velocity/velocity": f"{force} s^2/{position}^2", "1/force": f"1/({force})",
         }[parameter.scale]  # fmt: skip
 
     def works(self, eta: Array, scales: JointScales) -> bool:

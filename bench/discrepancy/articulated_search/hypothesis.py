@@ -10,18 +10,20 @@ import numpy as np
 from bench.arrays import Array
 from bench.discrepancy.articulated_search.effect import ArticulatedEffect, JointScales
 from bench.discrepancy.case.case import Case
-from bench.discrepancy.multibody.joint_run import SLOTS, Slot
+from bench.discrepancy.multibody.joint_forces import SLOTS, Slot
 from bench.discrepancy.multibody.model import ArticulatedModel, Joint
 from bench.errors import UnknownNameError
+from bench.rig.actuators import DRIVES
 
 LOCAL_SLOTS = {
-    "damping": Slot.DAMPING,
-    "armature": Slot.INERTIA,
-    "frictionloss": Slot.LIMIT,
-    "stiffness": Slot.STIFFNESS,
-    "kp": Slot.KP,
-    "kv": Slot.KV,
-    "gear": Slot.GEAR,
+    "damping": (Slot.DAMPING,),
+    "armature": (Slot.INERTIA,),
+    "frictionloss": (Slot.LIMIT,),
+    "stiffness": (Slot.STIFFNESS,),
+    "kp": (Slot.KP,),
+    "kv": (Slot.KV,),
+    "gear": (Slot.GEAR, Slot.RATIO),
+    "forcerange": (Slot.HIGH,),
 }
 """Entries of a joint's parameter vector that nominal parameters set."""
 
@@ -87,7 +89,7 @@ def nominal_parameters(case: Case, model: ArticulatedModel) -> tuple[Nominal, ..
         kind, _, target = parameter.name.partition(":")
         if kind == "mass":
             known: Mapping[str, int] = bodies
-        elif kind in ("kp", "kv", "gear"):
+        elif kind in DRIVES:
             known = drives
         elif kind in LOCAL_SLOTS:
             known = joints
@@ -109,12 +111,30 @@ def base_slots(joint: Joint, on_link: bool) -> Array:
     p[Slot.GEAR], p[Slot.SERVO] = drive.gear, float(drive.servo)
     p[Slot.KP], p[Slot.KV] = drive.kp, drive.kv
     p[Slot.LOW], p[Slot.HIGH] = drive.low, drive.high
+    if np.isfinite(drive.stall):
+        p[Slot.STALL], p[Slot.BACK_EMF] = drive.stall, drive.gear * drive.back_emf
     # MuJoCo's activation stands for the control, that of a servo for its target
-    p[Slot.INPUT_LAG] = drive.lag
+    p[Slot.INPUT_LAG], p[Slot.DELAY] = drive.lag, drive.delay
     p[Slot.DAMPING], p[Slot.LIMIT] = joint.damping, joint.friction
     p[Slot.STIFFNESS], p[Slot.REFERENCE] = joint.stiffness, joint.reference
-    p[Slot.MOTOR], p[Slot.ENCODER], p[Slot.STRIBECK], p[Slot.RATIO] = joint.armature, float(on_link), 1.0, 1.0
+    p[Slot.MOTOR], p[Slot.ENCODER], p[Slot.STRIBECK], p[Slot.RATIO] = (
+        joint.armature,
+        float(on_link),
+        1.0,
+        drive.gear,
+    )
     return p
+
+
+def move(p: Array, kind: str, by: float) -> None:
+    """Move a nominal parameter in the parameter vector (SLOTS,) of a joint."""
+    if kind == "forcerange" and p[Slot.STALL] > 0.0:
+        p[Slot.STALL] += by
+        return
+    if kind == "forcerange":
+        p[Slot.LOW] *= 1.0 + by / p[Slot.HIGH]
+    for slot in LOCAL_SLOTS[kind]:
+        p[slot] += by
 
 
 def placed_values(placed: PlacedOnJoint, eta: Array) -> dict[str, float]:

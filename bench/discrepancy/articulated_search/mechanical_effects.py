@@ -7,12 +7,24 @@ import math
 from bench.discrepancy.articulated_search.effect import SETTINGS, ArticulatedEffect
 from bench.discrepancy.articulated_search.slot_setters import (
     added,
+    carried,
     stop,
     written,
 )
 from bench.discrepancy.effects.effect import FreeParameter, log_grid
 
 LIMIT = FreeParameter("limit", "force", **SETTINGS.positive)
+STRIBECK_VELOCITY = FreeParameter(
+    "velocity", "velocity", mean=math.log(0.1), std=1.0, bounds=(-6.0, 0.7), grid=log_grid(0.03, 0.1, 0.3)
+)
+
+
+def _part(name: str, middle: float, *grid: float) -> FreeParameter:
+    """Friction over the torque that a gear carries: a middle within a factor of seven with 95 %."""
+    return FreeParameter(
+        name, mean=math.log(middle), std=1.0, bounds=(-7.0, 1.0), grid=log_grid(*grid), unit="1"
+    )
+
 
 MECHANICAL_EFFECTS: tuple[ArticulatedEffect, ...] = (
     ArticulatedEffect(
@@ -32,14 +44,7 @@ MECHANICAL_EFFECTS: tuple[ArticulatedEffect, ...] = (
             FreeParameter(
                 "rise", mean=math.log(0.7), std=0.7, bounds=(-3.0, 2.5), grid=log_grid(0.7), unit="1"
             ),
-            FreeParameter(
-                "velocity",
-                "velocity",
-                mean=math.log(0.1),
-                std=1.0,
-                bounds=(-6.0, 0.7),
-                grid=log_grid(0.03, 0.1, 0.3),
-            ),
+            STRIBECK_VELOCITY,
         ),
         "f = Fc (1 + rise exp(-(v/vs)^2)) sgn(v)",
         written(LIMIT="limit", RISE="rise", STRIBECK="velocity"),
@@ -78,13 +83,42 @@ MECHANICAL_EFFECTS: tuple[ArticulatedEffect, ...] = (
             FreeParameter(
                 "limit_0", "force", mean=math.log(0.05), std=1.5, bounds=(-9.0, 4.0), grid=log_grid(0.05)
             ),
-            FreeParameter(
-                "mu", mean=math.log(0.1), std=1.0, bounds=(-7.0, 1.0), grid=log_grid(0.1), unit="1"
-            ),
+            _part("mu", 0.1, 0.1),
             FreeParameter("of_actuator", fixed=True, signed=True, grid=(0.0, 1.0), unit="1"),
         ),
         "f = (F0 + mu |torque carried|) sgn(v), that of the link, or of the actuator",
-        written(LIMIT="limit_0", CARRIED="mu", CARRIED_BY="of_actuator"),
+        carried,
+    ),
+    ArticulatedEffect(
+        "gear_friction",
+        "friction",
+        "joint",
+        (
+            FreeParameter(
+                "limit_0", "force", mean=math.log(0.05), std=1.5, bounds=(-9.0, 4.0), grid=log_grid(0.05)
+            ),
+            _part("mu_drive", 0.1, 0.05, 0.3),
+            _part("mu_weight", 0.03, 0.03),
+            _part("mu_rest", 0.1, 0.1, 0.3),
+            STRIBECK_VELOCITY,
+            FreeParameter(
+                "growth",
+                "1/force",
+                mean=math.log(0.03),
+                std=1.5,
+                bounds=(-9.0, 1.0),
+                grid=log_grid(0.03, 0.2),
+            ),
+        ),
+        "f = (F0 + |mu_d Td + mu_w Tw| + mu_r |Tw| exp(-(v/vs)^2) + growth Td^2) sgn(v), Td of the drive, Tw what the link weighs",
+        written(
+            LIMIT="limit_0",
+            DRIVEN="mu_drive",
+            WEIGHED="mu_weight",
+            WEIGHED_RISE="mu_rest",
+            STRIBECK="velocity",
+            DRIVEN_SQUARE="growth",
+        ),
     ),
     ArticulatedEffect(
         "coupled_friction",

@@ -21,17 +21,18 @@ from numpy.typing import NDArray
 from bench.arrays import Array
 from bench.discrepancy.articulated_search.effect import JointScales
 from bench.discrepancy.articulated_search.hypothesis import (
-    LOCAL_SLOTS,
     JointHypothesis,
     Nominal,
     base_slots,
+    move,
     nominal_parameters,
     placed_values,
 )
 from bench.discrepancy.articulated_search.misfit import Octaves, transformed
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.multibody.encoders import Encoder
-from bench.discrepancy.multibody.joint_run import Slot, predict
+from bench.discrepancy.multibody.joint_forces import Slot
+from bench.discrepancy.multibody.joint_run import predict
 from bench.discrepancy.multibody.model import ArticulatedModel, Joint
 from bench.discrepancy.multibody.records import JointRecord, PreparedRecord, corrected, prepare, relinked
 from bench.discrepancy.numerics.deadline import NEVER, Deadline
@@ -202,7 +203,7 @@ class ArticulatedProblem:
         p = base_slots(joint, on_link)
         for i in self.locals(j):
             entry = self.nominal[i]
-            p[LOCAL_SLOTS[entry.kind]] += entry.std * vector[i]
+            move(p, entry.kind, entry.std * vector[i])
         for placed, eta in zip(hypothesis, self.etas(hypothesis, vector), strict=True):
             if placed.effect.slots is not None and j in placed.joints:
                 placed.effect.slots(placed_values(placed, eta), p)
@@ -229,7 +230,7 @@ class ArticulatedProblem:
         """Innovations (n, 2) and states (n, 4) of joint `j` from `starts`, set anew after `every` samples, see `joint_run.predict`."""
         bias, inertia = self.coefficients(record, hypothesis, vector)
         p = self.slots(j, hypothesis, vector, on_link=record.on_link)
-        p[Slot.RATIO] = record.servo_ratio
+        p[Slot.RATIO] *= record.servo_ratio
         return predict(
             p, (inertia, bias, record.slope, record.reference, record.load), record.servo_command, record.step,
             record.n_sub, (record.position, record.velocity), gain, starts, every, self.beside(j, hypothesis, record),
@@ -306,21 +307,19 @@ class ArticulatedProblem:
         joint = self.joints[j]
         drive = joint.drive
         assert drive is not None
-        forces, inputs, q, v = [], [], [], []
+        torques, inputs, q, v = [], [], [], []
         for prepared in self.records:
             record = prepared.joints[j]
-            error = record.command - record.reference if drive.servo else record.command
-            force = np.clip(drive.kp * error, drive.low, drive.high)
-            forces.append(force)
-            inputs.append(error)
+            inputs.append(record.command - drive.gear * record.reference if drive.servo else record.command)
+            torques.append(drive.torque(record.command, record.reference, np.zeros(len(record.command))))
             q.append(prepared.motion.position[:, j])
             v.append(prepared.motion.velocity[:, j])
         q_all, v_all = np.concatenate(q), np.concatenate(v)
-        force = np.concatenate(forces)
+        torque = np.concatenate(torques)
         middle = 0.5 * float(q_all.max() + q_all.min())
         return JointScales(
-            float(np.sqrt(np.mean(force**2))) * abs(drive.gear) or 1.0,
-            float(np.abs(force).max()) or 1.0,
+            float(np.sqrt(np.mean(torque**2))) or 1.0,
+            float(np.abs(torque).max()) / (abs(drive.gear) or 1.0) or 1.0,
             0.5 * float(np.ptp(q_all)) or 1.0,
             float(np.abs(v_all).max()) or 1.0,
             float(np.mean(self.records[0].joints[j].inertia)),

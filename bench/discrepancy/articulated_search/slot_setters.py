@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 
 from bench.arrays import Array
-from bench.discrepancy.multibody.joint_run import Slot
+from bench.discrepancy.multibody.joint_forces import Slot
 
 SlotValues = dict[str, float]
 
@@ -45,6 +45,12 @@ def saturated(values: SlotValues, p: Array) -> None:
     """Limit the force of the actuator to ``limit``."""
     p[Slot.LOW] = max(p[Slot.LOW], -values["limit"])
     p[Slot.HIGH] = min(p[Slot.HIGH], values["limit"])
+
+
+def carried(values: SlotValues, p: Array) -> None:
+    """Let dry friction grow with the torque of the link, or with that of the actuator."""
+    p[Slot.LIMIT] = values["limit_0"]
+    p[Slot.DRIVEN if values["of_actuator"] > 0.5 else Slot.CARRIED] = values["mu"]
 
 
 def train(values: SlotValues, p: Array) -> None:

@@ -7,8 +7,10 @@ import numpy as np
 
 from bench.discrepancy.case.case import Case, NominalParameter
 from bench.discrepancy.settings import ModelSettings
+from bench.errors import ModelError
 from bench.identification.linear_rig import current
 from bench.rig import Rig
+from bench.rig.actuators import DRIVES, drive_value
 from bench.rig.building import parse
 
 
@@ -42,7 +44,7 @@ def _note(parameter: NominalParameter, rig: Rig, *, settings: ModelSettings) -> 
 def _own_value(name: str, rig: Rig) -> float | None:
     kind, _, target = name.partition(":")
     model = rig.model
-    if kind in {"kp", "kv", "gear"}:
+    if kind in DRIVES:
         return _of_drive(model, kind, target)
     if kind == "frictionloss":
         joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, target)
@@ -57,13 +59,12 @@ def _own_value(name: str, rig: Rig) -> float | None:
 
 
 def _of_drive(model: mujoco.MjModel, kind: str, name: str) -> float | None:
-    """Gain of the input, velocity gain or gear of an actuator."""
+    """Gain of the input, velocity gain, gear or largest force of an actuator."""
     index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name)
-    if index < 0:
-        return None
-    if kind == "gear":
-        return float(model.actuator_gear[index, 0])
-    return float(model.actuator_gainprm[index, 0] if kind == "kp" else -model.actuator_biasprm[index, 2])
+    try:
+        return drive_value(model, index, kind) if index >= 0 else None
+    except ModelError:
+        return None  # refused with reasons where the model is taken apart
 
 
 def _sum(name: str, rig: Rig) -> str:

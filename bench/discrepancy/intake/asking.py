@@ -10,7 +10,6 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from bench.discrepancy.application.own_share import with_simulator
 from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.case.reading import read_case
@@ -19,6 +18,7 @@ from bench.discrepancy.intake.assumptions import Assumptions
 from bench.discrepancy.intake.drafting import Draft, draft
 from bench.discrepancy.intake.logs import log_of
 from bench.discrepancy.intake.models import model_file
+from bench.discrepancy.replay.own_share import with_simulator
 from bench.discrepancy.report.answers import answers
 from bench.discrepancy.verdict import Verdict
 from bench.errors import MissingPackageError

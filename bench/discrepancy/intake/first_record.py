@@ -7,14 +7,14 @@ from pathlib import Path
 from bench import native
 from bench.discrepancy.application.applying import INTEGRATORS, Findings, apply, specification
 from bench.discrepancy.application.reading import findings_of
-from bench.discrepancy.application.verification import (
+from bench.discrepancy.case.case import Case
+from bench.discrepancy.replay.verification import (
     Figure,
     Verification,
     is_articulated,
     replay_of,
     root_mean_square,
 )
-from bench.discrepancy.case.case import Case
 from bench.discrepancy.verdict import InSimulator, Verdict
 from bench.errors import BenchError
 

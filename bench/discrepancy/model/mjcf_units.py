@@ -13,6 +13,7 @@ from bench.discrepancy.case.case import Case, CaseChannel
 from bench.discrepancy.case.unit_conversion import Expectation
 from bench.discrepancy.motion.observer import ORDERS
 from bench.rig import Rig
+from bench.rig.actuators import commanded
 
 TURNS = {
     "position": ("rad",), "velocity": ("rad/s",), "acceleration": ("rad/s^2",), "load": ("N m",),
@@ -148,15 +149,11 @@ def _article(quantity: str) -> str:
 def _command(model: mujoco.MjModel, name: str) -> Expectation | None:
     """What drives an actuator: a force, or the position or velocity that a servo follows."""
     index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name)
-    affine = int(model.actuator_biastype[index]) == int(mujoco.mjtBias.mjBIAS_AFFINE)
-    if affine and model.actuator_biasprm[index, 1] != 0.0:
-        return _at_actuator(model, name, "position")
-    if affine and model.actuator_biasprm[index, 2] != 0.0 and int(model.actuator_gaintype[index]) == int(
-        mujoco.mjtGain.mjGAIN_FIXED
-    ) and abs(model.actuator_gainprm[index, 0] + model.actuator_biasprm[index, 2]) <= 1e-9 * abs(
-        model.actuator_gainprm[index, 0]
-    ):  # fmt: skip
-        return _at_actuator(model, name, "velocity")
+    asked = commanded(model, index)
+    if asked in {"position", "velocity"}:
+        return _at_actuator(model, name, asked)
+    if asked == "voltage":
+        return Expectation(("V",), f"actuator '{name}' of the model takes a voltage")
     return _at_actuator(model, name, "load", gain=float(model.actuator_gainprm[index, 0]))
 
 

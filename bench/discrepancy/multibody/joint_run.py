@@ -21,63 +21,23 @@ References:
 from __future__ import annotations
 
 import math
-from enum import IntEnum
 from typing import NamedTuple
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
-
-class Slot(IntEnum):
-    """Entries of the parameter vector of a run; zero switches an effect off, except where noted."""
-
-    GEAR = 0  # factor of the actuator's force
-    SERVO = 1  # 1: the input is a position target, 0: it is a force
-    KP = 2
-    KV = 3
-    LOW = 4  # limits of the actuator's force
-    HIGH = 5
-    DAMPING = 6
-    STIFFNESS = 7
-    REFERENCE = 8  # angle without spring force
-    INERTIA = 9  # inertia besides that of the coefficients, on the motor's side
-    LIMIT = 10  # dry friction: limit, relative rise at rest, Stribeck velocity, part of the torque carried
-    RISE = 11
-    STRIBECK = 12
-    CARRIED = 13
-    QUADRATIC = 14
-    OFFSET = 15
-    BRISTLE_LIMIT = 16
-    BRISTLE_STIFFNESS = 17
-    BRISTLE_DAMPING = 18
-    COGGING = 19  # amplitude, periods a turn, phase
-    PERIODS = 20
-    PHASE = 21
-    STOP = 22  # stiffness, position, damping, side (+1, -1)
-    STOP_AT = 23
-    STOP_DAMPING = 24
-    STOP_SIDE = 25
-    DEADBAND = 26  # half width, of the servo's position error or of the force
-    LAG = 27  # time constant of the force [s]
-    DELAY = 28  # of the input [s]
-    TRAIN = 29  # 1: an elastic drive train between motor and link
-    TRAIN_STIFFNESS = 30
-    TRAIN_DAMPING = 31
-    CLEARANCE = 32  # half of the play
-    MOTOR = 33  # inertia of the motor, at the joint
-    ENCODER = 34  # 0: on the motor, 1: on the link
-    SPEED_LIMIT = 35  # speed at which the force available has fallen to zero; 0: no such limit
-    RATIO = 36  # reading of a servo's encoder over the true position; one where nothing is wrong
-    ON_LINK = 37  # 1: damping acts on the link's side of a train
-    CARRIED_BY = 38  # 0: friction grows with the torque on the link, 1: with that of the actuator
-    INPUT_LAG = 39  # time constant of a filter of the input [s], of a servo that of its target
-    PAIR_LIMIT = 40  # dry friction and damping in what this joint and a neighbour turn together: limit, damping, sense of the neighbour
-    PAIR_DAMPING = 41
-    PAIR_SENSE = 42
-
-
-SLOTS = len(Slot)
+from bench.discrepancy.multibody.joint_forces import (
+    actuator_force,
+    beyond_band,
+    bristle_force_of,
+    bristles_slid,
+    delayed_input,
+    friction_limit,
+    inlined,
+    pair_friction,
+    stop_force,
+)
 
 
 class JointRunLimits(NamedTuple):
@@ -88,97 +48,6 @@ class JointRunLimits(NamedTuple):
 
 
 JOINT_RUN_LIMITS = JointRunLimits()
-
-inlined = numba.njit(cache=True, error_model="numpy", nogil=True, inline="always")
-
-
-@inlined
-def delayed_input(u, k, shift):
-    """Input at the middle of step `k`, delayed by `shift` steps."""
-    at = k - shift
-    if at <= 0.0:
-        return u[0]
-    low = int(at)
-    if low >= u.shape[0] - 1:
-        return u[u.shape[0] - 1]
-    return u[low] + (at - low) * (u[low + 1] - u[low])
-
-
-@inlined
-def beyond_band(x, width):
-    """What of `x` lies beyond a dead band of half width `width`."""
-    if x > width:
-        return x - width
-    if x < -width:
-        return x + width
-    return 0.0
-
-
-@inlined
-def actuator_force(p, command, q, v, lagged, keep):
-    """Force of the actuator at the joint, the part of its velocity gain that the step may take implicitly, and the state of its lag."""
-    implicit = 0.0
-    if p[1] > 0.5:  # a servo
-        wanted = p[2] * beyond_band(command - p[36] * q, p[26]) - p[3] * p[36] * v
-        implicit = p[3] * p[36]
-    else:
-        wanted = p[2] * beyond_band(command, p[26])
-    if p[27] > 0.0:
-        lagged = wanted if math.isnan(lagged) else wanted + (lagged - wanted) * keep
-        wanted = lagged
-        implicit = 0.0
-    low, high = p[4], p[5]
-    if p[35] > 0.0:  # the force available falls with the speed
-        high = min(high, high * max(0.0, 1.0 - v / p[35]))
-        low = max(low, low * max(0.0, 1.0 + v / p[35]))
-    if wanted > high or wanted < low:
-        wanted = min(max(wanted, low), high)
-        implicit = 0.0
-    return p[0] * wanted, p[0] * implicit, lagged
-
-
-@inlined
-def stop_force(p, x, w):
-    """Force of the one-sided stop on the joint; it only pushes."""
-    depth = p[25] * (x - p[23])
-    if p[22] > 0.0 and depth > 0.0:
-        return -p[25] * max(p[22] * depth + p[24] * p[25] * w, 0.0)
-    return 0.0
-
-
-@inlined
-def friction_limit(p, v, load):
-    """Limit of the dry friction."""
-    limit = p[10]
-    if p[11] != 0.0:
-        ratio = v / p[12]
-        limit *= 1.0 + p[11] * math.exp(-ratio * ratio)
-    return limit + p[13] * load
-
-
-@inlined
-def pair_friction(p, w):
-    """Friction on what two joints turn together at velocity `w`."""
-    return p[41] * w + (math.copysign(p[40], w) if w != 0.0 else 0.0)
-
-
-@inlined
-def bristle_force_of(p, v, z):
-    """Force of the bristles at velocity `v`, and the damping that the step may take implicitly."""
-    if p[16] <= 0.0:
-        return 0.0, 0.0
-    damping = p[18] * (1.0 - p[17] / p[16] * z * math.copysign(1.0, v))
-    implicit = 0.5 * max(damping, 0.0)
-    return -p[17] * z - (damping - implicit) * v, implicit
-
-
-@inlined
-def bristles_slid(p, z, v, step):
-    """The bristles after a step of sliding at velocity `v`; exact where that is constant."""
-    if p[16] <= 0.0:
-        return z
-    steady = math.copysign(p[16] / p[17], v)
-    return steady + (z - steady) * math.exp(-p[17] * abs(v) * step / p[16])
 
 
 @inlined
@@ -293,10 +162,10 @@ def run(
             bristle_force, bristle = bristle_force_of(p, v, z)
             own = force + bristle_force - p[19] * math.sin(p[20] * q + p[21])
             x, w = (ql, vl) if train else (q, v)
-            rest = p[15] - bias[k] - slope[k] * (x - reference[k]) - p[7] * (x - p[8]) + stop_force(p, x, w)
-            limit = friction_limit(p, v, abs(force) if p[38] > 0.5 else load[k])
-            damping = p[6] + p[14] * abs(v)
-            before, inertia = v, (mass[k] + p[9]) / step
+            weight = bias[k] + slope[k] * (x - reference[k])
+            rest = p[15] - weight - p[7] * (x - p[8]) + stop_force(p, x, w)
+            limit = friction_limit(p, v, load[k], force, weight)
+            before, inertia, damping = v, (mass[k] + p[9]) / step, p[6] + p[14] * abs(v)
             if train:
                 rest -= pair_friction(p, w + p[42] * beside[k])
                 v, vl = _kick_train(p, mass[k], step, own, rest, damping, implicit, bristle, limit, q, v, ql, vl)  # fmt: skip

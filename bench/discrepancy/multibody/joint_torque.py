@@ -14,7 +14,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.discrepancy.multibody.joint_run import (
+from bench.discrepancy.multibody.joint_forces import (
     actuator_force,
     bristle_force_of,
     bristles_slid,
@@ -52,12 +52,13 @@ def _missing(p, mass, bias, load, beside, u, step, motion, still, least, out):
         rest = p[15] - bias[k] - p[7] * (q - p[8]) + stop_force(p, q, v)
         rest -= pair_friction(p, v + p[42] * beside[k])
         free = own + rest - (p[6] + p[14] * abs(v)) * v - (mass[k] + p[9]) * a
-        limit = friction_limit(p, v, abs(force) if p[38] > 0.5 else load[k])
+        limit = friction_limit(p, v, load[k], force, bias[k])
         held = abs(free) if abs(v) < still else limit
         error = free - math.copysign(min(limit, held), free if abs(v) < still else v)
         # of what is added to the drive, friction that carries it takes a part, or adds as much where it is driven back
-        if p[38] > 0.5:
-            error /= max(1.0 - p[13] * math.copysign(1.0, force) * math.copysign(1.0, v), least)
+        if p[38] != 0.0 or p[45] != 0.0:
+            more = p[38] * math.copysign(1.0, p[38] * force + p[43] * bias[k]) + 2.0 * p[45] * force
+            error /= max(1.0 - more * math.copysign(1.0, v), least)
         out[k] = error
         z = bristles_slid(p, z, v, step)
 
@@ -74,7 +75,7 @@ def missing_torque(
     """Torque (n_steps,) by which the drive exceeds what the motion takes.
 
     Args:
-        p: (SLOTS,) parameters of a joint without an elastic train, see `joint_run.Slot`.
+        p: (SLOTS,) parameters of a joint without an elastic train, see `joint_forces.Slot`.
         arrays: Inertia, bias (at the measured motion) and load at the middle of every step, each (n_steps,).
         u: (n_steps,) input.
         step: Length of a step [s].

@@ -17,10 +17,10 @@ import mujoco
 import numpy as np
 
 from bench.arrays import Array
-from bench.discrepancy.multibody.drives import JointDrive, drive_of, is_driven
 from bench.discrepancy.multibody.inverse import along
 from bench.errors import ModelError, UnknownNameError
 from bench.rig import Rig
+from bench.rig.actuators import JointDrive, drive_of, is_driven
 from bench.rig.held_joints import MOTION
 
 MOVING = {int(mujoco.mjtJoint.mjJNT_HINGE): "rad", int(mujoco.mjtJoint.mjJNT_SLIDE): "m"}
@@ -257,18 +257,24 @@ def _joint(model: mujoco.MjModel, i: int) -> Joint:
             f"joint '{model.joint(i).name}' has {len(drives)} actuators ({', '.join(d.name for d in drives)}); one a joint is expected: "
             "keep the one whose command or torque was recorded"
         )
+    drive = drives[0] if drives else None
+    # what the actuator itself weighs and damps, behind its gear
+    own = model.actuator(drive.name).id if drive else 0
+    behind = drive.gear**2 if drive else 0.0
+    armature = behind * float(model.actuator_armature[own]) if drive else 0.0
+    damping = behind * float(np.ravel(model.actuator_damping[own])[0]) if drive else 0.0
     return Joint(
         model.joint(i).name,
         dof,
         body_name(model, int(model.jnt_bodyid[i])),
         MOVING[int(model.jnt_type[i])],
-        float(np.ravel(model.dof_damping[dof])[0]),
+        float(np.ravel(model.dof_damping[dof])[0]) + damping,
         float(model.dof_frictionloss[dof]),
-        float(model.dof_armature[dof]),
+        float(model.dof_armature[dof]) + armature,
         float(np.ravel(model.jnt_stiffness[i])[0]),
         float(model.qpos_spring[model.jnt_qposadr[i]]),
         (float(model.jnt_range[i, 0]), float(model.jnt_range[i, 1])) if limited else (-np.inf, np.inf),
-        drives[0] if drives else None,
+        drive,
     )
 
 
@@ -278,6 +284,8 @@ def _bare(model: mujoco.MjModel) -> mujoco.MjModel:
     bare.dof_damping[:] = 0.0
     bare.dof_frictionloss[:] = 0.0
     bare.dof_armature[:] = 0.0
+    bare.actuator_armature[:] = 0.0
+    bare.actuator_damping[:] = 0.0
     bare.jnt_stiffness[:] = 0.0
     # of a body whose inertia is diagonal in its joints MuJoCo keeps the row of the mass matrix from when it was compiled, armature
     # included, and of one whose centre of mass is its origin that it is; here masses, centres and armatures change

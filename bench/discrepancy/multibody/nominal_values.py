@@ -10,13 +10,10 @@ import mujoco
 from bench.discrepancy.case.case import NominalParameter
 from bench.errors import UnknownNameError
 from bench.rig import Rig
+from bench.rig.actuators import DRIVES, set_drive
 
 LOCAL = ("damping", "frictionloss", "armature", "stiffness")
 """Parameters of joints."""
-
-
-DRIVES = ("kp", "kv", "gear")
-"""Parameters of actuators."""
 
 
 def with_nominal_values(rig: Rig, parameters: Iterable[NominalParameter]) -> mujoco.MjModel:
@@ -46,16 +43,5 @@ def with_nominal_values(rig: Rig, parameters: Iterable[NominalParameter]) -> muj
     for kind, name, value in drives:
         if name not in actuators:
             raise UnknownNameError(f"target of parameter '{kind}:{name}'", name, actuators)
-        _set_drive(model, actuators.index(name), kind, value)
+        set_drive(model, actuators.index(name), kind, value)
     return model
-
-
-def _set_drive(model: mujoco.MjModel, u: int, kind: str, value: float) -> None:
-    if kind == "gear":
-        model.actuator_gear[u, 0] = value
-    elif kind == "kv":
-        model.actuator_biasprm[u, 2] = -value
-    else:
-        if model.actuator_biasprm[u, 1] != 0.0:  # a servo's input and its position have one gain
-            model.actuator_biasprm[u, 1] = -value
-        model.actuator_gainprm[u, 0] = value

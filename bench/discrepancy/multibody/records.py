@@ -105,8 +105,9 @@ class JointRecord:
     def servo_command(self) -> Array:
         """The input (n_steps,), that of a servo less the offset of its encoder."""
         drive = self.joint.drive
-        wrong = drive is not None and drive.servo and self.encoder.in_loop > 0.5
-        return self.command - self.encoder.offset if wrong else self.command
+        if drive is None or not drive.servo or self.encoder.in_loop <= 0.5:
+            return self.command
+        return self.command - drive.gear * self.encoder.offset
 
     @property
     def servo_ratio(self) -> float:
@@ -135,8 +136,8 @@ class JointRecord:
         """Transition, process noise, observation and noise of the joint about its mean inertia, sample by sample."""
         drive, m = self.joint.drive, float(np.mean(self.inertia))
         assert drive is not None
-        stiffness = drive.gear * drive.kp + float(np.mean(self.slope)) if drive.servo else 0.0
-        damping = self.joint.damping + (drive.gear * drive.kv if drive.servo else 0.0)
+        stiffness = drive.stiffness + float(np.mean(self.slope)) if drive.servo else 0.0
+        damping = self.joint.damping + drive.damping
         transition = expm(np.array([[0.0, 1.0], [-stiffness / m, -damping / m]]) * self.sample)
         push = np.array([0.5 * self.sample**2, self.sample]) / m
         process = np.outer(push, push) * self.process**2

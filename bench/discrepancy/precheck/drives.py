@@ -97,7 +97,7 @@ def _of_clocks(
     held = 0.5 * record.step if own.load_interpolation == "zero_order_hold" else 0.0
     late = -found.lag - held  # the joint after the target
     least = SETTINGS.certain * found.lag_std
-    hold = abs(joint.drive.gear) * joint.drive.kp
+    hold = joint.drive.stiffness or abs(joint.drive.gear) * joint.drive.kp
     # a servo lags by its damping over its gain
     overstated = joint.damping / hold
     stated = [p.std for p in own.parameters if p.name in (f"damping:{joint.name}", f"kv:{joint.drive.name}")]

@@ -16,17 +16,17 @@ import numpy as np
 from bench import native
 from bench.arrays import Array
 from bench.discrepancy.application.applying import Applied, Findings, RunOptions, apply, specification
-from bench.discrepancy.application.joint_replay import encoders_wrong
-from bench.discrepancy.application.linear_replay import LinearReplay
-from bench.discrepancy.application.running import Stretch, controls, hook_of, run, sampled
 from bench.discrepancy.application.target import PREFIX
-from bench.discrepancy.application.verification import VerificationSettings
 from bench.discrepancy.articulated.recognition import applies
 from bench.discrepancy.case.case import Case, CaseChannel, CaseRecord
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.multibody.channels import bound
 from bench.discrepancy.multibody.encoders import TRUE, Encoder, encoders_of, input_of
 from bench.discrepancy.multibody.model import ArticulatedModel
+from bench.discrepancy.replay.joint_replay import encoders_wrong
+from bench.discrepancy.replay.linear_replay import LinearReplay
+from bench.discrepancy.replay.running import Stretch, controls, hook_of, run, sampled
+from bench.discrepancy.replay.verification import VerificationSettings
 from bench.discrepancy.verdict import NamedEffect, NominalEstimate
 from bench.errors import ModelError, ParameterError, SimulationError
 

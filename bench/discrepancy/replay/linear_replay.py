@@ -13,11 +13,11 @@ from bench.arrays import Array
 from bench.discrepancy.application.applying import Applied, loads_of, rest_of
 from bench.discrepancy.application.drives import LOGGED
 from bench.discrepancy.application.forces import values_of
-from bench.discrepancy.application.running import Reading, Stretch, controls, hook_of, run, sampled
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.effects.catalogue import CATALOGUE
 from bench.discrepancy.judgement.validation_discrepancy import DIVERGED_GAP, coordinates
 from bench.discrepancy.model.structure import Structure
+from bench.discrepancy.replay.running import Reading, Stretch, controls, hook_of, run, sampled
 from bench.discrepancy.response.initial_states import in_motion
 from bench.discrepancy.response.windows import cut, drifts
 from bench.discrepancy.verdict import NamedEffect
@@ -25,7 +25,7 @@ from bench.discrepancy.verdict import NamedEffect
 
 @dataclass(frozen=True)
 class LinearReplaySettings:
-    """Numbers of `bench.discrepancy.application.linear_replay`."""
+    """Numbers of `bench.discrepancy.replay.linear_replay`."""
 
     periods: int = 8
     """Periods over which a steady state runs in from rest."""

@@ -8,13 +8,13 @@ from pathlib import Path
 import mujoco
 
 from bench.discrepancy.application.applying import INTEGRATORS, Findings, RunOptions, apply, specification
-from bench.discrepancy.application.verification import (
+from bench.discrepancy.case.case import Case
+from bench.discrepancy.replay.verification import (
     VerificationSettings,
     is_articulated,
     replay_of,
     root_mean_square,
 )
-from bench.discrepancy.case.case import Case
 from bench.discrepancy.verdict import Location, Verdict, of_runs
 from bench.errors import BenchError
 

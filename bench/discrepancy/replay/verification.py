@@ -19,14 +19,14 @@ from bench.discrepancy.application.applying import (
     apply,
     specification,
 )
-from bench.discrepancy.application.joint_replay import JointReplay
-from bench.discrepancy.application.linear_replay import LinearReplay
 from bench.discrepancy.articulated.recognition import applies
 from bench.discrepancy.articulated_search.catalogue import CATALOGUE as ARTICULATED
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.checks.initial_motion import with_starts_found
 from bench.discrepancy.effects.catalogue import CATALOGUE as LINEAR
 from bench.discrepancy.model.rigs import structure_of
+from bench.discrepancy.replay.joint_replay import JointReplay
+from bench.discrepancy.replay.linear_replay import LinearReplay
 from bench.discrepancy.verdict import Gap, of_runs
 from bench.errors import BenchError, ModelError
 

@@ -17,7 +17,6 @@ from scipy.interpolate import CubicSpline
 from bench.arrays import Array
 from bench.discrepancy.application.applying import Applied
 from bench.discrepancy.application.forces import values_of
-from bench.discrepancy.application.running import Reading, Stretch, controls, hook_of, run, sampled
 from bench.discrepancy.application.target import PREFIX, as_mujoco
 from bench.discrepancy.articulated_search.catalogue import CATALOGUE
 from bench.discrepancy.case.case import Case, CaseRecord
@@ -26,6 +25,7 @@ from bench.discrepancy.multibody.encoders import Encoder, input_of, travel
 from bench.discrepancy.multibody.model import ArticulatedModel, Joint
 from bench.discrepancy.multibody.motion import JointMotion, motion_of
 from bench.discrepancy.multibody.records import RECORDS_SETTINGS
+from bench.discrepancy.replay.running import Reading, Stretch, controls, hook_of, run, sampled
 from bench.discrepancy.settings import DEFAULT
 from bench.discrepancy.verdict import NamedEffect
 from bench.errors import ModelError
@@ -33,7 +33,7 @@ from bench.errors import ModelError
 
 @dataclass(frozen=True)
 class JointReplaySettings:
-    """Numbers of `bench.discrepancy.application.joint_replay`."""
+    """Numbers of `bench.discrepancy.replay.joint_replay`."""
 
     heavy: float = 1e6
     """Armature of a joint that follows the measured motion, over its inertia: what it still feels of the others."""
