@@ -119,7 +119,9 @@ def _range(parameter: FreeParameter) -> str:
         )
     if parameter.signed:
         return f"{parameter.mean:g} ± {parameter.std:g}"
-    return f"{np.exp(parameter.mean - parameter.std):.2g} … {np.exp(parameter.mean + parameter.std):.2g}"
+    ends = np.exp(parameter.mean + parameter.std * np.array([-1.0, 1.0]))
+    low, high = ends / (1.0 + ends) if parameter.share else ends
+    return f"{low:.2g} … {high:.2g}"
 
 
 def _table(parameters: tuple[FreeParameter, ...]) -> list[str]:

@@ -20,9 +20,10 @@ STRIBECK_VELOCITY = FreeParameter(
 
 
 def _part(name: str, middle: float, *grid: float) -> FreeParameter:
-    """Friction over the torque that a gear carries: a middle within a factor of seven with 95 %."""
+    """Friction as a part of a torque that a gear carries: a middle within a factor of some seven with 95 %; a gear leaves something."""
+    mean, *points = (math.log(part / (1.0 - part)) for part in (middle, *grid))
     return FreeParameter(
-        name, mean=math.log(middle), std=1.0, bounds=(-7.0, 1.0), grid=log_grid(*grid), unit="1"
+        name, mean=mean, std=1.0, bounds=(-7.0, 5.0), grid=tuple(points), unit="1", share=True
     )
 
 

@@ -96,6 +96,7 @@ class FreeParameter:
         grid: Values of eta for the screening and as starts; the prior mean where empty.
         fixed: A discrete choice, held at its grid value by the fits.
         unit: Unit, where the scale does not tell it.
+        share: A part between none and all of the scale: ``scale / (1 + exp(-eta))``.
     """
 
     name: str
@@ -107,19 +108,24 @@ class FreeParameter:
     grid: tuple[float, ...] = ()
     fixed: bool = False
     unit: str = ""
+    share: bool = False
 
     def value(self, eta: float, scales: Magnitudes) -> float:
         """Physical value at `eta`."""
-        return scale_of(self.scale, scales) * (eta if self.signed else math.exp(eta))
+        size = 1.0 / (1.0 + math.exp(-eta)) if self.share else math.exp(eta)
+        return scale_of(self.scale, scales) * (eta if self.signed else size)
 
     def slope(self, eta: float, scales: Magnitudes) -> float:
         """Derivative of the physical value by `eta`."""
-        return scale_of(self.scale, scales) * (1.0 if self.signed else math.exp(eta))
+        part = 1.0 / (1.0 + math.exp(-eta)) if self.share else 0.0
+        return scale_of(self.scale, scales) * (1.0 if self.signed else part * (1.0 - part) or math.exp(eta))
 
     def eta(self, value: float, scales: Magnitudes) -> float:
         """Inverse of `value`, clipped to the bounds."""
         ratio = value / scale_of(self.scale, scales)
         raw = ratio if self.signed else math.log(max(ratio, 1e-12))
+        if self.share:
+            raw -= math.log(max(1.0 - ratio, 1e-12))
         return float(np.clip(raw, *self.bounds))
 
 
