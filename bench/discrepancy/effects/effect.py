@@ -112,13 +112,20 @@ class FreeParameter:
 
     def value(self, eta: float, scales: Magnitudes) -> float:
         """Physical value at `eta`."""
-        size = 1.0 / (1.0 + math.exp(-eta)) if self.share else math.exp(eta)
-        return scale_of(self.scale, scales) * (eta if self.signed else size)
+        return scale_of(self.scale, scales) * self._form(eta)[0]
 
     def slope(self, eta: float, scales: Magnitudes) -> float:
         """Derivative of the physical value by `eta`."""
-        part = 1.0 / (1.0 + math.exp(-eta)) if self.share else 0.0
-        return scale_of(self.scale, scales) * (1.0 if self.signed else part * (1.0 - part) or math.exp(eta))
+        return scale_of(self.scale, scales) * self._form(eta)[1]
+
+    def _form(self, eta: float) -> tuple[float, float]:
+        """Value over the scale, and its derivative."""
+        if self.signed:
+            return eta, 1.0
+        if self.share:
+            part = 1.0 / (1.0 + math.exp(-eta))
+            return part, part * (1.0 - part)
+        return math.exp(eta), math.exp(eta)
 
     def eta(self, value: float, scales: Magnitudes) -> float:
         """Inverse of `value`, clipped to the bounds."""
