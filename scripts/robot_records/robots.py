@@ -139,13 +139,17 @@ def _pendulum(
 def double_pendulum_a0(data: Path) -> Records:
     """Design A.0 by its drawing."""
     known = "Coulomb friction 0.15 and 0.12 N m, rotors of 0.0022 kg m2"
-    return _pendulum(data, "model_A0_10.xml", ("A0_0815_00", "A0_0815_02"), ("A0_0815_12",), known)
+    return _pendulum(
+        data, "model_A0_10.xml", ("A0_0815_00", "A0_0815_02", "A0_0815_04"), ("A0_0815_12",), known
+    )
 
 
 def double_pendulum_c1(data: Path) -> Records:
     """Design C.1 by the hypothetical set of its lengths."""
     known = "Coulomb friction 0.25 and 0.19 N m"
-    return _pendulum(data, "model_C0_h10.xml", ("C1_143339", "C1_143704"), ("C1_154220",), known)
+    return _pendulum(
+        data, "model_C0_h10.xml", ("C1_143339", "C1_143601", "C1_143704", "C1_144003"), ("C1_154220",), known
+    )
 
 
 def simple_pendulum(data: Path) -> Records:
