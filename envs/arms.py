@@ -12,7 +12,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.discrepancy.multibody.model import ArticulatedModel, Joint
+from bench.discrepancy.multibody.joints import Joint
+from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.errors import ModelError, ParameterError, UnknownNameError
 from bench.excitation import Limits, RigHypothesis, RigPrior, Uncertain
 from bench.rig import Rig

@@ -26,7 +26,8 @@ from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.model.mjcf_file import rig_of
 from bench.discrepancy.multibody.channels import bound
 from bench.discrepancy.multibody.encoders import input_of
-from bench.discrepancy.multibody.model import ArticulatedModel, Joint, body_name
+from bench.discrepancy.multibody.joints import Joint, body_name
+from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.multibody.motion import JointMotion, motion_of
 from bench.discrepancy.multibody.nominal_values import with_nominal_values
 from bench.discrepancy.multibody.records import RECORDS_SETTINGS

@@ -28,7 +28,7 @@ from bench.discrepancy.settings import (
     DEFAULT,
     DiagnosisSettings,
 )
-from bench.errors import ModelError, RecordingError, UnitError
+from bench.errors import FileFormatError, ModelError, RecordingError, UnitError
 
 
 class AdmittedRobot(NamedTuple):
@@ -93,6 +93,13 @@ def _refuse(case: Case, model: ArticulatedModel, settings: DiagnosisSettings) ->
                 f"'{record.name}' has {record.step:.4g} s between its samples, in which a joint does whatever it likes; "
                 f"under {settings.articulated.longest_sample:g} s are expected: is its time column in milliseconds?"
             )
+    for tie in model.ties:
+        for channel in case.channels:
+            if channel.target == f"joint:{tie.name}":
+                raise FileFormatError(
+                    f"'{channel.name}' measures joint '{tie.name}', which joint '{tie.to}' moves by an equality of the model; measure "
+                    f"'{tie.to}', or exchange joint1 and joint2 of the equality"
+                )
     inputs = [input_of(case, joint).name for joint in model.joints]
     responses = [c.name for joint in model.joints for c in encoders_of(case, joint).channels]
     for record in case.identification:

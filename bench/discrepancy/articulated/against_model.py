@@ -16,7 +16,8 @@ from bench.discrepancy.case.case import Case
 from bench.discrepancy.checks.bands import bands_between, common_factor, compare_channels, spectra
 from bench.discrepancy.checks.scales import grossly_apart, model_words, pair_words, shown_noise, suggestion
 from bench.discrepancy.multibody.encoders import encoders_of, input_of
-from bench.discrepancy.multibody.model import ArticulatedModel, Joint
+from bench.discrepancy.multibody.joints import Joint
+from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.multibody.motion import JointMotion, Moving
 from bench.discrepancy.settings import ChecksSettings, ScaleSettings
 

@@ -98,30 +98,29 @@ def _balance_of_mujoco(
     motion: JointMotion,
     picked: NDArray[np.intp],
 ) -> tuple[Array, Array]:
-    """The same at some samples (n_picked, n_joints) as MuJoCo has it, and the RMS (n_joints,) of what acts on each joint."""
+    """The same at some samples (n_picked, n_joints) as MuJoCo has it, and the RMS (n_joints,) of what acts on each joint.
+
+    What acts on a joint that another one moves, acts on that by the ratio of the two.
+    """
     data, out = mujoco.MjData(compiled), np.empty((len(picked), len(model.joints)))
     acting = np.zeros(len(model.joints))
     inputs = {joint.name: record.values[input_of(case, joint).name] for joint in model.joints}
+    q, v, a = (model.whole(part, order) for order, part in enumerate(motion[:3]))
     with native.quiet():
         for k, sample in enumerate(picked):
-            for j, joint in enumerate(model.moving):
-                data.qpos[joint.dof], data.qvel[joint.dof] = (
-                    motion.position[sample, j],
-                    motion.velocity[sample, j],
-                )
-                data.qacc[joint.dof] = motion.acceleration[sample, j]
+            data.qpos[:], data.qvel[:], data.qacc[:] = q[sample], v[sample], a[sample]
             for joint in model.joints:
                 assert joint.drive is not None
                 data.ctrl[compiled.actuator(joint.drive.name).id] = inputs[joint.name][sample]
             mujoco.mj_inverse(compiled, data)
-            asked = np.array(data.qfrc_inverse)
+            asked = model.on_joints(data.qfrc_inverse)
             mujoco.mj_fwdPosition(compiled, data)
             mujoco.mj_fwdVelocity(compiled, data)
             _settle(compiled, data)
             mujoco.mj_fwdActuation(compiled, data)
-            for j, joint in enumerate(model.joints):
-                out[k, j] = asked[joint.dof] - data.qfrc_actuator[joint.dof]
-                acting[j] += asked[joint.dof] ** 2 + data.qfrc_actuator[joint.dof] ** 2
+            given = model.on_joints(data.qfrc_actuator)
+            out[k] = asked - given
+            acting += asked**2 + given**2
     return out, np.sqrt(acting / len(picked))
 
 

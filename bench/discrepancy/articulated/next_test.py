@@ -180,9 +180,9 @@ def _collides(compiled: mujoco.MjModel, problem: ArticulatedProblem, trajectory:
     data = mujoco.MjData(compiled)
     settings = problem.settings.articulated.next_test
     before: set[tuple[int, int]] | None = None
-    for q in trajectory.position[:: max(1, len(trajectory.position) // settings.poses)]:
-        for j, joint in enumerate(problem.joints):
-            data.qpos[joint.dof] = q[j]
+    picked = trajectory.position[:: max(1, len(trajectory.position) // settings.poses)]
+    for q in problem.model.whole(picked, 0):
+        data.qpos[:] = q
         mujoco.mj_kinematics(compiled, data)
         mujoco.mj_collision(compiled, data)
         met = {(int(c.geom[0]), int(c.geom[1])) for c in data.contact[: data.ncon]}

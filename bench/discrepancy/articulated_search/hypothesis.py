@@ -11,7 +11,8 @@ from bench.arrays import Array
 from bench.discrepancy.articulated_search.effect import ArticulatedEffect, JointScales
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.multibody.joint_forces import SLOTS, Slot
-from bench.discrepancy.multibody.model import ArticulatedModel, Joint
+from bench.discrepancy.multibody.joints import Joint
+from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.errors import UnknownNameError
 from bench.rig.actuators import DRIVES
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from bench.arrays import Array
 from bench.discrepancy.case.case import Case, CaseChannel, CaseRecord
-from bench.discrepancy.multibody.model import Joint
+from bench.discrepancy.multibody.joints import Joint
 from bench.errors import FileFormatError
 
 

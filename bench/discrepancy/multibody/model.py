@@ -18,13 +18,10 @@ import numpy as np
 
 from bench.arrays import Array
 from bench.discrepancy.multibody.inverse import along
+from bench.discrepancy.multibody.joints import MOVING, Joint, Tie, body_name, joint_of, ties_of, with_moved
 from bench.errors import ModelError, UnknownNameError
 from bench.rig import Rig
-from bench.rig.actuators import JointDrive, drive_of, is_driven
 from bench.rig.held_joints import MOTION
-
-MOVING = {int(mujoco.mjtJoint.mjJNT_HINGE): "rad", int(mujoco.mjtJoint.mjJNT_SLIDE): "m"}
-"""Types of joint that a model may have, with the unit of their coordinate."""
 
 
 @dataclass(frozen=True)
@@ -36,37 +33,6 @@ class MultibodySettings:
 
 
 SETTINGS = MultibodySettings()
-
-
-class Joint(NamedTuple):
-    """A joint.
-
-    Attributes:
-        name: Its name.
-        dof: Its degree of freedom.
-        body: Body that it moves.
-        unit: Unit of its coordinate.
-        damping, friction, armature, stiffness, reference: Passive parameters of the model.
-        range: Its stops; infinite where it has none.
-        drive: Its actuator; None where it has none.
-    """
-
-    name: str
-    dof: int
-    body: str
-    unit: str
-    damping: float
-    friction: float
-    armature: float
-    stiffness: float
-    reference: float
-    range: tuple[float, float]
-    drive: JointDrive | None
-
-    @property
-    def torque_driven(self) -> bool:
-        """Whether its drive takes a torque, not a target."""
-        return self.drive is not None and not self.drive.servo
 
 
 class Dynamics(NamedTuple):
@@ -92,6 +58,7 @@ class ArticulatedModel:
         bodies: Names of the bodies that move, see `body_name`.
         tips: Body to the position of its tip in its own frame, where a payload would sit: a site called ``…tip``, else the joint of
             its only child, else its own centre of mass.
+        ties: Joints that those move by equalities.
     """
 
     model: mujoco.MjModel
@@ -99,6 +66,7 @@ class ArticulatedModel:
     followed: tuple[Joint, ...]
     bodies: tuple[str, ...]
     tips: Mapping[str, Array]
+    ties: tuple[Tie, ...] = ()
 
     @classmethod
     def from_file(cls, path: str | Path) -> ArticulatedModel:
@@ -113,12 +81,17 @@ class ArticulatedModel:
     def of(cls, model: mujoco.MjModel, name: str = "model") -> ArticulatedModel:
         """Take a compiled model apart; it is copied."""
         _refuse(model, name)
-        every = [_joint(model, i) for i in range(model.njnt)]
+        every, ties = [joint_of(model, i) for i in range(model.njnt)], ties_of(model)
+        for tie in ties:
+            moved = next(j for j in every if j.name == tie.name)
+            every = [
+                with_moved(j, moved, tie) if j.name == tie.to else j for j in every if j.name != tie.name
+            ]
         followed = tuple(j for j in every if j.drive is not None and j.drive.name.startswith(MOTION))
         joints = tuple(j for j in every if j not in followed)
         bare = _bare(model)
         bodies = tuple(body_name(model, i) for i in range(1, model.nbody) if model.body_dofnum[i] > 0)
-        return cls(bare, joints, followed, bodies, {body: _tip(model, body) for body in bodies})
+        return cls(bare, joints, followed, bodies, {body: _tip(model, body) for body in bodies}, ties)
 
     def joint(self, name: str) -> Joint:
         """Return a joint by name.
@@ -200,12 +173,45 @@ class ArticulatedModel:
 
     def dynamics(self, q: Array, v: Array, a: Array) -> Dynamics:
         """Inverse dynamics along positions, velocities and accelerations (n, n_moving)."""
-        if not self.followed:
+        if not self.followed and not self.ties:
             return Dynamics(*along(self.model, q, v, a))
         dofs = [joint.dof for joint in self.moving]
-        order = np.argsort(dofs)
-        torque, inertia = along(self.model, q[:, order], v[:, order], a[:, order])
-        return Dynamics(torque[:, dofs], inertia[:, dofs])
+        torque, inertia = along(self.model, *(self.whole(part, k) for k, part in enumerate((q, v, a))))
+        out, own = torque[:, dofs], inertia[:, dofs]
+        for tie in self.ties:
+            j = dofs.index(tie.to_dof)
+            out[:, j] += tie.ratio * torque[:, tie.dof]
+            own[:, j] += tie.ratio**2 * inertia[:, tie.dof] + 2.0 * tie.ratio * self._between(q, tie)
+        return Dynamics(out, own)
+
+    def whole(self, motion: Array, order: int) -> Array:
+        """Columns (n, n_dofs) of all degrees of freedom from those of the joints (n, n_moving): positions (order 0) or derivatives."""
+        out = np.empty((len(motion), self.model.nv))
+        for j, joint in enumerate(self.moving):
+            out[:, joint.dof] = motion[:, j]
+        for tie in self.ties:
+            out[:, tie.dof] = tie.ratio * out[:, tie.to_dof] + (tie.offset if order == 0 else 0.0)
+        return out
+
+    def on_joints(self, force: Array) -> Array:
+        """Forces (n_joints,) on the joints from those on all degrees of freedom (n_dofs,)."""
+        out = np.array(force)
+        for tie in self.ties:
+            out[tie.to_dof] += tie.ratio * force[tie.dof]
+        return out[[joint.dof for joint in self.joints]]
+
+    def _between(self, q: Array, tie: Tie) -> Array:
+        """Entry (n,) of the mass matrix between a joint and one that it moves."""
+        at, still, unit = (
+            self.whole(q, 0),
+            np.zeros((len(q), self.model.nv)),
+            np.zeros((len(q), self.model.nv)),
+        )
+        unit[:, tie.dof] = 1.0
+        return (
+            along(self.model, at, still, unit)[0][:, tie.to_dof]
+            - along(self.model, at, still, still)[0][:, tie.to_dof]
+        )
 
     def slopes(self, q: Array, v: Array, a: Array) -> Array:
         """Derivative (n, n_moving) of the torque on every joint by its own position; zero of what is followed."""
@@ -217,12 +223,6 @@ class ArticulatedModel:
             behind = self.dynamics(q - step, v, a).torque[:, j]
             out[:, j] = (ahead - behind) / (2.0 * SETTINGS.difference)
         return out
-
-
-def body_name(model: mujoco.MjModel, i: int) -> str:
-    """Name of body `i`; of one without a name, that of what moves it."""
-    first = int(model.body_jntadr[i])
-    return model.body(i).name or (f"body of {model.joint(first).name}" if first >= 0 else f"body {i}")
 
 
 def _index(model: mujoco.MjModel, body: str) -> int:
@@ -246,36 +246,6 @@ def _refuse(model: mujoco.MjModel, name: str) -> None:
                 f"joint '{model.joint(i).name}' of '{name}' is a {kind} joint; hinges and slides on a fixed base are expected: hang the "
                 "robot up (remove the free joint), lock a ball joint, or cut out the limb that was tested"
             )
-
-
-def _joint(model: mujoco.MjModel, i: int) -> Joint:
-    dof = int(model.jnt_dofadr[i])
-    limited = bool(model.jnt_limited[i])
-    drives = [drive_of(model, u) for u in range(model.nu) if is_driven(model, u, i)]
-    if len(drives) > 1:
-        raise ModelError(
-            f"joint '{model.joint(i).name}' has {len(drives)} actuators ({', '.join(d.name for d in drives)}); one a joint is expected: "
-            "keep the one whose command or torque was recorded"
-        )
-    drive = drives[0] if drives else None
-    # what the actuator itself weighs and damps, behind its gear
-    own = model.actuator(drive.name).id if drive else 0
-    behind = drive.gear**2 if drive else 0.0
-    armature = behind * float(model.actuator_armature[own]) if drive else 0.0
-    damping = behind * float(np.ravel(model.actuator_damping[own])[0]) if drive else 0.0
-    return Joint(
-        model.joint(i).name,
-        dof,
-        body_name(model, int(model.jnt_bodyid[i])),
-        MOVING[int(model.jnt_type[i])],
-        float(np.ravel(model.dof_damping[dof])[0]) + damping,
-        float(model.dof_frictionloss[dof]),
-        float(model.dof_armature[dof]) + armature,
-        float(np.ravel(model.jnt_stiffness[i])[0]),
-        float(model.qpos_spring[model.jnt_qposadr[i]]),
-        (float(model.jnt_range[i, 0]), float(model.jnt_range[i, 1])) if limited else (-np.inf, np.inf),
-        drive,
-    )
 
 
 def _bare(model: mujoco.MjModel) -> mujoco.MjModel:

@@ -22,7 +22,8 @@ from scipy.signal import butter, sosfiltfilt
 from bench.arrays import Array
 from bench.discrepancy.case.case import Case, CaseChannel, CaseRecord
 from bench.discrepancy.multibody.encoders import TRUE, Encoder, encoders_of, input_of, weights_of
-from bench.discrepancy.multibody.model import ArticulatedModel, Dynamics, Joint
+from bench.discrepancy.multibody.joints import Joint
+from bench.discrepancy.multibody.model import ArticulatedModel, Dynamics
 from bench.discrepancy.multibody.motion import Coefficients, JointClock, JointMotion, clock_of, motion_of
 from bench.discrepancy.multibody.noise import torque_noise
 from bench.discrepancy.settings import DEFAULT, ArticulatedSettings, DiagnosisSettings

@@ -12,7 +12,8 @@ from bench.arrays import Array
 from bench.discrepancy.articulated.against_model import asked_input
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.multibody.encoders import encoders_of, input_of
-from bench.discrepancy.multibody.model import ArticulatedModel, Joint
+from bench.discrepancy.multibody.joints import Joint
+from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.multibody.motion import motion_of
 from bench.discrepancy.precheck.loads import is_magnitude
 from bench.discrepancy.precheck.settings import CheckSettings

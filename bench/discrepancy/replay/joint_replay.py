@@ -22,7 +22,8 @@ from bench.discrepancy.articulated_search.catalogue import CATALOGUE
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.multibody.channels import bound
 from bench.discrepancy.multibody.encoders import Encoder, input_of, travel
-from bench.discrepancy.multibody.model import ArticulatedModel, Joint
+from bench.discrepancy.multibody.joints import Joint
+from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.multibody.motion import JointMotion, motion_of
 from bench.discrepancy.multibody.records import RECORDS_SETTINGS
 from bench.discrepancy.replay.running import Reading, Stretch, controls, hook_of, run, sampled
@@ -92,7 +93,7 @@ class JointReplay:
         ]
         reference = applied.compiled()
         for j, joint in enumerate(self.model.joints):
-            held = _held(applied, joint.name, reference)
+            held = _held(applied, joint.name, reference, [tie.name for tie in self.model.ties])
             factor = 1.0 + wrong.get(joint.name, Encoder()).gain
             size = travel(self.case, joint, max(float(np.max(logged.noise[j])) for logged in raw))
             for record, motion, logged in zip(self.case.validation, motions, raw, strict=True):
@@ -189,6 +190,10 @@ class JointReplay:
             here = begin < len(follow.position) and i != j
             data.qpos[own.qposadr[0]] = follow.position[begin, i] if here else motion.position[first, i]
             data.qvel[own.dofadr[0]] = follow.velocity[begin, i] if here else motion.velocity[first, i]
+        for tie in self.model.ties:
+            to, moved = model.joint(tie.to), model.joint(tie.name)
+            data.qpos[moved.qposadr[0]] = tie.offset + tie.ratio * data.qpos[to.qposadr[0]]
+            data.qvel[moved.dofadr[0]] = tie.ratio * data.qvel[to.dofadr[0]]
         name = self.model.joints[j].name
         train = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, f"{PREFIX}{name}_train")
         if train >= 0:
@@ -229,8 +234,8 @@ def _holder(joint: str) -> str:
     return f"{PREFIX}{joint}_as_measured"
 
 
-def _held(applied: Applied, free: str, reference: mujoco.MjModel) -> mujoco.MjModel:
-    """The model with all joints but one, and what was added to that, following the measured motion."""
+def _held(applied: Applied, free: str, reference: mujoco.MjModel, moved: Sequence[str]) -> mujoco.MjModel:
+    """The model with all joints but one, what was added to that, and those that others move, following the measured motion."""
     spec = applied.spec.copy()
     step = float(spec.option.timestep)
     data = mujoco.MjData(reference)
@@ -238,7 +243,7 @@ def _held(applied: Applied, free: str, reference: mujoco.MjModel) -> mujoco.MjMo
     full = np.zeros((reference.nv, reference.nv))
     mujoco.mj_fullM(reference, data, full)
     rate = SETTINGS.servo_rate / step
-    followed = {j.name for j in spec.joints if not j.name.startswith(PREFIX) and j.name != free}
+    followed = {j.name for j in spec.joints if not j.name.startswith(PREFIX)} - {free, *moved}
     followed |= {
         f"{PREFIX}{name}_train" for name in applied.outputs if name != free
     }  # its link is what was measured
