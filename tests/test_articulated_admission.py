@@ -138,7 +138,7 @@ LEFT_OUT = {
         "range of a joint",
     ),
     "an equality": (
-        {"</mujoco>": '<equality><joint joint1="shoulder" joint2="elbow"/></equality></mujoco>'},
+        {"</mujoco>": '<equality><connect body1="fore" anchor="0 0 -0.1"/></equality></mujoco>'},
         "equality",
     ),
 }

@@ -120,7 +120,7 @@ def test_what_cannot_be_tied_is_said(arm):
     with pytest.raises(ModelError, match="hold"):
         ArticulatedModel.of(mujoco.MjModel.from_xml_string(alone))
     driven = tied(mjcf(servo=True)).replace("<actuator>", '<actuator><motor name="own" joint="wrist"/>')
-    with pytest.raises(ModelError, match="move together and have an actuator each"):
+    with pytest.raises(ModelError, match="together, and they have an actuator each"):
         ArticulatedModel.of(mujoco.MjModel.from_xml_string(driven))
     text = (arm / "nominal.json").read_text()
     (arm / "nominal.json").write_text(text.replace('"joint": "elbow"', '"joint": "wrist"'))

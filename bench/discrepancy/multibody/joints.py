@@ -166,8 +166,8 @@ def with_moved(joint: Joint, moved: Joint, tie: Tie) -> Joint:
     if moved.drive is not None:
         if drive is not None:
             raise ModelError(
-                f"joints '{joint.name}' and '{moved.name}' move together and have an actuator each ('{drive.name}', '{moved.drive.name}'); "
-                "keep the one whose command or torque was recorded"
+                f"an equality moves joints '{joint.name}' and '{moved.name}' together, and they have an actuator each ('{drive.name}', "
+                f"'{moved.drive.name}'); keep the one whose command or torque was recorded"
             )
         if moved.drive.servo and abs(offset) > 1e-9:
             raise ModelError(

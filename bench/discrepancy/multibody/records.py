@@ -105,10 +105,12 @@ class JointRecord:
     @property
     def servo_command(self) -> Array:
         """The input (n_steps,), that of a servo less the offset of its encoder."""
-        drive = self.joint.drive
-        if drive is None or not drive.servo or self.encoder.in_loop <= 0.5:
-            return self.command
-        return self.command - drive.gear * self.encoder.offset
+        drive, wrong = self.joint.drive, self.encoder.in_loop > 0.5
+        return (
+            self.command - drive.gear * self.encoder.offset
+            if wrong and drive and drive.servo
+            else self.command
+        )
 
     @property
     def servo_ratio(self) -> float:
