@@ -26,11 +26,11 @@ from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.model.mjcf_file import rig_of
 from bench.discrepancy.multibody.channels import bound
 from bench.discrepancy.multibody.encoders import input_of
+from bench.discrepancy.multibody.joint_record import JOINT_RECORD_SETTINGS
 from bench.discrepancy.multibody.joints import Joint, body_name
 from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.multibody.motion import JointMotion, motion_of
 from bench.discrepancy.multibody.nominal_values import with_nominal_values
-from bench.discrepancy.multibody.records import RECORDS_SETTINGS
 from bench.discrepancy.replay.running import controls
 from bench.discrepancy.settings import DEFAULT
 from bench.rig.actuators import set_drive
@@ -128,7 +128,7 @@ class Fit:
     def _windows(self, record: CaseRecord, motion: JointMotion) -> list[Any]:
         step = float(self.plain.opt.timestep)
         servos = all(joint.drive is not None and joint.drive.servo for joint in self.model.joints)
-        every = len(record) if servos else max(2, round(RECORDS_SETTINGS.window / record.step))
+        every = len(record) if servos else max(2, round(JOINT_RECORD_SETTINGS.window / record.step))
         per = record.step / step
         columns = {
             joint.drive.name: np.asarray(record.values[input_of(self.case, joint).name])

@@ -27,7 +27,8 @@ from numpy.typing import NDArray
 from scipy.fft import dct
 
 from bench.arrays import Array
-from bench.discrepancy.multibody.records import JointRecord, PreparedRecord
+from bench.discrepancy.multibody.joint_record import JointRecord
+from bench.discrepancy.multibody.records import PreparedRecord
 from bench.discrepancy.settings import DiagnosisSettings
 
 

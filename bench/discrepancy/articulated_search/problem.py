@@ -32,10 +32,11 @@ from bench.discrepancy.articulated_search.misfit import Octaves, transformed
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.multibody.encoders import Encoder
 from bench.discrepancy.multibody.joint_forces import Slot
+from bench.discrepancy.multibody.joint_record import JointRecord
 from bench.discrepancy.multibody.joint_run import predict
 from bench.discrepancy.multibody.joints import Joint
 from bench.discrepancy.multibody.model import ArticulatedModel
-from bench.discrepancy.multibody.records import JointRecord, PreparedRecord, corrected, prepare, relinked
+from bench.discrepancy.multibody.records import PreparedRecord, corrected, prepare, relinked
 from bench.discrepancy.numerics.deadline import NEVER, Deadline
 from bench.discrepancy.settings import DEFAULT, DiagnosisSettings
 

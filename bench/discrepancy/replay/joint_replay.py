@@ -22,10 +22,10 @@ from bench.discrepancy.articulated_search.catalogue import CATALOGUE
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.multibody.channels import bound
 from bench.discrepancy.multibody.encoders import Encoder, input_of, travel
+from bench.discrepancy.multibody.joint_record import JOINT_RECORD_SETTINGS
 from bench.discrepancy.multibody.joints import Joint
 from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.multibody.motion import JointMotion, motion_of
-from bench.discrepancy.multibody.records import RECORDS_SETTINGS
 from bench.discrepancy.replay.running import Reading, Stretch, controls, hook_of, run, sampled
 from bench.discrepancy.settings import DEFAULT
 from bench.discrepancy.verdict import NamedEffect
@@ -128,7 +128,7 @@ class JointReplay:
         """Measured less simulated positions (n,) of joint `j`."""
         joint, step = self.model.joints[j], float(model.opt.timestep)
         servo = joint.drive is not None and joint.drive.servo
-        every = len(record) if servo else max(2, round(RECORDS_SETTINGS.window / record.step))
+        every = len(record) if servo else max(2, round(JOINT_RECORD_SETTINGS.window / record.step))
         steps = int(np.ceil((len(record) - 1) * record.step / step - 1e-9)) + 1
         late = wrong.get(joint.name, Encoder()).delay
         columns = self._columns(record, joint.name, late)

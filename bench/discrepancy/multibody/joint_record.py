@@ -1,0 +1,172 @@
+"""One joint of an articulated model in one record: what its equation needs along the measured motion, and its noise.
+
+The gain of the innovations is the stationary Kalman gain of the joint about its mean inertia. Its process noise is the stated noise of the
+measured torque, and what the noise of the other joints' motion makes of the torque of the inverse dynamics; both pass through the
+model once, as one draw.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import expm, solve_discrete_are
+
+from bench.arrays import Array
+from bench.discrepancy.multibody.encoders import TRUE, Encoder
+from bench.discrepancy.multibody.joints import Joint
+
+
+@dataclass(frozen=True)
+class JointRecordSettings:
+    """Numbers of `bench.discrepancy.multibody.joint_record`."""
+
+    window: float = 0.5
+    """Length of a free run of a joint that no servo holds [s]: some time constants of its drive, and far less than it takes to drift
+    off."""
+
+
+JOINT_RECORD_SETTINGS = JointRecordSettings()
+
+
+@dataclass(frozen=True, eq=False)
+class JointRecord:
+    """One joint in one record.
+
+    Attributes:
+        joint: The joint.
+        step: Integration step [s].
+        n_sub: Integration steps a sample.
+        inertia: (n_steps,) armature included; bias, slope, reference, load likewise, see `joint_run.run`.
+        bias: (n_steps,).
+        slope: (n_steps,).
+        reference: (n_steps,).
+        load: (n_steps,) torque that the gear carries.
+        command: (n_steps,) input.
+        position: (n,) measured.
+        velocity: (n,) measured, or (0,).
+        noise: (n_measured,).
+        start: (2,) smoothed position and velocity at the first sample.
+        side: "motor" or "link", where the encoder sits; empty where nobody says.
+        process: Equivalent white noise of the torque, one-sigma a sample.
+        changes: Body to the changes of bias and inertia (2, n_steps) for a kilogram more of it.
+        payloads: The same for a kilogram at its tip.
+        centres: The same (3, 2, n_steps) for a metre of its centre of mass along each axis.
+        weights: Body to the change of bias (n_steps,) by its weight.
+        beside: Neighbour in the tree to its velocity (n_steps,).
+        sample: Time between samples [s].
+        encoder: What is wrong with its encoder.
+        weight: (n, n_measured) of the innovations, one where every reading tells something new, see `weight_of_readings`.
+        filter: Gain (2, 2) and whitening (n_measured, n_measured) of the innovations; made for the joint about its mean inertia where None.
+            A corrected log keeps those of the log: they are what innovations are compared by.
+    """
+
+    joint: Joint
+    step: float
+    n_sub: int
+    inertia: Array
+    bias: Array
+    slope: Array
+    reference: Array
+    load: Array
+    command: Array
+    position: Array
+    velocity: Array
+    noise: Array
+    start: Array
+    side: str
+    process: float
+    changes: Mapping[str, Array]
+    payloads: Mapping[str, Array]
+    centres: Mapping[str, Array]
+    weights: Mapping[str, Array]
+    beside: Mapping[str, Array]
+    sample: float
+    weight: Array
+    encoder: Encoder = TRUE
+    filter: tuple[Array, Array] | None = None
+
+    def __post_init__(self) -> None:
+        if self.filter is None:
+            object.__setattr__(self, "filter", self._filter())
+
+    @property
+    def gain(self) -> Array:
+        """Gain (2, 2) of the innovations."""
+        assert self.filter is not None
+        return self.filter[0]
+
+    @property
+    def whitening(self) -> Array:
+        """Whitening (n_measured, n_measured) of the innovations."""
+        assert self.filter is not None
+        return self.filter[1]
+
+    @property
+    def servo_command(self) -> Array:
+        """The input (n_steps,), that of a servo less the offset of its encoder."""
+        drive, wrong = self.joint.drive, self.encoder.in_loop > 0.5
+        return (
+            self.command - drive.gear * self.encoder.offset
+            if wrong and drive and drive.servo
+            else self.command
+        )
+
+    @property
+    def servo_ratio(self) -> float:
+        """What a servo reads over the true position."""
+        return 1.0 + self.encoder.gain if self.encoder.in_loop > 0.5 else 1.0
+
+    @property
+    def on_link(self) -> bool:
+        """Whether the encoder is known to sit on the link."""
+        return self.side == "link"
+
+    @property
+    def n_measured(self) -> int:
+        """Number of measured channels of the joint."""
+        return len(self.noise)
+
+    @property
+    def window(self) -> int:
+        """Samples that a free run goes without drifting off; zero where a servo holds it, so that it goes for the whole record."""
+        drive = self.joint.drive
+        return (
+            0
+            if drive is not None and drive.servo
+            else max(2, round(JOINT_RECORD_SETTINGS.window / self.sample))
+        )
+
+    def _system(self) -> tuple[Array, Array, Array, Array]:
+        """Transition, process noise, observation and noise of the joint about its mean inertia, sample by sample."""
+        drive, m = self.joint.drive, float(np.mean(self.inertia))
+        assert drive is not None
+        stiffness = drive.stiffness + float(np.mean(self.slope)) if drive.servo else 0.0
+        damping = self.joint.damping + drive.damping
+        transition = expm(np.array([[0.0, 1.0], [-stiffness / m, -damping / m]]) * self.sample)
+        push = np.array([0.5 * self.sample**2, self.sample]) / m
+        process = np.outer(push, push) * self.process**2
+        return (
+            np.asarray(transition, dtype=np.float64),
+            process,
+            np.eye(2)[: self.n_measured],
+            np.diag(self.noise**2),
+        )
+
+    def _covariance(self) -> Array:
+        """Stationary covariance (2, 2) of the predicted state."""
+        transition, process, observed, noise = self._system()
+        try:
+            return np.asarray(solve_discrete_are(transition.T, observed.T, process, noise))
+        except (np.linalg.LinAlgError, ValueError):
+            return np.zeros((2, 2))
+
+    def _filter(self) -> tuple[Array, Array]:
+        """Stationary gain, and the whitening of the innovations."""
+        _, _, observed, noise = self._system()
+        covariance = self._covariance()
+        innovation = observed @ covariance @ observed.T + noise
+        gain = np.zeros((2, 2))
+        gain[:, : self.n_measured] = covariance @ observed.T @ np.linalg.inv(innovation)
+        return gain, np.asarray(np.linalg.inv(np.linalg.cholesky(innovation)), dtype=np.float64)
