@@ -210,6 +210,20 @@ CAPABILITIES: Sequence[Capability] = (
         data="../trials",
         hours=True,
     ),
+    Capability(
+        "peers_arms",
+        "mujoco.sysid on ten arms of others, given the diagnosis's time",
+        (*("python", "scripts/benchmark.py", "arms", "--data", "{data}/../trials-arms"), "--json"),
+        benchmark,
+        data="../trials-arms",
+    ),
+    Capability(
+        "peers_so101",
+        "mujoco.sysid on the public record of the SO-101, given the diagnosis's time",
+        (*("python", "scripts/benchmark.py", "arms", "--data", "{data}/robots"), "--json"),
+        benchmark,
+        data="robots",
+    ),
     _excitation_task(
         "sdof", "Excitation on the SDOF rig: trained policy against the baselines, held-out rigs"
     ),

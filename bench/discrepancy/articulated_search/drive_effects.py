@@ -127,7 +127,7 @@ DRIVE_EFFECTS: tuple[ArticulatedEffect, ...] = (
         "actuator",
         (_time("delay_s", 0.01, -1.5),),
         "input acts later by a delay",
-        written(DELAY="delay_s"),
+        added(DELAY="delay_s"),
     ),
     ArticulatedEffect(
         "actuator_lag",

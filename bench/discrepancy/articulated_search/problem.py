@@ -313,7 +313,8 @@ class ArticulatedProblem:
         for prepared in self.records:
             record = prepared.joints[j]
             inputs.append(record.command - drive.gear * record.reference if drive.servo else record.command)
-            torques.append(drive.torque(record.command, record.reference, np.zeros(len(record.command))))
+            speed = np.gradient(record.reference, record.step)
+            torques.append(drive.torque(record.command, record.reference, speed))
             q.append(prepared.motion.position[:, j])
             v.append(prepared.motion.velocity[:, j])
         q_all, v_all = np.concatenate(q), np.concatenate(v)

@@ -179,9 +179,9 @@ class ArticulatedModel:
         torque, inertia = along(self.model, *(self.whole(part, k) for k, part in enumerate((q, v, a))))
         out, own = torque[:, dofs], inertia[:, dofs]
         for tie in self.ties:
-            j = dofs.index(tie.to_dof)
-            out[:, j] += tie.ratio * torque[:, tie.dof]
-            own[:, j] += tie.ratio**2 * inertia[:, tie.dof] + 2.0 * tie.ratio * self._between(q, tie)
+            out[:, dofs.index(tie.to_dof)] += tie.ratio * torque[:, tie.dof]
+        for j in {dofs.index(tie.to_dof) for tie in self.ties}:
+            own[:, j] = self._inertia(q, j)
         return Dynamics(out, own)
 
     def whole(self, motion: Array, order: int) -> Array:
@@ -200,18 +200,13 @@ class ArticulatedModel:
             out[tie.to_dof] += tie.ratio * force[tie.dof]
         return out[[joint.dof for joint in self.joints]]
 
-    def _between(self, q: Array, tie: Tie) -> Array:
-        """Entry (n,) of the mass matrix between a joint and one that it moves."""
-        at, still, unit = (
-            self.whole(q, 0),
-            np.zeros((len(q), self.model.nv)),
-            np.zeros((len(q), self.model.nv)),
-        )
-        unit[:, tie.dof] = 1.0
-        return (
-            along(self.model, at, still, unit)[0][:, tie.to_dof]
-            - along(self.model, at, still, still)[0][:, tie.to_dof]
-        )
+    def _inertia(self, q: Array, j: int) -> Array:
+        """Inertia (n,) about joint `j` with all that it moves: what a unit acceleration of it asks for."""
+        at, still = self.whole(q, 0), np.zeros((len(q), self.model.nv))
+        along_joint = self.whole(np.eye(len(self.moving))[[j]], 1)
+        unit = np.repeat(along_joint, len(q), axis=0)
+        asked = along(self.model, at, still, unit)[0] - along(self.model, at, still, still)[0]
+        return np.asarray(asked @ along_joint[0])
 
     def slopes(self, q: Array, v: Array, a: Array) -> Array:
         """Derivative (n, n_moving) of the torque on every joint by its own position; zero of what is followed."""
