@@ -5,13 +5,16 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 import pytest
+from test_apply import effect
 
+from bench.discrepancy.application.applying import Findings, apply
 from bench.discrepancy.articulated_search.hypothesis import base_slots, move
 from bench.discrepancy.case.case import NominalParameter
 from bench.discrepancy.multibody.joint_forces import Slot
 from bench.discrepancy.multibody.joint_run import predict
 from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.multibody.nominal_values import with_nominal_values
+from bench.discrepancy.verdict import NominalEstimate
 from bench.errors import ModelError
 from bench.rig import Rig
 from bench.rig.actuators import commanded, drive_of, drive_value, set_drive
@@ -90,10 +93,18 @@ def test_a_motor_gives_what_its_voltage_leaves():
     np.testing.assert_allclose(drive.torque(far, np.zeros(2), speed), expected)
 
 
-@pytest.mark.parametrize("name", ["position servo behind a gear", "DC motor whose voltage saturates"])
+@pytest.mark.parametrize(
+    "name",
+    ["position servo behind a gear", "DC motor whose voltage saturates", "position servo with a delay"],
+)
 def test_numbers_of_a_drive_are_set_as_they_are_read(name):
     model = model_with(ACTUATORS[name][0])
-    kinds = ("kp", "kv", "gear") if "gear" in name else ("kp", "kv", "forcerange")
+    kinds = {
+        "a gear": ("kp", "kv", "gear"),
+        "saturates": ("kp", "kv", "forcerange"),
+        "a delay": ("kp", "delay"),
+    }
+    kinds = next(mine for end, mine in kinds.items() if name.endswith(end))
     before = base_slots(ArticulatedModel.of(model).joints[0], False)
     for kind in kinds:
         value = drive_value(model, 0, kind)
@@ -108,6 +119,8 @@ def test_numbers_of_a_drive_are_set_as_they_are_read(name):
 def test_what_a_drive_has_not_cannot_be_set():
     with pytest.raises(ModelError, match="no limit of its force"):
         set_drive(model_with(ACTUATORS["motor behind a gear"][0]), 0, "forcerange", 1.0)
+    with pytest.raises(ModelError, match="has no delay"):
+        set_drive(model_with(ACTUATORS["motor behind a gear"][0]), 0, "delay", 1.0)
     with pytest.raises(ModelError, match="takes a voltage"):
         set_drive(model_with(ACTUATORS["DC motor, voltage"][0]), 0, "kp", 1.0)
     limited = model_with('motor name="a" joint="pivot" forcerange="-1 2"')
@@ -135,3 +148,29 @@ def test_values_of_nominal_json_reach_a_motor(tmp_path):
     )
     drive = drive_of(model, 0)
     assert (drive.kp, drive.stall) == pytest.approx((0.9, 0.8))
+
+
+def test_what_is_found_of_a_motor_is_written_into_its_model(tmp_path):
+    path = tmp_path / "model.xml"
+    path.write_text(PENDULUM.format(f"<{ACTUATORS['DC motor whose voltage saturates'][0]}/>"))
+    before = drive_of(mujoco.MjModel.from_xml_path(str(path)), 0)
+    numbers = tuple(
+        NominalEstimate(f"{kind}:a", value, 0.01, 1.0, 0.1, 1.0)
+        for kind, value in (("kp", 0.9), ("kv", 0.05), ("forcerange", 0.6), ("delay", 0.01))
+    )
+    put = apply(path, Findings((), numbers))
+    drive = drive_of(put.spec.compile(), 0)
+    assert (drive.kp, drive.kv, drive.stall, drive.delay) == pytest.approx((0.9, 0.05, 0.6, 0.01))
+    # all of its force, and the gain alone
+    weaker = drive_of(
+        apply(path, Findings((effect("force_gain_error", "a", relative_error=-0.2),))).spec.compile(), 0
+    )
+    ratios = [getattr(weaker, name) / getattr(before, name) for name in ("kp", "kv", "back_emf", "stall")]
+    np.testing.assert_allclose(ratios, 0.8)
+    softer = drive_of(
+        apply(path, Findings((effect("servo_gain_error", "a", relative_error=0.5),))).spec.compile(), 0
+    )
+    assert (softer.kp / before.kp, softer.stall) == pytest.approx((1.5, before.stall))
+    # a servo that reads too much stands where its reading is the target
+    off = apply(path, Findings((effect("position_offset", "pivot", offset=0.1, in_loop=1.0),)))
+    assert any("data.ctrl[u] -= 0.1" in line for line in off.lines)

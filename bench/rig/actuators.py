@@ -13,7 +13,7 @@ from bench.errors import ModelError
 
 Commanded = Literal["position", "velocity", "voltage", "load", "another input"]
 
-DRIVES = ("kp", "kv", "gear", "forcerange")
+DRIVES = ("kp", "kv", "gear", "forcerange", "delay")
 """Parameters of actuators; ``forcerange`` is the largest force, of a dcmotor that of its full voltage at standstill."""
 
 
@@ -169,7 +169,7 @@ def drive_value(model: mujoco.MjModel, u: int, kind: str) -> float:
     """Parameter of actuator `u`, one of `DRIVES`."""
     drive = drive_of(model, u)
     return {
-        "kp": drive.kp, "kv": drive.kv, "gear": drive.gear, "forcerange": min(drive.high, drive.stall),
+        "kp": drive.kp, "kv": drive.kv, "gear": drive.gear, "forcerange": min(drive.high, drive.stall), "delay": drive.delay,
     }[kind]  # fmt: skip
 
 
@@ -194,6 +194,13 @@ def set_drive(model: mujoco.MjModel, u: int, kind: str, value: float) -> None:
             gain[7] *= value / drive.stall
         else:
             model.actuator_forcerange[u] *= value / drive.high
+    elif kind == "delay":
+        if model.actuator_history[u, 0] < 1:
+            raise ModelError(
+                f"actuator '{name}' has no delay in the model that 'delay:{name}' could set; give it delay and nsample, or take the "
+                "parameter out"
+            )
+        model.actuator_delay[u] = value
     elif electric and not drive.servo:
         raise ModelError(
             f"dcmotor '{name}' takes a voltage and has neither kp nor kv; motorconst and resistance of its model are taken as they are"

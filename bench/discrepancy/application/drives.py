@@ -34,9 +34,7 @@ def delay(target: Target, effect: NamedEffect) -> Change:
     actuator = _actuator(target, effect)
     late = next(iter(values_of(effect).values()))
     before = float(actuator.delay)
-    actuator.delay = before + late
-    actuator.nsample = math.ceil(actuator.delay / target.step) + 2
-    actuator.interp = 1
+    set_delay(target, actuator, before + late)
     return _done(effect, actuator, f"delay {before:.6g} -> {actuator.delay:.6g} s")
 
 
@@ -146,6 +144,13 @@ def set_kv(actuator: Any, kv: float) -> None:
         actuator.gainprm[6] = kv
     else:
         actuator.biasprm[2] = -kv
+
+
+def set_delay(target: Target, actuator: Any, delay: float) -> None:
+    """Set the delay of a control, and the memory that it takes."""
+    actuator.delay = max(delay, 0.0)
+    actuator.nsample = math.ceil(actuator.delay / target.step) + 2
+    actuator.interp = 1
 
 
 def set_limit(actuator: Any, force: float) -> None:

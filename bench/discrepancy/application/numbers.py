@@ -8,7 +8,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from bench.discrepancy.application.drives import set_kp, set_kv, set_limit
+from bench.discrepancy.application.drives import set_delay, set_kp, set_kv, set_limit
 from bench.discrepancy.application.forces import damping_error, values_of
 from bench.discrepancy.application.target import Change, Target
 from bench.discrepancy.multibody.model import ArticulatedModel
@@ -55,6 +55,8 @@ def _set(target: Target, kind: str, name: str, value: float, label: str) -> tupl
         actuator.gear[0] = value
     elif kind == "forcerange":
         set_limit(actuator, value)
+    elif kind == "delay":
+        set_delay(target, actuator, value)
     else:
         raise UnknownNameError(
             "parameter of the verdict", label, ["mass:BODY", "stiffness:JOINT", "kp:ACTUATOR"]

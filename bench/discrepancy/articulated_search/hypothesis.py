@@ -25,6 +25,7 @@ LOCAL_SLOTS = {
     "kv": (Slot.KV,),
     "gear": (Slot.GEAR, Slot.RATIO),
     "forcerange": (Slot.HIGH,),
+    "delay": (Slot.DELAY,),
 }
 """Entries of a joint's parameter vector that nominal parameters set."""
 
