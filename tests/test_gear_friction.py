@@ -7,8 +7,14 @@ import json
 import numpy as np
 import pytest
 from scipy.optimize import brentq
+from test_articulated import problem_of
 
 from bench.discrepancy import diagnose, read_case
+from bench.discrepancy.articulated_search.catalogue import CATALOGUE
+from bench.discrepancy.articulated_search.containing import begun_again
+from bench.discrepancy.articulated_search.fitting import ArticulatedFit, refitted
+from bench.discrepancy.articulated_search.placements import placements
+from bench.discrepancy.articulated_search.search import nominal_fit
 from bench.discrepancy.multibody.joint_forces import SLOTS, Slot
 from bench.discrepancy.multibody.joint_torque import missing_torque
 
@@ -112,3 +118,28 @@ def test_friction_in_the_gear_of_a_servo_is_named_and_its_size_found(servo):
     assert whole == pytest.approx(sought, rel=0.1)
     (gap,) = verdict.gaps
     assert gap.after < 0.05 * gap.before
+
+
+def test_a_law_is_never_less_likely_than_one_within_it(servo):
+    problem = problem_of(servo)
+    places = {placed.effect.name: placed for placed in placements(problem, CATALOGUE)}
+    nominal = nominal_fit(problem)
+
+    def fitted(name, eta):
+        placed, start = places[name], np.concatenate([nominal.vector, eta])
+        return refitted(problem, (placed,), start, scale=nominal.scale)
+
+    simple = fitted("load_dependent_friction", [-2.0, -1.0, 1.0])
+    gear = places["gear_friction"]
+    far = ArticulatedFit.at(
+        problem, (gear,), np.concatenate([nominal.vector, [3.0] * len(gear.effect.parameters)])
+    )
+    assert far.log_posterior < simple.log_posterior
+    kept, again = begun_again(
+        problem, [simple, far], lambda f, start: refitted(problem, f.hypothesis, start, scale=simple.scale)
+    )
+    assert kept is simple
+    assert again.hypothesis == far.hypothesis
+    assert again.log_posterior > simple.log_posterior
+    # what contains nothing better stays
+    assert begun_again(problem, [again, simple], lambda f, start: far)[0] is again

@@ -13,9 +13,9 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple
 
 from bench.arrays import Array
-from bench.discrepancy.articulated_search.slot_setters import SlotValues, train
 from bench.discrepancy.effects.effect import FreeParameter
 from bench.discrepancy.multibody.encoders import Encoder
+from bench.discrepancy.multibody.slot_setters import SlotValues, train
 
 JointSite = Literal["joint", "pair", "body", "actuator", "sensor"]
 
@@ -83,6 +83,7 @@ class ArticulatedEffect:
         encoder: For sensors: values to what is wrong.
         servo: Only for servos (True), only for forces (False), or both (None).
         needs: Quantity that has to be measured ("velocity"), if any.
+        contains: Names of simpler effects that it is for some values of its parameters, and how their values are then its own.
     """
 
     name: str
@@ -94,6 +95,7 @@ class ArticulatedEffect:
     encoder: Callable[[SlotValues], Encoder] | None = None
     servo: bool | None = None
     needs: str = ""
+    contains: Mapping[str, Callable[[SlotValues], SlotValues]] = field(default_factory=dict)
 
     @property
     def number(self) -> bool:

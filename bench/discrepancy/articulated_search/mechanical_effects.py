@@ -5,15 +5,23 @@ from __future__ import annotations
 import math
 
 from bench.discrepancy.articulated_search.effect import SETTINGS, ArticulatedEffect
-from bench.discrepancy.articulated_search.slot_setters import (
+from bench.discrepancy.effects.effect import FreeParameter, log_grid
+from bench.discrepancy.multibody.slot_setters import (
     added,
     carried,
+    in_gear,
     stop,
     written,
 )
-from bench.discrepancy.effects.effect import FreeParameter, log_grid
 
 LIMIT = FreeParameter("limit", "force", **SETTINGS.positive)
+LIMIT_0 = FreeParameter(
+    "limit_0", "force", mean=math.log(0.05), std=1.5, bounds=(-9.0, 4.0), grid=log_grid(0.05)
+)
+PARTS = ("mu_weight", "mu_drive")
+GROWTH = FreeParameter(
+    "growth", "1/force", mean=math.log(0.03), std=1.5, bounds=(-9.0, 1.0), grid=log_grid(0.03, 0.2)
+)
 STRIBECK_VELOCITY = FreeParameter(
     "velocity", "velocity", mean=math.log(0.1), std=1.0, bounds=(-6.0, 0.7), grid=log_grid(0.03, 0.1, 0.3)
 )
@@ -49,6 +57,7 @@ MECHANICAL_EFFECTS: tuple[ArticulatedEffect, ...] = (
         ),
         "f = Fc (1 + rise exp(-(v/vs)^2)) sgn(v)",
         written(LIMIT="limit", RISE="rise", STRIBECK="velocity"),
+        contains={"coulomb_friction": lambda v: {"limit": v["limit"]}},
     ),
     ArticulatedEffect(
         "presliding_friction",
@@ -81,45 +90,35 @@ MECHANICAL_EFFECTS: tuple[ArticulatedEffect, ...] = (
         "friction",
         "joint",
         (
-            FreeParameter(
-                "limit_0", "force", mean=math.log(0.05), std=1.5, bounds=(-9.0, 4.0), grid=log_grid(0.05)
-            ),
+            LIMIT_0,
             _part("mu", 0.1, 0.1),
             FreeParameter("of_actuator", fixed=True, signed=True, grid=(0.0, 1.0), unit="1"),
         ),
         "f = (F0 + mu |torque carried|) sgn(v), that of the link, or of the actuator",
         carried,
+        contains={"coulomb_friction": lambda v: {"limit_0": v["limit"]}},
     ),
     ArticulatedEffect(
         "gear_friction",
         "friction",
         "joint",
         (
-            FreeParameter(
-                "limit_0", "force", mean=math.log(0.05), std=1.5, bounds=(-9.0, 4.0), grid=log_grid(0.05)
-            ),
+            LIMIT_0,
             _part("mu_drive", 0.1, 0.05, 0.3),
             _part("mu_weight", 0.03, 0.03),
             _part("mu_rest", 0.1, 0.1, 0.3),
             STRIBECK_VELOCITY,
-            FreeParameter(
-                "growth",
-                "1/force",
-                mean=math.log(0.03),
-                std=1.5,
-                bounds=(-9.0, 1.0),
-                grid=log_grid(0.03, 0.2),
-            ),
+            GROWTH,
         ),
         "f = (F0 + |mu_d Td + mu_w Tw| + mu_r |Tw| exp(-(v/vs)^2) + growth Td^2) sgn(v), Td of the drive, Tw what the link weighs",
-        written(
-            LIMIT="limit_0",
-            DRIVEN="mu_drive",
-            WEIGHED="mu_weight",
-            WEIGHED_RISE="mu_rest",
-            STRIBECK="velocity",
-            DRIVEN_SQUARE="growth",
-        ),
+        in_gear,
+        contains={
+            "coulomb_friction": lambda v: {"limit_0": v["limit"]},
+            "load_dependent_friction": lambda v: {
+                "limit_0": v["limit_0"],
+                PARTS[v["of_actuator"] > 0.5]: v["mu"],
+            },
+        },
     ),
     ArticulatedEffect(
         "coupled_friction",

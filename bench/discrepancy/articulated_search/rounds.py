@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.arrays import Array
+from bench.discrepancy.articulated_search.containing import begun_again
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit, Others, fit, own_entries, refitted
 from bench.discrepancy.articulated_search.hypothesis import JointHypothesis, PlacedOnJoint
 from bench.discrepancy.articulated_search.misfit import log_likelihood
@@ -318,4 +319,6 @@ def _fits(
         new = _beside(problem, new, others, settings)
         out.append(new)
         gained = max(gained, 2.0 * (new.log_posterior - base.log_posterior))
-    return out
+    return begun_again(
+        problem, out, lambda f, start: refitted(problem, f.hypothesis, start, scale=f.scale, others=others)
+    )

@@ -8,6 +8,8 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
+from bench.rig.actuators import commanded, drive_of
+
 _TURNING = int(mujoco.mjtJoint.mjJNT_HINGE)
 
 
@@ -28,6 +30,7 @@ class Assumptions:
         armature: Of the inertia of a rotor.
         kp: Of the position gain of a servo.
         kv: Of its velocity gain.
+        forcerange: Of the force of a DC motor at full voltage.
         judging: Share at the end of a single log that judges.
     """
 
@@ -38,6 +41,7 @@ class Assumptions:
     armature: float = 0.3
     kp: float = 0.1
     kv: float = 0.3
+    forcerange: float = 0.1
     judging: float = 1.0 / 3.0
 
 
@@ -92,16 +96,26 @@ def _gains(model: mujoco.MjModel, assumptions: Assumptions) -> list[Assumed]:
             continue
         name = model.actuator(u).name
         turning = int(model.jnt_type[int(model.actuator_trnid[u, 0])]) == _TURNING
-        kp, kv = -float(model.actuator_biasprm[u, 1]), -float(model.actuator_biasprm[u, 2])
-        out.append(Assumed(f"kp:{name}", kp, assumptions.kp * kp, "N m/rad" if turning else "N/m"))
-        if kv > 0.0:
-            out.append(Assumed(f"kv:{name}", kv, assumptions.kv * kv, "N m s/rad" if turning else "N s/m"))
+        units = {"kp": "N m/rad", "kv": "N m s/rad", "forcerange": "N m"}
+        if not turning:
+            units = {"kp": "N/m", "kv": "N s/m", "forcerange": "N"}
+        drive = drive_of(model, u)
+        values = {
+            "kp": drive.kp,
+            "kv": drive.kv,
+            "forcerange": drive.stall if np.isfinite(drive.stall) else 0.0,
+        }
+        out += [
+            Assumed(f"{kind}:{name}", value, getattr(assumptions, kind) * value, units[kind])
+            for kind, value in values.items()
+            if value > 0.0
+        ]
     return out
 
 
 def is_servo(model: mujoco.MjModel, actuator: int) -> bool:
     """Whether an actuator follows a position."""
-    return float(model.actuator_biasprm[actuator, 1]) < 0.0
+    return commanded(model, actuator) == "position"
 
 
 def moving_bodies(model: mujoco.MjModel) -> list[int]:

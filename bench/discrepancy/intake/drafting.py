@@ -22,6 +22,7 @@ from bench.errors import RecordingError, UnitError
 from bench.files import write_text
 from bench.record_files.column_map import name_and_unit
 from bench.recording.units import conversion, read_as
+from bench.rig.actuators import commanded
 
 _TURNING = int(mujoco.mjtJoint.mjJNT_HINGE)
 
@@ -161,8 +162,10 @@ def unit_of(match: Match, model: mujoco.MjModel) -> str:
         if int(model.actuator_trntype[u]) != int(mujoco.mjtTrn.mjTRN_JOINT):
             return ""
         turning = int(model.jnt_type[int(model.actuator_trnid[u, 0])]) == _TURNING
-        if is_servo(model, u):
-            return "rad" if turning else "m"
+        asked = commanded(model, u)
+        known = {"position": ("rad", "m"), "velocity": ("rad/s", "m/s"), "voltage": ("V", "V")}
+        if asked in known:
+            return known[asked][0 if turning else 1]
         if abs(float(model.actuator_gear[u, 0]) * float(model.actuator_gainprm[u, 0])) != 1.0:
             return ""
         return "N m" if turning else "N"

@@ -11,6 +11,7 @@ import mujoco
 
 from bench.discrepancy.intake.assumptions import is_servo
 from bench.errors import ParameterError, UnknownNameError
+from bench.rig.actuators import commanded
 
 WORDS: Mapping[str, frozenset[str]] = {
     "position": frozenset(
@@ -263,18 +264,13 @@ def _joint_of(heading: _Heading, others: Sequence[_Heading], model: mujoco.MjMod
 
 
 def _driving(heading: _Heading, actuator: str, model: mujoco.MjModel, how: str) -> tuple[Match | None, str]:
-    servo = is_servo(model, model.actuator(actuator).id)
-    if servo and (heading.quantity in ("velocity", "torque", "acceleration")):
-        return (
-            None,
-            f"actuator '{actuator}' follows a position; its {heading.quantity} is an outcome, not an input",
-        )
-    if not servo and heading.quantity in ("position", "velocity", "acceleration"):
-        return (
-            None,
-            f"actuator '{actuator}' exerts a force; no controller in the model follows a {heading.quantity}",
-        )
-    role = "command" if servo or heading.commanded else "measured"
+    asked = commanded(model, model.actuator(actuator).id)
+    follows, given = asked in ("position", "velocity"), heading.quantity
+    if follows and given in {"position", "velocity", "torque", "acceleration"} - {asked}:
+        return None, f"actuator '{actuator}' follows a {asked}; its {given} is an outcome, not an input"
+    if not follows and given in ("position", "velocity", "acceleration"):
+        return None, f"actuator '{actuator}' exerts a force; no controller in the model follows a {given}"
+    role = "command" if follows or heading.commanded else "measured"
     return Match(heading.column, "actuator", actuator, role=role, how=how), ""
 
 

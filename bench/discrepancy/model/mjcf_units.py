@@ -63,7 +63,7 @@ def _gain(name: str, model: mujoco.MjModel, quantity: str) -> Expectation | None
     """A gain of a servo without a gear."""
     actuator = name.partition(":")[2]
     index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, actuator)
-    if index < 0 or model.actuator_biasprm[index, 1] == 0.0:
+    if index < 0 or commanded(model, index) != "position":
         return None
     return _at_actuator(model, actuator, quantity)
 

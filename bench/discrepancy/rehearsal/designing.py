@@ -40,6 +40,7 @@ from bench.discrepancy.rehearsal.truth import ModelLaboratory
 from bench.discrepancy.settings import DEFAULT
 from bench.errors import BenchError, ParameterError, SimulationError
 from bench.files import together, write_text
+from bench.rig.actuators import commanded
 from bench.signals import Multisine
 
 NAMES = ("identification", "identification_2", "validation")
@@ -246,7 +247,7 @@ def _of_model(laboratory: ModelLaboratory) -> dict[str, float]:
             u = compiled.actuator(name).id
             if compiled.actuator_ctrllimited[u]:
                 out[channel.name] = float(np.abs(compiled.actuator_ctrlrange[u]).min())
-            elif compiled.actuator_biasprm[u, 1] and compiled.jnt_limited[compiled.actuator_trnid[u, 0]]:
+            elif commanded(compiled, u) == "position" and compiled.jnt_limited[compiled.actuator_trnid[u, 0]]:
                 out[channel.name] = float(np.abs(compiled.jnt_range[compiled.actuator_trnid[u, 0]]).min())
     return out
 

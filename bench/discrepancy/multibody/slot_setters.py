@@ -47,6 +47,17 @@ def saturated(values: SlotValues, p: Array) -> None:
     p[Slot.HIGH] = min(p[Slot.HIGH], values["limit"])
 
 
+in_gear = written(
+    LIMIT="limit_0",
+    DRIVEN="mu_drive",
+    WEIGHED="mu_weight",
+    WEIGHED_RISE="mu_rest",
+    STRIBECK="velocity",
+    DRIVEN_SQUARE="growth",
+)
+"""Let dry friction grow with what drives a gear and with what hangs on it."""
+
+
 def carried(values: SlotValues, p: Array) -> None:
     """Let dry friction grow with the torque of the link, or with that of the actuator."""
     p[Slot.LIMIT] = values["limit_0"]
