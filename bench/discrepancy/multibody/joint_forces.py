@@ -30,9 +30,7 @@ class Slot(IntEnum):
     STIFFNESS = 7
     REFERENCE = 8  # angle without spring force
     INERTIA = 9  # inertia besides that of the coefficients, on the motor's side
-    LIMIT = (
-        10  # dry friction: limit, relative rise at rest, Stribeck velocity, part of the torque on the link
-    )
+    LIMIT = 10  # dry friction: limit, relative rise at rest, Stribeck velocity, part of the load
     RISE = 11
     STRIBECK = 12
     CARRIED = 13
@@ -66,9 +64,7 @@ class Slot(IntEnum):
     PAIR_DAMPING = 41
     PAIR_SENSE = 42
     WEIGHED = 43
-    WEIGHED_RISE = (
-        44  # part of what the link weighs, at rest, and part of the square of the actuator's torque
-    )
+    WEIGHED_RISE = 44  # part of what the link weighs at rest, and of the square of the actuator's torque
     DRIVEN_SQUARE = 45
     STALL = 46
 
