@@ -114,8 +114,26 @@ def _both_joints(row: Any) -> Figures:
     ]
 
 
+LOADED = ("load_dependent_friction", "gear_friction")
+"""Friction that grows with the torque carried."""
+
+
+def _xl330(row: Any) -> Figures:
+    loaded = bool(_joints(row, lambda one: one.name in LOADED))
+    found = "preferred" if loaded else "not preferred"
+    return [
+        (
+            "XL330: friction that grows with the torque carried, over Coulomb friction",
+            found,
+            "preferred",
+            _held(loaded),
+        )
+    ]
+
+
 ROBOT_LIMITS: dict[str, Callable[[Any], Figures]] = {
     "UR10": _ur10, "TX40": _tx40, "SO-101": _so101, "double pendulum A.0": _both_joints, "double pendulum C.1": _both_joints,
+    "XL330": _xl330,
 }  # fmt: skip
 """What has to hold of some robots."""
 
