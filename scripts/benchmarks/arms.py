@@ -24,6 +24,7 @@ from bench.arrays import Array
 from bench.discrepancy import BlindOptions, make_blind, read_case
 from bench.discrepancy.articulated.diagnosis import diagnose_articulated
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
+from bench.discrepancy.multibody.channels import bound
 from bench.files import write_text
 from benchmarks.peer_sysid_arms import Fit, errors_of
 from benchmarks.timing import Row
@@ -77,7 +78,7 @@ def _compared(path: Path, folder: Path, progress: Callable[[str], None]) -> tupl
         seconds = time.perf_counter() - begun
         progress(f"{path.name}: mujoco.sysid, {seconds:.0f} s")
         fit = Fit(case)
-        theirs = fit.errors(fit.fitted(seconds), case.validation)
+        theirs = fit.errors(fit.fitted(seconds), case)
         worst = [max(gap.after for gap in verdict.gaps), float(np.sqrt(np.mean(theirs**2, axis=0)).max())]
         write_text(kept, json.dumps([worst, seconds]))
     worst, seconds = json.loads(kept.read_text(encoding="utf-8"))
@@ -97,9 +98,9 @@ def _so101(data: Path, folder: Path, progress: Callable[[str], None]) -> list[Ro
     progress(f"SO-101: mujoco.sysid, {seconds:.0f} s")
     fit = Fit(case)
     fitted = fit.fitted(seconds)
-    problem = ArticulatedProblem.of(judged, found.model, judged.validation)
+    problem = ArticulatedProblem.of(bound(judged, fit.compiled), found.model, judged.validation)
     ours = errors_of(problem, found.final.hypothesis, found.final.vector)
-    theirs = fit.errors(fitted, judged.validation)
+    theirs = fit.errors(fitted, judged)
     middle = np.array([np.median(ours, axis=0), np.median(theirs, axis=0)]).T
     told = (
         f"parts of the travel: ours {np.median(middle[:, 0]):.3g}, theirs {np.median(middle[:, 1]):.3g} ({len(fit.settings)} parameters), "

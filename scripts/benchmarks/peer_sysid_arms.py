@@ -11,7 +11,7 @@ from __future__ import annotations
 import contextlib
 import io
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 import mujoco
@@ -218,9 +218,11 @@ class Fit:
             best = (0.0, np.asarray(result.x).ravel())
         return self.build(best[1])
 
-    def errors(self, fitted: mujoco.MjModel, records: Sequence[CaseRecord]) -> Array:
-        """RMS errors (n_records, n_joints) of free runs with a fitted model, one joint at a time, over the travel of the joints."""
-        problem = ArticulatedProblem.of(self.case, ArticulatedModel.of(fitted), tuple(records))
+    def errors(self, fitted: mujoco.MjModel, case: Case) -> Array:
+        """RMS errors (n_records, n_joints) of free runs of a case's judging records, one joint at a time, over its travel there."""
+        problem = ArticulatedProblem.of(
+            bound(case, self.compiled), ArticulatedModel.of(fitted), case.validation
+        )
         return errors_of(problem, (), np.zeros(len(problem.nominal)))
 
 
