@@ -37,7 +37,10 @@ def short(columns: dict, seconds: float = LONGEST, after: float = 0.0) -> dict:
 
 
 def so101(data: Path) -> Records:
-    """The SO-101 with the gains of its public model; the jaw, whose record is no angle, is held."""
+    """The SO-101 with the gains of one of its public models; the jaw, whose record is no angle, is held.
+
+    Of a hobby servo little is known: two public models of this arm have gains of 17.8 and 998 N m/rad.
+    """
     folder = data / "so101"
     axes = [
         Axis(joint, f"position_{label}", f"command_{label}", 2e-4, TURN / 4096.0)
@@ -50,7 +53,8 @@ def so101(data: Path) -> Records:
     return Records(
         (folder / "model_joints_properties.xml").read_text(), axes, [read[n] for n in SO101_FINDING[:3]],
         [read[n] for n in SO101_JUDGING[:2]], 50.0, True, "friction against gravity, play of a degree, a zero that is off",
-        held={"gripper": "hold"}, further=[short(table(folder / "motions" / f"{n}.parquet"), 1e3, 5.0) for n in SO101_JUDGING],
+        {"mass": 0.1, "damping": 0.5, "armature": 0.5, "kp": 0.5}, held={"gripper": "hold"},
+        further=[short(table(folder / "motions" / f"{n}.parquet"), 1e3, 5.0) for n in SO101_JUDGING],
     )  # fmt: skip
 
 
