@@ -202,7 +202,9 @@ def test_a_campaign_that_is_told_to_stop_leaves_whole_parts_only(
 ) -> None:
     plan, folder = tmp_path / "plan.json", tmp_path / "out"
     plan.write_text(json.dumps(document(records=4000, records_per_part=40, duration=1.0)))
-    code = "import sys; from bench.cli import main; sys.exit(main())"
+    # a shell's background jobs inherit that they do not hear SIGINT, a person's do
+    heard = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
+    code = f"{heard}; import sys; from bench.cli import main; sys.exit(main())"
     child = subprocess.Popen(
         [sys.executable, "-c", code, "campaign", str(plan), "--out", str(folder), "--threads", "2", "--json"],
         cwd=Path(__file__).parents[1],
