@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from enum import IntEnum
+from typing import Any, Literal
 
 import mujoco
 import numpy as np
@@ -74,9 +75,24 @@ class JointDrive:
         return asked + self.gear * position if self.servo else asked
 
 
+class DcMotor(IntEnum):
+    """Where MuJoCo keeps the numbers of a DC motor, in ``gainprm``; the gains of its controller are in force, not in voltage."""
+
+    RESISTANCE = 0
+    CONSTANT = 1
+    KP = 4
+    KD = 6
+    VOLTAGE = 7
+
+
+def is_dc_motor(actuator: Any) -> bool:
+    """Whether an actuator, of a compiled model or of a specification, is a ``dcmotor``."""
+    return int(np.ravel(actuator.gaintype)[0]) == int(mujoco.mjtGain.mjGAIN_DCMOTOR)
+
+
 def commanded(model: mujoco.MjModel, actuator: int) -> Commanded:
     """What the input of an actuator is: the target of a servo, the voltage of a motor, or the force itself, in some unit."""
-    if int(model.actuator_gaintype[actuator]) == int(mujoco.mjtGain.mjGAIN_DCMOTOR):
+    if is_dc_motor(model.actuator(actuator)):
         inputs: dict[int, Commanded] = {
             int(mujoco.mjtCtrlInput.mjINPUT_POS): "position",
             int(mujoco.mjtCtrlInput.mjINPUT_VEL): "velocity",
@@ -114,7 +130,7 @@ def drive_of(model: mujoco.MjModel, u: int) -> JointDrive:
     if model.jnt_actfrclimited[joint]:
         own = np.sort(np.array(model.jnt_actfrcrange[joint]) / gear)
         low, high = max(low, own[0]), min(high, own[1])
-    electric = int(model.actuator_gaintype[u]) == int(mujoco.mjtGain.mjGAIN_DCMOTOR)
+    electric = is_dc_motor(model.actuator(u))
     kp, kv, back_emf, stall = _motor(model, u) if electric else _affine(model, u)
     return JointDrive(
         name, commanded(model, u) == "position", gear, kp, kv, float(low), float(high), float(lowest), float(highest),
@@ -146,7 +162,7 @@ def _motor(model: mujoco.MjModel, u: int) -> tuple[float, float, float, float]:
         )
     if asked not in ("position", "voltage"):
         raise ModelError(f"dcmotor '{name}' takes {asked}; input='pos' or input='voltage' is expected")
-    resistance, constant, kp, kd, most = (float(gain[k]) for k in (0, 1, 4, 6, 7))
+    resistance, constant, kp, kd, most = (float(gain[number]) for number in DcMotor)
     back_emf, stall = constant**2 / resistance, constant / resistance * most if most > 0.0 else np.inf
     if asked == "voltage":
         return constant / resistance, back_emf, back_emf, stall
@@ -180,36 +196,50 @@ def set_drive(model: mujoco.MjModel, u: int, kind: str, value: float) -> None:
         ModelError: The actuator has none of that kind.
     """
     name, drive = model.actuator(u).name, drive_of(model, u)
-    gain, bias = model.actuator_gainprm[u], model.actuator_biasprm[u]
-    electric = int(model.actuator_gaintype[u]) == int(mujoco.mjtGain.mjGAIN_DCMOTOR)
-    if kind == "gear":
-        model.actuator_gear[u, 0] = value
-    elif kind == "forcerange":
-        if not np.isfinite(min(drive.high, drive.stall)):
-            raise ModelError(
-                f"actuator '{name}' has no limit of its force that 'forcerange:{name}' could set; give it a forcerange, or take the "
-                "parameter out"
-            )
-        if np.isfinite(drive.stall):
-            gain[7] *= value / drive.stall
-        else:
-            model.actuator_forcerange[u] *= value / drive.high
-    elif kind == "delay":
-        if model.actuator_history[u, 0] < 1:
-            raise ModelError(
-                f"actuator '{name}' has no delay in the model that 'delay:{name}' could set; give it delay and nsample, or take the "
-                "parameter out"
-            )
-        model.actuator_delay[u] = value
-    elif electric and not drive.servo:
+    if kind == "forcerange" and not np.isfinite(min(drive.high, drive.stall)):
+        raise ModelError(
+            f"actuator '{name}' has no limit of its force that 'forcerange:{name}' could set; give it a forcerange, or take the "
+            "parameter out"
+        )
+    if kind == "delay" and model.actuator_history[u, 0] < 1:
+        raise ModelError(
+            f"actuator '{name}' has no delay in the model that 'delay:{name}' could set; give it delay and nsample, or take the "
+            "parameter out"
+        )
+    if kind in ("kp", "kv") and commanded(model, u) == "voltage":
         raise ModelError(
             f"dcmotor '{name}' takes a voltage and has neither kp nor kv; motorconst and resistance of its model are taken as they are"
         )
-    elif electric:
-        gain[4 if kind == "kp" else 6] = value
-    elif kind == "kv":
-        bias[2] = -value
+    if kind == "kp" and commanded(model, u) == "velocity":
+        raise ModelError(f"actuator '{name}' follows a velocity, so that its gain is 'kv:{name}'; name it so")
+    if kind == "delay":
+        model.actuator_delay[u] = value
     else:
+        write_drive(model.actuator(u), kind, value)
+
+
+def write_drive(actuator: Any, kind: str, value: float) -> None:
+    """Set a parameter of an actuator, one of `DRIVES` but its delay.
+
+    Args:
+        actuator: Of a compiled model, or of a specification.
+        kind: Which.
+        value: Its value.
+    """
+    gain, bias = actuator.gainprm, actuator.biasprm
+    if kind == "gear":
+        actuator.gear[0] = value
+    elif kind == "forcerange" and is_dc_motor(actuator) and gain[DcMotor.VOLTAGE] > 0.0:
+        gain[DcMotor.VOLTAGE] = value * gain[DcMotor.RESISTANCE] / gain[DcMotor.CONSTANT]
+    elif kind == "forcerange":
+        actuator.forcerange[:] = np.array(actuator.forcerange) * (value / actuator.forcerange[1])
+    elif is_dc_motor(actuator):
+        gain[DcMotor.KP if kind == "kp" else DcMotor.KD] = value
+    elif kind == "kp":
         if bias[1] != 0.0:  # a servo's input and its position have one gain
             bias[1] = -value
         gain[0] = value
+    else:
+        if bias[1] == 0.0 and bias[2] == -gain[0]:  # and so have those of a velocity servo
+            gain[0] = value
+        bias[2] = -value

@@ -207,6 +207,10 @@ def apply(
     return Applied(spec, tuple(changes), target.outputs, str(Path(path).parent))
 
 
+AT_JOINTS = FORCES | FRICTION
+"""Effects at joints that have a form in MuJoCo other than a law."""
+
+
 def _ordered(effects: Sequence[NamedEffect]) -> list[NamedEffect]:
     """Numbers first, trains of drives last: they divide what is there."""
     return sorted(
@@ -221,4 +225,4 @@ def _one(target: Target, effect: NamedEffect, nominal: set[str]) -> Change:
         return DRIVES[effect.name](target, effect)
     if effect.name.startswith(LOGGED):
         return logged(target, effect)
-    return (FORCES | FRICTION).get(effect.name, element)(target, effect)
+    return AT_JOINTS.get(effect.name, element)(target, effect)

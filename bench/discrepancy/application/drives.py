@@ -12,7 +12,7 @@ import numpy as np
 from bench.discrepancy.application.forces import values_of
 from bench.discrepancy.application.target import Change, Target
 from bench.discrepancy.verdict import NamedEffect
-from bench.rig.actuators import commanded
+from bench.rig.actuators import DcMotor, commanded, is_dc_motor, write_drive
 
 
 def _actuator(target: Target, effect: NamedEffect) -> Any:
@@ -63,21 +63,16 @@ def gain(target: Target, effect: NamedEffect) -> Change:
     actuator = _actuator(target, effect)
     v = values_of(effect)
     factor = 1.0 + v["relative_error"] if "relative_error" in v else -v.get("reversal", 1.0)
-    if _electric(actuator):
+    if is_dc_motor(actuator):
         if factor <= 0.0:
             return Change(
-                effect.name,
-                actuator.name,
-                "none",
-                "a dcmotor does not turn the other way; exchange its wires in the gear",
+                effect.name, actuator.name, "none", "a dcmotor turns the other way by its gear alone"
             )
-        for index, times in (
-            (0, 1.0 / factor),
-            (4, factor),
-            (6, factor),
-        ):  # resistance, and what its controller asks for
-            actuator.gainprm[index] *= times
-        text = f"resistance {actuator.gainprm[0] * factor:.6g} -> {actuator.gainprm[0]:.6g}, kp and kd times {factor:.6g}"
+        before = float(actuator.gainprm[DcMotor.RESISTANCE])
+        actuator.gainprm[DcMotor.RESISTANCE] /= factor
+        for asked in (DcMotor.KP, DcMotor.KD):
+            actuator.gainprm[asked] *= factor
+        text = f"resistance {before:.6g} -> {before / factor:.6g}, kp and kd times {factor:.6g}"
     else:
         before = float(actuator.gainprm[0])
         _freeze_damping(target, actuator)
@@ -87,10 +82,6 @@ def gain(target: Target, effect: NamedEffect) -> Change:
     if "relative_error" in v and _limited(target, actuator):
         actuator.forcerange = np.sort(np.asarray(actuator.forcerange) * factor)
     return _done(effect, actuator, text)
-
-
-def _electric(actuator: Any) -> bool:
-    return bool(actuator.gaintype == mujoco.mjtGain.mjGAIN_DCMOTOR)
 
 
 def _servo(target: Target, actuator: Any) -> bool:
@@ -112,38 +103,20 @@ def _limited(target: Target, actuator: Any) -> bool:
 def servo_gain(target: Target, effect: NamedEffect) -> Change:
     """The position gain of a servo."""
     actuator = _actuator(target, effect)
+    at = DcMotor.KP if is_dc_motor(actuator) else 0
     return _done(
         effect,
         actuator,
-        set_kp(
-            target,
-            actuator,
-            float(actuator.gainprm[_kp(actuator)]) * (1.0 + values_of(effect)["relative_error"]),
-        ),
+        set_kp(target, actuator, float(actuator.gainprm[at]) * (1.0 + values_of(effect)["relative_error"])),
     )
-
-
-def _kp(actuator: Any) -> int:
-    return 4 if _electric(actuator) else 0
 
 
 def set_kp(target: Target, actuator: Any, kp: float) -> str:
     """Set the position gain of a servo, or the gain of another actuator; return what was done."""
-    before = float(actuator.gainprm[_kp(actuator)])
-    if not _electric(actuator):
-        _freeze_damping(target, actuator)
-        if actuator.biasprm[1]:
-            actuator.biasprm[1] = -kp
-    actuator.gainprm[_kp(actuator)] = kp
+    before = float(actuator.gainprm[DcMotor.KP if is_dc_motor(actuator) else 0])
+    _freeze_damping(target, actuator)
+    write_drive(actuator, "kp", kp)
     return f"kp {before:.6g} -> {kp:.6g}"
-
-
-def set_kv(actuator: Any, kv: float) -> None:
-    """Set the velocity gain of a servo."""
-    if _electric(actuator):
-        actuator.gainprm[6] = kv
-    else:
-        actuator.biasprm[2] = -kv
 
 
 def set_delay(target: Target, actuator: Any, delay: float) -> None:
@@ -151,14 +124,6 @@ def set_delay(target: Target, actuator: Any, delay: float) -> None:
     actuator.delay = max(delay, 0.0)
     actuator.nsample = math.ceil(actuator.delay / target.step) + 2
     actuator.interp = 1
-
-
-def set_limit(actuator: Any, force: float) -> None:
-    """Set the largest force of an actuator, of a dcmotor that of its full voltage at standstill."""
-    if _electric(actuator) and actuator.gainprm[7] > 0.0:
-        actuator.gainprm[7] = force * float(actuator.gainprm[0]) / float(actuator.gainprm[1])
-    else:
-        actuator.forcerange = np.asarray(actuator.forcerange) * (force / float(actuator.forcerange[1]))
 
 
 def saturation(target: Target, effect: NamedEffect) -> Change:
@@ -199,9 +164,9 @@ def logged(target: Target, effect: NamedEffect) -> Change:
     if servo is None:
         return Change(effect.name, name, "log", text)
     wrong = float(servo.gear[0]) * v.get("offset", 0.0)
-    if _electric(servo):
+    if is_dc_motor(servo):
         off = f"{wrong:.8g}" if "offset" in v else f"{v['relative_error']:.8g} * data.actuator_length[u]"
-        servo.gainprm[6] *= 1.0 + v.get("relative_error", 0.0)
+        servo.gainprm[DcMotor.KD] *= 1.0 + v.get("relative_error", 0.0)
         lines = (f"u = model.actuator({servo.name!r}).id; data.ctrl[u] -= {off}",)
         text += "; the servo acts on that reading, by before_step in the snippet"
         return Change(effect.name, name, "log", text, (("actuator", servo.name),), lines=lines)

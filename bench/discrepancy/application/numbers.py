@@ -8,12 +8,13 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from bench.discrepancy.application.drives import set_delay, set_kp, set_kv, set_limit
+from bench.discrepancy.application.drives import set_delay, set_kp
 from bench.discrepancy.application.forces import damping_error, values_of
 from bench.discrepancy.application.target import Change, Target
 from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.verdict import NamedEffect, NominalEstimate
 from bench.errors import UnknownNameError
+from bench.rig.actuators import DRIVES, write_drive
 
 
 def nominal_parameter(target: Target, estimate: NominalEstimate) -> Change:
@@ -49,14 +50,10 @@ def _set(target: Target, kind: str, name: str, value: float, label: str) -> tupl
     actuator = target.actuator(name)
     if kind == "kp":
         set_kp(target, actuator, value)
-    elif kind == "kv":
-        set_kv(actuator, value)
-    elif kind == "gear":
-        actuator.gear[0] = value
-    elif kind == "forcerange":
-        set_limit(actuator, value)
     elif kind == "delay":
         set_delay(target, actuator, value)
+    elif kind in DRIVES:
+        write_drive(actuator, kind, value)
     else:
         raise UnknownNameError(
             "parameter of the verdict", label, ["mass:BODY", "stiffness:JOINT", "kp:ACTUATOR"]

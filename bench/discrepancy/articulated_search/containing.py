@@ -22,8 +22,8 @@ def begun_again(
 
     A law of many parameters has minima of its own; none of them is worse than the law within it.
     """
-    out = []
-    for found in fits:
+
+    def settled(found: ArticulatedFit) -> ArticulatedFit:
         placed = found.hypothesis[-1]
         within = [
             simple
@@ -33,11 +33,11 @@ def begun_again(
             and simple.hypothesis[:-1] == found.hypothesis[:-1]
         ]
         best = max(within, key=lambda f: f.log_posterior, default=found)
-        if best.log_posterior > found.log_posterior:
-            again = refit(found, _embedded(problem, best, placed))
-            found = max(found, again, key=lambda f: f.log_posterior)  # noqa: PLW2901  (the better of the two stands)
-        out.append(found)
-    return out
+        if best.log_posterior <= found.log_posterior:
+            return found
+        return max(found, refit(found, _embedded(problem, best, placed)), key=lambda f: f.log_posterior)
+
+    return [settled(found) for found in fits]
 
 
 def _embedded(problem: ArticulatedProblem, simple: ArticulatedFit, placed: PlacedOnJoint) -> Array:

@@ -135,6 +135,10 @@ def move(p: Array, kind: str, by: float) -> None:
         return
     if kind == "forcerange":
         p[Slot.LOW] *= 1.0 + by / p[Slot.HIGH]
+    if (
+        kind == "kv" and p[Slot.SERVO] < 0.5 and p[Slot.KP] == p[Slot.KV]
+    ):  # of a velocity servo the two are one
+        p[Slot.KP] += by
     for slot in LOCAL_SLOTS[kind]:
         p[slot] += by
 

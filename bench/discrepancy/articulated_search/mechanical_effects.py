@@ -7,6 +7,7 @@ import math
 from bench.discrepancy.articulated_search.effect import SETTINGS, ArticulatedEffect
 from bench.discrepancy.effects.effect import FreeParameter, log_grid
 from bench.discrepancy.multibody.slot_setters import (
+    SlotValues,
     added,
     carried,
     in_gear,
@@ -18,7 +19,6 @@ LIMIT = FreeParameter("limit", "force", **SETTINGS.positive)
 LIMIT_0 = FreeParameter(
     "limit_0", "force", mean=math.log(0.05), std=1.5, bounds=(-9.0, 4.0), grid=log_grid(0.05)
 )
-PARTS = ("mu_weight", "mu_drive")
 GROWTH = FreeParameter(
     "growth", "1/force", mean=math.log(0.03), std=1.5, bounds=(-9.0, 1.0), grid=log_grid(0.03, 0.2)
 )
@@ -33,6 +33,11 @@ def _part(name: str, middle: float, *grid: float) -> FreeParameter:
     return FreeParameter(
         name, mean=mean, std=1.0, bounds=(-7.0, 5.0), grid=tuple(points), unit="1", share=True
     )
+
+
+def _of_one_torque(v: SlotValues) -> SlotValues:
+    """Friction that grows with one torque as that in a gear."""
+    return {"limit_0": v["limit_0"], "mu_drive" if v["of_actuator"] > 0.5 else "mu_weight": v["mu"]}
 
 
 MECHANICAL_EFFECTS: tuple[ArticulatedEffect, ...] = (
@@ -114,10 +119,7 @@ MECHANICAL_EFFECTS: tuple[ArticulatedEffect, ...] = (
         in_gear,
         contains={
             "coulomb_friction": lambda v: {"limit_0": v["limit"]},
-            "load_dependent_friction": lambda v: {
-                "limit_0": v["limit_0"],
-                PARTS[v["of_actuator"] > 0.5]: v["mu"],
-            },
+            "load_dependent_friction": _of_one_torque,
         },
     ),
     ArticulatedEffect(
