@@ -27,12 +27,11 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "scripts"))
 
 from robot_records.case_folders import Records, write_folder  # noqa: E402
+from robot_records.free_run_errors import errors_of  # noqa: E402
 from robot_records.robots import ROBOTS  # noqa: E402
 
 from bench.discrepancy import read_case  # noqa: E402
 from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis, diagnose_articulated  # noqa: E402
-from bench.discrepancy.articulated.free_runs import FreeRuns  # noqa: E402
-from bench.discrepancy.articulated_search.hypothesis import JointHypothesis  # noqa: E402
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem  # noqa: E402
 from bench.errors import BenchError, UnknownNameError  # noqa: E402
 from bench.files import json_values, write_text  # noqa: E402
@@ -123,16 +122,6 @@ def _further(records: Records, found: ArticulatedDiagnosis) -> dict[str, list[tu
         joint.name: [(float(a[j]), float(b[j])) for a, b in zip(*runs, strict=True)]
         for j, joint in enumerate(problem.joints)
     }
-
-
-def errors_of(problem: ArticulatedProblem, hypothesis: JointHypothesis, vector: np.ndarray) -> np.ndarray:
-    """RMS errors (n_records, n_joints) of free runs."""
-    runs = FreeRuns(problem.settled(hypothesis, vector))
-    motions = runs.problem.motions(hypothesis, vector)
-    joints = range(len(problem.joints))
-    return np.array(
-        [[np.sqrt(np.mean(runs.errors(j, hypothesis, vector, m) ** 2)) for j in joints] for m in motions]
-    )
 
 
 def main(args: Args) -> None:

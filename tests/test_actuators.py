@@ -123,6 +123,14 @@ def test_what_a_drive_has_not_cannot_be_set():
         set_drive(model_with(ACTUATORS["motor behind a gear"][0]), 0, "delay", 1.0)
     with pytest.raises(ModelError, match="takes a voltage"):
         set_drive(model_with(ACTUATORS["DC motor, voltage"][0]), 0, "kp", 1.0)
+    follower = model_with(ACTUATORS["velocity servo behind a gear"][0])
+    with pytest.raises(ModelError, match="kv:a"):
+        set_drive(follower, 0, "kp", 1.0)
+    before = base_slots(ArticulatedModel.of(follower).joints[0], False)
+    set_drive(follower, 0, "kv", 0.08)
+    move(before, "kv", 0.03)
+    np.testing.assert_allclose(before, base_slots(ArticulatedModel.of(follower).joints[0], False))
+    assert commanded(follower, 0) == "velocity"
     limited = model_with('motor name="a" joint="pivot" forcerange="-1 2"')
     set_drive(limited, 0, "forcerange", 3.0)
     np.testing.assert_allclose(limited.actuator_forcerange[0], [-1.5, 3.0])

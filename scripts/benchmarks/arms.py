@@ -18,6 +18,7 @@ from pathlib import Path
 
 import numpy as np
 from robot_records.case_folders import write_folder
+from robot_records.free_run_errors import errors_of, over_travel
 from robot_records.robots import so101
 
 from bench.arrays import Array
@@ -26,7 +27,7 @@ from bench.discrepancy.articulated.diagnosis import diagnose_articulated
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.multibody.channels import bound
 from bench.files import write_text
-from benchmarks.peer_sysid_arms import Fit, errors_of
+from benchmarks.peer_sysid_arms import Fit
 from benchmarks.timing import Row
 
 EVERY = 4
@@ -99,7 +100,7 @@ def _so101(data: Path, folder: Path, progress: Callable[[str], None]) -> list[Ro
     fit = Fit(case)
     fitted = fit.fitted(seconds)
     problem = ArticulatedProblem.of(bound(judged, fit.compiled), found.model, judged.validation)
-    ours = errors_of(problem, found.final.hypothesis, found.final.vector)
+    ours = over_travel(problem, errors_of(problem, found.final.hypothesis, found.final.vector))
     theirs = fit.errors(fitted, judged)
     middle = np.array([np.median(ours, axis=0), np.median(theirs, axis=0)]).T
     told = (

@@ -8,8 +8,6 @@ what it fits is judged by the free runs that judge the diagnosis.
 
 from __future__ import annotations
 
-import contextlib
-import io
 import time
 from collections.abc import Callable
 from typing import Any
@@ -17,10 +15,9 @@ from typing import Any
 import mujoco
 import numpy as np
 from mujoco import sysid
+from robot_records.free_run_errors import errors_of, over_travel
 
 from bench.arrays import Array
-from bench.discrepancy.articulated.free_runs import FreeRuns
-from bench.discrepancy.articulated_search.hypothesis import JointHypothesis
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.model.mjcf_file import rig_of
@@ -35,6 +32,7 @@ from bench.discrepancy.replay.running import controls
 from bench.discrepancy.settings import DEFAULT
 from bench.rig.actuators import set_drive
 from bench.rig.building import parse
+from benchmarks.peer_model import optimised
 
 FAR = 1e3
 """Residual of a run that is not finite, in units of the noise."""
@@ -45,10 +43,6 @@ MOST = 20.0
 ITERATIONS = 50
 OFF = 0.01
 """Of the range between its bounds, how far above the lower one a parameter starts at least."""
-
-
-class LateError(Exception):
-    """The time of the fit is over."""
 
 
 class Fit:
@@ -200,40 +194,15 @@ class Fit:
             parameters.add(
                 sysid.Parameter(name, float(np.clip(start, low + OFF * (high - low), high)), low, high)
             )
-        best = (np.inf, parameters.as_vector())
-
-        def residual(x: Array, p: Any) -> Any:
-            nonlocal best
-            if time.perf_counter() > deadline:
-                raise LateError
-            found = self.residual(x, p)
-            if x.ndim == 1 or x.shape[1] == 1:
-                best = min(best, (float(np.sum(found[0][0] ** 2)), x.ravel().copy()), key=lambda b: b[0])
-            return found
-
-        with contextlib.redirect_stdout(io.StringIO()), contextlib.suppress(LateError):
-            _, result = sysid.optimize(
-                parameters, residual, verbose=False, max_iters=ITERATIONS, x_scale="jac"
-            )
-            best = (0.0, np.asarray(result.x).ravel())
-        return self.build(best[1])
+        _, vector = optimised(parameters, self.residual, iterations=ITERATIONS, deadline=deadline)
+        return self.build(vector)
 
     def errors(self, fitted: mujoco.MjModel, case: Case) -> Array:
         """RMS errors (n_records, n_joints) of free runs of a case's judging records, one joint at a time, over its travel there."""
         problem = ArticulatedProblem.of(
             bound(case, self.compiled), ArticulatedModel.of(fitted), case.validation
         )
-        return errors_of(problem, (), np.zeros(len(problem.nominal)))
-
-
-def errors_of(problem: ArticulatedProblem, hypothesis: JointHypothesis, vector: Array) -> Array:
-    """RMS errors (n_records, n_joints) of free runs of a problem's records over the travel of the joints."""
-    runs = FreeRuns(problem.settled(hypothesis, vector))
-    joints = range(len(problem.joints))
-    motions = runs.problem.motions(hypothesis, vector)
-    return np.array([
-        [np.sqrt(np.mean(runs.errors(j, hypothesis, vector, m) ** 2)) / runs.sizes[j] for j in joints] for m in motions
-    ])  # fmt: skip
+        return over_travel(problem, errors_of(problem, (), np.zeros(len(problem.nominal))))
 
 
 def _dof(field: str, index: int) -> Callable[[Any, float], None]:

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
 import copy
-import io
-import time
 from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
@@ -21,17 +18,13 @@ from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.likelihood.whitening import whitened
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.simulation.stick_slip import Motion
-from benchmarks.peer_model import Compiled
+from benchmarks.peer_model import Compiled, optimised
 from benchmarks.structure_mjcf import StructureMjcf
 
 REACH = 20.0
 """Bound, in units of the prior's standard deviation, of what has none: the optimiser wants finite ones."""
 DIVERGED = 1e6
 """Residual that stands for a simulation that is not finite."""
-
-
-class LateError(Exception):
-    """The time of a fit is over."""
 
 
 class Candidate:
@@ -253,25 +246,8 @@ class Candidate:
         """Fit from a start; the vector reached and its cost, at a deadline those of the best vector so far."""
         parameters = self.parameters(start)
         best = (np.inf, parameters.as_vector())
-
-        def residual(x: Array, p: Any) -> Any:
-            nonlocal best
-            if time.perf_counter() > deadline:
-                raise LateError
-            found = self.residual(x, p)
-            if x.ndim == 1 or x.shape[1] == 1:
-                best = min(
-                    best, (float(np.sum(np.concatenate(found[0]) ** 2)), x.ravel().copy()), key=lambda b: b[0]
-                )
-            return found
-
-        # its table cannot be turned off from here
-        with contextlib.redirect_stdout(io.StringIO()), contextlib.suppress(LateError):
-            if len(self.free):
-                _, result = sysid.optimize(
-                    parameters, residual, verbose=False, max_iters=iterations, x_scale="jac"
-                )
-                best = (np.inf, np.asarray(result.x).ravel())
+        if len(self.free):
+            best = optimised(parameters, self.residual, iterations=iterations, deadline=deadline)
         vector = self.full(best[1])
         return vector, best[0] if np.isfinite(best[0]) else self.cost(vector)
 
