@@ -13,6 +13,7 @@ import pyarrow.parquet as pq
 
 from bench.arrays import Array
 from bench.rig.actuators import drive_value
+from bench.rig.bodies import BODIES, body_value
 
 
 @dataclass(frozen=True)
@@ -42,6 +43,10 @@ class Axis:
     actuator: str = ""
 
 
+SPREADS = {"mass": 0.05, "damping": 0.25, "armature": 0.2, "kp": 0.05}
+"""Relative one-sigma uncertainty of a model that was drawn or measured; of a guessed one more is stated."""
+
+
 @dataclass(frozen=True)
 class Records:
     """A robot with its records.
@@ -53,7 +58,7 @@ class Records:
         validation: For judging.
         rate: Samples a second, on which the tables are put.
         servo: Whether the commands are position targets.
-        spreads: Relative one-sigma uncertainty of masses, damping, armature and of numbers of the drives, where the model has them.
+        spreads: Relative one-sigma uncertainty of masses, damping, armature; where stated of inertias, centres of mass and drives too.
         held: Joints that are held, see ``"joints"`` of nominal.json.
         known: What is published or was seen of the robot, a sentence.
         most: Most effects named together.
@@ -67,9 +72,7 @@ class Records:
     rate: float
     servo: bool
     known: str
-    spreads: Mapping[str, float] = field(
-        default_factory=lambda: {"mass": 0.05, "damping": 0.25, "armature": 0.2, "kp": 0.05}
-    )
+    spreads: Mapping[str, float] = field(default_factory=lambda: SPREADS)
     held: Mapping[str, float | str] = field(default_factory=dict)
     most: int = 3
     further: Sequence[Mapping[str, Array]] = ()
@@ -148,6 +151,14 @@ def _parameters(records: Records) -> dict[str, dict[str, object]]:
             value = float(np.ravel(values[dof])[0])
             if value > 0.0:
                 out[f"{kind}:{name}"] = {"value": value, "std": records.spreads[kind] * value, "unit": unit}
+    bodies = [parameter.partition(":")[2] for parameter in out if parameter.startswith("mass:")]
+    for kind in [kind for kind in BODIES[1:] if kind in records.spreads]:
+        for name in bodies:
+            value = body_value(model, model.body(name).id, kind)
+            if value != 0.0:
+                out[f"{kind}:{name}"] = {
+                    "value": value, "std": records.spreads[kind] * abs(value), "unit": "kg m^2" if kind == "inertia" else "m",
+                }  # fmt: skip
     units = {"kp": "N m/rad", "kv": "N m s/rad", "forcerange": "N m"}
     for axis in records.axes if records.servo else ():
         u = model.actuator(axis.actuator or axis.joint).id

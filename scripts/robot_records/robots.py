@@ -9,7 +9,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from robot_records.case_folders import Axis, Records, cut, table
+from robot_records.case_folders import SPREADS, Axis, Records, cut, table
 
 TURN = 2.0 * np.pi
 SO101 = {
@@ -117,7 +117,12 @@ def tx40(data: Path) -> Records:
 
 
 def _pendulum(
-    data: Path, model: str, finding: tuple[str, ...], judging: tuple[str, ...], known: str
+    data: Path,
+    model: str,
+    finding: tuple[str, ...],
+    judging: tuple[str, ...],
+    known: str,
+    spreads: Mapping[str, float] = SPREADS,
 ) -> Records:
     """A double pendulum, rigid: damping, friction and armature of its public model set to zero."""
     folder = data / "double_pendulum"
@@ -137,6 +142,7 @@ def _pendulum(
         250.0,
         False,
         known,
+        spreads,
     )
 
 
@@ -149,11 +155,12 @@ def double_pendulum_a0(data: Path) -> Records:
 
 
 def double_pendulum_c1(data: Path) -> Records:
-    """Design C.1 by the hypothetical set of its lengths."""
+    """Design C.1 by a hypothetical set: its lengths are right, masses and inertias were guessed before it was built."""
     known = "Coulomb friction 0.25 and 0.19 N m"
     return _pendulum(
-        data, "model_C0_h10.xml", ("C1_143339", "C1_143601", "C1_143704", "C1_144003"), ("C1_154220",), known
-    )
+        data, "model_C0_h10.xml", ("C1_143339", "C1_143601", "C1_143704", "C1_144003"), ("C1_154220",), known,
+        {"mass": 0.3, "inertia": 0.3, "com_z": 0.1},
+    )  # fmt: skip
 
 
 def simple_pendulum(data: Path) -> Records:

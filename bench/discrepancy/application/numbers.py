@@ -15,6 +15,7 @@ from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.verdict import NamedEffect, NominalEstimate
 from bench.errors import UnknownNameError
 from bench.rig.actuators import DRIVES, write_drive
+from bench.rig.bodies import AXES, BODIES, scaled_inertia
 
 
 def nominal_parameter(target: Target, estimate: NominalEstimate) -> Change:
@@ -30,12 +31,14 @@ def nominal_parameter(target: Target, estimate: NominalEstimate) -> Change:
 
 
 def _set(target: Target, kind: str, name: str, value: float, label: str) -> tuple[str, str]:
-    if kind in ("mass", "inertia"):
+    if kind in BODIES:
         body = target.body(name or _only_body(target))
         if kind == "mass":
             body.mass = value
+        elif kind == "inertia":
+            body.inertia = scaled_inertia(target.nominal, target.nominal.body(body.name).id, value)
         else:
-            body.inertia = np.full(3, value)
+            body.ipos = np.where(np.arange(3) == AXES[kind], value, body.ipos)
         return "body", body.name
     if kind in ("stiffness", "damping"):
         item: Any = target.joint_or_tendon(name)

@@ -1,9 +1,9 @@
 """Maximum a posteriori fits of hypotheses about an articulated model.
 
-The joints share nothing but the masses of the bodies. So a hypothesis about one joint is fitted with that joint's runs alone; what the
-others know of the masses enters as a quadratic form, once their own parameters are eliminated (`Others`). The residuals of a joint are
-divided by the scale that the last fit left on it, at least one: the fit of one joint is then not ruled by another at which something
-else is missing.
+The joints share nothing but the bodies: masses, inertias, centres of mass. So a hypothesis about one joint is fitted with that joint's
+runs alone; what the others know of the bodies enters as a quadratic form, once their own parameters are eliminated (`Others`). The
+residuals of a joint are divided by the scale that the last fit left on it, at least one: the fit of one joint is then not ruled by
+another at which something else is missing.
 """
 
 from __future__ import annotations
@@ -70,8 +70,8 @@ class Others:
 
     Attributes:
         base: The fit.
-        factors: (n_joints,) of triangular (n_masses, n_masses) factors of the information on the masses' deviations.
-        targets: (n_joints,) of what factor times deviation should be (n_masses,).
+        factors: (n_joints,) of triangular (n_shared, n_shared) factors of the information on the deviations of what they share.
+        targets: (n_joints,) of what factor times deviation should be (n_shared,).
     """
 
     base: ArticulatedFit
@@ -81,11 +81,11 @@ class Others:
     @classmethod
     def of(cls, problem: ArticulatedProblem, base: ArticulatedFit) -> Others:
         """Linearise every joint about a fit and eliminate its own parameters."""
-        masses = list(problem.masses)
+        shared = list(problem.shared)
 
         def eliminated(j: int) -> tuple[Array, Array]:
             own = own_entries(problem, base.hypothesis, j)
-            columns = own + masses
+            columns = own + shared
             jacobian, residual = linearised(
                 problem, base, j, columns, base.scale[j][problem.octaves.index[j]]
             )
@@ -96,9 +96,9 @@ class Others:
             deviation = (base.vector[own] - mean[own]) / std[own]
             stacked = np.column_stack([np.vstack([jacobian, rows]), np.concatenate([residual, deviation])])
             r = np.asarray(np.linalg.qr(stacked, mode="r"))
-            k, m = len(own), len(masses)
+            k, m = len(own), len(shared)
             factor, left = r[k : k + m, k : k + m], r[k : k + m, -1]
-            return factor, factor @ base.vector[masses] - left
+            return factor, factor @ base.vector[shared] - left
 
         found = in_threads(eliminated, range(len(problem.joints)))
         return cls(base, tuple(f for f, _ in found), tuple(t for _, t in found))
@@ -195,7 +195,7 @@ def fit(
     new = hypothesis[len(others.base.hypothesis) :] if others else hypothesis
     active = problem.reached(new) if others and new else tuple(range(n_joints))
     passive = [j for j in range(n_joints) if j not in active]
-    masses = list(problem.masses)
+    shared = list(problem.shared)
 
     runs = _Runs(problem, hypothesis)
     units = [scale[j][problem.octaves.index[j]] for j in range(n_joints)]
@@ -204,7 +204,7 @@ def fit(
         parts = in_threads(lambda j: runs.residual(j, vector) / units[j], active)
         for j in passive:
             assert others is not None
-            parts.append(others.factors[j] @ vector[masses] - others.targets[j])
+            parts.append(others.factors[j] @ vector[shared] - others.targets[j])
         return np.concatenate(parts)
 
     mean, std, low, high = problem.prior(hypothesis)
@@ -255,10 +255,8 @@ def refitted(
 def free_entries(
     problem: ArticulatedProblem, hypothesis: JointHypothesis, active: Sequence[int] | None = None
 ) -> NDArray[np.int64]:
-    """Entries that a fit moves: all that are free, or those of the active joints and the masses."""
-    out = [
-        i for i, p in enumerate(problem.nominal) if active is None or p.kind == "mass" or p.joint in active
-    ]
+    """Entries that a fit moves: all that are free, or those of the active joints and of bodies."""
+    out = [i for i, p in enumerate(problem.nominal) if active is None or p.shared or p.joint in active]
     at = len(problem.nominal)
     for placed in hypothesis:
         for p in placed.effect.parameters:
@@ -284,11 +282,11 @@ def _summary(
         if j in active or others is None:
             chi2[j] = octaves.power(j, problem.residual(j, hypothesis, vector))
         else:
-            # what the other joints lose by masses that suit this one
-            masses = list(problem.masses)
+            # what the other joints lose by bodies that suit this one
+            shared = list(problem.shared)
             base = others.base
-            now = others.factors[j] @ vector[masses] - others.targets[j]
-            then = others.factors[j] @ base.vector[masses] - others.targets[j]
+            now = others.factors[j] @ vector[shared] - others.targets[j]
+            then = others.factors[j] @ base.vector[shared] - others.targets[j]
             whole = float(np.sum(base.chi2[j] / base.scale[j] ** 2))
             chi2[j] = base.chi2[j] * max(1.0 + float(now @ now - then @ then) / whole, 0.0)
     total = sum(octaves.misfit(j, chi2[j]) for j in range(len(chi2)))

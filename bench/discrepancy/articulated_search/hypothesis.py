@@ -15,6 +15,7 @@ from bench.discrepancy.multibody.joints import Joint
 from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.errors import UnknownNameError
 from bench.rig.actuators import DRIVES
+from bench.rig.bodies import BODIES
 
 LOCAL_SLOTS = {
     "damping": (Slot.DAMPING,),
@@ -76,9 +77,14 @@ class Nominal:
     value: float
     std: float
 
+    @property
+    def shared(self) -> bool:
+        """Whether it belongs to a body, which all joints feel."""
+        return self.kind in BODIES
+
 
 def nominal_parameters(case: Case, model: ArticulatedModel) -> tuple[Nominal, ...]:
-    """The uncertain parameters of ``nominal.json``: masses first, then joint by joint.
+    """The uncertain parameters of ``nominal.json``: those of bodies first, then joint by joint.
 
     Raises:
         UnknownNameError: A parameter names nothing in the model.
@@ -86,23 +92,25 @@ def nominal_parameters(case: Case, model: ArticulatedModel) -> tuple[Nominal, ..
     joints = {joint.name: j for j, joint in enumerate(model.joints)}
     drives = {joint.drive.name: j for j, joint in enumerate(model.joints) if joint.drive is not None}
     bodies = {body: i for i, body in enumerate(model.bodies)}
-    masses, others = [], []
+    shared, others = [], []
     for parameter in case.parameters:
         kind, _, target = parameter.name.partition(":")
-        if kind == "mass":
+        if kind in BODIES:
             known: Mapping[str, int] = bodies
         elif kind in DRIVES:
             known = drives
         elif kind in LOCAL_SLOTS:
             known = joints
         else:
-            raise UnknownNameError("parameter", parameter.name, [f"{k}:NAME" for k in ("mass", *LOCAL_SLOTS)])
+            raise UnknownNameError(
+                "parameter", parameter.name, [f"{k}:NAME" for k in (*BODIES, *LOCAL_SLOTS)]
+            )
         if target not in known:
             raise UnknownNameError(f"target of parameter '{parameter.name}'", target, list(known))
         if parameter.std > 0.0:
             entry = Nominal(parameter.name, kind, target, known[target], parameter.value, parameter.std)
-            (masses if kind == "mass" else others).append(entry)
-    return (*masses, *sorted(others, key=lambda p: p.joint))
+            (shared if entry.shared else others).append(entry)
+    return (*shared, *sorted(others, key=lambda p: p.joint))
 
 
 def base_slots(joint: Joint, on_link: bool) -> Array:

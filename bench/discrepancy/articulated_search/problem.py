@@ -1,7 +1,7 @@
 """The statistical problem of an articulated model: whitened innovations of every joint, priors, and their derivatives.
 
 The vector of a hypothesis holds the deviations of the nominal parameters in units of their standard uncertainty, then the parameters of its
-effects. Only masses are shared by the joints; whatever sits at one joint or drive changes that joint's runs alone.
+effects. Only numbers of bodies are shared by the joints; whatever sits at one joint or drive changes that joint's runs alone.
 
 What a wrong model leaves is larger than the noise, differs from joint to joint, and lies where the robot moves, at low frequencies. Its
 scale in every octave is a parameter too, with the stated noise as its lower bound (`bench.discrepancy.articulated_search.misfit`).
@@ -39,6 +39,7 @@ from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.multibody.records import PreparedRecord, corrected, prepare, relinked
 from bench.discrepancy.numerics.deadline import NEVER, Deadline
 from bench.discrepancy.settings import DEFAULT, DiagnosisSettings
+from bench.rig.bodies import AXES
 
 
 @dataclass(eq=False)
@@ -52,7 +53,7 @@ class ArticulatedProblem:
         settings: Thresholds of the diagnosis.
         deadline: When nothing further is screened or fitted, and fits end where they are.
         softness: Noise of the torque that is assumed beyond what is stated, see `softened`.
-        nominal: Uncertain nominal parameters: masses first, then joint by joint.
+        nominal: Uncertain nominal parameters: those of bodies first, then joint by joint.
     """
 
     case: Case
@@ -92,13 +93,13 @@ class ArticulatedProblem:
         return self.model.joints
 
     @cached_property
-    def masses(self) -> tuple[int, ...]:
-        """Indices of the nominal parameters that all joints share."""
-        return tuple(i for i, p in enumerate(self.nominal) if p.kind == "mass")
+    def shared(self) -> tuple[int, ...]:
+        """Indices of the nominal parameters that all joints share, those of bodies."""
+        return tuple(i for i, p in enumerate(self.nominal) if p.shared)
 
     def locals(self, j: int) -> tuple[int, ...]:
         """Indices of the nominal parameters of joint `j` alone."""
-        return tuple(i for i, p in enumerate(self.nominal) if p.kind != "mass" and p.joint == j)
+        return tuple(i for i, p in enumerate(self.nominal) if not p.shared and p.joint == j)
 
     def size(self, hypothesis: JointHypothesis) -> int:
         """Length of the vector of a hypothesis."""
@@ -123,7 +124,7 @@ class ArticulatedProblem:
 
     def entries(self, j: int, hypothesis: JointHypothesis) -> NDArray[np.int64]:
         """Entries of the vector of a hypothesis on which the runs of joint `j` depend."""
-        out, at = [*self.masses, *self.locals(j)], len(self.nominal)
+        out, at = [*self.shared, *self.locals(j)], len(self.nominal)
         for placed in hypothesis:
             stop = at + len(placed.effect.parameters)
             out += range(at, stop) if j in self.reached((placed,)) else ()
@@ -249,12 +250,17 @@ class ArticulatedProblem:
     def coefficients(
         self, record: JointRecord, hypothesis: JointHypothesis, vector: Array
     ) -> tuple[Array, Array]:
-        """Bias and inertia (n_steps,) of a joint's equation as a hypothesis has the masses."""
+        """Bias and inertia (n_steps,) of a joint's equation as a hypothesis has the bodies."""
         bias, inertia = record.bias, record.inertia
-        for i in self.masses:
+        by: dict[str, dict[str, float]] = {}
+        for i in self.shared:
             if vector[i] != 0.0:
-                change = record.changes[self.nominal[i].target] * (self.nominal[i].std * vector[i])
-                bias, inertia = bias + change[0], inertia + change[1]
+                by.setdefault(self.nominal[i].target, {})[self.nominal[i].kind] = (
+                    self.nominal[i].std * vector[i]
+                )
+        for body, changed in by.items():
+            change = record.bodies[body].change(changed)
+            bias, inertia = bias + change[0], inertia + change[1]
         for placed, eta in zip(hypothesis, self.etas(hypothesis, vector), strict=True):
             if placed.effect.site != "body":
                 continue
@@ -294,7 +300,9 @@ class ArticulatedProblem:
         """Mean, standard deviation, lower and upper bound of a vector."""
         n = len(self.nominal)
         mean, std = [np.zeros(n)], [np.ones(n)]
-        low = np.array([-0.95 * p.value / p.std if p.value > 0 else -np.inf for p in self.nominal])
+        low = np.array(
+            [-0.95 * p.value / p.std if p.value > 0 and p.kind not in AXES else -np.inf for p in self.nominal]
+        )
         lows, highs = [low], [np.full(n, np.inf)]
         for placed in hypothesis:
             p = placed.effect.parameters

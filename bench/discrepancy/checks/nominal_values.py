@@ -11,6 +11,7 @@ from bench.errors import ModelError
 from bench.identification.linear_rig import current
 from bench.rig import Rig
 from bench.rig.actuators import DRIVES, drive_value
+from bench.rig.bodies import BODIES, body_value
 from bench.rig.building import parse
 
 
@@ -46,6 +47,9 @@ def _own_value(name: str, rig: Rig) -> float | None:
     model = rig.model
     if kind in DRIVES:
         return _of_drive(model, kind, target)
+    if kind in BODIES:
+        body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, target)
+        return body_value(model, body, kind) if body > 0 else None
     if kind == "frictionloss":
         joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, target)
         if joint >= 0:

@@ -14,6 +14,7 @@ from bench.discrepancy.case.unit_conversion import Expectation
 from bench.discrepancy.motion.observer import ORDERS
 from bench.rig import Rig
 from bench.rig.actuators import commanded
+from bench.rig.bodies import AXES
 
 TURNS = {
     "position": ("rad",), "velocity": ("rad/s",), "acceleration": ("rad/s^2",), "load": ("N m",),
@@ -52,6 +53,8 @@ def _parameter(name: str, model: mujoco.MjModel) -> Expectation | None:
         return Expectation(("kg",), "it is a mass")
     if kind == "inertia":
         return Expectation(("kg m^2",), "it is a moment of inertia")
+    if kind in AXES:
+        return Expectation(("m",), "it is a coordinate of a centre of mass")
     if kind in SERVO:
         return _gain(name, model, SERVO[kind])
     if kind not in PARAMETERS:

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.linalg import expm, solve_discrete_are
 
 from bench.arrays import Array
+from bench.discrepancy.multibody.body_terms import BodyTerms
 from bench.discrepancy.multibody.encoders import TRUE, Encoder
 from bench.discrepancy.multibody.joints import Joint
 
@@ -50,8 +51,8 @@ class JointRecord:
         start: (2,) smoothed position and velocity at the first sample.
         side: "motor" or "link", where the encoder sits; empty where nobody says.
         process: Equivalent white noise of the torque, one-sigma a sample.
-        changes: Body to the changes of bias and inertia (2, n_steps) for a kilogram more of it.
-        payloads: The same for a kilogram at its tip.
+        bodies: Body with uncertain numbers to what they change.
+        payloads: Body to the changes of bias and inertia (2, n_steps) by a kilogram at its tip.
         centres: The same (3, 2, n_steps) for a metre of its centre of mass along each axis.
         weights: Body to the change of bias (n_steps,) by its weight.
         beside: Neighbour in the tree to its velocity (n_steps,).
@@ -77,7 +78,7 @@ class JointRecord:
     start: Array
     side: str
     process: float
-    changes: Mapping[str, Array]
+    bodies: Mapping[str, BodyTerms]
     payloads: Mapping[str, Array]
     centres: Mapping[str, Array]
     weights: Mapping[str, Array]

@@ -21,6 +21,7 @@ from bench.discrepancy.multibody.inverse import along
 from bench.discrepancy.multibody.joints import MOVING, Joint, Tie, body_name, joint_of, ties_of, with_moved
 from bench.errors import ModelError, UnknownNameError
 from bench.rig import Rig
+from bench.rig.bodies import body_value, set_body, without_shortcuts
 from bench.rig.held_joints import MOTION
 
 
@@ -132,8 +133,16 @@ class ArticulatedModel:
 
     def with_mass(self, body: str, mass: float) -> ArticulatedModel:
         """The model with another mass of a body, its centre of mass and inertia about it as they are."""
+        return self.with_body("mass", body, mass)
+
+    def body_value(self, kind: str, body: str) -> float:
+        """A number of a body, see `bodies.body_value`."""
+        return body_value(self.model, _index(self.model, body), kind)
+
+    def with_body(self, kind: str, body: str, value: float) -> ArticulatedModel:
+        """The model with another number of a body, see `bodies.set_body`, which also says what it raises."""
         out = self._copied()
-        out.model.body_mass[_index(out.model, body)] = mass
+        set_body(out.model, _index(out.model, body), kind, value)
         return out
 
     def with_payload(self, body: str, mass: float, at: Array | None = None) -> ArticulatedModel:
@@ -252,11 +261,7 @@ def _bare(model: mujoco.MjModel) -> mujoco.MjModel:
     bare.actuator_armature[:] = 0.0
     bare.actuator_damping[:] = 0.0
     bare.jnt_stiffness[:] = 0.0
-    # of a body whose inertia is diagonal in its joints MuJoCo keeps the row of the mass matrix from when it was compiled, armature
-    # included, and of one whose centre of mass is its origin that it is; here masses, centres and armatures change
-    bare.body_simple[:] = 0
-    bare.dof_simplenum[:] = 0
-    bare.body_sameframe[:] = int(mujoco.mjtSameFrame.mjSAMEFRAME_NONE)
+    without_shortcuts(bare)  # masses, centres of mass and armatures change here
     disabled = (
         mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
         | mujoco.mjtDisableBit.mjDSBL_ACTUATION

@@ -16,6 +16,7 @@ from scipy.signal import butter, sosfiltfilt
 
 from bench.arrays import Array
 from bench.discrepancy.case.case import Case, CaseChannel, CaseRecord
+from bench.discrepancy.multibody.body_terms import body_terms
 from bench.discrepancy.multibody.encoders import TRUE, Encoder, encoders_of, input_of, weights_of
 from bench.discrepancy.multibody.joint_record import JointRecord
 from bench.discrepancy.multibody.model import ArticulatedModel, Dynamics
@@ -62,9 +63,7 @@ def prepare(
         """Changes of bias and inertia (n_joints, 2, n_steps)."""
         return Coefficients.of(_difference(changed, dynamics), motion, clock).stacked
 
-    masses = {
-        body: beside(model.with_mass(body, model.mass(body) + 1.0).dynamics(*moved)) for body in model.bodies
-    }
+    bodies = body_terms(case, model, moved, beside)
     payloads = {body: beside(model.with_payload(body, 1.0).dynamics(*moved)) for body in model.bodies}
     centres = {
         body: np.stack(
@@ -89,7 +88,7 @@ def prepare(
                 joint, record.step / clock.n_sub, clock.n_sub, base.inertia[j] + joint.armature, base.bias[j], slope[j],
                 base.reference[j], base.load[j], _input(case, record, channel, clock), *_measured(motion, j),
                 encoders_of(case, joint).channels[0].side, float(np.hypot(stated, process[j])),
-                {b: c[j] for b, c in masses.items()}, {b: c[j] for b, c in payloads.items()},
+                {b: terms.of_joint(j) for b, terms in bodies.items()}, {b: c[j] for b, c in payloads.items()},
                 {b: np.ascontiguousarray(c[:, j]) for b, c in centres.items()}, {b: c[j] for b, c in weights.items()},
                 beside_of(model, j, speeds), record.step,
                 weights_of(case, record, joint),

@@ -1,0 +1,114 @@
+"""What the numbers of a body change in the equations of the joints: mass, moment of inertia, centre of mass.
+
+A body is a point mass m at its centre c and an inertia about it. Of the point, torques and inertias along a given motion are a quadratic
+polynomial of where it lies; of the inertia they are linear. So along that motion
+
+    change = (m + dm) P(c + dc) - m P(c) + dI R,   P(c + dc) = P(c) + G dc + dc' H dc / 2,
+
+which is exact however large the changes are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bench.arrays import Array
+from bench.discrepancy.case.case import Case
+from bench.discrepancy.multibody.model import ArticulatedModel, Dynamics
+from bench.rig.bodies import AXES, BODIES
+
+
+@dataclass(frozen=True, eq=False)
+class BodyTerms:
+    """A body whose numbers are uncertain; arrays begin with an axis of joints, or have none for one joint.
+
+    Attributes:
+        mass: Its mass [kg].
+        axes: Uncertain coordinates of its centre of mass.
+        point: (…, 2, n_steps) P(c), bias and inertia by a kilogram at its centre of mass.
+        slopes: (n_axes, …, 2, n_steps) G.
+        curvatures: (n_axes, n_axes, …, 2, n_steps) H.
+        moment: (…, 2, n_steps) R, by a unit of its moment of inertia; zeros where that is certain.
+    """
+
+    mass: float
+    axes: tuple[str, ...]
+    point: Array
+    slopes: Array
+    curvatures: Array
+    moment: Array
+
+    def of_joint(self, j: int) -> BodyTerms:
+        """The terms of joint `j`."""
+        return replace(
+            self, point=self.point[j], slopes=self.slopes[:, j], curvatures=self.curvatures[:, :, j], moment=self.moment[j]
+        )  # fmt: skip
+
+    def change(self, by: Mapping[str, float]) -> Array:
+        """Changes (2, n_steps) of bias and inertia with the numbers changed by `by`, a kind of `BODIES` to its change."""
+        shift = np.array([by.get(axis, 0.0) for axis in self.axes])
+        out = by.get("mass", 0.0) * self.point
+        if shift.any():
+            moved = np.tensordot(
+                shift, self.slopes + 0.5 * np.tensordot(shift, self.curvatures, axes=1), axes=1
+            )
+            out = out + (self.mass + by.get("mass", 0.0)) * moved
+        if by.get("inertia"):
+            out = out + by["inertia"] * self.moment
+        return out
+
+
+def body_terms(
+    case: Case,
+    model: ArticulatedModel,
+    motion: tuple[Array, Array, Array],
+    beside: Callable[[Dynamics], Array],
+) -> dict[str, BodyTerms]:
+    """The terms (n_joints, 2, n_steps) of every body with uncertain numbers.
+
+    Args:
+        case: For what is uncertain; what names no body of the model is left to others to refuse.
+        model: The model at its nominal numbers.
+        motion: Position, velocity and acceleration (n, n_moving).
+        beside: Takes inverse dynamics along the motion to what they change (n_joints, 2, n_steps) in the equations.
+    """
+    stated: dict[str, dict[str, float]] = {}
+    for parameter in case.parameters:
+        kind, _, body = parameter.name.partition(":")
+        if kind in BODIES and body in model.bodies and parameter.std > 0.0:
+            stated.setdefault(body, {})[kind] = parameter.std
+    return {body: _terms(model, body, std, motion, beside) for body, std in stated.items()}
+
+
+def _terms(
+    model: ArticulatedModel,
+    body: str,
+    std: Mapping[str, float],
+    motion: tuple[Array, Array, Array],
+    beside: Callable[[Dynamics], Array],
+) -> BodyTerms:
+    axes = tuple(axis for axis in AXES if axis in std)
+    centre = np.array([model.body_value(axis, body) for axis in AXES])
+    # a polynomial of degree two is known from differences over any step
+    steps = [std[axis] * np.eye(3)[AXES[axis]] for axis in axes]
+
+    def point(at: Array) -> Array:
+        return beside(model.with_payload(body, 1.0, centre + at).dynamics(*motion))
+
+    here = point(np.zeros(3))
+    ahead, behind = [point(step) for step in steps], [point(-step) for step in steps]
+    slopes, curvatures = np.zeros((len(axes), *here.shape)), np.zeros((len(axes), len(axes), *here.shape))
+    for i, axis in enumerate(axes):
+        slopes[i] = (ahead[i] - behind[i]) / (2.0 * std[axis])
+        curvatures[i, i] = (ahead[i] + behind[i] - 2.0 * here) / std[axis] ** 2
+        for k, other in enumerate(axes[:i]):
+            both = point(steps[i] + steps[k]) - ahead[i] - ahead[k] + here
+            curvatures[i, k] = curvatures[k, i] = both / (std[axis] * std[other])
+    moment = np.zeros_like(here)
+    if "inertia" in std:
+        more = model.with_body("inertia", body, model.body_value("inertia", body) + std["inertia"])
+        moment = beside(more.dynamics(*motion)) / std["inertia"]
+    return BodyTerms(model.mass(body), axes, here, slopes, curvatures, moment)
