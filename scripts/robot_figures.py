@@ -131,9 +131,33 @@ def _xl330(row: Any) -> Figures:
     ]
 
 
+def _backlash_bench(row: Any) -> Figures:
+    """The dead zone: what friction makes of a servo's gain, or the clearance of a play, whichever is named."""
+    counts = 4096.0 / (2.0 * np.pi)
+    zones = []
+    for key, values in row["parameters"].items():
+        if _frictional(effect(key.split(" (")[0])):
+            zones.append(
+                2.0
+                * values[next(name for name in ("limit", "limit_0") if name in values)]
+                / row["nominal"]["kp:servo"]
+            )
+        elif "half_clearance" in values:
+            zones.append(2.0 * values["half_clearance"])
+    zone = counts * sum(zones)
+    return [
+        (
+            "backlash bench: dead zone of the unloaded servo, published 7.03 counts",
+            f"{zone:.2f} counts",
+            "within 20 %",
+            _held(abs(zone / 7.03 - 1.0) <= 0.2),
+        )
+    ]
+
+
 ROBOT_LIMITS: dict[str, Callable[[Any], Figures]] = {
     "UR10": _ur10, "TX40": _tx40, "SO-101": _so101, "double pendulum A.0": _both_joints, "double pendulum C.1": _both_joints,
-    "XL330": _xl330,
+    "XL330": _xl330, "backlash bench": _backlash_bench,
 }  # fmt: skip
 """What has to hold of some robots."""
 

@@ -5,8 +5,7 @@
 
 A row for every robot: the discrepancy (NRMSE of free runs of the judging records, worst joint) of the model as stated, what is named
 with the share that it closes, what is left, the noise floor, and seconds of the processor. Nothing is tuned to them; a robot that is
-refused has a row that says why. The bench for backlash is left out: at ten samples a second it has no dynamics, and no encoder
-outside the loop.
+refused has a row that says why.
 """
 
 from __future__ import annotations
@@ -65,6 +64,7 @@ class Row:
         complete: Whether nothing more is missing.
         seconds: Processor time [s].
         known: What is published.
+        nominal: Nominal parameters as re-estimated.
         further: Joint to the RMS errors [rad, m] of free runs of records that nothing was learned from, as stated and with what is named, a
             pair for every record. Of the SO-101, the first seconds of two of them judged.
     """
@@ -80,6 +80,7 @@ class Row:
     complete: bool
     seconds: float
     known: str
+    nominal: dict[str, float] = field(default_factory=dict)
     further: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
 
 
@@ -104,7 +105,7 @@ def row_of(name: str, data: Path) -> Row:
         {label: {k: float(x.value) for k, x in e.parameters.items()} for label, e in zip(labels, verdict.named, strict=True)},
         verdict.gap.before, verdict.gap.after, verdict.gap.noise_floor,
         {g.dof: (g.before, g.after, g.noise_floor) for g in verdict.gaps}, verdict.complete, time.process_time() - began,
-        records.known, further,
+        records.known, {one.name: one.value for one in verdict.nominal}, further,
     )  # fmt: skip
 
 

@@ -53,6 +53,13 @@ class JointDrive:
     stall: float = np.inf
 
     @property
+    def motor(self) -> bool:
+        """Whether it is a plain motor: a gain times its input at once, and nothing of its own motion."""
+        return not self.servo and not any(
+            (self.kv, self.lag, self.delay, self.back_emf, np.isfinite(self.stall))
+        )
+
+    @property
     def stiffness(self) -> float:
         """Stiffness that it gives the joint."""
         return self.gear**2 * self.kp if self.servo else 0.0

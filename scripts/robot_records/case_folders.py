@@ -48,6 +48,21 @@ SPREADS = {"mass": 0.05, "damping": 0.25, "armature": 0.2, "kp": 0.05}
 
 
 @dataclass(frozen=True)
+class Load:
+    """A motor of the model that stands for a load on a joint, and its column.
+
+    Attributes:
+        actuator: Its name.
+        column: Column of its torque.
+        noise: One-sigma noise of it [N m].
+    """
+
+    actuator: str
+    column: str
+    noise: float
+
+
+@dataclass(frozen=True)
 class Records:
     """A robot with its records.
 
@@ -62,6 +77,7 @@ class Records:
         held: Joints that are held, see ``"joints"`` of nominal.json.
         known: What is published or was seen of the robot, a sentence.
         most: Most effects named together.
+        loads: Loads besides the drives.
         further: Tables that do not find, on which the model is run as stated and with what was named; beginnings of some may judge.
     """
 
@@ -75,6 +91,7 @@ class Records:
     spreads: Mapping[str, float] = field(default_factory=lambda: SPREADS)
     held: Mapping[str, float | str] = field(default_factory=dict)
     most: int = 3
+    loads: Sequence[Load] = ()
     further: Sequence[Mapping[str, Array]] = ()
 
 
@@ -112,9 +129,13 @@ def write_folder(records: Records, folder: Path) -> None:
             channels[axis.velocity] = {
                 "unit": "rad/s", "joint": axis.joint, "quantity": "velocity", "noise_std": axis.velocity_noise,
             }  # fmt: skip
+    for load in records.loads:
+        channels[load.column] = {
+            "unit": "N m", "role": "measured", "actuator": load.actuator, "noise_std": load.noise,
+        }  # fmt: skip
     document = {
         "rig": "model.xml", "sample_rate_hz": records.rate, "starts_in_motion": True,
-        "load_interpolation": "zero_order_hold" if records.servo else "linear",
+        "load_interpolation": "zero_order_hold" if records.servo and not records.loads else "linear",
         "parameters": _parameters(records), "channels": channels,
     } | ({"joints": dict(records.held)} if records.held else {})  # fmt: skip
     (folder / "nominal.json").write_text(json.dumps(document, indent=1))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -9,7 +10,8 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from robot_records.case_folders import SPREADS, Axis, Records, cut, table
+from bench.arrays import Array
+from robot_records.case_folders import SPREADS, Axis, Load, Records, cut, table
 
 TURN = 2.0 * np.pi
 SO101 = {
@@ -235,6 +237,47 @@ def sts3250(data: Path) -> Records:
     )  # fmt: skip
 
 
+BENCH = """<mujoco><option timestep="0.001"/>
+<worldbody><body name="lever"><joint name="servo" axis="0 0 1" armature="0.028" damping="0.6"/>
+<inertial pos="0.05 0 0" mass="0.03" diaginertia="1e-5 1e-5 1e-5"/></body></worldbody>
+<actuator><position name="servo" joint="servo" kp="30"/><motor name="bands" joint="servo"/></actuator></mujoco>"""
+BENCH_PULL = 0.29
+"""Torque of the bands of the bench, pulled as far as they go [N m]."""
+
+
+def backlash_bench(data: Path) -> Records:
+    """An STS3215 that holds its target while two other servos pull at its lever by bands, in the four stretches between its own moves.
+
+    Rotor and damping are those of a public model of the SO-101, which has this servo; its gain lies between those of two such models.
+    How far a band is pulled is what the servo at its other end has moved.
+    """
+    columns: dict[str, list[float]] = {}
+    with (data / "backlash_bench" / "motor_telemetry_single.csv").open(encoding="utf-8") as file:
+        for row in csv.DictReader(file):
+            if row["pos (5)"]:
+                for name, value in row.items():
+                    if name.startswith(("pos", "target")):
+                        columns.setdefault(name, []).append(float(value))
+    counts: dict[str, Array] = {name: np.array(values) for name, values in columns.items()}
+    one, other = (
+        np.clip((counts[f"pos ({i})"] - rest) / reach, 0.0, 1.0)
+        for i, rest, reach in ((3, 1748.0, 394.0), (4, 2347.0, -398.0))
+    )
+    read: dict[str, Array] = {
+        "time": 0.1 * np.arange(len(one), dtype=np.float64),
+        "target": (counts["target pos (5)"] - 2047.0) * TURN / 4096.0,
+        "position": (counts["pos (5)"] - 2047.0) * TURN / 4096.0,
+        "pull": BENCH_PULL * (other - one),
+    }
+    still = [(17, 64), (81, 128), (145, 192), (209, 256)]
+    parts = [{name: samples[low:high] for name, samples in read.items()} for low, high in still]
+    return Records(
+        BENCH, [Axis("servo", "position", "target", 4e-4, TURN / 4096.0)], parts[:3], parts[3:], 10.0, True,
+        "an unloaded dead zone of 7.03 counts, 14.78 under load", {"mass": 0.2, "damping": 0.5, "armature": 0.5, "kp": 0.5},
+        loads=[Load("bands", "pull", 0.02 * BENCH_PULL)],
+    )  # fmt: skip
+
+
 def go2_leg(data: Path) -> Records:
     """The left front leg of the Go2, with gains and friction of its repository."""
     folder = data / "go2_air"
@@ -256,6 +299,7 @@ def go2_leg(data: Path) -> Records:
 
 ROBOTS: dict[str, Callable[[Path], Records]] = {
     "UR10": ur10, "TX40": tx40, "Panda": panda, "double pendulum A.0": double_pendulum_a0, "double pendulum C.1": double_pendulum_c1,
-    "simple pendulum": simple_pendulum, "XL330": xl330, "STS3250": sts3250, "Go2 leg": go2_leg, "SO-101": so101,
+    "simple pendulum": simple_pendulum, "XL330": xl330, "STS3250": sts3250, "backlash bench": backlash_bench, "Go2 leg": go2_leg,
+    "SO-101": so101,
 }  # fmt: skip
 """All robots."""

@@ -20,7 +20,7 @@ from bench.discrepancy.checks.nominal_values import value_notes
 from bench.discrepancy.model.mjcf_file import rig_of
 from bench.discrepancy.model.mjcf_units import expected_units
 from bench.discrepancy.multibody.channels import bound
-from bench.discrepancy.multibody.encoders import encoders_of, input_of
+from bench.discrepancy.multibody.encoders import encoders_of, input_of, loads_of
 from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.multibody.motion import motion_of
 from bench.discrepancy.multibody.nominal_values import with_nominal_values
@@ -100,7 +100,7 @@ def _refuse(case: Case, model: ArticulatedModel, settings: DiagnosisSettings) ->
                     f"'{channel.name}' measures joint '{tie.name}', which joint '{tie.to}' moves by an equality of the model; measure "
                     f"'{tie.to}', or exchange joint1 and joint2 of the equality"
                 )
-    inputs = [input_of(case, joint).name for joint in model.joints]
+    inputs = [c.name for joint in model.joints for c in (input_of(case, joint), *loads_of(case, joint))]
     responses = [c.name for joint in model.joints for c in encoders_of(case, joint).channels]
     for record in case.identification:
         for i, first in enumerate(responses):

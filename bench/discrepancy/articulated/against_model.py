@@ -12,10 +12,10 @@ from dataclasses import replace
 import numpy as np
 
 from bench.arrays import Array
-from bench.discrepancy.case.case import Case
+from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.checks.bands import bands_between, common_factor, compare_channels, spectra
 from bench.discrepancy.checks.scales import grossly_apart, model_words, pair_words, shown_noise, suggestion
-from bench.discrepancy.multibody.encoders import encoders_of, input_of
+from bench.discrepancy.multibody.encoders import encoders_of, input_of, load_on
 from bench.discrepancy.multibody.joints import Joint
 from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.multibody.motion import JointMotion, Moving
@@ -87,7 +87,7 @@ def _against_model(
         found = []
         for record, motion in moving:
             noise = (shown_noise(case, channel, record), 0.0)
-            asked = asked_input(model, joint, j, motion)
+            asked = asked_input(case, model, joint, j, record, motion)
             bands = bands_between(spectra(record.values[channel], asked, record.step, noise, settings))
             if bands is not None:
                 found.append(common_factor(bands, settings))
@@ -102,15 +102,18 @@ def _against_model(
     yield from (words for _, words in sorted(said, key=lambda entry: entry[0]))
 
 
-def asked_input(model: ArticulatedModel, joint: Joint, j: int, motion: JointMotion) -> Array:
-    """The input (n,) of a joint's drive along a motion, by its nominal equation without dry friction."""
+def asked_input(
+    case: Case, model: ArticulatedModel, joint: Joint, j: int, record: CaseRecord, motion: JointMotion
+) -> Array:
+    """The input (n,) of a joint's drive along the motion of a record, by its nominal equation without dry friction."""
     drive = joint.drive
     assert drive is not None
-    return drive.command(needed(model, joint, j, motion), motion.position[:, j], motion.velocity[:, j])
+    asked = needed(model, joint, j, motion) - load_on(case, joint, record)
+    return drive.command(asked, motion.position[:, j], motion.velocity[:, j])
 
 
 def needed(model: ArticulatedModel, joint: Joint, j: int, motion: JointMotion) -> Array:
-    """Torque (n,) that the nominal equation of a joint asks of its drive, without dry friction."""
+    """Torque (n,) that the nominal equation of a joint asks of its actuators, without dry friction."""
     q, v, a = motion.position, motion.velocity, motion.acceleration
     bodies = model.dynamics(q, v, a).torque[:, j]
     return (

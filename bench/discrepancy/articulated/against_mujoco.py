@@ -15,7 +15,7 @@ from bench.arrays import Array
 from bench.discrepancy.articulated.against_model import needed
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.checks.like_mujoco import ITEMS
-from bench.discrepancy.multibody.encoders import input_of
+from bench.discrepancy.multibody.encoders import input_of, inputs_of, load_on
 from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.multibody.motion import JointMotion, Moving
 from bench.discrepancy.settings import LikenessSettings
@@ -86,7 +86,7 @@ def _balance(case: Case, model: ArticulatedModel, record: CaseRecord, motion: Jo
         assert drive is not None
         command = record.values[input_of(case, joint).name]
         torque = drive.torque(command, motion.position[:, j], motion.velocity[:, j])
-        out[:, j] = needed(model, joint, j, motion) - torque
+        out[:, j] = needed(model, joint, j, motion) - torque - load_on(case, joint, record)
     return out
 
 
@@ -104,14 +104,17 @@ def _balance_of_mujoco(
     """
     data, out = mujoco.MjData(compiled), np.empty((len(picked), len(model.joints)))
     acting = np.zeros(len(model.joints))
-    inputs = {joint.name: record.values[input_of(case, joint).name] for joint in model.joints}
+    inputs = {
+        compiled.actuator(name).id: samples
+        for joint in model.joints
+        for name, samples in inputs_of(case, joint, record).items()
+    }
     q, v, a = (model.whole(part, order) for order, part in enumerate(motion[:3]))
     with native.quiet():
         for k, sample in enumerate(picked):
             data.qpos[:], data.qvel[:], data.qacc[:] = q[sample], v[sample], a[sample]
-            for joint in model.joints:
-                assert joint.drive is not None
-                data.ctrl[compiled.actuator(joint.drive.name).id] = inputs[joint.name][sample]
+            for u, samples in inputs.items():
+                data.ctrl[u] = samples[sample]
             mujoco.mj_inverse(compiled, data)
             asked = model.on_joints(data.qfrc_inverse)
             mujoco.mj_fwdPosition(compiled, data)

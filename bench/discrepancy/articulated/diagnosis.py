@@ -120,7 +120,7 @@ def diagnose_articulated(
         ),
         settings=changed(settings),
     )
-    rival = closest_rival(fits, final, settings.articulated.judgement) if verdict.named else None
+    rival = closest_rival(fits, final, settings.articulated.judgement, found.alike) if verdict.named else None
     told_apart = rival is not None and deadline.allows("the next test")
     proposal = propose(problem, compiled, final, rival) if told_apart else None
     if proposal is not None:

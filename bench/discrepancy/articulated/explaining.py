@@ -7,25 +7,27 @@ timed log the timing errors are larger than what friction makes of a run. There 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from bench.discrepancy.articulated.judgement import (
+    Keys,
     PredictedErrors,
+    alike,
     kept,
     noise_floor,
     predict,
     without_each,
 )
-from bench.discrepancy.articulated.naming import verdict_of
+from bench.discrepancy.articulated.naming import left_of, verdict_of
 from bench.discrepancy.articulated.torque_error import TorqueProblem, along_motion
-from bench.discrepancy.articulated.whiteness import coloured
+from bench.discrepancy.articulated.whiteness import astray, coloured
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.hypothesis import PlacedOnJoint
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
-from bench.discrepancy.articulated_search.search import search
+from bench.discrepancy.articulated_search.search import complete, search
 from bench.discrepancy.settings import ArticulatedSearchSettings as SearchSettings
 from bench.discrepancy.verdict import Verdict
 
@@ -41,6 +43,7 @@ class Explained:
         final: The one behind the verdict.
         predictions: Of the ladder that leads to it.
         verdict: The verdict, without what is said of the case.
+        alike: Explanations that predict the judging records as well.
     """
 
     problem: ArticulatedProblem
@@ -49,6 +52,7 @@ class Explained:
     final: ArticulatedFit
     predictions: Sequence[PredictedErrors]
     verdict: Verdict
+    alike: Collection[Keys]
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,12 +108,19 @@ def _explained(
     rungs, last, predictions, more = kept(problem, judged_by, fits, judged)
     fits = [*fits, *more]
     floor, final = predictions[0].floor, rungs[last]
+    left = coloured(judging, final, judged)
+    lost = astray(judging, final, predictions[last], judged) if judged_by is judging else None
+    # power above the noise at some frequencies shows that what is named is not all; where nothing is named it is no evidence that
+    # something is missing, which takes an effect that predicts the judging records better
+    noise_alone = lost is None and (left is None or not last) and complete(problem, final, judged)
+    whole = noise_alone and question.stated and judged_by is judging
+    near = alike(judged_by, fits, final, predictions[last], judged) if last and not whole else set()
     verdict = verdict_of(
         problem, fits, rungs, last, predict(judged_by, None, floor, judged), predictions,
         without_each(judged_by, fits, final, floor, judged), judged, rng,
-        stated=question.stated and judged_by is judging, left=coloured(judging, final, judged),
+        whole=whole, left=left_of(problem, final, left, lost), alike=near,
     )  # fmt: skip
-    return Explained(problem, judging, fits, final, predictions, verdict)
+    return Explained(problem, judging, fits, final, predictions, verdict, near)
 
 
 def _asks_torque(found: Explained) -> bool:

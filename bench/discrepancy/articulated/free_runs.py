@@ -14,7 +14,7 @@ from scipy.interpolate import CubicSpline
 from bench.arrays import Array
 from bench.discrepancy.articulated_search.hypothesis import JointHypothesis
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
-from bench.discrepancy.multibody.encoders import input_of, travel
+from bench.discrepancy.multibody.encoders import input_of, noise_of_loads, travel
 from bench.discrepancy.multibody.joint_forces import Slot
 from bench.discrepancy.multibody.motion import clock_of
 from bench.discrepancy.multibody.noise import NoiseDraw, NoiseSettings, draw
@@ -110,12 +110,21 @@ class FreeRuns:
         drive = record.joint.drive
         channel = input_of(self.problem.case, record.joint)
         stated = 0.0 if drive is None or drive.servo else channel.noise_std or 0.0
+        pushed = noise_of_loads(self.problem.case, record.joint)
         quiet = self.errors(j, hypothesis, vector, prepared)
         total = []
         for one in self.draws[r]:
             kicks = np.repeat(stated * rng.standard_normal(len(record.position) - 1), record.n_sub)
+            # drawn last and only where there are loads, so that the draws of others stay theirs
+            shocks = (
+                rng.standard_normal(len(record.position) - 1)
+                if pushed
+                else np.zeros(len(record.position) - 1)
+            )
+            pushes = np.repeat(pushed * shocks, record.n_sub)
             noisy = replace(
-                record, bias=record.bias + one.bias[j], reference=record.reference + one.reference[j], command=record.command + kicks,
+                record, bias=record.bias + one.bias[j] - pushes, reference=record.reference + one.reference[j],
+                command=record.command + kicks,
             )  # fmt: skip
             motion = prepared.motion._replace(
                 position=prepared.motion.position + one.motion[0],

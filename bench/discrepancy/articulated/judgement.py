@@ -24,6 +24,14 @@ from bench.discrepancy.articulated_search.search import complete, predecessors, 
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.settings import ArticulatedJudgementSettings as JudgementSettings
 
+Keys = frozenset[tuple[str, str]]
+"""Names and places of the effects of an explanation."""
+
+
+def keys_of(found: ArticulatedFit) -> Keys:
+    """Names and places of the effects of a fit."""
+    return frozenset(placed.key for placed in found.hypothesis)
+
 
 @dataclass(frozen=True, eq=False)
 class PredictedErrors:
@@ -230,10 +238,44 @@ def without_each(
     """Predictions of what a fit names without one effect after the other, by the likeliest fit of the others; None where none was made."""
     out: list[PredictedErrors | None] = []
     for placed in final.hypothesis:
-        others = {other.key for other in final.hypothesis} - {placed.key}
-        made = [f for f in fits if {other.key for other in f.hypothesis} == others]
+        made = [f for f in fits if keys_of(f) == keys_of(final) - {placed.key}]
         best = max(made, key=lambda f: f.log_posterior, default=None)
         out.append(None if best is None else predict(problem, best, floor, settings))
+    return out
+
+
+def alike(
+    problem: ArticulatedProblem,
+    fits: Sequence[ArticulatedFit],
+    final: ArticulatedFit,
+    predicted: PredictedErrors,
+    settings: JudgementSettings,
+) -> set[Keys]:
+    """Explanations, one effect of the final one exchanged for another at its joint, than which that predicts no better for sure.
+
+    How likely a record is under a law that is not right says little of another law that is not: both leave what neither knows. What an
+    explanation that leaves something is held against is how others predict.
+
+    Args:
+        problem: Records for judging.
+        fits: All fitted hypotheses, the likeliest first.
+        final: What is named, and leaves something.
+        predicted: What it predicts.
+        settings: Thresholds.
+    """
+    own, likeliest = keys_of(final), dict[Keys, ArticulatedFit]()
+    for f in fits:
+        if len(f.hypothesis) == len(own) and len(own - keys_of(f)) == 1:
+            likeliest.setdefault(keys_of(f), f)
+    out = set()
+    for theirs, f in likeliest.items():
+        (lost,) = [placed for placed in final.hypothesis if placed.key not in theirs]
+        (gained,) = [placed for placed in f.hypothesis if placed.key not in own]
+        at = problem.reached((lost,))
+        if not set(at) & set(problem.reached((gained,))):
+            continue
+        if not better(predict(problem, f, predicted.floor, settings).of(at), predicted.of(at), settings):
+            out.add(theirs)
     return out
 
 

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from bench.discrepancy.articulated.judgement import PredictedErrors, closed, closed_of_nominal
+from bench.discrepancy.articulated.judgement import Keys, PredictedErrors, closed, closed_of_nominal, keys_of
 from bench.discrepancy.articulated.places import gaps_of, locations_of, remainder_of
-from bench.discrepancy.articulated.whiteness import Coloured
+from bench.discrepancy.articulated.whiteness import Astray, Coloured
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.hypothesis import placed_values
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
-from bench.discrepancy.articulated_search.search import complete
 from bench.discrepancy.judgement.coarse import outside
 from bench.discrepancy.settings import ArticulatedJudgementSettings as JudgementSettings
 from bench.discrepancy.verdict import Estimate, NamedEffect, NominalEstimate, Ranked, Verdict, VerdictKind
@@ -29,8 +28,9 @@ def verdict_of(
     settings: JudgementSettings,
     rng: np.random.Generator,
     *,
-    stated: bool,
-    left: Coloured | None,
+    whole: bool,
+    left: str,
+    alike: Collection[Keys],
 ) -> Verdict:
     """The verdict.
 
@@ -44,13 +44,11 @@ def verdict_of(
         without: What the rung that is borne out predicts without one of its effects after the other.
         settings: Thresholds.
         rng: For the bootstrap intervals.
-        stated: Whether the noise of the responses is stated.
-        left: What the rung that is borne out leaves of a motion beside noise; None where it leaves noise alone.
+        whole: Whether the rung that is borne out leaves nothing but noise.
+        left: What it leaves, in words.
+        alike: Explanations that predict the judging records as well, see `judgement.alike`.
     """
     final, base = rungs[last], rungs[0]
-    # power above the noise at some frequencies shows that what is named is not all; where nothing is named it is no evidence that
-    # something is missing, which takes an effect that predicts the judging records better
-    whole = stated and (left is None or not last) and complete(problem, final, settings)
     explained = closed_of_nominal(untouched, predictions[0], predictions[last], rng)
     kind: VerdictKind = "effect" if last else "none"
     if not whole and (not last or explained < settings.material):
@@ -61,7 +59,7 @@ def verdict_of(
     if kind == "effect" and not whole:
         foreign = outside(1.0 - explained, problem.settings.judgement.coarse)
     probabilities = _probabilities(fits, final, kind, settings, foreign)
-    ranking = ranking_of(fits, final, settings, foreign)
+    ranking = ranking_of(fits, final, settings, foreign, alike)
     sure = {(entry.name, entry.where): entry.probability for entry in ranking}
     effects = tuple(
         _named(problem, final, k, shares[k], sure[placed.key]) for k, placed in enumerate(final.hypothesis)
@@ -73,7 +71,7 @@ def verdict_of(
         verdict=kind,
         named=effects if kind == "effect" else (),
         ranking=ranking,
-        indistinguishable=_sets(fits, final, settings) if kind == "effect" else (),
+        indistinguishable=_sets(fits, final, settings, alike) if kind == "effect" else (),
         locations=locations_of(problem, base),
         gap=widest,
         gaps=gaps,
@@ -83,7 +81,7 @@ def verdict_of(
             effects,
             whole,
             widest.closed if kind == "effect" else explained,
-            _left(problem, final, left),
+            left,
         ),
         warnings=(),
         complete=whole,
@@ -134,8 +132,22 @@ def _words(
     return f"Something is missing from the model, and no effect of the catalogue improves on the judging records.{left}"
 
 
-def _left(problem: ArticulatedProblem, final: ArticulatedFit, left: Coloured | None) -> str:
-    """What a fit leaves, in words."""
+def left_of(
+    problem: ArticulatedProblem, final: ArticulatedFit, left: Coloured | None, lost: Astray | None
+) -> str:
+    """What a fit leaves, in words.
+
+    Args:
+        problem: Records for identification.
+        final: The fit.
+        left: What it leaves of a motion beside noise in the judging records, if anything.
+        lost: A joint whose free runs in them go astray, if any.
+    """
+    if lost is not None:
+        return (
+            f"Joint '{problem.joints[lost.joint].name}' is still {lost.error:.3g} off in free runs, {lost.times:.3g} times what noise and "
+            "the uncertainty of the parameters leave: something more is missing, or the noise is larger than stated."
+        )
     j = int(np.argmax(final.reduced))
     times, where = float(np.sqrt(final.reduced[j])), ""
     if left is not None:
@@ -168,20 +180,25 @@ def _probabilities(
 
 
 def _rivals(
-    fits: Sequence[ArticulatedFit], final: ArticulatedFit, settings: JudgementSettings
+    fits: Sequence[ArticulatedFit], final: ArticulatedFit, alike: Collection[Keys]
 ) -> list[tuple[ArticulatedFit, float]]:
-    """Explanations of as many effects, by what they are less likely than the final one."""
-    out: dict[frozenset[tuple[str, str]], tuple[ArticulatedFit, float]] = {}
+    """Explanations of as many effects, by what they are less likely than the final one; nothing if they predict alike."""
+    out: dict[Keys, tuple[ArticulatedFit, float]] = {}
     for f in fits:
         if len(f.hypothesis) == len(final.hypothesis):
-            key = frozenset(placed.key for placed in f.hypothesis)
-            out.setdefault(key, (f, max(final.log_posterior - f.log_posterior, 0.0)))
-    out[frozenset(placed.key for placed in final.hypothesis)] = (final, 0.0)
+            key = keys_of(f)
+            behind = 0.0 if key in alike else max(final.log_posterior - f.log_posterior, 0.0)
+            out.setdefault(key, (f, behind))
+    out[keys_of(final)] = (final, 0.0)
     return list(out.values())
 
 
 def ranking_of(
-    fits: Sequence[ArticulatedFit], final: ArticulatedFit, settings: JudgementSettings, foreign: float
+    fits: Sequence[ArticulatedFit],
+    final: ArticulatedFit,
+    settings: JudgementSettings,
+    foreign: float,
+    alike: Collection[Keys] = (),
 ) -> tuple[Ranked, ...]:
     """Effects by their probability, shared among explanations that the records hardly tell apart.
 
@@ -190,8 +207,9 @@ def ranking_of(
         final: The one that is named.
         settings: Of the judgement.
         foreign: Probability that something outside the catalogue is the cause.
+        alike: Explanations that predict as well.
     """
-    rivals = _rivals(fits, final, settings)
+    rivals = _rivals(fits, final, alike)
     weights = np.exp([-behind for _, behind in rivals])
     weights = (1.0 - foreign) * weights / weights.sum()
     total: dict[tuple[str, str], float] = {}
@@ -203,23 +221,29 @@ def ranking_of(
 
 
 def closest_rival(
-    fits: Sequence[ArticulatedFit], final: ArticulatedFit, settings: JudgementSettings
+    fits: Sequence[ArticulatedFit],
+    final: ArticulatedFit,
+    settings: JudgementSettings,
+    alike: Collection[Keys] = (),
 ) -> ArticulatedFit | None:
     """The likeliest other explanation of as many effects that the records cannot tell from the final one; None where they can."""
     near = [
         (f, behind)
-        for f, behind in _rivals(fits, final, settings)
+        for f, behind in _rivals(fits, final, alike)
         if f is not final and behind <= settings.rival
     ]
     return min(near, key=lambda entry: entry[1])[0] if near else None
 
 
 def _sets(
-    fits: Sequence[ArticulatedFit], final: ArticulatedFit, settings: JudgementSettings
+    fits: Sequence[ArticulatedFit],
+    final: ArticulatedFit,
+    settings: JudgementSettings,
+    alike: Collection[Keys],
 ) -> tuple[tuple[str, ...], ...]:
     own = {placed.key for placed in final.hypothesis}
     sets: dict[str, set[str]] = {}
-    for f, behind in _rivals(fits, final, settings):
+    for f, behind in _rivals(fits, final, alike):
         theirs = {placed.key for placed in f.hypothesis}
         lost, gained = own - theirs, theirs - own
         if behind <= settings.rival and len(lost) == 1 and len(gained) == 1:

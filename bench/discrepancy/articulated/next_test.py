@@ -21,7 +21,7 @@ from bench.discrepancy.articulated.free_runs import FreeRuns
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.case.case import CaseRecord
-from bench.discrepancy.multibody.encoders import encoders_of, input_of
+from bench.discrepancy.multibody.encoders import encoders_of, input_of, loads_of
 from bench.discrepancy.multibody.records import prepare
 from bench.discrepancy.settings import ArticulatedNextTestSettings as NextTestSettings
 
@@ -158,6 +158,7 @@ def _record(problem: ArticulatedProblem, trajectory: Trajectory) -> CaseRecord:
         needed = needed + joint.stiffness * (q[:, j] - joint.reference)
         command = drive.gear * q[:, j] if drive.servo else drive.command(needed, q[:, j], v[:, j])
         values[input_of(problem.case, joint).name] = np.ascontiguousarray(command)
+        values |= {channel.name: np.zeros(len(command)) for channel in loads_of(problem.case, joint)}
         measured = encoders_of(problem.case, joint)
         for channel, order in zip(measured.channels, measured.orders, strict=True):
             values[channel.name] = np.ascontiguousarray(v[:, j] if order else q[:, j])

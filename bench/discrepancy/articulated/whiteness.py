@@ -9,6 +9,9 @@ Asked of the judging records, and of joints that a servo holds, whose noise is t
 smoothing loses of the others' motion acts on it as well: draws of the noise leave up to four times less there, on a six-axis arm without
 fault, than that does.
 
+Innovations are corrected at every sample. A noisy torque, or a damping that lets the joint creep, may explain each of them where none
+explains where the joint ends, so that free runs are asked as well (`astray`).
+
 References:
     M. S. Bartlett, *An Introduction to Stochastic Processes*, 1955, section 9.2 (whiteness by the cumulated periodogram);
     A. Gelman, X.-L. Meng, H. Stern, Statistica Sinica 6 (1996) 733-807 (checks by what the posterior predicts).
@@ -23,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.arrays import Array
+from bench.discrepancy.articulated.judgement import PredictedErrors, runs_of
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.numerics.threads import in_threads
@@ -54,6 +58,55 @@ def coloured(
     settled = problem.settled(found.hypothesis, found.vector)
     sure = [one for one in _beyond(settled, found, settings) if one.odds > settings.certain]
     return max(sure, key=lambda one: one.odds, default=None)
+
+
+class Astray(NamedTuple):
+    """A joint whose free runs end where neither noise nor the uncertainty of the parameters brings it.
+
+    Attributes:
+        joint: Its index.
+        error: NRMSE of its free runs.
+        times: That over what noise and uncertainty leave.
+    """
+
+    joint: int
+    error: float
+    times: float
+
+
+def astray(
+    problem: ArticulatedProblem,
+    found: ArticulatedFit,
+    predicted: PredictedErrors,
+    settings: JudgementSettings,
+) -> Astray | None:
+    """The joint whose free runs in the records of a problem go astray most; None where none does.
+
+    Args:
+        problem: Records for judging.
+        found: An explanation.
+        predicted: What it predicts of them.
+        settings: Thresholds.
+    """
+    error = predicted.discrepancy
+    if not np.any(error > settings.astray * predicted.floor):
+        return None
+    runs, joints = runs_of(problem), range(len(problem.joints))
+
+    def errors(vector: Array) -> list[Array]:
+        motions = problem.motions(found.hypothesis, vector)
+        return in_threads(
+            lambda j: np.concatenate([runs.errors(j, found.hypothesis, vector, m) for m in motions]), joints
+        )
+
+    best, spread = errors(found.vector), np.zeros(len(problem.joints))
+    draws = _draws(problem, found, settings)
+    for vector in draws:
+        moved = zip(errors(vector), best, runs.sizes, strict=True)
+        spread += [float(np.mean(((a - b) / size) ** 2)) / len(draws) for a, b, size in moved]
+    times = error / np.sqrt(predicted.floor**2 + spread)
+    j = int(np.argmax(times))
+    return Astray(j, float(error[j]), float(times[j])) if times[j] > settings.astray else None
 
 
 def _beyond(

@@ -30,8 +30,8 @@ from bench.recording.outliers import bridged, outliers
 class CaseLimits:
     """Numbers of `bench.discrepancy.case.case`."""
 
-    min_samples: int = 64
-    """Shortest record that is accepted: of a robot's log two octaves of 32 ordinates each; a servo at 50 Hz gives that in 1.3 s."""
+    min_samples: int = 32
+    """Shortest record that is accepted: two octaves of eight ordinates each; a servo at 10 Hz gives that in 3.2 s."""
     largest: float = 1e100
     """Largest value of a sample: its square over a power of the step is still a number."""
 

@@ -64,7 +64,9 @@ def spectra(
     # longer where the motion is so slow that its strongest frequency would drown in the mean
     peak = max(int(np.argmax(np.abs(np.fft.rfft(signal.detrend(x)))[1:])) + 1 for x in (first, second))
     length = max(
-        min(settings.cycles * len(first) // peak, len(first) // 2), len(first) // settings.segments, 64
+        min(settings.cycles * len(first) // peak, len(first) // 2),
+        len(first) // settings.segments,
+        min(64, len(first)),
     )
 
     def density(x: Array, y: Array):

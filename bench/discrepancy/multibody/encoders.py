@@ -129,8 +129,9 @@ def weight_of_readings(readings: Array, resolution: float, noise: float) -> Arra
     """Weight (n,) of an encoder's readings (n,): how far each tells something that the others do not.
 
     While a reading stays the same, its error of quantisation does. Of ``L`` equal readings in a row the mean has the variance
-    ``noise^2 (s + (1 - s) / L)``, with the part ``s`` of the noise's variance that is the step's; each counts by the root of one L-th
+    ``noise^2 (s + (1 - s) / L)``, with the part ``s`` of the variance that is the step's; each counts by the root of one L-th
     of the inverse of that, in units of the noise. Where the motion crosses steps between samples these are white and weigh one.
+    Beside a torque that is noisy by more than a step moves the joint, a step matters little.
 
     A reading that noise throws to and fro between two values stays the same, too: counted as short runs, those near the edge of a step,
     whose errors are largest, would weigh most. So a run holds two neighbouring values, and of a motion that goes on it holds two steps.
@@ -138,7 +139,7 @@ def weight_of_readings(readings: Array, resolution: float, noise: float) -> Arra
     Args:
         readings: As logged.
         resolution: Step of the encoder; zero where none is stated.
-        noise: Standard deviation of the reading's error, the step's included.
+        noise: Standard deviation of what the readings are held against, the step's included: of their innovations.
 
     References:
         B. Widrow and I. Kollar, *Quantization Noise*, 2008, chapter 6 (correlation of the error of quantisation).
@@ -165,12 +166,53 @@ def input_of(case: Case, joint: Joint) -> CaseChannel:
     )
 
 
-def weights_of(case: Case, record: CaseRecord, joint: Joint) -> Array:
-    """Weights (n, n_measured) of the readings of a joint."""
-    measured = encoders_of(case, joint)
+def loads_of(case: Case, joint: Joint) -> tuple[CaseChannel, ...]:
+    """The channels of the loads on a joint besides its drive, in the order of `Joint.loads`.
+
+    Raises:
+        FileFormatError: A motor has none.
+    """
+    channels = {channel.target: channel for channel in case.channels}
+    for load in joint.loads:
+        if f"actuator:{load.name}" not in channels:
+            raise FileFormatError(
+                f"no channel says what motor '{load.name}' did on joint '{joint.name}', which has the drive "
+                f'\'{joint.drive.name if joint.drive else ""}\' besides; name its force by "actuator": "{load.name}", or take it out of '
+                "the model"
+            )
+    return tuple(channels[f"actuator:{load.name}"] for load in joint.loads)
+
+
+def inputs_of(case: Case, joint: Joint, record: CaseRecord) -> dict[str, Array]:
+    """Actuators of a joint, its drive first, to their logged inputs (n,); raises as `input_of` and `loads_of`."""
+    assert joint.drive is not None
+    channels = (input_of(case, joint), *loads_of(case, joint))
+    names = (joint.drive.name, *(load.name for load in joint.loads))
+    return {name: record.values[channel.name] for name, channel in zip(names, channels, strict=True)}
+
+
+def load_on(case: Case, joint: Joint, record: CaseRecord) -> Array:
+    """Torque (n,) of the loads on a joint besides its drive; raises as `loads_of`."""
+    out = np.zeros(len(record))
+    for load, channel in zip(joint.loads, loads_of(case, joint), strict=True):
+        out += load.torque(record.values[channel.name], out, out)
+    return out
+
+
+def noise_of_loads(case: Case, joint: Joint) -> float:
+    """Stated noise of that torque, one-sigma a sample."""
+    levels = [
+        (channel.noise_std or 0.0) * load.gear * load.kp
+        for load, channel in zip(joint.loads, loads_of(case, joint), strict=True)
+    ]
+    return float(np.hypot.reduce(levels or [0.0]))
+
+
+def weights_of(case: Case, record: CaseRecord, joint: Joint, innovations: Array) -> Array:
+    """Weights (n, n_measured) of the readings of a joint, whose innovations have the standard deviations (n_measured,)."""
     return np.column_stack(
         [
-            weight_of_readings(record.values[channel.name], channel.resolution, float(noise))
-            for channel, noise in zip(measured.channels, measured.noise, strict=True)
+            weight_of_readings(record.values[channel.name], channel.resolution, float(level))
+            for channel, level in zip(encoders_of(case, joint).channels, innovations, strict=True)
         ]
     )

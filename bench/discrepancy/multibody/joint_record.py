@@ -105,6 +105,12 @@ class JointRecord:
         return self.filter[1]
 
     @property
+    def innovation(self) -> Array:
+        """Standard deviation (n_measured,) of the innovations."""
+        root = np.linalg.inv(self.whitening)
+        return np.asarray(np.sqrt(np.diag(root @ root.T)))
+
+    @property
     def servo_command(self) -> Array:
         """The input (n_steps,), that of a servo less the offset of its encoder."""
         drive, wrong = self.joint.drive, self.encoder.in_loop > 0.5

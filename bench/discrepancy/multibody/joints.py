@@ -27,6 +27,7 @@ class Joint(NamedTuple):
         damping, friction, armature, stiffness, reference: Passive parameters of the model.
         range: Its stops; infinite where it has none.
         drive: Its actuator; None where it has none.
+        loads: Motors besides, each for a load whose force was logged: a band, a brake, a hand on a load cell.
     """
 
     name: str
@@ -40,6 +41,7 @@ class Joint(NamedTuple):
     reference: float
     range: tuple[float, float]
     drive: JointDrive | None
+    loads: tuple[JointDrive, ...] = ()
 
     @property
     def torque_driven(self) -> bool:
@@ -76,17 +78,18 @@ def joint_of(model: mujoco.MjModel, i: int) -> Joint:
     dof = int(model.jnt_dofadr[i])
     limited = bool(model.jnt_limited[i])
     drives = [drive_of(model, u) for u in range(model.nu) if is_driven(model, u, i)]
-    if len(drives) > 1:
+    others = [d for d in drives if not d.motor]
+    if len(others) > 1:
         raise ModelError(
-            f"joint '{model.joint(i).name}' has {len(drives)} actuators ({', '.join(d.name for d in drives)}); one a joint is expected: "
-            "keep the one whose command or torque was recorded"
+            f"joint '{model.joint(i).name}' has the actuators {', '.join(repr(d.name) for d in others)}, none of them a plain motor; one "
+            "drive a joint is expected, and motors besides it for loads that were logged: keep the one whose command was recorded"
         )
-    drive = drives[0] if drives else None
-    # what the actuator itself weighs and damps, behind its gear
-    own = model.actuator(drive.name).id if drive else 0
-    behind = drive.gear**2 if drive else 0.0
-    armature = behind * float(model.actuator_armature[own]) if drive else 0.0
-    damping = behind * float(np.ravel(model.actuator_damping[own])[0]) if drive else 0.0
+    # of several motors the first is the drive, whose gain and delay are in question
+    drive = others[0] if others else drives[0] if drives else None
+    # what actuators themselves weigh and damp, behind their gears
+    own = [(d.gear**2, model.actuator(d.name).id) for d in drives]
+    armature = sum(behind * float(model.actuator_armature[u]) for behind, u in own)
+    damping = sum(behind * float(np.ravel(model.actuator_damping[u])[0]) for behind, u in own)
     return Joint(
         model.joint(i).name,
         dof,
@@ -99,6 +102,7 @@ def joint_of(model: mujoco.MjModel, i: int) -> Joint:
         float(model.qpos_spring[model.jnt_qposadr[i]]),
         (float(model.jnt_range[i, 0]), float(model.jnt_range[i, 1])) if limited else (-np.inf, np.inf),
         drive,
+        tuple(d for d in drives if d is not drive),
     )
 
 
@@ -175,6 +179,7 @@ def with_moved(joint: Joint, moved: Joint, tie: Tie) -> Joint:
                 f"{offset:g}; put it on joint '{joint.name}'"
             )
         drive = replace(moved.drive, gear=moved.drive.gear * ratio)
+    loads = tuple(replace(load, gear=load.gear * ratio) for load in moved.loads)
     ends = sorted((end - offset) / ratio for end in moved.range) if ratio else (-np.inf, np.inf)
     return joint._replace(
         damping=joint.damping + ratio**2 * moved.damping,
@@ -184,6 +189,7 @@ def with_moved(joint: Joint, moved: Joint, tie: Tie) -> Joint:
         reference=pull / stiffness if stiffness else joint.reference,
         range=(max(joint.range[0], ends[0]), min(joint.range[1], ends[1])),
         drive=drive,
+        loads=(*joint.loads, *loads),
     )
 
 

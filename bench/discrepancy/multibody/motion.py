@@ -105,10 +105,19 @@ class Coefficients(NamedTuple):
     load: Array
 
     @classmethod
-    def of(cls, dynamics: Dynamics, motion: JointMotion, clock: JointClock) -> Coefficients:
-        """Coefficients along a motion; the bias is the torque besides that of the joint's own acceleration."""
-        bias = clock.between(dynamics.torque - dynamics.inertia * motion.acceleration)
-        load = np.abs(clock.between(dynamics.torque))
+    def of(
+        cls, dynamics: Dynamics, motion: JointMotion, clock: JointClock, pushed: Array | float = 0.0
+    ) -> Coefficients:
+        """Coefficients along a motion; the bias is the torque besides that of the joint's own acceleration.
+
+        Args:
+            dynamics: Inverse dynamics along it.
+            motion: The motion.
+            clock: Its samples and steps.
+            pushed: (n_joints, n_steps) torque of the loads on the joints besides their drives.
+        """
+        bias = clock.between(dynamics.torque - dynamics.inertia * motion.acceleration) - pushed
+        load = np.abs(clock.between(dynamics.torque) - pushed)
         return cls(bias, clock.between(dynamics.inertia), clock.between(motion.position), load)
 
     @property

@@ -15,9 +15,17 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfiltfilt
 
 from bench.arrays import Array
-from bench.discrepancy.case.case import Case, CaseChannel, CaseRecord
+from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.multibody.body_terms import body_terms
-from bench.discrepancy.multibody.encoders import TRUE, Encoder, encoders_of, input_of, weights_of
+from bench.discrepancy.multibody.encoders import (
+    TRUE,
+    Encoder,
+    encoders_of,
+    input_of,
+    load_on,
+    noise_of_loads,
+    weights_of,
+)
 from bench.discrepancy.multibody.joint_record import JointRecord
 from bench.discrepancy.multibody.model import ArticulatedModel, Dynamics
 from bench.discrepancy.multibody.motion import Coefficients, JointClock, JointMotion, clock_of, motion_of
@@ -57,7 +65,7 @@ def prepare(
     moved = (motion.position, motion.velocity, motion.acceleration)
     clock = clock_of(record, settings=settings.articulated)
     dynamics = model.dynamics(*moved)
-    base = Coefficients.of(dynamics, motion, clock)
+    base = Coefficients.of(dynamics, motion, clock, _pushed(case, model, record, clock))
 
     def beside(changed: Dynamics) -> Array:
         """Changes of bias and inertia (n_joints, 2, n_steps)."""
@@ -83,17 +91,16 @@ def prepare(
         drive, channel = joint.drive, input_of(case, joint)
         assert drive is not None
         stated = 0.0 if drive.servo else (channel.noise_std or 0.0) * abs(drive.gear * drive.kp)
-        joints.append(
-            JointRecord(
+        stated = float(np.hypot(stated, noise_of_loads(case, joint)))
+        raw = JointRecord(
                 joint, record.step / clock.n_sub, clock.n_sub, base.inertia[j] + joint.armature, base.bias[j], slope[j],
-                base.reference[j], base.load[j], _input(case, record, channel, clock), *_measured(motion, j),
+                base.reference[j], base.load[j], _between(case, record.values[channel.name], clock), *_measured(motion, j),
                 encoders_of(case, joint).channels[0].side, float(np.hypot(stated, process[j])),
                 {b: terms.of_joint(j) for b, terms in bodies.items()}, {b: c[j] for b, c in payloads.items()},
                 {b: np.ascontiguousarray(c[:, j]) for b, c in centres.items()}, {b: c[j] for b, c in weights.items()},
-                beside_of(model, j, speeds), record.step,
-                weights_of(case, record, joint),
-            )
-        )  # fmt: skip
+                beside_of(model, j, speeds), record.step, np.ones((len(record), len(motion.noise[j]))),
+            )  # fmt: skip
+        joints.append(replace(raw, weight=weights_of(case, record, joint, raw.innovation)))
     return PreparedRecord(record, motion, tuple(joints))
 
 
@@ -109,7 +116,8 @@ def corrected(
     motion = motion_of(case, model, prepared.record, encoders, prepared.motion, settings=settings.motion)
     clock = clock_of(prepared.record, settings=settings.articulated)
     dynamics = model.dynamics(motion.position, motion.velocity, motion.acceleration)
-    now, speeds = Coefficients.of(dynamics, motion, clock), clock.between(motion.velocity)
+    pushed, speeds = _pushed(case, model, prepared.record, clock), clock.between(motion.velocity)
+    now = Coefficients.of(dynamics, motion, clock, pushed)
     joints = []
     for j, old in enumerate(prepared.joints):
         position, velocity, noise, start = _measured(motion, j)
@@ -117,8 +125,8 @@ def corrected(
         wrong = encoders.get(old.joint.name, TRUE)
         if wrong.delay:  # what acts on the joint is late by as much, on the clock of its log
             late = clock.later(wrong.delay)
-            new = Coefficients.of(dynamics, motion, late)
-            command = _input(case, prepared.record, input_of(case, old.joint), late)
+            new = Coefficients.of(dynamics, motion, late, _pushed(case, model, prepared.record, late))
+            command = _between(case, prepared.record.values[input_of(case, old.joint).name], late)
         joints.append(
             replace(
                 old, inertia=new.inertia[j] + old.joint.armature, bias=new.bias[j], reference=new.reference[j], load=new.load[j],
@@ -157,7 +165,7 @@ def relinked(
     motion = prepared.motion._replace(position=out[0], velocity=out[1], acceleration=out[2])
     clock = clock_of(prepared.record, settings=settings)
     dynamics = model.dynamics(*out)
-    now = Coefficients.of(dynamics, motion, clock)
+    now = Coefficients.of(dynamics, motion, clock, _pushed(case, model, prepared.record, clock))
     joints = [
         replace(
             old, inertia=now.inertia[j] + old.joint.armature, bias=now.bias[j], reference=now.reference[j], load=now.load[j]
@@ -185,9 +193,17 @@ def _difference(changed: Dynamics, base: Dynamics) -> Dynamics:
     return Dynamics(changed.torque - base.torque, changed.inertia - base.inertia)
 
 
-def _input(case: Case, record: CaseRecord, channel: CaseChannel, clock: JointClock) -> Array:
-    """The input at the middle of every step."""
-    samples = record.values[channel.name]
+def _pushed(case: Case, model: ArticulatedModel, record: CaseRecord, clock: JointClock) -> Array:
+    """Torque (n_joints, n_steps) of the loads on the joints besides their drives, zero on those that are followed."""
+    out = np.zeros((len(model.moving), len(clock.middles)))
+    for j, joint in enumerate(model.joints):
+        if joint.loads:
+            out[j] = _between(case, load_on(case, joint, record), clock)
+    return out
+
+
+def _between(case: Case, samples: Array, clock: JointClock) -> Array:
+    """An input at the middle of every step."""
     if case.load_interpolation == "zero_order_hold":
         return samples[np.searchsorted(clock.samples, clock.middles, side="right") - 1]
     if case.load_interpolation == "band_limited":

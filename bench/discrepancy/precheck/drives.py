@@ -58,7 +58,7 @@ def drive_doubts(own: Case, model: ArticulatedModel, settings: CheckSettings) ->
         for j, joint in enumerate(model.joints):
             if joint.drive is None or joint.drive.kp == 0.0:
                 continue
-            asked, velocity = asked_input(model, joint, j, motion), motion.velocity[:, j]
+            asked, velocity = asked_input(own, model, joint, j, record, motion), motion.velocity[:, j]
             yield from _of_joint(own, joint, record, asked, velocity, settings)
 
 

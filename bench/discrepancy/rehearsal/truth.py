@@ -21,7 +21,7 @@ from bench.discrepancy.articulated.recognition import applies
 from bench.discrepancy.case.case import Case, CaseChannel, CaseRecord
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.multibody.channels import bound
-from bench.discrepancy.multibody.encoders import TRUE, Encoder, encoders_of, input_of
+from bench.discrepancy.multibody.encoders import TRUE, Encoder, encoders_of, inputs_of
 from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.replay.joint_replay import encoders_wrong
 from bench.discrepancy.replay.linear_replay import LinearReplay
@@ -206,9 +206,9 @@ class _OfJoints:
         settling = round(SETTINGS.settling / step) if servos else 0
         steps = int(np.ceil((len(record) - 1) * record.step / step - 1e-9)) + 1
         columns = {
-            joint.drive.name: np.asarray(record.values[input_of(self.case, joint).name])
+            name: samples
             for joint in self.model.joints
-            if joint.drive is not None
+            for name, samples in inputs_of(self.case, joint, record).items()
         }
         played = controls(record, columns, compiled, steps, self.case.load_interpolation)
         control = np.vstack([np.repeat(played[:1], settling, axis=0), played])

@@ -21,7 +21,7 @@ from bench.discrepancy.application.target import PREFIX, as_mujoco
 from bench.discrepancy.articulated_search.catalogue import CATALOGUE
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.multibody.channels import bound
-from bench.discrepancy.multibody.encoders import Encoder, input_of, travel
+from bench.discrepancy.multibody.encoders import Encoder, inputs_of, travel
 from bench.discrepancy.multibody.joint_record import JOINT_RECORD_SETTINGS
 from bench.discrepancy.multibody.joints import Joint
 from bench.discrepancy.multibody.model import ArticulatedModel
@@ -157,12 +157,9 @@ class JointReplay:
         clock = np.arange(len(record)) * record.step
         columns = {}
         for other in self.model.joints:
-            channel = input_of(self.case, other)
-            samples = np.asarray(record.values[channel.name])
-            if late and other.name == joint:
-                samples = np.interp(clock - late, clock, samples)
-            if other.drive is not None:
-                columns[other.drive.name] = samples
+            for name, samples in inputs_of(self.case, other, record).items():
+                shifted = late and other.name == joint
+                columns[name] = np.interp(clock - late, clock, samples) if shifted else samples
         return columns
 
     def _reading(self, applied: Applied, model: mujoco.MjModel, joint: str) -> Array:

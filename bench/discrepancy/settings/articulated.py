@@ -104,6 +104,11 @@ class ArticulatedJudgementSettings:
         "Draws of the parameters, for what their uncertainty leaves on the judging records.",
         "It is known to a third then, and added to the noise, which is mostly more.",
     )
+    astray: float = setting(
+        3.0,
+        "Error of free runs, over what noise and uncertain parameters leave, from which they are explained by neither.",
+        "Of an error that is one normal number all along, which is the least that a run can hold, three times its RMS is as rare as 0.3 %.",
+    )
     material: float = setting(
         0.5,
         "Part of the discrepancy that the effects together have to close for them to be called its cause.",
