@@ -188,7 +188,10 @@ BESIDE = '<body name="more">{joint}<inertial pos="0 0 0" mass="1" diaginertia="1
 REFUSED = {
     "free joint": ("</worldbody>", BESIDE.format(joint='<freejoint name="base"/>')),
     "ball joint": ("</worldbody>", BESIDE.format(joint='<joint name="wrist" type="ball"/>')),
-    "no channel says what motor 'second' did": ("<actuator>", '<actuator><motor name="second" joint="elbow"/>'),
+    "no channel says what motor 'second' did": (
+        "<actuator>",
+        '<actuator><motor name="second" joint="elbow"/>',
+    ),
 }
 
 

@@ -8,10 +8,10 @@ import numpy as np
 from bench.arrays import Array
 from bench.errors import ModelError
 
-BODIES = ("mass", "inertia", "com_x", "com_y", "com_z")
-"""Kinds of parameters ``KIND:BODY``."""
-AXES = {"com_x": 0, "com_y": 1, "com_z": 2}
+AXES = ("com_x", "com_y", "com_z")
 """Coordinates of the centre of mass in the frame of the body."""
+BODIES = ("mass", "inertia", *AXES)
+"""Kinds of parameters ``KIND:BODY``."""
 
 
 def moment(model: mujoco.MjModel, i: int) -> float:
@@ -45,7 +45,7 @@ def body_value(model: mujoco.MjModel, i: int, kind: str) -> float:
     """A number of body `i`: mass [kg], moment of inertia [kg m^2] (see `moment`), or a coordinate of its centre of mass [m]."""
     if kind == "mass":
         return float(model.body_mass[i])
-    return moment(model, i) if kind == "inertia" else float(model.body_ipos[i, AXES[kind]])
+    return moment(model, i) if kind == "inertia" else float(model.body_ipos[i, AXES.index(kind)])
 
 
 def set_body(model: mujoco.MjModel, i: int, kind: str, value: float) -> None:
@@ -60,7 +60,7 @@ def set_body(model: mujoco.MjModel, i: int, kind: str, value: float) -> None:
         model.body_inertia[i] = scaled_inertia(model, i, value)
     else:
         without_shortcuts(model)
-        model.body_ipos[i, AXES[kind]] = value
+        model.body_ipos[i, AXES.index(kind)] = value
 
 
 def without_shortcuts(model: mujoco.MjModel) -> None:

@@ -38,7 +38,7 @@ def _set(target: Target, kind: str, name: str, value: float, label: str) -> tupl
         elif kind == "inertia":
             body.inertia = scaled_inertia(target.nominal, target.nominal.body(body.name).id, value)
         else:
-            body.ipos = np.where(np.arange(3) == AXES[kind], value, body.ipos)
+            body.ipos = np.where(np.arange(3) == AXES.index(kind), value, body.ipos)
         return "body", body.name
     if kind in ("stiffness", "damping"):
         item: Any = target.joint_or_tendon(name)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bench.discrepancy.articulated.judgement import (
-    Keys,
+    EffectKeys,
     PredictedErrors,
     alike,
     kept,
@@ -52,7 +52,7 @@ class Explained:
     final: ArticulatedFit
     predictions: Sequence[PredictedErrors]
     verdict: Verdict
-    alike: Collection[Keys]
+    alike: Collection[EffectKeys]
 
 
 @dataclass(frozen=True, eq=False)

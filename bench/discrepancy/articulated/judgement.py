@@ -24,11 +24,11 @@ from bench.discrepancy.articulated_search.search import complete, predecessors, 
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.settings import ArticulatedJudgementSettings as JudgementSettings
 
-Keys = frozenset[tuple[str, str]]
+EffectKeys = frozenset[tuple[str, str]]
 """Names and places of the effects of an explanation."""
 
 
-def keys_of(found: ArticulatedFit) -> Keys:
+def keys_of(found: ArticulatedFit) -> EffectKeys:
     """Names and places of the effects of a fit."""
     return frozenset(placed.key for placed in found.hypothesis)
 
@@ -250,7 +250,7 @@ def alike(
     final: ArticulatedFit,
     predicted: PredictedErrors,
     settings: JudgementSettings,
-) -> set[Keys]:
+) -> set[EffectKeys]:
     """Explanations, one effect of the final one exchanged for another at its joint, than which that predicts no better for sure.
 
     How likely a record is under a law that is not right says little of another law that is not: both leave what neither knows. What an
@@ -263,7 +263,7 @@ def alike(
         predicted: What it predicts.
         settings: Thresholds.
     """
-    own, likeliest = keys_of(final), dict[Keys, ArticulatedFit]()
+    own, likeliest = keys_of(final), dict[EffectKeys, ArticulatedFit]()
     for f in fits:
         if len(f.hypothesis) == len(own) and len(own - keys_of(f)) == 1:
             likeliest.setdefault(keys_of(f), f)

@@ -6,7 +6,13 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from bench.discrepancy.articulated.judgement import Keys, PredictedErrors, closed, closed_of_nominal, keys_of
+from bench.discrepancy.articulated.judgement import (
+    EffectKeys,
+    PredictedErrors,
+    closed,
+    closed_of_nominal,
+    keys_of,
+)
 from bench.discrepancy.articulated.places import gaps_of, locations_of, remainder_of
 from bench.discrepancy.articulated.whiteness import Astray, Coloured
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
@@ -30,7 +36,7 @@ def verdict_of(
     *,
     whole: bool,
     left: str,
-    alike: Collection[Keys],
+    alike: Collection[EffectKeys],
 ) -> Verdict:
     """The verdict.
 
@@ -180,10 +186,10 @@ def _probabilities(
 
 
 def _rivals(
-    fits: Sequence[ArticulatedFit], final: ArticulatedFit, alike: Collection[Keys]
+    fits: Sequence[ArticulatedFit], final: ArticulatedFit, alike: Collection[EffectKeys]
 ) -> list[tuple[ArticulatedFit, float]]:
     """Explanations of as many effects, by what they are less likely than the final one; nothing if they predict alike."""
-    out: dict[Keys, tuple[ArticulatedFit, float]] = {}
+    out: dict[EffectKeys, tuple[ArticulatedFit, float]] = {}
     for f in fits:
         if len(f.hypothesis) == len(final.hypothesis):
             key = keys_of(f)
@@ -198,7 +204,7 @@ def ranking_of(
     final: ArticulatedFit,
     settings: JudgementSettings,
     foreign: float,
-    alike: Collection[Keys] = (),
+    alike: Collection[EffectKeys] = (),
 ) -> tuple[Ranked, ...]:
     """Effects by their probability, shared among explanations that the records hardly tell apart.
 
@@ -224,7 +230,7 @@ def closest_rival(
     fits: Sequence[ArticulatedFit],
     final: ArticulatedFit,
     settings: JudgementSettings,
-    alike: Collection[Keys] = (),
+    alike: Collection[EffectKeys] = (),
 ) -> ArticulatedFit | None:
     """The likeliest other explanation of as many effects that the records cannot tell from the final one; None where they can."""
     near = [
@@ -239,7 +245,7 @@ def _sets(
     fits: Sequence[ArticulatedFit],
     final: ArticulatedFit,
     settings: JudgementSettings,
-    alike: Collection[Keys],
+    alike: Collection[EffectKeys],
 ) -> tuple[tuple[str, ...], ...]:
     own = {placed.key for placed in final.hypothesis}
     sets: dict[str, set[str]] = {}

@@ -93,7 +93,7 @@ def _terms(
     axes = tuple(axis for axis in AXES if axis in std)
     centre = np.array([model.body_value(axis, body) for axis in AXES])
     # a polynomial of degree two is known from differences over any step
-    steps = [std[axis] * np.eye(3)[AXES[axis]] for axis in axes]
+    steps = [std[axis] * np.eye(3)[AXES.index(axis)] for axis in axes]
 
     def point(at: Array) -> Array:
         return beside(model.with_payload(body, 1.0, centre + at).dynamics(*motion))
