@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import mujoco
 import numpy as np
 import pytest
@@ -9,6 +11,9 @@ from test_articulated import FINE, KP, LIMIT, NOISE, RATE, mjcf, targets, write_
 
 from bench.discrepancy import diagnose, read_case
 from bench.discrepancy.application.applying import Findings
+from bench.discrepancy.articulated.admission import admitted_robot
+from bench.discrepancy.articulated_search.problem import ArticulatedProblem
+from bench.discrepancy.multibody.joint_forces import Slot
 from bench.discrepancy.multibody.joints import ties_of
 from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.replay.verification import verify
@@ -113,6 +118,29 @@ def test_friction_of_a_joint_that_moves_another_is_found_and_closes_in_mujoco(ar
     )
     for figure in told.better or told.figures:
         assert figure.after < 2.0 * figure.floor
+
+
+def test_parameters_of_a_joint_that_is_moved_count_by_the_ratio(arm):
+    text = (arm / "nominal.json").read_text()
+    document = json.loads(text)
+    document["parameters"] |= {
+        "damping:wrist": {"value": 0.05, "std": 0.02, "unit": "N m s/rad"},
+        "armature:wrist": {"value": 0.01, "std": 0.002, "unit": "kg m^2"},
+    }
+    try:
+        (arm / "nominal.json").write_text(json.dumps(document))
+        case, compiled, _ = admitted_robot(read_case(arm))
+    finally:
+        (arm / "nominal.json").write_text(text)
+    problem = ArticulatedProblem.of(case, ArticulatedModel.of(compiled), case.identification)
+    names = [parameter.name for parameter in problem.nominal]
+    elbow = [joint.name for joint in problem.joints].index("elbow")
+    vector = np.zeros(len(names))
+    before = problem.slots(elbow, (), vector, on_link=True)
+    vector[names.index("damping:wrist")] = vector[names.index("armature:wrist")] = 1.0
+    after = problem.slots(elbow, (), vector, on_link=True)
+    assert after[Slot.DAMPING] - before[Slot.DAMPING] == pytest.approx(0.02 * RATIO**2)
+    assert after[Slot.INERTIA] - before[Slot.INERTIA] == pytest.approx(0.002 * RATIO**2)
 
 
 def test_what_cannot_be_tied_is_said(arm):

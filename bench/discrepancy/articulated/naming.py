@@ -19,6 +19,7 @@ from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.hypothesis import placed_values
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.judgement.coarse import outside
+from bench.discrepancy.multibody.encoders import input_of
 from bench.discrepancy.settings import ArticulatedJudgementSettings as JudgementSettings
 from bench.discrepancy.verdict import Estimate, NamedEffect, NominalEstimate, Ranked, Verdict, VerdictKind
 
@@ -281,7 +282,7 @@ def _named(
                 float(abs(p.slope(float(e), placed.scales)) * s),
                 0.0 if p.fixed else least * abs(float(values[p.name])),
             ),
-            placed.effect.unit(p, joint.unit),
+            placed.effect.unit(p, joint.unit, input_of(problem.case, joint).unit),
         )
         for p, e, s in zip(placed.effect.parameters, eta, std, strict=True)
     }

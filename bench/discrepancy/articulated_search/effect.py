@@ -117,11 +117,11 @@ class ArticulatedEffect:
         """Whether motor and link part and meet again."""
         return any(p.name == "half_clearance" for p in self.parameters)
 
-    def unit(self, parameter: FreeParameter, position: str) -> str:
-        """Unit of a parameter on a joint whose coordinate has the unit `position`."""
+    def unit(self, parameter: FreeParameter, position: str, given: str) -> str:
+        """Unit of a parameter on a joint whose coordinate has the unit `position` and whose input has the unit `given`."""
         force, inertia = ("N m", "kg m^2") if position == "rad" else ("N", "kg")
         return parameter.unit or {
-            "force": force, "peak": force, "input": force if self.servo is False else "input", "position": position,
+            "force": force, "peak": force, "input": given or "input", "position": position,
             "velocity": f"{position}/s", "inertia": inertia, "mass": "kg", "reach": "m", "1": "1",
             "force/position": f"{force}/{position}", "force/velocity": f"{force} s/{position}",
             "force/velocity/velocity": f"{force} s^2/{position}^2", "1/force": f"1/({force})",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 
@@ -29,6 +30,8 @@ LOCAL_SLOTS = {
     "delay": (Slot.DELAY,),
 }
 """Entries of a joint's parameter vector that nominal parameters set."""
+BY_RATIO: Mapping[str, int] = MappingProxyType({"damping": 2, "armature": 2, "frictionloss": 1})
+"""Power of the ratio by which they act on the joint that moves theirs by an equality."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +71,17 @@ JointHypothesis = tuple[PlacedOnJoint, ...]
 
 @dataclass(frozen=True)
 class Nominal:
-    """A nominal parameter: what it sets, its value and standard uncertainty."""
+    """A nominal parameter.
+
+    Attributes:
+        name: Its name.
+        kind: What it sets.
+        target: The joint, drive or body that it belongs to.
+        joint: Index of the joint whose runs it changes; of a body, of the body.
+        value: Its value.
+        std: Its standard uncertainty.
+        factor: What a unit of it is there: of a joint that another one moves, what the ratio of the two makes of it.
+    """
 
     name: str
     kind: str
@@ -76,6 +89,7 @@ class Nominal:
     joint: int
     value: float
     std: float
+    factor: float = 1.0
 
     @property
     def shared(self) -> bool:
@@ -90,15 +104,20 @@ def nominal_parameters(case: Case, model: ArticulatedModel) -> tuple[Nominal, ..
         UnknownNameError: A parameter names nothing in the model.
     """
     joints = {joint.name: j for j, joint in enumerate(model.joints)}
+    tied = {tie.name: (joints[tie.to], tie.ratio) for tie in model.ties if tie.to in joints}
     drives = {joint.drive.name: j for j, joint in enumerate(model.joints) if joint.drive is not None}
     bodies = {body: i for i, body in enumerate(model.bodies)}
     shared, others = [], []
     for parameter in case.parameters:
         kind, _, target = parameter.name.partition(":")
+        factor = 1.0
         if kind in BODIES:
             known: Mapping[str, int] = bodies
         elif kind in DRIVES:
             known = drives
+        elif kind in BY_RATIO and target in tied:
+            joint, ratio = tied[target]
+            known, factor = {target: joint}, abs(ratio) ** BY_RATIO[kind]
         elif kind in LOCAL_SLOTS:
             known = joints
         else:
@@ -108,7 +127,9 @@ def nominal_parameters(case: Case, model: ArticulatedModel) -> tuple[Nominal, ..
         if target not in known:
             raise UnknownNameError(f"target of parameter '{parameter.name}'", target, list(known))
         if parameter.std > 0.0:
-            entry = Nominal(parameter.name, kind, target, known[target], parameter.value, parameter.std)
+            entry = Nominal(
+                parameter.name, kind, target, known[target], parameter.value, parameter.std, factor
+            )
             (shared if entry.shared else others).append(entry)
     return (*shared, *sorted(others, key=lambda p: p.joint))
 

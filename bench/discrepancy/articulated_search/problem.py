@@ -206,7 +206,7 @@ class ArticulatedProblem:
         p = base_slots(joint, on_link)
         for i in self.locals(j):
             entry = self.nominal[i]
-            move(p, entry.kind, entry.std * vector[i])
+            move(p, entry.kind, entry.factor * entry.std * vector[i])
         for placed, eta in zip(hypothesis, self.etas(hypothesis, vector), strict=True):
             if placed.effect.slots is not None and j in placed.joints:
                 placed.effect.slots(placed_values(placed, eta), p)

@@ -18,6 +18,7 @@ from bench.discrepancy.judgement.posterior import named_effect
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placements import placements
 from bench.discrepancy.model.rigs import structure_of
+from bench.discrepancy.multibody.encoders import input_of
 from bench.discrepancy.precheck import information, joint_information
 from bench.discrepancy.precheck.joints import admitted_joints
 from bench.discrepancy.precheck.settings import CheckSettings
@@ -117,6 +118,7 @@ def _of_joints(case: Case) -> list[EffectSite]:
 
     def site(placed: hypothesis.PlacedOnJoint) -> EffectSite:
         joint = found.joints[placed.joint]
+        given = input_of(own, joint).unit
 
         def at(size: float) -> NamedEffect | None:
             vector = joint_information.at_size(found, placed, size, settings)
@@ -124,7 +126,7 @@ def _of_joints(case: Case) -> list[EffectSite]:
                 return None
             values = hypothesis.placed_values(placed, vector[len(found.nominal) :])
             estimates = {
-                p.name: Estimate(float(values[p.name]), 0.0, placed.effect.unit(p, joint.unit))
+                p.name: Estimate(float(values[p.name]), 0.0, placed.effect.unit(p, joint.unit, given))
                 for p in placed.effect.parameters
             }
             return NamedEffect(
