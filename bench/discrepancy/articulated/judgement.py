@@ -253,8 +253,8 @@ def alike(
 ) -> set[EffectKeys]:
     """Explanations, one effect of the final one exchanged for another at its joint, than which that predicts no better for sure.
 
-    How likely a record is under a law that is not right says little of another law that is not: both leave what neither knows. What an
-    explanation that leaves something is held against is how others predict.
+    How likely a record is under a law that is not right says little of another law that is not: both leave what neither knows. Where
+    more of what an effect leaves of its joint is that than noise, it is held against how others predict.
 
     Args:
         problem: Records for judging.
@@ -272,9 +272,11 @@ def alike(
         (lost,) = [placed for placed in final.hypothesis if placed.key not in theirs]
         (gained,) = [placed for placed in f.hypothesis if placed.key not in own]
         at = problem.reached((lost,))
-        if not set(at) & set(problem.reached((gained,))):
+        mine = predicted.of(at)
+        noisy = float(np.mean(mine.excess)) <= float(np.sum(mine.floor**2))
+        if noisy or not set(at) & set(problem.reached((gained,))):
             continue
-        if not better(predict(problem, f, predicted.floor, settings).of(at), predicted.of(at), settings):
+        if not better(predict(problem, f, predicted.floor, settings).of(at), mine, settings):
             out.add(theirs)
     return out
 

@@ -97,6 +97,15 @@ class ArticulatedProblem:
         """Indices of the nominal parameters that all joints share, those of bodies."""
         return tuple(i for i, p in enumerate(self.nominal) if p.shared)
 
+    @cached_property
+    def felt(self) -> tuple[tuple[int, ...], ...]:
+        """Of those, (n_joints,) the ones that the runs of each joint feel: a joint does not move the bodies that carry it."""
+        bodies = [[record.joints[j].bodies for record in self.records] for j in range(len(self.joints))]
+        return tuple(
+            tuple(i for i in self.shared if any(one[self.nominal[i].target].felt for one in mine))
+            for mine in bodies
+        )
+
     def locals(self, j: int) -> tuple[int, ...]:
         """Indices of the nominal parameters of joint `j` alone."""
         return tuple(i for i, p in enumerate(self.nominal) if not p.shared and p.joint == j)
@@ -124,7 +133,7 @@ class ArticulatedProblem:
 
     def entries(self, j: int, hypothesis: JointHypothesis) -> NDArray[np.int64]:
         """Entries of the vector of a hypothesis on which the runs of joint `j` depend."""
-        out, at = [*self.shared, *self.locals(j)], len(self.nominal)
+        out, at = [*self.felt[j], *self.locals(j)], len(self.nominal)
         for placed in hypothesis:
             stop = at + len(placed.effect.parameters)
             out += range(at, stop) if j in self.reached((placed,)) else ()
@@ -254,7 +263,7 @@ class ArticulatedProblem:
         bias, inertia = record.bias, record.inertia
         by: dict[str, dict[str, float]] = {}
         for i in self.shared:
-            if vector[i] != 0.0:
+            if vector[i] != 0.0 and record.bodies[self.nominal[i].target].felt:
                 by.setdefault(self.nominal[i].target, {})[self.nominal[i].kind] = (
                     self.nominal[i].std * vector[i]
                 )

@@ -14,11 +14,23 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bench.arrays import Array
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.multibody.model import ArticulatedModel, Dynamics
 from bench.rig.bodies import AXES, BODIES
+
+
+@dataclass(frozen=True)
+class BodyTermsSettings:
+    """Numbers of `bench.discrepancy.multibody.body_terms`."""
+
+    rounding: float = 1e-9
+    """What a joint feels of a body, over what the joint does that feels it most, that differences of inverse dynamics make of nothing."""
+
+
+SETTINGS = BodyTermsSettings()
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +44,7 @@ class BodyTerms:
         slopes: (n_axes, …, 2, n_steps) G.
         curvatures: (n_axes, n_axes, …, 2, n_steps) H.
         moment: (…, 2, n_steps) R, by a unit of its moment of inertia; zeros where that is certain.
+        felt: (n_joints,), or of one joint: whether anything of it is more there than rounding, beside the joint that feels it most.
     """
 
     mass: float
@@ -40,11 +53,13 @@ class BodyTerms:
     slopes: Array
     curvatures: Array
     moment: Array
+    felt: NDArray[np.bool_]
 
     def of_joint(self, j: int) -> BodyTerms:
         """The terms of joint `j`."""
         return replace(
-            self, point=self.point[j], slopes=self.slopes[:, j], curvatures=self.curvatures[:, :, j], moment=self.moment[j]
+            self, point=self.point[j], slopes=self.slopes[:, j], curvatures=self.curvatures[:, :, j], moment=self.moment[j],
+            felt=self.felt[j],
         )  # fmt: skip
 
     def change(self, by: Mapping[str, float]) -> Array:
@@ -111,4 +126,7 @@ def _terms(
     if "inertia" in std:
         more = model.with_body("inertia", body, model.body_value("inertia", body) + std["inertia"])
         moment = beside(more.dynamics(*motion)) / std["inertia"]
-    return BodyTerms(model.mass(body), axes, here, slopes, curvatures, moment)
+    parts = [here, *slopes, *(row for block in curvatures for row in block), moment]
+    largest = [np.abs(part).max(axis=(1, 2)) for part in parts]
+    felt = np.any([size > SETTINGS.rounding * max(float(size.max()), 1e-300) for size in largest], axis=0)
+    return BodyTerms(model.mass(body), axes, here, slopes, curvatures, moment, felt)
