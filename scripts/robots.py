@@ -66,7 +66,7 @@ class Row:
         known: What is published.
         nominal: Nominal parameters as re-estimated.
         further: Joint to the RMS errors [rad, m] of free runs of records that nothing was learned from, as stated and with what is named, a
-            pair for every record. Of the SO-101, the first seconds of two of them judged.
+            pair for every record.
     """
 
     robot: str

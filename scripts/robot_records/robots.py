@@ -48,13 +48,10 @@ def so101(data: Path) -> Records:
         Axis(joint, f"position_{label}", f"command_{label}", 2e-4, TURN / 4096.0)
         for label, joint in SO101.items()
     ]
-    read = {
-        name: short(table(folder / "motions" / f"{name}.parquet"), after=5.0)
-        for name in (*SO101_FINDING[:3], *SO101_JUDGING[:2])
-    }
+    read = {name: short(table(folder / "motions" / f"{name}.parquet"), after=5.0) for name in SO101_FINDING}
     return Records(
         (folder / "model_joints_properties.xml").read_text(), axes, [read[n] for n in SO101_FINDING[:3]],
-        [read[n] for n in SO101_JUDGING[:2]], 50.0, True, "friction against gravity, play of a degree, a zero that is off",
+        [read[n] for n in SO101_FINDING[3:]], 50.0, True, "friction against gravity, play of a degree, a zero that is off",
         {"mass": 0.1, "damping": 0.5, "armature": 0.5, "kp": 0.5}, held={"gripper": "hold"},
         further=[short(table(folder / "motions" / f"{n}.parquet"), 1e3, 5.0) for n in SO101_JUDGING],
     )  # fmt: skip

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,17 +18,19 @@ from bench.discrepancy.articulated.judgement import (
     PredictedErrors,
     alike,
     kept,
+    ladder,
     noise_floor,
     predict,
+    simplest,
     without_each,
 )
 from bench.discrepancy.articulated.naming import left_of, verdict_of
 from bench.discrepancy.articulated.torque_error import TorqueProblem, along_motion
-from bench.discrepancy.articulated.whiteness import astray, coloured
+from bench.discrepancy.articulated.whiteness import Astray, Coloured, astray, coloured
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.hypothesis import PlacedOnJoint
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
-from bench.discrepancy.articulated_search.search import complete, search
+from bench.discrepancy.articulated_search.search import complete, exchanged, predecessors, search
 from bench.discrepancy.settings import ArticulatedSearchSettings as SearchSettings
 from bench.discrepancy.verdict import Verdict
 
@@ -106,21 +109,67 @@ def _explained(
     judged_by = asked_as(problem, judging)
     question.progress("judging records")
     rungs, last, predictions, more = kept(problem, judged_by, fits, judged)
-    fits = [*fits, *more]
-    floor, final = predictions[0].floor, rungs[last]
-    left = coloured(judging, final, judged)
-    lost = astray(judging, final, predictions[last], judged) if judged_by is judging else None
-    # power above the noise at some frequencies shows that what is named is not all; where nothing is named it is no evidence that
-    # something is missing, which takes an effect that predicts the judging records better
-    noise_alone = lost is None and (left is None or not last) and complete(problem, final, judged)
-    whole = noise_alone and question.stated and judged_by is judging
-    near = alike(judged_by, fits, final, predictions[last], judged) if last and not whole else set()
+    fits, floor = [*fits, *more], predictions[0].floor
+
+    def asked(final: ArticulatedFit, predicted: PredictedErrors) -> tuple[_Left, set[EffectKeys]]:
+        left = _left(problem, judging, judged_by, final, predicted, stated=question.stated)
+        return left, set() if left.whole else alike(judged_by, fits, final, predicted, judged)
+
+    left, near = asked(rungs[last], predictions[last])
+    if not left.whole and problem.deadline.allows("dry friction in the place of what is named"):
+        fits = [*fits, *_with_dry_friction(problem, candidates, rungs[last])]
+        left, near = asked(rungs[last], predictions[last])
+    final = simplest(fits, rungs[last], near)
+    if final is not rungs[last]:
+        fits = [*fits, *predecessors(problem, final, fits)]
+        rungs = ladder([final, *fits])
+        last, predictions = len(rungs) - 1, [predict(judged_by, rung, floor, judged) for rung in rungs]
+        left, near = asked(final, predictions[last])
     verdict = verdict_of(
         problem, fits, rungs, last, predict(judged_by, None, floor, judged), predictions,
         without_each(judged_by, fits, final, floor, judged), judged, rng,
-        whole=whole, left=left_of(problem, final, left, lost), alike=near,
+        whole=left.whole, left=left_of(problem, final, left.coloured, left.astray), alike=near,
     )  # fmt: skip
     return Explained(problem, judging, fits, final, predictions, verdict, near)
+
+
+def _with_dry_friction(
+    problem: ArticulatedProblem, candidates: Sequence[PlacedOnJoint], final: ArticulatedFit
+) -> list[ArticulatedFit]:
+    """An explanation with dry friction in the place of each law of several parameters at a joint that has none.
+
+    It is what joints have most, and what a law with more to fit imitates first; the search may never have held the two side by side.
+    """
+    dry = {p.joint: p for p in candidates if p.effect.name == "coulomb_friction"}
+    taken = {placed.joint for placed in final.hypothesis if placed.effect.name == "coulomb_friction"}
+    laws = [p for p in final.hypothesis if p.effect.site == "joint" and p.effect.free > 1]
+    return [exchanged(problem, final, p, dry[p.joint]) for p in laws if p.joint in dry.keys() - taken]
+
+
+class _Left(NamedTuple):
+    """What an explanation leaves of the judging records, and whether that is noise alone."""
+
+    coloured: Coloured | None
+    astray: Astray | None
+    whole: bool
+
+
+def _left(
+    problem: ArticulatedProblem,
+    judging: ArticulatedProblem,
+    judged_by: ArticulatedProblem,
+    final: ArticulatedFit,
+    predicted: PredictedErrors,
+    *,
+    stated: bool,
+) -> _Left:
+    judged = problem.settings.articulated.judgement
+    left = coloured(judging, final, judged)
+    lost = astray(judging, final, predicted, judged) if judged_by is judging else None
+    # power above the noise at some frequencies shows that what is named is not all; where nothing is named it is no evidence that
+    # something is missing, which takes an effect that predicts the judging records better
+    noise_alone = lost is None and (left is None or not final.hypothesis) and complete(problem, final, judged)
+    return _Left(left, lost, noise_alone and stated and judged_by is judging)
 
 
 def _asks_torque(found: Explained) -> bool:

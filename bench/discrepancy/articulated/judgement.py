@@ -7,7 +7,7 @@ keeps more than the noise, as well as its size is known.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -17,6 +17,7 @@ from bench.arrays import Array
 from bench.discrepancy.articulated.free_runs import FreeRuns
 from bench.discrepancy.articulated.torque_error import TorqueProblem
 from bench.discrepancy.articulated.torque_runs import TorqueRuns
+from bench.discrepancy.articulated_search.catalogue import CATALOGUE
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.hypothesis import PlacedOnJoint
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
@@ -254,7 +255,8 @@ def alike(
     """Explanations, one effect of the final one exchanged for another at its joint, than which that predicts no better for sure.
 
     How likely a record is under a law that is not right says little of another law that is not: both leave what neither knows. Where
-    more of what an effect leaves of its joint is that than noise, it is held against how others predict.
+    more of what an effect leaves of its joint is that than noise, it is held against how others predict; else against those that are
+    nearly as likely.
 
     Args:
         problem: Records for judging.
@@ -274,11 +276,32 @@ def alike(
         at = problem.reached((lost,))
         mine = predicted.of(at)
         noisy = float(np.mean(mine.excess)) <= float(np.sum(mine.floor**2))
-        if noisy or not set(at) & set(problem.reached((gained,))):
+        close = final.log_posterior - f.log_posterior <= settings.rival
+        if (noisy and not close) or not set(at) & set(problem.reached((gained,))):
             continue
         if not better(predict(problem, f, predicted.floor, settings).of(at), mine, settings):
             out.add(theirs)
     return out
+
+
+def simplest(
+    fits: Sequence[ArticulatedFit], final: ArticulatedFit, near: Collection[EffectKeys]
+) -> ArticulatedFit:
+    """Of explanations that predict alike, that with the fewest free parameters; of those, the one that comes first in the catalogue.
+
+    Args:
+        fits: All fitted hypotheses, the likeliest first.
+        final: What would be named.
+        near: Explanations that predict as well.
+    """
+    order = {effect.name: k for k, effect in enumerate(CATALOGUE)}
+
+    def plain(found: ArticulatedFit) -> tuple[int, int]:
+        effects = [placed.effect for placed in found.hypothesis]
+        return sum(effect.free for effect in effects), sum(order[effect.name] for effect in effects)
+
+    made = [next(f for f in fits if keys_of(f) == keys) for keys in sorted(near, key=sorted)]
+    return min((final, *made), key=plain)
 
 
 def closed_of_nominal(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 
 import numpy as np
 
@@ -30,8 +29,8 @@ LOCAL_SLOTS = {
     "delay": (Slot.DELAY,),
 }
 """Entries of a joint's parameter vector that nominal parameters set."""
-BY_RATIO: Mapping[str, int] = MappingProxyType({"damping": 2, "armature": 2, "frictionloss": 1})
-"""Power of the ratio by which they act on the joint that moves theirs by an equality."""
+BY_RATIO = ("damping", "armature", "frictionloss")
+"""Those that are counted by the ratio where another joint moves theirs by an equality: a friction by it, the others by its square."""
 
 
 @dataclass(frozen=True)
@@ -117,7 +116,7 @@ def nominal_parameters(case: Case, model: ArticulatedModel) -> tuple[Nominal, ..
             known = drives
         elif kind in BY_RATIO and target in tied:
             joint, ratio = tied[target]
-            known, factor = {target: joint}, abs(ratio) ** BY_RATIO[kind]
+            known, factor = {target: joint}, abs(ratio) if kind == "frictionloss" else ratio**2
         elif kind in LOCAL_SLOTS:
             known = joints
         else:

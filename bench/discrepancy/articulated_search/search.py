@@ -235,6 +235,16 @@ def shortened(
     return refitted(problem, hypothesis, start, scale=ArticulatedFit.at(problem, hypothesis, start).scale)
 
 
+def exchanged(
+    problem: ArticulatedProblem, found: ArticulatedFit, lost: PlacedOnJoint, gained: PlacedOnJoint
+) -> ArticulatedFit:
+    """A fit once more with one of its effects exchanged for another."""
+    others, start = _without(problem, found, (lost,))
+    start = np.append(start, [p.mean for p in gained.effect.parameters])
+    hypothesis = (*others, gained)
+    return refitted(problem, hypothesis, start, scale=ArticulatedFit.at(problem, hypothesis, start).scale)
+
+
 def _surprise(problem: ArticulatedProblem, found: ArticulatedFit) -> float:
     """Misfit of the prior at a fit: the sum of squared deviations."""
     mean, std, _, _ = problem.prior(found.hypothesis)
