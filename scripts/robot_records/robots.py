@@ -233,7 +233,7 @@ def sts3250(data: Path) -> Records:
     """The STS3250 as a servo of the published stiffness and damping, without its friction."""
     return _servo(
         data, ("sts3250_kp32_sin_sin",), ("sts3250_kp32_lift_and_drop",), "load-dependent friction: 0.2 N m and 0.2 of the load", 49.0,
-        '<position name="servo" joint="servo" kp="67.3" kv="2.35"/>', {"mass": 0.05, "armature": 0.2, "kp": 0.05},
+        '<position name="servo" joint="servo" kp="67.3" kv="2.35"/>', {"mass": 0.05, "armature": 0.2, "kp": 0.13, "kv": 0.11},
         armature=0.001, mass=1.13, length=0.12,
     )  # fmt: skip
 
