@@ -12,14 +12,14 @@ import pytest
 from bench.discrepancy import diagnose, read_case
 from bench.discrepancy.application.applying import Findings
 from bench.discrepancy.articulated.admission import admitted_robot
-from bench.discrepancy.articulated.judgement import alike, noise_floor, predict
+from bench.discrepancy.articulated.judgement import alike, keys_of, noise_floor, predict, simplest
 from bench.discrepancy.articulated.naming import ranking_of
 from bench.discrepancy.articulated.whiteness import astray
 from bench.discrepancy.articulated_search.catalogue import CATALOGUE
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit, refitted
 from bench.discrepancy.articulated_search.placements import placements
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
-from bench.discrepancy.articulated_search.search import nominal_fit
+from bench.discrepancy.articulated_search.search import exchanged, nominal_fit
 from bench.discrepancy.multibody.joints import joint_of
 from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.replay.verification import verify
@@ -159,6 +159,14 @@ def test_explanations_that_predict_as_well_are_told_beside_what_is_named(tmp_pat
     }
     assert ranking["stribeck_friction"] == pytest.approx(ranking["coulomb_friction"])
     assert ranking["force_offset"] < 1e-6
+    # what has most parameters is named only where it predicts better for sure
+    rich = next(f for f in fits if f.hypothesis[0].effect.name == "stribeck_friction")
+    assert simplest(fits, rich, {keys_of(final)}) is final
+    assert simplest(fits, rich, set()) is rich
+    assert simplest(fits, final, {keys_of(rich)}) is final
+    plain = exchanged(problem, rich, rich.hypothesis[0], final.hypothesis[0])
+    assert keys_of(plain) == keys_of(final)
+    np.testing.assert_allclose(plain.vector, final.vector, atol=0.05)
 
 
 def test_what_a_motor_did_has_to_be_known(tmp_path):
