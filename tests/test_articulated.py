@@ -145,11 +145,16 @@ CASES = {
 def test_what_was_left_out_is_named_at_its_place(tmp_path, name):
     servo, more, offset, wanted, (parameter, value, within) = CASES[name]
     folder = write_case(tmp_path, mjcf(servo=servo, **more), servo=servo, offset=offset)
-    verdict = diagnose(read_case(folder)).verdict
+    found = diagnose(read_case(folder))
+    verdict = found.verdict
     assert verdict.verdict == "effect"
     assert [(e.name, e.where) for e in verdict.named] == [wanted]
     assert verdict.named[0].parameters[parameter].value == pytest.approx(value, rel=within)
     assert all(gap.after < 1.6 * gap.noise_floor for gap in verdict.gaps)
+    # pages and recordings of servos, of arms driven by torques, and of wrong encoders
+    write_report(found, tmp_path / "report.html")
+    write_rerun(found, tmp_path / "run.rrd")
+    assert wanted[0] in (tmp_path / "report.html").read_text()
 
 
 @pytest.mark.slow

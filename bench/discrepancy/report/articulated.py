@@ -44,32 +44,36 @@ SETTINGS = ArticulatedReportSettings()
 
 
 def simulated_joints(diagnosis: ArticulatedDiagnosis) -> dict[str, Recording]:
-    """Positions of all joints in the first judging record: measured, nominal, and with what is named."""
+    """Positions of all joints in the first judging record: measured, nominal, and with what is named.
+
+    Where no servo holds a joint, the record begins with the second of its windows, as it does where it judges.
+    """
     judging = diagnosis.judging
     prepared = judging.records[0]
-    measured = np.column_stack([record.position for record in prepared.joints])
+    errors = {label: _errors(diagnosis, fit) for label, fit in ((NOMINAL, None), (FINAL, diagnosis.final))}
+    length = min(len(one) for columns in errors.values() for one in columns)
+    measured = np.column_stack([record.position for record in prepared.joints])[-length:]
     runs = {MEASURED: measured}
-    for label, fit in ((NOMINAL, None), (FINAL, diagnosis.final)):
-        runs[label] = measured - _errors(diagnosis, fit)
+    for label, columns in errors.items():
+        runs[label] = measured - np.column_stack([one[-length:] for one in columns])
     units = {joint.name: joint.unit for joint in judging.joints}
     return {
         label: Recording.from_arrays(
-            prepared.record.time, {name: columns[:, j] for j, name in enumerate(units)}, units=units
+            prepared.record.time[-length:], {name: columns[:, j] for j, name in enumerate(units)}, units=units
         )
         for label, columns in runs.items()
         if np.isfinite(columns).all()
     }
 
 
-def _errors(diagnosis: ArticulatedDiagnosis, fit: ArticulatedFit | None) -> Array:
+def _errors(diagnosis: ArticulatedDiagnosis, fit: ArticulatedFit | None) -> list[Array]:
+    """(n_joints,) of errors (n,) in the first judging record, the latter part of it where windows begin anew."""
     judging = diagnosis.judging
     hypothesis = fit.hypothesis if fit else ()
     vector = fit.vector if fit else np.zeros(len(judging.nominal))
     runs = FreeRuns(judging.settled(hypothesis, vector))
     prepared = runs.problem.motions(hypothesis, vector)[0]
-    return np.column_stack([
-        runs.errors(j, hypothesis, vector, prepared) for j in range(len(judging.joints))
-    ])  # fmt: skip
+    return [runs.errors(j, hypothesis, vector, prepared) for j in range(len(judging.joints))]
 
 
 def articulated_page(

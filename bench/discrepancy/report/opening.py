@@ -103,14 +103,15 @@ def _shown(gap: Gap, measured: Recording) -> str:
 
 
 def with_applied(runs: Mapping[str, Recording], applied: InSimulator | None) -> dict[str, Recording]:
-    """Runs with that of the user's own simulator, where it is on the same clock and did not diverge."""
+    """Runs with that of the user's own simulator, where it is on the same clock, from its beginning or later on, and did not diverge."""
     measured = next(iter(runs.values()))
+    n = len(measured.time)
     own = {} if applied is None else {name or measured.names[0]: y for name, y in applied.record.items()}
     shown = {
-        name: values
+        name: values[-n:]
         for name, values in own.items()
         if name in measured.names
-        and values.shape == measured.time.shape
+        and len(values) >= n
         and np.max(np.abs(values)) < DIVERGED_GAP * max(float(np.max(np.abs(measured[name]))), 1e-300)
     }
     if not shown:
