@@ -301,6 +301,10 @@ def test_a_ratio_that_changes_from_band_to_band_is_no_factor():
     frequencies = np.geomspace(1.0, 30.0, 8)
     one = np.full(8, np.log(1000.0))
     assert common_factor(Bands(one, np.ones(8), frequencies))[0] == pytest.approx(1000.0)
+    # friction of a geared joint makes any factor, of another course
+    assert common_factor(Bands(-one, 0.3 * np.ones(8), frequencies), more=True) == (1.0, 1.0)
+    assert common_factor(Bands(-one, np.ones(8), frequencies), more=True)[0] == pytest.approx(1e-3)
+    assert common_factor(Bands(one, 0.3 * np.ones(8), frequencies), more=True)[0] == pytest.approx(1000.0)
     assert common_factor(Bands(one + np.linspace(-6.0, 6.0, 8), np.ones(8), frequencies)) == (1.0, 1.0)
     # a sign that turns within an octave is a resonance in another place
     assert common_factor(Bands(0.0 * one, -np.ones(8), np.linspace(1.0, 1.9, 8)))[1] == 1.0

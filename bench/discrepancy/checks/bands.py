@@ -125,12 +125,16 @@ def bands_between(found: Spectra) -> Bands | None:
     return Bands(*(np.array(column) for column in zip(*rows, strict=True)))
 
 
-def common_factor(bands: Bands, settings: ScaleSettings = DEFAULT.checks.scales) -> tuple[float, float]:
+def common_factor(
+    bands: Bands, settings: ScaleSettings = DEFAULT.checks.scales, *, more: bool = False
+) -> tuple[float, float]:
     """The factor and the sign that all bands have in common; (1, 1) where they have none.
 
     Args:
         bands: Measured over predicted.
         settings: When a factor counts.
+        more: Whether the first of the two may be more than the second for reasons of its own: a factor below one, however small, then
+            counts only where both have the same course.
     """
     ratios = bands.ratios
     if len(ratios) < 3:
@@ -140,9 +144,8 @@ def common_factor(bands: Bands, settings: ScaleSettings = DEFAULT.checks.scales)
     wide = bands.frequencies[-1] >= 2.0**settings.octaves * bands.frequencies[0]
     turned = wide and bool(np.all(bands.correlations < 0.0)) and float(np.median(bands.correlations)) < -0.5
     agrees = float(np.median(np.abs(bands.correlations))) > settings.coherence
-    gross = abs(middle) > np.log(settings.any_factor) or (
-        agrees and abs(middle) > np.log(settings.gross) and _is_of_a_unit(middle, settings)
-    )
+    gross = abs(middle) > np.log(settings.any_factor) and (agrees or not (more and middle < 0.0))
+    gross |= agrees and abs(middle) > np.log(settings.gross) and _is_of_a_unit(middle, settings)
     return (float(np.exp(middle)) if describes and gross else 1.0), (-1.0 if turned else 1.0)
 
 

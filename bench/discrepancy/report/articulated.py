@@ -16,6 +16,7 @@ import numpy as np
 from bench.arrays import Array
 from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis
 from bench.discrepancy.articulated.free_runs import FreeRuns
+from bench.discrepancy.articulated.torque_error import TorqueProblem
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.judgement.shares import closed_words
 from bench.discrepancy.report.answers import level
@@ -30,6 +31,11 @@ from bench.recording import Recording
 from bench.rig import Rig
 
 FINAL = "with what is named"
+CAPTIONS = {
+    "position": "one joint free at a time",
+    "torque": "torques of the drives along the measured motion",
+}
+"""Quantity that is judged to how it is drawn."""
 
 
 @dataclass(frozen=True)
@@ -76,6 +82,34 @@ def _errors(diagnosis: ArticulatedDiagnosis, fit: ArticulatedFit | None) -> list
     return [runs.errors(j, hypothesis, vector, prepared) for j in range(len(judging.joints))]
 
 
+def judged_torques(diagnosis: ArticulatedDiagnosis) -> dict[str, Recording]:
+    """Torques of all drives in the first judging record, means over short intervals: logged, and as the models ask for along the motion.
+
+    Of a diagnosis by torque (`bench.discrepancy.articulated.torque_error`), in the places of what `simulated_joints` returns.
+    """
+    problem = TorqueProblem.like(diagnosis.judging)
+    prepared, n = problem.records[0], problem.intervals[0]
+    drives = [joint.drive for joint in problem.joints]
+    columns = []
+    for drive, record in zip(drives, prepared.joints, strict=True):
+        torque = record.command * (drive.gear * drive.kp if drive else 0.0)
+        columns.append(torque[: len(torque) // n * n].reshape(-1, n).mean(axis=1))
+    logged = np.column_stack(columns)
+    time = prepared.record.time[0] + (np.arange(len(logged)) + 0.5) * n * prepared.record.step
+    runs = {MEASURED: logged}
+    for label, hypothesis, vector in (
+        (NOMINAL, (), np.zeros(len(problem.nominal))), (FINAL, diagnosis.final.hypothesis, diagnosis.final.vector),
+    ):  # fmt: skip
+        moved = problem.motions(hypothesis, vector)[0]
+        missing = [problem.missing(j, hypothesis, vector, 0, moved) for j in range(len(problem.joints))]
+        runs[label] = logged - np.column_stack(missing)
+    names = {j.name: "N m" if j.unit == "rad" else "N" for j in problem.joints}
+    return {
+        label: Recording.from_arrays(time, {name: rows[:, j] for j, name in enumerate(names)}, units=names)
+        for label, rows in runs.items()
+    }
+
+
 def articulated_page(
     diagnosis: ArticulatedDiagnosis, applied: InSimulator | None = None, model: str = ""
 ) -> Page:
@@ -86,7 +120,8 @@ def articulated_page(
         applied: What was named in the user's own simulator, to be drawn beside it.
         model: Options of `jointbench apply` that name the user's own MJCF.
     """
-    runs = with_applied(simulated_joints(diagnosis), applied)
+    by_torque = isinstance(diagnosis.problem, TorqueProblem)
+    runs = judged_torques(diagnosis) if by_torque else with_applied(simulated_joints(diagnosis), applied)
     out = opened(
         diagnosis.case.name, diagnosis.verdict, runs, model=model,
         settings=diagnosis.problem.settings.judgement, applied=applied,
@@ -118,7 +153,7 @@ def _how_far(out: Page, diagnosis: ArticulatedDiagnosis, runs: Mapping[str, Reco
     names = [g.dof for g in worst[: SETTINGS.shown_joints]]
     section.plots(
         [histories(runs, names), histories(runs, names, errors=True)],
-        "Judging record, one joint free at a time: the joints with most of the discrepancy, and what each simulation misses them by.",
+        f"Judging record, {CAPTIONS[quantity]}: the joints with most of the discrepancy, and what each model misses them by.",
     )
 
 
