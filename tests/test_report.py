@@ -33,6 +33,7 @@ from bench.discrepancy.verdict import (
     Ranked,
     Split,
     Verdict,
+    by_name,
 )
 from bench.page import Page
 from bench.recording import Recording
@@ -140,3 +141,28 @@ def test_a_page_is_one_file_of_a_bounded_size(tmp_path: Path):
     assert "src=" not in text.partition("<script")[0]
     assert "http://" not in text
     assert "https://" not in text
+
+
+def test_many_effects_are_told_by_name_and_few_with_their_numbers():
+    laws = [("coulomb_friction", f"joint_{k}") for k in range(1, 4)] + [
+        ("damping_error", f"joint_{k}") for k in range(1, 7)
+    ]
+    named = tuple(
+        NamedEffect(
+            name,
+            where,
+            0.9 - 0.1 * (k > 4),
+            {"limit": Estimate(1.0 + k, 0.1, "N m")},
+            closed=0.5 / (k + 1),
+            closed_ci95=(0.0, 0.6),
+        )
+        for k, (name, where) in enumerate(laws)
+    )
+    assert by_name(named[:4]) == "coulomb_friction (joint_1, joint_2, joint_3), damping_error (joint_1)"
+    told = dict(answers(replace(VERDICT, named=named)))
+    assert told["Which"].count("limit") == 3
+    assert (
+        "and of less weight damping_error (joint_1, joint_2, joint_3, joint_4, joint_5, joint_6)"
+        in told["Which"]
+    )
+    assert "the 6 others 0.800 to 0.900, up to 12 % each" in told["How sure"]

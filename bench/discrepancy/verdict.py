@@ -52,6 +52,14 @@ class NamedEffect:
     closed_ci95: tuple[float, float] = (0.0, 0.0)
 
 
+def by_name(effects: Iterable[NamedEffect]) -> str:
+    """Effects by name, with the places at which each is named: "coulomb_friction (elbow, wrist), damping_error (elbow)"."""
+    places: dict[str, list[str]] = {}
+    for effect in effects:
+        places.setdefault(effect.name, []).append(effect.where)
+    return ", ".join(f"{name} ({', '.join(where)})" if any(where) else name for name, where in places.items())
+
+
 @dataclass(frozen=True)
 class NominalEstimate:
     """A nominal parameter as the explanation has it.

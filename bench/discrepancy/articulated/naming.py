@@ -21,7 +21,15 @@ from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.judgement.coarse import outside
 from bench.discrepancy.multibody.encoders import input_of
 from bench.discrepancy.settings import ArticulatedJudgementSettings as JudgementSettings
-from bench.discrepancy.verdict import Estimate, NamedEffect, NominalEstimate, Ranked, Verdict, VerdictKind
+from bench.discrepancy.verdict import (
+    Estimate,
+    NamedEffect,
+    NominalEstimate,
+    Ranked,
+    Verdict,
+    VerdictKind,
+    by_name,
+)
 
 
 def verdict_of(
@@ -117,7 +125,8 @@ def _shares(
 def _words(
     kind: VerdictKind, effects: Sequence[NamedEffect], whole: bool, explained: float, left: str
 ) -> str:
-    names = " and ".join(f"{e.name} ({e.where})" for e in effects)
+    few = len(effects) <= 3
+    names = " and ".join(f"{e.name} ({e.where})" for e in effects) if few else by_name(effects)
     left = "" if whole else f" {left}"
     if kind == "none":
         return (

@@ -14,7 +14,7 @@ from bench.discrepancy.case.case import Case
 from bench.discrepancy.judgement.shares import closed_words, interval, probability
 from bench.discrepancy.judgement.validation_discrepancy import DIVERGED_GAP
 from bench.discrepancy.settings import DEFAULT, JudgementSettings
-from bench.discrepancy.verdict import Location, NamedEffect, Verdict
+from bench.discrepancy.verdict import Location, NamedEffect, Verdict, by_name
 
 
 @dataclass(frozen=True)
@@ -25,6 +25,8 @@ class AnswersSettings:
     """Share of the excess from which a place is named beside the first, where no effect says where it is."""
     places: int = 3
     """Most places that are named."""
+    effects: int = 3
+    """Effects that are told with their numbers, those that close most; of a robot with many the others are told by name."""
 
 
 SETTINGS = AnswersSettings()
@@ -104,8 +106,10 @@ def _place(location: Location) -> str:
 
 def _which(verdict: Verdict) -> str:
     if verdict.named:
-        called = [(_called(e, verdict), e) for e in verdict.named]
-        own = "; ".join(f"{name}: {estimates(e)}" if e.parameters else name for name, e in called)
+        first, others = verdict.named[: SETTINGS.effects], verdict.named[SETTINGS.effects :]
+        told = [(_called(e, verdict), e) for e in first]
+        parts = [f"{name}: {estimates(e)}" if e.parameters else name for name, e in told]
+        own = "; ".join((*parts, *([f"and of less weight {by_name(others)}"] if others else [])))
     elif verdict.verdict == "none":
         own = "no effect is missing"
     else:
@@ -131,10 +135,17 @@ def _how_far(verdict: Verdict, settings: JudgementSettings) -> str:
 
 def _how_sure(verdict: Verdict) -> str:
     own = f"probability of “{verdict.verdict}” {probability(verdict.probabilities.get(verdict.verdict))}"
+    first, others = verdict.named[: SETTINGS.effects], verdict.named[SETTINGS.effects :]
     parts = [
         f"{_called(e, verdict)} {probability(e.probability)}, without it {interval(e.closed, e.closed_ci95)} comes back"
-        for e in verdict.named
+        for e in first
     ]
+    if others:
+        odds = sorted(e.probability for e in others)
+        most = max(e.closed for e in others)
+        parts.append(
+            f"the {len(others)} others {probability(odds[0])} to {probability(odds[-1])}, up to {100.0 * most:.2g} % each"
+        )
     return "; ".join((own, *parts))
 
 

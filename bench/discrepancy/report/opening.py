@@ -13,7 +13,7 @@ from bench.discrepancy.report.answers import answers, next_steps
 from bench.discrepancy.report.interactive import histories, ranking_plot
 from bench.discrepancy.report.simulated_records import APPLIED
 from bench.discrepancy.settings import JudgementSettings
-from bench.discrepancy.verdict import Gap, InSimulator, Verdict
+from bench.discrepancy.verdict import Gap, InSimulator, NamedEffect, Verdict
 from bench.page import Page, Section
 from bench.recording import Recording
 
@@ -70,20 +70,29 @@ def opened(
     words.text(verdict.explanation)
     for warning in verdict.warnings:
         words.text(f"Note: {warning}.")
+    _parameters(words, verdict)
+    return page
+
+
+def _parameters(section: Section, verdict: Verdict) -> None:
+    """What is named or nearest with its parameters: laws of one name in a table."""
+    laws: dict[str, list[NamedEffect]] = {}
     for effect in (*verdict.named, *verdict.nearest):
-        place = f" ({effect.where})" if effect.where else ""
-        words.table(
-            f"{'' if verdict.named else 'Nearest: '}{effect.name}{place}: {effect.equation}",
-            ("parameter", "value", "one-sigma", "95 % interval", "unit"),
+        laws.setdefault(effect.name, []).append(effect)
+    for name, effects in laws.items():
+        place = f" ({effects[0].where})" if len(effects) == 1 and effects[0].where else ""
+        section.table(
+            f"{'' if verdict.named else 'Nearest: '}{name}{place}: {effects[0].equation}",
+            (*(("where",) if len(effects) > 1 else ()), "parameter", "value", "one-sigma", "95 % interval", "unit"),
             [
                 (
-                    key, f"{e.value:.4g}", f"{e.std:.2g}",
+                    *((effect.where,) if len(effects) > 1 else ()), key, f"{e.value:.4g}", f"{e.std:.2g}",
                     f"{e.value - 1.96 * e.std:.4g} to {e.value + 1.96 * e.std:.4g}", e.unit,
                 )
+                for effect in effects
                 for key, e in effect.parameters.items()
             ],
         )  # fmt: skip
-    return page
 
 
 def add_ranking(section: Section, verdict: Verdict) -> None:
