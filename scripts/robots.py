@@ -2,6 +2,7 @@
 
     python scripts/robots.py --data FOLDER                 FOLDER holds so101, ur10, tx40, … (formats: their own READMEs)
     python scripts/robots.py UR10 TX40 --data FOLDER
+    python scripts/robots.py --data FOLDER --picture docs/pictures/robots.png
 
 A row for every robot: the discrepancy (NRMSE of free runs of the judging records, worst joint) of the model as stated, what is named
 with the share that it closes, what is left, the noise floor, and seconds of the processor. Nothing is tuned to them; a robot that is
@@ -16,6 +17,7 @@ import tempfile
 import time
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import tyro
@@ -27,6 +29,7 @@ sys.path.insert(0, str(ROOT / "scripts"))
 
 from robot_records.case_folders import Records, write_folder  # noqa: E402
 from robot_records.free_run_errors import errors_of  # noqa: E402
+from robot_records.picture import draw, trace  # noqa: E402
 from robot_records.robots import ROBOTS  # noqa: E402
 
 from bench.discrepancy import read_case  # noqa: E402
@@ -46,6 +49,8 @@ class Args:
     """Folder of the records."""
     out: Path | None = None
     """Folder for the rows, one JSON file each; a robot that has one there is not diagnosed again."""
+    picture: Path | None = None
+    """File for a picture of what is measured, of the models and of what was named (.png, .svg, .pdf)."""
     json: bool = False
     """Print JSON."""
 
@@ -65,6 +70,7 @@ class Row:
         seconds: Processor time [s].
         known: What is published.
         nominal: Nominal parameters as re-estimated.
+        trace: What is drawn, see `robot_records.picture.trace`.
         further: Joint to the RMS errors [rad, m] of free runs of records that nothing was learned from, as stated and with what is named, a
             pair for every record.
     """
@@ -81,6 +87,7 @@ class Row:
     seconds: float
     known: str
     nominal: dict[str, float] = field(default_factory=dict)
+    trace: dict[str, Any] = field(default_factory=dict)
     further: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
 
 
@@ -105,7 +112,7 @@ def row_of(name: str, data: Path) -> Row:
         {label: {k: float(x.value) for k, x in e.parameters.items()} for label, e in zip(labels, verdict.named, strict=True)},
         verdict.gap.before, verdict.gap.after, verdict.gap.noise_floor,
         {g.dof: (g.before, g.after, g.noise_floor) for g in verdict.gaps}, verdict.complete, time.process_time() - began,
-        records.known, {one.name: one.value for one in verdict.nominal}, further,
+        records.known, {one.name: one.value for one in verdict.nominal}, trace(found), further,
     )  # fmt: skip
 
 
@@ -140,8 +147,11 @@ def main(args: Args) -> None:
         rows.append(row_of(name, args.data))
         if kept is not None:
             write_text(kept, json.dumps(json_values(asdict(rows[-1])), indent=1))
+    if args.picture is not None:
+        draw({row.robot: row.trace for row in rows if row.trace}, args.picture)
     if args.json:
-        print(json.dumps(json_values([asdict(row) for row in rows]), indent=1))
+        told = [{key: value for key, value in asdict(row).items() if key != "trace"} for row in rows]
+        print(json.dumps(json_values(told), indent=1))
         return
     shown = Table("robot", "verdict", "named (share)", "before", "after", "floor", "s", "known")
     for row in rows:
