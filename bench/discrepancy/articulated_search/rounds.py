@@ -271,6 +271,11 @@ def scale_of(problem: ArticulatedProblem, found: ArticulatedFit) -> Array:
     return problem.octaves.scale(np.array(left))
 
 
+def _begins(promised: Array, base: Array, untouched: Array, *, apart: bool) -> list[tuple[Array, ...]]:
+    """Vectors of which the one of least misfit is gone on from, those that the screening promised on their own where they are `apart`."""
+    return [(promised,), (base, untouched)] if apart else [(promised, base, untouched)]
+
+
 def _fits(
     problem: ArticulatedProblem,
     base: ArticulatedFit,
@@ -297,21 +302,17 @@ def _fits(
         # nominal parameters that stood in for what was missing are also tried where they were stated, and fitted from there:
         # a start of less misfit need not be the nearer one
         untouched = np.concatenate([np.zeros(len(problem.nominal)), base.vector[len(problem.nominal) :]])
+        # and every grid point may lie beside a minimum of its own: some steps from each tell which leads lower
         starts = [
-            np.array([np.concatenate([point.start, point.eta]) for point in mine]),
-            np.array([np.concatenate([at, point.eta]) for point in mine for at in (base.vector, untouched)]),
+            np.array([np.concatenate([at, point.eta]) for at in begins])
+            for point in mine
+            for begins in _begins(point.start, base.vector, untouched, apart=bool(moved))
         ]
+        steps = settings.iterations if len(starts) == 1 else settings.tried
         new = max(
             (
-                fit(
-                    problem,
-                    hypothesis,
-                    start,
-                    scale=base.scale,
-                    iterations=settings.iterations,
-                    others=others,
-                )
-                for start in (starts if moved else [np.vstack(starts)])
+                fit(problem, hypothesis, start, scale=base.scale, iterations=steps, others=others)
+                for start in starts
             ),
             key=lambda f: f.log_posterior,
         )

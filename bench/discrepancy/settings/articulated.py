@@ -29,6 +29,11 @@ class ArticulatedSearchSettings:
     )
     starts: int = setting(2, "Grid points from which one effect is fitted.", "Convention.")
     iterations: int = setting(20, "Steps of a fit.", "Convention.")
+    tried: int = setting(
+        3,
+        "Steps from each of several starts of one effect, the best of which is gone on from.",
+        "A fit gains most in its first steps; another basin shows in them.",
+    )
     refits: int = setting(
         6,
         "Fits of one hypothesis, each with the scales that the last one left, at most.",
