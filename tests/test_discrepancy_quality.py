@@ -284,7 +284,7 @@ BROKEN: dict[str, tuple[dict, str]] = {
     "nan": ({"validation": HEADER + rows(cell="nan")}, "values are lost"),
     "ragged": ({"validation": HEADER + "0,1\n0.1,2,3,4\n"}, "4 columns at line 2"),
     "more names than columns": ({"validation": HEADER + "0,1,2\n" * 300}, "4 names over 3 columns"),
-    "short": ({"validation": HEADER + rows(20)}, "at least 64"),
+    "short": ({"validation": HEADER + rows(20)}, "at least 32"),
     "short for a structure": ({"validation": HEADER + rows(100)}, "100 samples; at least 200"),
     "clock that stands": ({"validation": HEADER + rows(step=0.0)}, "stands still"),
     "binary": ({"identification": "\x00\x01"}, "identification.csv"),
