@@ -22,7 +22,7 @@ from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.model.mjcf_file import rig_of
 from bench.discrepancy.multibody.channels import bound
-from bench.discrepancy.multibody.encoders import input_of
+from bench.discrepancy.multibody.inputs import input_of
 from bench.discrepancy.multibody.joint_record import JOINT_RECORD_SETTINGS
 from bench.discrepancy.multibody.joints import Joint, body_name
 from bench.discrepancy.multibody.model import ArticulatedModel

@@ -78,7 +78,7 @@ class Records:
         known: What is published or was seen of the robot, a sentence.
         most: Most effects named together.
         loads: Loads besides the drives.
-        further: Tables that do not find, on which the model is run as stated and with what was named; beginnings of some may judge.
+        further: Tables that do not find, on which the model is run as stated and with what was named.
     """
 
     model: str

@@ -20,7 +20,8 @@ from bench.discrepancy.checks.nominal_values import value_notes
 from bench.discrepancy.model.mjcf_file import rig_of
 from bench.discrepancy.model.mjcf_units import expected_units
 from bench.discrepancy.multibody.channels import bound
-from bench.discrepancy.multibody.encoders import encoders_of, input_of, loads_of
+from bench.discrepancy.multibody.encoders import encoders_of
+from bench.discrepancy.multibody.inputs import input_of, loads_of
 from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.multibody.motion import motion_of
 from bench.discrepancy.multibody.nominal_values import with_nominal_values

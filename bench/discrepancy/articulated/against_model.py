@@ -15,7 +15,8 @@ from bench.arrays import Array
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.checks.bands import bands_between, common_factor, compare_channels, spectra
 from bench.discrepancy.checks.scales import grossly_apart, model_words, pair_words, shown_noise, suggestion
-from bench.discrepancy.multibody.encoders import encoders_of, input_of, load_on
+from bench.discrepancy.multibody.encoders import encoders_of
+from bench.discrepancy.multibody.inputs import input_of, load_on
 from bench.discrepancy.multibody.joints import Joint
 from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.multibody.motion import JointMotion, Moving

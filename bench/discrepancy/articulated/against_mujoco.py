@@ -15,7 +15,7 @@ from bench.arrays import Array
 from bench.discrepancy.articulated.against_model import needed
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.checks.like_mujoco import ITEMS
-from bench.discrepancy.multibody.encoders import input_of, inputs_of, load_on
+from bench.discrepancy.multibody.inputs import input_of, inputs_of, load_on
 from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.multibody.motion import JointMotion, Moving
 from bench.discrepancy.settings import LikenessSettings

@@ -108,41 +108,41 @@ def _explained(
     judging = question.judging.softened(problem.softness)
     judged_by = asked_as(problem, judging)
     question.progress("judging records")
-    rungs, last, predictions, more = kept(problem, judged_by, fits, judged)
-    fits, floor = [*fits, *more], predictions[0].floor
-
-    def asked(final: ArticulatedFit, predicted: PredictedErrors) -> tuple[_Left, set[EffectKeys]]:
-        left = _left(problem, judging, judged_by, final, predicted, stated=question.stated)
-        return left, set() if left.whole else alike(judged_by, fits, final, predicted, judged)
-
-    left, near = asked(rungs[last], predictions[last])
-    if not left.whole and problem.deadline.allows("dry friction in the place of what is named"):
-        fits = [*fits, *_with_dry_friction(problem, candidates, rungs[last])]
-        left, near = asked(rungs[last], predictions[last])
-    final = simplest(fits, rungs[last], near)
-    if final is not rungs[last]:
-        fits = [*fits, *predecessors(problem, final, fits)]
-        rungs = ladder([final, *fits])
-        last, predictions = len(rungs) - 1, [predict(judged_by, rung, floor, judged) for rung in rungs]
-        left, near = asked(final, predictions[last])
+    climbed = kept(problem, judged_by, fits, judged)
+    fits, floor = [*fits, *climbed.fits], climbed.predictions[0].floor
+    rungs = climbed.rungs[: climbed.last + 1]
+    predictions, near = climbed.predictions[: len(rungs)], set[EffectKeys]()
+    left = _left(problem, judged_by, rungs[-1], predictions[-1], stated=question.stated)
+    if not left.whole:
+        fits += _with_dry_friction(problem, candidates, rungs[-1])
+        near = alike(judged_by, fits, rungs[-1], predictions[-1], judged)
+        plain = simplest(fits, rungs[-1], near)
+        if plain is not rungs[-1]:
+            fits += predecessors(problem, plain, fits)
+            rungs = ladder([plain, *fits])
+            predictions = [predict(judged_by, rung, floor, judged) for rung in rungs]
+            left = _left(problem, judged_by, plain, predictions[-1], stated=question.stated)
+            near = alike(judged_by, fits, plain, predictions[-1], judged)
     verdict = verdict_of(
-        problem, fits, rungs, last, predict(judged_by, None, floor, judged), predictions,
-        without_each(judged_by, fits, final, floor, judged), judged, rng,
-        whole=left.whole, left=left_of(problem, final, left.coloured, left.astray), alike=near,
+        problem, fits, rungs, predict(judged_by, None, floor, judged), predictions,
+        without_each(judged_by, fits, rungs[-1], floor, judged), judged, rng,
+        whole=left.whole, left=left_of(problem, rungs[-1], left.coloured, left.astray), alike=near,
     )  # fmt: skip
-    return Explained(problem, judging, fits, final, predictions, verdict, near)
+    return Explained(problem, judging, fits, rungs[-1], predictions, verdict, near)
 
 
 def _with_dry_friction(
     problem: ArticulatedProblem, candidates: Sequence[PlacedOnJoint], final: ArticulatedFit
 ) -> list[ArticulatedFit]:
-    """An explanation with dry friction in the place of each law of several parameters at a joint that has none.
+    """An explanation with dry friction in the place of each law of several parameters at a joint that has none, while there is time.
 
     It is what joints have most, and what a law with more to fit imitates first; the search may never have held the two side by side.
     """
+    laws = [p for p in final.hypothesis if p.effect.site == "joint" and p.effect.free > 1]
+    if not laws or not problem.deadline.allows("dry friction in the place of what is named"):
+        return []
     dry = {p.joint: p for p in candidates if p.effect.name == "coulomb_friction"}
     taken = {placed.joint for placed in final.hypothesis if placed.effect.name == "coulomb_friction"}
-    laws = [p for p in final.hypothesis if p.effect.site == "joint" and p.effect.free > 1]
     return [exchanged(problem, final, p, dry[p.joint]) for p in laws if p.joint in dry.keys() - taken]
 
 
@@ -157,19 +157,19 @@ class _Left(NamedTuple):
 def _left(
     problem: ArticulatedProblem,
     judging: ArticulatedProblem,
-    judged_by: ArticulatedProblem,
     final: ArticulatedFit,
     predicted: PredictedErrors,
     *,
     stated: bool,
 ) -> _Left:
-    judged = problem.settings.articulated.judgement
-    left = coloured(judging, final, judged)
-    lost = astray(judging, final, predicted, judged) if judged_by is judging else None
+    """What is left of records for judging that are asked as the problem is: by runs, or by the torque, which is never all of it."""
+    judged, runs = problem.settings.articulated.judgement, not isinstance(problem, TorqueProblem)
+    left = coloured(judging, final, judged) if runs else None
+    lost = astray(judging, final, predicted, judged) if runs else None
     # power above the noise at some frequencies shows that what is named is not all; where nothing is named it is no evidence that
     # something is missing, which takes an effect that predicts the judging records better
     noise_alone = lost is None and (left is None or not final.hypothesis) and complete(problem, final, judged)
-    return _Left(left, lost, noise_alone and stated and judged_by is judging)
+    return _Left(left, lost, noise_alone and stated and runs)
 
 
 def _asks_torque(found: Explained) -> bool:

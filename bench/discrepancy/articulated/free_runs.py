@@ -14,7 +14,8 @@ from scipy.interpolate import CubicSpline
 from bench.arrays import Array
 from bench.discrepancy.articulated_search.hypothesis import JointHypothesis
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
-from bench.discrepancy.multibody.encoders import input_of, noise_of_loads, travel
+from bench.discrepancy.multibody.encoders import travel
+from bench.discrepancy.multibody.inputs import input_of, noise_of_loads
 from bench.discrepancy.multibody.joint_forces import Slot
 from bench.discrepancy.multibody.motion import clock_of
 from bench.discrepancy.multibody.noise import NoiseDraw, NoiseSettings, draw

@@ -19,7 +19,7 @@ from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.hypothesis import placed_values
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.judgement.coarse import outside
-from bench.discrepancy.multibody.encoders import input_of
+from bench.discrepancy.multibody.inputs import input_of
 from bench.discrepancy.settings import ArticulatedJudgementSettings as JudgementSettings
 from bench.discrepancy.verdict import (
     Estimate,
@@ -36,7 +36,6 @@ def verdict_of(
     problem: ArticulatedProblem,
     fits: Sequence[ArticulatedFit],
     rungs: Sequence[ArticulatedFit],
-    last: int,
     untouched: PredictedErrors,
     predictions: Sequence[PredictedErrors],
     without: Sequence[PredictedErrors | None],
@@ -52,23 +51,22 @@ def verdict_of(
     Args:
         problem: Records for identification.
         fits: All fitted hypotheses, the likeliest first.
-        rungs: The best with its predecessors, the nominal model alone first.
-        last: The rung that the judging records bear out.
+        rungs: What the judging records bear out with its predecessors, the nominal model alone first.
         untouched: What the nominal model as stated predicts of them.
         predictions: What every rung does.
-        without: What the rung that is borne out predicts without one of its effects after the other.
+        without: What the last rung predicts without one of its effects after the other.
         settings: Thresholds.
         rng: For the bootstrap intervals.
-        whole: Whether the rung that is borne out leaves nothing but noise.
+        whole: Whether the last rung leaves nothing but noise.
         left: What it leaves, in words.
         alike: Explanations that predict the judging records as well, see `judgement.alike`.
     """
-    final, base = rungs[last], rungs[0]
-    explained = closed_of_nominal(untouched, predictions[0], predictions[last], rng)
-    kind: VerdictKind = "effect" if last else "none"
-    if not whole and (not last or explained < settings.material):
+    final, base = rungs[-1], rungs[0]
+    explained = closed_of_nominal(untouched, predictions[0], predictions[-1], rng)
+    kind: VerdictKind = "effect" if final.hypothesis else "none"
+    if not whole and (not final.hypothesis or explained < settings.material):
         kind = "unknown"
-    shares = _shares(predictions[: last + 1], without, rng)
+    shares = _shares(predictions, without, rng)
     # of what is named beside noise, the part that is left tells how likely something outside the catalogue is
     foreign = settings.outside
     if kind == "effect" and not whole:
@@ -80,7 +78,7 @@ def verdict_of(
         _named(problem, final, k, shares[k], sure[placed.key]) for k, placed in enumerate(final.hypothesis)
     )
     effects = tuple(sorted(effects, key=lambda e: -e.closed))
-    gaps = gaps_of(problem, rungs[: last + 1], untouched, predictions[: last + 1], rng)
+    gaps = gaps_of(problem, rungs, untouched, predictions, rng)
     widest = max(gaps, key=lambda gap: gap.before / max(gap.noise_floor, 1e-12))
     return Verdict(
         verdict=kind,
@@ -100,7 +98,7 @@ def verdict_of(
         ),
         warnings=(),
         complete=whole,
-        remainder=remainder_of(problem, final, predictions[last], untouched),
+        remainder=remainder_of(problem, final, predictions[-1], untouched),
         nominal=_nominal(problem, final),
     )
 

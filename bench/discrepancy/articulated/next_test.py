@@ -21,7 +21,8 @@ from bench.discrepancy.articulated.free_runs import FreeRuns
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.case.case import CaseRecord
-from bench.discrepancy.multibody.encoders import encoders_of, input_of, loads_of
+from bench.discrepancy.multibody.encoders import encoders_of
+from bench.discrepancy.multibody.inputs import input_of, loads_of
 from bench.discrepancy.multibody.records import prepare
 from bench.discrepancy.settings import ArticulatedNextTestSettings as NextTestSettings
 

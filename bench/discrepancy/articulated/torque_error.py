@@ -33,7 +33,7 @@ from bench.arrays import Array
 from bench.discrepancy.articulated_search.hypothesis import JointHypothesis, PlacedOnJoint, base_slots
 from bench.discrepancy.articulated_search.misfit import Octaves
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
-from bench.discrepancy.multibody.encoders import input_of
+from bench.discrepancy.multibody.inputs import input_of
 from bench.discrepancy.multibody.joint_forces import Slot
 from bench.discrepancy.multibody.joint_torque import missing_torque
 from bench.discrepancy.multibody.motion import clock_of
@@ -132,9 +132,19 @@ class TorqueProblem(ArticulatedProblem):
             p, (inertia, bias, record.load), record.servo_command, record.step, motion, still,
             self.beside(j, hypothesis, record),
         )  # fmt: skip
-        steps = self.intervals[r] * record.n_sub
-        whole = torque[: len(torque) // steps * steps].reshape(-1, steps)
-        return np.asarray(whole.mean(axis=1) / part)
+        return self.means(r, torque) / part
+
+    def means(self, r: int, samples: Array) -> Array:
+        """Means (n_intervals,) of what is known at the steps (n_steps,) of record `r`."""
+        steps = self.intervals[r] * self.records[r].joints[0].n_sub
+        return np.asarray(samples[: len(samples) // steps * steps].reshape(-1, steps).mean(axis=1))
+
+    def logged(self, j: int, r: int) -> Array:
+        """Mean torque (n_intervals,) of the drive of joint `j` in record `r`, by its logged input."""
+        prepared, drive = self.records[r], self.joints[j].drive
+        assert drive is not None
+        position, velocity, _ = self.moved(prepared)[j].T
+        return self.means(r, drive.torque(prepared.joints[j].command, position, velocity))
 
     def residuals(self, j: int, hypothesis: JointHypothesis, vector: Array) -> list[Array]:
         """Missing torque (n_intervals, 1) of joint `j` over that of noise, in every record."""

@@ -13,7 +13,7 @@ import numpy as np
 from bench.arrays import Array
 from bench.discrepancy.articulated.torque_error import TorqueProblem
 from bench.discrepancy.articulated_search.hypothesis import JointHypothesis
-from bench.discrepancy.multibody.encoders import input_of
+from bench.discrepancy.multibody.inputs import input_of
 from bench.discrepancy.multibody.records import PreparedRecord
 
 

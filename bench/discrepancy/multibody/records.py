@@ -17,15 +17,8 @@ from scipy.signal import butter, sosfiltfilt
 from bench.arrays import Array
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.multibody.body_terms import body_terms
-from bench.discrepancy.multibody.encoders import (
-    TRUE,
-    Encoder,
-    encoders_of,
-    input_of,
-    load_on,
-    noise_of_loads,
-    weights_of,
-)
+from bench.discrepancy.multibody.encoders import TRUE, Encoder, encoders_of, weights_of
+from bench.discrepancy.multibody.inputs import input_of, load_on, noise_of_loads
 from bench.discrepancy.multibody.joint_record import JointRecord
 from bench.discrepancy.multibody.model import ArticulatedModel, Dynamics
 from bench.discrepancy.multibody.motion import Coefficients, JointClock, JointMotion, clock_of, motion_of
@@ -93,13 +86,13 @@ def prepare(
         stated = 0.0 if drive.servo else (channel.noise_std or 0.0) * abs(drive.gear * drive.kp)
         stated = float(np.hypot(stated, noise_of_loads(case, joint)))
         raw = JointRecord(
-                joint, record.step / clock.n_sub, clock.n_sub, base.inertia[j] + joint.armature, base.bias[j], slope[j],
-                base.reference[j], base.load[j], _between(case, record.values[channel.name], clock), *_measured(motion, j),
-                encoders_of(case, joint).channels[0].side, float(np.hypot(stated, process[j])),
-                {b: terms.of_joint(j) for b, terms in bodies.items()}, {b: c[j] for b, c in payloads.items()},
-                {b: np.ascontiguousarray(c[:, j]) for b, c in centres.items()}, {b: c[j] for b, c in weights.items()},
-                beside_of(model, j, speeds), record.step, np.ones((len(record), len(motion.noise[j]))),
-            )  # fmt: skip
+            joint, record.step / clock.n_sub, clock.n_sub, base.inertia[j] + joint.armature, base.bias[j], slope[j],
+            base.reference[j], base.load[j], _between(case, record.values[channel.name], clock), *_measured(motion, j),
+            encoders_of(case, joint).channels[0].side, float(np.hypot(stated, process[j])),
+            {b: terms.of_joint(j) for b, terms in bodies.items()}, {b: c[j] for b, c in payloads.items()},
+            {b: np.ascontiguousarray(c[:, j]) for b, c in centres.items()}, {b: c[j] for b, c in weights.items()},
+            beside_of(model, j, speeds), record.step, np.ones((len(record), len(motion.noise[j]))),
+        )  # fmt: skip
         joints.append(replace(raw, weight=weights_of(case, record, joint, raw.innovation)))
     return PreparedRecord(record, motion, tuple(joints))
 

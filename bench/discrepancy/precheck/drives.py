@@ -11,7 +11,8 @@ import numpy as np
 from bench.arrays import Array
 from bench.discrepancy.articulated.against_model import asked_input
 from bench.discrepancy.case.case import Case, CaseRecord
-from bench.discrepancy.multibody.encoders import encoders_of, input_of
+from bench.discrepancy.multibody.encoders import encoders_of
+from bench.discrepancy.multibody.inputs import input_of
 from bench.discrepancy.multibody.joints import Joint
 from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.multibody.motion import motion_of

@@ -13,7 +13,8 @@ from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.checks.channel_comparison import compare_channels
 from bench.discrepancy.model.mjcf_file import rig_of
 from bench.discrepancy.multibody.channels import bound
-from bench.discrepancy.multibody.encoders import encoders_of, input_of
+from bench.discrepancy.multibody.encoders import encoders_of
+from bench.discrepancy.multibody.inputs import input_of
 from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.precheck.positions import position_doubts
 from bench.errors import BenchError, RecordingError

@@ -28,7 +28,7 @@ from bench.discrepancy.case.schema import NominalDocument
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.multibody.channels import bound
-from bench.discrepancy.multibody.encoders import input_of
+from bench.discrepancy.multibody.inputs import input_of
 from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.next_test.feasible_excitations import RigLimits, candidates, shapes
 from bench.discrepancy.precheck.information import Told, effects_told, parameters_told

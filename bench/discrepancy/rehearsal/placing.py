@@ -18,7 +18,7 @@ from bench.discrepancy.judgement.posterior import named_effect
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placements import placements
 from bench.discrepancy.model.rigs import structure_of
-from bench.discrepancy.multibody.encoders import input_of
+from bench.discrepancy.multibody.inputs import input_of
 from bench.discrepancy.precheck import information, joint_information
 from bench.discrepancy.precheck.joints import admitted_joints
 from bench.discrepancy.precheck.settings import CheckSettings

@@ -21,7 +21,8 @@ from bench.discrepancy.articulated.recognition import applies
 from bench.discrepancy.case.case import Case, CaseChannel, CaseRecord
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.multibody.channels import bound
-from bench.discrepancy.multibody.encoders import TRUE, Encoder, encoders_of, inputs_of
+from bench.discrepancy.multibody.encoders import TRUE, Encoder, encoders_of
+from bench.discrepancy.multibody.inputs import inputs_of
 from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.replay.joint_replay import encoders_wrong
 from bench.discrepancy.replay.linear_replay import LinearReplay

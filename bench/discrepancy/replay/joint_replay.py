@@ -21,7 +21,8 @@ from bench.discrepancy.application.target import PREFIX, as_mujoco
 from bench.discrepancy.articulated_search.catalogue import CATALOGUE
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.multibody.channels import bound
-from bench.discrepancy.multibody.encoders import Encoder, inputs_of, travel
+from bench.discrepancy.multibody.encoders import Encoder, travel
+from bench.discrepancy.multibody.inputs import inputs_of
 from bench.discrepancy.multibody.joint_record import JOINT_RECORD_SETTINGS
 from bench.discrepancy.multibody.joints import Joint
 from bench.discrepancy.multibody.model import ArticulatedModel

@@ -89,19 +89,15 @@ def judged_torques(diagnosis: ArticulatedDiagnosis) -> dict[str, Recording]:
     """
     problem = TorqueProblem.like(diagnosis.judging)
     prepared, n = problem.records[0], problem.intervals[0]
-    drives = [joint.drive for joint in problem.joints]
-    columns = []
-    for drive, record in zip(drives, prepared.joints, strict=True):
-        torque = record.command * (drive.gear * drive.kp if drive else 0.0)
-        columns.append(torque[: len(torque) // n * n].reshape(-1, n).mean(axis=1))
-    logged = np.column_stack(columns)
+    joints = range(len(problem.joints))
+    logged = np.column_stack([problem.logged(j, 0) for j in joints])
     time = prepared.record.time[0] + (np.arange(len(logged)) + 0.5) * n * prepared.record.step
     runs = {MEASURED: logged}
     for label, hypothesis, vector in (
         (NOMINAL, (), np.zeros(len(problem.nominal))), (FINAL, diagnosis.final.hypothesis, diagnosis.final.vector),
     ):  # fmt: skip
         moved = problem.motions(hypothesis, vector)[0]
-        missing = [problem.missing(j, hypothesis, vector, 0, moved) for j in range(len(problem.joints))]
+        missing = [problem.missing(j, hypothesis, vector, 0, moved) for j in joints]
         runs[label] = logged - np.column_stack(missing)
     names = {j.name: "N m" if j.unit == "rad" else "N" for j in problem.joints}
     return {
