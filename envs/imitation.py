@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import torch
-from stable_baselines3 import PPO, SAC
+from numpy.typing import NDArray
+from sb3_contrib import RecurrentPPO
+from stable_baselines3 import SAC
 from stable_baselines3.common.vec_env import VecNormalize
+from torch import Tensor
+from torch.nn.utils.rnn import pad_sequence
 
 from .base import setup_of
 from .feedback import Feedback, braked_design, pump
-from .policy_export import layers
+from .policy_export import Learner, layers
 from .sb3 import KINDS
 from .scheduled import scheduled
 from .training_plan import SETTINGS, TASKS, TrainingPlan
@@ -27,7 +32,7 @@ def first_feedback(plan: TrainingPlan) -> Feedback:
     return start if plan.start == "pump" else replace(start, schedule=np.zeros_like(start.schedule))
 
 
-def imitate(model: PPO | SAC, env: VecNormalize, feedback: Feedback, *, seed: int) -> None:
+def imitate(model: Learner, env: VecNormalize, feedback: Feedback, *, seed: int) -> None:
     """Fit a model's mean action to a feedback's corrections, and the statistics of the observations to what it meets.
 
     Args:
@@ -37,23 +42,57 @@ def imitate(model: PPO | SAC, env: VecNormalize, feedback: Feedback, *, seed: in
         seed: Seed of the tests.
     """
     venv, rng = scheduled(env), np.random.default_rng(seed)
-    seen, told = [], []
-    observation = venv.reset()
+    seen, told, begun = [], [], []
+    observation, start = venv.reset(), np.ones(venv.num_envs, dtype=bool)
     for _ in range(SETTINGS.episodes * feedback.station.n_windows):
         wanted = feedback.correction(observation)
         seen.append(observation)
         told.append(wanted)
-        observation = np.asarray(venv.step(wanted + SETTINGS.noise * rng.standard_normal(wanted.shape))[0])
-    x, y = np.concatenate(seen), np.concatenate(told)
-    env.obs_rms.update(x)  # type: ignore[union-attr]
+        begun.append(start)
+        observation, _, start, _ = venv.step(wanted + SETTINGS.noise * rng.standard_normal(wanted.shape))
+        observation = np.asarray(observation)
+    x, y = np.stack(seen), np.stack(told)
+    env.obs_rms.update(x.reshape(-1, x.shape[-1]))  # type: ignore[union-attr]
     y = np.arctanh(np.clip(y, -0.96, 0.96)) if isinstance(model, SAC) else y
-    target = torch.as_tensor(y, dtype=torch.float32)
     inputs = torch.as_tensor(np.asarray(env.normalize_obs(x)), dtype=torch.float32)
+    target = torch.as_tensor(y, dtype=torch.float32)
+    if isinstance(model, RecurrentPPO):
+        _imitate_tests(model, _tests(inputs, target, np.stack(begun)), rng)
+    else:
+        _imitate_windows(model, inputs.flatten(0, 1), target.flatten(0, 1), rng)
+
+
+def _imitate_windows(model: Learner, inputs: Tensor, target: Tensor, rng: np.random.Generator) -> None:
     network = torch.nn.Sequential(*layers(model))
     optimiser = torch.optim.Adam(network.parameters(), lr=2e-3)
     for _ in range(1500):
-        rows = torch.as_tensor(rng.integers(len(x), size=512))
+        rows = torch.as_tensor(rng.integers(len(inputs), size=512))
         loss = torch.nn.functional.mse_loss(network(inputs[rows]), target[rows])
+        optimiser.zero_grad()
+        loss.backward()
+        optimiser.step()
+
+
+def _tests(inputs: Tensor, target: Tensor, begun: NDArray[np.bool_]) -> list[tuple[Tensor, Tensor]]:
+    """What was seen and told in each test ``(n_windows, …)``; a limit switch ends some early."""
+    tests = []
+    for place in range(begun.shape[1]):
+        edges = [*np.flatnonzero(begun[:, place]).tolist(), len(begun)]
+        tests += [(inputs[a:b, place], target[a:b, place]) for a, b in pairwise(edges)]
+    return tests
+
+
+def _imitate_tests(model: RecurrentPPO, tests: list[tuple[Tensor, Tensor]], rng: np.random.Generator) -> None:
+    """The same through the memory, over whole tests."""
+    memory, network = model.policy.lstm_actor, torch.nn.Sequential(*layers(model))
+    assert isinstance(memory, torch.nn.LSTM)
+    optimiser = torch.optim.Adam([*memory.parameters(), *network.parameters()], lr=2e-3)
+    for _ in range(300):
+        rows = rng.integers(len(tests), size=48)
+        x, y = (pad_sequence([tests[i][side] for i in rows]) for side in (0, 1))
+        lengths = torch.as_tensor([len(tests[i][0]) for i in rows])
+        counts = torch.arange(len(x))[:, None] < lengths
+        loss = torch.nn.functional.mse_loss(network(memory(x)[0])[counts], y[counts])
         optimiser.zero_grad()
         loss.backward()
         optimiser.step()

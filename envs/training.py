@@ -20,16 +20,18 @@ import numpy as np
 import torch
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
+from sb3_contrib import RecurrentPPO
 from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecNormalize
 
 from bench.errors import FileFormatError
+from bench.excitation.acting import ActingPolicy
 from bench.excitation.policy import Policy
 from bench.files import replacing, together, write_bytes, write_text
 
 from .imitation import first_feedback, imitate
-from .policy_export import export
+from .policy_export import Learner, export
 from .practice_vector import PracticeVectorEnv
 from .sb3 import KINDS, BenchVecEnv
 from .scheduled import Scheduled, scheduled
@@ -49,7 +51,12 @@ class Score(NamedTuple):
 
 
 def evaluate(
-    policy: Policy, task: str, *, n: int = 96, seed: int = SETTINGS.held_out, reward: str = "information"
+    policy: ActingPolicy,
+    task: str,
+    *,
+    n: int = 96,
+    seed: int = SETTINGS.held_out,
+    reward: str = "information",
 ) -> Score:
     """Run a policy for one test on each of `n` held-out rigs (practice benches).
 
@@ -70,8 +77,9 @@ def evaluate(
     merit, cost, violated, windows = np.zeros(n), np.zeros(n), 0, 0
     stopped = np.zeros(n, dtype=bool)
     certain = np.full(n, benches.station.duration)
+    memory = policy.memory(n)
     for window in range(benches.n_windows):
-        outcome = benches.step(np.arange(n), policy.act(observation))
+        outcome = benches.step(np.arange(n), policy.act(observation, memory))
         observation = outcome.observation
         merit = np.where(alive, outcome.info["merit"], merit)
         cost += np.where(alive, outcome.info["cost"], 0.0)
@@ -103,7 +111,7 @@ def _environment(plan: TrainingPlan, schedule: NDArray[np.float32]) -> VecNormal
     return VecNormalize(Scheduled(env, schedule), gamma=plan.discount)
 
 
-def _model(plan: TrainingPlan, env: VecNormalize) -> PPO | SAC:
+def _model(plan: TrainingPlan, env: VecNormalize) -> Learner:
     def rate(left: float) -> float:
         return plan.learning_rate * max(left, 0.1)
 
@@ -123,10 +131,15 @@ def _model(plan: TrainingPlan, env: VecNormalize) -> PPO | SAC:
     kwargs = {"net_arch": {"pi": units, "vf": [64, 64]}, "log_std_init": SETTINGS.log_std}
     episode = scheduled(env).station.n_windows
     n_steps = min(episode, max(1, plan.evaluate_every // plan.n_envs))
-    return PPO(
-        "MlpPolicy", env, n_steps=n_steps, batch_size=max(64, n_steps * plan.n_envs // 8), n_epochs=8, clip_range=0.2,
-        target_kl=0.04, gae_lambda=SETTINGS.gae_lambda, policy_kwargs=kwargs, **common,
-    )  # fmt: skip
+    common |= {"n_steps": n_steps, "clip_range": 0.2, "target_kl": 0.04, "gae_lambda": SETTINGS.gae_lambda}
+    if plan.memory:
+        kwargs["lstm_hidden_size"] = plan.memory
+        batch = max(64, n_steps * plan.n_envs // 4)
+        return RecurrentPPO(
+            "MlpLstmPolicy", env, batch_size=batch, n_epochs=4, policy_kwargs=kwargs, **common
+        )
+    batch = max(64, n_steps * plan.n_envs // 8)
+    return PPO("MlpPolicy", env, batch_size=batch, n_epochs=8, policy_kwargs=kwargs, **common)
 
 
 class _Watch(BaseCallback):
@@ -198,7 +211,7 @@ class Trainer:
             self._spent = self.curve[-1].seconds
             fresh = _environment(plan, np.load(folder / "schedule.npy"))
             self.env = VecNormalize.load(str(folder / "statistics.pkl"), scheduled(fresh))
-            kind = SAC if plan.algorithm == "sac" else PPO
+            kind = SAC if plan.algorithm == "sac" else RecurrentPPO if plan.memory else PPO
             self.model = kind.load(folder / "model.zip", env=self.env, device="cpu")
             return
         feedback = first_feedback(plan)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 from bench.errors import ParameterError, UnknownNameError
@@ -51,6 +52,7 @@ class TrainingPlan:
         seed: Seed of rigs, noise, network and exploration.
         n_envs: Benches side by side.
         network: Units of the hidden layers.
+        memory: Units of a long short-term memory before them, which keeps the record; none by default.
         start: What is imitated before, see `envs.feedback`: "pump", "design", or "nothing".
         reward: "practice" (merit at each rig) or "error" (expected error at each rig, which has a background), see `envs.practice`; or
             the registered environment with the merit's "prior" or "posterior" average.
@@ -66,6 +68,7 @@ class TrainingPlan:
     seed: int = 0
     n_envs: int = 192
     network: tuple[int, ...] = (64, 64)
+    memory: int = 0
     start: str = "pump"
     reward: str = "practice"
     learning_rate: float = 4e-4
@@ -87,6 +90,10 @@ class TrainingPlan:
             raise ParameterError(
                 f"reward \"error\" came with task '{self.task}', in which nothing is identified; sdof or joint is expected"
             )
+        if self.memory < 0 or (self.memory and self.algorithm != "ppo"):
+            raise ParameterError(
+                f"a memory of {self.memory} units came with algorithm '{self.algorithm}'; one of none or more with \"ppo\" is expected"
+            )
         if min(self.steps, self.n_envs, self.evaluate_every, self.n_held_out, *self.network) < 1:
             raise ParameterError(f"{self} has a number below one; steps, benches and units are positive")
 
@@ -94,3 +101,42 @@ class TrainingPlan:
     def scored(self) -> str:
         """The reward by which policies are scored on held-out rigs."""
         return "error" if self.reward == "error" else "information"
+
+
+@dataclass(frozen=True)
+class PlanTraining:
+    """What to train and how.
+
+    Attributes:
+        task: "sdof" or "joint".
+        decisions: Times of decisions, as shares of the test.
+        plans: Plans that each decision is among.
+        rigs: Rigs of each hypothesis on which all of them are tried.
+        evaluations: Signals that the search for the opening weighs.
+        generations: Generations of the search for each plan, see `bench.excitation.Planner`.
+        steps: Steps of the network's training, for each decision.
+        seed: Seed of rigs, searches, noise and network.
+    """
+
+    task: str = "sdof"
+    decisions: tuple[float, ...] = (0.2, 0.4)
+    plans: int = 240
+    rigs: int = 1200
+    evaluations: int = 1600
+    generations: int = 16
+    steps: int = 6000
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "decisions", tuple(self.decisions))
+        if self.task not in ("sdof", "joint"):
+            raise ParameterError(
+                f"plans came with task '{self.task}', in which nothing is identified; sdof or joint is expected"
+            )
+        ordered = (0.0, *self.decisions, 1.0)
+        if any(a >= b for a, b in pairwise(ordered)):
+            raise ParameterError(
+                f"decisions at {self.decisions} came; ascending shares of the test between 0 and 1 are expected"
+            )
+        if min(self.plans, self.rigs, self.evaluations, self.generations, self.steps) < 1:
+            raise ParameterError(f"{self} has a number below one; plans, rigs and steps are positive")

@@ -18,6 +18,7 @@ from capability_figures import (
     reproduction,
     rewards,
     training,
+    training_plans,
 )
 from diagnosis_figures import (
     applied,
@@ -227,6 +228,9 @@ CAPABILITIES: Sequence[Capability] = (
     _excitation_task(
         "sdof", "Excitation on the SDOF rig: trained policy against the baselines, held-out rigs"
     ),
+    _excitation_task(
+        "joint", "Excitation of the joint with two loads: trained policy against the baselines, held-out rigs"
+    ),
     _excitation_task("rivals", "Excitation that tells rivals apart: trained policy against the baselines"),
     Capability(
         "rewards",
@@ -246,13 +250,21 @@ CAPABILITIES: Sequence[Capability] = (
         Capability(
             f"training_{task}",
             f"Training from scratch of the policy `{task}`",
-            ("python", "scripts/train_excitation.py", task, *options, "--fresh", "--json"),
-            training,
+            ("python", "scripts/train_plans.py", task, "--fresh", "--json"),
+            training_plans,
+            hours=True,
         )
-        for task, options in (
-            ("sdof", ()),
-            ("rivals", ("--steps", "2000000", "--n-envs", "96", "--discount", "0.98")),
-        )
+        for task in ("sdof", "joint")
+    ),
+    Capability(
+        "training_rivals",
+        "Training from scratch of the policy `rivals`",
+        (
+            *("python", "scripts/train_excitation.py", "rivals", "--memory", "64", "--steps", "9000000"),
+            *("--n-envs", "96", "--discount", "0.98", "--fresh", "--json"),
+        ),
+        training,
+        hours=True,
     ),
     Capability(
         "memory_joint",

@@ -122,12 +122,13 @@ def memory_joint(told: Any) -> Figures:
 
 def excitation(told: Any) -> Figures:
     """Methods of excitation beside the best open-loop one."""
-    # to certainty in half the time; an identification at least a fifth better
-    limit = "≤ 0.5" if told["measure"] == "seconds" else "≤ 0.8"
+    # to certainty in half the time; an identification at least a fifth better, on the SDOF rig a third over all
+    rivals, sdof = told["measure"] == "seconds", told["task"] == "sdof"
     figures: list[tuple[str, ...]] = []
     for group, methods in told.items():
         if not isinstance(methods, dict):
             continue
+        limit = "≤ 0.5" if rivals else "≤ 0.65" if sdof and group == "all" else "≤ 0.8"
         for name, row in methods.items():
             low, high = row["interval"]
             what = f"{group}, {name}: {told['measure']} [{told['unit']}], interquartile mean"
@@ -153,6 +154,16 @@ def training(told: Any) -> Figures:
         ("of the policy that comes with the bench", f"{shipped['score']:.2f}", ""),
         ("time to that score", "not reached" if reached is None else f"{reached:.0f} s", "≤ 3600 s"),
         ("windows that violate a limit", f"{100 * best['violations']:.2f} %", "≤ 0.75 %"),
+    ]
+
+
+def training_plans(told: Any) -> Figures:
+    """What the policy of plans scores, and how long it took."""
+    score = told["score"]
+    return [
+        ("score on held-out rigs (practice benches)", f"{score['score']:.2f}", ""),
+        ("time of training", f"{score['seconds']:.0f} s", "≤ 3600 s"),
+        ("windows that violate a limit", f"{100 * score['violations']:.2f} %", "≤ 0.75 %"),
     ]
 
 

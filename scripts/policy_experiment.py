@@ -6,8 +6,8 @@
 
 `rewards` runs some 200 records of drawn rigs under many excitations, without and with a background, identifies each, and tells how
 well each reward ranks the error that is left: Spearman's rank correlation, 1 where the reward follows identification. `train` trains
-policies for different rewards and holds them against the planner and open-loop designs on held-out rigs; stopped, the same command goes
-on. `targets` designs joint targets for a model of your own.
+policies for different rewards, without and with a memory of the record, and holds them against the planner and open-loop designs on
+held-out rigs; stopped, the same command goes on. `targets` designs joint targets for a model of your own.
 """
 
 from __future__ import annotations
@@ -76,12 +76,13 @@ class Rewards:
 
 @dataclass
 class Train:
-    """Train policies for different rewards, and hold them against the planner and open-loop designs.
+    """Train policies for different rewards, without and with a memory, and hold them against the planner and open-loop designs.
 
     Attributes:
         task: sdof or joint.
         rewards: Rewards: practice, error, prior or posterior, see scripts/train_excitation.py.
-        seeds: Seeds of training, for each reward.
+        memories: Units of a memory of the record, 0 for none.
+        seeds: Seeds of training, for each reward and memory.
         steps: Windows of each training.
         rig_seeds: Seeds of held-out rigs.
         rigs: Held-out rigs a seed, each without and with a background.
@@ -92,6 +93,7 @@ class Train:
 
     task: tyro.conf.Positional[str] = "sdof"
     rewards: tuple[str, ...] = ("practice", "error")
+    memories: tuple[int, ...] = (0, 64)
     seeds: int = 3
     steps: int = 4_000_000
     rig_seeds: int = 10
@@ -107,7 +109,9 @@ class Train:
 
         setup = setup_of(self.task)
         with Console(stderr=True).status("") as status:
-            policies = trained(self.task, self.rewards, self.seeds, self.steps, self.out, status.update)
+            policies = trained(
+                self.task, self.rewards, self.memories, self.seeds, self.steps, self.out, status.update
+            )
             rows = contest(setup, policies, seeds=self.rig_seeds, rigs=self.rigs, tell=status.update)
         numbers: dict[str, Any] = {"task": self.task, "steps": self.steps, **summary(rows)}
         if self.figure is not None:

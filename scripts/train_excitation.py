@@ -34,6 +34,7 @@ class Args:
         seconds: Most time to spend now.
         seed: Seed.
         n_envs: Benches side by side.
+        memory: Units of a long short-term memory, by which the policy keeps the record; none by default (ppo only).
         start: pump (imitates a push along the velocity), design (corrects a D-optimal multisine), or nothing.
         reward: practice (merit at each rig itself), error (expected error at each rig), or prior or posterior (as the registered
             environments).
@@ -51,6 +52,7 @@ class Args:
     seconds: float = math.inf
     seed: int = 0
     n_envs: int = 192
+    memory: int = 0
     start: str = "pump"
     reward: str = "practice"
     learning_rate: float = 4e-4
@@ -79,7 +81,7 @@ def main() -> int:
     try:
         plan = TrainingPlan(
             args.task, args.algorithm, args.steps, args.seed, args.n_envs,
-            start=args.start, reward=args.reward, learning_rate=args.learning_rate, discount=args.discount,
+            memory=args.memory, start=args.start, reward=args.reward, learning_rate=args.learning_rate, discount=args.discount,
         )  # fmt: skip
         with Progress(*columns, console=Console(stderr=True), disable=args.json) as bar:
             task = bar.add_task("starting", total=1.0)

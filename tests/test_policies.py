@@ -20,7 +20,10 @@ from bench.excitation import (
     Ensemble,
     Family,
     Planner,
+    PlanPolicy,
+    PlanStage,
     Policy,
+    Recurrence,
     RigHypothesis,
     RivalPlanner,
     Rivals,
@@ -75,6 +78,27 @@ def small_policy(seed: int = 0, station: Station = STATION) -> Policy:
         0.3 * rng.standard_normal((1, station.n_windows, 1)),
         station,
     )
+
+
+def remembering_policy(units: int = 3) -> Policy:
+    """A small policy behind a memory of three units."""
+    policy, rng = small_policy(), np.random.default_rng(1)
+    arrays = [
+        rng.standard_normal(shape) / 3.0 for shape in ((4 * units, 21), (4 * units, units), (4 * units,))
+    ]
+    first = rng.standard_normal((7, units))
+    return replace(policy, weights=(first, policy.weights[1]), recurrence=Recurrence(*arrays))
+
+
+def planning_policy() -> PlanPolicy:
+    """Takes the second of two plans where the first displacement of the third window is above zero, the first where it is below."""
+    entries = 13  # four samples of three channels, and the command
+    weight = np.zeros((3, 3 * entries))
+    weight[1, 2 * entries], weight[2, 2 * entries] = 1.0, -1.0
+    ones = np.ones(3 * entries)
+    rest = np.ones((STATION.n_windows - 3, 1))
+    stage = PlanStage(3, np.stack([-0.5 * rest, 0.5 * rest]), 0.0 * ones, ones, (weight,), (np.zeros(3),))
+    return PlanPolicy("planning", STATION, np.full((STATION.n_windows, 1), 0.1), (stage,))
 
 
 @pytest.mark.parametrize("family", [GAP, BOUC_WEN, COULOMB], ids=lambda f: f.hypothesis.name)
@@ -152,13 +176,113 @@ def test_practice_rewards_what_the_record_tells_of_the_rig() -> None:
     assert total[0] == pytest.approx(-4.0 * np.log(remaining + PRACTICE_SETTINGS.floor**2), rel=1e-6)
 
 
-def test_policies_travel_and_say_what_they_cannot_take(tmp_path: Path) -> None:
-    policy = small_policy()
+@pytest.mark.parametrize(
+    "policy",
+    [small_policy(), remembering_policy(), planning_policy()],
+    ids=["no memory", "memory", "plans"],
+)
+def test_policies_travel(policy: Policy | PlanPolicy, tmp_path: Path) -> None:
     policy.save(tmp_path / "small.npz")
     observation = np.random.default_rng(1).uniform(-1.0, 1.0, (5, 21)).astype(np.float32)
     for other in (find_policy(str(tmp_path / "small.npz")), pickle.loads(pickle.dumps(policy))):
-        np.testing.assert_array_equal(other.act(observation), policy.act(observation))
+        theirs, ours = other.memory(5), policy.memory(5)
+        for _ in range(5):
+            np.testing.assert_array_equal(other.act(observation, theirs), policy.act(observation, ours))
         assert other.station == policy.station
+
+
+def test_a_memory_tells_records_apart_that_end_in_the_same_window() -> None:
+    policy, rng = remembering_policy(), np.random.default_rng(2)
+    first, last = rng.uniform(-1.0, 1.0, (2, 4, 21)).astype(np.float32)
+    memory = policy.memory(4)
+    policy.act(first, memory)
+    after = policy.act(last, memory)
+    assert np.abs(after - policy.act(last, policy.memory(4))).min() > 1e-3
+    one = policy.memory()  # a single test, as on a shaker
+    policy.act(first[2], one)
+    np.testing.assert_allclose(policy.act(last[2], one), after[2], atol=1e-6)
+    for wrong in (None, policy.memory(3)):
+        with pytest.raises(ParameterError, match=r"memory = policy\.memory"):
+            policy.act(last, wrong)
+    short = Recurrence(np.zeros((12, 20)), np.zeros((12, 3)), np.zeros(12))
+    with pytest.raises(ParameterError, match="takes 20 observations; 21"):
+        replace(policy, recurrence=short)
+    with pytest.raises(ParameterError, match="are expected"):
+        Recurrence(np.zeros((12, 21)), np.zeros((12, 4)), np.zeros(12))
+
+
+def test_a_policy_of_plans_takes_the_plan_of_least_expected_error() -> None:
+    policy = planning_policy()
+    observation = np.zeros(
+        (6, 3, 21), dtype=np.float32
+    )  # windows of three tests; the first shows the rest before
+    observation[3, :, 0] = 0.2, -0.2, 0.0  # what the third window shows, seen by the fourth decision
+    memory, one = policy.memory(3), policy.memory()
+    acted = [policy.act(row, memory) for row in observation]
+    np.testing.assert_allclose(acted[2], 0.1)
+    np.testing.assert_allclose(acted[3][:, 0], [0.5, -0.5, 0.1])
+    np.testing.assert_allclose(acted[5], acted[3])  # and stays there
+    np.testing.assert_array_equal([policy.act(row[1], one) for row in observation], [a[1] for a in acted])
+    with pytest.raises(ParameterError, match=r"memory = policy\.memory"):
+        policy.act(observation[0])
+    with pytest.raises(ParameterError, match="length 21"):
+        policy.act(observation[0, :, :20], policy.memory(3))
+    over = policy.memory(3)
+    over.seen = STATION.n_windows
+    with pytest.raises(ParameterError, match="begin anew"):
+        policy.act(observation[0], over)
+    with pytest.raises(ParameterError, match="decides after 3 windows"):
+        replace(policy, stages=(policy.stages[0], policy.stages[0]))
+    with pytest.raises(ParameterError, match="an opening of shape"):
+        replace(policy, opening=policy.opening[1:])
+    with pytest.raises(ParameterError, match="3 outputs"):
+        replace(policy.stages[0], weights=(np.zeros((2, 39)),), biases=(np.zeros(2),))
+
+
+def test_archives_of_plans_that_lack_something_are_refused(tmp_path: Path) -> None:
+    policy = planning_policy()
+    policy.save(tmp_path / "whole.npz")
+    with np.load(tmp_path / "whole.npz") as whole:
+        arrays = dict(whole)
+    del arrays["mean_0"]
+    np.savez(tmp_path / "part.npz", **arrays)
+    with pytest.raises(FileFormatError, match="mean_0"):
+        find_policy(str(tmp_path / "part.npz"))
+
+
+@pytest.mark.slow
+def test_plans_are_tried_on_rigs_as_the_policy_leaves_them_and_training_goes_on(tmp_path: Path) -> None:
+    from envs.plan_training import train_plans
+    from envs.training_plan import PlanTraining
+
+    training = PlanTraining(plans=4, rigs=6, evaluations=8, generations=2, steps=40)
+    policy = train_plans(training, tmp_path)
+    assert [stage.window for stage in policy.stages] == [40, 80]
+    assert policy.about["environment"] == "JointBench/SDOFExcitation-v0"
+    with np.load(tmp_path / "tried-1.npz") as kept:
+        values, plans = kept["values"][12:18], kept["plans"]  # of the rigs with Coulomb friction
+    assert plans.shape == (4, 120, 1)
+    # the first choice is to go on: what is left then is what the record of the policy with one decision leaves
+    first = replace(policy, stages=policy.stages[:1])
+    rng = np.random.default_rng((0, 1, 3))
+    x = [rng.uniform(-np.sqrt(3.0), np.sqrt(3.0), (6, f.n_parameters)) for f in (GAP, BOUC_WEN, COULOMB)][2]
+    noise = disturbances(STATION, 6, np.random.default_rng((0, 1, 4, 2)))
+    runs = run_policy(first, COULOMB.packed(x), noise)
+    information, _ = normal_equations(COULOMB, runs.records, x, NOISE)
+    left = np.sqrt(np.trace(np.linalg.inv(np.eye(3) + information), axis1=1, axis2=2) / 3.0)
+    within = runs.reached.max(axis=1) < 0.9
+    assert within.any()
+    # differences over a hundredth of the prior's standard deviation against a ten-thousandth
+    np.testing.assert_allclose(np.exp(values[within, 0]), left[within], rtol=0.1)
+    again = train_plans(training, tmp_path)
+    np.testing.assert_array_equal(again.stages[1].weights[0], policy.stages[1].weights[0])
+    with pytest.raises(FileFormatError, match="another folder"):
+        train_plans(replace(training, plans=5), tmp_path)
+
+
+def test_policies_say_what_they_cannot_take(tmp_path: Path) -> None:
+    policy = small_policy()
+    observation = np.random.default_rng(1).uniform(-1.0, 1.0, (5, 21)).astype(np.float32)
     with pytest.raises(ParameterError, match="length 21"):
         policy.act(observation[:, :20])
     with pytest.raises(UnknownNameError, match="policy"):
@@ -179,9 +303,9 @@ def test_shipped_policies_keep_the_limits_of_their_station(name: str) -> None:
     violations = steps = 0
     for seed in range(4):
         observation, _ = env.reset(seed=910 + seed)
-        done = False
+        done, memory = False, policy.memory()
         while not done:
-            observation, _, terminated, truncated, info = env.step(policy.act(observation))
+            observation, _, terminated, truncated, info = env.step(policy.act(observation, memory))
             violations, steps, done = violations + info["violation"], steps + 1, terminated or truncated
     # the aim over all rigs, which scripts/evaluate_excitation.py measures
     assert violations <= 0.0075 * steps
@@ -244,14 +368,16 @@ def test_rival_planners_say_what_they_cannot_take() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("algorithm", ["ppo", "sac"])
-def test_exported_policies_are_the_trained_networks(algorithm: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("algorithm", "memory"), [("ppo", 0), ("sac", 0), ("ppo", 6)])
+def test_exported_policies_are_the_trained_networks(algorithm: str, memory: int, tmp_path: Path) -> None:
     import torch
 
     from envs.training import Trainer
     from envs.training_plan import TrainingPlan
 
-    plan = TrainingPlan(algorithm=algorithm, n_envs=3, network=(8, 5), start="nothing", n_held_out=3)
+    plan = TrainingPlan(
+        algorithm=algorithm, n_envs=3, network=(8, 5), memory=memory, start="nothing", n_held_out=3
+    )
     trainer = Trainer(plan, tmp_path)
     with torch.no_grad():  # networks begin with outputs of nearly zero
         for parameter in trainer.model.policy.parameters():
@@ -260,13 +386,26 @@ def test_exported_policies_are_the_trained_networks(algorithm: str, tmp_path: Pa
     for _ in range(5):
         trainer.env.step(np.ones((3, 1), dtype=np.float32))  # for statistics of observations
     policy = trainer.policy()
-    observation = np.random.default_rng(0).uniform(-1.0, 1.0, (40, 21)).astype(np.float32)
-    seen = np.asarray(trainer.env.normalize_obs(observation))
-    mean, _ = trainer.model.predict(seen, deterministic=True)
-    wanted = np.clip(mean + STATION.scheduled(observation, policy.schedule), -1.0, 1.0)
-    # float32 in two orders of summation
-    np.testing.assert_allclose(policy.act(observation), wanted, atol=1e-5)
+    state, kept = None, policy.memory(40)
+    for observation in np.random.default_rng(0).uniform(-1.0, 1.0, (3, 40, 21)).astype(np.float32):
+        seen = np.asarray(trainer.env.normalize_obs(observation))
+        mean, state = trainer.model.predict(seen, state, deterministic=True)
+        wanted = np.clip(mean + STATION.scheduled(observation, policy.schedule), -1.0, 1.0)
+        # float32 in two orders of summation
+        np.testing.assert_allclose(policy.act(observation, kept), wanted, atol=1e-5)
     assert np.std(wanted) > 0.1
+
+
+@pytest.mark.slow
+def test_a_memory_learns_to_imitate_whole_tests(tmp_path: Path) -> None:
+    from envs.training import Trainer, evaluate
+    from envs.training_plan import TrainingPlan
+
+    found = {}
+    for start in ("nothing", "pump"):
+        plan = TrainingPlan(n_envs=24, network=(16,), memory=16, start=start, n_held_out=24)
+        found[start] = evaluate(Trainer(plan, tmp_path / start).policy(), "sdof", n=24).score
+    assert found["pump"] > found["nothing"] + 10.0  # found: 21 and 0 nat
 
 
 @pytest.mark.slow

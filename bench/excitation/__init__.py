@@ -34,9 +34,11 @@ from bench.excitation.information import (
 from bench.excitation.limits import Limits, Peaks, feasible
 from bench.excitation.linear_structure import AffineStructure, linear_structure
 from bench.excitation.methods import METHODS, Design, controls_from, design, paired_experiment
+from bench.excitation.plan_policy import PlanPolicy, PlanStage
 from bench.excitation.planner import Decision, Planner
 from bench.excitation.policy import Policy, find_policy, policy_names
 from bench.excitation.prior import Draw, RigHypothesis, RigPrior, Uncertain
+from bench.excitation.recurrence import PolicyMemory, Recurrence
 from bench.excitation.rival_planner import RivalPlan, RivalPlanner
 from bench.excitation.rivals import RivalDraws, Rivals
 from bench.excitation.station import Desk, Station
@@ -58,9 +60,13 @@ __all__ = [
     "Family",
     "Limits",
     "Peaks",
+    "PlanPolicy",
+    "PlanStage",
     "Planner",
     "Policy",
+    "PolicyMemory",
     "Records",
+    "Recurrence",
     "RigHypothesis",
     "RigPrior",
     "RivalDraws",

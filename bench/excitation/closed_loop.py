@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.errors import ParameterError
+from bench.excitation.acting import ActingPolicy
 from bench.excitation.estimation import Records
-from bench.excitation.policy import Policy
 from bench.excitation.station import Desk, Station
 from bench.excitation.stepping import Packed, integrate_cases
 
@@ -36,7 +36,7 @@ def disturbances(station: Station, m: int, rng: np.random.Generator) -> NDArray[
 
 
 def run_policy(
-    policy: Policy,
+    policy: ActingPolicy,
     packed: Packed,
     disturbance: NDArray[np.float64],
     *,
@@ -58,9 +58,10 @@ def run_policy(
     station = station or policy.station
     m, places = len(packed.start), np.arange(len(packed.start))
     desk = Desk(station, m)
-    if desk.n_observations != len(policy.mean) or desk.shaping.width != len(policy.biases[-1]):
+    trained = policy.station
+    if desk.n_observations != trained.n_observations or desk.shaping.width != trained.width:
         raise ParameterError(
-            f"policy '{policy.name}' takes {len(policy.mean)} observations and gives {len(policy.biases[-1])} actions; "
+            f"policy '{policy.name}' takes {trained.n_observations} observations and gives {trained.width} actions; "
             f"this station has {desk.n_observations} and {desk.shaping.width}"
         )
     asked = np.full(m, question)
@@ -71,8 +72,9 @@ def run_policy(
     observation = desk.observe(
         places, disturbance[:, -1], np.zeros((m, n, width)), np.zeros((m, desk.shaping.width)), asked
     )
+    memory = policy.memory(m)
     for window in range(station.n_windows):
-        actions = policy.act(observation).astype(float)
+        actions = policy.act(observation, memory).astype(float)
         commands, _ = desk.commands(places, actions)
         span = slice(window * n, (window + 1) * n)
         clock = np.full(m, window * n * station.timestep)

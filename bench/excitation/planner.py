@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -97,7 +98,8 @@ class Planner(SequentialPlanner):
                 controls[:] = self.opening
                 return
             for i, (k, x) in enumerate(self._found(records)):
-                controls[i, begin:] = self._continuation(k, x, controls[i], begin, seed + i, i, told)
+                share = None if told is None else partial(told, i)
+                controls[i, begin:] = self.continuation(k, x, controls[i], begin, seed + i, share)
 
         return decide
 
@@ -110,17 +112,25 @@ class Planner(SequentialPlanner):
         best = np.argmax(odds, axis=0)
         return [(int(k), fits[k].coordinates[i]) for i, k in enumerate(best)]
 
-    def _continuation(
+    def continuation(
         self,
         kind: int,
         x: NDArray[np.float64],
         controls: NDArray[np.float64],
         begin: int,
         seed: int,
-        place: int,
-        told: Callable[[int, Decision], None] | None,
+        told: Callable[[Decision], None] | None = None,
     ) -> NDArray[np.float64]:
-        """The best commands found for the rest of the test ``(n - begin, n_actuators)``."""
+        """The best commands found for the rest of a test of a rig ``(n - begin, n_actuators)``.
+
+        Args:
+            kind: Place of the rig's hypothesis.
+            x: The rig ``(p,)``, standardised.
+            controls: Commands so far, and those that the search starts from ``(n, n_actuators)``.
+            begin: Sample from which on they are free.
+            seed: Seed of the search.
+            told: Called with the plan.
+        """
         from cmaes import CMA  # noqa: PLC0415  (for this method alone)
 
         family, rest = self.families[kind], controls[begin:]
@@ -139,7 +149,7 @@ class Planner(SequentialPlanner):
                 best, least = fitted[int(np.argmin(errors))], float(errors.min())
         if told is not None:
             values = dict(zip(family.hypothesis.names, family.values(x).tolist(), strict=True))
-            told(place, Decision(begin * self.station.timestep, family.hypothesis.name, values, least))
+            told(Decision(begin * self.station.timestep, family.hypothesis.name, values, least))
         return best
 
     def _weigh(

@@ -21,11 +21,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.errors import FileFormatError, ParameterError, UnknownNameError, shortened
+from bench.excitation.plan_policy import PlanPolicy, plan_policy
+from bench.excitation.recurrence import PolicyMemory, Recurrence, frozen
 from bench.excitation.station import Station
 from bench.files import write_bytes
 
 FOLDER = Path(__file__).resolve().parent.parent / "_data" / "policies"
 FORMAT = 1
+_RECURRENT = ("input", "hidden", "bias")
 _UNREADABLE = (
     ValueError, EOFError, OSError, RuntimeError, NotImplementedError, MemoryError, zipfile.BadZipFile, zlib.error
 )  # fmt: skip
@@ -49,6 +52,8 @@ SETTINGS = PolicySettings()
 class Policy:
     """A network with hyperbolic tangents between its layers: observations in, the mean of the actions out.
 
+    With a memory, the layers read what it shows instead of the observations.
+
     Attributes:
         name: Name.
         weights: Matrices of the layers ``(n_out, n_in)``, float32.
@@ -60,6 +65,7 @@ class Policy:
         station: What it was trained for.
         bounded: Whether a last hyperbolic tangent bounds the actions (SAC) or they are cut off at −1 and 1 (PPO).
         about: Where it comes from, in JSON values.
+        recurrence: Its memory of the record; none where it decides by the last window alone.
     """
 
     name: str
@@ -71,15 +77,22 @@ class Policy:
     station: Station = field(repr=False)
     bounded: bool = False
     about: Mapping[str, Any] = field(default_factory=dict)
+    recurrence: Recurrence | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         for name in ("weights", "biases"):
-            object.__setattr__(self, name, tuple(_frozen(array) for array in getattr(self, name)))
+            object.__setattr__(self, name, tuple(frozen(array) for array in getattr(self, name)))
         for name in ("mean", "deviation", "schedule"):
-            object.__setattr__(self, name, _frozen(getattr(self, name)))
+            object.__setattr__(self, name, frozen(getattr(self, name)))
         object.__setattr__(self, "about", MappingProxyType(dict(self.about)))
         self._check_numbers()
         width = len(self.mean)
+        if self.recurrence is not None:
+            if self.recurrence.input.shape[1] != width:
+                raise ParameterError(
+                    f"the memory of policy '{self.name}' takes {self.recurrence.input.shape[1]} observations; {width} are expected"
+                )
+            width = self.recurrence.n_units
         for weight, bias in zip(self.weights, self.biases, strict=True):
             if weight.ndim != 2 or weight.shape[1] != width or bias.shape != weight.shape[:1]:
                 raise ParameterError(
@@ -106,6 +119,9 @@ class Policy:
             "the deviation": self.deviation,
             "the schedule": self.schedule,
         }
+        if self.recurrence is not None:
+            memory = self.recurrence
+            named["the memory"] = np.concatenate([memory.input, memory.hidden, memory.bias[:, None]], axis=1)
         if len(self.weights) != len(self.biases) or self.mean.ndim != 1:
             raise ParameterError(
                 f"policy '{self.name}' has {len(self.weights)} weights, {len(self.biases)} biases and a mean of shape "
@@ -124,14 +140,30 @@ class Policy:
             )
 
     def __reduce__(self) -> tuple:
-        rest = (self.schedule, self.station, self.bounded, dict(self.about))
+        rest = (self.schedule, self.station, self.bounded, dict(self.about), self.recurrence)
         return (Policy, (self.name, self.weights, self.biases, self.mean, self.deviation, *rest))
 
-    def act(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
+    def memory(self, shape: int | tuple[int, ...] = ()) -> PolicyMemory:
+        """What is remembered at the start of as many tests: nothing.
+
+        Args:
+            shape: Number of tests m, or the shape of what stands before the last axis of the observations; () for one test.
+        """
+        before = (shape,) if isinstance(shape, int) else shape
+        width = self.recurrence.n_units if self.recurrence is not None else 0
+        empty = np.zeros((*before, width), dtype=np.float32)
+        return PolicyMemory(empty, empty.copy())
+
+    def act(self, observation: NDArray[np.float32], memory: Any = None) -> NDArray[np.float32]:
         """Actions ``(…, n_actions)`` in −1 … 1 for observations ``(…, n_observations)``.
 
+        Args:
+            observation: What was seen of the last window.
+            memory: The `PolicyMemory` that `memory` gave at the start of the test; brought up to date here, and needed where the
+                policy has a memory.
+
         Raises:
-            ParameterError: The observations have another length.
+            ParameterError: The observations have another length, or the policy has a memory and none came.
         """
         observation = np.asarray(observation, dtype=np.float32)
         if observation.shape[-1:] != self.mean.shape:
@@ -139,6 +171,14 @@ class Policy:
                 f"policy '{self.name}' was trained on observations of length {len(self.mean)}; {observation.shape} came"
             )
         value = np.clip((observation - self.mean) / self.deviation, -SETTINGS.clip, SETTINGS.clip)
+        if self.recurrence is not None:
+            if memory is None or memory.hidden.shape != (*observation.shape[:-1], self.recurrence.n_units):
+                came = "none" if memory is None else f"one of {memory.hidden.shape}"
+                raise ParameterError(
+                    f"policy '{self.name}' remembers the record, and {came} came as its memory; take "
+                    f"memory = policy.memory({observation.shape[:-1]}) at the start of a test and act(observation, memory) in it"
+                )
+            value = self.recurrence(value, memory)
         last = len(self.weights) - 1
         for i, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
             value = value @ weight.T + bias
@@ -165,6 +205,8 @@ class Policy:
         layers = {f"weight_{i}": array for i, array in enumerate(self.weights)}
         layers |= {f"bias_{i}": array for i, array in enumerate(self.biases)}
         arrays = {"mean": self.mean, "deviation": self.deviation, "schedule": self.schedule, **layers}
+        if self.recurrence is not None:
+            arrays |= {f"memory_{name}": getattr(self.recurrence, name) for name in _RECURRENT}
         content = io.BytesIO()
         np.savez_compressed(content, allow_pickle=False, document=np.array(json.dumps(about)), **arrays)
         write_bytes(path if path.suffix == ".npz" else Path(f"{path}.npz"), content.getvalue())
@@ -176,45 +218,58 @@ class Policy:
         Raises:
             FileFormatError: The file is no policy, or of another format.
         """
-        from bench.documents import (  # noqa: PLC0415
-            DocumentLimits,
-            checked,
-            naming,
-            parse_json,
-        )
-        from bench.excitation.schema import PolicyHeader  # noqa: PLC0415
+        arrays, text = _read(path, "document")
+        return _policy(path, arrays, text)
 
-        try:
-            arrays = _arrays(path)
-            text = str(arrays.pop("document"))
-        except (*_UNREADABLE, KeyError) as error:
-            raise FileFormatError(
-                f"{path} is no policy ({error}); one is written by scripts/train_excitation.py"
-            ) from error
-        # infinity stands for no limit there
-        document = parse_json(text, str(path), limits=DocumentLimits(finite=False))
-        header = checked(PolicyHeader, document, str(path))
-        count = sum(name.startswith("weight_") for name in arrays)
-        layers = [f"{kind}_{i}" for kind in ("weight", "bias") for i in range(count)]
-        expected = {*layers, "mean", "deviation", "schedule"}
-        if not count or set(arrays) != expected:
-            odd = sorted(set(arrays) ^ expected)
-            raise FileFormatError(
-                f"{path} is no policy: of its arrays, {', '.join(map(shortened, odd[:5]))} {'is' if len(odd) == 1 else 'are'} "
-                "missing or too many; mean, deviation, schedule and a weight and a bias for each layer are expected"
-            )
-        with naming(str(path)):
-            return cls(
-                header.name,
-                tuple(arrays[name] for name in layers[:count]),
-                tuple(arrays[name] for name in layers[count:]),
-                arrays["mean"],
-                arrays["deviation"],
-                arrays["schedule"],
-                Station.from_entry(header.station),
-                header.bounded,
-                header.about,
-            )
+
+def _policy(path: Path, arrays: dict[str, NDArray[Any]], text: str) -> Policy:
+    from bench.documents import DocumentLimits, checked, naming, parse_json  # noqa: PLC0415
+    from bench.excitation.schema import PolicyHeader  # noqa: PLC0415
+
+    # infinity stands for no limit there
+    document = parse_json(text, str(path), limits=DocumentLimits(finite=False))
+    header = checked(PolicyHeader, document, str(path))
+    count = sum(name.startswith("weight_") for name in arrays)
+    layers = [f"{kind}_{i}" for kind in ("weight", "bias") for i in range(count)]
+    remembered = [f"memory_{name}" for name in _RECURRENT]
+    recurrent = any(name in arrays for name in remembered)
+    expected = {*layers, "mean", "deviation", "schedule", *(remembered if recurrent else ())}
+    if not count or set(arrays) != expected:
+        odd = sorted(set(arrays) ^ expected)
+        raise FileFormatError(
+            f"{path} is no policy: of its arrays, {', '.join(map(shortened, odd[:5]))} {'is' if len(odd) == 1 else 'are'} "
+            "missing or too many; mean, deviation, schedule and a weight and a bias for each layer are expected"
+        )
+    with naming(str(path)):
+        return Policy(
+            header.name,
+            tuple(arrays[name] for name in layers[:count]),
+            tuple(arrays[name] for name in layers[count:]),
+            arrays["mean"],
+            arrays["deviation"],
+            arrays["schedule"],
+            Station.from_entry(header.station),
+            header.bounded,
+            header.about,
+            Recurrence(*(arrays[name] for name in remembered)) if recurrent else None,
+        )
+
+
+def _read(path: Path, *documents: str) -> tuple[dict[str, NDArray[Any]], str]:
+    """Arrays of an archive, and the first document of these names that it holds.
+
+    Raises:
+        FileFormatError: It is no archive of a policy.
+    """
+    try:
+        arrays = _arrays(path)
+        name = next(name for name in documents if name in arrays)
+        return arrays, str(arrays.pop(name))
+    except (*_UNREADABLE, StopIteration) as error:
+        reason = f"it holds no {documents[0]}" if isinstance(error, StopIteration) else error
+        raise FileFormatError(
+            f"{path} is no policy ({reason}); one is written by scripts/train_excitation.py"
+        ) from error
 
 
 def _arrays(path: Path) -> dict[str, NDArray[Any]]:
@@ -244,30 +299,20 @@ def _arrays(path: Path) -> dict[str, NDArray[Any]]:
     return arrays
 
 
-def _frozen(array: NDArray) -> NDArray[np.float32]:
-    if np.asarray(array).dtype.kind not in "fiu":
-        raise ParameterError(f"an array of a policy holds {np.asarray(array).dtype}; numbers are expected")
-    with np.errstate(over="ignore"):  # infinity is refused with the name of its array
-        result = np.array(array, dtype=np.float32)
-    result.flags.writeable = False
-    return result
-
-
 def policy_names() -> tuple[str, ...]:
     """Names of the policies that come with the package."""
     return tuple(sorted(path.stem for path in FOLDER.glob("*.npz")))
 
 
-def find_policy(name: str) -> Policy:
+def find_policy(name: str) -> Policy | PlanPolicy:
     """A policy by its name, or by the path of its file.
 
     Raises:
         UnknownNameError: Neither.
         FileFormatError: The file is no policy.
     """
-    if name in policy_names():
-        return Policy.load(FOLDER / f"{name}.npz")
-    path = Path(name)
+    path = FOLDER / f"{name}.npz" if name in policy_names() else Path(name)
     if path.suffix == ".npz" and path.is_file():
-        return Policy.load(path)
+        arrays, text = _read(path, "plan_document", "document")
+        return plan_policy(path, arrays, text) if "opening" in arrays else _policy(path, arrays, text)
     raise UnknownNameError("policy (or file of one, .npz)", name, policy_names())

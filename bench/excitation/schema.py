@@ -138,3 +138,21 @@ class PolicyHeader(Entry):
     """Whether a last hyperbolic tangent bounds the actions."""
     about: dict[str, Any]
     """Where it comes from."""
+
+
+class PlanPolicyHeader(Entry):
+    """What the archive of a policy of plans says of it."""
+
+    entry_name = "the header of a policy of plans"
+    format: Literal[1]
+    """Version of the layout."""
+    name: Name
+    """Name."""
+    station: StationEntry
+    """What it was trained for."""
+    windows: Listed[Size]
+    """Windows run before each decision."""
+    layers: Listed[Size]
+    """Layers of the network of each decision."""
+    about: dict[str, Any]
+    """Where it comes from."""

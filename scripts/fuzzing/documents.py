@@ -264,7 +264,7 @@ def read_policy(folder: Path) -> None:
     from bench.excitation import find_policy
 
     policy = find_policy(str(folder / "policy.npz"))
-    action = policy.act(np.zeros(len(policy.mean), dtype=np.float32))
+    action = policy.act(np.zeros(policy.station.n_observations, dtype=np.float32), policy.memory())
     assert np.isfinite(action).all(), "a policy was accepted that acts NaN"
 
 

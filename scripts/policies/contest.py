@@ -1,8 +1,12 @@
-"""Policies trained for different rewards, beside a planner and an open-loop design, on held-out rigs without and with a background."""
+"""Policies trained for different rewards, without and with a memory, beside a planner and open-loop designs.
+
+They are held against each other on held-out rigs without and with a background.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +15,7 @@ from evaluate_excitation import interval, middle
 from numpy.typing import NDArray
 
 from bench.excitation import Planner, Policy, RigPrior, estimate
+from bench.excitation.acting import ActingPolicy
 from bench.excitation.closed_loop import Runs, disturbances, run_commands, run_policy
 from bench.excitation.stepping import Packed
 from envs.setups import Setup
@@ -18,18 +23,25 @@ from policies.judge import HELD_OUT
 
 from .trials import kinds_of, open_loop
 
-Source = Policy | Planner | NDArray[np.float64]
+Source = ActingPolicy | Planner | NDArray[np.float64]
 BASELINES = ("random_multisine", "schroeder", "crest_multisine", "log_sweep", "prbs", "d_optimal")
 
 
 def trained(
-    task: str, rewards: tuple[str, ...], seeds: int, steps: int, folder: Path, tell: Callable[[str], None]
+    task: str,
+    rewards: tuple[str, ...],
+    memories: tuple[int, ...],
+    seeds: int,
+    steps: int,
+    folder: Path,
+    tell: Callable[[str], None],
 ) -> dict[str, Policy]:
-    """A policy for each reward and seed; stopped, the same call goes on.
+    """A policy for each reward, memory and seed; stopped, the same call goes on.
 
     Args:
         task: sdof or joint.
         rewards: "practice", "error", or those of the registered environments.
+        memories: Units of the memory, 0 for none.
         seeds: Seeds from 0 on.
         steps: Windows of each training.
         folder: Checkpoints, in a folder for each.
@@ -39,14 +51,13 @@ def trained(
     from envs.training_plan import TrainingPlan
 
     policies = {}
-    for reward in rewards:
-        for seed in range(seeds):
-            plan = TrainingPlan(task, steps=steps, seed=seed, reward=reward)
-            label = f"policy for {reward}, seed {seed}"
-            trainer = Trainer(plan, folder / f"{task}-{reward}-{seed}")
-            policies[label] = trainer.run(
-                progress=lambda text, share, of=label: tell(f"{of}: {100 * share:.0f} %, {text}")
-            )
+    for reward, memory, seed in product(rewards, memories, range(seeds)):
+        plan = TrainingPlan(task, steps=steps, seed=seed, reward=reward, memory=memory)
+        label = f"policy for {reward}, {f'memory of {memory}' if memory else 'no memory'}, seed {seed}"
+        trainer = Trainer(plan, folder / f"{task}-{reward}-{memory}-{seed}")
+        policies[label] = trainer.run(
+            progress=lambda text, share, of=label: tell(f"{of}: {100 * share:.0f} %, {text}")
+        )
     return policies
 
 
@@ -93,11 +104,11 @@ def contest(
 
 
 def _run(source: Source, setup: Setup, packed: Packed, disturbance: NDArray[np.float64], seed: int) -> Runs:
-    if isinstance(source, Policy):
-        return run_policy(source, packed, disturbance)
     if isinstance(source, Planner):
         return source.run(packed, disturbance, seed=seed)
-    return run_commands(setup.station(), source, packed, disturbance)
+    if isinstance(source, np.ndarray):
+        return run_commands(setup.station(), source, packed, disturbance)
+    return run_policy(source, packed, disturbance)
 
 
 def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:

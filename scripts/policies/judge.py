@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from bench.excitation import (
     Family,
+    PlanPolicy,
     Policy,
     RigPrior,
     RivalPlanner,
@@ -18,7 +19,6 @@ from bench.excitation import (
 from bench.excitation.closed_loop import Runs, disturbances, run_commands, run_policy
 from bench.excitation.estimation import Records, estimate
 from bench.excitation.planner import Planner
-from bench.excitation.sequential import SequentialPlanner
 from bench.excitation.stepping import Packed
 from envs.setups import Setup
 
@@ -50,7 +50,7 @@ def hidden(setup: Setup, seed: int, rigs: int) -> Iterator[tuple[int, str, NDArr
         )
 
 
-Source = Policy | Planner | list[RivalPlanner] | list[NDArray[np.float64]]
+Source = Policy | PlanPolicy | Planner | list[RivalPlanner] | list[NDArray[np.float64]]
 
 
 class Judge:
@@ -103,10 +103,12 @@ class Judge:
         self, source: Source, question: int, packed: Packed, noise: NDArray[np.float64], seed: int
     ) -> Runs:
         """Tests on rigs of which a question is asked."""
-        if isinstance(source, Policy):
+        if isinstance(source, Planner):
+            return source.run(packed, noise, seed=seed)
+        if not isinstance(source, list):
             return run_policy(source, packed, noise, question=question)
-        own = source if isinstance(source, Planner) else source[question]
-        if isinstance(own, SequentialPlanner):
+        own = source[question]
+        if isinstance(own, RivalPlanner):
             return own.run(packed, noise, seed=seed)
         return run_commands(self.station, own, packed, noise)
 
@@ -163,6 +165,12 @@ def fingerprint(source: Source) -> str:
 
     if isinstance(source, Policy):
         arrays = [*source.weights, *source.biases, source.mean, source.deviation, source.schedule]
+        if source.recurrence is not None:
+            arrays += [source.recurrence.input, source.recurrence.hidden, source.recurrence.bias]
+    elif isinstance(source, PlanPolicy):
+        arrays = [source.opening]
+        for stage in source.stages:
+            arrays += [np.array(stage.window), stage.plans, *stage.weights, *stage.biases]
     elif isinstance(source, Planner):
         arrays = [source.opening, np.array([*source.decisions, source.generations])]
     elif isinstance(source[0], RivalPlanner):

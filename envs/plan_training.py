@@ -1,0 +1,343 @@
+"""Training of policies that choose among plans: plans for drawn rigs, what each leaves to know of many others, and a network that tells.
+
+Stage by stage, on records that the policy makes so far (rigs are run under it anew for each decision, so that the network learns where it
+will be asked): for some rigs the best rest of the test is searched for, as the planner does, from where the record ends; for many others,
+all these plans are simulated, and the error that each would leave is computed; a network learns to tell these errors from the record
+with noise on it. Nothing is reinforced: the values are known, each choice at each rig.
+
+Importing this module imports torch (extra `rl`); policies run without.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
+from torch import Tensor
+
+from bench.errors import FileFormatError
+from bench.excitation import (
+    Experiment,
+    Family,
+    Planner,
+    PlanPolicy,
+    PlanStage,
+    RigPrior,
+    controls_from,
+    design,
+    fans,
+)
+from bench.excitation.closed_loop import disturbances, run_policy
+from bench.excitation.ensemble import available_threads
+from bench.excitation.information import noise_vector
+from bench.excitation.plan_policy import n_entries
+from bench.excitation.station import Desk, Station
+from bench.files import replacing, write_text
+
+from .base import setup_of
+from .sb3 import KINDS
+from .training_plan import TASKS, PlanTraining
+
+Showing = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class PlanTrainingSettings:
+    """Numbers of `envs.plan_training`."""
+
+    step: float = 1e-2
+    """Step of the differences in prior standard deviations, that of `bench.excitation.background`: over much smaller ones chaotic motion
+    seems to tell more than any fit finds in it."""
+    margin: float = 0.97
+    """Of the limits of stroke and velocity that a plan may use on a rig; noise of the sensors comes on top."""
+    design_draws: int = 24
+    """Rigs that the opening, a D-optimal multisine, is made for, as in the evaluation."""
+    units: tuple[int, ...] = (192, 96)
+    batch: int = 256
+    learning_rate: float = 2e-3
+    weight_decay: float = 1e-2
+    aside: float = 0.1
+    """Part of the rigs that the network does not learn from: the state of least loss on them is kept."""
+    checks: int = 40
+    """Times at which it is looked at."""
+
+
+SETTINGS = PlanTrainingSettings()
+
+
+class _Tried(NamedTuple):
+    """What was tried at a decision: n rigs."""
+
+    plans: NDArray[np.float32]  # (n_plans, n_windows - window, width)
+    record: NDArray[np.float32]  # (n, window, n_entries) without noise
+    values: NDArray[np.float32]  # (n, 1 + n_plans)
+
+
+def train_plans(
+    training: PlanTraining, folder: Path, told: Showing = lambda text, share: None, *, resume: bool = True
+) -> PlanPolicy:
+    """Train a policy of plans, or go on where the training was stopped: after its opening, plans tried, or network of a decision.
+
+    Args:
+        training: What to train.
+        folder: Where what is done so far is kept.
+        told: Called with a label and the share done.
+        resume: Go on with what is there; otherwise it is done anew.
+
+    Raises:
+        FileFormatError: The folder holds another training.
+    """
+    if not resume:
+        for path in (folder / "training.json", folder / "opening.npz", *folder.glob("tried-*.npz")):
+            path.unlink(missing_ok=True)
+    begun = time.monotonic()
+    torch.set_num_threads(max(1, available_threads() // 2))
+    _claim(training, folder)
+    laboratory = _PlanBench(training)
+    opening = _kept(folder / "opening.npz", lambda: {"opening": laboratory.opening(told)})["opening"]
+    policy = PlanPolicy(training.task, laboratory.station, opening, ())
+    for i, share in enumerate(training.decisions):
+        window = round(share * laboratory.station.n_windows)
+        label = f"decision {i + 1} of {len(training.decisions)}"
+        kept = _kept(
+            folder / f"tried-{i}.npz",
+            lambda policy=policy, window=window, i=i, label=label: laboratory.tried(
+                policy, window, i, lambda text, part: told(f"{label}: {text}", part)
+            )._asdict(),
+        )
+        stage = learned(
+            training, laboratory, window, _Tried(**kept),
+            lambda part, label=label: told(f"{label}: network", part),
+        )  # fmt: skip
+        identifier, arguments = TASKS[training.task]
+        about = {
+            "environment": identifier,
+            "arguments": arguments,
+            "plan": asdict(training),
+            "seconds": round(time.monotonic() - begun, 1),
+            "steps": training.steps,
+        }
+        policy = PlanPolicy(training.task, laboratory.station, opening, (*policy.stages, stage), about)
+    policy.save(folder / "best.npz")
+    return policy
+
+
+def _claim(training: PlanTraining, folder: Path) -> None:
+    path = folder / "training.json"
+    wanted = json.loads(json.dumps(asdict(training)))
+    if path.is_file() and (found := json.loads(path.read_text(encoding="utf-8"))) != wanted:
+        raise FileFormatError(
+            f"{folder} holds the training of another plan ({found}); take another folder or start afresh"
+        )
+    write_text(path, json.dumps(wanted, indent=1))
+
+
+def _kept(path: Path, made: Callable[[], dict[str, NDArray[Any]]]) -> dict[str, NDArray[Any]]:
+    """Arrays of a file, made and written where there is none."""
+    if not path.is_file():
+        arrays = made()
+        with replacing(path) as temporary:
+            np.savez(temporary, allow_pickle=False, **arrays)  # pyrefly: ignore[bad-argument-type]
+    with np.load(path) as kept:
+        return {name: kept[name] for name in kept.files}
+
+
+class _PlanBench:
+    """Where plans are made and tried."""
+
+    def __init__(self, training: PlanTraining) -> None:
+        identifier, arguments = TASKS[training.task]
+        self.training = training
+        self.setup = setup_of(KINDS[identifier], dict(arguments))
+        self.station: Station = self.setup.station()
+        prior = self.setup.questions[0]
+        assert isinstance(prior, RigPrior)
+        self.prior = prior
+        self.families = tuple(
+            Family(h, self.station.channels, self.station.actuators) for h in prior.hypotheses
+        )
+        self.noise = noise_vector(self.station.noise, self.station.channels)
+        self.scale = np.array([self.station.scale[name] for name in self.station.channels])
+        self.force = np.array([self.station.limits.force[name] for name in self.station.actuators])
+
+    def opening(self, told: Showing) -> NDArray[np.float32]:
+        """A D-optimal multisine, as actions ``(n_windows, width)``."""
+        told("opening", 0.0)
+        rng = np.random.default_rng(self.training.seed)
+        draws = self.prior.draws(SETTINGS.design_draws, rng)
+        experiment = Experiment(self.prior, self.setup.noise, self.setup.limits, draws)
+        plan = design(
+            "d_optimal", experiment, duration=self.setup.duration, band=self.setup.band, rng=rng,
+            evaluations=self.training.evaluations,
+            progress=lambda n, _: told("opening", n / self.training.evaluations),
+        )  # fmt: skip
+        return self.knots(controls_from(plan)[None])[0]
+
+    def knots(self, controls: NDArray[np.float64]) -> NDArray[np.float32]:
+        """Actions ``(m, n_windows, width)`` of commands ``(m, n_samples, n_actuators)``: those at the end of each window."""
+        ends = controls[:, self.station.n_steps - 1 :: self.station.n_steps]
+        return np.clip(ends / self.force, -1.0, 1.0).astype(np.float32)
+
+    def commands(self, actions: NDArray[np.float32]) -> NDArray[np.float64]:
+        """Commands ``(m, n_samples, n_actuators)`` of the actions of whole tests ``(m, n_windows, width)``, within force and energy."""
+        m, n_windows, _ = actions.shape
+        desk, places = Desk(self.station, m), np.arange(m)
+        windows = [desk.commands(places, actions[:, w].astype(float))[0] for w in range(n_windows)]
+        return np.concatenate(windows, axis=1)
+
+    def rigs(self, count: int, key: tuple[int, ...]) -> list[NDArray[np.float64]]:
+        """Coordinates of rigs drawn from each hypothesis ``(count, p)``."""
+        rng = np.random.default_rng((self.training.seed, *key))
+        bound = np.sqrt(3.0)
+        return [rng.uniform(-bound, bound, (count, family.n_parameters)) for family in self.families]
+
+    def tried(self, policy: PlanPolicy, window: int, stage: int, told: Showing) -> _Tried:
+        """Plans for some rigs, and what each leaves to know of others, from where the policy has brought their records."""
+        with threadpool_limits(1, user_api="blas"):  # small products, beside threads of our own
+            plans = self._plans(policy, window, stage, told)
+            record, values = self._values(policy, window, stage, plans, told)
+        return _Tried(plans, record, values)
+
+    def _plans(self, policy: PlanPolicy, window: int, stage: int, told: Showing) -> NDArray[np.float32]:
+        n, begin = self.training.plans, window * self.station.n_steps
+        planner = Planner(
+            self.prior, self.station, self.commands(policy.opening[None])[0], (window / self.station.n_windows,),
+            self.training.generations,
+        )  # fmt: skip
+        each = -(-n // len(self.families))
+        jobs = []
+        for k, coordinates in enumerate(self.rigs(each, (stage, 1))):
+            family, rng = self.families[k], np.random.default_rng((self.training.seed, stage, 2, k))
+            runs = run_policy(policy, family.packed(coordinates), disturbances(self.station, each, rng))
+            jobs += [
+                (k, x, u, i) for i, (x, u) in enumerate(zip(coordinates, runs.records.controls, strict=True))
+            ]
+
+        def plan(job: tuple) -> NDArray[np.float64]:
+            k, x, controls, i = job
+            return planner.continuation(k, x, controls.copy(), begin, self.training.seed + 1000 * k + i)
+
+        jobs = sorted(jobs, key=lambda job: job[3])[:n]
+        whole = np.zeros((n, self.station.n_samples, len(self.force)))
+        for i, rest in enumerate(_spread(plan, jobs, lambda part: told("plans", part))):
+            whole[i, begin:] = rest
+        return self.knots(whole)[:, window:]
+
+    def _values(
+        self, policy: PlanPolicy, window: int, stage: int, plans: NDArray[np.float32], told: Showing
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        record, values = [], []
+        count = self.training.rigs
+        for k, coordinates in enumerate(self.rigs(count, (stage, 3))):
+            family, rng = self.families[k], np.random.default_rng((self.training.seed, stage, 4, k))
+            runs = run_policy(policy, family.packed(coordinates), disturbances(self.station, count, rng))
+            actions = self.knots(runs.records.controls)
+
+            def tried(i: int, family=family, coordinates=coordinates, actions=actions) -> NDArray[np.float32]:
+                rest = np.concatenate([actions[i, None, window:], plans])
+                past = np.broadcast_to(actions[i, :window], (len(rest), window, self.station.width))
+                commands = self.commands(np.concatenate([past, rest], axis=1))
+                return self._value(family, coordinates[i], commands)
+
+            part = _spread(tried, range(count), lambda p, k=k: told("tried", (k + p) / len(self.families)))
+            values.append(np.stack(list(part)))
+            shown = np.clip(runs.ideal / self.scale, -1.0, 1.0).reshape(count, self.station.n_windows, -1)
+            record.append(np.concatenate([shown, actions], axis=2)[:, :window].astype(np.float32))
+        return np.concatenate(record), np.concatenate(values)
+
+    def _value(
+        self, family: Family, x: NDArray[np.float64], commands: NDArray[np.float64]
+    ) -> NDArray[np.float32]:
+        """Logarithm of the error that each excitation leaves of a rig ``(k,)``; 0 where it passes a limit."""
+        k, p = len(commands), family.n_parameters
+        y = family.record(np.broadcast_to(fans(x, SETTINGS.step), (k, 1 + p, p)), commands)
+        rows = ((y[:, 1:] - y[:, :1]) / (SETTINGS.step * self.noise)).reshape(k, p, -1)
+        information = rows @ rows.transpose(0, 2, 1)
+        information = np.where(np.isfinite(information), information, 0.0)
+        left = np.trace(np.linalg.inv(np.eye(p) + information), axis1=1, axis2=2) / p
+        reached = np.max(np.nan_to_num(Desk(self.station, 1).reached(y[:, 0]), nan=np.inf), axis=1)
+        return np.where(reached > SETTINGS.margin, 0.0, 0.5 * np.log(left)).astype(np.float32)
+
+
+def _spread(
+    task: Callable[[Any], NDArray[Any]], items: Any, told: Callable[[float], None]
+) -> list[NDArray[Any]]:
+    """What a task makes of each item, in order, over all threads."""
+    made = []
+    with ThreadPoolExecutor(available_threads()) as pool:
+        for result in pool.map(task, items):
+            made.append(result)
+            told(len(made) / len(items))
+    return made
+
+
+def learned(
+    training: PlanTraining, laboratory: _PlanBench, window: int, table: _Tried, told: Callable[[float], None]
+) -> PlanStage:
+    """The decision after some windows: a network that tells the values of a table from its records with noise on them."""
+    station, n = laboratory.station, len(table.values)
+    rng = np.random.default_rng((training.seed, window))
+    torch.manual_seed(training.seed)
+    order = rng.permutation(n)
+    count = max(1, round(SETTINGS.aside * n))
+    aside, own = order[:count], order[count:]
+    noise = np.zeros(n_entries(station), dtype=np.float32)
+    noise[: station.n_steps * len(station.channels)] = np.tile(
+        laboratory.noise / laboratory.scale, station.n_steps
+    )
+    mean = table.record[own].mean(axis=0)
+    # commands that are the same in every record say nothing
+    deviation = np.sqrt(table.record[own].var(axis=0) + noise**2 + 1e-6)
+    offset, spread = table.values[own].mean(axis=0), max(float(table.values[own].std()), 1e-6)
+    network = _network(len(mean.ravel()), table.values.shape[1])
+    optimiser = torch.optim.AdamW(
+        network.parameters(), SETTINGS.learning_rate, weight_decay=SETTINGS.weight_decay
+    )
+    schedule = torch.optim.lr_scheduler.OneCycleLR(
+        optimiser, SETTINGS.learning_rate, total_steps=training.steps
+    )
+
+    def pair(rows: NDArray[np.int64]) -> tuple[Tensor, Tensor]:
+        shown = table.record[rows]
+        shown = shown + noise * rng.standard_normal(shown.shape, dtype=np.float32)
+        entries = ((shown - mean) / deviation).reshape(len(rows), -1)
+        return torch.as_tensor(entries), torch.as_tensor((table.values[rows] - offset) / spread)
+
+    judged, best, least = pair(aside), network.state_dict(), np.inf
+    every = max(1, training.steps // SETTINGS.checks)
+    for step in range(training.steps):
+        entries, values = pair(own[rng.integers(len(own), size=SETTINGS.batch)])
+        loss = torch.nn.functional.mse_loss(network(entries), values)
+        optimiser.zero_grad()
+        loss.backward()
+        optimiser.step()
+        schedule.step()
+        if step % every == every - 1:
+            with torch.no_grad():
+                now = float(torch.nn.functional.mse_loss(network(judged[0]), judged[1]))
+            if now < least:
+                least, best = now, {name: value.clone() for name, value in network.state_dict().items()}
+            told((step + 1) / training.steps)
+    network.load_state_dict(best)
+    layers = [module for module in network if isinstance(module, torch.nn.Linear)]
+    weights = [layer.weight.detach().numpy() for layer in layers]
+    biases = [layer.bias.detach().numpy() for layer in layers]
+    weights[-1], biases[-1] = weights[-1] * spread, biases[-1] * spread + offset
+    return PlanStage(window, table.plans, mean.ravel(), deviation.ravel(), tuple(weights), tuple(biases))
+
+
+def _network(width: int, choices: int) -> torch.nn.Sequential:
+    modules: list[torch.nn.Module] = []
+    for units in SETTINGS.units:
+        modules += [torch.nn.Linear(width, units), torch.nn.Tanh()]
+        width = units
+    return torch.nn.Sequential(*modules, torch.nn.Linear(width, choices))
