@@ -16,13 +16,12 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
-from torch import Tensor
 
 from bench.errors import FileFormatError
 from bench.excitation import (
@@ -30,7 +29,6 @@ from bench.excitation import (
     Family,
     Planner,
     PlanPolicy,
-    PlanStage,
     RigPrior,
     controls_from,
     design,
@@ -39,11 +37,11 @@ from bench.excitation import (
 from bench.excitation.closed_loop import disturbances, run_policy
 from bench.excitation.ensemble import available_threads
 from bench.excitation.information import noise_vector
-from bench.excitation.plan_policy import n_entries
 from bench.excitation.station import Desk, Station
 from bench.files import replacing, write_text
 
 from .base import setup_of
+from .plan_network import TriedPlans, learned
 from .sb3 import KINDS
 from .training_plan import TASKS, PlanTraining
 
@@ -61,25 +59,9 @@ class PlanTrainingSettings:
     """Of the limits of stroke and velocity that a plan may use on a rig; noise of the sensors comes on top."""
     design_draws: int = 24
     """Rigs that the opening, a D-optimal multisine, is made for, as in the evaluation."""
-    units: tuple[int, ...] = (192, 96)
-    batch: int = 256
-    learning_rate: float = 2e-3
-    weight_decay: float = 1e-2
-    aside: float = 0.1
-    """Part of the rigs that the network does not learn from: the state of least loss on them is kept."""
-    checks: int = 40
-    """Times at which it is looked at."""
 
 
 SETTINGS = PlanTrainingSettings()
-
-
-class _Tried(NamedTuple):
-    """What was tried at a decision: n rigs."""
-
-    plans: NDArray[np.float32]  # (n_plans, n_windows - window, width)
-    record: NDArray[np.float32]  # (n, window, n_entries) without noise
-    values: NDArray[np.float32]  # (n, 1 + n_plans)
 
 
 def train_plans(
@@ -115,7 +97,7 @@ def train_plans(
             )._asdict(),
         )
         stage = learned(
-            training, laboratory, window, _Tried(**kept),
+            training, laboratory.station, window, TriedPlans(**kept),
             lambda part, label=label: told(f"{label}: network", part),
         )  # fmt: skip
         identifier, arguments = TASKS[training.task]
@@ -200,12 +182,12 @@ class _PlanBench:
         bound = np.sqrt(3.0)
         return [rng.uniform(-bound, bound, (count, family.n_parameters)) for family in self.families]
 
-    def tried(self, policy: PlanPolicy, window: int, stage: int, told: Showing) -> _Tried:
+    def tried(self, policy: PlanPolicy, window: int, stage: int, told: Showing) -> TriedPlans:
         """Plans for some rigs, and what each leaves to know of others, from where the policy has brought their records."""
         with threadpool_limits(1, user_api="blas"):  # small products, beside threads of our own
             plans = self._plans(policy, window, stage, told)
             record, values = self._values(policy, window, stage, plans, told)
-        return _Tried(plans, record, values)
+        return TriedPlans(plans, record, values)
 
     def _plans(self, policy: PlanPolicy, window: int, stage: int, told: Showing) -> NDArray[np.float32]:
         n, begin = self.training.plans, window * self.station.n_steps
@@ -241,12 +223,18 @@ class _PlanBench:
             family, rng = self.families[k], np.random.default_rng((self.training.seed, stage, 4, k))
             runs = run_policy(policy, family.packed(coordinates), disturbances(self.station, count, rng))
             actions = self.knots(runs.records.controls)
+            some = min(self.training.tried, len(plans))
+            drawn = [rng.choice(len(plans), some, replace=False) for _ in range(count)]
 
-            def tried(i: int, family=family, coordinates=coordinates, actions=actions) -> NDArray[np.float32]:
-                rest = np.concatenate([actions[i, None, window:], plans])
+            def tried(
+                i: int, family=family, coordinates=coordinates, actions=actions, drawn=drawn
+            ) -> NDArray[np.float32]:
+                rest = np.concatenate([actions[i, None, window:], plans[drawn[i]]])
                 past = np.broadcast_to(actions[i, :window], (len(rest), window, self.station.width))
                 commands = self.commands(np.concatenate([past, rest], axis=1))
-                return self._value(family, coordinates[i], commands)
+                values = np.full(1 + len(plans), np.nan, dtype=np.float32)
+                values[np.append(0, 1 + drawn[i])] = self._value(family, coordinates[i], commands)
+                return values
 
             part = _spread(tried, range(count), lambda p, k=k: told("tried", (k + p) / len(self.families)))
             values.append(np.stack(list(part)))
@@ -278,66 +266,3 @@ def _spread(
             made.append(result)
             told(len(made) / len(items))
     return made
-
-
-def learned(
-    training: PlanTraining, laboratory: _PlanBench, window: int, table: _Tried, told: Callable[[float], None]
-) -> PlanStage:
-    """The decision after some windows: a network that tells the values of a table from its records with noise on them."""
-    station, n = laboratory.station, len(table.values)
-    rng = np.random.default_rng((training.seed, window))
-    torch.manual_seed(training.seed)
-    order = rng.permutation(n)
-    count = max(1, round(SETTINGS.aside * n))
-    aside, own = order[:count], order[count:]
-    noise = np.zeros(n_entries(station), dtype=np.float32)
-    noise[: station.n_steps * len(station.channels)] = np.tile(
-        laboratory.noise / laboratory.scale, station.n_steps
-    )
-    mean = table.record[own].mean(axis=0)
-    # commands that are the same in every record say nothing
-    deviation = np.sqrt(table.record[own].var(axis=0) + noise**2 + 1e-6)
-    offset, spread = table.values[own].mean(axis=0), max(float(table.values[own].std()), 1e-6)
-    network = _network(len(mean.ravel()), table.values.shape[1])
-    optimiser = torch.optim.AdamW(
-        network.parameters(), SETTINGS.learning_rate, weight_decay=SETTINGS.weight_decay
-    )
-    schedule = torch.optim.lr_scheduler.OneCycleLR(
-        optimiser, SETTINGS.learning_rate, total_steps=training.steps
-    )
-
-    def pair(rows: NDArray[np.int64]) -> tuple[Tensor, Tensor]:
-        shown = table.record[rows]
-        shown = shown + noise * rng.standard_normal(shown.shape, dtype=np.float32)
-        entries = ((shown - mean) / deviation).reshape(len(rows), -1)
-        return torch.as_tensor(entries), torch.as_tensor((table.values[rows] - offset) / spread)
-
-    judged, best, least = pair(aside), network.state_dict(), np.inf
-    every = max(1, training.steps // SETTINGS.checks)
-    for step in range(training.steps):
-        entries, values = pair(own[rng.integers(len(own), size=SETTINGS.batch)])
-        loss = torch.nn.functional.mse_loss(network(entries), values)
-        optimiser.zero_grad()
-        loss.backward()
-        optimiser.step()
-        schedule.step()
-        if step % every == every - 1:
-            with torch.no_grad():
-                now = float(torch.nn.functional.mse_loss(network(judged[0]), judged[1]))
-            if now < least:
-                least, best = now, {name: value.clone() for name, value in network.state_dict().items()}
-            told((step + 1) / training.steps)
-    network.load_state_dict(best)
-    layers = [module for module in network if isinstance(module, torch.nn.Linear)]
-    weights = [layer.weight.detach().numpy() for layer in layers]
-    biases = [layer.bias.detach().numpy() for layer in layers]
-    weights[-1], biases[-1] = weights[-1] * spread, biases[-1] * spread + offset
-    return PlanStage(window, table.plans, mean.ravel(), deviation.ravel(), tuple(weights), tuple(biases))
-
-
-def _network(width: int, choices: int) -> torch.nn.Sequential:
-    modules: list[torch.nn.Module] = []
-    for units in SETTINGS.units:
-        modules += [torch.nn.Linear(width, units), torch.nn.Tanh()]
-        width = units
-    return torch.nn.Sequential(*modules, torch.nn.Linear(width, choices))

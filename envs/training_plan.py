@@ -111,7 +111,9 @@ class PlanTraining:
         task: "sdof" or "joint".
         decisions: Times of decisions, as shares of the test.
         plans: Plans that each decision is among.
-        rigs: Rigs of each hypothesis on which all of them are tried.
+        rigs: Rigs of each hypothesis on which plans are tried.
+        tried: Plans, drawn anew, that are tried on each: of the same number of trials the network learns more from many rigs than from
+            many plans on each.
         evaluations: Signals that the search for the opening weighs.
         generations: Generations of the search for each plan, see `bench.excitation.Planner`.
         steps: Steps of the network's training, for each decision.
@@ -121,7 +123,8 @@ class PlanTraining:
     task: str = "sdof"
     decisions: tuple[float, ...] = (0.2, 0.4)
     plans: int = 240
-    rigs: int = 1200
+    rigs: int = 5000
+    tried: int = 40
     evaluations: int = 1600
     generations: int = 16
     steps: int = 6000
@@ -138,5 +141,5 @@ class PlanTraining:
             raise ParameterError(
                 f"decisions at {self.decisions} came; ascending shares of the test between 0 and 1 are expected"
             )
-        if min(self.plans, self.rigs, self.evaluations, self.generations, self.steps) < 1:
+        if min(self.plans, self.rigs, self.tried, self.evaluations, self.generations, self.steps) < 1:
             raise ParameterError(f"{self} has a number below one; plans, rigs and steps are positive")

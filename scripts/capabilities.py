@@ -8,6 +8,7 @@ from typing import Any
 
 from capability_figures import (
     Figures,
+    backgrounds,
     benchmark,
     bouc_wen,
     demo,
@@ -233,6 +234,13 @@ CAPABILITIES: Sequence[Capability] = (
     ),
     _excitation_task("rivals", "Excitation that tells rivals apart: trained policy against the baselines"),
     Capability(
+        "backgrounds_sdof",
+        "Policy `sdof` on rigs with a background that no hypothesis holds",
+        ("python", "scripts/policy_experiment.py", "backgrounds", "sdof", "--no-planner", "--json", "-"),
+        backgrounds,
+        hours=True,
+    ),
+    Capability(
         "rewards",
         "Which reward of an excitation follows identification",
         ("python", "scripts/policy_experiment.py", "rewards", "sdof", "--seed", "2006", "--json", "-"),
@@ -246,15 +254,12 @@ CAPABILITIES: Sequence[Capability] = (
         kills,
         hours=True,
     ),
-    *(
-        Capability(
-            f"training_{task}",
-            f"Training from scratch of the policy `{task}`",
-            ("python", "scripts/train_plans.py", task, "--fresh", "--json"),
-            training_plans,
-            hours=True,
-        )
-        for task in ("sdof", "joint")
+    Capability(
+        "training_sdof",
+        "Training from scratch of the policy `sdof`",
+        ("python", "scripts/train_plans.py", "sdof", "--fresh", "--json"),
+        training_plans,
+        hours=True,
     ),
     Capability(
         "training_rivals",

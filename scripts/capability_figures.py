@@ -143,6 +143,19 @@ def excitation(told: Any) -> Figures:
     return figures
 
 
+def backgrounds(told: Any) -> Figures:
+    """Policies beside the best open-loop method, on rigs without and with a background."""
+    figures: list[tuple[str, ...]] = []
+    for where in ("without background", "with background"):
+        for kind, group in told[where].items():
+            for name, row in group.items():
+                if name.startswith(("policy", "planner")):
+                    low, high = row["ratio_interval"]
+                    what = f"rigs {where}, {kind}, {name}: of the best open-loop method's error ({row['best_open_loop']})"
+                    figures.append((what, f"{row['ratio']:.3g} ({low:.3g} to {high:.3g})", "≤ 0.8"))
+    return figures
+
+
 def training(told: Any) -> Figures:
     """The training curve, and the policy shipped."""
     curve, shipped = told["curve"], told["shipped"]

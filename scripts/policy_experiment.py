@@ -2,12 +2,14 @@
 
     python scripts/policy_experiment.py rewards sdof --json out/rewards.json --figure out/rewards.svg
     python scripts/policy_experiment.py train sdof --rewards practice error --json out/train.json
+    python scripts/policy_experiment.py backgrounds sdof
     python scripts/policy_experiment.py targets examples/arm/arm.xml -o targets.csv
 
 `rewards` runs some 200 records of drawn rigs under many excitations, without and with a background, identifies each, and tells how
 well each reward ranks the error that is left: Spearman's rank correlation, 1 where the reward follows identification. `train` trains
 policies for different rewards, without and with a memory of the record, and holds them against the planner and open-loop designs on
-held-out rigs; stopped, the same command goes on. `targets` designs joint targets for a model of your own.
+held-out rigs; stopped, the same command goes on. `backgrounds` does the latter with policies that are there. `targets` designs joint
+targets for a model of your own.
 """
 
 from __future__ import annotations
@@ -116,11 +118,53 @@ class Train:
         numbers: dict[str, Any] = {"task": self.task, "steps": self.steps, **summary(rows)}
         if self.figure is not None:
             contest_figure(numbers, self.figure)
-        if _written(numbers, self.json):
-            return
-        for where in ("without background", "with background"):
-            for kind, group in numbers[where].items():
-                _tell_contest(f"{self.task}, {kind}, rigs {where}", group)
+        _tell_all(numbers, self.json)
+
+
+@dataclass
+class Backgrounds:
+    """Hold trained policies against the planner and open-loop designs on held-out rigs without and with a background.
+
+    Attributes:
+        task: sdof or joint.
+        policies: Policies by name or file; by default the one that comes with the task.
+        planner: Also the planner.
+        rig_seeds: Seeds of held-out rigs.
+        rigs: Held-out rigs a seed, each without and with a background.
+        json: File for the figures; "-" prints them.
+        figure: File for a figure (.svg, .png or .pdf).
+    """
+
+    task: tyro.conf.Positional[str] = "sdof"
+    policies: tuple[str, ...] = ()
+    planner: bool = True
+    rig_seeds: int = 10
+    rigs: int = 50
+    json: Path | None = None
+    figure: Path | None = None
+
+    def __call__(self) -> None:
+        """Compare."""
+        from policies.contest import contest, summary
+        from policies.figure import contest_figure
+
+        from bench.excitation import find_policy
+
+        setup = setup_of(self.task)
+        policies = {f"policy {Path(name).stem}": find_policy(name) for name in self.policies or (self.task,)}
+        with Console(stderr=True).status("") as status:
+            rows = contest(
+                setup,
+                policies,
+                seeds=self.rig_seeds,
+                rigs=self.rigs,
+                planner=self.planner,
+                tell=status.update,
+            )
+        numbers: dict[str, Any] = {"task": self.task, **summary(rows)}
+        if self.figure is not None:
+            contest_figure(numbers, self.figure)
+        _tell_all(numbers, self.json)
 
 
 @dataclass
@@ -211,6 +255,14 @@ def _tell_rewards(title: str, rows: dict[str, Any]) -> None:
     Console(width=140).print(table)
 
 
+def _tell_all(numbers: dict[str, Any], path: Path | None) -> None:
+    if _written(numbers, path):
+        return
+    for where in ("without background", "with background"):
+        for kind, group in numbers[where].items():
+            _tell_contest(f"{numbers['task']}, {kind}, rigs {where}", group)
+
+
 def _tell_contest(title: str, rows: dict[str, Any]) -> None:
     table = Table("method", "error", "95 %", "of the best open-loop", "violations %", title=title)
     for name, row in rows.items():
@@ -228,7 +280,8 @@ def _tell_contest(title: str, rows: dict[str, Any]) -> None:
 def main() -> int:
     """Run one of the experiments."""
     command = tyro.extras.subcommand_cli_from_dict(
-        {"rewards": Rewards, "train": Train, "targets": Targets}, description=__doc__
+        {"rewards": Rewards, "train": Train, "backgrounds": Backgrounds, "targets": Targets},
+        description=__doc__,
     )
     try:
         command()

@@ -27,7 +27,8 @@ class Args:
         task: sdof or joint.
         decisions: Times of decisions, as shares of the test.
         plans: Plans that each decision is among.
-        rigs: Rigs of each hypothesis on which all of them are tried.
+        rigs: Rigs of each hypothesis on which plans are tried.
+        tried: Plans that are tried on each.
         steps: Steps of the network's training, for each decision.
         seed: Seed.
         out: Folder for what is done so far and the policy; by default out/policies/TASK-plans.
@@ -39,7 +40,8 @@ class Args:
     task: tyro.conf.Positional[str] = "sdof"
     decisions: tuple[float, ...] = (0.2, 0.4)
     plans: int = 240
-    rigs: int = 1200
+    rigs: int = 5000
+    tried: int = 40
     steps: int = 6000
     seed: int = 0
     out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
@@ -65,7 +67,7 @@ def main() -> int:
     )
     try:
         training = PlanTraining(
-            args.task, args.decisions, args.plans, args.rigs, steps=args.steps, seed=args.seed
+            args.task, args.decisions, args.plans, args.rigs, args.tried, steps=args.steps, seed=args.seed
         )
         with Progress(*columns, console=Console(stderr=True), disable=args.json) as bar:
             task = bar.add_task("starting", total=1.0)

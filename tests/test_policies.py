@@ -248,6 +248,16 @@ def test_archives_of_plans_that_lack_something_are_refused(tmp_path: Path) -> No
     np.savez(tmp_path / "part.npz", **arrays)
     with pytest.raises(FileFormatError, match="mean_0"):
         find_policy(str(tmp_path / "part.npz"))
+    stage = policy.stages[0]
+    for odd, said in (
+        ({"mean": np.float32(1.0)}, "mean of another number"),
+        ({"weights": ()}, "0 weights"),
+        ({"deviation": -stage.deviation}, "not positive"),
+        ({"weights": (1e38 * np.ones_like(stage.weights[0]),)}, "too large"),
+        ({"biases": (np.full(3, np.nan),)}, "NaN"),
+    ):
+        with pytest.raises(ParameterError, match=said):
+            replace(stage, **odd)
 
 
 @pytest.mark.slow

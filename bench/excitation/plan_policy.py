@@ -72,10 +72,21 @@ class PlanStage:
             object.__setattr__(self, name, frozen(getattr(self, name)))
         for name in ("weights", "biases"):
             object.__setattr__(self, name, tuple(frozen(array) for array in getattr(self, name)))
-        arrays = (self.plans, self.mean, self.deviation, *self.weights, *self.biases)
-        if not all(np.isfinite(array).all() for array in arrays) or not (self.deviation > 0.0).all():
+        dimensions = {"plans": self.plans.ndim - 2, "mean": self.mean.ndim, "deviation": self.deviation.ndim}
+        dimensions |= {f"biases {i}": array.ndim for i, array in enumerate(self.biases)}
+        dimensions |= {f"weights {i}": array.ndim - 1 for i, array in enumerate(self.weights)}
+        odd = [name for name, excess in dimensions.items() if excess != 1]
+        if odd or len(self.weights) != len(self.biases) or not self.weights:
             raise ParameterError(
-                f"the decision after {self.window} windows holds NaN, infinity or a deviation that is not positive; "
+                f"the decision after {self.window} windows has {len(self.weights)} weights, {len(self.biases)} biases and "
+                f"{', '.join(odd) or 'no array'} of another number of dimensions; a bias a weight, plans (n, n_windows, width), matrices "
+                "of weights and one dimension elsewhere are expected"
+            )
+        arrays = (self.plans, self.mean, self.deviation, *self.weights, *self.biases)
+        sums = [np.sum(np.abs(array, dtype=np.float64), axis=-1).max(initial=0.0) for array in arrays]
+        if not np.max(sums) * SETTINGS.clip <= np.finfo(np.float32).max or not (self.deviation > 0.0).all():
+            raise ParameterError(
+                f"the decision after {self.window} windows holds NaN, infinity, numbers too large or a deviation that is not positive; "
                 "finite numbers are expected"
             )
         width = [len(self.mean), *(len(bias) for bias in self.biases)]
@@ -205,7 +216,7 @@ class PlanPolicy:
             if stage.window == window:
                 self._decide(stage, memory)
         memory.seen += 1
-        return memory.actions[:, window].reshape(*before, station.width)
+        return np.clip(memory.actions[:, window], -1.0, 1.0).reshape(*before, station.width)
 
     def _decide(self, stage: PlanStage, memory: PlanMemory) -> None:
         record = memory.record[:, : stage.window].reshape(len(memory.record), -1)

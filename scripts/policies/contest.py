@@ -5,7 +5,7 @@ They are held against each other on held-out rigs without and with a background.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -62,7 +62,13 @@ def trained(
 
 
 def contest(
-    setup: Setup, policies: dict[str, Policy], *, seeds: int, rigs: int, tell: Callable[[str], None]
+    setup: Setup,
+    policies: Mapping[str, ActingPolicy],
+    *,
+    seeds: int,
+    rigs: int,
+    planner: bool = True,
+    tell: Callable[[str], None],
 ) -> list[dict[str, Any]]:
     """One row a held-out rig and method: what identification leaves, and how many windows passed a limit.
 
@@ -71,14 +77,16 @@ def contest(
         policies: Policies by name.
         seeds: Seeds of rigs.
         rigs: Rigs a seed, each without and with its background.
+        planner: Also the planner.
         tell: Called with what is done.
     """
     prior, station = setup.questions[0], setup.station()
     assert isinstance(prior, RigPrior)
     tell("designing")
     opened = open_loop(setup, np.random.default_rng(HELD_OUT - 1))
-    planner = Planner(prior, station, opened["d_optimal"])
-    sources: dict[str, Source] = {**opened, "planner": planner, **policies}
+    sources: dict[str, Source] = {**opened, **policies}
+    if planner:
+        sources["planner"] = Planner(prior, station, opened["d_optimal"])
     noise = np.array([station.noise[name] for name in station.channels])
     rows = []
     for seed in range(seeds):
