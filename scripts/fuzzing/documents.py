@@ -225,7 +225,14 @@ def read_campaign(folder: Path) -> None:
 
 
 def make_policy(folder: Path) -> None:
-    """A policy that comes with the package."""
+    """A policy with a memory, which comes with the package."""
+    from bench.excitation.policy import FOLDER
+
+    (folder / "policy.npz").write_bytes((FOLDER / "rivals.npz").read_bytes())
+
+
+def make_plans(folder: Path) -> None:
+    """A policy of plans, which comes with the package."""
     from bench.excitation.policy import FOLDER
 
     (folder / "policy.npz").write_bytes((FOLDER / "sdof.npz").read_bytes())
@@ -240,15 +247,16 @@ def spoil_policy(folder: Path, rng: np.random.Generator) -> None:
         return
     with np.load(path, allow_pickle=False) as archive:
         arrays = {name: archive[name] for name in archive.files}
+    (document,) = {"document", "plan_document"} & set(arrays)
     if chance < 0.8:
-        text = mutated(json.loads(str(arrays["document"])), rng)
-        arrays["document"] = np.array(text.encode("utf-8", "replace").decode("utf-8").rstrip("\x00"))
+        text = mutated(json.loads(str(arrays[document])), rng)
+        arrays[document] = np.array(text.encode("utf-8", "replace").decode("utf-8").rstrip("\x00"))
     else:
         name = str(rng.choice(sorted(arrays)))
         array = arrays.pop(name)
         odd = (
             [np.zeros((0,)), np.full(3, np.nan), array.T, np.array("text"), array.astype("f8") * 1e300]
-            if name != "document"
+            if name != document
             else []
         )
         if odd and rng.random() < 0.8:
@@ -316,6 +324,7 @@ TARGETS: dict[str, Target] = {
     "nominal": Target(make_case, spoiler("nominal.json"), read_case),
     "manifest": Target(make_campaign, spoiler("campaign/manifest.json"), read_campaign),
     "policy": Target(make_policy, spoil_policy, read_policy),
+    "plan_policy": Target(make_plans, spoil_policy, read_policy),
     "protocol": Target(make_protocol, spoiler("protocol.json"), read_protocol),
     "score": Target(make_scores, spoiler("results/case-000.json", "answers/case-000.json"), read_scores),
 }
