@@ -32,6 +32,7 @@ LARGEST = 40_000
 def small_png(path: Path) -> bytes:
     """The picture with 32 colours, rare ones kept, as wide as its size allows and at most 800 pixels."""
     picture = Image.open(path).convert("RGB")
+    content = b""
     for width in range(800, 200, -40):
         scale = min(width / picture.width, 1.0)
         size = (round(picture.width * scale), round(picture.height * scale))
@@ -39,9 +40,10 @@ def small_png(path: Path) -> bytes:
         picture.resize(size, Image.Resampling.LANCZOS).quantize(32, Image.Quantize.MAXCOVERAGE).save(
             buffer, "PNG", optimize=True
         )
-        if buffer.tell() <= LARGEST:
+        content = buffer.getvalue()
+        if len(content) <= LARGEST:
             break
-    return buffer.getvalue()
+    return content
 
 
 def write_pages(results: Sequence[Result], folder: Path, docs: Path) -> None:

@@ -118,6 +118,17 @@ def multisine_error(rig: Rig, folder: Path) -> float:
     return float(np.sqrt(np.mean((x[::finer][-len(u) :] - y) ** 2)))
 
 
+def enough(
+    data: Data, levels: tuple[MemorySettings, ...], progress: Progress
+) -> tuple[MemoryModel, Rig, float]:
+    """What is learned at the first level whose residual is near the noise, or at the last."""
+    for settings in levels[:-1]:
+        found = learned(data, settings, progress)
+        if found[2] <= ENOUGH * data.noise:
+            return found
+    return learned(data, levels[-1], progress)
+
+
 def sweep_error(rig: Rig, folder: Path) -> float:
     """RMS error on the sine sweep, from rest [m]."""
     y = loadmat(folder / "yval_sinesweep.mat")["yval_sinesweep"].ravel()
@@ -135,12 +146,7 @@ def rows(progress: Progress, folder: Path) -> list[Row]:
     found = [Row(task, "", "noise of the mean training period", data.noise, "m")]
     for label, levels in (("memory, profiles", PROFILES), ("memory, sliders", SLIDERS)):
         begun = clock.monotonic()
-        for settings in levels:
-            model, rig, residual = learned(
-                data, settings, lambda text, label=label: progress(f"{label}: {text}")
-            )
-            if residual <= ENOUGH * data.noise:
-                break
+        model, rig, residual = enough(data, levels, lambda text, label=label: progress(f"{label}: {text}"))
         seconds = clock.monotonic() - begun
         mass = {name: value for kind, name, value in rig.structure if kind == "mass"}["carriage"]
         size = f"{model.report.n_parameters} parameters, mass {mass:.4f} kg"
