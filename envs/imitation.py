@@ -64,9 +64,10 @@ def imitate(model: Learner, env: VecNormalize, feedback: Feedback, *, seed: int)
 
 def _imitate_windows(model: Learner, inputs: Tensor, target: Tensor, rng: np.random.Generator) -> None:
     network = torch.nn.Sequential(*layers(model))
-    optimiser = torch.optim.Adam(network.parameters(), lr=2e-3)
-    for _ in range(1500):
-        rows = torch.as_tensor(rng.integers(len(inputs), size=512))
+    optimiser = torch.optim.Adam(network.parameters(), lr=SETTINGS.imitation_rate)
+    steps, batch = SETTINGS.imitation_windows
+    for _ in range(steps):
+        rows = torch.as_tensor(rng.integers(len(inputs), size=batch))
         loss = torch.nn.functional.mse_loss(network(inputs[rows]), target[rows])
         optimiser.zero_grad()
         loss.backward()
@@ -86,9 +87,10 @@ def _imitate_tests(model: RecurrentPPO, tests: list[tuple[Tensor, Tensor]], rng:
     """The same through the memory, over whole tests."""
     memory, network = model.policy.lstm_actor, torch.nn.Sequential(*layers(model))
     assert isinstance(memory, torch.nn.LSTM)
-    optimiser = torch.optim.Adam([*memory.parameters(), *network.parameters()], lr=2e-3)
-    for _ in range(300):
-        rows = rng.integers(len(tests), size=48)
+    optimiser = torch.optim.Adam([*memory.parameters(), *network.parameters()], lr=SETTINGS.imitation_rate)
+    steps, batch = SETTINGS.imitation_tests
+    for _ in range(steps):
+        rows = rng.integers(len(tests), size=batch)
         x, y = (pad_sequence([tests[i][side] for i in rows]) for side in (0, 1))
         lengths = torch.as_tensor([len(tests[i][0]) for i in rows])
         counts = torch.arange(len(x))[:, None] < lengths

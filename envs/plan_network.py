@@ -14,6 +14,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from bench.errors import ParameterError
 from bench.excitation import PlanStage, Station
 from bench.excitation.plan_policy import n_entries
 
@@ -61,6 +62,11 @@ def learned(
     mean = table.record[own].mean(axis=0)
     # commands that are the same in every record say nothing
     deviation = np.sqrt(table.record[own].var(axis=0) + noise**2 + 1e-6)
+    if unknown := int(np.sum(np.isnan(table.values[own]).all(axis=0))):
+        raise ParameterError(
+            f"{unknown} of {len(table.plans)} plans were tried on no rig that the network learns from ({len(own)} rigs, "
+            f"{training.tried} plans on each); more rigs, more plans on each, or fewer plans are expected"
+        )
     offset, spread = np.nanmean(table.values[own], axis=0), max(float(np.nanstd(table.values[own])), 1e-6)
     network = _network(len(mean.ravel()), table.values.shape[1])
     optimiser = torch.optim.AdamW(

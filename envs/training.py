@@ -134,6 +134,7 @@ def _model(plan: TrainingPlan, env: VecNormalize) -> Learner:
     common |= {"n_steps": n_steps, "clip_range": 0.2, "target_kl": 0.04, "gae_lambda": SETTINGS.gae_lambda}
     if plan.memory:
         kwargs["lstm_hidden_size"] = plan.memory
+        # passes over whole tests, step by step, cost several times those over single windows: fewer and larger ones
         batch = max(64, n_steps * plan.n_envs // 4)
         return RecurrentPPO(
             "MlpLstmPolicy", env, batch_size=batch, n_epochs=4, policy_kwargs=kwargs, **common

@@ -31,6 +31,10 @@ class TrainingSettings:
     """Seeds from here on are for evaluation only."""
     episodes: int = 3
     noise: float = 0.3
+    imitation_rate: float = 2e-3
+    imitation_windows: tuple[int, int] = (1500, 512)
+    imitation_tests: tuple[int, int] = (300, 48)
+    """Steps of imitation, and windows, or with a memory whole tests, in each."""
     log_std: float = -1.2
     """Logarithm of the exploration's standard deviation at the start."""
     gae_lambda: float = 1.0

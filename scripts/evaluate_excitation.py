@@ -24,8 +24,8 @@ import numpy as np
 import tyro
 from numpy.typing import NDArray
 from policies.judge import HELD_OUT, Judge, Source, fingerprint
+from policies.progress import progress_bar
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 from scipy.stats import trim_mean
 
@@ -257,13 +257,7 @@ def contest_of(args: Args, tell: Callable[[str], None] = lambda name: None) -> C
 
 def evaluate(args: Args) -> dict[str, Any]:
     """All figures; partial results are kept in `args.out`."""
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.percentage:>3.0f} %"),
-        TimeElapsedColumn(),
-    )
-    with Progress(*columns, console=Console(stderr=True), disable=args.json == Path("-")) as bar:
+    with progress_bar(hidden=args.json == Path("-")) as bar:
         task = bar.add_task("designing")
         contest = contest_of(args, lambda name: bar.update(task, description=f"designing {name}"))
         paths = {

@@ -16,8 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import tyro
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from policies.progress import progress_bar
 
 if TYPE_CHECKING:
     from envs.training import Score
@@ -72,18 +71,12 @@ def main() -> int:
     from envs.training_plan import TrainingPlan
 
     folder = args.out or Path("out/policies") / args.task
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.percentage:>3.0f} %"),
-        TimeElapsedColumn(),
-    )
     try:
         plan = TrainingPlan(
             args.task, args.algorithm, args.steps, args.seed, args.n_envs,
             memory=args.memory, start=args.start, reward=args.reward, learning_rate=args.learning_rate, discount=args.discount,
         )  # fmt: skip
-        with Progress(*columns, console=Console(stderr=True), disable=args.json) as bar:
+        with progress_bar(hidden=args.json) as bar:
             task = bar.add_task("starting", total=1.0)
             trainer = Trainer(plan, folder, resume=not args.fresh)
             policy = trainer.run(

@@ -15,8 +15,7 @@ from pathlib import Path
 from typing import Annotated
 
 import tyro
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from policies.progress import progress_bar
 
 
 @dataclass
@@ -59,17 +58,11 @@ def main() -> int:
     from envs.training_plan import PlanTraining
 
     folder = args.out or Path("out/policies") / f"{args.task}-plans"
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.percentage:>3.0f} %"),
-        TimeElapsedColumn(),
-    )
     try:
         training = PlanTraining(
             args.task, args.decisions, args.plans, args.rigs, args.tried, steps=args.steps, seed=args.seed
         )
-        with Progress(*columns, console=Console(stderr=True), disable=args.json) as bar:
+        with progress_bar(hidden=args.json) as bar:
             task = bar.add_task("starting", total=1.0)
             policy = train_plans(
                 training,

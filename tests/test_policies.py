@@ -288,6 +288,8 @@ def test_plans_are_tried_on_rigs_as_the_policy_leaves_them_and_training_goes_on(
     np.testing.assert_array_equal(again.stages[1].weights[0], policy.stages[1].weights[0])
     with pytest.raises(FileFormatError, match="another folder"):
         train_plans(replace(training, plans=5), tmp_path)
+    with pytest.raises(ParameterError, match="tried on no rig"):
+        train_plans(replace(training, plans=40, rigs=2, tried=1), tmp_path / "few")
 
 
 def test_policies_say_what_they_cannot_take(tmp_path: Path) -> None:

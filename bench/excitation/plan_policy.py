@@ -13,8 +13,6 @@ References:
 
 from __future__ import annotations
 
-import io
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -26,17 +24,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.errors import ParameterError
+from bench.excitation.archive import FORMAT, write_archive
 from bench.excitation.recurrence import frozen
 from bench.excitation.station import Station
-from bench.files import write_bytes
 
 
 @dataclass(frozen=True)
 class PlanPolicySettings:
     """Numbers of `bench.excitation.plan_policy`."""
 
-    layout: int = 1
-    """Version of the layout of archives."""
     clip: float = 10.0
     """Standardised entries of the record are cut off there, as those of other policies."""
 
@@ -234,7 +230,7 @@ class PlanPolicy:
             OutputError: It cannot be written.
         """
         header = {
-            "format": SETTINGS.layout,
+            "format": FORMAT,
             "name": self.name,
             "station": self.station.to_dict(),
             "windows": [stage.window for stage in self.stages],
@@ -246,9 +242,7 @@ class PlanPolicy:
             arrays |= {f"{name}_{i}": getattr(stage, name) for name in ("plans", "mean", "deviation")}
             for kind in ("weights", "biases"):
                 arrays |= {f"{kind}_{i}_{j}": array for j, array in enumerate(getattr(stage, kind))}
-        content = io.BytesIO()
-        np.savez_compressed(content, allow_pickle=False, plan_document=np.array(json.dumps(header)), **arrays)
-        write_bytes(path if path.suffix == ".npz" else Path(f"{path}.npz"), content.getvalue())
+        write_archive(path, "plan_document", header, arrays)
 
 
 def n_entries(station: Station) -> int:

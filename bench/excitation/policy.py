@@ -6,11 +6,6 @@ trained for (channels, scales, limits, windows), because its numbers mean someth
 
 from __future__ import annotations
 
-import io
-import json
-import math
-import zipfile
-import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -21,26 +16,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.errors import FileFormatError, ParameterError, UnknownNameError, shortened
+from bench.excitation.archive import FORMAT, read_archive, write_archive
 from bench.excitation.plan_policy import PlanPolicy, plan_policy
 from bench.excitation.recurrence import PolicyMemory, Recurrence, frozen
 from bench.excitation.station import Station
-from bench.files import write_bytes
 
 FOLDER = Path(__file__).resolve().parent.parent / "_data" / "policies"
-FORMAT = 1
 _RECURRENT = ("input", "hidden", "bias")
-_UNREADABLE = (
-    ValueError, EOFError, OSError, RuntimeError, NotImplementedError, MemoryError, zipfile.BadZipFile, zlib.error
-)  # fmt: skip
-"""What NumPy and zipfile raise for archives that are damaged, encrypted, or packed in a way they do not know."""
 
 
 @dataclass(frozen=True)
 class PolicySettings:
     """Numbers of `bench.excitation.policy`."""
 
-    largest: int = 64 * 2**20
-    """Bytes of all arrays of a policy at most: networks of some millions of weights, which no laboratory computer runs in a window."""
     clip: float = 10.0
     """Normalised observations are cut off there, as stable-baselines3's `VecNormalize` does."""
 
@@ -207,9 +195,7 @@ class Policy:
         arrays = {"mean": self.mean, "deviation": self.deviation, "schedule": self.schedule, **layers}
         if self.recurrence is not None:
             arrays |= {f"memory_{name}": getattr(self.recurrence, name) for name in _RECURRENT}
-        content = io.BytesIO()
-        np.savez_compressed(content, allow_pickle=False, document=np.array(json.dumps(about)), **arrays)
-        write_bytes(path if path.suffix == ".npz" else Path(f"{path}.npz"), content.getvalue())
+        write_archive(path, "document", about, arrays)
 
     @classmethod
     def load(cls, path: Path) -> Policy:
@@ -218,7 +204,7 @@ class Policy:
         Raises:
             FileFormatError: The file is no policy, or of another format.
         """
-        arrays, text = _read(path, "document")
+        arrays, text = read_archive(path, "document")
         return _policy(path, arrays, text)
 
 
@@ -255,50 +241,6 @@ def _policy(path: Path, arrays: dict[str, NDArray[Any]], text: str) -> Policy:
         )
 
 
-def _read(path: Path, *documents: str) -> tuple[dict[str, NDArray[Any]], str]:
-    """Arrays of an archive, and the first document of these names that it holds.
-
-    Raises:
-        FileFormatError: It is no archive of a policy.
-    """
-    try:
-        arrays = _arrays(path)
-        name = next(name for name in documents if name in arrays)
-        return arrays, str(arrays.pop(name))
-    except (*_UNREADABLE, StopIteration) as error:
-        reason = f"it holds no {documents[0]}" if isinstance(error, StopIteration) else error
-        raise FileFormatError(
-            f"{path} is no policy ({reason}); one is written by scripts/train_excitation.py"
-        ) from error
-
-
-def _arrays(path: Path) -> dict[str, NDArray[Any]]:
-    """The arrays of an archive, none of which may claim more than the archive holds, nor all of them more than `window_largest`."""
-    arrays: dict[str, NDArray[Any]] = {}
-    with zipfile.ZipFile(path) as archive:
-        if sum(member.file_size for member in archive.infolist()) > SETTINGS.largest:
-            raise ValueError(f"its arrays take more than {SETTINGS.largest} bytes")
-        for member in archive.infolist():
-            content = archive.read(member)
-            stream = io.BytesIO(content)
-            version = np.lib.format.read_magic(stream)
-            read = (
-                np.lib.format.read_array_header_1_0
-                if version == (1, 0)
-                else np.lib.format.read_array_header_2_0
-            )
-            shape, _, dtype = read(stream)
-            if dtype.kind not in "fiuU" or math.prod(shape) * dtype.itemsize > len(content):
-                raise ValueError(
-                    f"{member.filename} is {dtype} {shape}, of which the archive holds {len(content)} bytes"
-                )
-            stream.seek(0)
-            arrays[member.filename.removesuffix(".npy")] = np.lib.format.read_array(
-                stream, allow_pickle=False
-            )
-    return arrays
-
-
 def policy_names() -> tuple[str, ...]:
     """Names of the policies that come with the package."""
     return tuple(sorted(path.stem for path in FOLDER.glob("*.npz")))
@@ -313,6 +255,6 @@ def find_policy(name: str) -> Policy | PlanPolicy:
     """
     path = FOLDER / f"{name}.npz" if name in policy_names() else Path(name)
     if path.suffix == ".npz" and path.is_file():
-        arrays, text = _read(path, "plan_document", "document")
+        arrays, text = read_archive(path, "plan_document", "document")
         return plan_policy(path, arrays, text) if "opening" in arrays else _policy(path, arrays, text)
     raise UnknownNameError("policy (or file of one, .npz)", name, policy_names())
