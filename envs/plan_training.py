@@ -34,6 +34,7 @@ from bench.excitation import (
     design,
     fans,
 )
+from bench.excitation.background import expected_error
 from bench.excitation.closed_loop import disturbances, run_policy
 from bench.excitation.ensemble import available_threads
 from bench.excitation.information import noise_vector
@@ -251,9 +252,9 @@ class _PlanBench:
         rows = ((y[:, 1:] - y[:, :1]) / (SETTINGS.step * self.noise)).reshape(k, p, -1)
         information = rows @ rows.transpose(0, 2, 1)
         information = np.where(np.isfinite(information), information, 0.0)
-        left = np.trace(np.linalg.inv(np.eye(p) + information), axis1=1, axis2=2) / p
+        left = expected_error(information, np.zeros((k, p)))
         reached = np.max(np.nan_to_num(Desk(self.station, 1).reached(y[:, 0]), nan=np.inf), axis=1)
-        return np.where(reached > SETTINGS.margin, 0.0, 0.5 * np.log(left)).astype(np.float32)
+        return np.where(reached > SETTINGS.margin, 0.0, np.log(left)).astype(np.float32)
 
 
 def _spread(

@@ -69,7 +69,7 @@ def read_archive(path: Path, *documents: str) -> tuple[dict[str, NDArray[Any]], 
     except (*_UNREADABLE, StopIteration) as error:
         reason = f"it holds no {documents[0]}" if isinstance(error, StopIteration) else error
         raise FileFormatError(
-            f"{path} is no policy ({reason}); one is written by scripts/train_excitation.py"
+            f"{path} is no policy ({reason}); one is written by scripts/train_excitation.py or scripts/train_plans.py"
         ) from error
 
 
