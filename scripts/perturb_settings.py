@@ -4,7 +4,9 @@
 
 Every diagnosis is one line of `--out`, written as it ends; a run that was stopped goes on where it was. Compared are the kind of the
 verdict and the named effects; a threshold that changes either on any case is fragile there. Counts are moved by at least one, shares
-stay below one. What only saves time ("a cost cut-off") and flips a verdict says that the search ended too early.
+stay below one. What only saves time ("a cost cut-off") and flips a verdict says that the search ended too early. A diagnosis is the
+same in every run, so a threshold that the one with the defaults does not read before its names are settled cannot change them; such
+diagnoses are not run.
 """
 
 from __future__ import annotations
@@ -12,9 +14,11 @@ from __future__ import annotations
 import hashlib
 import json
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass
+from contextlib import contextmanager
+from dataclasses import dataclass, fields, is_dataclass
+from functools import reduce
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -24,6 +28,9 @@ from bench.discrepancy.settings import DEFAULT, DescribedSetting, described, wit
 
 SHARES = ("part of", "share", "probability", "correlation", "coherence")
 """First words of the meaning of a number that has to stay below one."""
+
+SETTLED = "gap on the judging records"
+"""What a diagnosis of a linear structure tells of its progress once kind and names of its verdict are settled."""
 
 
 @dataclass
@@ -73,35 +80,84 @@ def moved(entry: DescribedSetting, factor: float) -> Any:
     return [one(value) for value in entry.default] if isinstance(entry.default, tuple) else one(entry.default)
 
 
-def tasks(args: Args) -> Iterator[Task]:
-    """All diagnoses, those with the defaults first."""
-    cases = [str(case) for case in args.cases]
-    for case in cases:
-        yield Task(case, "", None)
+def defaults(args: Args) -> list[Task]:
+    """The diagnoses with the defaults."""
+    return [Task(str(case), "", None) for case in args.cases]
+
+
+def tasks(args: Args, known: dict[str, dict[str, Any]]) -> Iterator[Task]:
+    """The diagnoses with one threshold moved, of the cases whose diagnosis with the defaults reads it."""
     for entry in described(DEFAULT):
         if args.rooms and not entry.path.startswith(args.rooms):
             continue
         for factor in (args.factor, 1.0 / args.factor):
             value = moved(entry, factor)
-            if value != (list(entry.default) if isinstance(entry.default, tuple) else entry.default):
-                yield from (Task(case, entry.path, value) for case in cases)
+            if value == (list(entry.default) if isinstance(entry.default, tuple) else entry.default):
+                continue
+            for usual in defaults(args):
+                if entry.path in known[usual.key]["read"]:
+                    yield Task(usual.case, entry.path, value)
+
+
+@contextmanager
+def reading() -> Generator[Callable[[], list[str]]]:
+    """Within it the thresholds that are read are noted; gives what returns their paths, by class and name."""
+    read: set[tuple[type, str]] = set()
+    owners = {path: _owner(path) for path in (entry.path for entry in described(DEFAULT))}
+    kinds = set(owners.values()) | {type(DEFAULT)}
+
+    def noted(kind: type, names: set[str]) -> Any:
+        def get(self: Any, name: str) -> Any:
+            if name in names:
+                read.add((kind, name))
+            return object.__getattribute__(self, name)
+
+        return get
+
+    for kind in kinds:
+        kind.__getattribute__ = noted(kind, {entry.name for entry in fields(kind)})
+    try:
+        yield lambda: [path for path, kind in owners.items() if (kind, path.rpartition(".")[2]) in read]
+    finally:
+        for kind in kinds:
+            del kind.__getattribute__
+
+
+def _owner(path: str) -> type:
+    holder = reduce(getattr, path.split(".")[:-1], DEFAULT)
+    assert is_dataclass(holder)
+    return type(holder)
 
 
 def verdict_of(task: Task, budget: float) -> dict[str, Any]:
-    """Kind and names of the verdict of one diagnosis."""
-    from bench.discrepancy import diagnose, read_case
+    """Kind and names of the verdict of one diagnosis; of one with the defaults also the thresholds that it reads."""
+    from bench.discrepancy import Diagnosis, diagnose, read_case
     from bench.errors import BenchError
 
     values: Any = task.value
     for name in reversed(task.path.split(".") if task.path else []):
         values = {name: values}
+    settings = with_values(DEFAULT, values or {})
+    settled: list[list[str]] = []
     try:
-        found = diagnose(read_case(task.case), settings=with_values(DEFAULT, values or {}), budget=budget)
+        if task.path:
+            found = diagnose(read_case(task.case), settings=settings, budget=budget)
+        else:
+            with reading() as read:
+                found = diagnose(
+                    read_case(task.case),
+                    settings=settings,
+                    budget=budget,
+                    progress=lambda text: settled.append(read()) if text == SETTLED else None,
+                )
+                if not settled or not isinstance(found, Diagnosis):
+                    settled.append(read())
     except (BenchError, ArithmeticError, ValueError) as error:
         return {"verdict": "error", "named": [type(error).__name__]}
     return {
         "verdict": found.verdict.verdict,
         "named": sorted(effect.name for effect in found.verdict.named),
+        **({"read": settled[-1]} if settled else {}),
     }
 
 
@@ -110,26 +166,36 @@ def run(args: Args) -> dict[str, dict[str, Any]]:
     known: dict[str, dict[str, Any]] = {}
     if args.out.exists():
         known = {row["key"]: row for row in map(json.loads, args.out.read_text().splitlines())}
-    todo = [task for task in tasks(args) if task.key not in known]
     with ProcessPoolExecutor(args.jobs) as pool, args.out.open("a") as file:
-        waiting = {pool.submit(verdict_of, task, args.budget): task for task in todo}
-        for done in as_completed(waiting):
-            task = waiting[done]
-            known[task.key] = {"key": task.key, **task._asdict(), **done.result()}
-            file.write(json.dumps(known[task.key]) + "\n")
-            file.flush()
-            print(f"{len(known)}: {task.path or 'defaults'} {task.value} {task.case}", file=sys.stderr)
+
+        def added(asked: list[Task]) -> None:
+            waiting = {
+                pool.submit(verdict_of, task, args.budget): task for task in asked if task.key not in known
+            }
+            for number, done in enumerate(as_completed(waiting), 1):
+                task = waiting[done]
+                known[task.key] = {"key": task.key, **task._asdict(), **done.result()}
+                file.write(json.dumps(known[task.key]) + "\n")
+                file.flush()
+                print(
+                    f"{number} of {len(waiting)}: {task.path or 'defaults'} {task.value} {task.case}",
+                    file=sys.stderr,
+                )
+
+        added(defaults(args))
+        added(list(tasks(args, known)))
     return known
 
 
 def changes(args: Args, known: dict[str, dict[str, Any]]) -> list[dict[str, Any]]:
     """Thresholds that change a verdict, with the cases and what became of them."""
-    rows = [known[task.key] for task in tasks(args) if task.key in known]
-    usual = {row["case"]: (row["verdict"], row["named"]) for row in rows if not row["path"]}
+    usual = {
+        row["case"]: (row["verdict"], row["named"]) for row in (known[task.key] for task in defaults(args))
+    }
     out = []
-    for row in rows:
+    for row in (known[task.key] for task in tasks(args, known)):
         now = (row["verdict"], row["named"])
-        if row["path"] and now != usual[row["case"]]:
+        if now != usual[row["case"]]:
             before, after = (" ".join([kind, *names]) for kind, names in (usual[row["case"]], now))
             out.append(
                 {

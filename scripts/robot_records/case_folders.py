@@ -79,6 +79,8 @@ class Records:
         most: Most effects named together.
         loads: Loads besides the drives.
         further: Tables that do not find, on which the model is run as stated and with what was named.
+        servos: Type of all the drives, where they are of one.
+        scatter: Relative one-sigma scatter of drives of one type about what they have in common.
     """
 
     model: str
@@ -93,6 +95,8 @@ class Records:
     most: int = 3
     loads: Sequence[Load] = ()
     further: Sequence[Mapping[str, Array]] = ()
+    servos: str = ""
+    scatter: float = 0.0
 
 
 def table(path: Path) -> dict[str, Array]:
@@ -188,4 +192,7 @@ def _parameters(records: Records) -> dict[str, dict[str, object]]:
             out[f"{kind}:{model.actuator(u).name}"] = {
                 "value": value, "std": records.spreads[kind] * value, "unit": units[kind],
             }  # fmt: skip
+    for name, entry in out.items() if records.servos else ():
+        if name.partition(":")[0] not in BODIES:
+            entry |= {"alike": records.servos, "each": records.scatter * float(str(entry["value"]))}
     return out

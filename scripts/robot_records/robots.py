@@ -41,7 +41,8 @@ def short(columns: dict, seconds: float = LONGEST, after: float = 0.0) -> dict:
 def so101(data: Path) -> Records:
     """The SO-101 with the gains of one of its public models; the jaw, whose record is no angle, is held.
 
-    Of a hobby servo little is known: two public models of this arm have gains of 17.8 and 998 N m/rad.
+    Of a hobby servo little is known: two public models of this arm have gains of 17.8 and 998 N m/rad. But all five are of one type;
+    small DC motors of one type differ by some ten percent.
     """
     folder = data / "so101"
     axes = [
@@ -54,6 +55,7 @@ def so101(data: Path) -> Records:
         [read[n] for n in SO101_FINDING[3:]], 50.0, True, "friction against gravity, play of a degree, a zero that is off",
         {"mass": 0.1, "damping": 0.5, "armature": 0.5, "kp": 0.5}, held={"gripper": "hold"},
         further=[short(table(folder / "motions" / f"{n}.parquet"), 1e3, 5.0) for n in SO101_JUDGING],
+        servos="STS3215", scatter=0.1,
     )  # fmt: skip
 
 

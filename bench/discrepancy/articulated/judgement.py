@@ -147,7 +147,8 @@ def kept(
     """What the judging records bear out of the best of some fits.
 
     Effects are kept up to the last that improves on what was kept before it. One before it that did not improve when it was added is
-    kept if the explanation is worse without it.
+    kept if the explanation is worse without it, or if numbers of the model that move in its place lose as much log prior as an effect has
+    to add to be found.
 
     Args:
         problem: Records for identification.
@@ -165,7 +166,10 @@ def kept(
             found.append(shorter)
             at = judging.reached((placed,))
             without = predict(judging, shorter, floor, settings).of(at)
-            if not better(without, predictions[last].of(at), settings):
+            against = _against_stated(problem, shorter) - _against_stated(problem, rungs[last])
+            if against < problem.settings.articulated.search.worth and not better(
+                without, predictions[last].of(at), settings
+            ):
                 break
         else:
             return Kept(rungs, last, predictions, found[len(fits) :])
@@ -173,6 +177,11 @@ def kept(
         best = shortened(problem, rungs[-1], (placed,))
         found += [best, *predecessors(problem, best, found)]
         rungs = ladder([best, *found])
+
+
+def _against_stated(problem: ArticulatedProblem, found: ArticulatedFit) -> float:
+    """Log prior that a fit has lost by moving the numbers of the model."""
+    return 0.5 * float(np.sum(found.vector[: len(problem.nominal)] ** 2))
 
 
 def _climbed(

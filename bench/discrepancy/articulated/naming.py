@@ -20,6 +20,7 @@ from bench.discrepancy.articulated_search.hypothesis import placed_values
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.judgement.coarse import outside
 from bench.discrepancy.multibody.inputs import input_of
+from bench.discrepancy.multibody.nominal_parameters import Nominal
 from bench.discrepancy.settings import ArticulatedJudgementSettings as JudgementSettings
 from bench.discrepancy.verdict import (
     Estimate,
@@ -99,7 +100,7 @@ def verdict_of(
         warnings=(),
         complete=whole,
         remainder=remainder_of(problem, final, predictions[-1], untouched),
-        nominal=_nominal(problem, final),
+        nominal=model_numbers(problem, final),
     )
 
 
@@ -305,9 +306,13 @@ def _named(
     )
 
 
-def _nominal(problem: ArticulatedProblem, final: ArticulatedFit) -> tuple[NominalEstimate, ...]:
-    deviations = np.sqrt(np.maximum(np.diag(final.covariance), 0.0))
-    return tuple(
-        NominalEstimate(p.name, p.value + p.std * float(x), p.std * float(s), p.value, p.std, float(x))
-        for p, x, s in zip(problem.nominal, final.vector, deviations, strict=False)
-    )
+def model_numbers(problem: ArticulatedProblem, final: ArticulatedFit) -> tuple[NominalEstimate, ...]:
+    """The nominal parameters as a fit has them, what parts of one type have in common counted in."""
+
+    def estimate(i: int, p: Nominal) -> NominalEstimate:
+        moved, slopes = p.deviation(final.vector, i), p.slopes(final.vector, i)
+        at, slope = list(slopes), np.array(list(slopes.values()))
+        std = float(np.sqrt(max(slope @ final.covariance[np.ix_(at, at)] @ slope, 0.0)))
+        return NominalEstimate(p.name, p.value + moved, std, p.value, p.stated_std, moved / p.stated_std)
+
+    return tuple(estimate(i, p) for i, p in enumerate(problem.nominal) if p.of_body or not p.shared)

@@ -8,13 +8,13 @@ import mujoco
 import numpy as np
 
 from bench import native
-from bench.discrepancy.articulated_search.hypothesis import nominal_parameters
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.model.mjcf_file import rig_of
 from bench.discrepancy.multibody.channels import bound
 from bench.discrepancy.multibody.encoders import encoders_of
 from bench.discrepancy.multibody.inputs import input_of
 from bench.discrepancy.multibody.model import ArticulatedModel
+from bench.discrepancy.multibody.nominal_parameters import nominal_parameters
 from bench.discrepancy.settings import DEFAULT, ArticulatedSettings
 from bench.errors import BenchError
 from bench.rig.actuators import DRIVES, commanded

@@ -30,7 +30,7 @@ import numpy as np
 from scipy.signal import welch
 
 from bench.arrays import Array
-from bench.discrepancy.articulated_search.hypothesis import JointHypothesis, PlacedOnJoint, base_slots
+from bench.discrepancy.articulated_search.hypothesis import JointHypothesis, PlacedOnJoint
 from bench.discrepancy.articulated_search.misfit import Octaves
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.multibody.inputs import input_of
@@ -38,6 +38,7 @@ from bench.discrepancy.multibody.joint_forces import Slot
 from bench.discrepancy.multibody.joint_torque import missing_torque
 from bench.discrepancy.multibody.motion import clock_of
 from bench.discrepancy.multibody.noise import NoiseSettings, draw
+from bench.discrepancy.multibody.nominal_parameters import base_slots
 from bench.discrepancy.multibody.records import PreparedRecord
 
 

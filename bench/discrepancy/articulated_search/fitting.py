@@ -1,7 +1,8 @@
 """Maximum a posteriori fits of hypotheses about an articulated model.
 
-The joints share nothing but the bodies: masses, inertias, centres of mass. So a hypothesis about one joint is fitted with that joint's
-runs alone; what the others know of the bodies enters as a quadratic form, once their own parameters are eliminated (`Others`). The
+The joints share nothing but the bodies (masses, inertias, centres of mass) and what parts of one type have in common. So a hypothesis
+about one joint is fitted with that joint's runs alone; what the others know of these enters as a quadratic form, once their own
+parameters are eliminated (`Others`). The
 residuals of a joint are divided by the scale that the last fit left on it, at least one: the fit of one joint is then not ruled by
 another at which something else is missing.
 """
@@ -255,8 +256,12 @@ def refitted(
 def free_entries(
     problem: ArticulatedProblem, hypothesis: JointHypothesis, active: Sequence[int] | None = None
 ) -> NDArray[np.int64]:
-    """Entries that a fit moves: all that are free, or those of the active joints and of bodies."""
-    out = [i for i, p in enumerate(problem.nominal) if active is None or p.shared or p.joint in active]
+    """Entries that a fit moves: all that are free, or those of the active joints and what joints share."""
+    out = [
+        i
+        for i, p in enumerate(problem.nominal)
+        if active is None or p.shared or any(j in active for j in p.joints)
+    ]
     at = len(problem.nominal)
     for placed in hypothesis:
         for p in placed.effect.parameters:

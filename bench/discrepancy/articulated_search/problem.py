@@ -1,7 +1,8 @@
 """The statistical problem of an articulated model: whitened innovations of every joint, priors, and their derivatives.
 
 The vector of a hypothesis holds the deviations of the nominal parameters in units of their standard uncertainty, then the parameters of its
-effects. Only numbers of bodies are shared by the joints; whatever sits at one joint or drive changes that joint's runs alone.
+effects. Shared by joints are the numbers of bodies and what parts of one type have in common; whatever else sits at one joint or drive
+changes that joint's runs alone.
 
 What a wrong model leaves is larger than the noise, differs from joint to joint, and lies where the robot moves, at low frequencies. Its
 scale in every octave is a parameter too, with the stated noise as its lower bound (`bench.discrepancy.articulated_search.misfit`).
@@ -20,14 +21,7 @@ from numpy.typing import NDArray
 
 from bench.arrays import Array
 from bench.discrepancy.articulated_search.effect import JointScales
-from bench.discrepancy.articulated_search.hypothesis import (
-    JointHypothesis,
-    Nominal,
-    base_slots,
-    move,
-    nominal_parameters,
-    placed_values,
-)
+from bench.discrepancy.articulated_search.hypothesis import JointHypothesis, placed_values
 from bench.discrepancy.articulated_search.misfit import Octaves, transformed
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.multibody.encoders import Encoder
@@ -36,6 +30,7 @@ from bench.discrepancy.multibody.joint_record import JointRecord
 from bench.discrepancy.multibody.joint_run import predict
 from bench.discrepancy.multibody.joints import Joint
 from bench.discrepancy.multibody.model import ArticulatedModel
+from bench.discrepancy.multibody.nominal_parameters import Nominal, base_slots, move, nominal_parameters
 from bench.discrepancy.multibody.records import PreparedRecord, corrected, prepare, relinked
 from bench.discrepancy.numerics.deadline import NEVER, Deadline
 from bench.discrepancy.settings import DEFAULT, DiagnosisSettings
@@ -94,21 +89,25 @@ class ArticulatedProblem:
 
     @cached_property
     def shared(self) -> tuple[int, ...]:
-        """Indices of the nominal parameters that all joints share, those of bodies."""
+        """Indices of the nominal parameters that joints share."""
         return tuple(i for i, p in enumerate(self.nominal) if p.shared)
 
     @cached_property
     def felt(self) -> tuple[tuple[int, ...], ...]:
         """Of those, (n_joints,) the ones that the runs of each joint feel: a joint does not move the bodies that carry it."""
-        bodies = [[record.joints[j].bodies for record in self.records] for j in range(len(self.joints))]
+
+        def feels(j: int, entry: Nominal) -> bool:
+            if not entry.of_body:
+                return j in entry.joints
+            return any(record.joints[j].bodies[entry.target].felt for record in self.records)
+
         return tuple(
-            tuple(i for i in self.shared if any(one[self.nominal[i].target].felt for one in mine))
-            for mine in bodies
+            tuple(i for i in self.shared if feels(j, self.nominal[i])) for j in range(len(self.joints))
         )
 
     def locals(self, j: int) -> tuple[int, ...]:
         """Indices of the nominal parameters of joint `j` alone."""
-        return tuple(i for i, p in enumerate(self.nominal) if not p.shared and p.joint == j)
+        return tuple(i for i, p in enumerate(self.nominal) if p.joints == (j,))
 
     def size(self, hypothesis: JointHypothesis) -> int:
         """Length of the vector of a hypothesis."""
@@ -215,7 +214,7 @@ class ArticulatedProblem:
         p = base_slots(joint, on_link)
         for i in self.locals(j):
             entry = self.nominal[i]
-            move(p, entry.kind, entry.factor * entry.std * vector[i])
+            move(p, entry.kind, entry.factor * entry.deviation(vector, i))
         for placed, eta in zip(hypothesis, self.etas(hypothesis, vector), strict=True):
             if placed.effect.slots is not None and j in placed.joints:
                 placed.effect.slots(placed_values(placed, eta), p)
@@ -262,7 +261,7 @@ class ArticulatedProblem:
         """Bias and inertia (n_steps,) of a joint's equation as a hypothesis has the bodies."""
         bias, inertia = record.bias, record.inertia
         by: dict[str, dict[str, float]] = {}
-        for i in self.shared:
+        for i in (i for i in self.shared if self.nominal[i].of_body):
             if vector[i] != 0.0 and record.bodies[self.nominal[i].target].felt:
                 by.setdefault(self.nominal[i].target, {})[self.nominal[i].kind] = (
                     self.nominal[i].std * vector[i]

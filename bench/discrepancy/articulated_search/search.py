@@ -7,7 +7,7 @@ parameters could do as well, is regressed on the residuals: what that takes away
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -171,7 +171,59 @@ def round_of(
         together = _joined(problem, current, sorted(parts, key=lambda part: -part.log_posterior))
         fits.append(together)
         best = max(best, together, key=lambda f: f.log_posterior)
+    for alike, worth in list(_of_one_kind(problem, current, fits, own, settings)):
+        fits += [] if alike in fits else [alike]
+        if best is None or alike.log_posterior + worth > best.log_posterior:
+            best = alike
     return Round(best, fits, corrected)
+
+
+def _of_one_kind(
+    problem: ArticulatedProblem,
+    current: ArticulatedFit,
+    fits: Sequence[ArticulatedFit],
+    own: Mapping[int, Sequence[PlacedOnJoint]],
+    settings: SearchSettings,
+) -> Iterator[tuple[ArticulatedFit, float]]:
+    """Fits with one kind of effect at all parts of a type, and what each has before a choice joint by joint.
+
+    Whether one servo of a type has friction is no news once another has. One choice among the candidates is made for all of them where
+    `own` would have them make one each, and a choice among k that are as likely costs log k of log posterior.
+    """
+    for joints in sorted({p.joints for p in problem.nominal if len(p.joints) > 1}):
+        if not own.keys() >= set(joints):
+            continue
+        found: dict[str, dict[int, ArticulatedFit]] = {}
+        for f in sorted(fits, key=lambda f: f.log_posterior):
+            placed = f.hypothesis[-1]
+            if len(f.hypothesis) == len(current.hypothesis) + 1 and problem.reached((placed,)) == (
+                placed.joint,
+            ):
+                found.setdefault(placed.effect.name, {})[placed.joint] = f
+        open_to = {(c.effect.name, c.joint): c for j in joints for c in own[j]}
+        whole = [name for name in found if all((name, j) in open_to for j in joints)]
+        gains = {
+            name: sum(f.log_posterior - current.log_posterior for f in found[name].values()) for name in whole
+        }
+        worth = sum(float(np.log(len(own[j]))) for j in joints[1:])
+        for name in sorted(whole, key=lambda name: -gains[name])[: settings.finalists]:
+            if not problem.deadline.allows("one kind of effect at all parts of a type"):
+                return
+            kind = {open_to[name, j].key for j in joints}
+            made = [f for f in fits if {p.key for p in f.hypothesis[len(current.hypothesis) :]} == kind]
+            if not made:
+                parts = [
+                    found[name].get(j) or ArticulatedFit.at(problem, *_begun(current, open_to[name, j]))
+                    for j in joints
+                ]
+                made = [_joined(problem, current, sorted(parts, key=lambda part: -part.log_posterior))]
+            yield max(made, key=lambda f: f.log_posterior), worth
+
+
+def _begun(current: ArticulatedFit, placed: PlacedOnJoint) -> tuple[JointHypothesis, Array]:
+    """The hypothesis of a fit with one effect more, and its vector with the effect where its prior has it."""
+    eta = [p.mean for p in placed.effect.parameters]
+    return (*current.hypothesis, placed), np.append(current.vector, eta)
 
 
 def _joined(

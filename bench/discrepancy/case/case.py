@@ -13,6 +13,7 @@ first two, what is not stated is looked for in the records (`search.load_interpo
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -48,12 +49,26 @@ class NominalParameter:
         value: Nominal value.
         std: One-sigma uncertainty; zero where it is taken as exact.
         unit: Unit.
+        alike: Type of the part that it belongs to, whose numbers are off together; "" where that is not stated.
+        each: One-sigma scatter of the parts of that type about their common value.
     """
 
     name: str
     value: float
     std: float
     unit: str = ""
+    alike: str = ""
+    each: float = 0.0
+
+    @property
+    def own_std(self) -> float:
+        """The part of its uncertainty that is its own: all of it, or the scatter of its type."""
+        return self.each if self.alike else self.std
+
+    @property
+    def common_std(self) -> float:
+        """The part that it has in common with the others of its type; the two add in quadrature."""
+        return math.sqrt(self.std**2 - self.each**2) if self.alike else 0.0
 
 
 @dataclass(frozen=True)

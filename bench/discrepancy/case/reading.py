@@ -78,7 +78,7 @@ def read_case(folder: str | Path, *, planned: bool = False) -> Case:
         raise FileFormatError(f"no nominal.json in '{folder}'; a case folder needs one beside its records")
     nominal = NominalDocument.read(path)
     parameters = tuple(
-        NominalParameter(name, entry.value, entry.std, entry.unit)
+        NominalParameter(name, entry.value, entry.std, entry.unit, entry.alike, entry.each or 0.0)
         for name, entry in nominal.parameters.items()
     )
     declared = declared_parameters(nominal.elements, path)

@@ -15,6 +15,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 from bench.discrepancy.case.acquisition import Antialias, Interpolation
 from bench.discrepancy.case.single_axis import LOADS as LOAD_NAMES
 from bench.discrepancy.case.single_axis import MOTIONS
+from bench.discrepancy.case.types_of_parts import check_types
 from bench.documents import (
     Document,
     Entry,
@@ -107,6 +108,10 @@ class ParameterEntry(Entry):
     """One-sigma uncertainty; 0 to mean certain."""
     unit: Unit = ""
     """Unit."""
+    alike: Label = ""
+    """Type of the part that it belongs to, "STS3215" of every such servo: numbers of one kind of parts of one type are off together."""
+    each: Positive | None = None
+    """One-sigma scatter of the parts of that type about their common value, which std counts in."""
 
 
 AntialiasEntry = entry_of(Antialias, lambda hint: None, kind="an antialias filter", name="AntialiasEntry")
@@ -215,6 +220,7 @@ class NominalDocument(Document):
         for name in self.limits:
             if name not in self.channels:
                 refuse(unknown_name("channel", name, self.channels), "limits", unknown=True)
+        check_types(self.parameters, own=self.rig not in PARAMETERS)
         if self.rig in PARAMETERS:
             self._fit_the_rig(PARAMETERS[self.rig], RESPONSES[self.rig])
         return self

@@ -144,7 +144,9 @@ def _labelled(case: Case, channels: Mapping[str, Conversion], parameters: Mappin
         done = parameters.get(entry.name)
         if done is None:
             return entry
-        return replace(entry, unit=done.unit, value=entry.value * done.factor, std=entry.std * done.factor)
+        return replace(
+            entry, unit=done.unit, value=entry.value * done.factor, std=entry.std * done.factor, each=entry.each * done.factor
+        )  # fmt: skip
 
     return replace(
         case,

@@ -71,6 +71,7 @@ def admitted(declared: Case, *, anyway: bool = False, settings: DiagnosisSetting
     case = with_starts_found(case, settings=settings)
     problem = Problem(case, structure_of(case, settings=settings), case.identification, settings=settings)
     refuse_unusable(problem)
+    said = (*said, *_parts_alone(case))
     doubts = suspicions(declared, problem)
     for first in doubts:
         if not anyway:
@@ -82,6 +83,17 @@ def admitted(declared: Case, *, anyway: bool = False, settings: DiagnosisSetting
             raise ModelError(f"{apart}; --anyway diagnoses with the nominal model all the same")
         doubts = (*doubts, apart) if apart else doubts
     return Admitted(case, (*said, *doubts))
+
+
+def _parts_alone(case: Case) -> tuple[str, ...]:
+    types = sorted({entry.alike for entry in case.parameters if entry.alike})
+    if not types:
+        return ()
+    named = ", ".join(f"'{name}'" for name in types)
+    return (
+        f"the joints of this model do not carry one another; what parts of type {named} have in common is not used, and each of their "
+        "numbers is taken as known to its std",
+    )
 
 
 def _driven_by_name(case: Case) -> bool:

@@ -19,6 +19,7 @@ from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.articulated_search.screening import grid
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.multibody.model import ArticulatedModel
+from bench.discrepancy.multibody.nominal_parameters import Nominal
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.precheck.information import (
     SETTINGS,
@@ -52,9 +53,16 @@ def joints_told(
         moved[i] = SETTINGS.step
         J[:, i] = (_residuals(problem, (), moved) - rest) / SETTINGS.step
     inner = np.asarray(np.linalg.inv(J.T @ J + np.eye(J.shape[1])), dtype=np.float64)
+
+    def known(i: int, entry: Nominal) -> float:
+        slopes = entry.slopes(zero, i)
+        at, slope = list(slopes), np.array(list(slopes.values())) / entry.stated_std
+        return float(np.sqrt(slope @ inner[np.ix_(at, at)] @ slope))
+
     parameters = [
-        graded_parameter(entry.name, float(np.sqrt(inner[i, i])), entry.std, settings)
+        graded_parameter(entry.name, known(i, entry), entry.stated_std, settings)
         for i, entry in enumerate(problem.nominal)
+        if entry.of_body or not entry.shared
     ]
 
     chosen = [effect for effect in CATALOGUE if not only or effect.name in only]

@@ -1,0 +1,121 @@
+"""Parts of one type: what is off in one servo is off in its twins, and one that is missing friction has no better twins."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from test_articulated import KP, LIMIT, mjcf, problem_of, write_case
+from test_articulated_rounds import rubbing
+
+from bench.discrepancy import read_case
+from bench.discrepancy.articulated.naming import model_numbers
+from bench.discrepancy.articulated_search.catalogue import CATALOGUE
+from bench.discrepancy.articulated_search.placements import placements
+from bench.discrepancy.articulated_search.search import nominal_fit, round_of
+from bench.discrepancy.multibody.nominal_parameters import nominal_parameters
+from bench.errors import DocumentError
+
+COMMON, EACH = 0.4, 0.02
+"""Relative uncertainty of the gain of a type of servo, and scatter of two of them."""
+
+
+def of_type(folder, entries):
+    """A case whose gains say of which type their servos are; entries by name of the parameter."""
+    path = folder / "nominal.json"
+    document = json.loads(path.read_text())
+    for name, entry in entries.items():
+        document["parameters"][name] |= entry
+    path.write_text(json.dumps(document))
+    return folder
+
+
+def twins():
+    """Both gains: little is known of the type, and much of how far two of it differ."""
+    return {f"kp:{j}_drive": {"std": COMMON * kp, "alike": "S1", "each": EACH * kp} for j, kp in KP.items()}
+
+
+def with_gain(factor):
+    """The arm with other gains than stated."""
+    text = mjcf(servo=True)
+    for kp in KP.values():
+        text = text.replace(f'kp="{kp}"', f'kp="{factor * kp}"')
+    return text
+
+
+def test_deviations_of_twins_have_one_part_in_common(tmp_path):
+    problem = problem_of(of_type(write_case(tmp_path, mjcf(servo=True), servo=True), twins()))
+    parameters = nominal_parameters(problem.case, problem.model)
+    index = {p.name: i for i, p in enumerate(parameters)}
+    common, elbow = index["kp:S1"], index["kp:elbow_drive"]
+    assert parameters[common].shared
+    assert all(common in felt for felt in problem.felt)
+    assert parameters[elbow].stated_std == pytest.approx(COMMON * KP["elbow"])
+    rng = np.random.default_rng(0)
+    draws = rng.standard_normal((20_000, len(parameters)))
+    gains = np.array([
+        [parameters[i].deviation(x, i) / parameters[i].value for i in (index["kp:shoulder_drive"], elbow)] for x in draws
+    ])  # fmt: skip
+    assert gains.std(axis=0) == pytest.approx(COMMON, rel=0.02)
+    # of two twins, (a - b) / (1 + common) has the scatter of both
+    apart = (gains[:, 0] - gains[:, 1]) / (1.0 + 0.5 * gains.sum(axis=1))
+    assert np.median(np.abs(apart)) == pytest.approx(0.6745 * np.sqrt(2.0) * EACH, rel=0.05)
+    vector, step = draws[0], 1e-6
+    for i, slope in parameters[elbow].slopes(vector, elbow).items():
+        moved = vector.copy()
+        moved[i] += step
+        change = parameters[elbow].deviation(moved, elbow) - parameters[elbow].deviation(vector, elbow)
+        assert change / step == pytest.approx(slope, rel=1e-4)
+
+
+def test_what_one_twin_shows_is_known_of_the_other(tmp_path):
+    factor = 0.8
+    alone = {f"kp:{j}_drive": {"std": COMMON * kp} for j, kp in KP.items()}
+    found = {}
+    for name, entries in (("alone", alone), ("twins", twins())):
+        folder = tmp_path / name
+        folder.mkdir()
+        problem = problem_of(of_type(write_case(folder, with_gain(factor), servo=True), entries))
+        found[name] = {entry.name: entry for entry in model_numbers(problem, nominal_fit(problem))}
+        assert set(found[name]) == {p.name for p in problem.case.parameters}
+    for j, kp in KP.items():
+        mine, twin = (found[name][f"kp:{j}_drive"] for name in ("alone", "twins"))
+        assert twin.value == pytest.approx(factor * kp, rel=0.02)
+        assert twin.stated_std == pytest.approx(mine.stated_std)
+        assert twin.std < 1.01 * mine.std
+        assert twin.shift_in_std == pytest.approx((factor - 1.0) / COMMON, rel=0.1)
+
+
+def test_one_kind_of_effect_is_taken_at_all_parts_of_a_type(tmp_path):
+    problem = problem_of(of_type(write_case(tmp_path, rubbing(LIMIT), servo=True), twins()))
+    names = {"coulomb_friction", "stribeck_friction", "servo_gain_error"}
+    candidates = placements(problem, [effect for effect in CATALOGUE if effect.name in names])
+    settings = problem.settings.articulated.search
+    told = round_of(problem, nominal_fit(problem), candidates, settings, lambda text: None)
+    assert told.best is not None
+    assert {placed.key for placed in told.best.hypothesis} == {("coulomb_friction", j) for j in KP}
+    kinds = [
+        {placed.effect.name for placed in f.hypothesis} for f in told.fits if len(f.hypothesis) == len(KP)
+    ]
+    assert {"coulomb_friction"} in kinds
+    assert {"servo_gain_error"} in kinds
+
+
+REFUSED = {
+    "a type without a scatter": ({"kp:elbow_drive": {"alike": "S1"}}, "alike and each belong together"),
+    "a scatter without a type": ({"kp:elbow_drive": {"each": 0.1}}, "alike and each belong together"),
+    "more scatter than uncertainty": ({"kp:elbow_drive": {"alike": "S1", "each": 9.0}}, "std counts the scatter of the parts in"),
+    "one part of a type": ({"kp:elbow_drive": {"alike": "S1", "each": 0.1}}, "no other 'kp:…' is of type 'S1'"),
+    "masses of a type": (
+        {name: {"alike": "S1", "each": 0.001} for name in ("mass:upper", "mass:fore")}, "are joints and drives of an MJCF",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_types_of_which_nothing_follows_are_refused(tmp_path, name):
+    entries, says = REFUSED[name]
+    folder = of_type(write_case(tmp_path, mjcf(servo=True), servo=True, length=1.0), entries)
+    with pytest.raises(DocumentError, match=says):
+        read_case(folder)
