@@ -316,6 +316,14 @@ ARM_EFFECTS = {
 }  # fmt: skip
 
 
+def test_a_lag_of_the_diagnosis_is_told_from_mujocos(tmp_path):
+    case = stage_case(tmp_path, n=400)
+    _, _, found = STAGE_EFFECTS["actuator_lag"]
+    (change,) = apply(case.folder / case.rig, Findings((found,)), case=case, linear=True).changes
+    assert change.form == "native"
+    assert "half a sample earlier" in change.text
+
+
 def carried(model, data):
     """Torque that the elbow carries, by inverse dynamics of the bodies alone."""
     full = np.zeros((model.nv, model.nv))

@@ -54,8 +54,12 @@ def lag(target: Target, effect: NamedEffect) -> Change:
     actuator.actdim = 1
     actuator.actearly = True
     other = _servo(target, actuator) and effect.name == "actuator_lag"
-    servo = " (of the servo's target; the diagnosis lags its force)" if other else ""
-    return _done(effect, actuator, f"a first-order filter of {before + constant:.6g} s{servo}")
+    text = f"a first-order filter of {before + constant:.6g} s"
+    if other:
+        text += " (of the servo's target; the diagnosis lags its force)"
+    elif "time_constant" in effect.parameters:
+        text += " (an analogue one; that of the diagnosis moves on once a sample, half a sample earlier)"
+    return _done(effect, actuator, text)
 
 
 def gain(target: Target, effect: NamedEffect) -> Change:

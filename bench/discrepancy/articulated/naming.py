@@ -24,6 +24,7 @@ from bench.discrepancy.multibody.nominal_parameters import Nominal
 from bench.discrepancy.settings import ArticulatedJudgementSettings as JudgementSettings
 from bench.discrepancy.verdict import (
     Estimate,
+    Gap,
     NamedEffect,
     NominalEstimate,
     Ranked,
@@ -96,6 +97,7 @@ def verdict_of(
             whole,
             widest.closed if kind == "effect" else explained,
             left,
+            widest,
         ),
         warnings=(),
         complete=whole,
@@ -122,7 +124,7 @@ def _shares(
 
 
 def _words(
-    kind: VerdictKind, effects: Sequence[NamedEffect], whole: bool, explained: float, left: str
+    kind: VerdictKind, effects: Sequence[NamedEffect], whole: bool, explained: float, left: str, gap: Gap
 ) -> str:
     few = len(effects) <= 3
     names = " and ".join(f"{e.name} ({e.where})" for e in effects) if few else by_name(effects)
@@ -144,7 +146,13 @@ def _words(
             f"Something is missing from the model, and no effect of the catalogue closes most of it; the nearest is {names}, "
             f"with {100.0 * explained:.3g} %.{left}"
         )
-    return f"Something is missing from the model, and no effect of the catalogue improves on the judging records.{left}"
+    keep = ""
+    if gap.after > gap.before:
+        keep = (
+            f" Its own numbers, estimated from the other records, leave more of these ({gap.after:.3g}) than as stated "
+            f"({gap.before:.3g}): keep what is stated."
+        )
+    return f"Something is missing from the model, and no effect of the catalogue improves on the judging records.{left}{keep}"
 
 
 def left_of(
@@ -315,4 +323,4 @@ def model_numbers(problem: ArticulatedProblem, final: ArticulatedFit) -> tuple[N
         std = float(np.sqrt(max(slope @ final.covariance[np.ix_(at, at)] @ slope, 0.0)))
         return NominalEstimate(p.name, p.value + moved, std, p.value, p.stated_std, moved / p.stated_std)
 
-    return tuple(estimate(i, p) for i, p in enumerate(problem.nominal) if p.of_body or not p.shared)
+    return tuple(estimate(i, p) for i, p in enumerate(problem.nominal) if not p.of_type)

@@ -107,7 +107,7 @@ class ArticulatedProblem:
 
     def locals(self, j: int) -> tuple[int, ...]:
         """Indices of the nominal parameters of joint `j` alone."""
-        return tuple(i for i, p in enumerate(self.nominal) if p.joints == (j,))
+        return tuple(i for i, p in enumerate(self.nominal) if not p.shared and p.joints == (j,))
 
     def size(self, hypothesis: JointHypothesis) -> int:
         """Length of the vector of a hypothesis."""

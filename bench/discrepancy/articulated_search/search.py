@@ -190,7 +190,7 @@ def _of_one_kind(
     Whether one servo of a type has friction is no news once another has. One choice among the candidates is made for all of them where
     `own` would have them make one each, and a choice among k that are as likely costs log k of log posterior.
     """
-    for joints in sorted({p.joints for p in problem.nominal if len(p.joints) > 1}):
+    for joints in sorted({p.joints for p in problem.nominal if p.of_type}):
         if not own.keys() >= set(joints):
             continue
         found: dict[str, dict[int, ArticulatedFit]] = {}

@@ -50,6 +50,7 @@ class Nominal:
         factor: What a unit of it is there: of a joint that another one moves, what the ratio of the two makes of it.
         common: Index of what it has in common with the other parts of its type; None where it is a part of none.
         together: Standard uncertainty of that.
+        of_type: Whether it is what parts of one type have in common.
     """
 
     name: str
@@ -61,6 +62,7 @@ class Nominal:
     factor: float = 1.0
     common: int | None = None
     together: float = 0.0
+    of_type: bool = False
 
     @property
     def of_body(self) -> bool:
@@ -70,7 +72,7 @@ class Nominal:
     @property
     def shared(self) -> bool:
         """Whether several joints may feel it: it belongs to a body, or to a type of parts."""
-        return self.of_body or len(self.joints) > 1
+        return self.of_body or self.of_type
 
     @property
     def stated_std(self) -> float:
@@ -147,7 +149,7 @@ def _common(name: str, parts: Sequence[Nominal]) -> Nominal:
     kind, _, label = name.partition(":")
     joints = tuple(sorted({part.joints[0] for part in parts}))
     least = min(part.value / part.together for part in parts)
-    return Nominal(name, kind, label, joints, least, 1.0)
+    return Nominal(name, kind, label, joints, least, 1.0, of_type=True)
 
 
 def base_slots(joint: Joint, on_link: bool) -> Array:

@@ -62,7 +62,7 @@ def joints_told(
     parameters = [
         graded_parameter(entry.name, known(i, entry), entry.stated_std, settings)
         for i, entry in enumerate(problem.nominal)
-        if entry.of_body or not entry.shared
+        if not entry.of_type
     ]
 
     chosen = [effect for effect in CATALOGUE if not only or effect.name in only]

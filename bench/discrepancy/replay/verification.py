@@ -246,10 +246,9 @@ def _remedied(
         (f"a step of {out.step / part:.3g} s", out.step / part, None) for part in settings.refinements
     ]
     if out.integrator != "RK4":
-        trials.insert(
-            0,
-            (f"the integrator RK4 at the step of {out.step:.3g} s", out.step, mujoco.mjtIntegrator.mjINT_RK4),
-        )
+        runge, fine = mujoco.mjtIntegrator.mjINT_RK4, out.step / settings.converged
+        trials.insert(0, (f"the integrator RK4 at the step of {out.step:.3g} s", out.step, runge))
+        trials.append((f"the integrator RK4 at a step of {fine:.3g} s", fine, runge))
     best, label = out.figures, ""
     for name, step, integrator in trials:
         progress(f"with {name}")
