@@ -22,6 +22,7 @@ from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.hypothesis import PlacedOnJoint
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.articulated_search.search import complete, predecessors, shortened
+from bench.discrepancy.multibody.nominal_parameters import twins
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.settings import ArticulatedJudgementSettings as JudgementSettings
 
@@ -147,8 +148,7 @@ def kept(
     """What the judging records bear out of the best of some fits.
 
     Effects are kept up to the last that improves on what was kept before it. One before it that did not improve when it was added is
-    kept if the explanation is worse without it, or if numbers of the model that move in its place lose as much log prior as an effect has
-    to add to be found.
+    kept if the explanation is worse without it; one that another part of the same type shows, unless it is better without it.
 
     Args:
         problem: Records for identification.
@@ -166,10 +166,12 @@ def kept(
             found.append(shorter)
             at = judging.reached((placed,))
             without = predict(judging, shorter, floor, settings).of(at)
-            against = _against_stated(problem, shorter) - _against_stated(problem, rungs[last])
-            if against < problem.settings.articulated.search.worth and not better(
-                without, predictions[last].of(at), settings
-            ):
+            mine = predictions[last].of(at)
+            shown = [
+                p for p in rungs[last].hypothesis if p not in doubtful and p.effect.name == placed.effect.name
+            ]
+            of_twin = bool({p.joint for p in shown} & twins(problem.nominal, placed.joint))
+            if better(mine, without, settings) if of_twin else not better(without, mine, settings):
                 break
         else:
             return Kept(rungs, last, predictions, found[len(fits) :])
@@ -177,11 +179,6 @@ def kept(
         best = shortened(problem, rungs[-1], (placed,))
         found += [best, *predecessors(problem, best, found)]
         rungs = ladder([best, *found])
-
-
-def _against_stated(problem: ArticulatedProblem, found: ArticulatedFit) -> float:
-    """Log prior that a fit has lost by moving the numbers of the model."""
-    return 0.5 * float(np.sum(found.vector[: len(problem.nominal)] ** 2))
 
 
 def _climbed(

@@ -152,6 +152,11 @@ def _common(name: str, parts: Sequence[Nominal]) -> Nominal:
     return Nominal(name, kind, label, joints, least, 1.0, of_type=True)
 
 
+def twins(nominal: Sequence[Nominal], j: int) -> set[int]:
+    """The other joints whose parts are of one type with those of joint `j`."""
+    return {other for p in nominal if p.of_type and j in p.joints for other in p.joints} - {j}
+
+
 def base_slots(joint: Joint, on_link: bool) -> Array:
     """Parameter vector (SLOTS,) of a joint's nominal model."""
     p = np.zeros(SLOTS)
