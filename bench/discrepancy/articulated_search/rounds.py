@@ -149,10 +149,12 @@ def parted(
 
 def strained(problem: ArticulatedProblem, base: ArticulatedFit, settings: SearchSettings) -> set[int]:
     """Joints one of whose nominal parameters a fit has moved too far."""
-    far = [i for i in range(len(problem.nominal)) if abs(base.vector[i]) > settings.strained]
-    feel = {i: [j for j in range(len(problem.joints)) if i in problem.felt[j]] for i in far}
-    # a body hangs on the last of the joints that feel it
-    return {j for i in far for j in problem.nominal[i].joints or feel[i][-1:]}
+    carriers = {joint.body: j for j, joint in enumerate(problem.joints)}
+    out: set[int] = set()
+    for entry, moved in zip(problem.nominal, base.vector, strict=False):
+        if abs(moved) > settings.strained:
+            out |= {carriers[entry.target]} if entry.target in carriers else set(entry.joints)
+    return out
 
 
 def _untouched(problem: ArticulatedProblem, base: ArticulatedFit) -> ArticulatedFit:
