@@ -69,7 +69,7 @@ class _Ground:
     def _moves(self, problem: ArticulatedProblem, base: ArticulatedFit, i: int) -> bool:
         n = len(problem.nominal)
         if i < n:
-            return any(i in problem.felt[j] or i in problem.locals(j) for j in self.joints)
+            return problem.nominal[i].of_body or any(j in problem.nominal[i].joints for j in self.joints)
         for placed in base.hypothesis:
             n += len(placed.effect.parameters)
             if i < n:
