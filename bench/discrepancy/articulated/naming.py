@@ -97,7 +97,7 @@ def verdict_of(
             whole,
             widest.closed if kind == "effect" else explained,
             left,
-            widest,
+            gaps,
         ),
         warnings=(),
         complete=whole,
@@ -124,7 +124,12 @@ def _shares(
 
 
 def _words(
-    kind: VerdictKind, effects: Sequence[NamedEffect], whole: bool, explained: float, left: str, gap: Gap
+    kind: VerdictKind,
+    effects: Sequence[NamedEffect],
+    whole: bool,
+    explained: float,
+    left: str,
+    gaps: Sequence[Gap],
 ) -> str:
     few = len(effects) <= 3
     names = " and ".join(f"{e.name} ({e.where})" for e in effects) if few else by_name(effects)
@@ -147,11 +152,9 @@ def _words(
             f"with {100.0 * explained:.3g} %.{left}"
         )
     keep = ""
-    if gap.after > gap.before:
-        keep = (
-            f" Its own numbers, estimated from the other records, leave more of these ({gap.after:.3g}) than as stated "
-            f"({gap.before:.3g}): keep what is stated."
-        )
+    before, after = (sum(getattr(gap, end) ** 2 for gap in gaps) for end in ("before", "after"))
+    if after > before:
+        keep = " Its own numbers, estimated from the other records, leave more of these than as stated: keep what is stated."
     return f"Something is missing from the model, and no effect of the catalogue improves on the judging records.{left}{keep}"
 
 

@@ -42,7 +42,7 @@ LABELS = {
     "both_named": "both effects of a double named",
     "tellable": "right where the records can tell",
     "unknown_tellable": "foreign effects called unknown where the records can tell",
-    "struck_right": "true effect struck: unknown, or its kin",
+    "struck_right": "true effect struck: unknown, or one of its family",
     "struck_unknown": "true effect struck: unknown",
     "sets_hold_truth": "declared sets hold the truth",
     "mean_set": "mean size of a declared set",
