@@ -18,6 +18,7 @@ from bench.discrepancy.articulated.judgement import (
     PredictedErrors,
     alike,
     kept,
+    keys_of,
     ladder,
     noise_floor,
     predict,
@@ -30,7 +31,8 @@ from bench.discrepancy.articulated.whiteness import Astray, Coloured, astray, co
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.hypothesis import PlacedOnJoint
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
-from bench.discrepancy.articulated_search.search import complete, exchanged, predecessors, search
+from bench.discrepancy.articulated_search.search import complete, exchanged, predecessors, search, shortened
+from bench.discrepancy.multibody.nominal_parameters import twins
 from bench.discrepancy.settings import ArticulatedSearchSettings as SearchSettings
 from bench.discrepancy.verdict import Verdict
 
@@ -123,12 +125,32 @@ def _explained(
             predictions = [predict(judged_by, rung, floor, judged) for rung in rungs]
             left = _left(problem, judged_by, plain, predictions[-1], stated=question.stated)
             near = alike(judged_by, fits, plain, predictions[-1], judged)
+    fits += _without_a_twin(problem, fits, rungs[-1])
     verdict = verdict_of(
         problem, fits, rungs, predict(judged_by, None, floor, judged), predictions,
         without_each(judged_by, fits, rungs[-1], floor, judged), judged, rng,
         whole=left.whole, left=left_of(problem, rungs[-1], left.coloured, left.astray), alike=near,
     )  # fmt: skip
     return Explained(problem, judging, fits, rungs[-1], predictions, verdict, near)
+
+
+def _without_a_twin(
+    problem: ArticulatedProblem, fits: Sequence[ArticulatedFit], final: ArticulatedFit
+) -> list[ArticulatedFit]:
+    """An explanation without each effect at a part of a type, where none was made, while there is time.
+
+    The first effect at such a part sets right the numbers that all parts have in common, and its step takes off what others miss besides:
+    what each of them closes is told by what comes back without it alone.
+    """
+    out = []
+    for placed in final.hypothesis if len(final.hypothesis) > 1 else ():
+        rest = keys_of(final) - {placed.key}
+        if not twins(problem.nominal, placed.joint) or any(keys_of(f) == rest for f in fits):
+            continue
+        if not problem.deadline.allows("what comes back without each effect"):
+            break
+        out.append(shortened(problem, final, (placed,)))
+    return out
 
 
 def _with_dry_friction(
