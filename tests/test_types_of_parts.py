@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from test_apply import stage_case
 from test_articulated import KP, LIMIT, mjcf, problem_of, write_case
 from test_articulated_rounds import rubbing
 
@@ -14,7 +16,8 @@ from bench.discrepancy.articulated.naming import model_numbers
 from bench.discrepancy.articulated_search.catalogue import CATALOGUE
 from bench.discrepancy.articulated_search.placements import placements
 from bench.discrepancy.articulated_search.search import nominal_fit, round_of
-from bench.discrepancy.multibody.nominal_parameters import nominal_parameters
+from bench.discrepancy.checks.admission import admitted
+from bench.discrepancy.multibody.nominal_parameters import nominal_parameters, twins
 from bench.errors import DocumentError
 
 COMMON, EACH = 0.4, 0.02
@@ -31,7 +34,7 @@ def of_type(folder, entries):
     return folder
 
 
-def twins():
+def alike():
     """Both gains: little is known of the type, and much of how far two of it differ."""
     return {f"kp:{j}_drive": {"std": COMMON * kp, "alike": "S1", "each": EACH * kp} for j, kp in KP.items()}
 
@@ -45,11 +48,12 @@ def with_gain(factor):
 
 
 def test_deviations_of_twins_have_one_part_in_common(tmp_path):
-    problem = problem_of(of_type(write_case(tmp_path, mjcf(servo=True), servo=True), twins()))
+    problem = problem_of(of_type(write_case(tmp_path, mjcf(servo=True), servo=True), alike()))
     parameters = nominal_parameters(problem.case, problem.model)
     index = {p.name: i for i, p in enumerate(parameters)}
     common, elbow = index["kp:S1"], index["kp:elbow_drive"]
     assert parameters[common].shared
+    assert [twins(parameters, j) for j in range(len(problem.joints))] == [{1}, {0}]
     assert all(common in felt for felt in problem.felt)
     assert parameters[elbow].stated_std == pytest.approx(COMMON * KP["elbow"])
     rng = np.random.default_rng(0)
@@ -73,7 +77,7 @@ def test_what_one_twin_shows_is_known_of_the_other(tmp_path):
     factor = 0.8
     alone = {f"kp:{j}_drive": {"std": COMMON * kp} for j, kp in KP.items()}
     found = {}
-    for name, entries in (("alone", alone), ("twins", twins())):
+    for name, entries in (("alone", alone), ("twins", alike())):
         folder = tmp_path / name
         folder.mkdir()
         problem = problem_of(of_type(write_case(folder, with_gain(factor), servo=True), entries))
@@ -88,7 +92,7 @@ def test_what_one_twin_shows_is_known_of_the_other(tmp_path):
 
 
 def test_one_kind_of_effect_is_taken_at_all_parts_of_a_type(tmp_path):
-    problem = problem_of(of_type(write_case(tmp_path, rubbing(LIMIT), servo=True), twins()))
+    problem = problem_of(of_type(write_case(tmp_path, rubbing(LIMIT), servo=True), alike()))
     names = {"coulomb_friction", "stribeck_friction", "servo_gain_error"}
     candidates = placements(problem, [effect for effect in CATALOGUE if effect.name in names])
     settings = problem.settings.articulated.search
@@ -119,3 +123,11 @@ def test_types_of_which_nothing_follows_are_refused(tmp_path, name):
     folder = of_type(write_case(tmp_path, mjcf(servo=True), servo=True, length=1.0), entries)
     with pytest.raises(DocumentError, match=says):
         read_case(folder)
+
+
+def test_a_linear_structure_says_that_it_takes_parts_one_by_one(tmp_path):
+    case = stage_case(tmp_path, n=400)
+    of_a_type = tuple(replace(p, alike="S1", each=0.5 * p.std) for p in case.parameters)
+    (said,) = [note for note in admitted(replace(case, parameters=of_a_type)).notes if "'S1'" in note]
+    assert "is not used" in said
+    assert not [note for note in admitted(case).notes if "is not used" in note]
