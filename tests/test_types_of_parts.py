@@ -93,7 +93,7 @@ def test_what_one_twin_shows_is_known_of_the_other(tmp_path):
 
 def test_one_kind_of_effect_is_taken_at_all_parts_of_a_type(tmp_path):
     problem = problem_of(of_type(write_case(tmp_path, rubbing(LIMIT), servo=True), alike()))
-    names = {"coulomb_friction", "stribeck_friction", "servo_gain_error"}
+    names = {"coulomb_friction", "stribeck_friction", "load_dependent_friction", "servo_gain_error"}
     candidates = placements(problem, [effect for effect in CATALOGUE if effect.name in names])
     settings = problem.settings.articulated.search
     told = round_of(problem, nominal_fit(problem), candidates, settings, lambda text: None)
@@ -103,7 +103,13 @@ def test_one_kind_of_effect_is_taken_at_all_parts_of_a_type(tmp_path):
         {placed.effect.name for placed in f.hypothesis} for f in told.fits if len(f.hypothesis) == len(KP)
     ]
     assert {"coulomb_friction"} in kinds
-    assert {"servo_gain_error"} in kinds
+    assert {"load_dependent_friction"} in kinds
+    of_one = [
+        f
+        for f, kind in zip((f for f in told.fits if len(f.hypothesis) == len(KP)), kinds, strict=True)
+        if len(kind) == 1
+    ]
+    assert told.best.log_posterior == max(f.log_posterior for f in of_one)
 
 
 REFUSED = {

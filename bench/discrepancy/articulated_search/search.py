@@ -171,8 +171,10 @@ def round_of(
         together = _joined(problem, current, sorted(parts, key=lambda part: -part.log_posterior))
         fits.append(together)
         best = max(best, together, key=lambda f: f.log_posterior)
-    for alike, worth in list(_of_one_kind(problem, current, fits, own, settings)):
-        fits += [] if alike in fits else [alike]
+    kinds = list(_of_one_kind(problem, current, fits, own, settings))
+    fits += [alike for alike, _ in kinds if alike not in fits]
+    if kinds:
+        alike, worth = max(kinds, key=lambda kind: kind[0].log_posterior + kind[1])
         if best is None or alike.log_posterior + worth > best.log_posterior:
             best = alike
     return Round(best, fits, corrected)
