@@ -32,7 +32,7 @@ def told(found: ArticulatedDiagnosis) -> str:
     ]
     rungs = [
         (r.hypothesis[-1].key if r.hypothesis else "", r.reduced.round(2).tolist())
-        for r in ladder(found.fits)
+        for r in ladder(found.problem, found.fits)
     ]
     gaps = [f"{g.before:.3g}>{g.after:.3g}/{g.noise_floor:.3g}" for g in verdict.gaps]
     return (

@@ -347,7 +347,7 @@ def test_what_records_cannot_tell_apart_shares_a_probability_and_what_is_left_lo
         fits.append(replace(ArticulatedFit.at(problem, (placed,), vector), log_posterior=-7.0))
     judged = JudgementSettings()
     for foreign in (judged.outside, 0.3):
-        told = ranking_of(fits, fits[0], judged, foreign)
+        told = ranking_of(fits, fits[0], foreign)
         assert [entry.probability for entry in told] == pytest.approx([0.5 * (1.0 - foreign)] * 2)
 
 

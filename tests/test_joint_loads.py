@@ -11,7 +11,9 @@ import pytest
 
 from bench.discrepancy import diagnose, read_case
 from bench.discrepancy.application.applying import Findings
+from bench.discrepancy.articulated import explaining
 from bench.discrepancy.articulated.admission import admitted_robot
+from bench.discrepancy.articulated.explaining import Question, explained
 from bench.discrepancy.articulated.judgement import alike, keys_of, noise_floor, predict, simplest
 from bench.discrepancy.articulated.naming import ranking_of
 from bench.discrepancy.articulated.whiteness import astray
@@ -19,7 +21,7 @@ from bench.discrepancy.articulated_search.catalogue import CATALOGUE
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit, refitted
 from bench.discrepancy.articulated_search.placements import placements
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
-from bench.discrepancy.articulated_search.search import exchanged, nominal_fit
+from bench.discrepancy.articulated_search.search import Searched, exchanged, nominal_fit
 from bench.discrepancy.multibody.joints import joint_of
 from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.replay.verification import verify
@@ -133,6 +135,31 @@ def test_an_error_that_no_noise_makes_is_not_complete_however_well_samples_are_e
     assert less is None or less.times < lost.times
 
 
+def test_what_the_search_gave_up_is_named_where_the_judging_records_bear_it_out(tmp_path, monkeypatch):
+    case, compiled, _ = admitted_robot(read_case(folder_of(tmp_path)))
+    model = ArticulatedModel.of(compiled)
+    problem, judging = (
+        ArticulatedProblem.of(case, model, records) for records in (case.identification, case.validation)
+    )
+    nominal = nominal_fit(problem)
+    candidates = placements(problem, CATALOGUE)
+    fits = {}
+    for placed in candidates:
+        if placed.effect.name in ("coulomb_friction", "force_offset"):
+            start = np.append(nominal.vector, [p.mean for p in placed.effect.parameters])
+            fits[placed.effect.name] = refitted(problem, (placed,), start, scale=nominal.scale)
+    settings = problem.settings.articulated.search
+    question = Question(judging, settings, np.random.default_rng(0), True, lambda text: None)
+    named = []
+    for left in ([], [fits["coulomb_friction"]]):
+        told = Searched(problem, [fits["force_offset"], fits["coulomb_friction"], nominal], left)
+        monkeypatch.setattr(explaining, "search", lambda *a, told=told, **k: told)
+        monkeypatch.setattr(explaining, "_asks_torque", lambda found: False)
+        final = explained(problem, candidates, question).final
+        named.append([placed.effect.name for placed in final.hypothesis])
+    assert named == [[], ["coulomb_friction"]]
+
+
 def test_explanations_that_predict_as_well_are_told_beside_what_is_named(tmp_path):
     case, compiled, _ = admitted_robot(read_case(folder_of(tmp_path)))
     model = ArticulatedModel.of(compiled)
@@ -154,9 +181,7 @@ def test_explanations_that_predict_as_well_are_told_beside_what_is_named(tmp_pat
     assert frozenset({("force_offset", "pivot")}) not in found
     # what is as good counts as much, however much likelier the one is
     behind = [replace(f, log_posterior=f.log_posterior - 100.0 * (f is not final)) for f in fits]
-    ranking = {
-        r.name: r.probability for r in ranking_of(behind, behind[fits.index(final)], settings, 0.0, found)
-    }
+    ranking = {r.name: r.probability for r in ranking_of(behind, behind[fits.index(final)], 0.0, found)}
     assert ranking["stribeck_friction"] == pytest.approx(ranking["coulomb_friction"])
     assert ranking["force_offset"] < 1e-6
     # what has most parameters is named only where it predicts better for sure
@@ -164,7 +189,7 @@ def test_explanations_that_predict_as_well_are_told_beside_what_is_named(tmp_pat
     assert simplest(fits, rich, {keys_of(final)}) is final
     assert simplest(fits, rich, set()) is rich
     assert simplest(fits, final, {keys_of(rich)}) is final
-    plain = exchanged(problem, rich, rich.hypothesis[0], final.hypothesis[0])
+    plain = exchanged(problem, rich, rich.hypothesis[:1], final.hypothesis[:1])
     assert keys_of(plain) == keys_of(final)
     np.testing.assert_allclose(plain.vector, final.vector, atol=0.05)
 

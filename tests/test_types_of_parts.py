@@ -12,10 +12,12 @@ from test_articulated import KP, LIMIT, mjcf, problem_of, write_case
 from test_articulated_rounds import rubbing
 
 from bench.discrepancy import read_case
+from bench.discrepancy.articulated.judgement import alike as alike_in
+from bench.discrepancy.articulated.judgement import keys_of, ladder, noise_floor, predict, simplest
 from bench.discrepancy.articulated.naming import model_numbers
 from bench.discrepancy.articulated_search.catalogue import CATALOGUE
 from bench.discrepancy.articulated_search.placements import placements
-from bench.discrepancy.articulated_search.search import nominal_fit, round_of
+from bench.discrepancy.articulated_search.search import nominal_fit, round_of, steps
 from bench.discrepancy.checks.admission import admitted
 from bench.discrepancy.multibody.nominal_parameters import nominal_parameters, twins
 from bench.errors import DocumentError
@@ -45,6 +47,11 @@ def with_gain(factor):
     for kp in KP.values():
         text = text.replace(f'kp="{kp}"', f'kp="{factor * kp}"')
     return text
+
+
+def of_one_size(fits):
+    """Fits with as many effects as there are parts."""
+    return [f for f in fits if len(f.hypothesis) == len(KP)]
 
 
 def test_deviations_of_twins_have_one_part_in_common(tmp_path):
@@ -99,17 +106,31 @@ def test_one_kind_of_effect_is_taken_at_all_parts_of_a_type(tmp_path):
     told = round_of(problem, nominal_fit(problem), candidates, settings, lambda text: None)
     assert told.best is not None
     assert {placed.key for placed in told.best.hypothesis} == {("coulomb_friction", j) for j in KP}
-    kinds = [
-        {placed.effect.name for placed in f.hypothesis} for f in told.fits if len(f.hypothesis) == len(KP)
-    ]
+    kinds = [{placed.effect.name for placed in f.hypothesis} for f in of_one_size(told.fits)]
     assert {"coulomb_friction"} in kinds
     assert {"load_dependent_friction"} in kinds
-    of_one = [
-        f
-        for f, kind in zip((f for f in told.fits if len(f.hypothesis) == len(KP)), kinds, strict=True)
-        if len(kind) == 1
-    ]
+    of_one = [f for f, kind in zip(of_one_size(told.fits), kinds, strict=True) if len(kind) == 1]
     assert told.best.log_posterior == max(f.log_posterior for f in of_one)
+    # one choice is judged as one, and exchanged as one
+    fits = [told.best, nominal_fit(problem), *told.fits]
+    assert [len(f.hypothesis) for f in ladder(problem, fits)] == [0, len(KP)]
+    other = next(
+        f
+        for f, kind in zip(of_one_size(told.fits), kinds, strict=True)
+        if kind == {"load_dependent_friction"}
+    )
+    judged = problem.settings.articulated.judgement
+    floor = noise_floor(problem, told.best, judged)
+    near = alike_in(problem, fits, other, predict(problem, other, floor, judged), judged)
+    assert keys_of(told.best) in near
+    assert simplest(fits, other, near).hypothesis == told.best.hypothesis
+
+
+def test_kinds_at_parts_of_no_type_are_choices_of_their_own(tmp_path):
+    problem = problem_of(write_case(tmp_path, rubbing(LIMIT), servo=True))
+    kind = [effect for effect in CATALOGUE if effect.name == "coulomb_friction"]
+    assert steps(problem, tuple(placements(problem, kind))) == [1, 2]
+    assert steps(problem, ()) == []
 
 
 REFUSED = {

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +18,7 @@ from bench.discrepancy.articulated.judgement import (
     EffectKeys,
     PredictedErrors,
     alike,
+    better,
     kept,
     keys_of,
     ladder,
@@ -31,7 +33,14 @@ from bench.discrepancy.articulated.whiteness import Astray, Coloured, astray, co
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.hypothesis import PlacedOnJoint
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
-from bench.discrepancy.articulated_search.search import complete, exchanged, predecessors, search, shortened
+from bench.discrepancy.articulated_search.search import (
+    complete,
+    exchanged,
+    predecessors,
+    search,
+    shortened,
+    steps,
+)
 from bench.discrepancy.multibody.nominal_parameters import twins
 from bench.discrepancy.settings import ArticulatedSearchSettings as SearchSettings
 from bench.discrepancy.verdict import Verdict
@@ -106,11 +115,17 @@ def _explained(
 ) -> Explained:
     """Explain by runs, or by the torque of a `TorqueProblem`, whose explanations are never complete."""
     judged, rng = problem.settings.articulated.judgement, question.rng
-    problem, fits = search(problem, candidates, settings=question.settings, progress=question.progress)
+    problem, fits, left_behind = search(
+        problem, candidates, settings=question.settings, progress=question.progress
+    )
     judging = question.judging.softened(problem.softness)
     judged_by = asked_as(problem, judging)
     question.progress("judging records")
     climbed = kept(problem, judged_by, fits, judged)
+    for earlier in left_behind:  # of what was likelier later, the judging records may bear out less
+        other = kept(problem, judged_by, [earlier, *fits], judged)
+        if better(climbed.predictions[climbed.last], other.predictions[other.last], judged):
+            climbed = other
     fits, floor = [*fits, *climbed.fits], climbed.predictions[0].floor
     rungs = climbed.rungs[: climbed.last + 1]
     predictions, near = climbed.predictions[: len(rungs)], set[EffectKeys]()
@@ -121,7 +136,7 @@ def _explained(
         plain = simplest(fits, rungs[-1], near)
         if plain is not rungs[-1]:
             fits += predecessors(problem, plain, fits)
-            rungs = ladder([plain, *fits])
+            rungs = ladder(problem, [plain, *fits])
             predictions = [predict(judged_by, rung, floor, judged) for rung in rungs]
             left = _left(problem, judged_by, plain, predictions[-1], stated=question.stated)
             near = alike(judged_by, fits, plain, predictions[-1], judged)
@@ -160,12 +175,17 @@ def _with_dry_friction(
 
     It is what joints have most, and what a law with more to fit imitates first; the search may never have held the two side by side.
     """
-    laws = [p for p in final.hypothesis if p.effect.site == "joint" and p.effect.free > 1]
-    if not laws or not problem.deadline.allows("dry friction in the place of what is named"):
-        return []
     dry = {p.joint: p for p in candidates if p.effect.name == "coulomb_friction"}
     taken = {placed.joint for placed in final.hypothesis if placed.effect.name == "coulomb_friction"}
-    return [exchanged(problem, final, p, dry[p.joint]) for p in laws if p.joint in dry.keys() - taken]
+    out, ends = [], [0, *steps(problem, final.hypothesis)]
+    for start, end in pairwise(ends):
+        laws = [p for p in final.hypothesis[start:end] if p.effect.site == "joint" and p.effect.free > 1]
+        if not laws or not {p.joint for p in laws} <= dry.keys() - taken:
+            continue
+        if not problem.deadline.allows("dry friction in the place of what is named"):
+            break
+        out.append(exchanged(problem, final, laws, [dry[p.joint] for p in laws]))
+    return out
 
 
 class _Left(NamedTuple):

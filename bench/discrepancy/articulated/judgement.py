@@ -19,9 +19,9 @@ from bench.discrepancy.articulated.torque_error import TorqueProblem
 from bench.discrepancy.articulated.torque_runs import TorqueRuns
 from bench.discrepancy.articulated_search.catalogue import CATALOGUE
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
-from bench.discrepancy.articulated_search.hypothesis import PlacedOnJoint
+from bench.discrepancy.articulated_search.hypothesis import JointHypothesis, PlacedOnJoint
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
-from bench.discrepancy.articulated_search.search import complete, predecessors, shortened
+from bench.discrepancy.articulated_search.search import complete, predecessors, shortened, steps
 from bench.discrepancy.multibody.nominal_parameters import twins
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.settings import ArticulatedJudgementSettings as JudgementSettings
@@ -113,11 +113,11 @@ def predict(
     return PredictedErrors(np.minimum(power, 1e6), floor, weight)
 
 
-def ladder(fits: Sequence[ArticulatedFit]) -> list[ArticulatedFit]:
-    """The best fit with its predecessors: the nominal model alone, then one effect more at a time."""
+def ladder(problem: ArticulatedProblem, fits: Sequence[ArticulatedFit]) -> list[ArticulatedFit]:
+    """The best fit with its predecessors: the nominal model alone, then one step more at a time, see `steps`."""
     best = fits[0]
     out = [best]
-    for size in range(len(best.hypothesis) - 1, -1, -1):
+    for size in reversed([0, *steps(problem, best.hypothesis)][:-1]):
         shorter = [f for f in fits if f.hypothesis == best.hypothesis[:size]]
         out.insert(0, max(shorter, key=lambda f: f.log_posterior))
     return out
@@ -128,7 +128,7 @@ class Kept(NamedTuple):
 
     Attributes:
         rungs: The ladder.
-        last: How many of its effects are kept.
+        last: How many of its steps are kept.
         predictions: Of every rung.
         fits: Further fits that were made.
     """
@@ -156,7 +156,7 @@ def kept(
         fits: All fitted hypotheses, the best first.
         settings: Thresholds.
     """
-    found, rungs = list(fits), ladder(fits)
+    found, rungs = list(fits), ladder(problem, fits)
     floor = noise_floor(judging, rungs[-1], settings)
     while True:
         predictions = [predict(judging, rung, floor, settings) for rung in rungs]
@@ -178,7 +178,7 @@ def kept(
         # what was added after it is asked again without it, since the one may have spoilt the other
         best = shortened(problem, rungs[-1], (placed,))
         found += [best, *predecessors(problem, best, found)]
-        rungs = ladder([best, *found])
+        rungs = ladder(problem, [best, *found])
 
 
 def _climbed(
@@ -187,7 +187,7 @@ def _climbed(
     predictions: Sequence[PredictedErrors],
     settings: JudgementSettings,
 ) -> tuple[int, list[PlacedOnJoint]]:
-    """How many effects of a ladder the judging records bear out, and which of them did not improve when they were added.
+    """How many steps of a ladder the judging records bear out, and which effects did not improve when they were added.
 
     An effect improves if it takes off more than the standard error allows for, and more than it leaves; one at a joint or its drive is
     asked about that joint, or it stands in for something else. What it leaves of a joint is less than the joint moves: a run that is
@@ -203,8 +203,8 @@ def _climbed(
         likelier = rungs[k].log_posterior - rungs[last].log_posterior
         if complete(problem, rungs[last], settings) and likelier < settings.certain:
             break
-        placed = rungs[k].hypothesis[-1]
-        at = problem.reached((placed,))
+        added = rungs[k].hypothesis[len(rungs[k - 1].hypothesis) :]
+        at = problem.reached(added)
         first, before, after = (p.of(at) for p in (predictions[0], predictions[last], predictions[k]))
         gained, left = float(np.mean(before.excess - after.excess)), float(np.mean(after.excess))
         small = 0.0 if not last or complete(problem, rungs[k], settings) else least_part
@@ -213,7 +213,7 @@ def _climbed(
         if follows and gained > least and better(before, after, settings):
             last, doubtful, waiting = k, [*doubtful, *waiting], []
         else:
-            waiting.append(placed)
+            waiting += added
     return last, doubtful
 
 
@@ -260,6 +260,8 @@ def alike(
 ) -> set[EffectKeys]:
     """Explanations, one effect of the final one exchanged for another at its joint, than which that predicts no better for sure.
 
+    Of one kind of effect at parts of one type, all are exchanged for another kind.
+
     How likely a record is under a law that is not right says little of another law that is not: both leave what neither knows. Where
     more of what an effect leaves of its joint is that than noise, it is held against how others predict; else against those that are
     nearly as likely.
@@ -273,17 +275,20 @@ def alike(
     """
     own, likeliest = keys_of(final), dict[EffectKeys, ArticulatedFit]()
     for f in fits:
-        if len(f.hypothesis) == len(own) and len(own - keys_of(f)) == 1:
+        if len(f.hypothesis) == len(own) and keys_of(f) != own:
             likeliest.setdefault(keys_of(f), f)
     out = set()
     for theirs, f in likeliest.items():
-        (lost,) = [placed for placed in final.hypothesis if placed.key not in theirs]
-        (gained,) = [placed for placed in f.hypothesis if placed.key not in own]
-        at = problem.reached((lost,))
+        lost = tuple(placed for placed in final.hypothesis if placed.key not in theirs)
+        gained = tuple(placed for placed in f.hypothesis if placed.key not in own)
+        kinds = len(steps(problem, lost)) == len(steps(problem, gained)) == 1
+        if len(lost) > 1 and not (kinds and {p.joint for p in lost} == {p.joint for p in gained}):
+            continue
+        at = problem.reached(lost)
         mine = predicted.of(at)
         noisy = float(np.mean(mine.excess)) <= float(np.sum(mine.floor**2))
         close = final.log_posterior - f.log_posterior <= settings.rival
-        if (noisy and not close) or not set(at) & set(problem.reached((gained,))):
+        if (noisy and not close) or not set(at) & set(problem.reached(gained)):
             continue
         if not better(predict(problem, f, predicted.floor, settings).of(at), mine, settings):
             out.add(theirs)

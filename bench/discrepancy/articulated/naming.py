@@ -68,13 +68,13 @@ def verdict_of(
     kind: VerdictKind = "effect" if final.hypothesis else "none"
     if not whole and (not final.hypothesis or explained < settings.material):
         kind = "unknown"
-    shares = _shares(predictions, without, rng)
+    shares = _shares(rungs, predictions, without, rng)
     # of what is named beside noise, the part that is left tells how likely something outside the catalogue is
     foreign = settings.outside
     if kind == "effect" and not whole:
         foreign = outside(1.0 - explained, problem.settings.judgement.coarse)
     probabilities = _probabilities(fits, final, kind, settings, foreign)
-    ranking = ranking_of(fits, final, settings, foreign, alike)
+    ranking = ranking_of(fits, final, foreign, alike)
     sure = {(entry.name, entry.where): entry.probability for entry in ranking}
     effects = tuple(
         _named(problem, final, k, shares[k], sure[placed.key]) for k, placed in enumerate(final.hypothesis)
@@ -92,12 +92,7 @@ def verdict_of(
         gaps=gaps,
         probabilities=probabilities,
         explanation=_words(
-            kind,
-            effects,
-            whole,
-            widest.closed if kind == "effect" else explained,
-            left,
-            gaps,
+            kind, effects, whole, widest.closed if kind == "effect" else explained, left, gaps
         ),
         warnings=(),
         complete=whole,
@@ -107,6 +102,7 @@ def verdict_of(
 
 
 def _shares(
+    rungs: Sequence[ArticulatedFit],
     predictions: Sequence[PredictedErrors],
     without: Sequence[PredictedErrors | None],
     rng: np.random.Generator,
@@ -115,12 +111,14 @@ def _shares(
 
     Where they never were, it is what came back as the search found it, beside those before it.
     """
-    return [
-        closed(predictions[k], predictions[k + 1], predictions[0], rng)
-        if others is None
-        else closed(others, predictions[-1], predictions[0], rng)
-        for k, others in enumerate(without)
-    ]
+    out = []
+    for k, others in enumerate(without):
+        at = next(i for i, rung in enumerate(rungs) if len(rung.hypothesis) > k)
+        before, after = (
+            (predictions[at - 1], predictions[at]) if others is None else (others, predictions[-1])
+        )
+        out.append(closed(before, after, predictions[0], rng))
+    return out
 
 
 def _words(
@@ -222,7 +220,6 @@ def _rivals(
 def ranking_of(
     fits: Sequence[ArticulatedFit],
     final: ArticulatedFit,
-    settings: JudgementSettings,
     foreign: float,
     alike: Collection[EffectKeys] = (),
 ) -> tuple[Ranked, ...]:
@@ -231,7 +228,6 @@ def ranking_of(
     Args:
         fits: All fitted hypotheses.
         final: The one that is named.
-        settings: Of the judgement.
         foreign: Probability that something outside the catalogue is the cause.
         alike: Explanations that predict as well.
     """
@@ -272,10 +268,14 @@ def _sets(
     for f, behind in _rivals(fits, final, alike):
         theirs = {placed.key for placed in f.hypothesis}
         lost, gained = own - theirs, theirs - own
-        if behind <= settings.rival and len(lost) == 1 and len(gained) == 1:
-            (mine,), (other,) = lost, gained
-            if mine[0] != other[0]:
-                sets.setdefault(mine[0], {mine[0]}).add(other[0])
+        names = {name for name, _ in lost}, {name for name, _ in gained}
+        if (
+            behind <= settings.rival
+            and (len(lost) == 1 or frozenset(theirs) in alike)
+            and names[0] != names[1]
+        ):
+            (mine,), (other,) = names
+            sets.setdefault(mine, {mine}).add(other)
     return tuple(tuple(sorted(entry)) for entry in sets.values())
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -31,6 +32,7 @@ from bench.discrepancy.articulated_search.rounds import (
     sound,
     strained,
 )
+from bench.discrepancy.multibody.nominal_parameters import twins
 from bench.discrepancy.settings import ArticulatedJudgementSettings as JudgementSettings
 from bench.discrepancy.settings import ArticulatedSearchSettings as SearchSettings
 
@@ -47,22 +49,32 @@ def nominal_fit(problem: ArticulatedProblem) -> ArticulatedFit:
     return refitted(problem, (), vector, scale=ArticulatedFit.at(problem, (), vector).scale)
 
 
+class Searched(NamedTuple):
+    """What a search found.
+
+    Attributes:
+        problem: The one in which all is fitted, softened where runs that nothing corrects lose a play (`parted`).
+        fits: All fitted hypotheses, the one that the search ended with first, then the likeliest first.
+        left: Those that effects were given up of, which what was found later had made superfluous.
+    """
+
+    problem: ArticulatedProblem
+    fits: list[ArticulatedFit]
+    left: list[ArticulatedFit]
+
+
 def search(
     problem: ArticulatedProblem,
     candidates: Sequence[PlacedOnJoint],
     *,
     settings: SearchSettings | None = None,
     progress: Callable[[str], None] = lambda text: None,
-) -> tuple[ArticulatedProblem, list[ArticulatedFit]]:
-    """All fitted hypotheses: the one that nothing is worth adding to or taking from, then the likeliest first.
-
-    Returns:
-        The problem in which they are fitted, softened where runs that nothing corrects lose a play (`parted`), and the fits.
-    """
+) -> Searched:
+    """All fitted hypotheses: the one that nothing is worth adding to or taking from, then the likeliest first."""
     settings = settings or problem.settings.articulated.search
     progress("nominal model")
     asked, current = problem, nominal_fit(problem)
-    found, dropped = [current], set[tuple[str, str]]()
+    found, dropped, left = [current], set[tuple[str, str]](), list[ArticulatedFit]()
     for count in range(1, 2 * settings.most + 1):
         if not problem.deadline.allows(f"a search for effects (round {count})"):
             break
@@ -78,13 +90,16 @@ def search(
         if not _material(problem, found[0], current, best):
             break
         problem = problem.settled(best.hypothesis, best.vector)
-        added = len(best.hypothesis) - len(current.hypothesis)
+        before, added = current, len(best.hypothesis) - len(current.hypothesis)
         current, fits = without_idle(problem, best, settings, added=added)
         found += fits
-        dropped |= {placed.key for placed in best.hypothesis} - {placed.key for placed in current.hypothesis}
+        idle = {placed.key for placed in best.hypothesis} - {placed.key for placed in current.hypothesis}
+        left += [before] if idle else []
+        dropped |= idle
         progress(f"round {count}: " + ", ".join(f"{p.effect.name} ({p.where})" for p in current.hypothesis))
-    found += predecessors(problem, current, found)
-    return asked, sorted(found, key=lambda f: (f is not current, -f.log_posterior))
+    for end in (current, *left):
+        found += predecessors(problem, end, found)
+    return Searched(asked, sorted(found, key=lambda f: (f is not current, -f.log_posterior)), left)
 
 
 def _needed(problem: ArticulatedProblem, found: ArticulatedFit, settings: SearchSettings) -> float:
@@ -290,12 +305,15 @@ def shortened(
 
 
 def exchanged(
-    problem: ArticulatedProblem, found: ArticulatedFit, lost: PlacedOnJoint, gained: PlacedOnJoint
+    problem: ArticulatedProblem,
+    found: ArticulatedFit,
+    lost: Collection[PlacedOnJoint],
+    gained: Sequence[PlacedOnJoint],
 ) -> ArticulatedFit:
-    """A fit once more with one of its effects exchanged for another."""
-    others, start = _without(problem, found, (lost,))
-    start = np.append(start, [p.mean for p in gained.effect.parameters])
-    hypothesis = (*others, gained)
+    """A fit once more with some of its effects exchanged for others."""
+    others, start = _without(problem, found, lost)
+    start = np.append(start, [p.mean for placed in gained for p in placed.effect.parameters])
+    hypothesis = (*others, *gained)
     return refitted(problem, hypothesis, start, scale=ArticulatedFit.at(problem, hypothesis, start).scale)
 
 
@@ -305,12 +323,24 @@ def _surprise(problem: ArticulatedProblem, found: ArticulatedFit) -> float:
     return float(np.sum(((found.vector - mean) / std)[free_entries(problem, found.hypothesis)] ** 2))
 
 
+def steps(problem: ArticulatedProblem, hypothesis: JointHypothesis) -> list[int]:
+    """How many effects there are after each step of an explanation; effects of one kind at parts of one type are one choice."""
+    ends = list[int]()
+    for k, placed in enumerate(hypothesis):
+        before = hypothesis[k - 1]
+        of_kind = before.effect.name == placed.effect.name
+        if ends and of_kind and before.joint in twins(problem.nominal, placed.joint):
+            ends.pop()
+        ends.append(k + 1)
+    return ends
+
+
 def predecessors(
     problem: ArticulatedProblem, best: ArticulatedFit, found: Sequence[ArticulatedFit]
 ) -> list[ArticulatedFit]:
-    """Fits with the first effects of a fit alone, where there is none among those found."""
+    """Fits with the first steps of a fit alone, where there is none among those found."""
     out = []
-    for size in range(1, len(best.hypothesis)):
+    for size in steps(problem, best.hypothesis)[:-1]:
         first = best.hypothesis[:size]
         if all(f.hypothesis != first for f in found):
             vector = best.vector[: problem.size(first)]
