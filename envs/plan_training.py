@@ -32,15 +32,15 @@ from bench.excitation import (
     RigPrior,
     controls_from,
     design,
-    fans,
 )
-from bench.excitation.background import expected_error
+from bench.excitation.background import errors_left, with_background
 from bench.excitation.closed_loop import disturbances, run_policy
 from bench.excitation.ensemble import available_threads
 from bench.excitation.information import noise_vector
 from bench.excitation.station import Desk, Station
 from bench.files import replacing, write_text
 
+from .background import background_of
 from .base import setup_of
 from .plan_network import TriedPlans, learned
 from .sb3 import KINDS
@@ -53,9 +53,6 @@ Showing = Callable[[str, float], None]
 class PlanTrainingSettings:
     """Numbers of `envs.plan_training`."""
 
-    step: float = 1e-2
-    """Step of the differences in prior standard deviations, that of `bench.excitation.background`: over much smaller ones chaotic motion
-    seems to tell more than any fit finds in it."""
     margin: float = 0.97
     """Of the limits of stroke and velocity that a plan may use on a rig; noise of the sensors comes on top."""
     design_draws: int = 24
@@ -145,8 +142,10 @@ class _PlanBench:
         prior = self.setup.questions[0]
         assert isinstance(prior, RigPrior)
         self.prior = prior
-        self.families = tuple(
-            Family(h, self.station.channels, self.station.actuators) for h in prior.hypotheses
+        self.background = background_of(self.setup) if training.backgrounds else ()
+        self.real = tuple(
+            Family(with_background(h, self.background), self.station.channels, self.station.actuators)
+            for h in prior.hypotheses
         )
         self.noise = noise_vector(self.station.noise, self.station.channels)
         self.scale = np.array([self.station.scale[name] for name in self.station.channels])
@@ -178,10 +177,20 @@ class _PlanBench:
         return np.concatenate(windows, axis=1)
 
     def rigs(self, count: int, key: tuple[int, ...]) -> list[NDArray[np.float64]]:
-        """Coordinates of rigs drawn from each hypothesis ``(count, p)``."""
-        rng = np.random.default_rng((self.training.seed, *key))
-        bound = np.sqrt(3.0)
-        return [rng.uniform(-bound, bound, (count, family.n_parameters)) for family in self.families]
+        """Coordinates of rigs drawn from each hypothesis, then of their background, zeros where one has none ``(count, p + b)``."""
+        rng, besides = (np.random.default_rng((self.training.seed, *key, *more)) for more in ((), (5,)))
+        bound, b = np.sqrt(3.0), len(self.background)
+        backed = np.diff(np.floor(self.training.backgrounds * np.arange(count + 1))) > 0.0
+        drawn = []
+        for family in self.real:
+            x = rng.uniform(-bound, bound, (count, family.n_parameters - b))
+            drawn.append(np.hstack([x, backed[:, None] * besides.uniform(-bound, bound, (count, b))]))
+        return drawn
+
+    def parted(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        """Coordinates of rigs without those of their background ``(…, p)``, and whether they have one ``(…)``."""
+        p = points.shape[-1] - len(self.background)
+        return points[..., :p], np.asarray(np.any(points[..., p:] != 0.0, axis=-1))
 
     def tried(self, policy: PlanPolicy, window: int, stage: int, told: Showing) -> TriedPlans:
         """Plans for some rigs, and what each leaves to know of others, from where the policy has brought their records."""
@@ -192,24 +201,25 @@ class _PlanBench:
 
     def _plans(self, policy: PlanPolicy, window: int, stage: int, told: Showing) -> NDArray[np.float32]:
         n, begin = self.training.plans, window * self.station.n_steps
-        planner = Planner(
-            self.prior, self.station, self.commands(policy.opening[None])[0], (window / self.station.n_windows,),
-            self.training.generations,
-        )  # fmt: skip
-        each = -(-n // len(self.families))
+        opening, share = self.commands(policy.opening[None])[0], window / self.station.n_windows
+        planners = [
+            Planner(self.prior, self.station, opening, (share,), self.training.generations, background)
+            for background in ((), self.background)
+        ]
+        each = -(-n // len(self.real))
         jobs = []
-        for k, coordinates in enumerate(self.rigs(each, (stage, 1))):
-            family, rng = self.families[k], np.random.default_rng((self.training.seed, stage, 2, k))
-            runs = run_policy(policy, family.packed(coordinates), disturbances(self.station, each, rng))
-            jobs += [
-                (k, x, u, i) for i, (x, u) in enumerate(zip(coordinates, runs.records.controls, strict=True))
-            ]
+        for k, points in enumerate(self.rigs(each, (stage, 1))):
+            rng = np.random.default_rng((self.training.seed, stage, 2, k))
+            runs = run_policy(policy, self.real[k].packed(points), disturbances(self.station, each, rng))
+            rows = zip(*self.parted(points), runs.records.controls, strict=True)
+            jobs += [(k, *row, i) for i, row in enumerate(rows)]
 
         def plan(job: tuple) -> NDArray[np.float64]:
-            k, x, controls, i = job
-            return planner.continuation(k, x, controls.copy(), begin, self.training.seed + 1000 * k + i)
+            k, x, backed, controls, i = job
+            seed = self.training.seed + 1000 * k + i
+            return planners[int(backed)].continuation(k, x, controls.copy(), begin, seed)
 
-        jobs = sorted(jobs, key=lambda job: job[3])[:n]
+        jobs = sorted(jobs, key=lambda job: job[-1])[:n]
         whole = np.zeros((n, self.station.n_samples, len(self.force)))
         for i, rest in enumerate(_spread(plan, jobs, lambda part: told("plans", part))):
             whole[i, begin:] = rest
@@ -220,41 +230,36 @@ class _PlanBench:
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         record, values = [], []
         count = self.training.rigs
-        for k, coordinates in enumerate(self.rigs(count, (stage, 3))):
-            family, rng = self.families[k], np.random.default_rng((self.training.seed, stage, 4, k))
-            runs = run_policy(policy, family.packed(coordinates), disturbances(self.station, count, rng))
+        for k, points in enumerate(self.rigs(count, (stage, 3))):
+            rng = np.random.default_rng((self.training.seed, stage, 4, k))
+            runs = run_policy(policy, self.real[k].packed(points), disturbances(self.station, count, rng))
             actions = self.knots(runs.records.controls)
             some = min(self.training.tried, len(plans))
             drawn = [rng.choice(len(plans), some, replace=False) for _ in range(count)]
 
-            def tried(
-                i: int, family=family, coordinates=coordinates, actions=actions, drawn=drawn
-            ) -> NDArray[np.float32]:
+            def tried(i: int, k=k, points=points, actions=actions, drawn=drawn) -> NDArray[np.float32]:
                 rest = np.concatenate([actions[i, None, window:], plans[drawn[i]]])
                 past = np.broadcast_to(actions[i, :window], (len(rest), window, self.station.width))
                 commands = self.commands(np.concatenate([past, rest], axis=1))
                 values = np.full(1 + len(plans), np.nan, dtype=np.float32)
-                values[np.append(0, 1 + drawn[i])] = self._value(family, coordinates[i], commands)
+                values[np.append(0, 1 + drawn[i])] = self._value(k, points[i], commands)
                 return values
 
-            part = _spread(tried, range(count), lambda p, k=k: told("tried", (k + p) / len(self.families)))
+            part = _spread(tried, range(count), lambda p, k=k: told("tried", (k + p) / len(self.real)))
             values.append(np.stack(list(part)))
             shown = np.clip(runs.ideal / self.scale, -1.0, 1.0).reshape(count, self.station.n_windows, -1)
             record.append(np.concatenate([shown, actions], axis=2)[:, :window].astype(np.float32))
         return np.concatenate(record), np.concatenate(values)
 
     def _value(
-        self, family: Family, x: NDArray[np.float64], commands: NDArray[np.float64]
+        self, kind: int, point: NDArray[np.float64], commands: NDArray[np.float64]
     ) -> NDArray[np.float32]:
         """Logarithm of the error that each excitation leaves of a rig ``(k,)``; 0 where it passes a limit."""
-        k, p = len(commands), family.n_parameters
-        y = family.record(np.broadcast_to(fans(x, SETTINGS.step), (k, 1 + p, p)), commands)
-        rows = ((y[:, 1:] - y[:, :1]) / (SETTINGS.step * self.noise)).reshape(k, p, -1)
-        information = rows @ rows.transpose(0, 2, 1)
-        information = np.where(np.isfinite(information), information, 0.0)
-        left = expected_error(information, np.zeros((k, p)))
-        reached = np.max(np.nan_to_num(Desk(self.station, 1).reached(y[:, 0]), nan=np.inf), axis=1)
-        return np.where(reached > SETTINGS.margin, 0.0, np.log(left)).astype(np.float32)
+        x, backed = self.parted(point)
+        left = errors_left(self.real[kind], x, commands, self.noise)
+        reached = np.max(np.nan_to_num(Desk(self.station, 1).reached(left.motion), nan=np.inf), axis=1)
+        error = np.log(left.backed if backed else left.bare)
+        return np.where(reached > SETTINGS.margin, 0.0, error).astype(np.float32)
 
 
 def _spread(

@@ -118,6 +118,8 @@ class PlanTraining:
         rigs: Rigs of each hypothesis on which plans are tried.
         tried: Plans, drawn anew, that are tried on each: of the same number of trials the network learns more from many rigs than from
             many plans on each.
+        backgrounds: Share of the rigs that have a background, see `bench.excitation.background`: so many plans are made for the error
+            that is left over all backgrounds, and on so many rigs that error is what is to be told from the record.
         evaluations: Signals that the search for the opening weighs.
         generations: Generations of the search for each plan, see `bench.excitation.Planner`.
         steps: Steps of the network's training, for each decision.
@@ -129,6 +131,7 @@ class PlanTraining:
     plans: int = 240
     rigs: int = 5000
     tried: int = 40
+    backgrounds: float = 0.0
     evaluations: int = 1600
     generations: int = 16
     steps: int = 6000
@@ -144,6 +147,10 @@ class PlanTraining:
         if any(a >= b for a, b in pairwise(ordered)):
             raise ParameterError(
                 f"decisions at {self.decisions} came; ascending shares of the test between 0 and 1 are expected"
+            )
+        if not 0.0 <= self.backgrounds <= 1.0:
+            raise ParameterError(
+                f"a share of {self.backgrounds:g} of the rigs came to have a background; 0 to 1 is expected"
             )
         if min(self.plans, self.rigs, self.tried, self.evaluations, self.generations, self.steps) < 1:
             raise ParameterError(f"{self} has a number below one; plans, rigs and steps are positive")

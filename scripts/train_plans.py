@@ -28,6 +28,7 @@ class Args:
         plans: Plans that each decision is among.
         rigs: Rigs of each hypothesis on which plans are tried.
         tried: Plans that are tried on each.
+        backgrounds: Share of the rigs that have a background.
         steps: Steps of the network's training, for each decision.
         seed: Seed.
         out: Folder for what is done so far and the policy; by default out/policies/TASK-plans.
@@ -41,6 +42,7 @@ class Args:
     plans: int = 240
     rigs: int = 5000
     tried: int = 40
+    backgrounds: float = 0.0
     steps: int = 6000
     seed: int = 0
     out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
@@ -60,7 +62,14 @@ def main() -> int:
     folder = args.out or Path("out/policies") / f"{args.task}-plans"
     try:
         training = PlanTraining(
-            args.task, args.decisions, args.plans, args.rigs, args.tried, steps=args.steps, seed=args.seed
+            args.task,
+            args.decisions,
+            args.plans,
+            args.rigs,
+            args.tried,
+            args.backgrounds,
+            steps=args.steps,
+            seed=args.seed,
         )
         with progress_bar(hidden=args.json) as bar:
             task = bar.add_task("starting", total=1.0)

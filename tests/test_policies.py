@@ -34,12 +34,14 @@ from bench.excitation import (
     find_policy,
     policy_names,
 )
+from bench.excitation.background import errors_left, with_background
 from bench.excitation.closed_loop import disturbances, run_commands, run_policy
 from bench.excitation.estimation import costs, normal_equations
 from bench.excitation.information import (
     INFORMATION_LIMITS,
 )
 from bench.signals import Excitation
+from envs.background import background_of
 from envs.options import Options
 from envs.practice import (
     PRACTICE_SETTINGS,
@@ -265,18 +267,23 @@ def test_plans_are_tried_on_rigs_as_the_policy_leaves_them_and_training_goes_on(
     from envs.plan_training import train_plans
     from envs.training_plan import PlanTraining
 
-    training = PlanTraining(plans=4, rigs=6, evaluations=8, generations=2, steps=40)
+    training = PlanTraining(plans=4, rigs=6, backgrounds=0.5, evaluations=8, generations=2, steps=40)
     policy = train_plans(training, tmp_path)
     assert [stage.window for stage in policy.stages] == [40, 80]
     assert policy.about["environment"] == "JointBench/SDOFExcitation-v0"
     with np.load(tmp_path / "tried-1.npz") as kept:
-        values, plans = kept["values"][12:18], kept["plans"]  # of the rigs with Coulomb friction
+        values, plans = (
+            kept["values"][12:18:2],
+            kept["plans"],
+        )  # of the rigs with Coulomb friction, no background
     assert plans.shape == (4, 120, 1)
     # the first choice is to go on: what is left then is what the record of the policy with one decision leaves
     first = replace(policy, stages=policy.stages[:1])
     rng = np.random.default_rng((0, 1, 3))
-    x = [rng.uniform(-np.sqrt(3.0), np.sqrt(3.0), (6, f.n_parameters)) for f in (GAP, BOUC_WEN, COULOMB)][2]
-    noise = disturbances(STATION, 6, np.random.default_rng((0, 1, 4, 2)))
+    x = [rng.uniform(-np.sqrt(3.0), np.sqrt(3.0), (6, f.n_parameters)) for f in (GAP, BOUC_WEN, COULOMB)][2][
+        ::2
+    ]
+    noise = disturbances(STATION, 6, np.random.default_rng((0, 1, 4, 2)))[::2]
     runs = run_policy(first, COULOMB.packed(x), noise)
     information, _ = normal_equations(COULOMB, runs.records, x, NOISE)
     left = np.sqrt(np.trace(np.linalg.inv(np.eye(3) + information), axis1=1, axis2=2) / 3.0)
@@ -288,6 +295,8 @@ def test_plans_are_tried_on_rigs_as_the_policy_leaves_them_and_training_goes_on(
     np.testing.assert_array_equal(again.stages[1].weights[0], policy.stages[1].weights[0])
     with pytest.raises(FileFormatError, match="another folder"):
         train_plans(replace(training, plans=5), tmp_path)
+    with pytest.raises(ParameterError, match="a share of 1"):
+        replace(training, backgrounds=1.5)
     with pytest.raises(ParameterError, match="tried on no rig"):
         train_plans(replace(training, plans=40, rigs=2, tried=1), tmp_path / "few")
 
@@ -343,6 +352,23 @@ def test_planning_knows_more_than_its_opening_and_keeps_the_limits() -> None:
     assert [place for place, _ in plans] == [0, 1, 2]
     again = planner.run(BOUC_WEN.packed(x), noise)
     np.testing.assert_array_equal(again.records.controls, runs.records.controls)
+
+
+@pytest.mark.slow
+def test_planning_for_rigs_with_a_background_leaves_less_error_there() -> None:
+    terms, x = background_of(SETUP), some(COULOMB, 3, seed=4)
+    real = Family(with_background(COULOMB.hypothesis, terms), STATION.channels, STATION.actuators)
+    left = []
+    for background in ((), terms):
+        planner = Planner(SETUP.questions[0], STATION, 0.7 * sweep(), (0.375,), 5, background)  # type: ignore[arg-type]
+        rests = [planner.continuation(2, row, 0.7 * sweep(), 300, 1) for row in x]
+        whole = np.tile(0.7 * sweep(), (3, 1, 1))
+        whole[:, 300:] = rests
+        left.append(
+            [errors_left(real, row, u[None], NOISE).backed[0] for row, u in zip(x, whole, strict=True)]
+        )
+    assert np.all(np.less_equal(left[1], left[0]))
+    assert np.mean(np.log(left[1])) < np.mean(np.log(left[0])) - 0.1  # found: half the error of two of three
 
 
 @pytest.mark.slow

@@ -10,7 +10,7 @@ import pytest
 
 from bench.errors import ParameterError
 from bench.excitation import Family, estimate, fans
-from bench.excitation.background import SETTINGS, expected_error, with_background
+from bench.excitation.background import SETTINGS, errors_left, expected_error, with_background
 from bench.excitation.closed_loop import disturbances, run_commands
 from bench.excitation.contrastive import contrastive_bound, local_contrasts
 from envs.background import background_of
@@ -86,6 +86,30 @@ def test_reward_is_the_expected_error_of_the_rig_with_its_background(setup) -> N
     )
     assert total[0] == pytest.approx(knowing, rel=1e-6)
     assert knowing < blind - 1e-3  # the background shows
+
+
+def test_errors_left_are_those_over_many_backgrounds(rng: np.random.Generator) -> None:
+    """Against the mean over drawn backgrounds, each run as it is, of a rig with friction, whose motion is not chaotic."""
+    hypothesis = SETUP.questions[0].hypotheses[2]  # type: ignore[union-attr]
+    family = Family(hypothesis, STATION.channels, STATION.actuators)
+    real = Family(with_background(hypothesis, background_of(SETUP)), STATION.channels, STATION.actuators)
+    x, clock = np.array([0.3, -0.5, 0.8]), np.arange(STATION.n_samples) * STATION.timestep
+    u = 1.2 * np.sin(2.0 * np.pi * np.array([1.2, 1.5])[:, None] * clock)[..., None]
+    found = errors_left(real, x, u, NOISE)
+    y = family.record(np.broadcast_to(fans(x, SETTINGS.step), (2, 4, 3)), u)
+    np.testing.assert_allclose(found.motion, y[:, 0], atol=1e-12)  # sums in another order
+    slopes = ((y[:, 1:] - y[:, :1]) / (SETTINGS.step * NOISE)).reshape(2, 3, -1)
+    information = slopes @ slopes.transpose(0, 2, 1)
+    np.testing.assert_allclose(found.bare, expected_error(information, np.zeros((2, 3))), rtol=1e-9)
+    drawn = rng.uniform(-math.sqrt(3.0), math.sqrt(3.0), (400, 3))
+    points = np.concatenate([np.tile(x, (len(drawn), 1)), drawn], axis=1)
+    besides = ((real.record(np.tile(points, (2, 1, 1)), u) - y[:, :1]) / NOISE).reshape(2, len(drawn), -1)
+    score = np.einsum("kpt,kbt->kbp", slopes, besides)
+    square = np.mean(expected_error(information[:, None], score) ** 2, axis=1)
+    # 400 draws tell a mean square to some 5 %; the record is not quite linear in the background
+    np.testing.assert_allclose(found.backed, np.sqrt(square), rtol=0.15)
+    alone = errors_left(family, x, u, NOISE)
+    np.testing.assert_array_equal(alone.backed, alone.bare)
 
 
 @pytest.mark.slow

@@ -16,10 +16,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.excitation.family import Family, fans
 from bench.excitation.prior import RigHypothesis, Uncertain
 from bench.laws import find_law
 from bench.rig import Element
@@ -94,3 +96,42 @@ def expected_error(information: NDArray[np.float64], score: NDArray[np.float64])
     bias = np.einsum("...ij,...j->...i", covariance, score)
     square = np.trace(covariance, axis1=-2, axis2=-1) + np.sum(bias**2, axis=-1)
     return np.sqrt(square / p)
+
+
+class ErrorsLeft(NamedTuple):
+    """What identification is expected to leave of one rig after each of k excitations, as by `errors_left`."""
+
+    motion: NDArray[np.float64]  # (k, n, n_channels) of the rig without a background
+    bare: NDArray[np.float64]  # (k,) error where it has none [prior standard deviations]
+    backed: NDArray[np.float64]  # (k,) error where it has one, over all backgrounds
+
+
+def errors_left(
+    real: Family, x: NDArray[np.float64], controls: NDArray[np.float64], noise: NDArray[np.float64]
+) -> ErrorsLeft:
+    """What identification is expected to leave of a rig, without a background and over all of them.
+
+    The terms of a background have standard deviation one and are independent of each other: over them the bias is expected to be
+    ``|| (I + F)^-1 J' D ||``, the columns of D what each term at its standard deviation does to the record. An error is at most
+    one, what is known without a record.
+
+    Args:
+        real: The hypothesis with its background, see `with_background`; without one `backed` is `bare`.
+        x: The rig ``(p,)``, standardised, without its background's coordinates.
+        controls: Commands ``(k, n, n_actuators)``.
+        noise: Standard deviations of the channels ``(n_channels,)``.
+    """
+    p, k = len(x), len(controls)
+    points = fans(np.append(x, np.zeros(real.n_parameters - p)), SETTINGS.step)
+    points[1 + p :, p:] /= SETTINGS.step
+    y = real.record(np.broadcast_to(points, (k, *points.shape)), controls)
+    apart = ((y[:, 1:] - y[:, :1]) / noise).reshape(k, len(points) - 1, -1)
+    slopes, terms = apart[:, :p] / SETTINGS.step, apart[:, p:]
+    information, score = slopes @ slopes.transpose(0, 2, 1), slopes @ terms.transpose(0, 2, 1)
+    known = np.isfinite(information).all(axis=(1, 2)) & np.isfinite(score).all(axis=(1, 2))
+    information[~known], score[~known] = 0.0, 0.0
+    covariance = np.linalg.inv(np.eye(p) + information)
+    spread = np.trace(covariance, axis1=1, axis2=2)
+    bias = np.sum((covariance @ score) ** 2, axis=(1, 2))
+    bare, backed = (np.sqrt(np.minimum(square / p, 1.0)) for square in (spread, spread + bias))
+    return ErrorsLeft(y[:, 0], bare, backed)

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.errors import ParameterError
+from bench.excitation.background import BackgroundTerm, errors_left, with_background
 from bench.excitation.estimation import Estimates, Records, estimate, normal_equations
 from bench.excitation.family import Family
 from bench.excitation.methods import spectral_lines
@@ -63,6 +64,8 @@ class Planner(SequentialPlanner):
         opening: Commands ``(n_samples, n_actuators)`` of an open-loop design, used until the first decision.
         decisions: Times of decisions, as shares of the test.
         generations: Generations of `population` candidates that a decision weighs.
+        background: What a rig may have besides: a continuation is then designed for the error over all backgrounds. Rigs are still
+            identified as if they had none.
     """
 
     prior: RigPrior
@@ -70,6 +73,7 @@ class Planner(SequentialPlanner):
     opening: NDArray[np.float64]
     decisions: tuple[float, ...] = (0.2, 0.4, 0.6)
     generations: int = 16
+    background: tuple[BackgroundTerm, ...] = ()
 
     def __post_init__(self) -> None:
         shape = (self.station.n_samples, len(self.station.actuators))
@@ -83,6 +87,10 @@ class Planner(SequentialPlanner):
             )
         station = self.station
         self.families = tuple(Family(h, station.channels, station.actuators) for h in self.prior.hypotheses)
+        self.real = tuple(
+            Family(with_background(h, self.background), station.channels, station.actuators)
+            for h in self.prior.hypotheses
+        )
         self.desk = Desk(station, 1)
         clock = np.arange(station.n_samples) * station.timestep
         angle = 2.0 * np.pi * np.outer(clock, spectral_lines(station.band, station.duration))
@@ -133,28 +141,29 @@ class Planner(SequentialPlanner):
         """
         from cmaes import CMA  # noqa: PLC0415  (for this method alone)
 
-        family, rest = self.families[kind], controls[begin:]
+        rest = controls[begin:]
         basis = self.basis[begin:]
         start = np.linalg.lstsq(basis, rest, rcond=None)[0]
         size = max(float(np.std(start)), 1e-9)
-        errors, fitted = self._weigh(family, x, controls, rest[None])
+        errors, fitted = self._weigh(kind, x, controls, rest[None])
         best, least = fitted[0], float(errors[0])
         search = CMA(mean=start.ravel() / size, sigma=0.6, population_size=SETTINGS.population, seed=seed)
         for _ in range(self.generations):
             asked = [search.ask() for _ in range(SETTINGS.population)]
             rests = np.stack([basis @ (size * z).reshape(start.shape) for z in asked])
-            errors, fitted = self._weigh(family, x, controls, rests)
+            errors, fitted = self._weigh(kind, x, controls, rests)
             search.tell([(z, float(np.log(e))) for z, e in zip(asked, errors, strict=True)])
             if errors.min() < least:
                 best, least = fitted[int(np.argmin(errors))], float(errors.min())
         if told is not None:
+            family = self.families[kind]
             values = dict(zip(family.hypothesis.names, family.values(x).tolist(), strict=True))
             told(Decision(begin * self.station.timestep, family.hypothesis.name, values, least))
         return best
 
     def _weigh(
         self,
-        family: Family,
+        kind: int,
         x: NDArray[np.float64],
         controls: NDArray[np.float64],
         rests: NDArray[np.float64],
@@ -163,7 +172,7 @@ class Planner(SequentialPlanner):
 
         A candidate that leaves the stroke at every scale tried is worth as much as none.
         """
-        k, n, width = len(rests), len(controls), controls.shape[1]
+        family, k, n, width = self.families[kind], len(rests), len(controls), controls.shape[1]
         begin = n - rests.shape[1]
         spent = self.station.timestep * np.sum(controls[:begin] ** 2, axis=0)
         left = np.maximum(self.desk.budget - spent, 0.0)
@@ -187,6 +196,9 @@ class Planner(SequentialPlanner):
                 break
             rests[wide] *= np.clip(0.97 / reached[reached > 1.0], 0.3, 0.97)[:, None, None]
         whole[:, begin:] = rests
+        if self.background:
+            left = errors_left(self.real[kind], x, whole, self.desk.noise)
+            return np.where(over, 1.0, left.backed), rests
         empty = np.zeros((k, n, len(self.station.channels)))
         information, _ = normal_equations(
             family, Records(whole, empty, np.full(k, n)), point[:, 0], self.desk.noise

@@ -19,7 +19,7 @@ from bench.discrepancy.articulated.torque_error import TorqueProblem
 from bench.discrepancy.articulated.torque_runs import TorqueRuns
 from bench.discrepancy.articulated_search.catalogue import CATALOGUE
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
-from bench.discrepancy.articulated_search.hypothesis import JointHypothesis, PlacedOnJoint
+from bench.discrepancy.articulated_search.hypothesis import PlacedOnJoint
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.articulated_search.search import complete, predecessors, shortened, steps
 from bench.discrepancy.multibody.nominal_parameters import twins
