@@ -178,13 +178,13 @@ class _PlanBench:
 
     def rigs(self, count: int, key: tuple[int, ...]) -> list[NDArray[np.float64]]:
         """Coordinates of rigs drawn from each hypothesis, then of their background, zeros where one has none ``(count, p + b)``."""
-        rng, besides = (np.random.default_rng((self.training.seed, *key, *more)) for more in ((), (5,)))
-        bound, b = np.sqrt(3.0), len(self.background)
-        backed = np.diff(np.floor(self.training.backgrounds * np.arange(count + 1))) > 0.0
+        rng, bound = np.random.default_rng((self.training.seed, *key)), np.sqrt(3.0)
+        bare = np.diff(np.floor(self.training.backgrounds * np.arange(count + 1))) == 0.0
         drawn = []
         for family in self.real:
-            x = rng.uniform(-bound, bound, (count, family.n_parameters - b))
-            drawn.append(np.hstack([x, backed[:, None] * besides.uniform(-bound, bound, (count, b))]))
+            points = rng.uniform(-bound, bound, (count, family.n_parameters))
+            points[bare, family.n_parameters - len(self.background) :] = 0.0
+            drawn.append(points)
         return drawn
 
     def parted(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
@@ -204,7 +204,7 @@ class _PlanBench:
         opening, share = self.commands(policy.opening[None])[0], window / self.station.n_windows
         planners = [
             Planner(self.prior, self.station, opening, (share,), self.training.generations, background)
-            for background in ((), self.background)
+            for background in dict.fromkeys(((), self.background))
         ]
         each = -(-n // len(self.real))
         jobs = []

@@ -272,17 +272,15 @@ def test_plans_are_tried_on_rigs_as_the_policy_leaves_them_and_training_goes_on(
     assert [stage.window for stage in policy.stages] == [40, 80]
     assert policy.about["environment"] == "JointBench/SDOFExcitation-v0"
     with np.load(tmp_path / "tried-1.npz") as kept:
-        values, plans = (
-            kept["values"][12:18:2],
-            kept["plans"],
-        )  # of the rigs with Coulomb friction, no background
+        # of the rigs with Coulomb friction those without a background
+        values, plans = kept["values"][12:18:2], kept["plans"]
     assert plans.shape == (4, 120, 1)
     # the first choice is to go on: what is left then is what the record of the policy with one decision leaves
     first = replace(policy, stages=policy.stages[:1])
     rng = np.random.default_rng((0, 1, 3))
-    x = [rng.uniform(-np.sqrt(3.0), np.sqrt(3.0), (6, f.n_parameters)) for f in (GAP, BOUC_WEN, COULOMB)][2][
-        ::2
-    ]
+    b, bound = len(background_of(SETUP)), np.sqrt(3.0)
+    drawn = [rng.uniform(-bound, bound, (6, f.n_parameters + b)) for f in (GAP, BOUC_WEN, COULOMB)]
+    x = drawn[2][::2, : COULOMB.n_parameters]
     noise = disturbances(STATION, 6, np.random.default_rng((0, 1, 4, 2)))[::2]
     runs = run_policy(first, COULOMB.packed(x), noise)
     information, _ = normal_equations(COULOMB, runs.records, x, NOISE)

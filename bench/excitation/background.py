@@ -123,7 +123,7 @@ def errors_left(
     """
     p, k = len(x), len(controls)
     points = fans(np.append(x, np.zeros(real.n_parameters - p)), SETTINGS.step)
-    points[1 + p :, p:] /= SETTINGS.step
+    points[1 + p :, p:] /= SETTINGS.step  # a term at its standard deviation
     y = real.record(np.broadcast_to(points, (k, *points.shape)), controls)
     apart = ((y[:, 1:] - y[:, :1]) / noise).reshape(k, len(points) - 1, -1)
     slopes, terms = apart[:, :p] / SETTINGS.step, apart[:, p:]

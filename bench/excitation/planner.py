@@ -87,10 +87,10 @@ class Planner(SequentialPlanner):
             )
         station = self.station
         self.families = tuple(Family(h, station.channels, station.actuators) for h in self.prior.hypotheses)
-        self.real = tuple(
-            Family(with_background(h, self.background), station.channels, station.actuators)
-            for h in self.prior.hypotheses
-        )
+        self.real = self.families
+        if self.background:
+            hypotheses = [with_background(h, self.background) for h in self.prior.hypotheses]
+            self.real = tuple(Family(h, station.channels, station.actuators) for h in hypotheses)
         self.desk = Desk(station, 1)
         clock = np.arange(station.n_samples) * station.timestep
         angle = 2.0 * np.pi * np.outer(clock, spectral_lines(station.band, station.duration))

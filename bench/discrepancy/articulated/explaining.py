@@ -115,14 +115,16 @@ def _explained(
 ) -> Explained:
     """Explain by runs, or by the torque of a `TorqueProblem`, whose explanations are never complete."""
     judged, rng = problem.settings.articulated.judgement, question.rng
-    problem, fits, left_behind = search(
+    problem, fits, given_up = search(
         problem, candidates, settings=question.settings, progress=question.progress
     )
     judging = question.judging.softened(problem.softness)
     judged_by = asked_as(problem, judging)
     question.progress("judging records")
     climbed = kept(problem, judged_by, fits, judged)
-    for earlier in left_behind:  # of what was likelier later, the judging records may bear out less
+    for earlier in given_up:  # of what was likelier later, the judging records may bear out less
+        if not problem.deadline.allows("whether what the search gave up predicts better"):
+            break
         other = kept(problem, judged_by, [earlier, *fits], judged)
         if better(climbed.predictions[climbed.last], other.predictions[other.last], judged):
             climbed = other

@@ -55,12 +55,12 @@ class Searched(NamedTuple):
     Attributes:
         problem: The one in which all is fitted, softened where runs that nothing corrects lose a play (`parted`).
         fits: All fitted hypotheses, the one that the search ended with first, then the likeliest first.
-        left: Those that effects were given up of, which what was found later had made superfluous.
+        given_up: Those that lost effects which what was found later had made superfluous, as they were before.
     """
 
     problem: ArticulatedProblem
     fits: list[ArticulatedFit]
-    left: list[ArticulatedFit]
+    given_up: list[ArticulatedFit]
 
 
 def search(
@@ -74,7 +74,7 @@ def search(
     settings = settings or problem.settings.articulated.search
     progress("nominal model")
     asked, current = problem, nominal_fit(problem)
-    found, dropped, left = [current], set[tuple[str, str]](), list[ArticulatedFit]()
+    found, dropped, given_up = [current], set[tuple[str, str]](), list[ArticulatedFit]()
     for count in range(1, 2 * settings.most + 1):
         if not problem.deadline.allows(f"a search for effects (round {count})"):
             break
@@ -94,12 +94,12 @@ def search(
         current, fits = without_idle(problem, best, settings, added=added)
         found += fits
         idle = {placed.key for placed in best.hypothesis} - {placed.key for placed in current.hypothesis}
-        left += [before] if idle else []
+        given_up += [before] if idle else []
         dropped |= idle
         progress(f"round {count}: " + ", ".join(f"{p.effect.name} ({p.where})" for p in current.hypothesis))
-    for end in (current, *left):
+    for end in (current, *given_up):
         found += predecessors(problem, end, found)
-    return Searched(asked, sorted(found, key=lambda f: (f is not current, -f.log_posterior)), left)
+    return Searched(asked, sorted(found, key=lambda f: (f is not current, -f.log_posterior)), given_up)
 
 
 def _needed(problem: ArticulatedProblem, found: ArticulatedFit, settings: SearchSettings) -> float:
@@ -327,9 +327,9 @@ def steps(problem: ArticulatedProblem, hypothesis: JointHypothesis) -> list[int]
     """How many effects there are after each step of an explanation; effects of one kind at parts of one type are one choice."""
     ends = list[int]()
     for k, placed in enumerate(hypothesis):
-        before = hypothesis[k - 1]
+        before = hypothesis[k - 1] if k else placed
         of_kind = before.effect.name == placed.effect.name
-        if ends and of_kind and before.joint in twins(problem.nominal, placed.joint):
+        if of_kind and before.joint in twins(problem.nominal, placed.joint):
             ends.pop()
         ends.append(k + 1)
     return ends
