@@ -234,7 +234,7 @@ def _move_all(moves: list[_Move]) -> None:
                 former = _set_by(move.target)
                 undo.append((move.target, former))
                 SYSTEM.replace(move.temporary, move.target)
-        for folder in {move.target.parent for move in moves}:
+        for folder in dict.fromkeys(move.target.parent for move in moves):
             settle(folder)
     except BaseException:
         for target, former in reversed(undo):

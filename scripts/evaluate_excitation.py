@@ -239,7 +239,7 @@ def contest_of(args: Args, tell: Callable[[str], None] = lambda name: None) -> C
     """
     setup = setup_of(args.task)
     experiments = wide_experiments(setup, args.task)
-    names = args.policies or tuple({args.task} & set(policy_names()))
+    names = args.policies or tuple(name for name in policy_names() if name == args.task)
     sources: dict[str, Source] = {}
     for name in args.methods:
         tell(name)

@@ -30,7 +30,7 @@ from bench.discrepancy.localisation.remainder import free_force
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.search.explanation import Explanation
-from bench.discrepancy.search.extension import _begun_faint, _Offers, first_fit
+from bench.discrepancy.search.extension import Offers, begun_faint, first_fit
 from bench.discrepancy.verdict import NominalEstimate, far_off
 
 FEW = [
@@ -398,14 +398,14 @@ def test_a_further_effect_that_made_it_worse_is_begun_again_faint():
     task = (stopped, np.append(base.vector, eta))
     worse = first_fit(problem, *task)
     search.add(worse)
-    (again,) = _begun_faint(search, _Offers(base, [task], []))
+    (again,) = begun_faint(search, Offers(base, [task], []))
     assert np.all(again[1][:, -2] < eta[0])
     found = first_fit(problem, *again)
     assert found.cost < min(worse.cost, 1.01 * base.cost)
     # what is better than its base already is left alone, and so is everything where noise decides
     search.add(replace(found, cost=0.5 * base.cost))
-    assert not list(_begun_faint(search, _Offers(base, [task], [])))
-    assert not list(_begun_faint(Search(problem_of(case)), _Offers(base, [task], [])))
+    assert not list(begun_faint(search, Offers(base, [task], [])))
+    assert not list(begun_faint(Search(problem_of(case)), Offers(base, [task], [])))
 
 
 def test_a_hypothesis_weighed_by_what_itself_leaves_may_leave_much():

@@ -1,4 +1,4 @@
-"""Structure: no circle of files, nothing too large, one name for one thing, nothing loose beside the rooms of the diagnosis."""
+"""Structure: no circle of files, nothing too large, one name for one thing, no order of hashes, few files beside the rooms."""
 
 from __future__ import annotations
 
@@ -202,3 +202,73 @@ def rooms_imported() -> set[tuple[str, str]]:
 
 def test_architecture_is_drawn_as_it_is():
     assert drawn((ROOT / "docs" / "architecture.md").read_text()) == rooms_imported()
+
+
+def _is_set(node: ast.AST) -> bool:
+    """Whether an expression is a set as it stands there."""
+    if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Sub | ast.BitAnd | ast.BitOr | ast.BitXor):
+        return _is_set(node.left) or _is_set(node.right) or _calls(node.left, "keys")
+    return isinstance(node, ast.Set | ast.SetComp) or _calls(node, "set") or _calls(node, "frozenset")
+
+
+def _calls(node: ast.AST, *names: str) -> bool:
+    """Whether an expression is a call of one of these functions or methods."""
+    if not isinstance(node, ast.Call):
+        return False
+    called = node.func
+    return (called.attr if isinstance(called, ast.Attribute) else getattr(called, "id", "")) in names
+
+
+def ordered_as_hashed(text: str) -> list[int]:
+    """Lines that go through a set where the order tells: it is that of the hashes, which differ from process to process."""
+    tree, found = parsed(text), []
+    orderless = {
+        id(argument)
+        for node in ast.walk(tree)
+        if _calls(node, "sorted", "set", "frozenset", "any", "all", "min", "max", "len")
+        for argument in node.args  # pyrefly: ignore[missing-attribute]
+    }
+    for node in ast.walk(tree):
+        loops = [node.iter] if isinstance(node, ast.For) else []
+        if isinstance(node, ast.ListComp | ast.DictComp | ast.GeneratorExp) and id(node) not in orderless:
+            loops += [part.iter for part in node.generators]
+        if _calls(node, "tuple", "list", "fromkeys", "enumerate", "zip"):
+            loops += node.args  # pyrefly: ignore[missing-attribute]
+        if isinstance(node, ast.List | ast.Tuple):
+            loops += [part.value for part in node.elts if isinstance(part, ast.Starred)]
+        found += [loop.lineno for loop in loops if _is_set(loop)]
+    return sorted(found)
+
+
+def test_nothing_is_in_the_order_of_hashes():
+    lines = {path: ordered_as_hashed(text) for path, text in code().items()}
+    assert {path: found for path, found in lines.items() if found} == {}
+
+
+@pytest.mark.parametrize(
+    ("text", "lines"),
+    [
+        ("for x in {f(y) for y in z}: pass", [1]),
+        ("a = [x for x in one.keys() - two.keys()]", [1]),
+        ("a = {x: 1 for x in set(z)}", [1]),
+        ("a = tuple({x for x in z})", [1]),
+        ("a = [*{1, 2}]", [1]),
+        ("a = sorted(x for x in set(z))", []),
+        ("a = {x for x in set(z)} | {*one}", []),
+        ("for x in sorted({f(y) for y in z}): pass", []),
+    ],
+)
+def test_orders_of_hashes_are_found(text, lines):
+    assert ordered_as_hashed(text) == lines
+
+
+def test_tests_bind_to_public_names():
+    inner = [
+        f"{path.name}: {alias.name}"
+        for path in (ROOT / "tests").rglob("*.py")
+        for node in ast.walk(parsed(path.read_text()))
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith(("bench", "envs"))
+        for alias in node.names
+        if alias.name.startswith("_")
+    ]
+    assert inner == []

@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from bench.cli import main
+from bench.cli.monitoring import Monitor
 from bench.errors import IdentificationError, ParameterError, RecordingError
 from bench.identification.damper_study import damper_record
 from bench.monitoring import (
@@ -120,6 +122,33 @@ def test_motion_that_was_not_learnt_is_told_and_not_judged():
     assert not any(period.inside for period in late)
     assert all(math.isnan(period.z) for period in late)
     assert not [alarm for alarm in monitor.alarms if alarm.time > 210.0]
+
+
+def test_where_the_learning_saw_speeds_vary_a_little_beyond_them_is_judged():
+    run = [service_run("wandering", 0.0, seed) for seed in range(1000, 1004)]
+    # motion wanders for longer than was learnt from; harmonic motion, judged whole, has 199 or 200 periods of 200
+    assert sum(r.outside for r in run) < 0.05 * 4 * 240
+    assert not sum(r.false_alarms for r in run)
+
+
+def test_friction_beside_a_damper_is_learnt_as_such():
+    test = record("random", seconds=400.0)
+    rubbed = test._replace(force=0.5 * test.force + 0.5 * test.force.std() * np.sign(test.velocity))
+    plain, beside = (monitor_record(*channels(r)).baseline for r in (test, rubbed))
+    assert plain is not None
+    assert beside is not None
+    assert beside.weights[0] > 0.0
+    # one power of the speed would leave some three times as much
+    assert beside.scatter < 1.5 * plain.scatter
+
+
+def test_the_command_seeks_what_the_settings_do():
+    ours, theirs = MonitorSettings(), Monitor(Path("record.csv"))
+    assert (theirs.learning, theirs.change, theirs.run_length) == (
+        ours.learning,
+        ours.change,
+        ours.run_length,
+    )
 
 
 @pytest.mark.slow

@@ -36,7 +36,7 @@ class Monitor:
     """Displacement about which the motion goes [SI]; the middle of the learning by default."""
     learning: int = 30
     """Periods to learn from."""
-    change: float = 0.15
+    change: float = 0.12
     """Smallest change of a period's energy to be found, as a share; what a fifth of C lost leaves beside some friction."""
     run_length: float = 2000.0
     """Mean number of periods between false alarms."""

@@ -187,7 +187,7 @@ class Coverage:
         for _ in range(n):
             counts, merit = self._counts.copy(), self.merit.copy()
             gains = np.full(len(motions), -np.inf)
-            for i in set(range(len(motions))) - set(chosen):
+            for i in (i for i in range(len(motions)) if i not in chosen):
                 gains[i] = self._record(motions[i])
                 self._counts[:], self.merit[:] = counts, merit
             chosen.append(int(np.argmax(gains)))

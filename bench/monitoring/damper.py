@@ -1,9 +1,10 @@
 """A damper watched in service: learn what it dissipates, then ask after each period whether it still does.
 
-Adaptive least squares identify ``F = C sgn(v)|v|^n`` on line (eq. 3.8), from the first sample to the last. From the periods of the
-learning time comes the baseline: the logarithm of the energy of a period over that of the model along the same motion,
+Adaptive least squares identify ``F = C sgn(v)|v|^n`` on line (eq. 3.8), from the first sample to the last: what is told of the damper.
+From the periods of the learning time comes the baseline: what a period takes is that of a sum of powers of the speed, with weights
+not below zero by least squares (dry friction of the seals beside the fluid is no single power), and the logarithm of what is over
 
-    ``y_k = log( ∮ F v dt / ∮ C |v|^(n+1) dt ) = b0 + b1 log v_k + b2 log f_k + e_k``,
+    ``y_k = log( ∮ F v dt / sum_i c_i ∮ |v|^(n_i+1) dt ) = b0 + b1 log v_k + b2 log f_k + e_k``,
 
 regressed on the period's speed and frequency as far as these varied. The energy of a period is what the damper is there for, is
 not touched by springs, offsets or backlash, and a loss of C by a share shows as the logarithm of that share. Later
@@ -24,6 +25,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy import optimize
 
 from bench.errors import IdentificationError
 from bench.identification.adaptive import AdaptiveLeastSquares
@@ -40,8 +42,14 @@ class DamperMonitorSettings:
     varied: float = 0.02
     """Standard deviation of log speed or log frequency over the learning below which it counts as constant: what two hundredths do to
     a damper of any exponent is a tenth of the change sought."""
+    exponents: tuple[float, ...] = (0.0, 0.25, 0.5, 0.75, 1.0)
+    """Powers of the speed that a damper's force is a sum of: dry friction, fluid dampers, which lie between, a linear damper."""
     beyond: float = 0.1
     """How far beyond the learnt range, in the logarithm, a period's speed and frequency may lie: half of the change sought, for n = 1."""
+    curvature: tuple[float, float] = (0.25, 1.0)
+    """Largest second derivative of the log energy by log speed and by log frequency: of a sum of two forces whose exponents differ by one,
+    as dry friction and a linear damper, with s and 1 - s of the energy, s (1 - s); of a spring in series with a damper, whose loss goes as
+    w / (1 + w^2), 4 w^2 / (1 + w^2)^2."""
 
 
 SETTINGS = DamperMonitorSettings()
@@ -137,9 +145,14 @@ class DamperMonitor:
         self._scales = (v_peak, f_peak)
         thetas = np.array([self._estimate(period) for period in periods])
         exponent = float(np.median(thetas[:, 1]))
-        ratios = np.array([self._log_energy(period, 1.0, exponent) for period in periods])
-        coefficient = math.exp(float(np.mean(ratios)))
-        self.baseline = self._regressed(ratios - math.log(coefficient), coefficient, exponent)
+        model = np.array(
+            [np.trapezoid(np.abs(period.velocity) ** (exponent + 1.0), period.time) for period in periods]
+        )
+        coefficient = math.exp(float(np.mean(np.log(energies / model))))
+        of_terms = np.array([self._energies(period) for period in periods])
+        weights, _ = optimize.nnls(of_terms / energies[:, None], np.ones(len(energies)))
+        y = np.array([self._log_energy(period, weights) for period in periods])
+        self.baseline = self._regressed(y, weights, coefficient, exponent)
         self._learnt = []
 
     def _estimate(self, period: Period) -> tuple[float, float]:
@@ -155,23 +168,31 @@ class DamperMonitor:
         return math.exp(min(log_peak + math.log(f_peak) - exponent * math.log(v_peak), 700.0)), exponent
 
     @staticmethod
-    def _log_energy(period: Period, coefficient: float, exponent: float) -> float:
-        """Logarithm of the energy over that of a damper of C and n along the same motion."""
-        model = coefficient * float(np.trapezoid(np.abs(period.velocity) ** (exponent + 1.0), period.time))
+    def _energies(period: Period) -> NDArray[np.float64]:
+        """What powers of the speed of weight one would take over a period ``(n_exponents,)``."""
+        speed = np.abs(period.velocity)
+        return np.array([np.trapezoid(speed ** (n + 1.0), period.time) for n in SETTINGS.exponents])
+
+    def _log_energy(self, period: Period, weights: NDArray[np.float64]) -> float:
+        """Logarithm of the energy over that of the damper as learnt along the same motion."""
+        model = float(self._energies(period) @ weights)
         return math.log(max(period.energy, 1e-6 * model) / model)
 
     @staticmethod
     def _motion(period: Period) -> NDArray[np.float64]:
         return np.array([1.0, math.log(period.peak_velocity), math.log(period.frequency)])
 
-    def _regressed(self, y: NDArray[np.float64], coefficient: float, exponent: float) -> Baseline:
+    def _regressed(
+        self, y: NDArray[np.float64], weights: NDArray[np.float64], coefficient: float, exponent: float
+    ) -> Baseline:
         x = np.array([self._motion(period) for period in self._learnt])
         terms = np.concatenate([[True], x[:, 1:].std(axis=0) > SETTINGS.varied])
         used = x[:, terms]
         inverse = np.asarray(np.linalg.pinv(used.T @ used), dtype=np.float64)
         b = inverse @ used.T @ y
         e = y - used @ b
-        freedom = float(len(y) - used.shape[1])
+        # the weights have a scale in common with the constant
+        freedom = float(len(y) - used.shape[1] - max(int(np.count_nonzero(weights)) - 1, 0))
         neighbours = float(np.clip(np.sum(e[1:] * e[:-1]) / max(float(np.sum(e**2)), 1e-300), 0.0, 0.9))
         # Sums of correlated errors scatter as those of independent ones of a larger deviation.
         scatter = math.sqrt(float(np.sum(e**2)) / freedom * (1.0 + neighbours) / (1.0 - neighbours))
@@ -181,11 +202,13 @@ class DamperMonitor:
         return Baseline(
             coefficient,
             exponent,
+            weights,
             b,
             terms,
             inverse,
             scatter,
             freedom,
+            x[:, 1:].mean(axis=0),
             x[:, 1:].min(axis=0),
             x[:, 1:].max(axis=0),
             reference,
@@ -195,11 +218,10 @@ class DamperMonitor:
     def _judge(self, period: Period, learnt: Baseline) -> None:
         coefficient, exponent = self._estimate(period)
         motion = self._motion(period)
-        outside = (motion[1:] < learnt.low - SETTINGS.beyond) | (motion[1:] > learnt.high + SETTINGS.beyond)
         used = motion[learnt.terms]
-        y = self._log_energy(period, learnt.coefficient, learnt.exponent) - float(used @ learnt.regression)
+        y = self._log_energy(period, learnt.weights) - float(used @ learnt.regression)
         z = math.nan
-        inside = not bool(outside.any())
+        inside = self._learnt_from(motion[1:], learnt)
         if inside:
             spread = learnt.scatter * math.sqrt(1.0 + float(used @ learnt.inverse @ used))
             z = (y - self._level) / spread
@@ -226,6 +248,18 @@ class DamperMonitor:
             )
             self._sums[:] = 0.0
             self._since, self._confirming = [[], []], []
+
+    def _learnt_from(self, motion: NDArray[np.float64], learnt: Baseline) -> bool:
+        """Whether what was learnt holds for a log speed and log frequency (2,).
+
+        It does in the learnt range, and a little beyond. The straight lines that were regressed go on as far as what may bend away from
+        them takes up a quarter of the change sought, half of what is let pass as drift.
+        """
+        outside = (motion < learnt.low - SETTINGS.beyond) | (motion > learnt.high + SETTINGS.beyond)
+        lines = learnt.terms[1:]
+        bent = 0.5 * float(np.sum((SETTINGS.curvature * (motion - learnt.mean) ** 2)[lines]))
+        near = bent < 0.25 * abs(math.log(1.0 - self.settings.change))
+        return not bool(np.any(outside & ~lines if near else outside))
 
     def _add(self, y: float, z: float, reference: float) -> None:
         """Add a period to the sums, or to those that confirm the last change."""

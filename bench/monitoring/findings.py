@@ -17,8 +17,8 @@ class MonitorSettings:
 
     Attributes:
         learning: Periods from which the baseline is learnt. With 30 the threshold is within a tenth of that of a known scatter.
-        change: Smallest change of a period's energy to be found, as a share of it. 0.15 is what the loss of a fifth of C leaves where a
-            quarter of the energy is the seals' friction, which is not lost with it.
+        change: Smallest change of a period's energy to be found, as a share of it. 0.12 is what the loss of a fifth of C makes where two
+            fifths of the energy are the seals' friction, which is not lost with it; half of it is more than what fluids drift.
         run_length: Mean number of periods between false alarms. Twice the thousand that is asked of a monitor, since the
             scatter of neighbouring periods is not quite independent.
         memory: Periods that the running estimate of C and n remembers.
@@ -27,7 +27,7 @@ class MonitorSettings:
     """
 
     learning: int = 30
-    change: float = 0.15
+    change: float = 0.12
     run_length: float = 2000.0
     memory: float = 10.0
     confirm: int = 5
@@ -52,11 +52,13 @@ class Baseline(NamedTuple):
     Attributes:
         coefficient: C [N (s/m)^n].
         exponent: n [1].
+        weights: Of the powers of the speed (n_exponents,) [N (s/m)^exponent].
         regression: b of the terms in use (p,).
         terms: Which of 1, log speed, log frequency these are.
         inverse: Inverse of the normal matrix (p, p).
         scatter: Standard deviation of e, correlation of neighbours counted in [1].
         freedom: Degrees of freedom of it.
+        mean: Mean log speed and log frequency learnt from (2,).
         low: Least log speed and log frequency learnt from (2,).
         high: Largest (2,).
         reference: Of the cumulative sum [standard deviations].
@@ -65,11 +67,13 @@ class Baseline(NamedTuple):
 
     coefficient: float
     exponent: float
+    weights: NDArray[np.float64]
     regression: NDArray[np.float64]
     terms: NDArray[np.bool_]
     inverse: NDArray[np.float64]
     scatter: float
     freedom: float
+    mean: NDArray[np.float64]
     low: NDArray[np.float64]
     high: NDArray[np.float64]
     reference: float

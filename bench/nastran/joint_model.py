@@ -113,7 +113,7 @@ def read_joint_model(deck: Deck, *, units: Units = SI) -> JointModel:
     axes = [_axis(deck, relative, bodies, component, auxiliary) for component in SETTINGS.axes]
     held = {card.grid for card in deck.of(Spc)}
     mounts = {}
-    for grid in {card.grid for card in deck.of(Conm2)}:
+    for grid in dict.fromkeys(card.grid for card in deck.of(Conm2)):
         found = [
             _between(deck, kind, grid, component, held)
             for component in SETTINGS.axes

@@ -276,7 +276,7 @@ def read_line(folder: Path) -> None:
             command(*line)
         finally:
             asked = {Path(word).resolve() for word in line if "\x00" not in word and len(word) < 200}
-            for path in set(folder.rglob("*")) - before:
+            for path in sorted(set(folder.rglob("*")) - before):
                 if path.resolve() in asked or asked & {parent.resolve() for parent in path.parents} - {
                     folder.resolve()
                 }:

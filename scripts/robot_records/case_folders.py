@@ -187,7 +187,7 @@ def _parameters(records: Records) -> dict[str, dict[str, object]]:
     units = {"kp": "N m/rad", "kv": "N m s/rad", "forcerange": "N m"}
     for axis in records.axes if records.servo else ():
         u = model.actuator(axis.actuator or axis.joint).id
-        for kind in units.keys() & records.spreads.keys():
+        for kind in (kind for kind in units if kind in records.spreads):
             value = drive_value(model, u, kind)
             out[f"{kind}:{model.actuator(u).name}"] = {
                 "value": value, "std": records.spreads[kind] * value, "unit": units[kind],

@@ -102,7 +102,8 @@ def screen(
 ) -> list[Screened]:
     """Screen effects on top of a fit; the most promising first."""
     grounds = {
-        joints: _Ground(problem, base, joints) for joints in {problem.reached((c,)) for c in candidates}
+        joints: _Ground(problem, base, joints)
+        for joints in dict.fromkeys(problem.reached((c,)) for c in candidates)
     }
 
     def look(placed: PlacedOnJoint) -> list[Screened]:

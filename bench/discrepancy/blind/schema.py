@@ -32,7 +32,7 @@ class ProtocolDocument(Document):
 
     entry_name = "a protocol"
     exclude: Listed[Name] = ()
-    """Effects struck from the catalogue."""
+    """Effects left out of the catalogue."""
 
 
 class _Open(Entry):
@@ -89,7 +89,7 @@ class AnswerDocument(Document, _Open):
     effects: Listed[AnswerEffect]
     """Withheld effects."""
     struck: Listed[Name] = ()
-    """Effects struck from the catalogue."""
+    """Effects left out of the catalogue."""
     rig: Text = ""
     """The rig."""
     regions: Listed[AnswerRegion] | None = None

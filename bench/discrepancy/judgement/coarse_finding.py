@@ -239,7 +239,7 @@ def _marginal(judged: Judged) -> dict[tuple[str, str], float]:
     total: dict[tuple[str, str], float] = {}
     outside = judged.settings.outside if judged.vetoed else judged.outside
     for weight, entry in zip(judged.weights, judged.found, strict=True):
-        for key in {(p.effect.name, p.place.name) for p in entry.explanation.hypothesis}:
+        for key in dict.fromkeys((p.effect.name, p.place.name) for p in entry.explanation.hypothesis):
             total[key] = total.get(key, 0.0) + (1.0 - outside) * float(weight)
     return total
 
@@ -253,8 +253,8 @@ def _sets(judged: Judged) -> tuple[tuple[str, ...], ...]:
         theirs = {p.key: p for p in entry.explanation.hypothesis}
         if not theirs or not own or entry is judged.chosen:
             continue
-        lost = [own[key] for key in own.keys() - theirs.keys()]
-        gained = [theirs[key] for key in theirs.keys() - own.keys()]
+        lost = [p for key, p in own.items() if key not in theirs]
+        gained = [p for key, p in theirs.items() if key not in own]
         if len(lost) != 1 or len(gained) != 1:
             lost, gained = list(chosen.hypothesis), list(entry.explanation.hypothesis)
         label, instead = (" + ".join(sorted(p.effect.name for p in part)) for part in (lost, gained))

@@ -138,7 +138,7 @@ def marginal(explanations: Sequence[Explanation]) -> dict[tuple[str, str], float
     total: dict[tuple[str, str], float] = {}
     known = 1.0 - explanations[0].settings.judgement.outside if explanations[0].scaled else 1.0
     for share, explanation in zip(weights(explanations), explanations, strict=True):
-        for key in {(p.effect.name, p.place.name) for p in explanation.hypothesis}:
+        for key in dict.fromkeys((p.effect.name, p.place.name) for p in explanation.hypothesis):
             total[key] = total.get(key, 0.0) + known * float(share)
     return total
 
@@ -164,8 +164,8 @@ def indistinguishable(explanations: Sequence[Explanation]) -> tuple[tuple[str, .
         if not other.hypothesis or _behind(explanations, other) > explanations[0].settings.judgement.rival:
             continue
         theirs = {p.key: p for p in other.hypothesis}
-        lost = [own[key] for key in own.keys() - theirs.keys()]
-        gained = [theirs[key] for key in theirs.keys() - own.keys()]
+        lost = [p for key, p in own.items() if key not in theirs]
+        gained = [p for key, p in theirs.items() if key not in own]
         if len(lost) != 1 or len(gained) != 1:
             lost, gained = list(best.hypothesis), list(other.hypothesis)
         label, instead = (" + ".join(sorted(p.effect.name for p in part)) for part in (lost, gained))

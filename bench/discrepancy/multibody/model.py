@@ -189,7 +189,7 @@ class ArticulatedModel:
         out, own = torque[:, dofs], inertia[:, dofs]
         for tie in self.ties:
             out[:, dofs.index(tie.to_dof)] += tie.ratio * torque[:, tie.dof]
-        for j in {dofs.index(tie.to_dof) for tie in self.ties}:
+        for j in sorted({dofs.index(tie.to_dof) for tie in self.ties}):
             own[:, j] = self._inertia(q, j)
         return Dynamics(out, own)
 

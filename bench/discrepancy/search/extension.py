@@ -26,7 +26,7 @@ from bench.discrepancy.screening.linear_amplitudes import fainter
 from bench.discrepancy.screening.screen import Screen
 
 
-class _Offers(NamedTuple):
+class Offers(NamedTuple):
     """What a screening offers beside a base; the screening itself is large, and let go.
 
     Attributes:
@@ -57,7 +57,7 @@ def extend(
         search.fit_all(lambda task: first_fit(search.problem, *task, limit=limit), tasks)
 
     fit_all(task for found in offers for task in found.tasks)
-    fit_all(task for found in offers for task in _begun_faint(search, found))
+    fit_all(task for found in offers for task in begun_faint(search, found))
     for base, _, spare in offers:
         kept = _kept(search, base)
         fit_all(task for p, task in spare if p.gain > kept and search.start(base.hypothesis, p))
@@ -71,7 +71,7 @@ def _offers(
     *,
     count: int,
     among: Collection[tuple[str, str, str]],
-) -> _Offers:
+) -> Offers:
     """Screen one more effect beside a base, of those `among` where some are given."""
     settings = search.problem.settings
     problem = search.problem
@@ -87,7 +87,7 @@ def _offers(
     most = max((p.gain for p in [*points, *inertia]), default=0.0)
     excess = base.chi2 - base.n_residuals
     if named and problem.scaled and not consistent(base) and most < settings.search.unpromising * excess:
-        return _Offers(base, [], [])
+        return Offers(base, [], [])
 
     def task(point: Point) -> Task:
         return (*base.hypothesis, point.placed), local.starts(point, ground, named)
@@ -113,10 +113,10 @@ def _offers(
     tasks += [
         ((*base.hypothesis, p.placed), np.append(base.vector, p.eta)) for p in inertia if p.gain > least
     ]
-    return _Offers(base, tasks, spare)
+    return Offers(base, tasks, spare)
 
 
-def _begun_faint(search: Search, offers: _Offers) -> Iterator[Task]:
+def begun_faint(search: Search, offers: Offers) -> Iterator[Task]:
     """Fits of effects that left more than their base does, from the base and a faint effect: more is never worse, if fitted well.
 
     At the size that a screening promises along one motion, friction or a stop may make another one, which no small step leads away from.
