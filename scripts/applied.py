@@ -21,7 +21,7 @@ from typing import Any
 
 from bench.discrepancy import diagnose, read_case
 from bench.discrepancy.application.applying import apply
-from bench.discrepancy.application.reading import findings_of, read_verdict
+from bench.discrepancy.application.reading import findings_of, gaps_left, read_verdict
 from bench.discrepancy.replay.verification import VerificationSettings, is_articulated, verify
 from bench.errors import BenchError
 from bench.files import json_values, write_text
@@ -131,7 +131,7 @@ def attempt(source: Path, results: Path, verdicts: Path | None) -> dict[str, Any
     findings = findings_of(verdict, nearest=True)
     path = folder / case.rig
     changes = apply(path, findings, case=case, linear=not is_articulated(findings, case)).changes
-    worth = verify(path, findings, verdict.gaps, case)
+    worth = verify(path, findings, gaps_left(verdict), case)
     figures = [vars(f) | {"short": f.short} for f in worth.figures]
     off = max(abs(f.short) for f in worth.figures)
     within = off <= VerificationSettings().short

@@ -35,7 +35,7 @@ from mujoco import rollout
 from bench.arrays import Array
 from bench.discrepancy import diagnose, read_case
 from bench.discrepancy.application.applying import apply
-from bench.discrepancy.application.reading import findings_of
+from bench.discrepancy.application.reading import findings_of, gaps_left
 from bench.discrepancy.replay.verification import VerificationSettings, is_articulated, verify
 from bench.discrepancy.verdict import Verdict
 
@@ -285,7 +285,7 @@ def attempt(name: str, folder: Path) -> Row:
     found = findings_of(verdict, nearest=True)
     linear = not is_articulated(found, case)
     changes = apply(folder / "model.xml", found, case=case, linear=linear).changes
-    worth = verify(folder / "model.xml", found, verdict.gaps, case)
+    worth = verify(folder / "model.xml", found, gaps_left(verdict), case)
     figure = worth.worst
     return Row(
         name, verdict.verdict, tuple(e.name for e in verdict.named), is_named(verdict, native.called), figure.before, figure.diagnosis,

@@ -138,8 +138,8 @@ def test_friction_beside_a_damper_is_learnt_as_such():
     assert plain is not None
     assert beside is not None
     assert beside.weights[0] > 0.0
-    # one power of the speed would leave some three times as much
-    assert beside.scatter < 1.5 * plain.scatter
+    # of one power of the speed it is larger beside the friction; half of the force is known without noise here
+    assert beside.scatter < plain.scatter
 
 
 def test_the_command_seeks_what_the_settings_do():

@@ -45,7 +45,7 @@ class Apply:
     def __call__(self) -> None:
         """Run the command."""
         from bench.discrepancy.application.applying import apply
-        from bench.discrepancy.application.reading import findings_of, read_verdict
+        from bench.discrepancy.application.reading import findings_of, gaps_left, read_verdict
         from bench.discrepancy.application.writing import snippet
         from bench.discrepancy.replay.verification import is_articulated, verify
         from bench.targets import check_targets
@@ -61,7 +61,7 @@ class Apply:
             worth = (
                 None
                 if case is None
-                else verify(self.model, findings, verdict.gaps, case, progress=status.update)
+                else verify(self.model, findings, gaps_left(verdict), case, progress=status.update)
             )
         written = self._written(applied, findings, code if snippet(applied, self.output.name) else None)
         document["applied"] = {

@@ -196,9 +196,7 @@ def _diagnose(case: Case, how: How, rng: np.random.Generator, anyway: bool) -> D
         unknown=kind == "unknown",
     )
     named = with_closed(case, problem, finding.named, explanations, rng) if finding.named else ()
-    nearest = finding.nearest
-    if finding.closest is not None:
-        nearest = with_closed(case, problem, nearest, (finding.closest, *explanations), rng)
+    nearest = _nearest(case, problem, finding, closest, rng) if kind == "unknown" else ()
     ranked = (*(Ranked(e.name, e.where, e.probability) for e in seen), *finding.ranking)
     stated, sharp, nominal = problem.noise_stated, not finding.coarse, nominal_estimates(final)
     judged = complete(found, sharp=sharp, stated=stated, settings=how.settings.judgement)
@@ -227,9 +225,23 @@ def _diagnose(case: Case, how: How, rng: np.random.Generator, anyway: bool) -> D
         remainder=remainder(problem, final, widest),
         nominal=nominal,
         nearest=nearest,
+        nearest_nominal=nominal_estimates(closest) if nearest else (),
+        nearest_left=tuple(dict(gap.steps).get(names(closest.hypothesis), math.nan) for gap in found)
+        if nearest
+        else (),
         settings=changed(how.settings),
     )
     return Diagnosis(case, problem, tuple(explanations), verdict, final, where)
+
+
+def _nearest(
+    case: Case, problem: Problem, finding: Finding, closest: Explanation, rng: np.random.Generator
+) -> tuple[NamedEffect, ...]:
+    """Where nothing is named, the effects that come nearest, with what each of them closes."""
+    if not closest.hypothesis:
+        return ()
+    effects = finding.nearest or evidence.effects_of(closest, evidence.marginal(finding.explanations))
+    return with_closed(case, problem, effects, (closest, *finding.explanations), rng)
 
 
 def _kind(finding: Finding, seen: Sequence[NamedEffect]) -> tuple[VerdictKind, dict[str, float]]:

@@ -221,6 +221,8 @@ class Verdict:
             before), the "channel", "band_hz" and "time_s" that hold most of it in the records for identification, and the
             "free_force_gain": the part of what is left there that a free force, of what "free_force" names, would still take.
         nearest: Where nothing is named because something unknown is missing, the effects of the catalogue that come nearest.
+        nearest_nominal: Nominal parameters as the explanation by `nearest` has them; empty where `nominal` and the gaps are of that one.
+        nearest_left: What it leaves of each of `gaps`, beside `Gap.after`, which is what a free force leaves; empty likewise.
         nominal: Nominal parameters as the explanation behind `gap.after` has them.
         applied: What `jointbench apply` made of it in the user's own model: "changes", and "figures" before and after.
         settings: Thresholds that differ from their defaults, as `jointbench diagnose --settings` reads them.
@@ -244,6 +246,8 @@ class Verdict:
     remainder: dict[str, Any] = field(default_factory=dict)
     nominal: tuple[NominalEstimate, ...] = ()
     nearest: tuple[NamedEffect, ...] = ()
+    nearest_nominal: tuple[NominalEstimate, ...] = ()
+    nearest_left: tuple[float, ...] = ()
     applied: dict[str, Any] = field(default_factory=dict)
     settings: dict[str, Any] = field(default_factory=dict)
 

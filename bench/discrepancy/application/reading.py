@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
 from bench.discrepancy.application.applying import Findings
-from bench.discrepancy.verdict import Estimate, NamedEffect, NominalEstimate
+from bench.discrepancy.verdict import Estimate, Gap, NamedEffect, NominalEstimate
 from bench.discrepancy.verdict_schema import VerdictDocument
 from bench.documents import checked
 from bench.documents.loading import load_document
@@ -42,7 +43,19 @@ def findings_of(verdict: Any, *, nearest: bool = False) -> Findings:
             comes = f"; --nearest applies what comes nearest ({names})" if names else ""
             raise ParameterError(f"the verdict is 'unknown', so that there is nothing to apply{comes}")
         effects = verdict.nearest
-    return Findings(tuple(_effect(e) for e in effects), tuple(_nominal(p) for p in verdict.nominal))
+    numbers = (verdict.verdict == "unknown" and verdict.nearest_nominal) or verdict.nominal
+    return Findings(tuple(_effect(e) for e in effects), tuple(_nominal(p) for p in numbers))
+
+
+def gaps_left(verdict: Any) -> tuple[Gap, ...]:
+    """The gaps of a verdict, checked or a `Verdict`, with what `findings_of` leaves of them."""
+    names = [field.name for field in fields(Gap)]
+    gaps = [Gap(**{name: getattr(gap, name) for name in names}) for gap in verdict.gaps]
+    left = [_number(x) for x in verdict.nearest_left] or [math.nan] * len(gaps)
+    return tuple(
+        replace(gap, after=after) if math.isfinite(after) else gap
+        for gap, after in zip(gaps, left, strict=True)
+    )
 
 
 def _number(value: float | None) -> float:

@@ -85,6 +85,7 @@ def verdict_of(
     return Verdict(
         verdict=kind,
         named=effects if kind == "effect" else (),
+        nearest=effects if kind == "unknown" else (),
         ranking=ranking,
         indistinguishable=_sets(fits, final, settings, alike) if kind == "effect" else (),
         locations=locations_of(problem, base),
