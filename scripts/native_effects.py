@@ -150,6 +150,9 @@ EFFECTS: dict[str, Native] = {
     ),
     "delay": Native("arm", actuator(delay=0.02, nsample=25, interp=1), ("actuator_delay",)),
     "filter": Native(
+        "stage", actuator(dyntype=mujoco.mjtDyn.mjDYN_FILTEREXACT, dynprm={0: 0.02}, actdim=1), ("actuator_lag",)
+    ),
+    "filter, acting early": Native(
         "stage", actuator(dyntype=mujoco.mjtDyn.mjDYN_FILTEREXACT, dynprm={0: 0.02}, actdim=1, actearly=True), ("actuator_lag",)
     ),
     "filter of a servo": Native(

@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted_cases import SAMPLE_RATE, load, planted_case
+from planted_cases import SAMPLE_RATE, linear_motion, load, planted_case
 
 from bench.discrepancy import Case, CaseRecord, diagnose
 from bench.discrepancy.effects.catalogue import CATALOGUE
-from bench.discrepancy.effects.channel_operators import advance, held_lag, skew
+from bench.discrepancy.effects.channel_operators import advance, analogue_lag, held_lag, lag, skew
 from bench.discrepancy.fitting.fits import Search
 from bench.discrepancy.fitting.map_fit import fit
 from bench.discrepancy.likelihood.problem import Problem
@@ -40,6 +40,38 @@ def test_a_lag_of_held_samples_is_the_mean_of_a_finer_one():
         means.append(np.mean(held + (y - held) * np.exp(-t / tau)))
         y = held + (y - held) * np.exp(-step / tau)
     assert held_lag(x, np.array([tau]), step) == pytest.approx(means, abs=1e-5)
+
+
+def test_a_lag_of_an_amplifier_is_exact_along_lines():
+    step, tau = 0.01, 0.013
+    ramp = np.arange(40.0)
+    # of a ramp from zero: t - tau (1 - exp(-t / tau)), and one sample more for the line from before the record
+    t = np.arange(40.0) * step
+    assert analogue_lag(ramp, np.array([tau]), step) == pytest.approx((t - tau * -np.expm1(-t / tau)) / step)
+
+
+@pytest.mark.parametrize(
+    ("lagged", "equation"),
+    [(analogue_lag, "tau F' + F = command"), (lag, "tau F' + F = command, moved on once a sample")],
+    ids=["analogue", "digital"],
+)
+def test_a_lag_is_named_alone_and_as_what_it_is(lagged, equation):
+    case = planted_case(
+        lambda f: linear_motion(lagged(f, np.array([0.02]), 1.0 / SAMPLE_RATE)), role="command"
+    )
+    (found,) = diagnose(case).verdict.named
+    assert (found.name, found.equation) == ("actuator_lag", equation)
+    assert found.parameters["time_constant"].value == pytest.approx(0.02, rel=3e-3)
+
+
+@pytest.mark.parametrize("name", ["actuator_delay", "actuator_lag", "displacement_delay", "displacement_lag"])
+def test_what_a_log_is_uncertain_of_anyway_is_no_finding(name):
+    case = planted_case(n=400, role="command")
+    structure, effects = structure_of(case), [effect for effect in CATALOGUE if effect.name == name]
+    (placed,) = placements(case, structure, effects)
+    scales = Problem(case, structure, case.identification).scales_of(placed)
+    assert not placed.effect.tells(np.array([0.09 / SAMPLE_RATE]), scales)
+    assert placed.effect.tells(np.array([0.11 / SAMPLE_RATE]), scales)
 
 
 @pytest.mark.parametrize(

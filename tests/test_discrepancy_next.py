@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
+from bench.cli import main
 from bench.discrepancy import Case, CaseChannel, NominalParameter, record_from_arrays
 from bench.discrepancy.effects.catalogue import effect_named
 from bench.discrepancy.fitting.map_fit import fit
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.model.rigs import structure_of
+from bench.discrepancy.next_test import discriminating_excitation
 from bench.discrepancy.next_test.belief import Belief
 from bench.discrepancy.next_test.discriminating_excitation import propose, separate, told_apart
 from bench.discrepancy.next_test.distinguishability import why_none
@@ -165,3 +169,30 @@ def test_every_shape_fits_into_a_record_of_a_few_periods(periods):
         x = signal.sample(samples, rate, np.random.default_rng(1))
         assert np.isfinite(x).all(), label
         assert np.ptp(x) > 0.0, label
+
+
+def test_a_planner_takes_the_question_that_the_records_leave_open(tmp_path, capsys, monkeypatch):
+    problem, gap, cubic = small_motion()
+    monkeypatch.setattr(discriminating_excitation, "log_odds", lambda first, second: 1.0)
+    asked = separate(problem, [gap, cubic])["closed_loop"]
+    assert asked["elements"][0]["law"] == "gap"
+    assert asked["experiment"]["rival"]["elements"][0]["law"] == "cubic_stiffness"
+    assert asked["structure"]["mass"]["carriage"] == pytest.approx(2.0, rel=0.05)
+    asked["experiment"]["duration"] = (
+        2.0  # the records last 6 s, and the planner decides some twenty times in them
+    )
+    verdict = tmp_path / "verdict.json"
+    verdict.write_text(json.dumps({"verdict": "effect", "next_excitation": {"closed_loop": asked}}))
+    out = tmp_path / "next.csv"
+    assert main(["excite", str(verdict), "--method", "planner", "-o", str(out), "--json"]) == 0
+    notes = json.loads(capsys.readouterr().out)["notes"]
+    assert any("log Bayes factor" in note for note in notes)
+    force = np.loadtxt(out, delimiter=",", skiprows=1)[:, 1]
+    assert 0.0 < np.max(np.abs(force)) <= asked["experiment"]["force"]["shaker"] * (1.0 + 1e-6)
+
+
+def test_a_verdict_without_such_a_question_says_so(tmp_path, capsys):
+    verdict = tmp_path / "verdict.json"
+    verdict.write_text(json.dumps({"verdict": "none", "next_excitation": {}}))
+    assert main(["excite", str(verdict), "--method", "planner", "-o", str(tmp_path / "next.csv")]) != 0
+    assert "no test which a planner could shape" in capsys.readouterr().err

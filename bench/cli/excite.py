@@ -40,7 +40,7 @@ class Excite:
     """
 
     configuration: tyro.conf.Positional[Path]
-    """Rig and experiment (TOML or JSON)."""
+    """Rig and experiment (TOML or JSON); or a verdict whose next test a planner can shape."""
     method: str = "dopt"
     """dopt (best open-loop one), multisine, schroeder, crest, sweep, prbs; or, shaped while measuring, planner or policy."""
     policy: str = ""
@@ -64,13 +64,13 @@ class Excite:
         """Run the command."""
         import numpy as np
 
-        from bench.documents import naming
+        from bench.documents import checked, naming
         from bench.errors import ParameterError
         from bench.excitation.request import request
         from bench.excitation.schema import ExcitationRequest
 
         self._check()
-        document = ExcitationRequest.read(self.configuration)
+        document = checked(ExcitationRequest, _asked(self.configuration), str(self.configuration))
         with naming(str(self.configuration)):
             rig = document.build(self.configuration.parent)
         if document.experiment is None:
@@ -144,6 +144,23 @@ class Excite:
             raise ParameterError(
                 "--policy NAME and --method policy go together; trained policies are listed by an unknown name"
             )
+
+
+def _asked(path: Path) -> dict[str, Any]:
+    """The document of a file: a rig with an experiment, or what a verdict asks of its next test."""
+    from bench.documents.loading import load_document
+    from bench.errors import ParameterError
+
+    document = load_document(path)
+    if "next_excitation" not in document:
+        return document
+    asked = (document["next_excitation"] or {}).get("closed_loop")
+    if not asked:
+        raise ParameterError(
+            f"{path} is a verdict that asks for no test which a planner could shape; two force laws on the rig 'sdof' that the records "
+            "cannot tell apart are expected"
+        )
+    return asked
 
 
 def _tell(result: dict[str, Any]) -> None:

@@ -47,7 +47,7 @@ from bench.discrepancy.numerics.deadline import Deadline
 from bench.discrepancy.search.explanation import Explanation, nominal_alone
 from bench.discrepancy.search.load_interpolation import reading_notes
 from bench.discrepancy.settings import DEFAULT, DiagnosisSettings, changed
-from bench.discrepancy.verdict import NamedEffect, Ranked, Verdict, VerdictKind, far_off, of_runs
+from bench.discrepancy.verdict import Gap, NamedEffect, Ranked, Verdict, VerdictKind, far_off, of_runs
 from bench.errors import BenchError, UnknownNameError
 
 _Placed = TypeVar("_Placed", NamedEffect, Ranked)
@@ -196,7 +196,7 @@ def _diagnose(case: Case, how: How, rng: np.random.Generator, anyway: bool) -> D
         unknown=kind == "unknown",
     )
     named = with_closed(case, problem, finding.named, explanations, rng) if finding.named else ()
-    nearest = _nearest(case, problem, finding, closest, rng) if kind == "unknown" else ()
+    near = _nearest(case, problem, finding, closest, found, rng) if kind == "unknown" else {}
     ranked = (*(Ranked(e.name, e.where, e.probability) for e in seen), *finding.ranking)
     stated, sharp, nominal = problem.noise_stated, not finding.coarse, nominal_estimates(final)
     judged = complete(found, sharp=sharp, stated=stated, settings=how.settings.judgement)
@@ -224,24 +224,30 @@ def _diagnose(case: Case, how: How, rng: np.random.Generator, anyway: bool) -> D
         complete=kind != "unknown" and judged,
         remainder=remainder(problem, final, widest),
         nominal=nominal,
-        nearest=nearest,
-        nearest_nominal=nominal_estimates(closest) if nearest else (),
-        nearest_left=tuple(dict(gap.steps).get(names(closest.hypothesis), math.nan) for gap in found)
-        if nearest
-        else (),
         settings=changed(how.settings),
+        **near,
     )
     return Diagnosis(case, problem, tuple(explanations), verdict, final, where)
 
 
 def _nearest(
-    case: Case, problem: Problem, finding: Finding, closest: Explanation, rng: np.random.Generator
-) -> tuple[NamedEffect, ...]:
-    """Where nothing is named, the effects that come nearest, with what each of them closes."""
+    case: Case,
+    problem: Problem,
+    finding: Finding,
+    closest: Explanation,
+    found: Sequence[Gap],
+    rng: np.random.Generator,
+) -> dict[str, Any]:
+    """What the verdict says of the effects that come nearest where nothing is named: what each closes, and what all of them leave."""
     if not closest.hypothesis:
-        return ()
+        return {}
     effects = finding.nearest or evidence.effects_of(closest, evidence.marginal(finding.explanations))
-    return with_closed(case, problem, effects, (closest, *finding.explanations), rng)
+    label = names(closest.hypothesis)
+    return {
+        "nearest": with_closed(case, problem, effects, (closest, *finding.explanations), rng),
+        "nearest_nominal": nominal_estimates(closest),
+        "nearest_left": tuple(dict(gap.steps).get(label, math.nan) for gap in found),
+    }
 
 
 def _kind(finding: Finding, seen: Sequence[NamedEffect]) -> tuple[VerdictKind, dict[str, float]]:

@@ -195,7 +195,9 @@ def apply(
         raise ModelError(f"'{path}' is no MJCF that MuJoCo compiles: {told(error)}") from None
     places = case.options.get("places", ()) if case else ()
     named = tuple(str(p) for p in places) if isinstance(places, (list, tuple)) else ()
-    target = Target(spec, nominal, rest_of(nominal) if linear else {}, loads_of(case, nominal), named)
+    sampling = case.identification[0].step if case else 0.0
+    rest = rest_of(nominal) if linear else {}
+    target = Target(spec, nominal, rest, loads_of(case, nominal), named, sampling)
     known = {estimate.name for estimate in findings.nominal}
     changes = [nominal_parameter(target, estimate) for estimate in findings.nominal]
     changes += [_one(target, effect, known) for effect in _ordered(findings.effects)]

@@ -39,9 +39,16 @@ def delay(target: Target, effect: NamedEffect) -> Change:
 
 
 def lag(target: Target, effect: NamedEffect) -> Change:
-    """MuJoCo's first-order filter of the control. What it filters of a servo is the target, not the force."""
+    """MuJoCo's first-order filter of the control. What it filters of a servo is the target, not the force.
+
+    A step is run with the activation that it begins with, half a step late, or with the one that it ends with (`actearly`), half a step
+    ahead; a drive that moves on once a sample is half a sample ahead of a filter. What is left of these is taken off the time constant,
+    which is the delay of what is slow.
+    """
     actuator = _actuator(target, effect)
     constant = next(iter(values_of(effect).values()))
+    linear, digital = "time_constant" in effect.parameters, "once a sample" in effect.equation
+    ahead = 0.5 * (target.sampling - target.step if digital else target.step) if linear else 0.0
     if actuator.dyntype not in (
         mujoco.mjtDyn.mjDYN_NONE, mujoco.mjtDyn.mjDYN_FILTER, mujoco.mjtDyn.mjDYN_FILTEREXACT
     ):  # fmt: skip
@@ -50,15 +57,15 @@ def lag(target: Target, effect: NamedEffect) -> Change:
         )
     before = 0.0 if actuator.dyntype == mujoco.mjtDyn.mjDYN_NONE else float(actuator.dynprm[0])
     actuator.dyntype = mujoco.mjtDyn.mjDYN_FILTEREXACT
-    actuator.dynprm[0] = before + constant
+    actuator.dynprm[0] = before + max(constant - ahead, 0.0)
     actuator.actdim = 1
-    actuator.actearly = True
+    actuator.actearly = digital or not linear
     other = _servo(target, actuator) and effect.name == "actuator_lag"
-    text = f"a first-order filter of {before + constant:.6g} s"
+    text = f"a first-order filter of {actuator.dynprm[0]:.6g} s"
     if other:
         text += " (of the servo's target; the diagnosis lags its force)"
-    elif "time_constant" in effect.parameters:
-        text += " (an analogue one; that of the diagnosis moves on once a sample, half a sample earlier)"
+    elif "once a sample" in effect.equation:
+        text += f" (an analogue one; that of the diagnosis, of {constant:.6g} s, moves on once a sample, half a sample earlier)"
     return _done(effect, actuator, text)
 
 

@@ -67,6 +67,7 @@ class Target:
         rest: Joint to the position at rest, from which a linear case counts its motion; zero where a joint is not listed.
         loads: Load channel to actuator.
         places: Places of effects that say no place.
+        sampling: Time between samples of the case's records [s]; 0 where no case is given.
         outputs: Joint to the tendon that reads its link, where the encoder sits behind an elastic train.
         later: What is set once everything else is, given the model compiled then: numbers that depend on inertia.
     """
@@ -76,6 +77,7 @@ class Target:
     rest: Mapping[str, float] = field(default_factory=dict)
     loads: Mapping[str, str] = field(default_factory=dict)
     places: tuple[str, ...] = ()
+    sampling: float = 0.0
     outputs: dict[str, str] = field(default_factory=dict)
     later: list[Callable[[mujoco.MjModel], None]] = field(default_factory=list)
 

@@ -65,11 +65,15 @@ def advance(x: Samples, values: Samples, step: float) -> Samples:
 def lag(x: Samples, values: Samples, step: float) -> Samples:
     """Return `x` through a first-order lag of time constant tau, updated once a sample.
 
-    ``y[k] = y[k-1] + (1 - exp(-h / tau)) (x[k] - y[k-1])``, the recursion of a digital drive. An analogue lag differs
-    from it by half a sample of delay.
+    ``y[k] = y[k-1] + (1 - exp(-h / tau)) (x[k] - y[k-1])``, the recursion of a digital drive, half a sample earlier than an analogue lag.
     """
     share = 1.0 - np.exp(-step / values[0])
     return np.asarray(lfilter([share], [1.0, share - 1.0], x))
+
+
+def analogue_lag(x: Samples, values: Samples, step: float) -> Samples:
+    """Return `x` through an analogue lag, ``tau y' + y = x``, exact for lines between samples; zero before the record."""
+    return low_pass(np.concatenate([[0.0], x]), values, step)[1:]
 
 
 def held_lag(x: Samples, values: Samples, step: float) -> Samples:

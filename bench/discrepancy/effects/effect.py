@@ -182,6 +182,7 @@ class Effect:
         signal: For actuator and sensor effects, the operation on a channel.
         between_samples: That operation moves samples in time, and needs what the channel does between them.
         held: The same on samples that are held until the next, the means over these; `signal` where None.
+        held_equation: Its equation, where that is another one; empty elsewhere.
         logged: For actuator effects, what was logged is wrong rather than what follows a command: a measured load has it, too.
         tells: Parameter values and scales to whether they are more than the clocks of any log are uncertain by; of other effects None.
         exact: A free run with it is as exact as one of the nominal model: a number is wrong, and nothing is smoothed, switched or
@@ -212,6 +213,7 @@ class Effect:
     affine: bool = False
     signal: Callable[[Values, Values, float], Values] | None = None
     held: Callable[[Values, Values, float], Values] | None = None
+    held_equation: str = ""
     between_samples: bool = False
     logged: bool = False
     tells: Callable[[Values, Scales], bool] | None = None
@@ -231,6 +233,10 @@ class Effect:
         """What an actuator effect makes of loads that run so between samples, see `Case.load_interpolation`; None of other effects."""
         held = self.held if interpolation == "zero_order_hold" else None
         return held or self.signal
+
+    def equation_for(self, interpolation: str) -> str:
+        """One line for reports, with loads that run so between samples."""
+        return (interpolation == "zero_order_hold" and self.held_equation) or self.equation
 
     @property
     def sticks(self) -> bool:

@@ -10,6 +10,8 @@ from bench.discrepancy.effects.effect import (
     EFFECT_SETTINGS,
     Effect,
     FreeParameter,
+    Scales,
+    Values,
     log_grid,
 )
 
@@ -38,6 +40,11 @@ def _time(name: str, *grid: float) -> FreeParameter:
     return FreeParameter(name, mean=math.log(0.008), std=1.0, bounds=bounds, grid=log_grid(*grid), unit="s")
 
 
+def _beyond_jitter(values: Values, scales: Scales) -> bool:
+    """Whether a delay, or a lag, which delays what is slow by its time constant, is more than the times of any log are uncertain by."""
+    return bool(values[0] >= SETTINGS.jitter * scales.step)
+
+
 def _sensor_delay(
     channel: str, quantity: str, symbol: str, grid: tuple[float, ...], log_prior: float = 0.0
 ) -> Effect:
@@ -48,6 +55,7 @@ def _sensor_delay(
         (_time("delay", *grid),),
         f"{symbol}(t - tau)",
         signal=signals.sensor_delay,
+        tells=_beyond_jitter,
         quantity=quantity,
         log_prior=log_prior,
     )
@@ -61,6 +69,7 @@ def _sensor_lag(channel: str, quantity: str, symbol: str) -> Effect:
         (_time("time_constant", 0.003, 0.01),),
         f"tau y' + y = {symbol}, y what is read",
         signal=signals.low_pass,
+        tells=_beyond_jitter,
         quantity=quantity,
         log_prior=-1.0,
     )
@@ -148,6 +157,7 @@ CHANNELS: tuple[Effect, ...] = (
         "F(t - tau)",
         signal=signals.delay,
         between_samples=True,
+        tells=_beyond_jitter,
     ),
     Effect(
         "force_delay",
@@ -158,7 +168,7 @@ CHANNELS: tuple[Effect, ...] = (
         signal=signals.advance,
         between_samples=True,
         logged=True,
-        tells=lambda values, scales: values[0] >= SETTINGS.jitter * scales.step,
+        tells=_beyond_jitter,
         log_prior=EFFECT_SETTINGS.rare,
     ),
     Effect(
@@ -189,9 +199,11 @@ CHANNELS: tuple[Effect, ...] = (
         "actuator",
         "actuator",
         (_time("time_constant", 0.003, 0.01, 0.03),),
-        "tau F' + F = command",
+        "tau F' + F = command, moved on once a sample",
         signal=signals.lag,
         held=signals.held_lag,
+        tells=_beyond_jitter,
+        held_equation="tau F' + F = command",
     ),
     Effect(
         "force_gain_error",

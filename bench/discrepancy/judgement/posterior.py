@@ -245,7 +245,7 @@ def named_effect(
         probability=probabilities.get((effect.name, place.name), 1.0),
         parameters=estimates,
         channel=placed.target,
-        equation=effect.equation,
+        equation=effect.equation_for(problem.case.load_interpolation),
         law=effect.law.name if effect.law else "",
         theta=theta,
     )

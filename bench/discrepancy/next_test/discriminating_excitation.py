@@ -22,6 +22,7 @@ from bench.discrepancy.judgement.posterior import weights
 from bench.discrepancy.likelihood.problem import Array, Problem
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.next_test.belief import Belief
+from bench.discrepancy.next_test.closed_loop import closed_loop
 from bench.discrepancy.next_test.distinguishability import why_alike, why_none
 from bench.discrepancy.next_test.feasible_excitations import (
     SizedExcitation,
@@ -47,7 +48,8 @@ def separate(problem: Problem, explanations: Sequence[Explanation]) -> dict[str,
 
     Returns:
         The rivals, why these records cannot tell them apart, the excitation in words and numbers, its expected log odds and
-        power, and those of repeating the longest present record. Empty where the present records decide.
+        power, those of repeating the longest present record, and the question as a planner takes it that shapes the force while it
+        measures. Empty where the present records decide.
     """
     best = explanations[0]
     rivals = [e for e in explanations[1:] if _is_rival(best, e)]
@@ -69,6 +71,8 @@ def separate(problem: Problem, explanations: Sequence[Explanation]) -> dict[str,
         return out | {"excitation": ""}
     proposal, look = found
     out |= _described(problem, proposal, look)
+    if asked := closed_loop(problem, best, rivals[0]):
+        out["closed_loop"] = asked
     out["also_against"] = _others(problem, first, rivals[1:], proposal, scale)
     return out
 

@@ -100,9 +100,14 @@ def resonance(simulator: Simulator, load: int) -> float:
     return float(np.clip(np.median(rate) / (2.0 * np.pi), 4.0 / duration, 0.05 / step))
 
 
+def band_about(centre: float) -> tuple[float, float]:
+    """Lowest and highest frequency of what excites a resonance [Hz] and its surroundings."""
+    return 0.2 * centre, 3.0 * centre
+
+
 def shapes(centre: float, duration: float) -> list[tuple[str, Signal]]:
     """Signals around a resonance [Hz], with what they are in words."""
-    slow, pulse = 0.2 * centre, 0.5 / centre
+    slow, pulse, (low, high) = 0.2 * centre, 0.5 / centre, band_about(centre)
     return [
         (f"slow sine at {slow:.3g} Hz", Tapered(Harmonic(slow), fade_in=min(0.5 / slow, 0.9 * duration))),
         (
@@ -112,8 +117,8 @@ def shapes(centre: float, duration: float) -> list[tuple[str, Signal]]:
         (f"sweep up from {0.3 * centre:.3g} to {2 * centre:.3g} Hz", Sweep(0.3 * centre, 2.0 * centre)),
         (f"sweep down from {2 * centre:.3g} to {0.3 * centre:.3g} Hz", Sweep(2.0 * centre, 0.3 * centre)),
         (
-            f"multisine from {0.2 * centre:.3g} to {3 * centre:.3g} Hz",
-            Multisine(band=(0.2 * centre, 3.0 * centre), phases="schroeder"),
+            f"multisine from {low:.3g} to {high:.3g} Hz",
+            Multisine(band=(low, high), phases="schroeder"),
         ),
         (f"noise below {1.5 * centre:.3g} Hz", BandLimitedNoise(cutoff=1.5 * centre)),
         (

@@ -194,6 +194,13 @@ def next_steps(verdict: Verdict, model: str = "") -> tuple[NextStep, ...]:
                 f"{proposal['peak_load']:.3g}, {proposal['duration_s']:.3g} s; power {100.0 * proposal['power']:.0f} %."
             )
         )
+        if proposal.get("closed_loop"):
+            command = "jointbench excite verdict.json --method planner -o next.csv"
+            steps.append(
+                NextStep(
+                    "Or have a planner shape the force while it measures, which decides sooner:", command
+                )
+            )
     elif proposal.get("reason"):
         steps.append(NextStep(str(proposal["reason"])))
     if verdict.verdict == "none" and verdict.gap.before > verdict.gap.parameters_only:

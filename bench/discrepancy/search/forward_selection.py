@@ -32,6 +32,7 @@ from bench.discrepancy.screening.screen import Screen
 from bench.discrepancy.search.extension import contacts, extend
 from bench.discrepancy.search.horizons import lengthen
 from bench.discrepancy.search.rivals import challenge, reduce_best, simplify
+from bench.discrepancy.unscreened.analogue_lag import with_analogue_lag
 from bench.discrepancy.unscreened.harmonic_force import with_harmonic_force
 from bench.discrepancy.unscreened.scheduled import with_schedules
 from bench.discrepancy.unscreened.soft_friction import soften, stand_in
@@ -85,7 +86,7 @@ def attribute(
         if not bases:
             break
         extend(search, screen, bases, count=4 if consistent(best) else 6 - size)
-        soften(search, size + 1)
+        _with_variants(search, size + 1)
         if HARMONIC in _read_off(candidates):
             with_harmonic_force(search, size + 1)
         lengthen(search, size + 1, candidates)
@@ -100,7 +101,7 @@ def attribute(
     ):
         progress(f"rivals of {names(best.hypothesis)}")
         challenge(search, screen, rounds=3 if problem.error is None else 1)
-        soften(search, len(search.ranked()[0].hypothesis))
+        _with_variants(search, len(search.ranked()[0].hypothesis))
         if problem.error is None:
             multistart(search)
     return search
@@ -116,7 +117,7 @@ def _single(
     """Fit single effects: the common ones, then the rarer ones and those that no screening holds where these leave something."""
     nothing = search.ranked(0)[0]
     extend(search, screen, [nothing], count=8)
-    soften(search, 1)
+    _with_variants(search, 1)
     if not consistent(search.ranked()[0]) and all(o.order > 0 for o in search.problem.structure.observers):
         contacts(search, candidates)
     rare = [p for p in candidates if p.effect.rare]
@@ -133,6 +134,12 @@ def _single(
         if HARMONIC in asked:
             with_harmonic_force(search)
         with_schedules(search, asked)
+
+
+def _with_variants(search: Search, size: int) -> None:
+    """Fit what no screening tells from effects of the foremost hypotheses of a size: friction that creeps, a lag that is analogue."""
+    soften(search, size)
+    with_analogue_lag(search, size)
 
 
 def _read_off(candidates: Sequence[Placed]) -> set[str]:
