@@ -262,6 +262,26 @@ CAPABILITIES: Sequence[Capability] = (
         hours=True,
     ),
     Capability(
+        "training_joint",
+        "Training from scratch of the policy `joint`",
+        (
+            *(
+                "python",
+                "scripts/train_plans.py",
+                "joint",
+                "--decisions",
+                "0.2",
+                "0.4",
+                "0.6",
+                "--rigs",
+                "6000",
+            ),
+            *("--fresh", "--json"),
+        ),
+        training_plans,
+        hours=True,
+    ),
+    Capability(
         "training_rivals",
         "Training from scratch of the policy `rivals`",
         (
