@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 from bench.discrepancy.case.single_axis import load_channel, motion_channels, turns
+from bench.discrepancy.judgement.closing import nominal_estimates
 from bench.discrepancy.judgement.posterior import effects_of
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Placed
@@ -19,8 +20,8 @@ from bench.laws import find_law
 
 RIG, JOINT, SHAKER = "sdof", "carriage", "shaker"
 """The bench's oscillator, and what it calls its joint and its actuator."""
-MEASURED = ("displacement", "velocity", "acceleration_x")
-"""Its channels, by the order of the derivative."""
+MEASURED = (("displacement", "m"), ("velocity", "m/s"), ("acceleration_x", "m/s^2"))
+"""Its channels and their units, by the order of the derivative."""
 STRUCTURE = ("mass", "stiffness", "damping")
 """Its parameters."""
 
@@ -30,49 +31,57 @@ def closed_loop(problem: Problem, first: Explanation, second: Explanation) -> di
 
     Empty where the case is none of an oscillator of the bench in SI units, or an explanation holds more than force laws.
     """
-    case = problem.case
-    plain = case.rig == RIG and not turns(case) and {p.name for p in case.parameters} <= set(STRUCTURE)
-    named = [effects_of(explanation, {}) for explanation in (first, second)]
-    if (
-        not plain
-        or problem.driven
-        or not all(named)
-        or not all(map(_goes_into_a_rig, (*first.hypothesis, *second.hypothesis)))
+    effects = (*first.hypothesis, *second.hypothesis)
+    if not (
+        first.hypothesis
+        and second.hypothesis
+        and _is_the_benchs(problem)
+        and all(map(_goes_into_a_rig, effects))
     ):
         return {}
-    load, motion = load_channel(case), motion_channels(case)
-    units = {load: "N"} | dict(zip(motion.values(), ("m", "m/s", "m/s^2"), strict=False))
-    if any(case.channel(name).unit not in ("", unit) for name, unit in units.items()):
-        return {}
-    limits, record = limits_of(problem), max(problem.records, key=len)
+    ours, rival = (effects_of(explanation, {}) for explanation in (first, second))
+    record, limits = max(problem.records, key=len), limits_of(problem)
     (low, high), duration = band_about(resonance(problem, 0)), len(record) * record.step
+    channels = {MEASURED[order][0]: name for order, name in motion_channels(problem.case).items()}
     noise = dict(zip(problem.structure.channels, problem.noise.tolist(), strict=True))
-    ours = {MEASURED[order]: name for order, name in motion.items()}
-    part, fitted = first.parts[0]
-    values = dict(
-        zip(part.structure.parameters, part.split(fitted.hypothesis, fitted.vector)[0].tolist(), strict=False)
-    )
-    watched = {
-        kind: ours[name] for kind, name in zip(("stroke", "velocity"), MEASURED, strict=False) if name in ours
+    bounds = {
+        kind: {name: limits.motion[channels[name]]}
+        for kind, name in (("stroke", "displacement"), ("velocity", "velocity"))
+        if name in channels
     }
+    structure = {estimate.name: estimate.value for estimate in nominal_estimates(first)}
+    structure = {p.name: p.value for p in problem.case.parameters} | structure
     return {
         "rig": RIG,
         "timestep": record.step,
-        "structure": {name: {JOINT: values.get(name, 0.0)} for name in STRUCTURE},
-        "elements": [_element(effect) for effect in named[0]],
+        "structure": {name: {JOINT: structure.get(name, 0.0)} for name in STRUCTURE},
+        "elements": [_element(effect) for effect in ours],
         "experiment": {
             "duration": duration,
             "band": [max(low, 1.0 / duration), min(high, 0.4 / record.step)],
-            "force": {SHAKER: limits.load[load]},
-            **{
-                kind: {name: limits.motion[channel]}
-                for (kind, channel), name in zip(watched.items(), MEASURED, strict=False)
-            },
-            "noise": {name: noise[channel] for name, channel in ours.items()},
-            "uncertain": _ranges(named[0]),
-            "rival": {"elements": [_element(effect) for effect in named[1]], "uncertain": _ranges(named[1])},
+            "force": {SHAKER: limits.load[load_channel(problem.case)]},
+            **bounds,
+            "noise": {name: noise[channel] for name, channel in channels.items()},
+            "uncertain": _ranges(ours),
+            "rival": {"elements": [_element(effect) for effect in rival], "uncertain": _ranges(rival)},
         },
     }
+
+
+def _is_the_benchs(problem: Problem) -> bool:
+    """Whether a case is one of the bench's oscillator, driven by a force, in SI units, of mass, spring and damper alone."""
+    case = problem.case
+    if (
+        case.rig != RIG
+        or problem.driven
+        or turns(case)
+        or not {p.name for p in case.parameters} <= set(STRUCTURE)
+    ):
+        return False
+    units = {load_channel(case): "N"} | {
+        name: MEASURED[order][1] for order, name in motion_channels(case).items()
+    }
+    return all(case.channel(name).unit in ("", unit) for name, unit in units.items())
 
 
 def _goes_into_a_rig(placed: Placed) -> bool:
