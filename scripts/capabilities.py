@@ -136,8 +136,9 @@ CAPABILITIES: Sequence[Capability] = (
     Capability(
         "ten_minutes",
         "From a log to a corrected model",
-        ("python", "scripts/ten_minutes.py", "--json"),
+        ("python", "scripts/ten_minutes.py", "--robots", "{data}/robots", "--json"),
         ten_minutes,
+        data="robots",
     ),
     Capability(
         "applied",
