@@ -19,6 +19,7 @@ import pytest
 from bench.cli import main
 from bench.discrepancy import Case, CaseChannel, record_from_arrays
 from bench.discrepancy.application.applying import Findings, RunOptions, apply
+from bench.discrepancy.application.reading import findings_of, gaps_left
 from bench.discrepancy.application.writing import model_text, ranges, snippet, write_model
 from bench.discrepancy.case.case import NominalParameter
 from bench.discrepancy.effects.channel_operators import analogue_lag
@@ -26,7 +27,7 @@ from bench.discrepancy.effects.channel_operators import lag as digital_lag
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.replay.linear_replay import LinearReplay
 from bench.discrepancy.replay.verification import verify
-from bench.discrepancy.verdict import Estimate, Gap, NamedEffect, NominalEstimate
+from bench.discrepancy.verdict import Estimate, Gap, NamedEffect, NominalEstimate, Verdict
 
 STAGE = """
 <mujoco model="stage">
@@ -345,6 +346,25 @@ def test_a_lag_is_mujocos_filter_whichever_it_is(tmp_path, equation, signal):
     )
     # the delay of what is slow is right; what is left goes as the square of the frequency
     assert np.std(filtered.simulated - true.simulated) < 4e-3 * np.std(true.simulated)
+
+
+def test_what_comes_nearest_goes_with_its_own_numbers():
+    numbers = {
+        name: NominalEstimate("stiffness:guide", value, 1.0, 800.0, 8.0, 0.0)
+        for name, value in (("free", 790.0), ("near", 810.0))
+    }
+    gap = Gap("m", 1.0, 0.9, 0.2, 0.01, 0.8, (0.7, 0.9), dof="guide")
+    unknown = Verdict(
+        verdict="unknown", named=(), ranking=(), indistinguishable=(), locations=(), gap=gap, gaps=(gap,),
+        probabilities={}, explanation="", nominal=(numbers["free"],), nearest=(effect("coulomb_friction", "guide", limit=3.0),),
+        nearest_nominal=(numbers["near"],), nearest_left=(0.4,),
+    )  # fmt: skip
+    assert findings_of(unknown, nearest=True).nominal[0].value == 810.0
+    assert gaps_left(unknown)[0].after == 0.4
+    # of robots, and of older verdicts, `nominal` and the gaps are of what comes nearest
+    same = replace(unknown, nearest_nominal=(), nearest_left=())
+    assert findings_of(same, nearest=True).nominal[0].value == 790.0
+    assert gaps_left(same) == (gap,)
 
 
 def carried(model, data):
