@@ -178,9 +178,8 @@ def test_a_planner_takes_the_question_that_the_records_leave_open(tmp_path, caps
     assert asked["elements"][0]["law"] == "gap"
     assert asked["experiment"]["rival"]["elements"][0]["law"] == "cubic_stiffness"
     assert asked["structure"]["mass"]["carriage"] == pytest.approx(2.0, rel=0.05)
-    asked["experiment"]["duration"] = (
-        2.0  # the records last 6 s, and the planner decides some twenty times in them
-    )
+    # the records last 6 s, in which the planner decides some twenty times
+    asked["experiment"]["duration"] = 2.0
     verdict = tmp_path / "verdict.json"
     verdict.write_text(json.dumps({"verdict": "effect", "next_excitation": {"closed_loop": asked}}))
     out = tmp_path / "next.csv"

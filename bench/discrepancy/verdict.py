@@ -34,6 +34,7 @@ class NamedEffect:
         parameters: Estimates by name.
         channel: Channel or nominal parameter it acts on, for actuator, sensor and inertia effects.
         equation: The effect in one line.
+        variant: What tells it from the effect of the same name in the catalogue: "analogue" of a lag, "soft" of friction; mostly empty.
         law: Name of the force law in `bench.laws`, for effects that are one.
         theta: Parameters of that law, ready for an element.
         closed: Part of the judging records' discrepancy that comes back without it, everything else fitted again.
@@ -46,6 +47,7 @@ class NamedEffect:
     parameters: dict[str, Estimate]
     channel: str = ""
     equation: str = ""
+    variant: str = ""
     law: str = ""
     theta: tuple[float, ...] = ()
     closed: float = 0.0

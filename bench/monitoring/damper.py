@@ -41,11 +41,12 @@ class DamperMonitorSettings:
 
     varied: float = 0.02
     """Standard deviation of log speed or log frequency over the learning below which it counts as constant: what two hundredths do to
-    a damper of any exponent is a tenth of the change sought."""
+    the force of a damper is a sixth of the change sought at most."""
     exponents: tuple[float, ...] = (0.0, 0.25, 0.5, 0.75, 1.0)
     """Powers of the speed that a damper's force is a sum of: dry friction, fluid dampers, which lie between, a linear damper."""
     beyond: float = 0.1
-    """How far beyond the learnt range, in the logarithm, a period's speed and frequency may lie: half of the change sought, for n = 1."""
+    """How far beyond the learnt range, in the logarithm, a period's speed and frequency may lie: an exponent that is wrong by a half makes
+    less than half of the change sought there."""
     curvature: tuple[float, float] = (0.25, 1.0)
     """Largest second derivative of the log energy by log speed and by log frequency: of a sum of two forces whose exponents differ by one,
     as dry friction and a linear damper, with s and 1 - s of the energy, s (1 - s); of a spring in series with a damper, whose loss goes as
@@ -145,9 +146,7 @@ class DamperMonitor:
         self._scales = (v_peak, f_peak)
         thetas = np.array([self._estimate(period) for period in periods])
         exponent = float(np.median(thetas[:, 1]))
-        model = np.array(
-            [np.trapezoid(np.abs(period.velocity) ** (exponent + 1.0), period.time) for period in periods]
-        )
+        model = np.array([period.energy_of_power(exponent) for period in periods])
         coefficient = math.exp(float(np.mean(np.log(energies / model))))
         of_terms = np.array([self._energies(period) for period in periods])
         weights, _ = optimize.nnls(of_terms / energies[:, None], np.ones(len(energies)))
@@ -170,8 +169,7 @@ class DamperMonitor:
     @staticmethod
     def _energies(period: Period) -> NDArray[np.float64]:
         """What powers of the speed of weight one would take over a period ``(n_exponents,)``."""
-        speed = np.abs(period.velocity)
-        return np.array([np.trapezoid(speed ** (n + 1.0), period.time) for n in SETTINGS.exponents])
+        return np.array([period.energy_of_power(n) for n in SETTINGS.exponents])
 
     def _log_energy(self, period: Period, weights: NDArray[np.float64]) -> float:
         """Logarithm of the energy over that of the damper as learnt along the same motion."""

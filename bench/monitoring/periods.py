@@ -51,6 +51,10 @@ class Period(NamedTuple):
         # by velocity rather than by differences of the displacement: noise of the latter times that of the force adds up
         return float(np.trapezoid(self.force * self.velocity, self.time))
 
+    def energy_of_power(self, exponent: float) -> float:
+        """What a force ``sgn(v)|v|^exponent`` takes over the period, ``∮ |v|^(exponent + 1) dt`` [(m/s)^exponent m]."""
+        return float(np.trapezoid(np.abs(self.velocity) ** (exponent + 1.0), self.time))
+
     @property
     def peak_velocity(self) -> float:
         """Speed of a harmonic motion of the same mean square, √2 times the rms [m/s]."""

@@ -11,6 +11,7 @@ import numpy as np
 
 from bench.discrepancy.application.forces import values_of
 from bench.discrepancy.application.target import Change, Target
+from bench.discrepancy.effects.sensor_actuator import ANALOGUE_LAG
 from bench.discrepancy.verdict import NamedEffect
 from bench.rig.actuators import DcMotor, commanded, is_dc_motor, write_drive
 
@@ -47,7 +48,8 @@ def lag(target: Target, effect: NamedEffect) -> Change:
     """
     actuator = _actuator(target, effect)
     constant = next(iter(values_of(effect).values()))
-    linear, digital = "time_constant" in effect.parameters, "once a sample" in effect.equation
+    linear = "time_constant" in effect.parameters
+    digital = linear and effect.variant != ANALOGUE_LAG.variant
     ahead = 0.5 * (target.sampling - target.step if digital else target.step) if linear else 0.0
     if actuator.dyntype not in (
         mujoco.mjtDyn.mjDYN_NONE, mujoco.mjtDyn.mjDYN_FILTER, mujoco.mjtDyn.mjDYN_FILTEREXACT
@@ -64,7 +66,7 @@ def lag(target: Target, effect: NamedEffect) -> Change:
     text = f"a first-order filter of {actuator.dynprm[0]:.6g} s"
     if other:
         text += " (of the servo's target; the diagnosis lags its force)"
-    elif "once a sample" in effect.equation:
+    elif digital:
         text += f" (an analogue one; that of the diagnosis, of {constant:.6g} s, moves on once a sample, half a sample earlier)"
     return _done(effect, actuator, text)
 

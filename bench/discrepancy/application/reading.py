@@ -72,6 +72,7 @@ def _effect(e: Any) -> NamedEffect:
         },
         channel=e.channel,
         equation=e.equation,
+        variant=e.variant,
         law=e.law,
         theta=tuple(float(x) for x in e.theta),
     )

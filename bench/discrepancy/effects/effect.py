@@ -181,8 +181,7 @@ class Effect:
         affine: The force is affine in parameter 1.
         signal: For actuator and sensor effects, the operation on a channel.
         between_samples: That operation moves samples in time, and needs what the channel does between them.
-        held: The same on samples that are held until the next, the means over these; `signal` where None.
-        held_equation: Its equation, where that is another one; empty elsewhere.
+        held_as: What it is on samples that are held until the next, whose operation gives the means over these; itself where None.
         logged: For actuator effects, what was logged is wrong rather than what follows a command: a measured load has it, too.
         tells: Parameter values and scales to whether they are more than the clocks of any log are uncertain by; of other effects None.
         exact: A free run with it is as exact as one of the nominal model: a number is wrong, and nothing is smoothed, switched or
@@ -212,8 +211,7 @@ class Effect:
     modulated: bool = False
     affine: bool = False
     signal: Callable[[Values, Values, float], Values] | None = None
-    held: Callable[[Values, Values, float], Values] | None = None
-    held_equation: str = ""
+    held_as: Effect | None = None
     between_samples: bool = False
     logged: bool = False
     tells: Callable[[Values, Scales], bool] | None = None
@@ -229,14 +227,9 @@ class Effect:
     of_record: Callable[[Values, str], Values] | None = None
     schedule: Callable[[Values, CaseRecord], Values] | None = None
 
-    def operation(self, interpolation: str) -> Callable[[Values, Values, float], Values] | None:
-        """What an actuator effect makes of loads that run so between samples, see `Case.load_interpolation`; None of other effects."""
-        held = self.held if interpolation == "zero_order_hold" else None
-        return held or self.signal
-
-    def equation_for(self, interpolation: str) -> str:
-        """One line for reports, with loads that run so between samples."""
-        return (interpolation == "zero_order_hold" and self.held_equation) or self.equation
+    def on(self, interpolation: str) -> Effect:
+        """What it is on loads that run so between samples, see `Case.load_interpolation`."""
+        return (self.held_as if interpolation == "zero_order_hold" else None) or self
 
     @property
     def sticks(self) -> bool:

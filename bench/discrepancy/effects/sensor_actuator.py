@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from bench.discrepancy.effects import channel_operators as signals
 from bench.discrepancy.effects.effect import (
@@ -119,6 +119,17 @@ def _sensor_clipping(channel: str, quantity: str, symbol: str, log_prior: float 
     )
 
 
+ANALOGUE_LAG = Effect(
+    "actuator_lag",
+    "actuator",
+    "actuator",
+    (_time("time_constant", 0.003, 0.01, 0.03),),
+    "tau F' + F = command",
+    signal=signals.analogue_lag,
+    tells=_beyond_jitter,
+    variant="analogue",
+)
+"""The lag of an amplifier, or of MuJoCo's activation: that of a digital drive moves on once a sample, half a sample earlier."""
 CHANNELS: tuple[Effect, ...] = (
     Effect(
         "mass_error",
@@ -194,16 +205,12 @@ CHANNELS: tuple[Effect, ...] = (
         tells=lambda values, scales: abs(values[0]) * scales.duration >= SETTINGS.jitter * scales.step,
         log_prior=EFFECT_SETTINGS.rare,
     ),
-    Effect(
-        "actuator_lag",
-        "actuator",
-        "actuator",
-        (_time("time_constant", 0.003, 0.01, 0.03),),
-        "tau F' + F = command, moved on once a sample",
+    replace(
+        ANALOGUE_LAG,
+        equation="tau F' + F = command, moved on once a sample",
         signal=signals.lag,
-        held=signals.held_lag,
-        tells=_beyond_jitter,
-        held_equation="tau F' + F = command",
+        variant="",
+        held_as=replace(ANALOGUE_LAG, signal=signals.held_lag),
     ),
     Effect(
         "force_gain_error",

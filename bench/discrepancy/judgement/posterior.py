@@ -227,7 +227,7 @@ def named_effect(
 
     For `least`, see `effects_of`.
     """
-    effect, place = placed.effect, placed.place
+    effect, place = placed.effect.on(problem.case.load_interpolation), placed.place
     scales = problem.scales_of(placed)
     estimates = {}
     for parameter, value, deviation in zip(effect.parameters, eta, std, strict=True):
@@ -245,7 +245,8 @@ def named_effect(
         probability=probabilities.get((effect.name, place.name), 1.0),
         parameters=estimates,
         channel=placed.target,
-        equation=effect.equation_for(problem.case.load_interpolation),
+        equation=effect.equation,
+        variant=effect.variant,
         law=effect.law.name if effect.law else "",
         theta=theta,
     )

@@ -18,8 +18,8 @@ from bench.discrepancy.search.explanation import Explanation
 from bench.discrepancy.verdict import NamedEffect
 from bench.laws import find_law
 
-RIG, JOINT, SHAKER = "sdof", "carriage", "shaker"
-"""The bench's oscillator, and what it calls its joint and its actuator."""
+RIG, SHAKER = "sdof", "shaker"
+"""The bench's oscillator, and what it calls its actuator."""
 MEASURED = (("displacement", "m"), ("velocity", "m/s"), ("acceleration_x", "m/s^2"))
 """Its channels and their units, by the order of the derivative."""
 STRUCTURE = ("mass", "stiffness", "damping")
@@ -40,7 +40,11 @@ def closed_loop(problem: Problem, first: Explanation, second: Explanation) -> di
     ):
         return {}
     ours, rival = (effects_of(explanation, {}) for explanation in (first, second))
-    record, limits = max(problem.records, key=len), limits_of(problem)
+    joint, record, limits = (
+        problem.structure.places[0].site,
+        max(problem.records, key=len),
+        limits_of(problem),
+    )
     (low, high), duration = band_about(resonance(problem, 0)), len(record) * record.step
     channels = {MEASURED[order][0]: name for order, name in motion_channels(problem.case).items()}
     noise = dict(zip(problem.structure.channels, problem.noise.tolist(), strict=True))
@@ -54,8 +58,8 @@ def closed_loop(problem: Problem, first: Explanation, second: Explanation) -> di
     return {
         "rig": RIG,
         "timestep": record.step,
-        "structure": {name: {JOINT: structure.get(name, 0.0)} for name in STRUCTURE},
-        "elements": [_element(effect) for effect in ours],
+        "structure": {name: {joint: structure.get(name, 0.0)} for name in STRUCTURE},
+        "elements": [_element(effect, joint) for effect in ours],
         "experiment": {
             "duration": duration,
             "band": [max(low, 1.0 / duration), min(high, 0.4 / record.step)],
@@ -63,7 +67,7 @@ def closed_loop(problem: Problem, first: Explanation, second: Explanation) -> di
             **bounds,
             "noise": {name: noise[channel] for name, channel in channels.items()},
             "uncertain": _ranges(ours),
-            "rival": {"elements": [_element(effect) for effect in rival], "uncertain": _ranges(rival)},
+            "rival": {"elements": [_element(effect, joint) for effect in rival], "uncertain": _ranges(rival)},
         },
     }
 
@@ -95,8 +99,8 @@ def _goes_into_a_rig(placed: Placed) -> bool:
     )
 
 
-def _element(effect: NamedEffect) -> dict[str, Any]:
-    return {"law": effect.law, "joints": [JOINT], "name": effect.name, "theta": list(effect.theta)}
+def _element(effect: NamedEffect, joint: str) -> dict[str, Any]:
+    return {"law": effect.law, "joints": [joint], "name": effect.name, "theta": list(effect.theta)}
 
 
 def _ranges(effects: tuple[NamedEffect, ...]) -> dict[str, list[float]]:

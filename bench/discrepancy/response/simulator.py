@@ -251,7 +251,7 @@ class Simulator(MeasuredCase):
             )
             for placed, eta in zip(hypothesis, etas, strict=True)
             if placed.effect.site == "actuator"
-            and (operation := placed.effect.operation(self.case.load_interpolation)) is not None
+            and (operation := placed.effect.on(self.case.load_interpolation).signal) is not None
         ]
         lead = self.lead_in(record)
         # a proposed test may bear the name of a record, but be no period of anything

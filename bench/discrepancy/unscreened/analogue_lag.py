@@ -6,24 +6,11 @@ motion the two are one, so that the screening knows the first alone.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
-from bench.discrepancy.effects import channel_operators as signals
-from bench.discrepancy.effects.catalogue import effect_named
+from bench.discrepancy.effects.sensor_actuator import ANALOGUE_LAG
 from bench.discrepancy.fitting.fits import Search, converge
 from bench.discrepancy.model.placement import Placed
-
-DIGITAL = "actuator_lag"
-"""The effect that the other is a variant of."""
-ANALOGUE = replace(
-    effect_named(DIGITAL),
-    equation="tau F' + F = command",
-    signal=signals.analogue_lag,
-    held=None,
-    variant="analogue",
-)
 
 
 def with_analogue_lag(search: Search, size: int) -> None:
@@ -43,13 +30,14 @@ def with_analogue_lag(search: Search, size: int) -> None:
             f
             for f in ranked
             if np.isfinite(f.cost)
-            and any(p.effect.name == DIGITAL and not p.effect.variant for p in f.hypothesis)
+            and any(p.effect.name == ANALOGUE_LAG.name and not p.effect.variant for p in f.hypothesis)
         ),
         None,
     )
     if fitted is None or first.chi2 - first.n_residuals < np.sqrt(2.0 * first.n_residuals):
         return
     hypothesis = tuple(
-        Placed(ANALOGUE, p.place, p.target) if p.effect.name == DIGITAL else p for p in fitted.hypothesis
+        Placed(ANALOGUE_LAG, p.place, p.target) if p.effect.name == ANALOGUE_LAG.name else p
+        for p in fitted.hypothesis
     )
     converge(search, [(hypothesis, fitted.vector[None])])
