@@ -18,7 +18,7 @@ from threadpoolctl import threadpool_limits
 
 from bench.discrepancy import read_case
 from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis, diagnose_articulated
-from bench.discrepancy.articulated.judgement import ladder
+from bench.discrepancy.articulated_judgement.judgement import ladder
 from bench.errors import BenchError
 from bench.files import write_text
 

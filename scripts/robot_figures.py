@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from capability_figures import Figures
 
-from bench.discrepancy.articulated_search.catalogue import effect
-from bench.discrepancy.articulated_search.effect import ArticulatedEffect
+from bench.discrepancy.articulated_effects.catalogue import effect
+from bench.discrepancy.articulated_effects.effect import ArticulatedEffect
 from bench.discrepancy.articulated_search.placements import AND
 
 PUBLISHED_TX40 = {"joint_1": 7.14, "joint_2": 8.26, "joint_3": 6.34, "joint_4": 2.48}

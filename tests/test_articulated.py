@@ -13,13 +13,17 @@ from browser import CHROMIUM, shown_whole
 from bench.discrepancy import diagnose, read_case
 from bench.discrepancy.articulated.admission import admitted_robot
 from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis
-from bench.discrepancy.articulated.free_runs import FreeRuns
-from bench.discrepancy.articulated.judgement import JudgementSettings, PredictedErrors, closed_of_nominal
 from bench.discrepancy.articulated.naming import ranking_of
 from bench.discrepancy.articulated.next_test import propose
 from bench.discrepancy.articulated.recognition import applies
-from bench.discrepancy.articulated.whiteness import coloured
-from bench.discrepancy.articulated_search.catalogue import CATALOGUE
+from bench.discrepancy.articulated_effects.catalogue import CATALOGUE
+from bench.discrepancy.articulated_judgement.free_runs import FreeRuns
+from bench.discrepancy.articulated_judgement.judgement import (
+    JudgementSettings,
+    PredictedErrors,
+    closed_of_nominal,
+)
+from bench.discrepancy.articulated_judgement.whiteness import coloured
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit, fit, refitted
 from bench.discrepancy.articulated_search.placements import placements
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem

@@ -8,8 +8,8 @@ from scipy.integrate import quad
 from test_articulated import LIMIT, NOISE, mjcf, problem_of, write_case
 
 from bench.discrepancy import diagnose, read_case
-from bench.discrepancy.articulated.judgement import kept
-from bench.discrepancy.articulated_search.catalogue import CATALOGUE
+from bench.discrepancy.articulated_effects.catalogue import CATALOGUE
+from bench.discrepancy.articulated_judgement.judgement import kept
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit, refitted
 from bench.discrepancy.articulated_search.misfit import Octaves, transformed
 from bench.discrepancy.articulated_search.placements import placements

@@ -9,7 +9,7 @@ from test_articulated import mjcf, problem_of, write_case
 
 from bench.discrepancy import diagnose, read_case
 from bench.discrepancy.application.applying import Findings, apply
-from bench.discrepancy.articulated_search.catalogue import CATALOGUE, effect
+from bench.discrepancy.articulated_effects.catalogue import CATALOGUE, effect
 from bench.discrepancy.articulated_search.placements import apart, placements
 from bench.discrepancy.multibody.joint_forces import SLOTS, Slot
 from bench.discrepancy.multibody.joint_run import predict

@@ -100,7 +100,7 @@ PLACED = [
     ("plan", "excitations/0/signals/shaker/rms", "[1]", "excitations[0].signals.shaker.rms: [1] came; a number is expected"),
     ("plan", "duration", "1e9", "at most 10000000 samples a record"),
     ("plan", "records", "1e18", "at most 100000000 records can be asked for"),
-    ("nominal", "parameters/mass/std", "", "parameters.mass: a nominal parameter needs value, std; std missing (its one-sigma"),
+    ("nominal", "parameters/mass/std", "", "parameters.mass: a nominal parameter needs std (its one-sigma"),
     ("nominal", "parameters/mass/sigma", "1", "Did you mean 'std'"),
     ("nominal", "parameters/mass/value", "1" + "0" * 400, "parameters.mass.value: an integer of 401 digits came"),
     ("nominal", "parameters/mas", '{"value": 1, "std": 0}', "parameters: unknown parameter of rig 'sdof' 'mas'"),

@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from test_articulated import problem_of
 
 from bench.discrepancy import diagnose, read_case
-from bench.discrepancy.articulated_search.catalogue import CATALOGUE
+from bench.discrepancy.articulated_effects.catalogue import CATALOGUE
 from bench.discrepancy.articulated_search.containing import begun_again
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit, refitted
 from bench.discrepancy.articulated_search.placements import placements

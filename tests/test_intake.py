@@ -118,6 +118,35 @@ def test_init_writes_a_case_that_reads(logs, tmp_path, capsys):
     assert "--force" in capsys.readouterr().err
 
 
+def test_drives_of_equal_numbers_are_of_one_type_and_their_gains_known_to_a_factor(tmp_path, capsys):
+    servo = ARM.replace(
+        '<motor name="elbow_motor" joint="elbow_joint"/>',
+        '<position name="elbow_servo" joint="elbow_joint" kp="50" kv="1"/>',
+    )
+    (tmp_path / "arm.xml").write_text(servo)
+    t = np.arange(900) * 0.01
+    columns = np.column_stack([t, *[0.03 * np.sin(t + phase) for phase in (0.0, 0.1, 0.2, 0.3)]])
+    head = "time,shoulder_pos,shoulder_cmd,elbow_pos,elbow_cmd"
+    np.savetxt(tmp_path / "run.csv", columns, delimiter=",", header=head, comments="")
+    words = ["init", str(tmp_path / "run.csv"), str(tmp_path / "arm.xml"), "-o", str(tmp_path / "case")]
+    assert main(words) == 0
+    told = capsys.readouterr().out
+    assert (
+        "kp:elbow_servo = 50 N m/rad to within a factor of 10, of one type (drives like shoulder_servo)"
+        in told
+    )
+    case = read_case(tmp_path / "case")
+    found = {p.name: p for p in case.parameters}
+    assert {p.alike for p in found.values() if p.name.partition(":")[0] in ("kp", "kv")} == {
+        "drives like shoulder_servo"
+    }
+    assert (found["kp:elbow_servo"].factor, found["kp:elbow_servo"].each) == (10.0, 1.1)
+    assert not found["damping:shoulder_joint"].alike  # the other joint has none
+    assert main([*words, "--force", "--assume", "kp=0.05", "twins=0.02"]) == 0
+    known = {p.name: p for p in read_case(tmp_path / "case").parameters}["kp:elbow_servo"]
+    assert (known.std, known.each, known.factor) == pytest.approx((2.5, 1.0, 1.0))
+
+
 @pytest.mark.slow
 def test_logs_give_the_verdict_of_the_case_folder(logs, tmp_path, capsys):
     words = [str(logs / "run_1.csv"), str(logs / "run_2.csv"), str(logs / "stage.xml")]
@@ -168,12 +197,19 @@ def test_in_python_from_arrays_and_a_spec_and_the_simulator_is_named_before_phys
         (["init", "RUN", "MODEL", "-o", "OUT", "--map", "guide_position"], "NAME=VALUE"),
         (["init", "RUN", "MODEL", "-o", "OUT", "--map", "guide_position=-"], "no column bears the name"),
         (["init", "RUN", "MODEL", "-o", "OUT", "--unit", "guide_position=N"], "cannot be converted"),
+        (["init", "RUN", "MODEL", "-o", "OUT", "--assume", "mas=0.1"], "Did you mean 'mass'"),
+        (["init", "RUN", "MODEL", "-o", "OUT", "--assume", "mass=1"], "a share below 1 is expected"),
+        (["init", "RUN", "MODEL", "-o", "OUT", "--assume", "mass=much"], "a share below 1 is expected"),
+        (
+            ["diagnose", "FOLDER", "--assume", "mass=0.1", "--rate", "50"],
+            "--rate, --assume came with a case folder",
+        ),
         (["diagnose", "RUN", "RUN"], "the MJCF they are held against"),
         (["diagnose"], "give one case folder"),
     ],
 )
 def test_mistakes_are_answered_in_one_sentence(logs, tmp_path, capsys, words, message):
-    names = {"RUN": logs / "run_1.csv", "MODEL": logs / "stage.xml", "OUT": tmp_path / "out"}
+    names = {"RUN": logs / "run_1.csv", "MODEL": logs / "stage.xml", "OUT": tmp_path / "out", "FOLDER": logs}
     assert main([str(names.get(word, word)) for word in words]) == 2
     error = capsys.readouterr().err
     assert message in error

@@ -14,10 +14,10 @@ from bench.discrepancy.application.applying import Findings
 from bench.discrepancy.articulated import explaining
 from bench.discrepancy.articulated.admission import admitted_robot
 from bench.discrepancy.articulated.explaining import Question, explained
-from bench.discrepancy.articulated.judgement import alike, keys_of, noise_floor, predict, simplest
 from bench.discrepancy.articulated.naming import ranking_of
-from bench.discrepancy.articulated.whiteness import astray
-from bench.discrepancy.articulated_search.catalogue import CATALOGUE
+from bench.discrepancy.articulated_effects.catalogue import CATALOGUE
+from bench.discrepancy.articulated_judgement.judgement import alike, keys_of, noise_floor, predict, simplest
+from bench.discrepancy.articulated_judgement.whiteness import astray
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit, refitted
 from bench.discrepancy.articulated_search.placements import placements
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem

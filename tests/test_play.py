@@ -11,9 +11,9 @@ import pytest
 
 from bench.discrepancy import diagnose, read_case
 from bench.discrepancy.articulated.admission import admitted_robot
-from bench.discrepancy.articulated_search.catalogue import CATALOGUE
+from bench.discrepancy.articulated_effects.catalogue import CATALOGUE
+from bench.discrepancy.articulated_effects.hypothesis import JointHypothesis
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
-from bench.discrepancy.articulated_search.hypothesis import JointHypothesis
 from bench.discrepancy.articulated_search.misfit import log_likelihood
 from bench.discrepancy.articulated_search.placements import placements
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem

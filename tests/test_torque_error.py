@@ -14,11 +14,11 @@ from test_articulated import KP, RATE, mjcf, problem_of, write_case
 from bench.discrepancy import read_case
 from bench.discrepancy.application.applying import Findings
 from bench.discrepancy.articulated.diagnosis import diagnose_articulated
-from bench.discrepancy.articulated.free_runs import FreeRuns
-from bench.discrepancy.articulated.judgement import predict
 from bench.discrepancy.articulated.next_test import beyond
-from bench.discrepancy.articulated.torque_error import TorqueProblem, along_motion
-from bench.discrepancy.articulated_search.catalogue import CATALOGUE
+from bench.discrepancy.articulated_effects.catalogue import CATALOGUE
+from bench.discrepancy.articulated_judgement.free_runs import FreeRuns
+from bench.discrepancy.articulated_judgement.judgement import predict
+from bench.discrepancy.articulated_judgement.torque_error import TorqueProblem, along_motion
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.placements import placements
 from bench.discrepancy.articulated_search.rounds import sound

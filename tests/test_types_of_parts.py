@@ -12,12 +12,13 @@ from test_articulated import KP, LIMIT, mjcf, problem_of, write_case
 from test_articulated_rounds import rubbing
 
 from bench.discrepancy import read_case
-from bench.discrepancy.articulated.judgement import alike as alike_in
-from bench.discrepancy.articulated.judgement import keys_of, ladder, noise_floor, predict, simplest
 from bench.discrepancy.articulated.naming import model_numbers
-from bench.discrepancy.articulated_search.catalogue import CATALOGUE
+from bench.discrepancy.articulated_effects.catalogue import CATALOGUE
+from bench.discrepancy.articulated_judgement.judgement import alike as alike_in
+from bench.discrepancy.articulated_judgement.judgement import keys_of, ladder, noise_floor, predict, simplest
+from bench.discrepancy.articulated_search.joint_rounds import round_of
 from bench.discrepancy.articulated_search.placements import placements
-from bench.discrepancy.articulated_search.search import nominal_fit, round_of, steps
+from bench.discrepancy.articulated_search.search import nominal_fit, steps
 from bench.discrepancy.checks.admission import admitted
 from bench.discrepancy.multibody.nominal_parameters import nominal_parameters, twins
 from bench.errors import DocumentError
@@ -98,6 +99,57 @@ def test_what_one_twin_shows_is_known_of_the_other(tmp_path):
         assert twin.shift_in_std == pytest.approx((factor - 1.0) / COMMON, rel=0.1)
 
 
+def within_factor(factor, **of_a_type):
+    """Both gains as known to within a factor."""
+    return {
+        f"kp:{j}_drive": {"value": kp, "factor": factor, "unit": "N m/rad"} | of_a_type
+        for j, kp in KP.items()
+    }
+
+
+def stated(folder, entries):
+    """A case with other entries of parameters."""
+    path = folder / "nominal.json"
+    document = json.loads(path.read_text())
+    document["parameters"] |= entries
+    path.write_text(json.dumps(document))
+    return folder
+
+
+def test_of_what_is_known_to_a_factor_the_logarithm_is_normal(tmp_path):
+    """Its standard deviation is that of the factor, and twins differ by theirs."""
+    entries = within_factor(10.0, alike="S1", each=1.1)
+    problem = problem_of(stated(write_case(tmp_path, mjcf(servo=True), servo=True, length=1.0), entries))
+    parameters = problem.nominal
+    index = {p.name: i for i, p in enumerate(parameters)}
+    common, elbow, shoulder = index["kp:S1"], index["kp:elbow_drive"], index["kp:shoulder_drive"]
+    draws = np.random.default_rng(0).standard_normal((20_000, len(parameters)))
+    logs = np.array([
+        [np.log1p(parameters[i].deviation(x, i) / parameters[i].value) for i in (shoulder, elbow)] for x in draws
+    ])  # fmt: skip
+    assert logs.std(axis=0) == pytest.approx(np.log(10.0), rel=0.02)
+    assert np.std(logs[:, 0] - logs[:, 1]) == pytest.approx(np.sqrt(2.0) * np.log(1.1), rel=0.02)
+    vector, step = draws[0], 1e-6
+    slopes = parameters[elbow].slopes(vector, elbow)
+    assert set(slopes) == {elbow, common}
+    for i, slope in slopes.items():
+        moved = vector.copy()
+        moved[i] += step
+        change = parameters[elbow].deviation(moved, elbow) - parameters[elbow].deviation(vector, elbow)
+        assert change / step == pytest.approx(slope, rel=1e-4)
+
+
+@pytest.mark.parametrize("factor", [0.1, 10.0])
+def test_a_gain_of_which_the_order_of_magnitude_is_known_is_found(tmp_path, factor):
+    problem = problem_of(stated(write_case(tmp_path, with_gain(factor), servo=True), within_factor(10.0)))
+    found = {entry.name: entry for entry in model_numbers(problem, nominal_fit(problem))}
+    for j, kp in KP.items():
+        mine = found[f"kp:{j}_drive"]
+        # the stiffer servo turns at 16 Hz, of which steps of 1 ms make some 1e-2
+        assert mine.value == pytest.approx(factor * kp, rel=0.02)
+        assert mine.shift_in_std == pytest.approx(np.log(factor) / np.log(10.0), abs=0.01)
+
+
 def test_one_kind_of_effect_is_taken_at_all_parts_of_a_type(tmp_path):
     problem = problem_of(of_type(write_case(tmp_path, rubbing(LIMIT), servo=True), alike()))
     names = {"coulomb_friction", "stribeck_friction", "load_dependent_friction", "servo_gain_error"}
@@ -144,6 +196,34 @@ REFUSED = {
 }  # fmt: skip
 
 
+FACTORS_REFUSED = {
+    "a factor and a deviation": ({"std": 1.0}, "one of them says how well it is known"),
+    "a factor of nothing": ({"factor": 1.0}, "a number above 1 is expected"),
+    "a scatter that is none": ({"alike": "S1", "each": 0.9}, "beside a factor it is one, too"),
+    "a scatter as wide as the type": (
+        {"alike": "S1", "each": 10.0},
+        "factor counts the scatter of the parts in",
+    ),
+    "nothing": ({"value": 0.0}, "what is known to within a factor is positive"),
+}
+
+
+@pytest.mark.parametrize("name", FACTORS_REFUSED)
+def test_factors_that_say_nothing_are_refused(tmp_path, name):
+    changes, says = FACTORS_REFUSED[name]
+    folder = write_case(tmp_path, mjcf(servo=True), servo=True, length=1.0)
+    entries = {parameter: entry | changes for parameter, entry in within_factor(10.0).items()}
+    with pytest.raises(DocumentError, match=says):
+        read_case(stated(folder, entries))
+
+
+def test_parts_of_a_type_are_known_in_one_way(tmp_path):
+    entries = within_factor(10.0, alike="S1", each=1.1)
+    entries["kp:elbow_drive"] = {"value": 40.0, "std": 8.0, "alike": "S1", "each": 1.1}
+    with pytest.raises(DocumentError, match="have a factor and some a std"):
+        read_case(stated(write_case(tmp_path, mjcf(servo=True), servo=True, length=1.0), entries))
+
+
 @pytest.mark.parametrize("name", REFUSED)
 def test_types_of_which_nothing_follows_are_refused(tmp_path, name):
     entries, says = REFUSED[name]
@@ -154,6 +234,13 @@ def test_types_of_which_nothing_follows_are_refused(tmp_path, name):
 
 def test_a_linear_structure_says_that_it_takes_parts_one_by_one(tmp_path):
     case = stage_case(tmp_path, n=400)
+    roughly = tuple(replace(p, factor=3.0) for p in case.parameters[:1])
+    (said,) = [
+        n
+        for n in admitted(replace(case, parameters=(*roughly, *case.parameters[1:]))).notes
+        if "factor of 3" in n
+    ]
+    assert "it is taken as known to" in said
     of_a_type = tuple(replace(p, alike="S1", each=0.5 * p.std) for p in case.parameters)
     (said,) = [note for note in admitted(replace(case, parameters=of_a_type)).notes if "'S1'" in note]
     assert "is not used" in said

@@ -43,6 +43,9 @@ class Diagnose:
     """Of logs: those that judge; the last one by default, of a single log its last third."""
     rate: float = 0.0
     """Of logs: sample rate [Hz] where they have no time."""
+    assume: tuple[str, ...] = ()
+    """Of logs: how well numbers of the model are known, KIND=SHARE or KIND=FACTOR (mass, stiffness, damping, frictionloss, armature,
+    kp, kv, forcerange; twins, by how much drives of one type differ): kp=0.1 to ten percent, kp=10, the default, to a factor of ten."""
     scheduler: str = ""
     """Of a fleet: address of a dask scheduler (extra scale) that its cases run on."""
     json: Path | None = None
@@ -79,6 +82,10 @@ class Diagnose:
         model = [path for path in logs if path.suffix == ".xml"]
         if model and len(logs) == len(self.cases):
             self._of_logs([path for path in logs if path not in model], model)
+        elif self.cases and not logs and (stated := self._of_logs_alone()):
+            raise ParameterError(
+                f"{', '.join(stated)} came with a case folder, whose nominal.json says that; leave it out, or give logs and an MJCF"
+            )
         elif len(self.cases) == 1:
             from bench.discrepancy import read_case
             from bench.discrepancy.report.answers import model_options
@@ -99,8 +106,16 @@ class Diagnose:
                 "jointbench diagnose run.csv model.xml"
             )
 
+    def _of_logs_alone(self) -> list[str]:
+        """Options that came and say something of logs."""
+        came = {
+            "--map": self.map, "--unit": self.unit, "--judge": self.judge, "--rate": self.rate, "--assume": self.assume
+        }  # fmt: skip
+        return [option for option, value in came.items() if value]
+
     def _of_logs(self, logs: list[Path], models: list[Path]) -> None:
         from bench.discrepancy.intake.asking import case_from
+        from bench.discrepancy.intake.assumptions import Assumptions
         from bench.errors import ParameterError
 
         if len(models) != 1:
@@ -116,6 +131,7 @@ class Diagnose:
                 columns=pairs("--map", self.map),
                 units=pairs("--unit", self.unit),
                 rate=self.rate,
+                assumptions=Assumptions().changed(pairs("--assume", self.assume)),
             ) as (case, made),
         ):
             told = Console(stderr=True, soft_wrap=True)

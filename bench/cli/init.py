@@ -31,6 +31,9 @@ class Init:
     """Logs that judge."""
     rate: float = 0.0
     """Sample rate [Hz] of logs without a time."""
+    assume: tuple[str, ...] = ()
+    """How well numbers of the model are known, KIND=SHARE or KIND=FACTOR (mass, stiffness, damping, frictionloss, armature, kp, kv,
+    forcerange; twins, by how much drives of one type differ): kp=0.1 to ten percent, kp=10, the default, to a factor of ten."""
     json: bool = False
     """Print JSON."""
     force: bool = False
@@ -39,6 +42,7 @@ class Init:
     def __call__(self) -> None:
         """Run the command."""
         from bench.discrepancy.intake.asking import drafted
+        from bench.discrepancy.intake.assumptions import Assumptions
         from bench.errors import ParameterError
         from bench.targets import check_target_folder
 
@@ -58,6 +62,7 @@ class Init:
             columns=pairs("--map", self.map),
             units=pairs("--unit", self.unit),
             rate=self.rate,
+            assumptions=Assumptions().changed(pairs("--assume", self.assume)),
         )
         if self.json:
             emit({"folder": str(self.output), "files": [path.name for path in written], "assumed": list(made.assumed)})  # fmt: skip

@@ -20,7 +20,7 @@ from threadpoolctl import threadpool_limits
 
 from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis, diagnose_articulated
 from bench.discrepancy.articulated.recognition import applies, drives_only
-from bench.discrepancy.articulated_search.catalogue import CATALOGUE as ARTICULATED
+from bench.discrepancy.articulated_effects.catalogue import CATALOGUE as ARTICULATED
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.case.idle_loads import idle_notes, without_idle_noise
 from bench.discrepancy.case.reading import read_case

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from bench.discrepancy.articulated_search.catalogue import CATALOGUE as ARTICULATED
-from bench.discrepancy.articulated_search.effect import ArticulatedEffect
+from bench.discrepancy.articulated_effects.catalogue import CATALOGUE as ARTICULATED
+from bench.discrepancy.articulated_effects.effect import ArticulatedEffect
 from bench.discrepancy.effects.catalogue import CATALOGUE as LINEAR
 from bench.discrepancy.effects.effect import Effect, FreeParameter
 from bench.figures.look import COLOURS, REFERENCE_COLOUR, save, style

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from bench.arrays import Array
-from bench.discrepancy.articulated.free_runs import FreeRuns
-from bench.discrepancy.articulated_search.hypothesis import JointHypothesis
+from bench.discrepancy.articulated_effects.hypothesis import JointHypothesis
+from bench.discrepancy.articulated_judgement.free_runs import FreeRuns
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 
 

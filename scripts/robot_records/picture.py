@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis
-from bench.discrepancy.articulated.torque_error import TorqueProblem
+from bench.discrepancy.articulated_judgement.torque_error import TorqueProblem
 from bench.discrepancy.report.articulated import judged_torques, simulated_joints
 from bench.figures.look import axes_grid, legend, look, save, style
 

@@ -14,11 +14,13 @@ import numpy as np
 
 from bench.discrepancy.articulated.admission import admitted_robot
 from bench.discrepancy.articulated.explaining import Explained, Question, asked_as, explained
-from bench.discrepancy.articulated.judgement import predict
 from bench.discrepancy.articulated.naming import closest_rival
 from bench.discrepancy.articulated.next_test import Trajectory, propose
 from bench.discrepancy.articulated.places import matrix_of
-from bench.discrepancy.articulated_search.catalogue import CATALOGUE
+from bench.discrepancy.articulated.stepping import accurate, stepped
+from bench.discrepancy.articulated_effects.catalogue import CATALOGUE
+from bench.discrepancy.articulated_judgement.judgement import predict
+from bench.discrepancy.articulated_judgement.torque_error import TorqueProblem
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.placements import placements
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
@@ -103,10 +105,14 @@ def diagnose_articulated(
     told, compiled, notes = admitted_robot(case, anyway=anyway, settings=settings)
     model = ArticulatedModel.of(compiled, case.rig)
     case = with_beginnings(whole := thinned(told, settings=settings), settings=settings)
-    problem = ArticulatedProblem.of(case, model, case.identification, settings, deadline)
-    judging = ArticulatedProblem.of(case, model, case.validation, settings)
-    question = Question(judging, how, rng, stated, progress)
-    found = explained(problem, placements(problem, catalogue), question)
+    problem = stepped(case, model, settings, deadline)
+    found = None
+    while found is None or not _accurate(problem, found, settings):
+        if found is not None:  # with what is named, long steps tell something else
+            problem = ArticulatedProblem.of(case, model, case.identification, settings, deadline)
+        judging = ArticulatedProblem.of(case, model, case.validation, problem.settings)
+        question = Question(judging, how, rng, stated, progress)
+        found = explained(problem, placements(problem, catalogue), question)
     problem, fits, final, verdict = found.problem, found.fits, found.final, found.verdict
     verdict = replace(
         verdict,
@@ -130,6 +136,15 @@ def diagnose_articulated(
         case, model, problem, found.judging, tuple(fits), final, matrix_of(problem, fits), verdict,
         None if proposal is None else proposal.trajectory,
     )  # fmt: skip
+
+
+def _accurate(problem: ArticulatedProblem, found: Explained, settings: DiagnosisSettings) -> bool:
+    """Whether the steps of a problem are short enough for what is named by its runs, or none finer are to be had."""
+    by_torque = isinstance(found.problem, TorqueProblem)
+    nominal = next(fit for fit in found.fits if not fit.hypothesis)
+    if by_torque or accurate(problem, nominal, found.final, settings):
+        return True
+    return not problem.deadline.allows("the same once more in finer integration steps")
 
 
 def _of_long_records(told: Case, whole: Case, found: Explained) -> tuple[str, ...]:

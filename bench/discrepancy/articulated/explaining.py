@@ -2,7 +2,7 @@
 
 Runs of a model that is nearly right tell most. One without the friction of its gears runs away within half a second, and of a slow or badly
 timed log the timing errors are larger than what friction makes of a run. There the torque along the measured motion is asked
-(`bench.discrepancy.articulated.torque_error`), first or after runs have named nothing.
+(`bench.discrepancy.articulated_judgement.torque_error`), first or after runs have named nothing.
 """
 
 from __future__ import annotations
@@ -14,7 +14,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bench.discrepancy.articulated.judgement import (
+from bench.discrepancy.articulated.naming import left_of, verdict_of
+from bench.discrepancy.articulated_effects.hypothesis import PlacedOnJoint
+from bench.discrepancy.articulated_judgement.judgement import (
     EffectKeys,
     PredictedErrors,
     alike,
@@ -27,11 +29,9 @@ from bench.discrepancy.articulated.judgement import (
     simplest,
     without_each,
 )
-from bench.discrepancy.articulated.naming import left_of, verdict_of
-from bench.discrepancy.articulated.torque_error import TorqueProblem, along_motion
-from bench.discrepancy.articulated.whiteness import Astray, Coloured, astray, coloured
+from bench.discrepancy.articulated_judgement.torque_error import TorqueProblem, along_motion
+from bench.discrepancy.articulated_judgement.whiteness import Astray, Coloured, astray, coloured
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
-from bench.discrepancy.articulated_search.hypothesis import PlacedOnJoint
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.articulated_search.search import (
     complete,
@@ -87,6 +87,14 @@ class Question:
     stated: bool
     progress: Callable[[str], None]
 
+    def misled(self, problem: ArticulatedProblem, before: ArticulatedFit, after: ArticulatedFit) -> bool:
+        """Whether a fit predicts the records for judging worse for sure than the one before it."""
+        judged = problem.settings.articulated.judgement
+        judging = asked_as(problem, self.judging.softened(problem.softness))
+        floor = noise_floor(judging, after, judged)
+        then, now = (predict(judging, fit, floor, judged) for fit in (before, after))
+        return better(now, then, judged)
+
 
 def explained(
     problem: ArticulatedProblem, candidates: Sequence[PlacedOnJoint], question: Question
@@ -116,7 +124,7 @@ def _explained(
     """Explain by runs, or by the torque of a `TorqueProblem`, whose explanations are never complete."""
     judged, rng = problem.settings.articulated.judgement, question.rng
     problem, fits, given_up = search(
-        problem, candidates, settings=question.settings, progress=question.progress
+        problem, candidates, settings=question.settings, misled=question.misled, progress=question.progress
     )
     judging = question.judging.softened(problem.softness)
     judged_by = asked_as(problem, judging)

@@ -6,17 +6,17 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from bench.discrepancy.articulated.judgement import (
+from bench.discrepancy.articulated.places import gaps_of, locations_of, remainder_of
+from bench.discrepancy.articulated_effects.hypothesis import placed_values
+from bench.discrepancy.articulated_judgement.judgement import (
     EffectKeys,
     PredictedErrors,
     closed,
     closed_of_nominal,
     keys_of,
 )
-from bench.discrepancy.articulated.places import gaps_of, locations_of, remainder_of
-from bench.discrepancy.articulated.whiteness import Astray, Coloured
+from bench.discrepancy.articulated_judgement.whiteness import Astray, Coloured
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
-from bench.discrepancy.articulated_search.hypothesis import placed_values
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.judgement.coarse import outside
 from bench.discrepancy.multibody.inputs import input_of
@@ -325,6 +325,6 @@ def model_numbers(problem: ArticulatedProblem, final: ArticulatedFit) -> tuple[N
         moved, slopes = p.deviation(final.vector, i), p.slopes(final.vector, i)
         at, slope = list(slopes), np.array(list(slopes.values()))
         std = float(np.sqrt(max(slope @ final.covariance[np.ix_(at, at)] @ slope, 0.0)))
-        return NominalEstimate(p.name, p.value + moved, std, p.value, p.stated_std, moved / p.stated_std)
+        return NominalEstimate(p.name, p.value + moved, std, p.value, p.stated_std, p.sigmas(final.vector, i))
 
     return tuple(estimate(i, p) for i, p in enumerate(problem.nominal) if not p.of_type)

@@ -17,7 +17,7 @@ from scipy.stats import norm
 
 from bench import native
 from bench.arrays import Array
-from bench.discrepancy.articulated.free_runs import FreeRuns
+from bench.discrepancy.articulated_judgement.free_runs import FreeRuns
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.case.case import CaseRecord

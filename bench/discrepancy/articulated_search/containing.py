@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from bench.arrays import Array
+from bench.discrepancy.articulated_effects.hypothesis import PlacedOnJoint
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
-from bench.discrepancy.articulated_search.hypothesis import PlacedOnJoint
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 
 Refit = Callable[[ArticulatedFit, Array], ArticulatedFit]

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.arrays import Array
-from bench.discrepancy.articulated_search.hypothesis import JointHypothesis
+from bench.discrepancy.articulated_effects.hypothesis import JointHypothesis
 from bench.discrepancy.articulated_search.misfit import Octaves
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.numerics.least_squares import Prior, minimise
@@ -58,6 +58,16 @@ class ArticulatedFit:
     def reduced(self) -> Array:
         """Mean squared whitened innovation (n_joints,) of every joint; one where nothing is missing."""
         return np.asarray(self.chi2.sum(axis=1) / self.octaves.count.sum(axis=1))
+
+    @property
+    def misfit(self) -> Array:
+        """Twice the negative log likelihood (n_joints,) of every joint, its scales profiled out."""
+        return np.array([self.octaves.misfit(j, power) for j, power in enumerate(self.chi2)])
+
+    @property
+    def beyond_noise(self) -> Array:
+        """What of that (n_joints,) noise alone does not make; octaves in which less is left than was stated make up for no other."""
+        return self.misfit - np.minimum(self.chi2, self.octaves.count).sum(axis=1)
 
     @property
     def scale(self) -> Array:
@@ -224,8 +234,9 @@ def refitted(
     *,
     scale: Array,
     others: Others | None = None,
+    least: float = -np.inf,
 ) -> ArticulatedFit:
-    """Fit a hypothesis again and again, each time with the scale that the last fit left, until it leaves the scale that it was given.
+    """Fit a hypothesis again and again, each time with the scale that the last fit left, until that changes nothing that tells.
 
     The log-likelihood with its scales profiled out is concave in the squares, so that every such fit is a step of a majorisation and
     none loses. One fit alone may stop where a joint that it has spoilt is believed no more, and what its parameters are known to, which
@@ -237,6 +248,7 @@ def refitted(
         start: Vector to start from, or several (k, n).
         scale: (n_joints, n_octaves) of the residuals at the start.
         others: As of `fit`.
+        least: Log posterior short of which it is fitted once.
 
     References:
         D. R. Hunter and K. Lange, A tutorial on MM algorithms, The American Statistician 58 (2004) 30-37.
@@ -244,12 +256,14 @@ def refitted(
     settings = problem.settings.articulated.search
     found = fit(problem, hypothesis, start, scale=scale, iterations=settings.iterations, others=others)
     for _ in range(settings.refits - 1):
-        if np.allclose(found.scale, scale, rtol=settings.rescaled):
+        if found.log_posterior < least or np.allclose(found.scale, scale, rtol=settings.rescaled):
             break
-        scale = found.scale
+        scale, before = found.scale, found.log_posterior
         found = fit(
             problem, hypothesis, found.vector, scale=scale, iterations=settings.iterations, others=others
         )
+        if abs(found.log_posterior - before) < settings.rise:
+            break
     return found
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 
-from bench.discrepancy.articulated_search.effect import ArticulatedEffect, JointScales
-from bench.discrepancy.articulated_search.hypothesis import PlacedOnJoint
+from bench.discrepancy.articulated_effects.effect import ArticulatedEffect, JointScales
+from bench.discrepancy.articulated_effects.hypothesis import PlacedOnJoint
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 
 AND = "+"

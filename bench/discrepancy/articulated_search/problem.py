@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.arrays import Array
-from bench.discrepancy.articulated_search.effect import JointScales
-from bench.discrepancy.articulated_search.hypothesis import JointHypothesis, placed_values
+from bench.discrepancy.articulated_effects.effect import JointScales
+from bench.discrepancy.articulated_effects.hypothesis import JointHypothesis, placed_values
 from bench.discrepancy.articulated_search.misfit import Octaves, transformed
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.multibody.encoders import Encoder
@@ -34,7 +34,6 @@ from bench.discrepancy.multibody.nominal_parameters import Nominal, base_slots, 
 from bench.discrepancy.multibody.records import PreparedRecord, corrected, prepare, relinked
 from bench.discrepancy.numerics.deadline import NEVER, Deadline
 from bench.discrepancy.settings import DEFAULT, DiagnosisSettings
-from bench.rig.bodies import AXES
 
 
 @dataclass(eq=False)
@@ -107,7 +106,12 @@ class ArticulatedProblem:
 
     def locals(self, j: int) -> tuple[int, ...]:
         """Indices of the nominal parameters of joint `j` alone."""
-        return tuple(i for i, p in enumerate(self.nominal) if not p.shared and p.joints == (j,))
+        return self._locals[j]
+
+    @cached_property
+    def _locals(self) -> tuple[tuple[int, ...], ...]:
+        own = [None if p.shared else p.joints for p in self.nominal]
+        return tuple(tuple(i for i, at in enumerate(own) if at == (j,)) for j in range(len(self.joints)))
 
     def size(self, hypothesis: JointHypothesis) -> int:
         """Length of the vector of a hypothesis."""
@@ -237,10 +241,12 @@ class ArticulatedProblem:
         gain: Array,
         starts: Array,
         every: int | None,
+        p: Array | None = None,
     ) -> tuple[Array, Array]:
-        """Innovations (n, 2) and states (n, 4) of joint `j` from `starts`, set anew after `every` samples, see `joint_run.predict`."""
+        """Innovations (n, 2) and states (n, 4) of joint `j` from `starts`, set anew after `every` samples, see `joint_run.predict`; `p` as
+        of `slots`, where it is known."""
         bias, inertia = self.coefficients(record, hypothesis, vector)
-        p = self.slots(j, hypothesis, vector, on_link=record.on_link)
+        p = self.slots(j, hypothesis, vector, on_link=record.on_link) if p is None else p.copy()
         p[Slot.RATIO] *= record.servo_ratio
         return predict(
             p, (inertia, bias, record.slope, record.reference, record.load), record.servo_command, record.step,
@@ -258,42 +264,38 @@ class ArticulatedProblem:
     def coefficients(
         self, record: JointRecord, hypothesis: JointHypothesis, vector: Array
     ) -> tuple[Array, Array]:
-        """Bias and inertia (n_steps,) of a joint's equation as a hypothesis has the bodies."""
-        bias, inertia = record.bias, record.inertia
-        by: dict[str, dict[str, float]] = {}
-        for i in (i for i in self.shared if self.nominal[i].of_body):
-            if vector[i] != 0.0 and record.bodies[self.nominal[i].target].felt:
-                by.setdefault(self.nominal[i].target, {})[self.nominal[i].kind] = (
-                    self.nominal[i].std * vector[i]
-                )
-        for body, changed in by.items():
-            change = record.bodies[body].change(changed)
-            bias, inertia = bias + change[0], inertia + change[1]
-        for placed, eta in zip(hypothesis, self.etas(hypothesis, vector), strict=True):
-            if placed.effect.site != "body":
-                continue
-            values = placed.effect.values(eta, placed.scales)
-            if "payload" in values:
-                change = record.payloads[placed.where] * values["payload"]
-            elif "share" in values:
-                change = np.stack([-values["share"] * record.weights[placed.where], np.zeros_like(bias)])
-            else:
-                shift = np.array(list(values.values()))
-                change = np.tensordot(shift, record.centres[placed.where], axes=1)
-            bias, inertia = bias + change[0], inertia + change[1]
-        return bias, np.maximum(inertia, 1e-3 * record.inertia)
+        """Bias and inertia (n_steps,) of a joint's equation as a hypothesis has the bodies; not to be written to."""
+        changed: dict[str, dict[str, float]] = {}
+        for i in self._bodily:
+            entry = self.nominal[i]
+            if vector[i] != 0.0 and record.bodies[entry.target].felt:
+                changed.setdefault(entry.target, {})[entry.kind] = entry.deviation(vector, i)
+        missing = [
+            (placed.where, placed.effect.values(eta, placed.scales))
+            for placed, eta in zip(hypothesis, self.etas(hypothesis, vector), strict=True)
+            if placed.effect.site == "body"
+        ]
+        return record.coefficients(changed, missing)
+
+    @cached_property
+    def _bodily(self) -> tuple[int, ...]:
+        """Indices of the nominal parameters of bodies."""
+        return tuple(i for i, p in enumerate(self.nominal) if p.of_body)
 
     def residuals(self, j: int, hypothesis: JointHypothesis, vector: Array) -> list[Array]:
         """Whitened, weighted innovations (n, n_measured) of joint `j` in every record."""
-        most = self.settings.articulated.diverged
-        out = []
+        most, found = self.settings.articulated.diverged, []
+        p = self.slots(j, hypothesis, vector, on_link=self.records[0].joints[j].on_link)
         for original, prepared in zip(self.records, self.motions(hypothesis, vector), strict=True):
-            innovation, _ = self.innovations(j, hypothesis, vector, prepared)
+            record = prepared.joints[j]
+            out, _ = self.run(j, hypothesis, vector, record, record.gain, record.start, None, p)
             # a corrected log has another noise; residuals are compared in units of what was logged
-            innovation = innovation * (original.joints[j].noise / prepared.joints[j].noise)
+            innovation = out[:, : record.n_measured] * (original.joints[j].noise / record.noise)
             whitened = innovation @ original.joints[j].whitening.T * original.joints[j].weight
-            out.append(np.nan_to_num(whitened, nan=most, posinf=most, neginf=-most))
-        return out
+            if not np.isfinite(whitened).all():
+                whitened = np.nan_to_num(whitened, nan=most, posinf=most, neginf=-most)
+            found.append(whitened)
+        return found
 
     def residual(self, j: int, hypothesis: JointHypothesis, vector: Array) -> Array:
         """Their cosine transforms, all records in one (n,); the squares of an octave sum to about its count where nothing is missing."""
@@ -308,10 +310,7 @@ class ArticulatedProblem:
         """Mean, standard deviation, lower and upper bound of a vector."""
         n = len(self.nominal)
         mean, std = [np.zeros(n)], [np.ones(n)]
-        low = np.array(
-            [-0.95 * p.value / p.std if p.value > 0 and p.kind not in AXES else -np.inf for p in self.nominal]
-        )
-        lows, highs = [low], [np.full(n, np.inf)]
+        lows, highs = [np.array([p.lowest for p in self.nominal])], [np.full(n, np.inf)]
         for placed in hypothesis:
             p = placed.effect.parameters
             mean.append(np.array([x.mean for x in p]))

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.arrays import Array
+from bench.discrepancy.articulated_effects.hypothesis import JointHypothesis, PlacedOnJoint
 from bench.discrepancy.articulated_search.containing import begun_again
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit, Others, fit, own_entries, refitted
-from bench.discrepancy.articulated_search.hypothesis import JointHypothesis, PlacedOnJoint
 from bench.discrepancy.articulated_search.misfit import log_likelihood
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.articulated_search.screening import Screened, by_effect, screen
@@ -64,6 +64,7 @@ def best_of(
     settings: SearchSettings,
     progress: Callable[[str], None],
     gained: float = 0.0,
+    least: float = -np.inf,
 ) -> Round:
     """One effect more: screened and fitted where runs forget (`grounds_of`), the best of them fitted again as they are.
 
@@ -75,6 +76,7 @@ def best_of(
         settings: Of the search.
         progress: Called with a line of text at every stage.
         gained: Twice the log posterior that others have gained already, to which what an effect promises is compared.
+        least: Log posterior short of which a fit is not gone on with (`refitted`).
     """
     first: list[ArticulatedFit] = []
     corrected = None
@@ -94,17 +96,20 @@ def best_of(
         ):  # what stands in for the missing hides it; also from what was stated
             points += screen(soft, _untouched(soft, ground), candidates)
         progress("fits")
-        first = _fits(soft, ground, by_effect(points, settings.starts), settings, gained)
+        # where runs forget, other log posteriors hold
+        short_of = least if soft is problem else -np.inf
+        first = _fits(soft, ground, by_effect(points, settings.starts), settings, gained, short_of)
     others = Others.of(problem, base)
     first = [f for f in first if sound(problem, f)] or first
     finalists = sorted(first, key=lambda f: -f.log_posterior)[: settings.finalists]
-    fits = [f for f in (_again(problem, base, others, one) for one in finalists) if sound(problem, f)]
+    again = (_again(problem, base, others, one, least=least) for one in finalists)
+    fits = [f for f in again if sound(problem, f)]
     fits = [_where_links_are(problem, f) for f in fits]
     if not fits:
         return Round(None, fits, corrected)
     best = _simplest(problem, fits)
     settled = problem.settled(best.hypothesis, best.vector)
-    whole = refitted(settled, best.hypothesis, best.vector, scale=best.scale)
+    whole = refitted(settled, best.hypothesis, best.vector, scale=best.scale, least=least)
     return Round(whole, [*(f for f in fits if f is not best), whole], corrected)
 
 
@@ -192,6 +197,7 @@ def _again(
     others: Others,
     found: ArticulatedFit,
     starts: Sequence[Array] = (),
+    least: float = -np.inf,
 ) -> ArticulatedFit:
     """A fit once more in another problem, on the joints that its last effect changes; the other joints as a fit there has them.
 
@@ -204,7 +210,9 @@ def _again(
         own = own_entries(problem, base.hypothesis, j)
         vector[own] = base.vector[own]
     scale = scale_of(problem, replace(found, vector=vector))
-    return refitted(problem, found.hypothesis, np.vstack([vector, *starts]), scale=scale, others=others)
+    return refitted(
+        problem, found.hypothesis, np.vstack([vector, *starts]), scale=scale, others=others, least=least
+    )
 
 
 def _beside(
@@ -287,6 +295,7 @@ def _fits(
     points: Sequence[Sequence[Screened]],
     settings: SearchSettings,
     gained: float,
+    least: float,
 ) -> list[ArticulatedFit]:
     """Fits of the most promising effects on top of a fit, on the joints that they change."""
     others = Others.of(problem, base)
@@ -321,7 +330,7 @@ def _fits(
             ),
             key=lambda f: f.log_posterior,
         )
-        new = refitted(problem, hypothesis, new.vector, scale=new.scale, others=others)
+        new = refitted(problem, hypothesis, new.vector, scale=new.scale, others=others, least=least)
         new = _beside(problem, new, others, settings)
         out.append(new)
         gained = max(gained, 2.0 * (new.log_posterior - base.log_posterior))

@@ -14,8 +14,8 @@ from itertools import product
 import numpy as np
 
 from bench.arrays import Array
+from bench.discrepancy.articulated_effects.hypothesis import PlacedOnJoint
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit, free_entries, linearised
-from bench.discrepancy.articulated_search.hypothesis import PlacedOnJoint
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.numerics.threads import in_threads
 

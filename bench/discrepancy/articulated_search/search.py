@@ -7,31 +7,19 @@ parameters could do as well, is regressed on the residuals: what that takes away
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from bench.arrays import Array
-from bench.discrepancy.articulated_search.fitting import (
-    ArticulatedFit,
-    fit,
-    free_entries,
-    own_entries,
-    refitted,
-)
-from bench.discrepancy.articulated_search.hypothesis import JointHypothesis, PlacedOnJoint
+from bench.discrepancy.articulated_effects.hypothesis import JointHypothesis, PlacedOnJoint
+from bench.discrepancy.articulated_search.fitting import ArticulatedFit, fit, free_entries, refitted
+from bench.discrepancy.articulated_search.joint_rounds import round_of
+from bench.discrepancy.articulated_search.orders import roughly
 from bench.discrepancy.articulated_search.placements import apart
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
-from bench.discrepancy.articulated_search.rounds import (
-    Round,
-    best_of,
-    grounds_of,
-    parted,
-    quiet,
-    sound,
-    strained,
-)
+from bench.discrepancy.articulated_search.rounds import parted, quiet, sound
 from bench.discrepancy.multibody.nominal_parameters import twins
 from bench.discrepancy.settings import ArticulatedJudgementSettings as JudgementSettings
 from bench.discrepancy.settings import ArticulatedSearchSettings as SearchSettings
@@ -45,8 +33,12 @@ def complete(problem: ArticulatedProblem, found: ArticulatedFit, settings: Judge
 
 def nominal_fit(problem: ArticulatedProblem) -> ArticulatedFit:
     """The nominal model alone, with the scales of the joints that it leaves."""
-    vector = np.zeros(len(problem.nominal))
+    vector = roughly(problem)
     return refitted(problem, (), vector, scale=ArticulatedFit.at(problem, (), vector).scale)
+
+
+Misled = Callable[[ArticulatedProblem, ArticulatedFit, ArticulatedFit], bool]
+"""Takes a problem, a fit and the one before it to whether it is worse at what neither was fitted to."""
 
 
 class Searched(NamedTuple):
@@ -68,9 +60,18 @@ def search(
     candidates: Sequence[PlacedOnJoint],
     *,
     settings: SearchSettings | None = None,
+    misled: Misled = lambda problem, before, after: False,
     progress: Callable[[str], None] = lambda text: None,
 ) -> Searched:
-    """All fitted hypotheses: the one that nothing is worth adding to or taking from, then the likeliest first."""
+    """All fitted hypotheses: the one that nothing is worth adding to or taking from, then the likeliest first.
+
+    Args:
+        problem: Records and priors.
+        candidates: Effects at places.
+        settings: Of the search.
+        misled: Whether a fit predicts other records worse for sure than the one before it: the search ends there.
+        progress: Called with a line of text at every stage.
+    """
     settings = settings or problem.settings.articulated.search
     progress("nominal model")
     asked, current = problem, nominal_fit(problem)
@@ -83,7 +84,7 @@ def search(
             problem, current, rest, settings, lambda text, n=count: progress(f"round {n}: {text}")
         )
         if corrected is not None and parted(problem, fits, corrected, settings):
-            return search(corrected.problem, candidates, settings=settings, progress=progress)
+            return search(corrected.problem, candidates, settings=settings, misled=misled, progress=progress)
         found += fits
         if best is None or best.log_posterior < current.log_posterior + _needed(problem, current, settings):
             break
@@ -97,6 +98,9 @@ def search(
         given_up += [before] if idle else []
         dropped |= idle
         progress(f"round {count}: " + ", ".join(f"{p.effect.name} ({p.where})" for p in current.hypothesis))
+        if misled(problem, before, current):
+            progress(f"round {count}: makes the judging records worse, no further one")
+            break
     for end in (current, *given_up):
         found += predecessors(problem, end, found)
     return Searched(asked, sorted(found, key=lambda f: (f is not current, -f.log_posterior)), given_up)
@@ -115,16 +119,10 @@ def _material(
     judged = problem.settings.articulated.judgement
     fits = (nominal, before, after)
     power = (np.maximum(f.reduced - 1.0, 0.0) for f in fits)
-    misfit = (_misfit_beyond_noise(f) for f in fits)
+    misfit = (f.beyond_noise for f in fits)
     return complete(problem, after, judged) or any(
         bool(np.any(old - new > judged.small * first)) for first, old, new in (power, misfit)
     )
-
-
-def _misfit_beyond_noise(found: ArticulatedFit) -> Array:
-    octaves = found.octaves
-    misfit = [octaves.misfit(j, power) for j, power in enumerate(found.chi2)]
-    return np.maximum(np.array(misfit) - octaves.count.sum(axis=1), 0.0)
 
 
 def _open(
@@ -138,125 +136,6 @@ def _open(
     full = Counter(placed.joint for placed in current.hypothesis)
     free = [c for c in candidates if c.key not in taken and full[c.joint] < settings.most]
     return apart(free, current.hypothesis)
-
-
-def round_of(
-    problem: ArticulatedProblem,
-    current: ArticulatedFit,
-    candidates: Sequence[PlacedOnJoint],
-    settings: SearchSettings,
-    progress: Callable[[str], None],
-) -> Round:
-    """One round: an effect more at every joint that misses one, or one that reaches them all if that explains more.
-
-    What sits at one joint changes the runs of that joint alone. So what joints miss of their own is looked for joint by joint, and all is
-    then fitted together; what they gain in sum is held against what one effect common to them gains.
-    """
-    grounds = grounds_of(problem, current, settings)
-    judged = problem.settings.articulated.judgement
-    open_joints = {j for j, still in enumerate(quiet(current, judged)) if not still}
-    open_joints |= strained(problem, current, settings)
-    # behind an elastic drive the link is elsewhere, and all that hangs on it
-    shared = [c for c in candidates if len(problem.reached((c,))) > 1 or c.effect.train or not open_joints]
-    own = {j: [c for c in candidates if c.joint == j and c not in shared] for j in sorted(open_joints)}
-    rounds, parts = list[Round](), list[ArticulatedFit]()
-    for j, mine in own.items():
-        name = problem.joints[j].name
-        if not problem.deadline.allows(f"effects at joint '{name}'"):
-            break
-        told = best_of(
-            problem,
-            current,
-            grounds,
-            mine,
-            settings,
-            lambda text, name=name: progress(f"joint '{name}': {text}"),
-        )
-        rounds.append(told)
-        if told.best is not None and told.best.log_posterior >= current.log_posterior + settings.worth:
-            parts.append(told.best)
-    gained = sum(part.log_posterior - current.log_posterior for part in parts)
-    if shared and problem.deadline.allows("effects that reach several joints"):
-        rounds.append(best_of(problem, current, grounds, shared, settings, progress, gained=2.0 * gained))
-    fits = [f for told in rounds for f in told.fits]
-    heard = [told.corrected for told in rounds if told.corrected is not None]
-    corrected = max(heard, key=lambda one: one.best.log_posterior, default=None)
-    best = max((told.best for told in rounds if told.best), key=lambda f: f.log_posterior, default=None)
-    if len(parts) > 1 and best is not None and best.log_posterior < current.log_posterior + gained:
-        together = _joined(problem, current, sorted(parts, key=lambda part: -part.log_posterior))
-        fits.append(together)
-        best = max(best, together, key=lambda f: f.log_posterior)
-    kinds = list(_of_one_kind(problem, current, fits, own, settings))
-    fits += [alike for alike, _ in kinds if alike not in fits]
-    if kinds:
-        alike, worth = max(kinds, key=lambda kind: kind[0].log_posterior + kind[1])
-        if best is None or alike.log_posterior + worth > best.log_posterior:
-            best = alike
-    return Round(best, fits, corrected)
-
-
-def _of_one_kind(
-    problem: ArticulatedProblem,
-    current: ArticulatedFit,
-    fits: Sequence[ArticulatedFit],
-    own: Mapping[int, Sequence[PlacedOnJoint]],
-    settings: SearchSettings,
-) -> Iterator[tuple[ArticulatedFit, float]]:
-    """Fits with one kind of effect at all parts of a type, and what each has before a choice joint by joint.
-
-    Whether one servo of a type has friction is no news once another has. One choice among the candidates is made for all of them where
-    `own` would have them make one each, and a choice among k that are as likely costs log k of log posterior.
-    """
-    for joints in sorted({p.joints for p in problem.nominal if p.of_type}):
-        if not own.keys() >= set(joints):
-            continue
-        found: dict[str, dict[int, ArticulatedFit]] = {}
-        for f in sorted(fits, key=lambda f: f.log_posterior):
-            placed = f.hypothesis[-1]
-            if len(f.hypothesis) == len(current.hypothesis) + 1 and problem.reached((placed,)) == (
-                placed.joint,
-            ):
-                found.setdefault(placed.effect.name, {})[placed.joint] = f
-        open_to = {(c.effect.name, c.joint): c for j in joints for c in own[j]}
-        whole = [name for name in found if all((name, j) in open_to for j in joints)]
-        gains = {
-            name: sum(f.log_posterior - current.log_posterior for f in found[name].values()) for name in whole
-        }
-        worth = sum(float(np.log(len(own[j]))) for j in joints[1:])
-        for name in sorted(whole, key=lambda name: -gains[name])[: settings.finalists]:
-            if not problem.deadline.allows("one kind of effect at all parts of a type"):
-                return
-            kind = {open_to[name, j].key for j in joints}
-            made = [f for f in fits if {p.key for p in f.hypothesis[len(current.hypothesis) :]} == kind]
-            if not made:
-                parts = [
-                    found[name].get(j) or ArticulatedFit.at(problem, *_begun(current, open_to[name, j]))
-                    for j in joints
-                ]
-                made = [_joined(problem, current, sorted(parts, key=lambda part: -part.log_posterior))]
-            yield max(made, key=lambda f: f.log_posterior), worth
-
-
-def _begun(current: ArticulatedFit, placed: PlacedOnJoint) -> tuple[JointHypothesis, Array]:
-    """The hypothesis of a fit with one effect more, and its vector with the effect where its prior has it."""
-    eta = [p.mean for p in placed.effect.parameters]
-    return (*current.hypothesis, placed), np.append(current.vector, eta)
-
-
-def _joined(
-    problem: ArticulatedProblem, current: ArticulatedFit, parts: Sequence[ArticulatedFit]
-) -> ArticulatedFit:
-    """A fit with the last effects of several, each about a joint of its own, on top of what they have in common."""
-    vector, last = parts[0].vector[: problem.size(current.hypothesis)].copy(), list[Array]()
-    for part in parts:
-        (j,) = problem.reached(part.hypothesis[-1:])
-        own = own_entries(problem, current.hypothesis, j)
-        vector[own] = part.vector[own]
-        last.append(part.vector[len(vector) :])
-    hypothesis = (*current.hypothesis, *(part.hypothesis[-1] for part in parts))
-    vector = np.concatenate([vector, *last])
-    settled = problem.settled(hypothesis, vector)
-    return refitted(settled, hypothesis, vector, scale=ArticulatedFit.at(settled, hypothesis, vector).scale)
 
 
 def without_idle(

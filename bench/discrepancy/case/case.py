@@ -50,7 +50,9 @@ class NominalParameter:
         std: One-sigma uncertainty; zero where it is taken as exact.
         unit: Unit.
         alike: Type of the part that it belongs to, whose numbers are off together; "" where that is not stated.
-        each: One-sigma scatter of the parts of that type about their common value.
+        each: One-sigma scatter of the parts of that type about their common value; a factor where `factor` is one.
+        factor: Where it is positive and known to within a factor, that factor, one sigma of its logarithm; `std` is then what that makes
+            of it near its value. Else one.
     """
 
     name: str
@@ -59,16 +61,26 @@ class NominalParameter:
     unit: str = ""
     alike: str = ""
     each: float = 0.0
+    factor: float = 1.0
+
+    @classmethod
+    def within_factor(
+        cls, name: str, value: float, factor: float, unit: str = "", alike: str = "", each: float = 0.0
+    ) -> NominalParameter:
+        """One that is known to within a factor."""
+        return cls(name, value, value * math.log(factor), unit, alike, each, factor)
 
     @property
     def own_std(self) -> float:
-        """The part of its uncertainty that is its own: all of it, or the scatter of its type."""
-        return self.each if self.alike else self.std
+        """The part of its uncertainty that is its own: all of it, or the scatter of its type; of its logarithm where it has a factor."""
+        own = self.each if self.alike else self.factor
+        return math.log(own) if self.factor > 1.0 else self.each if self.alike else self.std
 
     @property
     def common_std(self) -> float:
         """The part that it has in common with the others of its type; the two add in quadrature."""
-        return math.sqrt(self.std**2 - self.each**2) if self.alike else 0.0
+        whole = math.log(self.factor) if self.factor > 1.0 else self.std
+        return math.sqrt(whole**2 - self.own_std**2) if self.alike else 0.0
 
 
 @dataclass(frozen=True)

@@ -78,7 +78,11 @@ def read_case(folder: str | Path, *, planned: bool = False) -> Case:
         raise FileFormatError(f"no nominal.json in '{folder}'; a case folder needs one beside its records")
     nominal = NominalDocument.read(path)
     parameters = tuple(
-        NominalParameter(name, entry.value, entry.std, entry.unit, entry.alike, entry.each or 0.0)
+        NominalParameter(name, entry.value, entry.std or 0.0, entry.unit, entry.alike, entry.each or 0.0)
+        if entry.factor is None
+        else NominalParameter.within_factor(
+            name, entry.value, entry.factor, entry.unit, entry.alike, entry.each or 0.0
+        )
         for name, entry in nominal.parameters.items()
     )
     declared = declared_parameters(nominal.elements, path)

@@ -10,17 +10,16 @@ import contextlib
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from bench.discrepancy.case.acquisition import Antialias, Interpolation
+from bench.discrepancy.case.parameters import ParameterEntry, Unit, check_types
 from bench.discrepancy.case.single_axis import LOADS as LOAD_NAMES
 from bench.discrepancy.case.single_axis import MOTIONS
-from bench.discrepancy.case.types_of_parts import check_types
 from bench.documents import (
     Document,
     Entry,
     Flag,
-    Label,
     Listed,
     Name,
     NotNegative,
@@ -32,7 +31,7 @@ from bench.documents import (
 )
 from bench.documents.derived import entry_of
 from bench.errors import UnitError, unknown_name
-from bench.recording.units import check_unit, conversion
+from bench.recording.units import conversion
 
 if TYPE_CHECKING:
     from bench.discrepancy.case.case import Case
@@ -77,41 +76,11 @@ def _known_rig(name: Any) -> Any:
     return name
 
 
-def _known_unit(unit: str) -> str:
-    if unit:
-        with telling():
-            check_unit(unit)
-    return unit
-
-
 CaseRigName = Annotated[
     Name,
     BeforeValidator(_known_rig),
     Field(json_schema_extra={"anyOf": [{"enum": list(PARAMETERS)}, {"pattern": r"\.xml$"}]}),
 ]
-Unit = Annotated[Label, Field(max_length=64), AfterValidator(_known_unit)]
-
-
-class ParameterEntry(Entry):
-    """A nominal parameter."""
-
-    entry_name = "a nominal parameter"
-    entry_misnomers = {"sigma": "std", "uncertainty": "std", "stdev": "std", "nominal": "value"}  # noqa: RUF012  (read only)
-    entry_hints = {  # noqa: RUF012
-        "value": 'as {"value": 2.1, "std": 0.02, "unit": "kg"}',
-        "std": "its one-sigma uncertainty; write 0 to mean certain",
-    }
-
-    value: Number
-    """Nominal value."""
-    std: NotNegative
-    """One-sigma uncertainty; 0 to mean certain."""
-    unit: Unit = ""
-    """Unit."""
-    alike: Label = ""
-    """Type of the part that it belongs to, "STS3215" of every such servo: numbers of one kind of parts of one type are off together."""
-    each: Positive | None = None
-    """One-sigma scatter of the parts of that type about their common value, which std counts in."""
 
 
 AntialiasEntry = entry_of(Antialias, lambda hint: None, kind="an antialias filter", name="AntialiasEntry")

@@ -144,9 +144,10 @@ def _labelled(case: Case, channels: Mapping[str, Conversion], parameters: Mappin
         done = parameters.get(entry.name)
         if done is None:
             return entry
+        each = entry.each if entry.factor > 1.0 else entry.each * done.factor
         return replace(
-            entry, unit=done.unit, value=entry.value * done.factor, std=entry.std * done.factor, each=entry.each * done.factor
-        )  # fmt: skip
+            entry, unit=done.unit, value=entry.value * done.factor, std=entry.std * done.factor, each=each
+        )
 
     return replace(
         case,

@@ -71,7 +71,7 @@ def admitted(declared: Case, *, anyway: bool = False, settings: DiagnosisSetting
     case = with_starts_found(case, settings=settings)
     problem = Problem(case, structure_of(case, settings=settings), case.identification, settings=settings)
     refuse_unusable(problem)
-    said = (*said, *_parts_alone(case))
+    said = (*said, *_parts_alone(case), *_factors(case))
     doubts = suspicions(declared, problem)
     for first in doubts:
         if not anyway:
@@ -93,6 +93,15 @@ def _parts_alone(case: Case) -> tuple[str, ...]:
     return (
         f"the joints of this model do not carry one another; what parts of type {named} have in common is not used, and each of their "
         "numbers is taken as known to its std",
+    )
+
+
+def _factors(case: Case) -> tuple[str, ...]:
+    return tuple(
+        f"'{entry.name}' is stated to be known to a factor of {entry.factor:g}; the joints of this model do not carry one another, and it "
+        f"is taken as known to {entry.std:.3g} (one sigma)"
+        for entry in case.parameters
+        if entry.factor > 1.0
     )
 
 

@@ -2,25 +2,29 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections import Counter, defaultdict
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
-from bench.rig.actuators import commanded, drive_of
+from bench.errors import ParameterError, UnknownNameError
+from bench.rig.actuators import DRIVES, JointDrive, commanded, drive_of
 
 _TURNING = int(mujoco.mjtJoint.mjJNT_HINGE)
 
 
 @dataclass(frozen=True)
 class Assumptions:
-    """One-sigma uncertainties of nominal parameters, relative to their values.
+    """One-sigma uncertainties of nominal parameters: shares of their values, or factors, above one, to within which they are known.
 
     They are those of a model that somebody made with care from drawings and data sheets: masses from CAD are right within some
     percent (cables, screws and tolerances are not drawn), stiffnesses within ten (10 % is what spring makers tolerate, DIN EN 15800),
-    a gain that was set in software is what it says, while damping, friction and rotor inertia are usually guessed. State your own
-    in the nominal.json that `jointbench init` writes.
+    while damping, friction and rotor inertia are usually guessed. The gains of a position servo in newton metres are a number of its
+    firmware times what nobody has measured: public models of one arm, the SO-101, have 17.8 and 998 N m/rad. State your own in the
+    nominal.json that `jointbench init` writes, or by `--assume`.
 
     Attributes:
         mass: Of the mass of a body.
@@ -31,6 +35,8 @@ class Assumptions:
         kp: Of the position gain of a servo.
         kv: Of its velocity gain.
         forcerange: Of the force of a DC motor at full voltage.
+        twins: Scatter of drives with equal numbers, which are taken for ones of one type; small DC motors of one type differ by some ten
+            percent.
         judging: Share at the end of a single log that judges.
     """
 
@@ -39,19 +45,73 @@ class Assumptions:
     damping: float = 0.3
     frictionloss: float = 0.3
     armature: float = 0.3
-    kp: float = 0.1
-    kv: float = 0.3
+    kp: float = 10.0
+    kv: float = 10.0
     forcerange: float = 0.1
+    twins: float = 0.1
     judging: float = 1.0 / 3.0
+
+    def changed(self, spreads: Mapping[str, str]) -> Assumptions:
+        """Others, by name and number.
+
+        Raises:
+            UnknownNameError: A name is none of these.
+            ParameterError: A number is none, or not positive.
+
+        Examples:
+            >>> Assumptions().changed({"kp": "0.1"}).kp
+            0.1
+        """
+        known = [field.name for field in fields(self) if field.name != "judging"]
+        found = {}
+        for name, text in spreads.items():
+            if name not in known:
+                raise UnknownNameError("assumption", name, known)
+            try:
+                found[name] = float(text)
+            except ValueError:
+                found[name] = float("nan")
+            if not 0.0 < found[name] < np.inf or found[name] == 1.0:
+                raise ParameterError(
+                    f"{name} = {text} came; a share below 1 is expected, such as 0.1 of a number known to 10 %, or a factor above 1, such "
+                    "as 10 of one of which the order of magnitude is known"
+                )
+        return replace(self, **found)
 
 
 class Assumed(NamedTuple):
-    """A nominal parameter with its assumed uncertainty."""
+    """A nominal parameter with what is assumed of it, see `NominalParameter`."""
 
     name: str
     value: float
-    std: float
+    spread: float
     unit: str
+    alike: str = ""
+    twins: float = 0.0
+
+    @property
+    def entry(self) -> dict[str, float | str]:
+        """Its entry in ``nominal.json``."""
+        out: dict[str, float | str] = {"value": self.value}
+        out |= {"factor": self.spread} if self.spread > 1.0 else {"std": self.spread * self.value}
+        out["unit"] = self.unit
+        if self.alike:
+            out |= {
+                "alike": self.alike,
+                "each": 1.0 + self.twins if self.spread > 1.0 else self.twins * self.value,
+            }
+        return out
+
+    @property
+    def told(self) -> str:
+        """In words."""
+        known = (
+            f"to within a factor of {self.spread:g}"
+            if self.spread > 1.0
+            else f"± {self.spread * self.value:.2g} {self.unit}"
+        )
+        same = f", of one type ({self.alike})" if self.alike else ""
+        return f"{self.name} = {self.value:.6g} {self.unit} {known}{same}".replace(f" {self.unit} ±", " ±")
 
 
 def assumed_parameters(
@@ -82,11 +142,47 @@ def assumed_parameters(
         if articulated:
             values["armature"] = float(model.dof_armature[dof])
         out += [
-            Assumed(f"{kind}:{name}", value, getattr(assumptions, kind) * value, units[kind])
+            Assumed(f"{kind}:{name}", value, getattr(assumptions, kind), units[kind])
             for kind, value in values.items()
             if value > 0.0 and name
         ]
-    return [*out, *(_gains(model, assumptions) if articulated else [])]
+    return _typed(model, [*out, *_gains(model, assumptions)], assumptions) if articulated else out
+
+
+def _typed(model: mujoco.MjModel, parameters: list[Assumed], assumptions: Assumptions) -> list[Assumed]:
+    """The same with those of drives of equal numbers, and of the joints that they drive, as ones of a type."""
+    alike: dict[JointDrive, list[tuple[str, str]]] = defaultdict(list)
+    for u in range(model.nu):
+        if is_servo(model, u):
+            drive, joint = drive_of(model, u), model.joint(int(model.actuator_trnid[u, 0]))
+            alike[replace(drive, name="", lowest=0.0, highest=0.0)].append((drive.name, joint.name))
+    types: dict[tuple[str, str], str] = {}
+    for several in (group for group in alike.values() if len(group) > 1):
+        label = f"drives like {several[0][0]}"
+        types |= {
+            (part, name): label
+            for pair in several
+            for part, name in zip(("drive", "joint"), pair, strict=True)
+        }
+
+    def label_of(one: Assumed) -> str:
+        kind, _, name = one.name.partition(":")
+        part = "drive" if kind in DRIVES else "joint" if kind in OF_MOTORS else ""
+        return types.get((part, name), "")
+
+    def counted(one: Assumed) -> tuple[str, str, float]:
+        return one.name.partition(":")[0], label_of(one), one.value
+
+    # what parts of a type scatter by has to be less than what is known of them all, and equal numbers show that they are of one
+    many = Counter(counted(one) for one in parameters if label_of(one) and one.spread > assumptions.twins)
+    return [
+        one._replace(alike=label_of(one), twins=assumptions.twins) if many[counted(one)] > 1 else one
+        for one in parameters
+    ]
+
+
+OF_MOTORS = ("armature", "damping", "frictionloss")
+"""Numbers of a joint that are mostly those of its motor and gear."""
 
 
 def _gains(model: mujoco.MjModel, assumptions: Assumptions) -> list[Assumed]:
@@ -106,7 +202,7 @@ def _gains(model: mujoco.MjModel, assumptions: Assumptions) -> list[Assumed]:
             "forcerange": drive.stall if np.isfinite(drive.stall) else 0.0,
         }
         out += [
-            Assumed(f"{kind}:{name}", value, getattr(assumptions, kind) * value, units[kind])
+            Assumed(f"{kind}:{name}", value, getattr(assumptions, kind), units[kind])
             for kind, value in values.items()
             if value > 0.0
         ]
@@ -132,4 +228,4 @@ def moving_bodies(model: mujoco.MjModel) -> list[int]:
 
 def _mass(model: mujoco.MjModel, body: int, assumptions: Assumptions) -> Assumed:
     value = float(model.body_mass[body])
-    return Assumed(f"mass:{model.body(body).name}", value, assumptions.mass * value, "kg")
+    return Assumed(f"mass:{model.body(body).name}", value, assumptions.mass, "kg")

@@ -109,7 +109,7 @@ def draft(
     assumed = [f"column {match.told}" for match in matching.matches]
     assumed += [f"column {column} is not used: {why}" for column, why in matching.unused.items()]
     parameters = assumed_parameters(model.compiled, own, articulated=articulated)
-    assumed += [f"{p.name} = {p.value:.6g} ± {p.std:.2g} {p.unit}" for p in parameters]
+    assumed += [p.told for p in parameters]
     channels: dict[str, Any] = {"time": {"unit": "s"}} if articulated else {}
     for match in matching.matches:
         channels[match.column] = _channel(match, model.compiled)
@@ -120,7 +120,7 @@ def draft(
     assumed.append("the noise of every response: the flattest part of its spectrum")
     nominal: dict[str, Any] = {
         "rig": model.name,
-        "parameters": {p.name: {"value": p.value, "std": p.std, "unit": p.unit} for p in parameters},
+        "parameters": {p.name: p.entry for p in parameters},
         "channels": channels,
     }
     if moving:

@@ -139,6 +139,12 @@ def friction_limit(p, v, load, force, weight):
 
 
 @inlined
+def cogging_force(p, q):
+    """Force of the cogging at position `q`."""
+    return -p[19] * math.sin(p[20] * q + p[21]) if p[19] != 0.0 else 0.0
+
+
+@inlined
 def pair_friction(p, w):
     """Friction on what two joints turn together at velocity `w`."""
     return p[41] * w + (math.copysign(p[40], w) if w != 0.0 else 0.0)

@@ -7,8 +7,10 @@ model once, as one draw.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections import OrderedDict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from threading import Lock
 
 import numpy as np
 from scipy.linalg import expm, solve_discrete_are
@@ -26,6 +28,11 @@ class JointRecordSettings:
     window: float = 0.5
     """Length of a free run of a joint that no servo holds [s]: some time constants of its drive, and far less than it takes to drift
     off."""
+    kept: int = 3
+    """Coefficients kept: most runs of a joint change nothing of the bodies, and a column of a Jacobian for a body comes between two of
+    them."""
+    lightest: float = 1e-3
+    """Inertia about the joint that is left, over the nominal one, however much is taken off the bodies."""
 
 
 JOINT_RECORD_SETTINGS = JointRecordSettings()
@@ -87,6 +94,10 @@ class JointRecord:
     weight: Array
     encoder: Encoder = TRUE
     filter: tuple[Array, Array] | None = None
+    _made: OrderedDict[object, tuple[Array, Array]] = field(
+        init=False, repr=False, default_factory=OrderedDict
+    )
+    _making: Lock = field(init=False, repr=False, default_factory=Lock)
 
     def __post_init__(self) -> None:
         if self.filter is None:
@@ -109,6 +120,48 @@ class JointRecord:
         """Standard deviation (n_measured,) of the innovations."""
         root = np.linalg.inv(self.whitening)
         return np.asarray(np.sqrt(np.diag(root @ root.T)))
+
+    def coefficients(
+        self,
+        changed: Mapping[str, Mapping[str, float]],
+        missing: Sequence[tuple[str, Mapping[str, float]]] = (),
+    ) -> tuple[Array, Array]:
+        """Bias and inertia (n_steps,), not to be written to.
+
+        Args:
+            changed: Body with uncertain numbers to what they are changed by, see `BodyTerms.change`.
+            missing: Bodies, each with what the model leaves out there: a "payload" [kg], the "share" of its weight that something else
+                carries, or a shift of its centre of mass [m] along each axis.
+        """
+        key = (
+            tuple((body, *by.items()) for body, by in changed.items()),
+            tuple((body, *values.items()) for body, values in missing),
+        )
+        with self._making:
+            if key in self._made:
+                self._made.move_to_end(key)
+                return self._made[key]
+        bias, inertia = self.bias, self.inertia
+        for body, by in changed.items():
+            change = self.bodies[body].change(by)
+            bias, inertia = bias + change[0], inertia + change[1]
+        for body, values in missing:
+            change = self._left_out(body, values)
+            bias, inertia = bias + change[0], inertia + change[1]
+        found = bias, np.maximum(inertia, JOINT_RECORD_SETTINGS.lightest * self.inertia)
+        with self._making:
+            self._made[key] = found
+            while len(self._made) > JOINT_RECORD_SETTINGS.kept:
+                self._made.popitem(last=False)
+        return found
+
+    def _left_out(self, body: str, values: Mapping[str, float]) -> Array:
+        """Changes of bias and inertia (2, n_steps) by what the model leaves out at a body."""
+        if "payload" in values:
+            return self.payloads[body] * values["payload"]
+        if "share" in values:
+            return np.stack([-values["share"] * self.weights[body], np.zeros_like(self.bias)])
+        return np.asarray(np.tensordot(np.array(list(values.values())), self.centres[body], axes=1))
 
     @property
     def servo_command(self) -> Array:

@@ -32,6 +32,7 @@ from bench.discrepancy.multibody.joint_forces import (
     beyond_band,
     bristle_force_of,
     bristles_slid,
+    cogging_force,
     delayed_input,
     friction_limit,
     inlined,
@@ -138,7 +139,7 @@ def run(
         out[i, 0] = y[i] - (ql if on_link else q)
         out[i, 1] = v_measured[i] - (vl if on_link else v) if v_measured.shape[0] > 0 else 0.0
         if not (abs(out[i, 0]) < JOINT_RUN_LIMITS.far and abs(out[i, 1]) < JOINT_RUN_LIMITS.far):
-            out[i:] = math.nan
+            out[i:], states[i + 1 :] = math.nan, 0.0
             return
         if i == n - 1:
             break
@@ -160,7 +161,7 @@ def run(
             force, implicit, lagged = actuator_force(p, target, q, v, lagged, keep)
             target = command + (target - command) * half
             bristle_force, bristle = bristle_force_of(p, v, z)
-            own = force + bristle_force - p[19] * math.sin(p[20] * q + p[21])
+            own = force + bristle_force + cogging_force(p, q)
             x, w = (ql, vl) if train else (q, v)
             weight = bias[k] + slope[k] * (x - reference[k])
             rest = p[15] - weight - p[7] * (x - p[8]) + stop_force(p, x, w)
@@ -206,7 +207,7 @@ def predict(
         beside: Velocity (n_steps,) of the neighbour with which the joint shares a drive; at rest where None.
     """
     n = len(measured[0])
-    out, states = np.zeros((n, 2)), np.zeros((n, 4))
+    out, states = np.empty((n, 2)), np.empty((n, 4))
     mass, bias, slope, reference, load = arrays
     position, velocity = measured
     beside = np.zeros(len(u)) if beside is None else beside

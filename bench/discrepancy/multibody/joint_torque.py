@@ -18,6 +18,7 @@ from bench.discrepancy.multibody.joint_forces import (
     actuator_force,
     bristle_force_of,
     bristles_slid,
+    cogging_force,
     delayed_input,
     friction_limit,
     pair_friction,
@@ -48,7 +49,7 @@ def _missing(p, mass, bias, load, beside, u, step, motion, still, least, out):
         force, _, lagged = actuator_force(p, target, q, v, lagged, keep)
         target = command + (target - command) * half
         bristles, implicit = bristle_force_of(p, v, z)
-        own = force + bristles - implicit * v - p[19] * math.sin(p[20] * q + p[21])
+        own = force + bristles - implicit * v + cogging_force(p, q)
         rest = p[15] - bias[k] - p[7] * (q - p[8]) + stop_force(p, q, v)
         rest -= pair_friction(p, v + p[42] * beside[k])
         free = own + rest - (p[6] + p[14] * abs(v)) * v - (mass[k] + p[9]) * a

@@ -18,8 +18,18 @@ from bench.discrepancy.multibody.joints import Joint
 from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.errors import UnknownNameError
 from bench.rig.actuators import DRIVES
-from bench.rig.bodies import BODIES
+from bench.rig.bodies import AXES, BODIES
 
+
+@dataclass(frozen=True)
+class NominalSettings:
+    """Numbers of `bench.discrepancy.multibody.nominal_parameters`."""
+
+    least: float = 0.05
+    """Part of a positive number that is left of it, however far it is moved; of one that is known to within a factor any."""
+
+
+SETTINGS = NominalSettings()
 LOCAL_SLOTS = {
     "damping": (Slot.DAMPING,),
     "armature": (Slot.INERTIA,),
@@ -51,6 +61,7 @@ class Nominal:
         common: Index of what it has in common with the other parts of its type; None where it is a part of none.
         together: Standard uncertainty of that.
         of_type: Whether it is what parts of one type have in common.
+        logarithmic: Whether it is known to within a factor: the uncertainties are then those of its logarithm.
     """
 
     name: str
@@ -63,6 +74,7 @@ class Nominal:
     common: int | None = None
     together: float = 0.0
     of_type: bool = False
+    logarithmic: bool = False
 
     @property
     def of_body(self) -> bool:
@@ -76,14 +88,24 @@ class Nominal:
 
     @property
     def stated_std(self) -> float:
-        """Standard uncertainty as stated, with what the parts of a type have in common."""
-        return float(np.hypot(self.std, self.together))
+        """Standard uncertainty as stated, with what the parts of a type have in common; near its value where a factor is stated."""
+        spread = float(np.hypot(self.std, self.together))
+        return spread * self.value if self.logarithmic else spread
+
+    @property
+    def lowest(self) -> float:
+        """Least entry of a vector: a number that is positive stays so."""
+        if self.logarithmic or self.value <= 0.0 or self.kind in AXES:
+            return -np.inf
+        return -(1.0 - SETTINGS.least) * self.value / self.std
 
     def deviation(self, vector: Array, i: int) -> float:
         """How far it is from its value where a vector has the nominal parameters, of which it is the one of index `i`.
 
         Parts of a type differ in proportion to their common value.
         """
+        if self.logarithmic:
+            return float(self.value * np.expm1(self._logarithm(vector, i)))
         own = self.std * float(vector[i])
         if self.common is None:
             return own
@@ -92,11 +114,24 @@ class Nominal:
 
     def slopes(self, vector: Array, i: int) -> dict[int, float]:
         """Derivatives of `deviation`, index by index of the vector."""
+        if self.logarithmic:
+            now = float(self.value * np.exp(self._logarithm(vector, i)))
+            return {i: now * self.std} | ({} if self.common is None else {self.common: now * self.together})
         if self.common is None:
             return {i: self.std}
         share = self.together / self.value if self.value else 0.0
         own, common = float(vector[i]), float(vector[self.common])
         return {i: self.std * (1.0 + share * common), self.common: self.together + share * self.std * own}
+
+    def sigmas(self, vector: Array, i: int) -> float:
+        """How far that is in units of the stated uncertainty, of its logarithm where a factor is stated."""
+        moved = self._logarithm(vector, i) * self.value if self.logarithmic else self.deviation(vector, i)
+        return moved / self.stated_std
+
+    def _logarithm(self, vector: Array, i: int) -> float:
+        """The logarithm of what it is over its value."""
+        common = 0.0 if self.common is None else self.together * float(vector[self.common])
+        return self.std * float(vector[i]) + common
 
 
 def nominal_parameters(case: Case, model: ArticulatedModel) -> tuple[Nominal, ...]:
@@ -132,7 +167,7 @@ def nominal_parameters(case: Case, model: ArticulatedModel) -> tuple[Nominal, ..
         if parameter.std > 0.0:
             entry = Nominal(
                 parameter.name, kind, target, () if kind in BODIES else (known[target],), parameter.value,
-                parameter.own_std, factor, together=parameter.common_std,
+                parameter.own_std, factor, together=parameter.common_std, logarithmic=parameter.factor > 1.0,
             )  # fmt: skip
             (shared if entry.of_body else others).append(entry)
             if parameter.alike:
@@ -149,7 +184,7 @@ def _common(name: str, parts: Sequence[Nominal]) -> Nominal:
     kind, _, label = name.partition(":")
     joints = tuple(sorted({part.joints[0] for part in parts}))
     least = min(part.value / part.together for part in parts)
-    return Nominal(name, kind, label, joints, least, 1.0, of_type=True)
+    return Nominal(name, kind, label, joints, least, 1.0, of_type=True, logarithmic=parts[0].logarithmic)
 
 
 def twins(nominal: Sequence[Nominal], j: int) -> set[int]:

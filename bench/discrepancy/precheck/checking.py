@@ -108,7 +108,7 @@ def check(case: Case, settings: CheckSettings | None = None, *, informed: bool =
     found = [note for note in said if not note.startswith(UNUSED)] + found
     brief = shortened(case, own.records_seconds)
     if applies(case):
-        return _of_joints(brief, own, found, notes, began, informed=informed)
+        return _of_joints(case, own, found, notes, began, informed=informed)
     try:
         told, admission = admitted(brief)
     except BenchError as error:
@@ -135,11 +135,13 @@ def _of_joints(
     informed: bool,
 ) -> Checked:
     """The check of an articulated model."""
-    own, model, said = admitted_joints(case)
+    own, model, said = admitted_joints(shortened(case, settings.motion_seconds))
     found = [*found, *said]
     if own is None or model is None:
         return Checked("unusable", tuple(found), notes, seconds=time.perf_counter() - began)
-    found += [*joint_doubts(own, model), *drive_doubts(own, model, settings)]
+    found += joint_doubts(own, model)
+    own = shortened(own, settings.records_seconds)
+    found += drive_doubts(own, model, settings)
     parameters: list[Told] = []
     effects: list[Told] = []
     if informed:

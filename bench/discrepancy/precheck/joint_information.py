@@ -11,9 +11,9 @@ from collections.abc import Collection
 import numpy as np
 
 from bench.arrays import Array
-from bench.discrepancy.articulated.free_runs import FreeRuns
-from bench.discrepancy.articulated_search.catalogue import CATALOGUE
-from bench.discrepancy.articulated_search.hypothesis import PlacedOnJoint
+from bench.discrepancy.articulated_effects.catalogue import CATALOGUE
+from bench.discrepancy.articulated_effects.hypothesis import PlacedOnJoint
+from bench.discrepancy.articulated_judgement.free_runs import FreeRuns
 from bench.discrepancy.articulated_search.placements import placements
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.articulated_search.screening import grid

@@ -78,14 +78,15 @@ def joint_doubts(own: Case, model: ArticulatedModel) -> list[str]:
         for record in own.identification:
             q = np.asarray(record.values[position.name])
             u = np.asarray(record.values[driving.name])
-            found += _moves(joint.name, record, q, float(position.noise_std or 0.0))
-            found += position_doubts(position.name, record, float(position.noise_std or 0.0))
+            noise = float(position.noise_std or 0.0)
+            found += _moves(joint.name, record, q, noise)
+            found += position_doubts(position.name, record, noise, u if servo else None)
             if servo:
                 found += _follows(joint.name, driving.name, record, q, u)
             velocity = next((c for c in encoders.channels if c.quantity == "velocity"), None)
             if velocity is not None:
-                noise = float(position.noise_std or 0.0), float(velocity.noise_std or 0.0)
-                found += _derivatives(position.name, velocity.name, record, q, *noise)
+                of_velocity = float(velocity.noise_std or 0.0)
+                found += _derivatives(position.name, velocity.name, record, q, noise, of_velocity)
     return list(dict.fromkeys(found))
 
 

@@ -33,16 +33,19 @@ class PositionsSettings:
 SETTINGS = PositionsSettings()
 
 
-def position_doubts(name: str, record: CaseRecord, noise: float) -> Iterator[str]:
+def position_doubts(
+    name: str, record: CaseRecord, noise: float, target: Array | None = None
+) -> Iterator[str]:
     """What is wrong with a position, a sentence each.
 
     Args:
         name: Its channel.
         record: The record.
         noise: Its noise, as stated.
+        target: What it is to follow (n,), of a servo.
     """
     yield from _jumps(name, record, noise)
-    yield from _ends(name, record)
+    yield from _ends(name, record, target)
 
 
 def _jumps(name: str, record: CaseRecord, noise: float) -> Iterator[str]:
@@ -76,13 +79,21 @@ def _runs_into(x: Array, end: float) -> bool:
     )
 
 
-def _ends(name: str, record: CaseRecord) -> Iterator[str]:
+def _further(x: Array, target: Array, end: float) -> bool:
+    """Whether a servo misses its target by more where its reading stands at an end than anywhere else: it may have gone further."""
+    there, missed = x == end, np.abs(target - x)
+    return float(missed[there].max()) > float(missed[~there].max())
+
+
+def _ends(name: str, record: CaseRecord, target: Array | None) -> Iterator[str]:
     """A reading that is at times one and the same largest or smallest number, though it changes with every sample otherwise."""
     x = np.asarray(record.values[name])
     if np.mean((np.diff(x) == 0.0) & (x[1:] > x.min()) & (x[1:] < x.max())) > SETTINGS.repeated:
         return
     for end in (float(x.max()), float(x.min())):
         share = float(np.mean(x == end))
+        if target is not None and not _further(x, target, end):
+            continue
         if DEFAULT.checks.levelled < share < DEFAULT.checks.square and _runs_into(x, end):
             yield (
                 f"'{name}' in '{record.name}' reads {end:.6g} in {100.0 * share:.2g} % of the samples and never beyond: the end of the "

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from bench.discrepancy.case.case import Case, CaseRecord
+from bench.discrepancy.case.case import Case, CaseChannel, CaseRecord
 from bench.discrepancy.precheck.settings import CheckSettings
 
 
@@ -21,7 +21,7 @@ def sample_doubts(case: Case, settings: CheckSettings) -> Iterator[str]:
         for channel in case.channels:
             if channel.name in record.values:
                 yield from _torn(record, channel.name, settings)
-                yield from _frozen(record, channel.name, settings)
+                yield from _frozen(record, channel, settings)
 
 
 def _torn(record: CaseRecord, name: str, settings: CheckSettings) -> Iterator[str]:
@@ -44,8 +44,12 @@ def _torn(record: CaseRecord, name: str, settings: CheckSettings) -> Iterator[st
         )
 
 
-def _frozen(record: CaseRecord, name: str, settings: CheckSettings) -> Iterator[str]:
-    """A channel that stands still for a while, though it otherwise changes with every sample."""
+def _frozen(record: CaseRecord, channel: CaseChannel, settings: CheckSettings) -> Iterator[str]:
+    """A channel that stands still for a while, though it otherwise changes with every sample.
+
+    A joint that its friction holds reads one number, too, and a velocity of zero: it then sets off from where it is.
+    """
+    name = channel.name
     x = np.asarray(record.values[name])
     same = np.diff(x) == 0.0
     if np.mean(same) > 0.2 or not same.any():
@@ -55,6 +59,12 @@ def _frozen(record: CaseRecord, name: str, settings: CheckSettings) -> Iterator[
     k = int(np.argmax(last - first))
     length = int(last[k] - first[k])
     at_rest = first[k] == 0 or last[k] == len(same)
+    if channel.quantity == "velocity" and x[first[k]] == 0.0:
+        return
+    if channel.quantity == "position":
+        moved = np.abs(np.diff(x))
+        if moved[last[k] : last[k] + 2].max(initial=0.0) < settings.resumed * np.percentile(moved, 99.0):
+            return
     if length >= settings.frozen and not at_rest:
         when = record.start + first[k] * record.step
         yield (

@@ -8,8 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bench.discrepancy.articulated_search import hypothesis, problem
-from bench.discrepancy.articulated_search.catalogue import CATALOGUE as JOINTS
+from bench.discrepancy.articulated_effects import hypothesis
+from bench.discrepancy.articulated_effects.catalogue import CATALOGUE as JOINTS
+from bench.discrepancy.articulated_search import problem
 from bench.discrepancy.articulated_search.placements import placements as placements_on_joints
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.checks.admission import admitted

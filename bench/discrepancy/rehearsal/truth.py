@@ -176,7 +176,8 @@ class ModelLaboratory:
             if p.std <= 0.0:
                 continue
             off = float(np.clip(rng.standard_normal(), -SETTINGS.within, SETTINGS.within))
-            out.append(NominalEstimate(p.name, max(p.value + off * p.std, 0.05 * p.value), 0.0, p.value, p.std, off))  # fmt: skip
+            true = p.value * p.factor**off if p.factor > 1.0 else max(p.value + off * p.std, 0.05 * p.value)
+            out.append(NominalEstimate(p.name, true, 0.0, p.value, p.std, off))
         return tuple(out)
 
 

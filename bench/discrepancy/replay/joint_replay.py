@@ -18,7 +18,7 @@ from bench.arrays import Array
 from bench.discrepancy.application.applying import Applied
 from bench.discrepancy.application.forces import values_of
 from bench.discrepancy.application.target import PREFIX, as_mujoco
-from bench.discrepancy.articulated_search.catalogue import CATALOGUE
+from bench.discrepancy.articulated_effects.catalogue import CATALOGUE
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.multibody.channels import bound
 from bench.discrepancy.multibody.encoders import Encoder, travel

@@ -20,7 +20,7 @@ from bench.discrepancy.application.applying import (
     specification,
 )
 from bench.discrepancy.articulated.recognition import applies
-from bench.discrepancy.articulated_search.catalogue import CATALOGUE as ARTICULATED
+from bench.discrepancy.articulated_effects.catalogue import CATALOGUE as ARTICULATED
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.checks.initial_motion import with_starts_found
 from bench.discrepancy.effects.catalogue import CATALOGUE as LINEAR

@@ -15,8 +15,8 @@ import numpy as np
 
 from bench.arrays import Array
 from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis
-from bench.discrepancy.articulated.free_runs import FreeRuns
-from bench.discrepancy.articulated.torque_error import TorqueProblem
+from bench.discrepancy.articulated_judgement.free_runs import FreeRuns
+from bench.discrepancy.articulated_judgement.torque_error import TorqueProblem
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.judgement.shares import closed_words
 from bench.discrepancy.report.answers import level
@@ -85,7 +85,7 @@ def _errors(diagnosis: ArticulatedDiagnosis, fit: ArticulatedFit | None) -> list
 def judged_torques(diagnosis: ArticulatedDiagnosis) -> dict[str, Recording]:
     """Torques of all drives in the first judging record, means over short intervals: logged, and as the models ask for along the motion.
 
-    Of a diagnosis by torque (`bench.discrepancy.articulated.torque_error`), in the places of what `simulated_joints` returns.
+    Of a diagnosis by torque (`bench.discrepancy.articulated_judgement.torque_error`), in the places of what `simulated_joints` returns.
     """
     problem = TorqueProblem.like(diagnosis.judging)
     prepared, n = problem.records[0], problem.intervals[0]

@@ -70,8 +70,8 @@ class ArticulatedSearchSettings:
     finalists: int = setting(5, "Effects that are fitted again without it.", "Convention.")
     rise: float = setting(
         0.5,
-        "Log posterior by which a neighbouring number of periods in a turn has to be likelier.",
-        "Some twenty times what ends a fit, so that the search ends, too.",
+        "Log posterior that the scales of the last fit, or a neighbouring number of periods in a turn, have to gain to go on.",
+        "A tenth of what a further effect has to add, and some twenty times what ends a fit.",
     )
 
 
@@ -244,6 +244,17 @@ class ArticulatedSettings:
         "Longest integration step.",
         "MuJoCo's own default is two of them, and a servo of 10 Hz is then integrated to 3e-4.",
         unit="s",
+    )
+    orders: tuple[float, ...] = setting(
+        (-2.0, -1.0, 0.0, 1.0, 2.0),
+        "Deviations, in sigmas, at which numbers that are known to within a factor are tried before they are fitted.",
+        "95 % of the prior, in steps of the factor that it is known to.",
+        unit="sigmas",
+    )
+    steps_a_sample: int = setting(
+        4,
+        "Integration steps a sample of a slow log, where so few tell the same, within what a further effect has to explain.",
+        "The leapfrog is stable to 8 / (2 pi) of the sampling rate then, 2.5 times what the log hears.",
     )
     followed: float = setting(
         20.0,

@@ -13,9 +13,9 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple
 
 from bench.arrays import Array
+from bench.discrepancy.articulated_effects.slot_setters import SlotValues, train
 from bench.discrepancy.effects.effect import FreeParameter
 from bench.discrepancy.multibody.encoders import Encoder
-from bench.discrepancy.multibody.slot_setters import SlotValues, train
 
 JointSite = Literal["joint", "pair", "body", "actuator", "sensor"]
 
@@ -28,7 +28,7 @@ NUMBERS = frozenset({
 
 @dataclass(frozen=True)
 class EffectsSettings:
-    """Numbers of `bench.discrepancy.articulated_search.effect`."""
+    """Numbers of `bench.discrepancy.articulated_effects.effect`."""
 
     positive: Mapping[str, Any] = field(
         default_factory=lambda: {"mean": math.log(0.2), "std": 1.5, "bounds": (-9.0, 4.0)}

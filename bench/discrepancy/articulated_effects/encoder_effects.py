@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from bench.discrepancy.articulated_search.effect import ArticulatedEffect
+from bench.discrepancy.articulated_effects.effect import ArticulatedEffect
 from bench.discrepancy.effects.effect import FreeParameter, log_grid
 from bench.discrepancy.multibody.encoders import Encoder
 

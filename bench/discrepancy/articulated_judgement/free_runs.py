@@ -12,7 +12,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from bench.arrays import Array
-from bench.discrepancy.articulated_search.hypothesis import JointHypothesis
+from bench.discrepancy.articulated_effects.hypothesis import JointHypothesis
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.multibody.encoders import travel
 from bench.discrepancy.multibody.inputs import input_of, noise_of_loads

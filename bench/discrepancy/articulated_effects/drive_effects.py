@@ -6,10 +6,8 @@ import math
 
 import numpy as np
 
-from bench.discrepancy.articulated_search.effect import ArticulatedEffect
-from bench.discrepancy.effects.effect import FreeParameter, log_grid
-from bench.discrepancy.multibody.joint_forces import Slot
-from bench.discrepancy.multibody.slot_setters import (
+from bench.discrepancy.articulated_effects.effect import ArticulatedEffect
+from bench.discrepancy.articulated_effects.slot_setters import (
     added,
     cogging,
     saturated,
@@ -17,6 +15,8 @@ from bench.discrepancy.multibody.slot_setters import (
     train,
     written,
 )
+from bench.discrepancy.effects.effect import FreeParameter, log_grid
+from bench.discrepancy.multibody.joint_forces import Slot
 
 TEETH = tuple(float(n) for n in range(2, 121))
 """Periods of cogging in a turn that are tried: slots, poles and teeth are whole numbers."""

@@ -30,7 +30,7 @@ import numpy as np
 from scipy.signal import welch
 
 from bench.arrays import Array
-from bench.discrepancy.articulated_search.hypothesis import JointHypothesis, PlacedOnJoint
+from bench.discrepancy.articulated_effects.hypothesis import JointHypothesis, PlacedOnJoint
 from bench.discrepancy.articulated_search.misfit import Octaves
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.multibody.inputs import input_of

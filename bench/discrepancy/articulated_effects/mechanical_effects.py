@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 
-from bench.discrepancy.articulated_search.effect import SETTINGS, ArticulatedEffect
-from bench.discrepancy.effects.effect import FreeParameter, log_grid
-from bench.discrepancy.multibody.slot_setters import (
+from bench.discrepancy.articulated_effects.effect import SETTINGS, ArticulatedEffect
+from bench.discrepancy.articulated_effects.slot_setters import (
     SlotValues,
     added,
     carried,
@@ -14,6 +13,7 @@ from bench.discrepancy.multibody.slot_setters import (
     stop,
     written,
 )
+from bench.discrepancy.effects.effect import FreeParameter, log_grid
 
 LIMIT = FreeParameter("limit", "force", **SETTINGS.positive)
 LIMIT_0 = FreeParameter(

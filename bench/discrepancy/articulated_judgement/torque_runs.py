@@ -11,8 +11,8 @@ from functools import cached_property
 import numpy as np
 
 from bench.arrays import Array
-from bench.discrepancy.articulated.torque_error import TorqueProblem
-from bench.discrepancy.articulated_search.hypothesis import JointHypothesis
+from bench.discrepancy.articulated_effects.hypothesis import JointHypothesis
+from bench.discrepancy.articulated_judgement.torque_error import TorqueProblem
 from bench.discrepancy.multibody.inputs import input_of
 from bench.discrepancy.multibody.records import PreparedRecord
 

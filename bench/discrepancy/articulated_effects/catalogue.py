@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from bench.discrepancy.articulated_search.drive_effects import DRIVE_EFFECTS
-from bench.discrepancy.articulated_search.effect import ArticulatedEffect
-from bench.discrepancy.articulated_search.encoder_effects import ENCODER_EFFECTS
-from bench.discrepancy.articulated_search.mechanical_effects import MECHANICAL_EFFECTS
+from bench.discrepancy.articulated_effects.drive_effects import DRIVE_EFFECTS
+from bench.discrepancy.articulated_effects.effect import ArticulatedEffect
+from bench.discrepancy.articulated_effects.encoder_effects import ENCODER_EFFECTS
+from bench.discrepancy.articulated_effects.mechanical_effects import MECHANICAL_EFFECTS
 from bench.errors import UnknownNameError
 
 CATALOGUE: tuple[ArticulatedEffect, ...] = (*MECHANICAL_EFFECTS, *DRIVE_EFFECTS, *ENCODER_EFFECTS)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from bench.arrays import Array
-from bench.discrepancy.articulated_search.effect import ArticulatedEffect, JointScales
+from bench.discrepancy.articulated_effects.effect import ArticulatedEffect, JointScales
 
 
 @dataclass(frozen=True)

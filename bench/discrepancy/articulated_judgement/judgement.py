@@ -14,12 +14,12 @@ from typing import NamedTuple
 import numpy as np
 
 from bench.arrays import Array
-from bench.discrepancy.articulated.free_runs import FreeRuns
-from bench.discrepancy.articulated.torque_error import TorqueProblem
-from bench.discrepancy.articulated.torque_runs import TorqueRuns
-from bench.discrepancy.articulated_search.catalogue import CATALOGUE
+from bench.discrepancy.articulated_effects.catalogue import CATALOGUE
+from bench.discrepancy.articulated_effects.hypothesis import PlacedOnJoint
+from bench.discrepancy.articulated_judgement.free_runs import FreeRuns
+from bench.discrepancy.articulated_judgement.torque_error import TorqueProblem
+from bench.discrepancy.articulated_judgement.torque_runs import TorqueRuns
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
-from bench.discrepancy.articulated_search.hypothesis import PlacedOnJoint
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.articulated_search.search import complete, predecessors, shortened, steps
 from bench.discrepancy.multibody.nominal_parameters import twins

@@ -1,0 +1,59 @@
+"""Integration steps of slowly sampled joints: some a sample, where that many tell the same as the finer ones do."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from bench.discrepancy.articulated_search.fitting import ArticulatedFit
+from bench.discrepancy.articulated_search.problem import ArticulatedProblem
+from bench.discrepancy.articulated_search.search import nominal_fit
+from bench.discrepancy.case.case import Case
+from bench.discrepancy.multibody.model import ArticulatedModel
+from bench.discrepancy.numerics.deadline import Deadline
+from bench.discrepancy.settings import DiagnosisSettings
+
+
+def stepped(
+    case: Case, model: ArticulatedModel, settings: DiagnosisSettings, deadline: Deadline
+) -> ArticulatedProblem:
+    """The problem of the records for identification, in the longest steps in which the nominal model, fitted, is accurate enough."""
+    own = settings.articulated
+    longest = min(record.step for record in case.identification) / own.steps_a_sample
+    if longest > own.longest_step:
+        longer = replace(settings, articulated=replace(own, longest_step=longest))
+        problem = ArticulatedProblem.of(case, model, case.identification, longer, deadline)
+        nominal = nominal_fit(problem)
+        if accurate(problem, nominal, nominal, settings):
+            return problem
+    return ArticulatedProblem.of(case, model, case.identification, settings, deadline)
+
+
+def accurate(
+    problem: ArticulatedProblem,
+    nominal: ArticulatedFit,
+    found: ArticulatedFit,
+    settings: DiagnosisSettings,
+) -> bool:
+    """Whether the steps of a problem change the misfit of a fit by less than what a further effect has to take off, joint by joint.
+
+    That is what evidence asks for, and half of the part of the nominal model's misfit that a round of the search has to take off.
+
+    Args:
+        problem: The problem.
+        nominal: The fit of the nominal model.
+        found: The fit.
+        settings: With the steps that its own are held against.
+    """
+    if problem.settings.articulated.longest_step <= settings.articulated.longest_step:
+        return True
+    shortest = min((prepared.record for prepared in problem.records), key=len)
+    misfit = []
+    for how in (problem.settings, settings):
+        tried = ArticulatedProblem.of(problem.case, problem.model, [shortest], how).softened(problem.softness)
+        misfit.append(ArticulatedFit.at(tried, found.hypothesis, found.vector).misfit)
+    samples = sum(len(prepared.record) for prepared in problem.records)
+    apart = np.abs(misfit[0] - misfit[1]) * samples / len(shortest)
+    least = 0.5 * settings.articulated.judgement.small * nominal.beyond_noise
+    return bool(np.all(apart < np.maximum(2.0 * settings.articulated.search.worth, least)))

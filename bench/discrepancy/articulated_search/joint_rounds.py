@@ -1,0 +1,141 @@
+"""One round over all joints: effects at single joints, fitted together, against effects that reach several, and one kind at twins."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+
+import numpy as np
+
+from bench.arrays import Array
+from bench.discrepancy.articulated_effects.hypothesis import JointHypothesis, PlacedOnJoint
+from bench.discrepancy.articulated_search.fitting import ArticulatedFit, own_entries, refitted
+from bench.discrepancy.articulated_search.problem import ArticulatedProblem
+from bench.discrepancy.articulated_search.rounds import Round, best_of, grounds_of, quiet, strained
+from bench.discrepancy.settings import ArticulatedSearchSettings as SearchSettings
+
+
+def round_of(
+    problem: ArticulatedProblem,
+    current: ArticulatedFit,
+    candidates: Sequence[PlacedOnJoint],
+    settings: SearchSettings,
+    progress: Callable[[str], None],
+) -> Round:
+    """One round: an effect more at every joint that misses one, or one that reaches them all if that explains more.
+
+    What sits at one joint changes the runs of that joint alone. So what joints miss of their own is looked for joint by joint, and all is
+    then fitted together; what they gain in sum is held against what one effect common to them gains.
+    """
+    grounds = grounds_of(problem, current, settings)
+    judged = problem.settings.articulated.judgement
+    open_joints = {j for j, still in enumerate(quiet(current, judged)) if not still}
+    open_joints |= strained(problem, current, settings)
+    # behind an elastic drive the link is elsewhere, and all that hangs on it
+    shared = [c for c in candidates if len(problem.reached((c,))) > 1 or c.effect.train or not open_joints]
+    own = {j: [c for c in candidates if c.joint == j and c not in shared] for j in sorted(open_joints)}
+    rounds, parts = list[Round](), list[ArticulatedFit]()
+    for j, mine in own.items():
+        name = problem.joints[j].name
+        if not problem.deadline.allows(f"effects at joint '{name}'"):
+            break
+        told = best_of(
+            problem,
+            current,
+            grounds,
+            mine,
+            settings,
+            lambda text, name=name: progress(f"joint '{name}': {text}"),
+        )
+        rounds.append(told)
+        if told.best is not None and told.best.log_posterior >= current.log_posterior + settings.worth:
+            parts.append(told.best)
+    fits = [f for told in rounds for f in told.fits]
+    best = max((told.best for told in rounds if told.best), key=lambda f: f.log_posterior, default=None)
+    if len(parts) > 1 and best is not None:
+        together = _joined(problem, current, sorted(parts, key=lambda part: -part.log_posterior))
+        fits.append(together)
+        best = max(best, together, key=lambda f: f.log_posterior)
+    if shared and problem.deadline.allows("effects that reach several joints"):
+        gained = sum(part.log_posterior - current.log_posterior for part in parts)
+        least = -np.inf if best is None else best.log_posterior - settings.sight
+        told = best_of(
+            problem, current, grounds, shared, settings, progress, gained=2.0 * gained, least=least
+        )
+        rounds.append(told)
+        fits += told.fits
+        best = max(
+            (f for f in (best, told.best) if f is not None), key=lambda f: f.log_posterior, default=None
+        )
+    kinds = list(_of_one_kind(problem, current, fits, own, settings))
+    fits += [alike for alike, _ in kinds if alike not in fits]
+    if kinds:
+        alike, worth = max(kinds, key=lambda kind: kind[0].log_posterior + kind[1])
+        if best is None or alike.log_posterior + worth > best.log_posterior:
+            best = alike
+    heard = [told.corrected for told in rounds if told.corrected is not None]
+    corrected = max(heard, key=lambda one: one.best.log_posterior, default=None)
+    return Round(best, fits, corrected)
+
+
+def _of_one_kind(
+    problem: ArticulatedProblem,
+    current: ArticulatedFit,
+    fits: Sequence[ArticulatedFit],
+    own: Mapping[int, Sequence[PlacedOnJoint]],
+    settings: SearchSettings,
+) -> Iterator[tuple[ArticulatedFit, float]]:
+    """Fits with one kind of effect at all parts of a type, and what each has before a choice joint by joint.
+
+    Whether one servo of a type has friction is no news once another has. One choice among the candidates is made for all of them where
+    `own` would have them make one each, and a choice among k that are as likely costs log k of log posterior.
+    """
+    for joints in sorted({p.joints for p in problem.nominal if p.of_type}):
+        if not own.keys() >= set(joints):
+            continue
+        found: dict[str, dict[int, ArticulatedFit]] = {}
+        for f in sorted(fits, key=lambda f: f.log_posterior):
+            placed = f.hypothesis[-1]
+            if len(f.hypothesis) == len(current.hypothesis) + 1 and problem.reached((placed,)) == (
+                placed.joint,
+            ):
+                found.setdefault(placed.effect.name, {})[placed.joint] = f
+        open_to = {(c.effect.name, c.joint): c for j in joints for c in own[j]}
+        whole = [name for name in found if all((name, j) in open_to for j in joints)]
+        gains = {
+            name: sum(f.log_posterior - current.log_posterior for f in found[name].values()) for name in whole
+        }
+        worth = sum(float(np.log(len(own[j]))) for j in joints[1:])
+        for name in sorted(whole, key=lambda name: -gains[name])[: settings.finalists]:
+            if not problem.deadline.allows("one kind of effect at all parts of a type"):
+                return
+            kind = {open_to[name, j].key for j in joints}
+            made = [f for f in fits if {p.key for p in f.hypothesis[len(current.hypothesis) :]} == kind]
+            if not made:
+                parts = [
+                    found[name].get(j) or ArticulatedFit.at(problem, *_begun(current, open_to[name, j]))
+                    for j in joints
+                ]
+                made = [_joined(problem, current, sorted(parts, key=lambda part: -part.log_posterior))]
+            yield max(made, key=lambda f: f.log_posterior), worth
+
+
+def _begun(current: ArticulatedFit, placed: PlacedOnJoint) -> tuple[JointHypothesis, Array]:
+    """The hypothesis of a fit with one effect more, and its vector with the effect where its prior has it."""
+    eta = [p.mean for p in placed.effect.parameters]
+    return (*current.hypothesis, placed), np.append(current.vector, eta)
+
+
+def _joined(
+    problem: ArticulatedProblem, current: ArticulatedFit, parts: Sequence[ArticulatedFit]
+) -> ArticulatedFit:
+    """A fit with the last effects of several, each about a joint of its own, on top of what they have in common."""
+    vector, last = parts[0].vector[: problem.size(current.hypothesis)].copy(), list[Array]()
+    for part in parts:
+        (j,) = problem.reached(part.hypothesis[-1:])
+        own = own_entries(problem, current.hypothesis, j)
+        vector[own] = part.vector[own]
+        last.append(part.vector[len(vector) :])
+    hypothesis = (*current.hypothesis, *(part.hypothesis[-1] for part in parts))
+    vector = np.concatenate([vector, *last])
+    settled = problem.settled(hypothesis, vector)
+    return refitted(settled, hypothesis, vector, scale=ArticulatedFit.at(settled, hypothesis, vector).scale)
