@@ -390,7 +390,7 @@ def test_an_effect_on_an_arm_closes_in_plain_mujoco(tmp_path, name):
     worth = verified(case, [found], ("shoulder", "elbow"), goal=0.008)
     # where the integrator of the model does not do, the setting that does is named
     assert bool(worth.better) == bool(worth.remedy)
-    figures = {f.dof: f for f in worth.better or worth.figures}
+    figures = {f.dof: f for f in (*worth.figures, *worth.better)}
     assert figures["elbow"].before > 0.03
     assert figures["elbow"].after < 0.05 * figures["elbow"].before + 0.005, figures
     assert figures["shoulder"].after < 0.01

@@ -114,18 +114,25 @@ def force(t, q, v, z, theta, f):  # noqa: PLR0912, PLR0915  (one C function: a k
         at += speeds
         index += 1
     stride = 2 + parts + max(int(theta[10]) - 1, 0)
+    total = 0.0
     for i in range(n_slips):
-        row = FIRST + int(theta[index]) * width
         r = theta[at]
-        x = (min(max(z[i], -r), r) / r + 1.0) * 0.5 * parts
-        whole = 0.0
-        below = 0.0
-        for b in range(parts):
-            whole += theta[at + 2 + b]
-            below += theta[at + 2 + b] * min(max(x - b, 0.0), 1.0)
-        push = 2.0 * r / parts * (below - theta[at + 1] * whole)
-        for o in range(n):
-            f[o] += theta[row + o] * push
+        if parts == 1:  # most joints' sliders
+            total += theta[at + 2] * (min(max(z[i], -r), r) + r - 2.0 * r * theta[at + 1])
+        else:
+            x = (min(max(z[i], -r), r) / r + 1.0) * 0.5 * parts
+            whole = 0.0
+            below = 0.0
+            for b in range(parts):
+                whole += theta[at + 2 + b]
+                below += theta[at + 2 + b] * min(max(x - b, 0.0), 1.0)
+            total += 2.0 * r / parts * (below - theta[at + 1] * whole)
+        # neighbours along one direction push together
+        if i == n_slips - 1 or theta[index + 1] != theta[index]:
+            row = FIRST + int(theta[index]) * width
+            for o in range(n):
+                f[o] += theta[row + o] * total
+            total = 0.0
         at += stride
         index += 1
     for i in range(n_maxwell):
@@ -137,7 +144,7 @@ def force(t, q, v, z, theta, f):  # noqa: PLR0912, PLR0915  (one C function: a k
 
 
 @kernel
-def rate(t, q, v, z, theta, zdot):
+def rate(t, q, v, z, theta, zdot):  # noqa: PLR0912  (one C function: a kernel calls no other)
     """``e' = s' (1 - h)`` while loading, ``s'`` while unloading; ``e' = s' - e / tau`` of Maxwell elements."""
     n = int(theta[0])
     width = n + 3
@@ -149,11 +156,13 @@ def rate(t, q, v, z, theta, zdot):
     at += int(theta[2]) * int(theta[3]) + n_gated * int(theta[5]) + int(theta[6]) * int(theta[7])
     transition = theta[12]
     stride = 2 + parts + max(profile - 1, 0)
+    rate = 0.0
     for i in range(n_slips):
-        row = FIRST + int(theta[index + i]) * width
-        rate = 0.0
-        for o in range(n):
-            rate += theta[row + o] * v[o]
+        if i == 0 or theta[index + i] != theta[index + i - 1]:  # neighbours along one direction move together
+            row = FIRST + int(theta[index + i]) * width
+            rate = 0.0
+            for o in range(n):
+                rate += theta[row + o] * v[o]
         slip = 0.0
         if z[i] * rate > 0.0:
             x = abs(z[i]) / theta[at]

@@ -154,6 +154,9 @@ def _words(
     before, after = (sum(getattr(gap, end) ** 2 for gap in gaps) for end in ("before", "after"))
     if after > before:
         keep = " Its own numbers, estimated from the other records, leave more of these than as stated: keep what is stated."
+    elif after < before:
+        share = 100.0 * (1.0 - after / before)
+        keep = f" Its own numbers, estimated from the other records, close {share:.3g} % of the discrepancy by themselves."
     return f"Something is missing from the model, and no effect of the catalogue improves on the judging records.{left}{keep}"
 
 

@@ -6,7 +6,7 @@ position, velocity and acceleration. All of it is plain MuJoCo.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -27,7 +27,8 @@ from bench.discrepancy.multibody.joint_record import JOINT_RECORD_SETTINGS
 from bench.discrepancy.multibody.joints import Joint
 from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.multibody.motion import JointMotion, motion_of
-from bench.discrepancy.replay.running import Reading, Stretch, controls, hook_of, run, sampled
+from bench.discrepancy.numerics.threads import in_threads
+from bench.discrepancy.replay.running import Reading, Stretch, controls, coordinate_at, hook_of, run
 from bench.discrepancy.settings import DEFAULT
 from bench.discrepancy.verdict import NamedEffect
 from bench.errors import ModelError
@@ -75,15 +76,17 @@ class JointReplay:
             )
         return cls(bound(case, nominal), ArticulatedModel.of(nominal, case.rig))
 
-    def readings(self, applied: Applied, effects: Sequence[NamedEffect]) -> dict[str, list[Reading]]:
+    def readings(
+        self, applied: Applied, effects: Sequence[NamedEffect], only: Collection[str] = ()
+    ) -> dict[str, list[Reading]]:
         """Position of every joint in every judging record, measured and simulated.
 
         Args:
             applied: The model they are run with.
             effects: Logs of wrong encoders are corrected first; what is simulated is the log.
+            only: Joints; all of them where none is named.
         """
         wrong = encoders_wrong(effects)
-        found: dict[str, list[Reading]] = {joint.name: [] for joint in self.model.joints}
         raw = [
             motion_of(self.case, self.model, record, {}, settings=DEFAULT.motion)
             for record in self.case.validation
@@ -93,18 +96,28 @@ class JointReplay:
             for record, like in zip(self.case.validation, raw, strict=True)
         ]
         reference = applied.compiled()
-        for j, joint in enumerate(self.model.joints):
+
+        def read(j: int) -> list[Reading]:
+            joint = self.model.joints[j]
             held = _held(applied, joint.name, reference, [tie.name for tie in self.model.ties])
             factor = 1.0 + wrong.get(joint.name, Encoder()).gain
             size = travel(self.case, joint, max(float(np.max(logged.noise[j])) for logged in raw))
+            out = []
             for record, motion, logged in zip(self.case.validation, motions, raw, strict=True):
                 error = self._error(applied, held, j, record, motion, wrong)
                 measured = logged.samples[j][:, 0]
-                found[joint.name].append(Reading(measured, measured - factor * error, size))
-        return found
+                out.append(Reading(measured, measured - factor * error, size))
+            return out
 
-    def errors(self, applied: Applied, effects: Sequence[NamedEffect]) -> dict[str, Array]:
-        """Simulated less measured positions over the travel of the joint, by joint, all judging records in a row."""
+        asked = [j for j, joint in enumerate(self.model.joints) if not only or joint.name in only]
+        return {
+            self.model.joints[j].name: found for j, found in zip(asked, in_threads(read, asked), strict=True)
+        }
+
+    def errors(
+        self, applied: Applied, effects: Sequence[NamedEffect], only: Collection[str] = ()
+    ) -> dict[str, Array]:
+        """Simulated less measured positions over the travel of the joint, by joint, all judging records in a row; `only` as above."""
         far = SETTINGS.far_off
         return {
             name: np.clip(
@@ -114,7 +127,7 @@ class JointReplay:
                 ),
                 -far, far,
             )
-            for name, found in self.readings(applied, effects).items()
+            for name, found in self.readings(applied, effects, only).items()
         }  # fmt: skip
 
     def _error(
@@ -146,12 +159,11 @@ class JointReplay:
         ]
         length = int(np.ceil((min(every, len(record)) - 1) * record.step / step - 1e-9)) + 2
         position, velocity = run(model, hook_of(applied), windows, control, length, rested=False)
-        out = []
+        out, reading = [], self._reading(applied, model, joint.name)
         for w, first in enumerate(firsts):
             count = min(every, len(record) - first)
             times = np.asarray((first + np.arange(count)) * record.step - begins[w] * step, dtype=np.float64)
-            simulated = sampled(position[w], velocity[w], model, times).position
-            out.append(simulated @ self._reading(applied, model, joint.name))
+            out.append(coordinate_at(position[w] @ reading, velocity[w] @ reading, step, times))
         return motion.samples[j][:, 0] - np.concatenate(out)
 
     def _columns(self, record: CaseRecord, joint: str, late: float) -> dict[str, Array]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import mujoco
@@ -74,10 +74,17 @@ class LinearReplay:
             out[name] = [Reading(y, _sum(run, channels), size) for y, run in zip(measured, runs, strict=True)]
         return out
 
-    def errors(self, applied: Applied, effects: Sequence[NamedEffect]) -> dict[str, Array]:
-        """Simulated less measured over the standard deviation of the measured, by judged coordinate, all judging records in a row."""
+    def errors(
+        self, applied: Applied, effects: Sequence[NamedEffect], only: Collection[str] = ()
+    ) -> dict[str, Array]:
+        """Simulated less measured over the standard deviation of the measured, by judged coordinate, all judging records in a row.
+
+        Those of `only` alone where any are named.
+        """
         out = {}
         for name, found in self.readings(applied, effects).items():
+            if only and name not in only:
+                continue
             error = np.concatenate([(r.simulated - r.measured) / r.size for r in found])
             out[name] = error if np.isfinite(error).all() else np.full(len(error), DIVERGED_GAP)
         return out

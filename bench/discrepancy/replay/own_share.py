@@ -43,18 +43,16 @@ def with_simulator(verdict: Verdict, case: Case, settings: VerificationSettings 
         option = specification(path).option
         step, integrator = float(option.timestep), INTEGRATORS[mujoco.mjtIntegrator(option.integrator)]
         fine = RunOptions(step / own.converged, mujoco.mjtIntegrator.mjINT_RK4, hard=True)
+        worst = max(verdict.gaps, key=lambda gap: of_runs(gap)[0] / max(of_runs(gap)[2], 1e-12))
         runs = [
-            replay.errors(apply(path, nothing, case=case, linear=not articulated, options=options), ())
+            replay.errors(
+                apply(path, nothing, case=case, linear=not articulated, options=options), (), (worst.dof,)
+            )
             for options in (RunOptions(), fine)
         ]
     except (BenchError, KeyError):
         return verdict
-    worst = max(
-        (gap for gap in verdict.gaps if gap.dof in runs[0]),
-        key=lambda gap: of_runs(gap)[0] / max(of_runs(gap)[2], 1e-12),
-        default=None,
-    )
-    if worst is None:
+    if worst.dof not in runs[0]:
         return verdict
     before, _, floor = of_runs(worst)
     share = root_mean_square(runs[0][worst.dof] - runs[1][worst.dof])

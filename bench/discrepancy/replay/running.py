@@ -158,6 +158,16 @@ def _remember(
         mujoco.mj_initCtrlHistory(model, data, u, times.reshape(-1, 1), np.ascontiguousarray(values))
 
 
+def coordinate_at(position: Array, velocity: Array, step: float, times: Array) -> Array:
+    """A coordinate of a run (n,) at sample times: between two of its steps, the cubic that has its positions and velocities there."""
+    at = times / step
+    k = np.clip(np.floor(at + 1e-6).astype(int), 0, len(position) - 2)
+    s = at - k
+    begins = (1.0 + 2.0 * s) * position[k] + s * step * velocity[k]
+    ends = (3.0 - 2.0 * s) * position[k + 1] - (1.0 - s) * step * velocity[k + 1]
+    return np.asarray((1.0 - s) ** 2 * begins + s**2 * ends)
+
+
 def sampled(position: Array, velocity: Array, model: mujoco.MjModel, times: Array) -> RunMotion:
     """A run of one window at sample times, of its own steps where these are no whole number of them."""
     step = float(model.opt.timestep)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -54,7 +54,7 @@ class Figure:
 
     Attributes:
         dof: Degree of freedom.
-        before: NRMSE with the model as it came.
+        before: NRMSE with the model as it came, as the user runs it.
         after: With the corrected one.
         diagnosis: What the diagnosis says of the latter.
         floor: What noise alone leaves.
@@ -84,7 +84,7 @@ class Verification:
             the figure before is the simulator's own, not missing physics.
         remedy: What setting would do, in words; empty where nothing is short.
         less: Why less is left than the diagnosis says, in words; empty where it is not.
-        better: Figures with that setting.
+        better: Figures of what is short and of the worst with that setting.
     """
 
     step: float
@@ -176,17 +176,20 @@ def verify(
     replay = replay_of(path, case, articulated=articulated)
     nothing = Findings(())
 
-    def errors(what: Findings, options: RunOptions) -> dict[str, NDArray[np.float64]]:
-        return replay.errors(
-            apply(path, what, case=case, linear=not articulated, options=options), what.effects
-        )
+    def errors(
+        what: Findings, options: RunOptions, only: Collection[str] = ()
+    ) -> dict[str, NDArray[np.float64]]:
+        applied = apply(path, what, case=case, linear=not articulated, options=options)
+        return replay.errors(applied, what.effects, only)
 
-    def figures(options: RunOptions) -> tuple[Figure, ...]:
-        before, after = errors(nothing, options), errors(findings, options)
+    before = errors(nothing, RunOptions())
+
+    def figures(options: RunOptions, only: Collection[str] = ()) -> tuple[Figure, ...]:
+        after = errors(findings, options, only)
         return tuple(
             Figure(g.dof, root_mean_square(before[g.dof]), root_mean_square(after[g.dof]), *of_runs(g)[1:])
             for g in gaps
-            if g.dof in before
+            if g.dof in before and g.dof in after
         )
 
     option = specification(path).option
@@ -198,14 +201,18 @@ def verify(
             f"the verdict judges {', '.join(g.dof or 'one coordinate' for g in gaps)}, the case something else; give the verdict's case"
         )
     out = Verification(step, INTEGRATORS[integrator], found)
-    fine = errors(nothing, RunOptions(step / settings.converged, mujoco.mjtIntegrator.mjINT_RK4, hard=True))
-    own = root_mean_square(errors(nothing, RunOptions())[out.worst.dof] - fine[out.worst.dof])
+    converged = RunOptions(step / settings.converged, mujoco.mjtIntegrator.mjINT_RK4, hard=True)
+    widest = out.worst.dof
+    own = root_mean_square(before[widest] - errors(nothing, converged, (widest,))[widest])
     out = replace(out, own_share=own)
     if _short(found) > settings.short:
         return _remedied(out, figures, settings, progress)
     if out.worst.short >= -settings.short:
         return out
     return replace(out, less=_less(out, figures, settings))
+
+
+_Figures = Callable[[RunOptions, Collection[str]], tuple[Figure, ...]]
 
 
 def root_mean_square(error: NDArray[np.float64]) -> float:
@@ -217,13 +224,10 @@ def _short(found: Sequence[Figure]) -> float:
     return max(figure.short for figure in found)
 
 
-def _less(
-    out: Verification, figures: Callable[[RunOptions], tuple[Figure, ...]], settings: VerificationSettings
-) -> str:
+def _less(out: Verification, figures: _Figures, settings: VerificationSettings) -> str:
     """Why a corrected model leaves less than the diagnosis says, in words: its step and integrator, if it leaves as much without them."""
     worst = out.worst
-    converged = figures(RunOptions(out.step / settings.converged, mujoco.mjtIntegrator.mjINT_RK4))
-    fine = next(figure for figure in converged if figure.dof == worst.dof)
+    (fine,) = figures(RunOptions(out.step / settings.converged, mujoco.mjtIntegrator.mjINT_RK4), (worst.dof,))
     less = (
         f"the corrected model leaves {-100.0 * worst.short:.0f} % less than the diagnosis says at your step"
     )
@@ -237,11 +241,12 @@ def _less(
 
 def _remedied(
     out: Verification,
-    figures: Callable[[RunOptions], tuple[Figure, ...]],
+    figures: _Figures,
     settings: VerificationSettings,
     progress: Callable[[str], None],
 ) -> Verification:
-    """Try other settings until one does; say which, or that none of them does."""
+    """Try other settings on what falls short until one does; say which, or that none of them does."""
+    missed = {f.dof for f in out.figures if f.short > settings.short} | {out.worst.dof}
     trials: list[tuple[str, float, mujoco.mjtIntegrator | None]] = [
         (f"a step of {out.step / part:.3g} s", out.step / part, None) for part in settings.refinements
     ]
@@ -249,11 +254,11 @@ def _remedied(
         runge, fine = mujoco.mjtIntegrator.mjINT_RK4, out.step / settings.converged
         trials.insert(0, (f"the integrator RK4 at the step of {out.step:.3g} s", out.step, runge))
         trials.append((f"the integrator RK4 at a step of {fine:.3g} s", fine, runge))
-    best, label = out.figures, ""
+    best, label = tuple(f for f in out.figures if f.dof in missed), ""
     for name, step, integrator in trials:
         progress(f"with {name}")
         try:
-            tried = figures(RunOptions(step, integrator))
+            tried = figures(RunOptions(step, integrator), missed)
         except BenchError:
             continue
         if _short(tried) < _short(best):
