@@ -63,10 +63,11 @@ def force(t, q, v, z, theta, f):  # noqa: PLR0912, PLR0915  (one C function: a k
         for o in range(n):
             s += theta[row + o] * q[o]
         low = theta[row + n]
-        size = (theta[row + n + 1] - low) / cells
+        span = theta[row + n + 1] - low
+        size, density = span / cells, cells / span
         # cells that hold s and 0; the first and the last reach to infinity
-        there = int(min(max((s - low) / size, 0.0), cells - 1.0))
-        here = int(min(max(-low / size, 0.0), cells - 1.0))
+        there = int(min(max((s - low) * density, 0.0), cells - 1.0))
+        here = int(min(max(-low * density, 0.0), cells - 1.0))
         if there == here:
             total = theta[at + here] * s
         elif there > here:
@@ -85,20 +86,28 @@ def force(t, q, v, z, theta, f):  # noqa: PLR0912, PLR0915  (one C function: a k
             f[o] += theta[row + o] * total
         at += cells
         index += 1
-    for _ in range(n_gated):
+    rate = 0.0
+    total = 0.0
+    for i in range(n_gated):
         row = FIRST + int(theta[index]) * width
         gate = FIRST + int(theta[index + 1]) * width
-        rate = 0.0
         s = 0.0
         for o in range(n):
-            rate += theta[row + o] * v[o]
             s += theta[gate + o] * q[o]
+        if i == 0 or theta[index] != theta[index - 2]:
+            rate = 0.0
+            for o in range(n):
+                rate += theta[row + o] * v[o]
         low = theta[gate + n]
         x = min(max((s - low) / (theta[gate + n + 1] - low) * (knots - 1.0), 0.0), knots - 1.0)
         b = min(int(x), knots - 2)
-        push = (theta[at + b] + (x - b) * (theta[at + b + 1] - theta[at + b])) * rate
-        for o in range(n):
-            f[o] += theta[row + o] * push
+        total += theta[at + b] + (x - b) * (theta[at + b + 1] - theta[at + b])
+        # what damps along one direction does so together
+        if i == n_gated - 1 or theta[index + 2] != theta[index]:
+            total *= rate
+            for o in range(n):
+                f[o] += theta[row + o] * total
+            total = 0.0
         at += knots
         index += 2
     for _ in range(n_speed):
