@@ -10,6 +10,10 @@ import numpy as np
 import pytest
 
 from bench.cli import main
+from bench.discrepancy.case.case import Case, CaseChannel, CaseRecord
+from bench.discrepancy.precheck.positions import position_doubts
+from bench.discrepancy.precheck.samples import sample_doubts
+from bench.discrepancy.precheck.settings import CheckSettings
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 from planted_faults import FAULTS, check_one
@@ -48,6 +52,41 @@ def test_times_in_milliseconds_are_refused_at_once(tmp_path):
     word, _, doubts = check_one("clock", 10, tmp_path / "case", "arm")
     assert word == "unusable"
     assert "milliseconds" in doubts[0]
+
+
+class Held:
+    """A joint of a coarse encoder that its friction holds at every reversal, under a servo whose target goes a little further."""
+
+    STEP, QUANTUM = 0.02, 1.5e-3
+    time = np.arange(3000) * STEP
+    target = 0.15 * np.sin(0.4 * time + 0.001 * time**2)
+    position = np.round(np.clip(target, -0.1411, 0.1411) / QUANTUM) * QUANTUM
+
+    @classmethod
+    def record(cls, **more):
+        """The record, as read: rows that repeat a number are told apart by the clock that they were brought onto."""
+        values = {"goal": cls.target, "angle": cls.position, **more}
+        return CaseRecord("run", cls.STEP, 0.0, values)
+
+    @classmethod
+    def doubts(cls, record):
+        """What is said of its samples and its position."""
+        channels = (CaseChannel("goal", role="command"), CaseChannel("angle", quantity="position"))
+        case = Case("", "arm.xml", (), channels, (record,), ())
+        found = [*sample_doubts(case, CheckSettings())]
+        return [*found, *position_doubts("angle", record, 5e-4, record.values["goal"])]
+
+
+def test_a_joint_that_its_friction_holds_is_no_stuck_sensor_and_at_no_end_of_its_range():
+    assert not Held.doubts(Held.record())
+    # the same with a reading that ends where the motion goes on
+    far = np.clip(Held.target, -0.1, 0.1) + 1e-5 * np.random.default_rng(0).standard_normal(len(Held.time))
+    cut = np.where(np.abs(Held.target) > 0.1, np.sign(Held.target) * 0.1, far)
+    assert any("never beyond" in doubt for doubt in Held.doubts(Held.record(angle=cut)))
+    # and with one that stands while the joint moves on
+    stuck = Held.target + 1e-5 * np.random.default_rng(0).standard_normal(len(Held.time))
+    stuck[1000:1030] = stuck[1000]
+    assert any("stands still" in doubt for doubt in Held.doubts(Held.record(angle=stuck)))
 
 
 def _write(folder, records, nominal):

@@ -21,7 +21,7 @@ def stepped(
     """The problem of the records for identification, in the longest steps in which the nominal model, fitted, is accurate enough."""
     own = settings.articulated
     longest = min(record.step for record in case.identification) / own.steps_a_sample
-    if longest > own.longest_step:
+    if longest >= 2.0 * own.longest_step:  # else what is saved pays for the comparison at best
         longer = replace(settings, articulated=replace(own, longest_step=longest))
         problem = ArticulatedProblem.of(case, model, case.identification, longer, deadline)
         nominal = nominal_fit(problem)
