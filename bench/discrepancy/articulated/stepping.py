@@ -18,9 +18,13 @@ from bench.discrepancy.settings import DiagnosisSettings
 def stepped(
     case: Case, model: ArticulatedModel, settings: DiagnosisSettings, deadline: Deadline
 ) -> ArticulatedProblem:
-    """The problem of the records for identification, in the longest steps in which the nominal model, fitted, is accurate enough."""
+    """The problem of the records for identification, in the longest steps in which the nominal model, fitted, is accurate enough.
+
+    Longer ones than usual are asked of servos alone: their runs go from end to end of a log, those of torques are short.
+    """
     own = settings.articulated
-    longest = min(record.step for record in case.identification) / own.steps_a_sample
+    servos = all(joint.drive is not None and joint.drive.servo for joint in model.joints)
+    longest = min(record.step for record in case.identification) / own.steps_a_sample if servos else 0.0
     if longest >= 2.0 * own.longest_step:  # else what is saved pays for the comparison at best
         longer = replace(settings, articulated=replace(own, longest_step=longest))
         problem = ArticulatedProblem.of(case, model, case.identification, longer, deadline)

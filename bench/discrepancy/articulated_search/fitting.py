@@ -236,7 +236,7 @@ def refitted(
     others: Others | None = None,
     least: float = -np.inf,
 ) -> ArticulatedFit:
-    """Fit a hypothesis again and again, each time with the scale that the last fit left, until that changes nothing that tells.
+    """Fit a hypothesis again and again, each time with the scale that the last fit left, until it leaves the scale that it was given.
 
     The log-likelihood with its scales profiled out is concave in the squares, so that every such fit is a step of a majorisation and
     none loses. One fit alone may stop where a joint that it has spoilt is believed no more, and what its parameters are known to, which
@@ -258,12 +258,10 @@ def refitted(
     for _ in range(settings.refits - 1):
         if found.log_posterior < least or np.allclose(found.scale, scale, rtol=settings.rescaled):
             break
-        scale, before = found.scale, found.log_posterior
+        scale = found.scale
         found = fit(
             problem, hypothesis, found.vector, scale=scale, iterations=settings.iterations, others=others
         )
-        if abs(found.log_posterior - before) < settings.rise:
-            break
     return found
 
 

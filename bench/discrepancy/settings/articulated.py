@@ -70,8 +70,8 @@ class ArticulatedSearchSettings:
     finalists: int = setting(5, "Effects that are fitted again without it.", "Convention.")
     rise: float = setting(
         0.5,
-        "Log posterior that the scales of the last fit, or a neighbouring number of periods in a turn, have to gain to go on.",
-        "A tenth of what a further effect has to add, and some twenty times what ends a fit.",
+        "Log posterior by which a neighbouring number of periods in a turn has to be likelier.",
+        "Some twenty times what ends a fit, so that the search ends, too.",
     )
 
 
