@@ -87,14 +87,6 @@ class Question:
     stated: bool
     progress: Callable[[str], None]
 
-    def misled(self, problem: ArticulatedProblem, before: ArticulatedFit, after: ArticulatedFit) -> bool:
-        """Whether a fit predicts the records for judging worse for sure than the one before it."""
-        judged = problem.settings.articulated.judgement
-        judging = asked_as(problem, self.judging.softened(problem.softness))
-        floor = noise_floor(judging, after, judged)
-        then, now = (predict(judging, fit, floor, judged) for fit in (before, after))
-        return better(now, then, judged)
-
 
 def explained(
     problem: ArticulatedProblem, candidates: Sequence[PlacedOnJoint], question: Question
@@ -123,11 +115,22 @@ def _explained(
 ) -> Explained:
     """Explain by runs, or by the torque of a `TorqueProblem`, whose explanations are never complete."""
     judged, rng = problem.settings.articulated.judgement, question.rng
+    judges = dict[float, ArticulatedProblem]()
+
+    def judge(of: ArticulatedProblem) -> ArticulatedProblem:
+        if of.softness not in judges:
+            judges[of.softness] = asked_as(of, question.judging.softened(of.softness))
+        return judges[of.softness]
+
+    def misled(of: ArticulatedProblem, before: ArticulatedFit, after: ArticulatedFit) -> bool:
+        floor = np.zeros(len(of.joints))  # noise takes the same off both
+        then, now = (predict(judge(of), fit, floor, judged) for fit in (before, after))
+        return better(now, then, judged)
+
     problem, fits, given_up = search(
-        problem, candidates, settings=question.settings, misled=question.misled, progress=question.progress
+        problem, candidates, settings=question.settings, misled=misled, progress=question.progress
     )
-    judging = question.judging.softened(problem.softness)
-    judged_by = asked_as(problem, judging)
+    judging, judged_by = question.judging.softened(problem.softness), judge(problem)
     question.progress("judging records")
     climbed = kept(problem, judged_by, fits, judged)
     for earlier in given_up:  # of what was likelier later, the judging records may bear out less

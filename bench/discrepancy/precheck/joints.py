@@ -80,7 +80,8 @@ def joint_doubts(own: Case, model: ArticulatedModel) -> list[str]:
             u = np.asarray(record.values[driving.name])
             noise = float(position.noise_std or 0.0)
             found += _moves(joint.name, record, q, noise)
-            found += position_doubts(position.name, record, noise, u if servo else None)
+            target = u / (joint.drive.gear or 1.0) if servo and joint.drive is not None else None
+            found += position_doubts(position.name, record, noise, target)
             if servo:
                 found += _follows(joint.name, driving.name, record, q, u)
             velocity = next((c for c in encoders.channels if c.quantity == "velocity"), None)
