@@ -24,7 +24,8 @@ def stepped(
     """
     own = settings.articulated
     servos = all(joint.drive is not None and joint.drive.servo for joint in model.joints)
-    longest = min(record.step for record in case.identification) / own.steps_a_sample if servos else 0.0
+    sample = min(record.step for record in case.identification)
+    longest = min(sample / own.steps_a_sample, own.longest_of_few) if servos else 0.0
     if longest >= 2.0 * own.longest_step:  # else what is saved pays for the comparison at best
         longer = replace(settings, articulated=replace(own, longest_step=longest))
         problem = ArticulatedProblem.of(case, model, case.identification, longer, deadline)

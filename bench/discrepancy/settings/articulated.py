@@ -256,6 +256,12 @@ class ArticulatedSettings:
         "Integration steps a sample of a slow log, where so few tell the same, within what a further effect has to explain.",
         "The leapfrog is stable to 8 / (2 pi) of the sampling rate then, 2.5 times what the log hears.",
     )
+    longest_of_few: float = setting(
+        7.8e-3,
+        "Longest integration step of so few.",
+        "The leapfrog's relative error of a frequency is (omega h)^2 / 24: of a servo of 10 Hz a hundredth.",
+        unit="s",
+    )
     followed: float = setting(
         20.0,
         "Frequency up to which links are moved.",
