@@ -106,12 +106,12 @@ class Assumed(NamedTuple):
     def told(self) -> str:
         """In words."""
         known = (
-            f"to within a factor of {self.spread:g}"
+            f"{self.unit} to within a factor of {self.spread:g}"
             if self.spread > 1.0
             else f"± {self.spread * self.value:.2g} {self.unit}"
         )
         same = f", of one type ({self.alike})" if self.alike else ""
-        return f"{self.name} = {self.value:.6g} {self.unit} {known}{same}".replace(f" {self.unit} ±", " ±")
+        return f"{self.name} = {self.value:.6g} {known}{same}"
 
 
 def assumed_parameters(
