@@ -6,7 +6,9 @@ import codecs
 import sys
 import warnings
 from collections.abc import Callable
+from dataclasses import fields
 from io import TextIOWrapper
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +27,7 @@ from bench.cli.init import Init
 from bench.cli.installation import Doctor, Example
 from bench.cli.joints import Compare, Export, Identify, Swap
 from bench.cli.monitoring import Monitor
+from bench.cli.paths import PRINTED
 from bench.cli.records import Convert, Plot
 from bench.cli.rehearsal import Design, Rehearse
 from bench.cli.rigs import Demo, Laws, Simulate, View
@@ -82,11 +85,24 @@ def _announce_compilation(command: object) -> None:
         print("jointbench: first run, force laws and fits are compiled once", file=sys.stderr)
 
 
+def _json_printed(arguments: list[str]) -> list[str]:
+    """Arguments in which a ``--json`` without a file asks for standard output, as it does of commands that write none."""
+    command = COMMANDS.get(arguments[0]) if arguments else None
+    if command is None or all(field.name != "json" or field.default is not None for field in fields(command)):
+        return arguments
+    told = []
+    for argument, following in pairwise((*arguments, "--")):
+        bare = argument == "--json" and following.startswith("--")
+        told += [argument, str(PRINTED)] if bare else [argument]
+    return told
+
+
 def main(argv: list[str] | None = None) -> int:
     """Run the command line; returns the exit status: 0 done, 2 refused with a message, 130 stopped by hand, 143 by the system."""
     warnings.showwarning = _show_warning
     _speak_unicode()
-    if (sys.argv[1:] if argv is None else argv) == ["--version"]:
+    arguments = sys.argv[1:] if argv is None else argv
+    if arguments == ["--version"]:
         print(f"jointbench {__version__}")
         return 0
     try:
@@ -94,7 +110,7 @@ def main(argv: list[str] | None = None) -> int:
             COMMANDS,
             prog="jointbench",
             description="A MuJoCo virtual test bench for nonlinear joints. --version prints the version.",
-            args=argv,
+            args=_json_printed(arguments),
         )
         _announce_compilation(command)
         with terminable():

@@ -11,14 +11,12 @@ import tyro
 from rich.console import Console
 
 from bench.cli.console import emit
+from bench.cli.paths import PRINTED
 
 if TYPE_CHECKING:
     from bench.discrepancy.application.applying import Applied, Findings
     from bench.discrepancy.case.case import Case
     from bench.discrepancy.replay.verification import Verification
-
-PRINTED = Path("-")
-"""Stands for standard output."""
 
 
 @dataclass
@@ -34,7 +32,7 @@ class Apply:
     case: Path | None = None
     """Case folder of the verdict, for its judging records; the verdict's own folder where it is one."""
     json: Path | None = None
-    """File for the verdict with what was done and what it is worth under `applied`; "-" prints it."""
+    """File for the verdict with what was done and what it is worth under `applied`; "-", or nothing at the end, prints it."""
     ranges: Path | None = None
     """File for ranges for domain randomisation, .json or .yaml."""
     nearest: bool = False

@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.table import Table
 
 from bench.cli.console import emit
+from bench.cli.paths import PRINTED
 
 
 @dataclass
@@ -25,7 +26,7 @@ class Check:
     information: bool = True
     """Tell which parameters and effects the records identify."""
     json: Path | None = None
-    """File for the result as JSON; "-" prints it."""
+    """File for the result as JSON; "-", or nothing at the end, prints it."""
     force: bool = False
     """Overwrite a file that exists."""
 
@@ -39,7 +40,7 @@ class Check:
 
         check_targets(self.json, force=self.force)
         found = check_folder(self.case, informed=self.information)
-        if self.json == Path("-"):
+        if self.json == PRINTED:
             emit(found.to_json())
         else:
             _tell(found, self.case)

@@ -14,6 +14,7 @@ from rich.console import Console
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from bench.cli.console import emit
+from bench.cli.paths import PRINTED
 from bench.cli.records import pairs
 from bench.cli.verdict_text import verdict_summary
 
@@ -49,7 +50,7 @@ class Diagnose:
     scheduler: str = ""
     """Of a fleet: address of a dask scheduler (extra scale) that its cases run on."""
     json: Path | None = None
-    """File for the result as JSON; "-" prints it."""
+    """File for the result as JSON; "-", or nothing at the end, prints it."""
     html: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
     """File for the report, a self-contained HTML page."""
     rrd: Path | None = None
@@ -230,10 +231,6 @@ class Diagnose:
         if not self.budget > 0.0:
             raise ParameterError(f"--budget is {self.budget:g} s; give more than zero")
         check_targets(self.json, self.html, self.rrd, self.next_test, force=self.force)
-
-
-PRINTED = Path("-")
-"""Stands for standard output."""
 
 
 @contextlib.contextmanager

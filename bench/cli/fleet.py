@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 
 from bench.cli.console import emit
+from bench.cli.paths import PRINTED
 
 Stages = Callable[[bool], AbstractContextManager[Callable[[str], None]]]
 
@@ -31,11 +31,11 @@ def diagnose_fleet(asked: Any, stages: Stages) -> None:
     document = {"cases": found}
     text = json.dumps(json_values(document), indent=1, ensure_ascii=False)
     with together():
-        if asked.json is not None and asked.json != Path("-"):
+        if asked.json is not None and asked.json != PRINTED:
             write_text(asked.json, text + "\n")
         if asked.html is not None:
             fleet_page(found).write(asked.html)
-    if asked.json == Path("-"):
+    if asked.json == PRINTED:
         emit(document)
         return
     header, lines = fleet_rows(found)

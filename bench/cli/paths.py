@@ -9,3 +9,6 @@ import tyro
 
 Out = Annotated[Path, tyro.conf.arg(aliases=["-o"])]
 """File or folder to write, also asked for by ``-o``."""
+
+PRINTED = Path("-")
+"""A file of this name stands for standard output."""
