@@ -19,6 +19,7 @@ from bench.discrepancy.articulated_judgement.judgement import keys_of, ladder, n
 from bench.discrepancy.articulated_search.joint_rounds import round_of
 from bench.discrepancy.articulated_search.placements import placements
 from bench.discrepancy.articulated_search.search import nominal_fit, steps
+from bench.discrepancy.blind.protocol import write_case as written_again
 from bench.discrepancy.checks.admission import admitted
 from bench.discrepancy.multibody.nominal_parameters import nominal_parameters, twins
 from bench.errors import DocumentError
@@ -215,6 +216,15 @@ def test_factors_that_say_nothing_are_refused(tmp_path, name):
     entries = {parameter: entry | changes for parameter, entry in within_factor(10.0).items()}
     with pytest.raises(DocumentError, match=says):
         read_case(stated(folder, entries))
+
+
+@pytest.mark.parametrize("known", ["std", "factor"])
+def test_a_case_that_is_written_again_keeps_what_is_stated_of_its_parts(tmp_path, known):
+    folder = write_case(tmp_path, mjcf(servo=True), servo=True, length=1.0)
+    entries = within_factor(10.0, alike="S1", each=1.1)
+    case = read_case(of_type(folder, alike()) if known == "std" else stated(folder, entries))
+    written_again(case, tmp_path / "again")
+    assert read_case(tmp_path / "again").parameters == case.parameters
 
 
 def test_parts_of_a_type_are_known_in_one_way(tmp_path):

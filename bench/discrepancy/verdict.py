@@ -73,6 +73,7 @@ class NominalEstimate:
         stated: Value that was stated.
         stated_std: Uncertainty that was stated.
         shift_in_std: Deviation from the stated value in units of the stated uncertainty, named errors not included.
+        stated_factor: Factor to within which it was said to be known, one sigma of its logarithm; 1 where it was `stated_std`.
     """
 
     name: str
@@ -81,6 +82,14 @@ class NominalEstimate:
     stated: float
     stated_std: float
     shift_in_std: float
+    stated_factor: float = 1.0
+
+    @property
+    def stated_text(self) -> str:
+        """What was stated, in words."""
+        if self.stated_factor > 1.0:
+            return f"{self.stated:.5g}, within a factor of {self.stated_factor:.3g}"
+        return f"{self.stated:.5g} ± {self.stated_std:.2g}"
 
 
 def far_off(estimates: Iterable[NominalEstimate], sigmas: float) -> tuple[str, ...]:

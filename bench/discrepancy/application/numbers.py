@@ -27,6 +27,8 @@ def nominal_parameter(target: Target, estimate: NominalEstimate) -> Change:
     kind, _, name = estimate.name.partition(":")
     anchor = _set(target, kind, name, estimate.value, estimate.name)
     text = f"{kind} {estimate.stated:.6g} -> {estimate.value:.6g} ± {estimate.std:.2g}: {estimate.shift_in_std:+.2f} stated sigmas"
+    if estimate.stated_factor > 1.0:
+        text += f" of a factor of {estimate.stated_factor:.3g}"
     return Change(estimate.name, name, "number", text, (anchor,))
 
 

@@ -86,4 +86,5 @@ def _nominal(p: Any) -> NominalEstimate:
         _number(p.stated),
         _number(p.stated_std),
         _number(p.shift_in_std),
+        _number(p.stated_factor),
     )

@@ -106,13 +106,15 @@ def diagnose_articulated(
     model = ArticulatedModel.of(compiled, case.rig)
     case = with_beginnings(whole := thinned(told, settings=settings), settings=settings)
     problem = stepped(case, model, settings, deadline)
-    found = None
-    while found is None or not _accurate(problem, found, settings):
-        if found is not None:  # with what is named, long steps tell something else
-            problem = ArticulatedProblem.of(case, model, case.identification, settings, deadline)
+
+    def asked(problem: ArticulatedProblem) -> Explained:
         judging = ArticulatedProblem.of(case, model, case.validation, problem.settings)
         question = Question(judging, how, rng, stated, progress)
-        found = explained(problem, placements(problem, catalogue), question)
+        return explained(problem, placements(problem, catalogue), question)
+
+    found = asked(problem)
+    if not _accurate(problem, found, settings):  # with what is named, long steps tell something else
+        found = asked(ArticulatedProblem.of(case, model, case.identification, settings, deadline))
     problem, fits, final, verdict = found.problem, found.fits, found.final, found.verdict
     verdict = replace(
         verdict,

@@ -328,6 +328,8 @@ def model_numbers(problem: ArticulatedProblem, final: ArticulatedFit) -> tuple[N
         moved, slopes = p.deviation(final.vector, i), p.slopes(final.vector, i)
         at, slope = list(slopes), np.array(list(slopes.values()))
         std = float(np.sqrt(max(slope @ final.covariance[np.ix_(at, at)] @ slope, 0.0)))
-        return NominalEstimate(p.name, p.value + moved, std, p.value, p.stated_std, p.sigmas(final.vector, i))
+        return NominalEstimate(
+            p.name, p.value + moved, std, p.value, p.stated_std, p.sigmas(final.vector, i), p.stated_factor
+        )
 
     return tuple(estimate(i, p) for i, p in enumerate(problem.nominal) if not p.of_type)

@@ -93,6 +93,11 @@ class Nominal:
         return spread * self.value if self.logarithmic else spread
 
     @property
+    def stated_factor(self) -> float:
+        """Factor to within which it is known; 1 where a standard uncertainty is stated."""
+        return float(np.exp(np.hypot(self.std, self.together))) if self.logarithmic else 1.0
+
+    @property
     def lowest(self) -> float:
         """Least entry of a vector: a number that is positive stays so."""
         if self.logarithmic or self.value <= 0.0 or self.kind in AXES:

@@ -186,7 +186,7 @@ def _parameters(out: Page, diagnosis: ArticulatedDiagnosis) -> None:
         [
             (
                 p.name,
-                f"{p.stated:.5g} ± {p.stated_std:.2g}",
+                p.stated_text,
                 f"{p.value:.5g} ± {p.std:.2g}",
                 f"{p.shift_in_std:+.2f}",
             )
