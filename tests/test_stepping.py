@@ -38,9 +38,10 @@ def test_a_slow_log_takes_few_steps_a_sample_where_these_tell_the_same(tmp_path)
     assert accurate(problem, complete, fits[1], stern)
 
 
-def test_no_round_follows_one_that_misleads(tmp_path):
+def test_no_round_follows_one_that_misleads_but_the_first(tmp_path):
+    """One effect of two alone may predict worse than none."""
     problem = problem_of(write_case(tmp_path, rubbing(LIMIT), servo=True))
-    kinds = [effect for effect in CATALOGUE if effect.name in ("damping_error", "coulomb_friction")]
+    kinds = [effect for effect in CATALOGUE if effect.name in ("damping_error", "coulomb_friction", "force_offset")]
     asked = []
 
     def misled(of, before, after):
@@ -48,8 +49,9 @@ def test_no_round_follows_one_that_misleads(tmp_path):
         return True
 
     told = search(problem, placements(problem, kinds), misled=misled)
-    assert len(asked) == 1
-    assert len(told.fits[0].hypothesis) == asked[0][1] > asked[0][0] == 0
+    assert len(asked) <= 1
+    assert all(before > 0 for before, _ in asked)
+    assert len(told.fits[0].hypothesis) > 0
 
 
 @pytest.mark.parametrize("step", [1e-2, 3e-3])

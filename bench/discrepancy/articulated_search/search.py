@@ -69,7 +69,7 @@ def search(
         problem: Records and priors.
         candidates: Effects at places.
         settings: Of the search.
-        misled: Whether a fit predicts other records worse for sure than the one before it: the search ends there.
+        misled: Whether a fit predicts other records worse for sure than the one before it: the search ends there, but for its first round.
         progress: Called with a line of text at every stage.
     """
     settings = settings or problem.settings.articulated.search
@@ -98,7 +98,8 @@ def search(
         given_up += [before] if idle else []
         dropped |= idle
         progress(f"round {count}: " + ", ".join(f"{p.effect.name} ({p.where})" for p in current.hypothesis))
-        if misled(problem, before, current):
+        # one effect of two may predict worse than none, what follows something that helped does not
+        if before.hypothesis and misled(problem, before, current):
             progress(f"round {count}: makes the judging records worse, no further one")
             break
     for end in (current, *given_up):
