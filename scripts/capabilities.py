@@ -25,6 +25,7 @@ from diagnosis_figures import (
     applied,
     arms,
     background,
+    formats,
     graded,
     localisation,
     measured,
@@ -179,6 +180,19 @@ CAPABILITIES: Sequence[Capability] = (
         "Faults planted into records of a slide, and what `jointbench check` says",
         ("python", "scripts/planted_faults.py", "--faults", "200", "--sound", "100"),
         planted,
+    ),
+    Capability(
+        "check_arm",
+        "The same, planted into logs of an arm",
+        ("python", "scripts/planted_faults.py", "--machine", "arm", "--faults", "80", "--sound", "40"),
+        planted,
+    ),
+    Capability(
+        "formats",
+        "The same case from records in other formats",
+        ("python", "scripts/same_formats.py", "out/formats", "--json"),
+        formats,
+        before=(("python", "examples/mismatch/measure.py", "out/formats"),),
     ),
     Capability(
         "unstated",

@@ -136,6 +136,19 @@ def planted(told: Any) -> Figures:
     return rows
 
 
+def formats(told: Any) -> Figures:
+    """What of a verdict is another where the records come in another format."""
+    return [
+        (
+            f"verdict from {kind}",
+            "; ".join(found) or "the same as from CSV",
+            "the same as from CSV",
+            "does not hold" if found else "holds",
+        )
+        for kind, found in told["differences"].items()
+    ]
+
+
 BACKGROUND_LIMITS = {
     "main effect named or in a declared set": "≥ 90 %",
     "and first": "≥ 85 %",

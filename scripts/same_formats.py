@@ -59,7 +59,7 @@ def samples(path: Path, record: Recording) -> None:
     """A list of samples."""
     columns = _table(record)
     rows = [dict(zip(columns, map(float, row), strict=True)) for row in zip(*columns.values(), strict=True)]
-    path.write_text(json.dumps({"machine": "bench", "samples": rows}), encoding="utf-8")
+    path.write_text(json.dumps({"samples": rows}), encoding="utf-8")
 
 
 def labview(path: Path, record: Recording) -> None:
