@@ -41,7 +41,9 @@ def test_a_slow_log_takes_few_steps_a_sample_where_these_tell_the_same(tmp_path)
 def test_no_round_follows_one_that_misleads_but_the_first(tmp_path):
     """One effect of two alone may predict worse than none."""
     problem = problem_of(write_case(tmp_path, rubbing(LIMIT), servo=True))
-    kinds = [effect for effect in CATALOGUE if effect.name in ("damping_error", "coulomb_friction", "force_offset")]
+    kinds = [
+        effect for effect in CATALOGUE if effect.name in ("damping_error", "coulomb_friction", "force_offset")
+    ]
     asked = []
 
     def misled(of, before, after):
