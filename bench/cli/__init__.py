@@ -92,7 +92,7 @@ def _json_printed(arguments: list[str]) -> list[str]:
         return arguments
     told = []
     for argument, following in pairwise((*arguments, "--")):
-        bare = argument == "--json" and following.startswith("--")
+        bare = argument == "--json" and following.startswith("-") and following != str(PRINTED)
         told += [argument, str(PRINTED)] if bare else [argument]
     return told
 
