@@ -32,6 +32,7 @@ from diagnosis_figures import (
     native_effects,
     pendulum,
     planted,
+    real_formats,
     sealed,
     ten_minutes,
 )
@@ -193,6 +194,13 @@ CAPABILITIES: Sequence[Capability] = (
         ("python", "scripts/same_formats.py", "out/formats", "--json"),
         formats,
         before=(("python", "examples/mismatch/measure.py", "out/formats"),),
+    ),
+    Capability(
+        "real_formats",
+        "Files of laboratories and robots in eight formats, against the same as CSV",
+        ("python", "scripts/real_formats.py", "--data", "{data}", "--json"),
+        real_formats,
+        data=".",
     ),
     Capability(
         "unstated",

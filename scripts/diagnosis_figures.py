@@ -149,6 +149,19 @@ def formats(told: Any) -> Figures:
     ]
 
 
+def real_formats(told: Any) -> Figures:
+    """Real files against their CSV."""
+    return [
+        (
+            row["format"],
+            f"{row['channels']} channels of {row['samples']} samples, largest difference {row['apart']:.3g}",
+            "the same to the last digit",
+            "does not hold" if row["apart"] else "holds",
+        )
+        for row in told
+    ]
+
+
 BACKGROUND_LIMITS = {
     "main effect named or in a declared set": "≥ 90 %",
     "and first": "≥ 85 %",

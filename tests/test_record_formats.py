@@ -200,6 +200,31 @@ def test_formats_hold_the_same_motion(kind, tmp_path):
         assert "held from sample to sample" in " ".join(found.notes)
 
 
+@pytest.mark.parametrize("told", ["", " [us]"])
+def test_tables_of_a_folder_in_microseconds_are_told_so_by_their_headings_or_taken_for_it(told, tmp_path):
+    path, position, _ = _folder(tmp_path)
+    for name in ("state_motor.csv", "control.csv"):
+        heading, *rows = (path / name).read_text().splitlines()
+        kind, time, *rest = zip(*(row.split(",", 2) for row in rows), strict=True)
+        late = [f"{k},{1e6 * float(t)!r},{x}" for k, t, x in zip(kind, time, *rest, strict=True)]
+        (path / name).write_text("\n".join([heading.replace("timestamp", f"timestamp{told}"), *late]))
+    log = log_of(path)
+    np.testing.assert_allclose(log.time, T, atol=1e-9)
+    np.testing.assert_allclose(log.arrays[position], Q, atol=1e-9)
+    assert ("taken for us" in " ".join(log.notes)) == (not told)
+    (path / "control.csv").write_text(
+        (path / "control.csv").read_text().replace("[us]", "").replace("timestamp", "timestamp [ms]")
+    )
+    with pytest.raises(FileFormatError, match="one unit is expected"):
+        log_of(path)
+
+
+def test_a_bag_without_its_metadata_is_found_in_its_folder(tmp_path):
+    path, position, _ = _bag(tmp_path, "SQLITE3")
+    (path / "metadata.yaml").unlink()
+    np.testing.assert_allclose(log_of(path).arrays[position], Q, atol=1e-9)
+
+
 def test_an_irregular_clock_is_brought_onto_one_and_told(tmp_path):
     rng = np.random.default_rng(0)
     time = np.cumsum(rng.uniform(0.5, 1.5, N)) / RATE

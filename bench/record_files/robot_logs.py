@@ -12,8 +12,10 @@ from typing import Any
 import numpy as np
 
 from bench.errors import FileFormatError
-from bench.record_files.column_map import Variable
+from bench.record_files.column_map import Variable, name_and_unit
 from bench.record_files.streams import Stream, merged
+from bench.record_files.times import file_times, time_source
+from bench.recording.clock import suspected_unit
 
 BAGS = (".bag", ".db3", ".mcap")
 COMMANDS = ("command", "cmd", "control", "goal", "target", "desired", "reference", "action", "setpoint")
@@ -102,34 +104,43 @@ def read_folder(path: Path) -> tuple[dict[str, Variable], tuple[str, ...]]:
     """A folder of tables with clocks of their own (command and state, as SAGE writes them), or of a rosbag 2.
 
     Cells that hold a list of numbers become a column a joint, named by joint_list.txt where there is one. Columns of a table of commands
-    begin with "command_".
+    begin with "command_". Times are in the unit that their headings tell; where none does and they are hardly seconds, in the likely one,
+    which is noted.
 
     Raises:
-        FileFormatError: There is no table in it.
+        FileFormatError: There is no table in it, or the headings of times tell different units.
     """
     if (path / "metadata.yaml").exists():
         return read_bag(path)
     joints_file = path / "joint_list.txt"
     joints = joints_file.read_text(encoding="utf-8").split() if joints_file.exists() else []
-    streams = []
-    for file in sorted(path.glob("*.csv")):
-        stream = _table(file, joints)
-        if stream is not None:
-            streams.append(stream)
-    if not streams:
+    tables = [table for file in sorted(path.glob("*.csv")) if (table := _table(file, joints)) is not None]
+    if not tables:
+        bags = [file for file in path.iterdir() if file.suffix in BAGS]
+        if len(bags) == 1:  # whose metadata.yaml has been lost
+            return read_bag(bags[0])
         raise FileFormatError(
             f"'{path}' is a folder without tables; a folder of CSV files with a column timestamp, or of a rosbag 2, is expected"
         )
-    return merged(streams, path.name)
+    streams, units = [stream for stream, _ in tables], sorted({unit for _, unit in tables})
+    if len(units) > 1:
+        told = " and in ".join(unit or "no unit" for unit in units)
+        raise FileFormatError(f"the times of the tables in '{path}' are in {told}; one unit is expected")
+    longest = max((stream.time for stream in streams), key=len)
+    likely = suspected_unit(longest) if not units[0] and len(longest) > 1 else ""
+    variables, notes = merged(streams, path.name, units[0] or likely or "s")
+    if likely:
+        said = f"no heading tells the unit of the times, which are hardly seconds and taken for {likely}"
+        notes += (f"{said}; head them 'timestamp [s]' if they are",)
+    return variables, notes
 
 
-def _table(file: Path, joints: list[str]) -> Stream | None:
+def _table(file: Path, joints: list[str]) -> tuple[Stream, str] | None:
+    """A table and the unit of its times, "" where that is not told; None of one without times or numbers."""
     with file.open(newline="", encoding="utf-8") as stream:
         rows = list(csv.DictReader(stream))
-    heading = next(
-        (h for h in (rows[0] if rows else {}) if h and h.lower() in ("time", "timestamp", "t")), None
-    )
-    if heading is None:
+    heading = time_source(filter(None, rows[0])) if rows else ""
+    if not heading:
         return None
     held = any(word in file.stem.lower() for word in COMMANDS)
     columns: dict[str, list[float]] = {}
@@ -144,7 +155,8 @@ def _table(file: Path, joints: list[str]) -> Stream | None:
                 for label, value in _cells(name, cell, joints, held):
                     columns.setdefault(label, []).append(value)
     whole = {name: np.array(values) for name, values in columns.items() if len(values) == len(times)}
-    return Stream(file.stem, np.array(times), whole, held=held) if whole else None
+    unit = name_and_unit(heading)[1] or file_times(np.array(times), "", heading).told
+    return (Stream(file.stem, np.array(times), whole, held=held), unit) if whole else None
 
 
 def _cells(name: str, cell: str, joints: list[str], command: bool) -> list[tuple[str, float]]:

@@ -22,7 +22,7 @@ class Stream(NamedTuple):
 
     Attributes:
         name: Name, for notes.
-        time: Times [s] (n,).
+        time: Times (n,), of all streams in one unit.
         columns: Values (n,) by column.
         units: Units by column.
         held: Whether its values hold until the next sample.
@@ -35,8 +35,15 @@ class Stream(NamedTuple):
     held: bool = False
 
 
-def merged(streams: Sequence[Stream], file: str) -> tuple[dict[str, Variable], tuple[str, ...]]:
+def merged(
+    streams: Sequence[Stream], file: str, unit: str = "s"
+) -> tuple[dict[str, Variable], tuple[str, ...]]:
     """All columns on the clock of the longest stream, from zero, and what was done.
+
+    Args:
+        streams: The streams.
+        file: Name, for messages.
+        unit: Unit of their times.
 
     Raises:
         RecordingError: There is none with two samples, or the streams have no time in common.
@@ -53,10 +60,10 @@ def merged(streams: Sequence[Stream], file: str) -> tuple[dict[str, Variable], t
     if len(clock) < 2:
         raise RecordingError(
             f"the streams of '{file}' have no time in common: "
-            + ", ".join(f"{s.name} from {s.time[0]:.6g} to {s.time[-1]:.6g} s" for s in usable[:6])
+            + ", ".join(f"{s.name} from {s.time[0]:.6g} to {s.time[-1]:.6g} {unit}" for s in usable[:6])
         )
     # from the first sample, so that a double keeps all digits of a step beside the seconds since 1970
-    variables = {"time": Variable(clock - clock[0], "s")}
+    variables = {"time": Variable(clock - clock[0], unit)}
     held, joined = [], []
     for stream in usable:
         same = stream is base or np.array_equal(stream.time, base.time)

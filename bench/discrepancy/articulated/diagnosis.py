@@ -10,12 +10,13 @@ import time
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 
+import mujoco
 import numpy as np
 
 from bench.discrepancy.articulated.admission import admitted_robot
 from bench.discrepancy.articulated.explaining import Explained, Question, asked_as, explained
 from bench.discrepancy.articulated.naming import closest_rival
-from bench.discrepancy.articulated.next_test import Trajectory, propose
+from bench.discrepancy.articulated.next_test import JointProposal, Trajectory, propose
 from bench.discrepancy.articulated.places import matrix_of
 from bench.discrepancy.articulated.stepping import accurate, stepped
 from bench.discrepancy.articulated_effects.catalogue import CATALOGUE
@@ -128,9 +129,7 @@ def diagnose_articulated(
         ),
         settings=changed(settings),
     )
-    rival = closest_rival(fits, final, settings.articulated.judgement, found.alike) if verdict.named else None
-    told_apart = rival is not None and deadline.allows("the next test")
-    proposal = propose(problem, compiled, final, rival) if told_apart else None
+    proposal = _next_test(compiled, found)
     if proposal is not None:
         verdict = replace(verdict, next_excitation=proposal.told)
     verdict = verdict.timed(time.perf_counter() - began)
@@ -138,6 +137,17 @@ def diagnose_articulated(
         case, model, problem, found.judging, tuple(fits), final, matrix_of(problem, fits), verdict,
         None if proposal is None else proposal.trajectory,
     )  # fmt: skip
+
+
+def _next_test(compiled: mujoco.MjModel, found: Explained) -> JointProposal | None:
+    """The motion that would tell what is named from its closest rival, where there is one and time for it."""
+    if not found.verdict.named:
+        return None
+    problem = found.problem
+    rival = closest_rival(found.fits, found.final, problem.settings.articulated.judgement, found.alike)
+    if rival is None or not problem.deadline.allows("the next test"):
+        return None
+    return propose(problem, compiled, found.final, rival)
 
 
 def _accurate(problem: ArticulatedProblem, found: Explained, settings: DiagnosisSettings) -> bool:

@@ -30,7 +30,7 @@ import numpy as np
 from bench.discrepancy.blind.drawing import BlindOptions, draw_case
 from bench.discrepancy.blind.robot_cases import draw_robot_case
 from bench.discrepancy.blind.schema import ANSWER_LIMITS, ProtocolDocument
-from bench.discrepancy.case.case import Case, CaseChannel, NominalParameter
+from bench.discrepancy.case.case import Case, CaseChannel
 from bench.documents import parse_json
 from bench.errors import BenchError, FileFormatError, ParameterError
 from bench.files import together, write_bytes, write_text
@@ -144,7 +144,7 @@ def write_case(case: Case, folder: str | Path) -> None:
     nominal = {
         "rig": case.rig,
         "sample_rate_hz": 1.0 / case.identification[0].step,
-        "parameters": {p.name: _stated(p) for p in case.parameters},
+        "parameters": {p.name: p.entry for p in case.parameters},
         "channels": {
             "time": {"unit": "s"},
             **{c.name: _entry_of(c) for c in case.channels},
@@ -155,13 +155,6 @@ def write_case(case: Case, folder: str | Path) -> None:
         write_bytes(folder / case.rig, (case.folder / case.rig).read_bytes())
     # last, since it is what makes a folder a case
     write_text(folder / "nominal.json", json.dumps(nominal, indent=1))
-
-
-def _stated(parameter: NominalParameter) -> dict[str, Any]:
-    """The entry of a nominal parameter in ``nominal.json``."""
-    known = {"std": parameter.std} if parameter.factor == 1.0 else {"factor": parameter.factor}
-    of_type = {"alike": parameter.alike, "each": parameter.each} if parameter.alike else {}
-    return {"value": parameter.value, **known, "unit": parameter.unit, **of_type}
 
 
 def _entry_of(channel: CaseChannel) -> dict[str, Any]:

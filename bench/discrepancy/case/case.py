@@ -71,6 +71,13 @@ class NominalParameter:
         return cls(name, value, value * math.log(factor), unit, alike, each, factor)
 
     @property
+    def entry(self) -> dict[str, float | str]:
+        """Its entry in ``nominal.json``."""
+        known = {"std": self.std} if self.factor == 1.0 else {"factor": self.factor}
+        of_type = {"alike": self.alike, "each": self.each} if self.alike else {}
+        return {"value": self.value, **known, "unit": self.unit, **of_type}
+
+    @property
     def own_std(self) -> float:
         """The part of its uncertainty that is its own: all of it, or the scatter of its type; of its logarithm where it has a factor."""
         own = self.each if self.alike else self.factor

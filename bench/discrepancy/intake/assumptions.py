@@ -10,6 +10,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
+from bench.discrepancy.case.case import NominalParameter
 from bench.errors import ParameterError, UnknownNameError
 from bench.rig.actuators import DRIVES, JointDrive, commanded, drive_of
 
@@ -92,15 +93,12 @@ class Assumed(NamedTuple):
     @property
     def entry(self) -> dict[str, float | str]:
         """Its entry in ``nominal.json``."""
-        out: dict[str, float | str] = {"value": self.value}
-        out |= {"factor": self.spread} if self.spread > 1.0 else {"std": self.spread * self.value}
-        out["unit"] = self.unit
-        if self.alike:
-            out |= {
-                "alike": self.alike,
-                "each": 1.0 + self.twins if self.spread > 1.0 else self.twins * self.value,
-            }
-        return out
+        if self.spread > 1.0:
+            return NominalParameter.within_factor(
+                self.name, self.value, self.spread, self.unit, self.alike, 1.0 + self.twins
+            ).entry
+        std, each = self.spread * self.value, self.twins * self.value
+        return NominalParameter(self.name, self.value, std, self.unit, self.alike, each).entry
 
     @property
     def told(self) -> str:
