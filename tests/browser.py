@@ -127,6 +127,19 @@ def too_wide(tab: Browser) -> list[str]:
     })()""")
 
 
+def overlapping(tab: Browser) -> list[str]:
+    """Legends of plots over which the tools of that plot, or of another, appear."""
+    return tab.ask("""(() => {
+      const boxes = (what) => [...document.querySelectorAll(what)].map((e) => e.getBoundingClientRect()).filter((b) => b.width > 0);
+      const found = [];
+      for (const a of boxes(".plot .legend")) for (const b of boxes(".plot .modebar")) {
+        if (a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom)
+          found.push(`legend ${Math.round(a.left)} to ${Math.round(a.right)}, tools ${Math.round(b.left)} to ${Math.round(b.right)}`);
+      }
+      return found;
+    })()""")
+
+
 def shown_whole(page: Path) -> None:
     """Assert that a page of plots is drawn without an error, and nothing of it cut, at every width and in every scheme."""
     with browser() as tab:
@@ -141,6 +154,7 @@ def shown_whole(page: Path) -> None:
                 where = f"{width} px, {scheme}"
                 assert not tab.messages, where
                 assert not too_wide(tab), where
+                assert not overlapping(tab), where
                 assert tab.ask("document.querySelectorAll('.plot:not(:has(.svg-container))').length") == 0, (
                     where
                 )
