@@ -151,6 +151,19 @@ CAPABILITIES: Sequence[Capability] = (
         hours=True,
     ),
     Capability(
+        "applied_arms",
+        "Verdicts of arms, legs and desks of others, applied in plain MuJoCo",
+        (
+            *("python", "scripts/applied.py", "{data}/../trials-arms", "out/applied-arms"),
+            *("--only", "arm2", "leg3", "desk5"),
+            *("--verdicts", "out/arms", "--again", "--json"),
+        ),
+        applied,
+        before=(("jointbench", "blind", "run", "{data}/../trials-arms", "out/arms"),),
+        data="../trials-arms",
+        hours=True,
+    ),
+    Capability(
         "localisation",
         "Where the missing force lies",
         ("python", "scripts/localisation.py", "--json"),

@@ -217,8 +217,9 @@ def applied(told: Any) -> Figures:
                     "",
                 )
             )
-    told_of = f"{told['within']} within 5 %, {told['explained']} with a cause, of {told['n']}"
-    return [*rows, ("all", told_of, "each within 5 % or with its cause")]
+    told_of = f"{told['within']} within 5 %, {told['explained']} with the whole cause, of {told['n']}"
+    held = "holds" if told["within"] + told["explained"] == told["n"] else "does not hold"
+    return [*rows, ("all", told_of, "each within 5 % or with its cause", held)]
 
 
 def ten_minutes(told: Any) -> Figures:

@@ -28,7 +28,7 @@ from bench.discrepancy.multibody.joints import Joint
 from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.multibody.motion import JointMotion, motion_of
 from bench.discrepancy.numerics.threads import in_threads
-from bench.discrepancy.replay.running import Reading, Stretch, controls, coordinate_at, hook_of, run
+from bench.discrepancy.replay.running import Reading, Stretch, Train, controls, coordinate_at, hook_of, run
 from bench.discrepancy.settings import DEFAULT
 from bench.discrepancy.verdict import NamedEffect
 from bench.errors import ModelError
@@ -157,8 +157,16 @@ class JointReplay:
             self._start(applied, model, j, motion, first, follow, b)
             for first, b in zip(firsts, begins, strict=True)
         ]
-        length = int(np.ceil((min(every, len(record)) - 1) * record.step / step - 1e-9)) + 2
-        position, velocity = run(model, hook_of(applied), windows, control, length, rested=False)
+        length = int(np.ceil(min(every, len(record)) * record.step / step - 1e-9)) + 1
+        position, velocity = run(
+            model,
+            hook_of(applied),
+            windows,
+            control,
+            length,
+            rested=False,
+            trains=_trains(applied, model, self.model.joints, joint.name),
+        )
         out, reading = [], self._reading(applied, model, joint.name)
         for w, first in enumerate(firsts):
             count = min(every, len(record) - first)
@@ -197,7 +205,7 @@ class JointReplay:
         data = mujoco.MjData(model)
         for i, joint in enumerate(self.model.joints):
             own = model.joint(joint.name)
-            here = begin < len(follow.position) and i != j
+            here = begin < len(follow.position)
             data.qpos[own.qposadr[0]] = follow.position[begin, i] if here else motion.position[first, i]
             data.qvel[own.dofadr[0]] = follow.velocity[begin, i] if here else motion.velocity[first, i]
         for tie in self.model.ties:
@@ -214,6 +222,19 @@ class JointReplay:
             if name in applied.outputs:
                 data.qpos[model.joint(name).qposadr[0]] += wound
         return Stretch(begin, np.array(data.qpos), np.array(data.qvel))
+
+
+def _trains(applied: Applied, model: mujoco.MjModel, joints: Sequence[Joint], free: str) -> list[Train]:
+    """Trains that move freely: of the free joint, and of those whose motor follows what its encoder measured."""
+    out = []
+    for joint in joints:
+        train = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, f"{PREFIX}{joint.name}_train")
+        on_link = joint.name in applied.outputs
+        if train >= 0 and (joint.name == free or not on_link):
+            own = model.joint(joint.name)
+            motor = (int(own.qposadr[0]), int(own.dofadr[0])) if on_link else None
+            out.append(Train(int(model.jnt_qposadr[train]), int(model.jnt_dofadr[train]), motor))
+    return out
 
 
 def _wound(model: mujoco.MjModel, train: int, weight: float) -> float:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
 from mujoco import rollout
+from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from bench import native
@@ -66,6 +67,15 @@ class Stretch(NamedTuple):
     velocity: Array
 
 
+class Train(NamedTuple):
+    """A train between a motor and its link: indices of its deflection's position and velocity, and of those of the motor, where the
+    encoder is on the link and shows their sum; None where it is on the motor."""
+
+    address: int
+    dof: int
+    motor: tuple[int, int] | None
+
+
 def run(
     model: mujoco.MjModel,
     hook: Hook | None,
@@ -74,38 +84,78 @@ def run(
     steps: int,
     *,
     rested: bool,
+    trains: Sequence[Train] = (),
 ) -> tuple[Array, Array]:
     """Run windows of `steps` steps; return positions (n_windows, steps + 1, nq) and velocities (n_windows, steps + 1, nv).
+
+    What no encoder shows, the memory of laws and the deflection of trains, a window takes over from the end of the one before.
 
     Args:
         model: The model.
         hook: Called before every step.
-        windows: Where they start.
+        windows: Where they start, in order.
         control: Controls (all_steps, nu) of the whole record; its last row is held.
         steps: Steps a window.
         rested: Whether actuators had no input before the record; otherwise its first.
+        trains: Trains whose deflection is taken over.
     """
     own = mujoco.MjModel.__copy__(model)
     own.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
-    activations = _activations(own, control, rested=rested)
-    starts, rows = [], []
-    for window in windows:
-        data = mujoco.MjData(own)
+    known, activations = _filters(own), _activations(own, control, rested=rested)
+    laws = np.setdiff1d(np.arange(own.na), [int(own.actuator_actadr[u]) for u in known])
+    whole: list[Array] = []
+
+    def start(k: int) -> Array:
+        data, window = mujoco.MjData(own), windows[k]
         data.qpos[:], data.qvel[:] = window.position, window.velocity
         data.act[:] = activations[min(window.first, len(activations) - 1)]
+        if k > 0 and hidden and np.isfinite(end := whole[k - 1][window.first - windows[k - 1].first]).all():
+            _take_over(own, data, end, laws, trains)
         _remember(own, data, control, window.first, rested=rested)
-        state = np.empty(mujoco.mj_stateSize(own, mujoco.mjtState.mjSTATE_FULLPHYSICS))
-        mujoco.mj_getState(own, data, state, mujoco.mjtState.mjSTATE_FULLPHYSICS)
-        starts.append(state)
-        rows.append(control[np.minimum(window.first + np.arange(steps), len(control) - 1)])
-    with native.running(own):
+        return _state(own, data)
+
+    def runs(starts: list[Array], rows: list[Array]) -> Array:
         if hook is None:
             found, _ = rollout.rollout(own, mujoco.MjData(own), np.array(starts), np.array(rows))
             states = np.asarray(found, dtype=np.float64)
         else:
             states = np.array([_stepped(own, hook, s, c) for s, c in zip(starts, rows, strict=True)])
-    whole = np.concatenate([np.array(starts)[:, None, :], states], axis=1)
-    return whole[:, :, 1 : 1 + own.nq], whole[:, :, 1 + own.nq : 1 + own.nq + own.nv]
+        return np.concatenate([np.array(starts)[:, None, :], states], axis=1)
+
+    hidden = bool(len(laws) or trains)
+    rows = [control[np.minimum(w.first + np.arange(steps), len(control) - 1)] for w in windows]
+    with native.running(own):
+        if hidden:
+            for k, row in enumerate(rows):
+                whole.append(runs([start(k)], [row])[0])
+        else:
+            whole = list(runs([start(k) for k in range(len(windows))], rows))
+    out = np.array(whole)
+    return out[:, :, 1 : 1 + own.nq], out[:, :, 1 + own.nq : 1 + own.nq + own.nv]
+
+
+def _state(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
+    state = np.empty(mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS))
+    mujoco.mj_getState(model, data, state, mujoco.mjtState.mjSTATE_FULLPHYSICS)
+    return state
+
+
+def _take_over(
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    end: Array,
+    laws: NDArray[np.int64],
+    trains: Sequence[Train],
+) -> None:
+    """Set what no encoder shows to what it is in another state; what encoders show stays."""
+    other = mujoco.MjData(model)
+    mujoco.mj_setState(model, other, end, mujoco.mjtState.mjSTATE_FULLPHYSICS)
+    data.act[laws] = other.act[laws]
+    for train in trains:
+        if train.motor is not None:
+            data.qpos[train.motor[0]] += data.qpos[train.address] - other.qpos[train.address]
+            data.qvel[train.motor[1]] += data.qvel[train.dof] - other.qvel[train.dof]
+        data.qpos[train.address], data.qvel[train.dof] = other.qpos[train.address], other.qvel[train.dof]
 
 
 def _stepped(model: mujoco.MjModel, hook: Hook, start: Array, control: Array) -> Array:
@@ -120,15 +170,17 @@ def _stepped(model: mujoco.MjModel, hook: Hook, start: Array, control: Array) ->
     return out
 
 
+def _filters(model: mujoco.MjModel) -> list[int]:
+    """Actuators whose activation is a first-order filter of their control."""
+    known = {int(mujoco.mjtDyn.mjDYN_FILTER), int(mujoco.mjtDyn.mjDYN_FILTEREXACT)}
+    return [u for u in range(model.nu) if int(model.actuator_dyntype[u]) in known]
+
+
 def _activations(model: mujoco.MjModel, control: Array, *, rested: bool) -> Array:
     """What first-order filters hold before every step (n, na); other activations begin at zero."""
     out = np.zeros((len(control), model.na))
     step = float(model.opt.timestep)
-    for u in range(model.nu):
-        if int(model.actuator_dyntype[u]) not in (
-            int(mujoco.mjtDyn.mjDYN_FILTER), int(mujoco.mjtDyn.mjDYN_FILTEREXACT)
-        ):  # fmt: skip
-            continue
+    for u in _filters(model):
         at, share = (
             int(model.actuator_actadr[u]),
             1.0 - np.exp(-step / max(float(model.actuator_dynprm[u, 0]), 1e-12)),

@@ -1,0 +1,58 @@
+"""Judging records run in windows: they begin as late as their log, and with what no encoder shows as the window before left it."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+from test_articulated import RATE, mjcf, write_case
+
+from bench.discrepancy import read_case
+from bench.discrepancy.application.applying import Findings, apply
+from bench.discrepancy.replay.running import Stretch, Train, run
+from bench.discrepancy.replay.verification import replay_of, root_mean_square
+from bench.discrepancy.verdict import Estimate, NamedEffect
+
+TRAIN = """<mujoco><option timestep="0.001" gravity="0 0 0"/><worldbody>
+  <body><joint name="motor" axis="0 0 1"/><inertial pos="0 0 0" mass="1" diaginertia="0.02 0.02 0.02"/>
+    <body><joint name="train" axis="0 0 1" stiffness="40" damping="0.02"/>
+      <inertial pos="0 0 0" mass="1" diaginertia="0.03 0.03 0.03"/></body></body></worldbody>
+  <actuator><motor joint="motor"/><general joint="motor" dyntype="integrator" gainprm="0.5"/></actuator></mujoco>"""
+
+
+@pytest.mark.parametrize("on_link", [False, True])
+def test_windows_in_a_row_are_one_run_where_encoders_show_what_it_shows(on_link):
+    model = mujoco.MjModel.from_xml_string(TRAIN)
+    steps, each = 900, 300
+    control = np.column_stack([np.sin(0.02 * np.arange(steps)), np.cos(0.005 * np.arange(steps))])
+    rest = Stretch(0, np.zeros(2), np.zeros(2))
+    whole = [found[0] for found in run(model, None, [rest], control, steps, rested=True)]
+    shown = [found.sum(axis=1) if on_link else found[:, 0] for found in whole]
+    # what an encoder shows at the start of a window, and a train at rest
+    windows = [Stretch(k, *(np.array([found[k], 0.0]) for found in shown)) for k in range(0, steps, each)]
+    trains = [Train(1, 1, (0, 0) if on_link else None)]
+    found = run(model, None, windows, control, each, rested=True, trains=trains)
+    for one, all_at_once in zip(found, whole, strict=True):
+        np.testing.assert_allclose(np.concatenate(one[:, :each]), all_at_once[:steps], atol=1e-12)
+    # with the train taken for unwound the runs part
+    other, _ = run(model, None, windows, control, each, rested=True)
+    assert np.abs(np.concatenate(other[:, :each]) - whole[0][:steps]).max() > 0.01
+
+
+def test_windows_of_a_late_log_begin_as_late(tmp_path):
+    folder = write_case(tmp_path, mjcf(servo=False), servo=False)
+    late = round(0.04 * RATE)
+    for path in folder.glob("*.csv"):
+        table = np.genfromtxt(path, delimiter=",", names=True)
+        table["elbow_q"] = np.append(np.full(late, table["elbow_q"][0]), table["elbow_q"][:-late])
+        header = ",".join(table.dtype.names)
+        np.savetxt(path, table.tolist(), delimiter=",", header=header, comments="", fmt="%.9g")
+    case, path = read_case(folder), folder / "model.xml"
+    replay = replay_of(path, case, articulated=True)
+
+    def left(*effects):
+        applied = apply(path, Findings(effects), case=case, linear=False)
+        return root_mean_square(replay.errors(applied, effects)["elbow"])
+
+    delay = NamedEffect("position_delay", "elbow", 1.0, {"delay_s": Estimate(late / RATE, 1e-4, "s")})
+    assert left(delay) < 0.1 * left()
