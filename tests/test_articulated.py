@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 import pytest
 from browser import CHROMIUM, shown_whole
+from scipy.interpolate import CubicSpline
 
 from bench.discrepancy import diagnose, read_case
 from bench.discrepancy.articulated.admission import admitted_robot
@@ -28,9 +29,11 @@ from bench.discrepancy.articulated_search.fitting import ArticulatedFit, fit, re
 from bench.discrepancy.articulated_search.placements import placements
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.articulated_search.search import complete, without_idle
+from bench.discrepancy.multibody.body_numbers import BodyNumbers
 from bench.discrepancy.multibody.channels import bound
 from bench.discrepancy.multibody.encoders import weight_of_readings
 from bench.discrepancy.multibody.model import ArticulatedModel, compiled_model
+from bench.discrepancy.multibody.records import relinked
 from bench.discrepancy.replay.verification import replay_of
 from bench.discrepancy.report.html_page import write_report
 from bench.discrepancy.report.rerun_recording import write_rerun
@@ -288,13 +291,48 @@ def test_a_joint_that_is_followed_leaves_the_equations_of_the_others_as_they_are
     (free,) = part.joints
     at = [joint.name for joint in whole.joints].index(free.name)
     mine, theirs = part.records[0].joints[0], whole.records[0].joints[at]
-    for name in ("inertia", "bias", "slope", "reference", "load", "command", "position"):
+    for name in ("inertia", "bias", "slope", "reference", "acceleration", "command", "position"):
         np.testing.assert_allclose(getattr(mine, name), getattr(theirs, name), rtol=1e-6, atol=1e-9)
     assert {p.where for p in placements(part, CATALOGUE) if p.effect.site == "joint"} == {free.name}
     with pytest.raises(BenchError, match=f"'{followed}' held or moving as measured"):
         replay_of(folder / "model.xml", read_case(folder), articulated=True)
     with pytest.raises(BenchError, match="elbwo"):
         problem_of(folder, elbwo="follow")
+
+
+def test_equations_hold_where_a_link_is_and_its_gear_carries_what_the_bodies_weigh(tmp_path):
+    """A wound-up drive and a payload: bias, inertia and load are those of MuJoCo's model with both, not of the model at its motors."""
+    problem = problem_of(write_case(tmp_path, mjcf(servo=False), servo=False))
+    numbers = BodyNumbers({"upper": {"mass": 0.2}}, [("fore", {"payload": PAYLOAD})])
+    prepared = problem.records[0]
+    motors, t = prepared.motion, np.arange(len(prepared.record)) * prepared.record.step
+    away = 0.1 * np.column_stack([np.sin(6.0 * t), 6.0 * np.cos(6.0 * t)])
+    links = np.column_stack([motors.position[:, 0], motors.velocity[:, 0]]) + away
+    found = relinked(problem.case, problem.model, prepared, {0: links}, numbers)
+
+    model = mujoco.MjModel.from_xml_string(mjcf(servo=False, payload=PAYLOAD))
+    model.body("upper").mass += 0.2
+    model.dof_damping[:], model.dof_armature[:] = 0.0, 0.0
+    mujoco.mj_setConst(model, mujoco.MjData(model))
+    data, torques = mujoco.MjData(model), []
+    followed = np.gradient(away[:, 1], t[1])
+    for k in range(len(t)):
+        data.qpos[:], data.qvel[:], data.qacc[:] = (part[k] for part in motors[:3])
+        data.qpos[0], data.qvel[0] = links[k]
+        data.qacc[0] += followed[k]
+        mujoco.mj_inverse(model, data)
+        torques.append(np.array(data.qfrc_inverse))
+    middles = (np.arange(len(found.joints[0].bias)) + 0.5) * (t[-1] / len(found.joints[0].bias))
+    inner = slice(
+        len(middles) // 20, -len(middles) // 20
+    )  # not the ends, where the filter of the angle rings
+    for j, record in enumerate(found.joints):
+        bias, inertia = record.coefficients(numbers)
+        wanted = np.abs(CubicSpline(t, np.array(torques)[:, j])(middles))[inner]
+        size = np.sqrt(np.mean(wanted**2))
+        np.testing.assert_allclose(record.load(bias, inertia)[inner], wanted, atol=0.01 * size)
+        stated, alone = record.coefficients(BodyNumbers({}))
+        assert np.sqrt(np.mean((record.load(stated, alone)[inner] - wanted) ** 2)) > 0.1 * size
 
 
 def test_bodies_without_a_name_go_by_what_moves_them():

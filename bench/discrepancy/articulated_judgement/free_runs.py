@@ -17,6 +17,7 @@ from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.multibody.encoders import travel
 from bench.discrepancy.multibody.inputs import input_of, noise_of_loads
 from bench.discrepancy.multibody.joint_forces import Slot
+from bench.discrepancy.multibody.joint_record import judged_from
 from bench.discrepancy.multibody.motion import clock_of
 from bench.discrepancy.multibody.noise import NoiseDraw, NoiseSettings, draw
 from bench.discrepancy.multibody.records import PreparedRecord
@@ -35,8 +36,8 @@ class FreeRuns:
     def errors(self, j: int, hypothesis: JointHypothesis, vector: Array, prepared: PreparedRecord) -> Array:
         """Logged less predicted positions (n,) of joint `j`, run without corrections from the measured states of its windows.
 
-        What no encoder tells at the start of a window, the winding of an elastic drive, is taken from the run that is corrected. The
-        first of several windows is left out: at the end of a record its velocity is told from one side alone, several times worse.
+        What no encoder tells at the start of a window, the winding of an elastic drive, is taken from the run that is corrected. They
+        are judged from `judged_from` on.
         """
         record, motion = prepared.joints[j], prepared.motion
         every = record.window or len(record.position)
@@ -50,7 +51,7 @@ class FreeRuns:
             _, states = self.problem.innovations(j, hypothesis, vector, prepared)
             starts = np.hstack([starts, states[::every, 2:] - states[::every, :2]])
         out, _ = self.problem.run(j, hypothesis, vector, record, np.zeros((2, 2)), starts, every)
-        return (1.0 + record.encoder.gain) * out[every if len(starts) > 1 else 0 :, 0]
+        return (1.0 + record.encoder.gain) * out[judged_from(record.window, len(record.position)) :, 0]
 
     @cached_property
     def sizes(self) -> Array:

@@ -24,6 +24,7 @@ from bench.discrepancy.articulated_effects.effect import JointScales
 from bench.discrepancy.articulated_effects.hypothesis import JointHypothesis, placed_values
 from bench.discrepancy.articulated_search.misfit import Octaves, transformed
 from bench.discrepancy.case.case import Case, CaseRecord
+from bench.discrepancy.multibody.body_numbers import BodyNumbers
 from bench.discrepancy.multibody.encoders import Encoder
 from bench.discrepancy.multibody.joint_forces import Slot
 from bench.discrepancy.multibody.joint_record import JointRecord
@@ -191,9 +192,7 @@ class ArticulatedProblem:
                     replace(record, process=torque, filter=None) if torque > record.process else record
                 )
             records.append(replace(prepared, joints=tuple(joints)))
-        return ArticulatedProblem(
-            self.case, self.model, tuple(records), self.settings, self.deadline, max(level, self.softness)
-        )
+        return replace(self, records=tuple(records), softness=max(level, self.softness))
 
     def settled(self, hypothesis: JointHypothesis, vector: Array) -> ArticulatedProblem:
         """The same problem with the links of elastic joints where a fit has them; itself where there are none behind their motors."""
@@ -204,13 +203,13 @@ class ArticulatedProblem:
         ]
         if not elastic:
             return self
-        records = []
+        records, numbers = [], self.numbers(hypothesis, vector)
         for raw, prepared in zip(self.records, self.motions(hypothesis, vector), strict=True):
             links = {j: self.innovations(j, hypothesis, vector, prepared)[1][:, 2:] for j in elastic}
-            records.append(relinked(self.case, self.model, raw, links, settings=self.settings.articulated))
-        return ArticulatedProblem(
-            self.case, self.model, tuple(records), self.settings, self.deadline, self.softness
-        )
+            records.append(
+                relinked(self.case, self.model, raw, links, numbers, settings=self.settings.articulated)
+            )
+        return replace(self, records=tuple(records))
 
     def slots(self, j: int, hypothesis: JointHypothesis, vector: Array, *, on_link: bool) -> Array:
         """Parameter vector (SLOTS,) of the runs of joint `j`."""
@@ -249,7 +248,7 @@ class ArticulatedProblem:
         p = self.slots(j, hypothesis, vector, on_link=record.on_link) if p is None else p.copy()
         p[Slot.RATIO] *= record.servo_ratio
         return predict(
-            p, (inertia, bias, record.slope, record.reference, record.load), record.servo_command, record.step,
+            p, (inertia, bias, record.slope, record.reference, record.load(bias, inertia)), record.servo_command, record.step,
             record.n_sub, (record.position, record.velocity), gain, starts, every, self.beside(j, hypothesis, record),
         )  # fmt: skip
 
@@ -265,17 +264,20 @@ class ArticulatedProblem:
         self, record: JointRecord, hypothesis: JointHypothesis, vector: Array
     ) -> tuple[Array, Array]:
         """Bias and inertia (n_steps,) of a joint's equation as a hypothesis has the bodies; not to be written to."""
+        changed, missing = self.numbers(hypothesis, vector)
+        felt = {body: by for body, by in changed.items() if record.bodies[body].felt}
+        return record.coefficients(BodyNumbers(felt, missing))
+
+    def numbers(self, hypothesis: JointHypothesis, vector: Array) -> BodyNumbers:
+        """The bodies as a hypothesis has them."""
         changed: dict[str, dict[str, float]] = {}
         for i in self._bodily:
-            entry = self.nominal[i]
-            if vector[i] != 0.0 and record.bodies[entry.target].felt:
+            if vector[i] != 0.0:
+                entry = self.nominal[i]
                 changed.setdefault(entry.target, {})[entry.kind] = entry.deviation(vector, i)
-        missing = [
-            (placed.where, placed.effect.values(eta, placed.scales))
-            for placed, eta in zip(hypothesis, self.etas(hypothesis, vector), strict=True)
-            if placed.effect.site == "body"
-        ]
-        return record.coefficients(changed, missing)
+        placed = zip(hypothesis, self.etas(hypothesis, vector), strict=True)
+        missing = [(p.where, p.effect.values(eta, p.scales)) for p, eta in placed if p.effect.site == "body"]
+        return BodyNumbers(changed, missing)
 
     @cached_property
     def _bodily(self) -> tuple[int, ...]:

@@ -8,7 +8,7 @@ model once, as one draw.
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from threading import Lock
 
@@ -16,6 +16,7 @@ import numpy as np
 from scipy.linalg import expm, solve_discrete_are
 
 from bench.arrays import Array
+from bench.discrepancy.multibody.body_numbers import BodyNumbers
 from bench.discrepancy.multibody.body_terms import BodyTerms
 from bench.discrepancy.multibody.encoders import TRUE, Encoder
 from bench.discrepancy.multibody.joints import Joint
@@ -38,6 +39,20 @@ class JointRecordSettings:
 JOINT_RECORD_SETTINGS = JointRecordSettings()
 
 
+def window_of(joint: Joint, sample: float) -> int:
+    """Samples that a free run of a joint goes without drifting off; zero where a servo holds it, so that it goes for the whole record."""
+    servo = joint.drive is not None and joint.drive.servo
+    return 0 if servo else max(2, round(JOINT_RECORD_SETTINGS.window / sample))
+
+
+def judged_from(window: int, samples: int) -> int:
+    """Sample from which free runs of windows as of `window_of` are judged: the second window, where there is one.
+
+    At the end of a record the velocity is told from one side alone, several times worse than within.
+    """
+    return window if window < samples else 0
+
+
 @dataclass(frozen=True, eq=False)
 class JointRecord:
     """One joint in one record.
@@ -46,11 +61,11 @@ class JointRecord:
         joint: The joint.
         step: Integration step [s].
         n_sub: Integration steps a sample.
-        inertia: (n_steps,) armature included; bias, slope, reference, load likewise, see `joint_run.run`.
+        inertia: (n_steps,) armature included; bias, slope, reference likewise, see `joint_run.run`.
         bias: (n_steps,).
         slope: (n_steps,).
         reference: (n_steps,).
-        load: (n_steps,) torque that the gear carries.
+        acceleration: (n_steps,) measured.
         command: (n_steps,) input.
         position: (n,) measured.
         velocity: (n,) measured, or (0,).
@@ -77,7 +92,7 @@ class JointRecord:
     bias: Array
     slope: Array
     reference: Array
-    load: Array
+    acceleration: Array
     command: Array
     position: Array
     velocity: Array
@@ -121,18 +136,9 @@ class JointRecord:
         root = np.linalg.inv(self.whitening)
         return np.asarray(np.sqrt(np.diag(root @ root.T)))
 
-    def coefficients(
-        self,
-        changed: Mapping[str, Mapping[str, float]],
-        missing: Sequence[tuple[str, Mapping[str, float]]] = (),
-    ) -> tuple[Array, Array]:
-        """Bias and inertia (n_steps,), not to be written to.
-
-        Args:
-            changed: Body with uncertain numbers to what they are changed by, see `BodyTerms.change`.
-            missing: Bodies, each with what the model leaves out there: a "payload" [kg], the "share" of its weight that something else
-                carries, or a shift of its centre of mass [m] along each axis.
-        """
+    def coefficients(self, numbers: BodyNumbers) -> tuple[Array, Array]:
+        """Bias and inertia (n_steps,) with bodies that are not as the model has them; not to be written to."""
+        changed, missing = numbers
         key = (
             tuple((body, *by.items()) for body, by in changed.items()),
             tuple((body, *values.items()) for body, values in missing),
@@ -154,6 +160,11 @@ class JointRecord:
             while len(self._made) > JOINT_RECORD_SETTINGS.kept:
                 self._made.popitem(last=False)
         return found
+
+    def load(self, bias: Array, inertia: Array) -> Array:
+        """Magnitude (n_steps,) of the torque that the gear carries along the measured motion, for bias and inertia as of `coefficients`:
+        what moves the link and holds it, the inertia of its own motor not counted."""
+        return np.abs(bias + (inertia - self.joint.armature) * self.acceleration)
 
     def _left_out(self, body: str, values: Mapping[str, float]) -> Array:
         """Changes of bias and inertia (2, n_steps) by what the model leaves out at a body."""
@@ -190,13 +201,8 @@ class JointRecord:
 
     @property
     def window(self) -> int:
-        """Samples that a free run goes without drifting off; zero where a servo holds it, so that it goes for the whole record."""
-        drive = self.joint.drive
-        return (
-            0
-            if drive is not None and drive.servo
-            else max(2, round(JOINT_RECORD_SETTINGS.window / self.sample))
-        )
+        """Samples of a free run, see `window_of`."""
+        return window_of(self.joint, self.sample)
 
     def _system(self) -> tuple[Array, Array, Array, Array]:
         """Transition, process noise, observation and noise of the joint about its mean inertia, sample by sample."""

@@ -102,7 +102,7 @@ class Coefficients(NamedTuple):
     bias: Array
     inertia: Array
     reference: Array
-    load: Array
+    acceleration: Array
 
     @classmethod
     def of(
@@ -117,8 +117,12 @@ class Coefficients(NamedTuple):
             pushed: (n_joints, n_steps) torque of the loads on the joints besides their drives.
         """
         bias = clock.between(dynamics.torque - dynamics.inertia * motion.acceleration) - pushed
-        load = np.abs(clock.between(dynamics.torque) - pushed)
-        return cls(bias, clock.between(dynamics.inertia), clock.between(motion.position), load)
+        return cls(
+            bias,
+            clock.between(dynamics.inertia),
+            clock.between(motion.position),
+            clock.between(motion.acceleration),
+        )
 
     @property
     def stacked(self) -> Array:

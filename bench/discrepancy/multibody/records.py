@@ -16,6 +16,7 @@ from scipy.signal import butter, sosfiltfilt
 
 from bench.arrays import Array
 from bench.discrepancy.case.case import Case, CaseRecord
+from bench.discrepancy.multibody.body_numbers import BodyNumbers
 from bench.discrepancy.multibody.body_terms import body_terms
 from bench.discrepancy.multibody.encoders import TRUE, Encoder, encoders_of, weights_of
 from bench.discrepancy.multibody.inputs import input_of, load_on, noise_of_loads
@@ -87,7 +88,7 @@ def prepare(
         stated = float(np.hypot(stated, noise_of_loads(case, joint)))
         raw = JointRecord(
             joint, record.step / clock.n_sub, clock.n_sub, base.inertia[j] + joint.armature, base.bias[j], slope[j],
-            base.reference[j], base.load[j], _between(case, record.values[channel.name], clock), *_measured(motion, j),
+            base.reference[j], base.acceleration[j], _between(case, record.values[channel.name], clock), *_measured(motion, j),
             encoders_of(case, joint).channels[0].side, float(np.hypot(stated, process[j])),
             {b: terms.of_joint(j) for b, terms in bodies.items()}, {b: c[j] for b, c in payloads.items()},
             {b: np.ascontiguousarray(c[:, j]) for b, c in centres.items()}, {b: c[j] for b, c in weights.items()},
@@ -122,9 +123,9 @@ def corrected(
             command = _between(case, prepared.record.values[input_of(case, old.joint).name], late)
         joints.append(
             replace(
-                old, inertia=new.inertia[j] + old.joint.armature, bias=new.bias[j], reference=new.reference[j], load=new.load[j],
-                command=command, position=position, velocity=velocity, noise=noise, start=start, encoder=wrong,
-                beside=beside_of(model, j, speeds),
+                old, inertia=new.inertia[j] + old.joint.armature, bias=new.bias[j], reference=new.reference[j],
+                acceleration=new.acceleration[j], command=command, position=position, velocity=velocity, noise=noise, start=start,
+                encoder=wrong, beside=beside_of(model, j, speeds),
             )
         )  # fmt: skip
     return PreparedRecord(prepared.record, motion, tuple(joints))
@@ -135,16 +136,20 @@ def relinked(
     model: ArticulatedModel,
     prepared: PreparedRecord,
     links: Mapping[int, Array],
+    numbers: BodyNumbers,
     *,
     settings: ArticulatedSettings = DEFAULT.articulated,
 ) -> PreparedRecord:
     """A prepared record with links where the runs of their elastic joints have them, not where their motors are.
+
+    Derivatives by the numbers of bodies stay those where the motors are; with the bodies as given, the equations are exact.
 
     Args:
         case: The case.
         model: Its model.
         prepared: The record.
         links: Joint to position and velocity (n, 2) of its link.
+        numbers: Bodies as the runs have them.
         settings: `ArticulatedSettings` of the diagnosis.
     """
     step = prepared.record.step
@@ -157,14 +162,17 @@ def relinked(
         out[2][:, j] += np.gradient(away[:, 1], step)
     motion = prepared.motion._replace(position=out[0], velocity=out[1], acceleration=out[2])
     clock = clock_of(prepared.record, settings=settings)
-    dynamics = model.dynamics(*out)
-    now = Coefficients.of(dynamics, motion, clock, _pushed(case, model, prepared.record, clock))
-    joints = [
-        replace(
-            old, inertia=now.inertia[j] + old.joint.armature, bias=now.bias[j], reference=now.reference[j], load=now.load[j]
-        )
-        for j, old in enumerate(prepared.joints)
-    ]  # fmt: skip
+    pushed = _pushed(case, model, prepared.record, clock)
+    now = Coefficients.of(numbers.put_into(model).dynamics(*out), motion, clock, pushed)
+    joints = []
+    for j, old in enumerate(prepared.joints):
+        bias, inertia = old.coefficients(numbers.of_inertia())
+        joints.append(
+            replace(
+                old, inertia=now.inertia[j] + old.joint.armature + old.inertia - inertia, bias=now.bias[j] + old.bias - bias,
+                reference=now.reference[j], acceleration=now.acceleration[j],
+            )
+        )  # fmt: skip
     return PreparedRecord(prepared.record, prepared.motion, tuple(joints))
 
 

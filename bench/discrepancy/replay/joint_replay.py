@@ -23,7 +23,7 @@ from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.multibody.channels import bound
 from bench.discrepancy.multibody.encoders import Encoder, travel
 from bench.discrepancy.multibody.inputs import inputs_of
-from bench.discrepancy.multibody.joint_record import JOINT_RECORD_SETTINGS
+from bench.discrepancy.multibody.joint_record import judged_from, window_of
 from bench.discrepancy.multibody.joints import Joint
 from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.multibody.motion import JointMotion, motion_of
@@ -106,7 +106,8 @@ class JointReplay:
             for record, motion, logged in zip(self.case.validation, motions, raw, strict=True):
                 error = self._error(applied, held, j, record, motion, wrong)
                 measured = logged.samples[j][:, 0]
-                out.append(Reading(measured, measured - factor * error, size))
+                first = judged_from(window_of(joint, record.step), len(record))
+                out.append(Reading(measured, measured - factor * error, size, first))
             return out
 
         asked = [j for j, joint in enumerate(self.model.joints) if not only or joint.name in only]
@@ -122,7 +123,7 @@ class JointReplay:
         return {
             name: np.clip(
                 np.nan_to_num(
-                    np.concatenate([(r.simulated - r.measured) / r.size for r in found]),
+                    np.concatenate([r.error for r in found]),
                     nan=far, posinf=far, neginf=-far,
                 ),
                 -far, far,
@@ -141,8 +142,7 @@ class JointReplay:
     ) -> Array:
         """Measured less simulated positions (n,) of joint `j`."""
         joint, step = self.model.joints[j], float(model.opt.timestep)
-        servo = joint.drive is not None and joint.drive.servo
-        every = len(record) if servo else max(2, round(JOINT_RECORD_SETTINGS.window / record.step))
+        every = window_of(joint, record.step) or len(record)
         steps = int(np.ceil((len(record) - 1) * record.step / step - 1e-9)) + 1
         late = wrong.get(joint.name, Encoder()).delay
         columns = self._columns(record, joint.name, late)
@@ -201,7 +201,7 @@ class JointReplay:
         follow: _Followed,
         begin: int,
     ) -> Stretch:
-        """State at the first sample of a window: as measured; a train wound up by what its link weighs."""
+        """State at the first sample of a window: as measured; trains wound up by what their links weigh."""
         data = mujoco.MjData(model)
         for i, joint in enumerate(self.model.joints):
             own = model.joint(joint.name)
@@ -212,15 +212,14 @@ class JointReplay:
             to, moved = model.joint(tie.to), model.joint(tie.name)
             data.qpos[moved.qposadr[0]] = tie.offset + tie.ratio * data.qpos[to.qposadr[0]]
             data.qvel[moved.dofadr[0]] = tie.ratio * data.qvel[to.dofadr[0]]
-        name = self.model.joints[j].name
-        train = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, f"{PREFIX}{name}_train")
-        if train >= 0:
+        trains = _trains(applied, model, self.model.joints, self.model.joints[j].name)
+        if trains:
             mujoco.mj_forward(model, data)
-            dof, address = int(model.jnt_dofadr[train]), int(model.jnt_qposadr[train])
-            wound = _wound(model, train, float(data.qfrc_bias[dof]))
-            data.qpos[address] = -wound
-            if name in applied.outputs:
-                data.qpos[model.joint(name).qposadr[0]] += wound
+        for train in trains:
+            wound = _wound(model, train, float(data.qfrc_bias[train.dof]))
+            data.qpos[train.address] = -wound
+            if train.motor is not None:
+                data.qpos[train.motor[0]] += wound
         return Stretch(begin, np.array(data.qpos), np.array(data.qvel))
 
 
@@ -237,15 +236,16 @@ def _trains(applied: Applied, model: mujoco.MjModel, joints: Sequence[Joint], fr
     return out
 
 
-def _wound(model: mujoco.MjModel, train: int, weight: float) -> float:
+def _wound(model: mujoco.MjModel, train: Train, weight: float) -> float:
     """Deflection of a train under a torque."""
-    stiffness = float(np.ravel(model.jnt_stiffness[train])[0])
+    joint = int(model.dof_jntid[train.dof])
+    stiffness = float(np.ravel(model.jnt_stiffness[joint])[0])
     if stiffness > 0.0:
         return weight / stiffness
-    if not model.jnt_limited[train]:
+    if not model.jnt_limited[joint]:
         return 0.0
-    contact = -float(model.jnt_solref[train, 0]) / float(model.dof_invweight0[model.jnt_dofadr[train]])
-    return weight / max(contact, 1e-300) + float(np.copysign(model.jnt_range[train, 1], weight))
+    contact = -float(model.jnt_solref[joint, 0]) / float(model.dof_invweight0[train.dof])
+    return weight / max(contact, 1e-300) + float(np.copysign(model.jnt_range[joint, 1], weight))
 
 
 def encoders_wrong(effects: Sequence[NamedEffect]) -> dict[str, Encoder]:

@@ -30,11 +30,17 @@ class RunMotion(NamedTuple):
 
 
 class Reading(NamedTuple):
-    """A judged coordinate of a record: measured and simulated (n,), and what its error is held against."""
+    """A judged coordinate of a record: measured and simulated (n,), what its error is held against, and from which sample on."""
 
     measured: Array
     simulated: Array
     size: float
+    first: int = 0
+
+    @property
+    def error(self) -> Array:
+        """Simulated less measured over the size, as judged."""
+        return (self.simulated - self.measured)[self.first :] / self.size
 
 
 def hook_of(applied: Applied) -> Hook | None:

@@ -43,7 +43,7 @@ class VerificationSettings:
     """
 
     short: float = 0.05
-    refinements: tuple[int, ...] = (2, 4, 10)
+    refinements: tuple[int, ...] = (2, 4, 10, 20)
     converged: int = 10
     matters: float = 0.1
 
