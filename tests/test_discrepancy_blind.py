@@ -443,6 +443,8 @@ def test_what_counts_as_right(tmp_path):
         ("unknown", [], "none", [], {}, False),
         ("unknown", [], "foreign", [("strange", "")], {}, True),
         ("none", [], "foreign", [("strange", "")], {}, False),
+        ("effect", [gap], "foreign", [("strange", "")], {"result": {"complete": False}}, False),
+        ("effect", [gap], "foreign", [("strange", "")], {"result": {"complete": True}}, False),
         ("effect", [cubic], "single", [gap], {"answer": {"struck": ["gap"]}}, True),
         ("effect", [coulomb_], "single", [gap], {"answer": {"struck": ["gap"]}}, False),
         ("unknown", [], "single", [gap], {"answer": {"struck": ["gap"]}}, True),
@@ -458,13 +460,15 @@ def test_what_counts_as_right(tmp_path):
     # the wrong axis and cubic for gap are of the family; two names for one effect, and no name, are not
     assert score.family == pytest.approx(4 / 6)
     assert score.false_alarms == 0.5
-    assert score.unknown_caught == 0.5
+    assert score.unknown_caught == 0.25
+    assert score.unfinished == 0.5
+    assert score.p90_ratio == score.p90_ratio_catalogued == 2.0
     assert score.both_named == pytest.approx(2 / 3)
     assert score.struck_right == pytest.approx(2 / 3)
     assert score.sets_hold_truth == 1.0
     assert score.median_seconds == 2.0
     assert score.confusion["gap"] == {"gap": 2, "cubic_stiffness + gap": 1, "failed": 1}
-    assert len(score.wrong) == 8
+    assert len(score.wrong) == 10
     assert json.loads(json.dumps(score.to_json()))["shares"]["exact"]["n"] == 6
 
 

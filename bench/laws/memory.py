@@ -182,7 +182,7 @@ def rate(t, q, v, z, theta, zdot):  # noqa: PLR0912  (one C function: a kernel c
             elif x >= 1.0:
                 slip = 1.0
             else:
-                g = int(x * profile)
+                g = min(int(x * profile), profile - 1)
                 left = theta[at + 1 + parts + g] if g > 0 else 0.0
                 right = theta[at + 2 + parts + g] if g < profile - 1 else 1.0
                 slip = left + (x * profile - g) * (right - left)

@@ -52,6 +52,7 @@ class BlindScore:
         place: Share of named joint-rig effects at the right place.
         false_alarms: Share of clean cases with another verdict than "none".
         unknown_caught: Share of foreign cases with the verdict "unknown".
+        unfinished: Share of foreign cases with the verdict "unknown", or with names that are said not to be all (`complete`).
         both_named: Share of double cases with both effects named.
         tellable: Share of right verdicts over all cases whose records can tell: expected log odds of at least `tellable`
             (foreign ones: `tellable_unknown`) against the nearest rival and against none, where the answers state them.
@@ -65,6 +66,7 @@ class BlindScore:
         verdict_calibration_error: The same of the probability of the verdict.
         median_ratio: Median of after / noise_floor over cases.
         p90_ratio: Its 90th percentile.
+        p90_ratio_catalogued: The same over cases of catalogued effects.
         median_seconds, p90_seconds: The same of the time of a diagnosis [s].
         failed: Number of diagnoses that ended in an error.
         shares: The shares above with their numbers of cases and intervals.
@@ -82,6 +84,7 @@ class BlindScore:
     place: float
     false_alarms: float
     unknown_caught: float
+    unfinished: float
     both_named: float
     tellable: float
     unknown_tellable: float
@@ -94,6 +97,7 @@ class BlindScore:
     verdict_calibration_error: float
     median_ratio: float
     p90_ratio: float
+    p90_ratio_catalogued: float
     median_seconds: float
     p90_seconds: float
     failed: int

@@ -155,6 +155,7 @@ def summary(scored: Sequence[Scored]) -> BlindScore:
     sizes = [len(entry) for s in _declared(scored) for entry in s.result["indistinguishable"]]
     shares, hits, verdicts = _shares(scored), _effects_claimed(scored), _verdicts_claimed(scored)
     ratios = [r for s in scored for r in _ratios(s.result)]
+    catalogued = [r for s in scored if s.kind in {"single", "double"} for r in _ratios(s.result)]
     seconds = [float(s.result["seconds"]) for s in every if s.result.get("seconds")]
     f1 = [f for s in scored for f in region_scores(s.result, s.answer)]
     return BlindScore(
@@ -166,6 +167,7 @@ def summary(scored: Sequence[Scored]) -> BlindScore:
         verdict_calibration_error=calibration_error(verdicts),
         median_ratio=_quantile(ratios, 0.5),
         p90_ratio=_quantile(ratios, 0.9),
+        p90_ratio_catalogued=_quantile(catalogued, 0.9),
         median_seconds=_quantile(seconds, 0.5),
         p90_seconds=_quantile(seconds, 0.9),
         failed=sum(s.verdict == "failed" for s in every),
@@ -197,6 +199,7 @@ def _shares(scored: Sequence[Scored]) -> dict[str, Share]:
         "place": share_of(_places(scored)),
         "false_alarms": share_of(not s.right for s in by_kind["none"]),
         "unknown_caught": share_of(s.right for s in by_kind["foreign"]),
+        "unfinished": share_of(s.right or s.result.get("complete") is False for s in by_kind["foreign"]),
         "both_named": share_of(s.right for s in by_kind["double"]),
         "tellable": share_of(s.right for s in tellable),
         "unknown_tellable": share_of(s.right for s in tellable if s.kind == "foreign"),
