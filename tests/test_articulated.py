@@ -31,9 +31,9 @@ from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.articulated_search.search import complete, without_idle
 from bench.discrepancy.multibody.body_numbers import BodyNumbers
 from bench.discrepancy.multibody.channels import bound
-from bench.discrepancy.multibody.encoders import weight_of_readings
+from bench.discrepancy.multibody.encoders import Encoder, weight_of_readings
 from bench.discrepancy.multibody.model import ArticulatedModel, compiled_model
-from bench.discrepancy.multibody.records import relinked
+from bench.discrepancy.multibody.records import corrected, settled
 from bench.discrepancy.replay.verification import replay_of
 from bench.discrepancy.report.html_page import write_report
 from bench.discrepancy.report.rerun_recording import write_rerun
@@ -308,7 +308,7 @@ def test_equations_hold_where_a_link_is_and_its_gear_carries_what_the_bodies_wei
     motors, t = prepared.motion, np.arange(len(prepared.record)) * prepared.record.step
     away = 0.1 * np.column_stack([np.sin(6.0 * t), 6.0 * np.cos(6.0 * t)])
     links = np.column_stack([motors.position[:, 0], motors.velocity[:, 0]]) + away
-    found = relinked(problem.case, problem.model, prepared, {0: links}, numbers)
+    found = settled(problem.case, problem.model, prepared, prepared, {0: links}, numbers)
 
     model = mujoco.MjModel.from_xml_string(mjcf(servo=False, payload=PAYLOAD))
     model.body("upper").mass += 0.2
@@ -333,6 +333,23 @@ def test_equations_hold_where_a_link_is_and_its_gear_carries_what_the_bodies_wei
         np.testing.assert_allclose(record.load(bias, inertia)[inner], wanted, atol=0.01 * size)
         stated, alone = record.coefficients(BodyNumbers({}))
         assert np.sqrt(np.mean((record.load(stated, alone)[inner] - wanted) ** 2)) > 0.1 * size
+
+
+def test_behind_a_wrong_encoder_bodies_weigh_what_they_do_in_the_true_posture(tmp_path):
+    problem = problem_of(write_case(tmp_path, mjcf(servo=False), servo=False))
+    raw, wrong = problem.records[0], {"shoulder": Encoder(offset=0.5)}
+    known = corrected(problem.case, problem.model, raw, wrong)
+    numbers = BodyNumbers({"fore": {"mass": 0.1}})
+    heavier = numbers.put_into(problem.model)
+    true = corrected(problem.case, heavier, raw, wrong)
+    about = settled(problem.case, problem.model, raw, known, {}, numbers)
+    found = corrected(problem.case, problem.model, about, wrong)
+    for j, joint in enumerate(true.joints):
+        bias, inertia = found.joints[j].coefficients(numbers)
+        np.testing.assert_allclose(bias, joint.bias, rtol=1e-6, atol=1e-9)
+        np.testing.assert_allclose(inertia, joint.inertia, rtol=1e-6)
+        as_logged, _ = known.joints[j].coefficients(numbers)
+        assert np.abs(as_logged - joint.bias).max() > 0.05
 
 
 def test_bodies_without_a_name_go_by_what_moves_them():

@@ -32,7 +32,7 @@ from bench.discrepancy.multibody.joint_run import predict
 from bench.discrepancy.multibody.joints import Joint
 from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.multibody.nominal_parameters import Nominal, base_slots, move, nominal_parameters
-from bench.discrepancy.multibody.records import PreparedRecord, corrected, prepare, relinked
+from bench.discrepancy.multibody.records import PreparedRecord, corrected, prepare, settled
 from bench.discrepancy.numerics.deadline import NEVER, Deadline
 from bench.discrepancy.settings import DEFAULT, DiagnosisSettings
 
@@ -195,20 +195,17 @@ class ArticulatedProblem:
         return replace(self, records=tuple(records), softness=max(level, self.softness))
 
     def settled(self, hypothesis: JointHypothesis, vector: Array) -> ArticulatedProblem:
-        """The same problem with the links of elastic joints where a fit has them; itself where there are none behind their motors."""
+        """The same problem about the postures that a fit has: of links of elastic joints, and behind wrong encoders; else itself."""
         elastic = [
-            placed.joint
-            for placed in hypothesis
-            if placed.effect.train and not self.records[0].joints[placed.joint].on_link
+            p.joint for p in hypothesis if p.effect.train and not self.records[0].joints[p.joint].on_link
         ]
-        if not elastic:
+        if not elastic and not any(placed.effect.encoder for placed in hypothesis):
             return self
-        records, numbers = [], self.numbers(hypothesis, vector)
+        numbers, records = self.numbers(hypothesis, vector), []
         for raw, prepared in zip(self.records, self.motions(hypothesis, vector), strict=True):
             links = {j: self.innovations(j, hypothesis, vector, prepared)[1][:, 2:] for j in elastic}
-            records.append(
-                relinked(self.case, self.model, raw, links, numbers, settings=self.settings.articulated)
-            )
+            settings = self.settings.articulated
+            records.append(settled(self.case, self.model, raw, prepared, links, numbers, settings=settings))
         return replace(self, records=tuple(records))
 
     def slots(self, j: int, hypothesis: JointHypothesis, vector: Array, *, on_link: bool) -> Array:

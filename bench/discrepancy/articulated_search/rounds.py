@@ -104,7 +104,7 @@ def best_of(
     finalists = sorted(first, key=lambda f: -f.log_posterior)[: settings.finalists]
     again = (_again(problem, base, others, one, least=least) for one in finalists)
     fits = [f for f in again if sound(problem, f)]
-    fits = [_where_links_are(problem, f) for f in fits]
+    fits = [_where_settled(problem, f) for f in fits]
     if not fits:
         return Round(None, fits, corrected)
     best = _simplest(problem, fits)
@@ -169,8 +169,8 @@ def _untouched(problem: ArticulatedProblem, base: ArticulatedFit) -> Articulated
     return ArticulatedFit.at(problem, base.hypothesis, vector)
 
 
-def _where_links_are(problem: ArticulatedProblem, found: ArticulatedFit) -> ArticulatedFit:
-    """A fit once more with the links of its elastic joints where it has them: what the other joints feel is part of the explanation."""
+def _where_settled(problem: ArticulatedProblem, found: ArticulatedFit) -> ArticulatedFit:
+    """A fit once more about the postures that it has, see `ArticulatedProblem.settled`: they are part of the explanation."""
     settled = problem.settled(found.hypothesis, found.vector)
     return (
         found if settled is problem else refitted(settled, found.hypothesis, found.vector, scale=found.scale)

@@ -7,7 +7,7 @@ follows from the corrected one, since a posture that is wrong at one joint is fe
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -60,11 +60,7 @@ def prepare(
     clock = clock_of(record, settings=settings.articulated)
     dynamics = model.dynamics(*moved)
     base = Coefficients.of(dynamics, motion, clock, _pushed(case, model, record, clock))
-
-    def beside(changed: Dynamics) -> Array:
-        """Changes of bias and inertia (n_joints, 2, n_steps)."""
-        return Coefficients.of(_difference(changed, dynamics), motion, clock).stacked
-
+    beside = _changes(motion, clock, dynamics)
     bodies = body_terms(case, model, moved, beside)
     payloads = {body: beside(model.with_payload(body, 1.0).dynamics(*moved)) for body in model.bodies}
     centres = {
@@ -131,41 +127,46 @@ def corrected(
     return PreparedRecord(prepared.record, motion, tuple(joints))
 
 
-def relinked(
+def settled(
     case: Case,
     model: ArticulatedModel,
+    raw: PreparedRecord,
     prepared: PreparedRecord,
     links: Mapping[int, Array],
     numbers: BodyNumbers,
     *,
     settings: ArticulatedSettings = DEFAULT.articulated,
 ) -> PreparedRecord:
-    """A prepared record with links where the runs of their elastic joints have them, not where their motors are.
-
-    Derivatives by the numbers of bodies stay those where the motors are; with the bodies as given, the equations are exact.
+    """A record about the postures that a fit has.
 
     Args:
         case: The case.
         model: Its model.
-        prepared: The record.
-        links: Joint to position and velocity (n, 2) of its link.
-        numbers: Bodies as the runs have them.
+        raw: The record as prepared for the nominal model.
+        prepared: The same with its encoders corrected, see `corrected`; `raw` itself where they are right.
+        links: Of elastic joints with the encoder at the motor: joint to position and velocity (n, 2) of its link.
+        numbers: Bodies as the fit has them.
         settings: `ArticulatedSettings` of the diagnosis.
     """
-    step = prepared.record.step
-    out = [np.array(part) for part in prepared.motion[:3]]
+    if prepared is not raw:
+        raw = _reposed(case, model, raw, prepared.motion, settings)
+    if not links:
+        return raw
+    step, motion = raw.record.step, raw.motion
+    out = [np.array(part) for part in motion[:3]]
     sections = butter(2, min(2.0 * settings.followed * step, 0.9), output="sos")
     for j, states in links.items():
         away = sosfiltfilt(sections, states - np.column_stack([out[0][:, j], out[1][:, j]]), axis=0)
         out[0][:, j] += away[:, 0]
         out[1][:, j] += away[:, 1]
         out[2][:, j] += np.gradient(away[:, 1], step)
-    motion = prepared.motion._replace(position=out[0], velocity=out[1], acceleration=out[2])
-    clock = clock_of(prepared.record, settings=settings)
-    pushed = _pushed(case, model, prepared.record, clock)
-    now = Coefficients.of(numbers.put_into(model).dynamics(*out), motion, clock, pushed)
+    clock = clock_of(raw.record, settings=settings)
+    linked = motion._replace(position=out[0], velocity=out[1], acceleration=out[2])
+    pushed = _pushed(case, model, raw.record, clock)
+    now = Coefficients.of(numbers.put_into(model).dynamics(*out), linked, clock, pushed)
     joints = []
-    for j, old in enumerate(prepared.joints):
+    for j, old in enumerate(raw.joints):
+        # derivatives by the numbers of bodies stay those where the motors are; with the numbers as given, the equations are exact
         bias, inertia = old.coefficients(numbers.of_inertia())
         joints.append(
             replace(
@@ -173,7 +174,22 @@ def relinked(
                 reference=now.reference[j], acceleration=now.acceleration[j],
             )
         )  # fmt: skip
-    return PreparedRecord(prepared.record, prepared.motion, tuple(joints))
+    return replace(raw, joints=tuple(joints))
+
+
+def _reposed(
+    case: Case,
+    model: ArticulatedModel,
+    raw: PreparedRecord,
+    motion: JointMotion,
+    settings: ArticulatedSettings,
+) -> PreparedRecord:
+    """A record whose derivatives by the numbers of bodies are those along another motion, that of its corrected encoders."""
+    moved = (motion.position, motion.velocity, motion.acceleration)
+    clock = clock_of(raw.record, settings=settings)
+    bodies = body_terms(case, model, moved, _changes(motion, clock, model.dynamics(*moved)))
+    own = [{body: terms.of_joint(j) for body, terms in bodies.items()} for j in range(len(raw.joints))]
+    return replace(raw, joints=tuple(replace(old, bodies=b) for old, b in zip(raw.joints, own, strict=True)))
 
 
 def beside_of(model: ArticulatedModel, j: int, speeds: Array) -> dict[str, Array]:
@@ -188,6 +204,11 @@ def _measured(motion: JointMotion, j: int) -> tuple[Array, Array, Array, Array]:
     velocity = np.ascontiguousarray(samples[:, 1]) if samples.shape[1] > 1 else np.zeros(0)
     start = np.array([motion.position[0, j], motion.velocity[0, j]])
     return np.ascontiguousarray(samples[:, 0]), velocity, motion.noise[j], start
+
+
+def _changes(motion: JointMotion, clock: JointClock, base: Dynamics) -> Callable[[Dynamics], Array]:
+    """Takes inverse dynamics along a motion to what they change (n_joints, 2, n_steps) in bias and inertia."""
+    return lambda changed: Coefficients.of(_difference(changed, base), motion, clock).stacked
 
 
 def _difference(changed: Dynamics, base: Dynamics) -> Dynamics:
