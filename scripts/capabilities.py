@@ -152,9 +152,10 @@ CAPABILITIES: Sequence[Capability] = (
     ),
     Capability(
         "applied_arms",
-        "Verdicts of arms and legs of others, applied in plain MuJoCo",
+        "Verdicts of arms, legs and desks of others, applied in plain MuJoCo",
         (
             *("python", "scripts/applied.py", "{data}/../trials-arms", "out/applied-arms"),
+            *("--only", "arm2", "leg3", "desk5"),
             *("--verdicts", "out/arms", "--again", "--json"),
         ),
         applied,
