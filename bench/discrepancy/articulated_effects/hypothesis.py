@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from bench.arrays import Array
@@ -49,3 +50,12 @@ def placed_values(placed: PlacedOnJoint, eta: Array) -> dict[str, float]:
     if placed.effect.name == "one_sided_stop":
         values["position"] += placed.scales.middle
     return values
+
+
+def placed_eta(placed: PlacedOnJoint, values: Mapping[str, float]) -> list[float]:
+    """Free parameters of an effect from its physical values, the inverse of `placed_values`; the prior's mean where a value is not told."""
+    shift = {"position": placed.scales.middle} if placed.effect.name == "one_sided_stop" else {}
+    return [
+        float(p.eta(values[p.name] - shift.get(p.name, 0.0), placed.scales)) if p.name in values else p.mean
+        for p in placed.effect.parameters
+    ]

@@ -37,7 +37,7 @@ def in_simulator(verdict: Verdict, case: Case) -> InSimulator | None:
     findings = findings_of(verdict)
     articulated = is_articulated(findings, case)
     try:
-        replay = replay_of(path, case, articulated=articulated)
+        replay = replay_of(path, case, articulated=articulated, findings=findings)
         before, after = (
             apply(path, what, case=case, linear=not articulated) for what in (Findings(()), findings)
         )

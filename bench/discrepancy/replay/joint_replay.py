@@ -7,7 +7,7 @@ position, velocity and acceleration. All of it is plain MuJoCo.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import mujoco
@@ -15,7 +15,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from bench.arrays import Array
-from bench.discrepancy.application.applying import Applied
+from bench.discrepancy.application.applying import Applied, Findings
 from bench.discrepancy.application.forces import values_of
 from bench.discrepancy.application.target import PREFIX, as_mujoco
 from bench.discrepancy.articulated_effects.catalogue import CATALOGUE
@@ -29,6 +29,7 @@ from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.multibody.motion import JointMotion, motion_of
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.replay.running import Reading, Stretch, Train, controls, coordinate_at, hook_of, run
+from bench.discrepancy.replay.wound_trains import Wound, wound_trains
 from bench.discrepancy.settings import DEFAULT
 from bench.discrepancy.verdict import NamedEffect
 from bench.errors import ModelError
@@ -56,14 +57,16 @@ class JointReplay:
     Attributes:
         case: The case, its channels bound to joints and actuators.
         model: The nominal model.
+        wound: How far trains are wound up where windows begin, as far as it is known.
     """
 
     case: Case
     model: ArticulatedModel
+    wound: Wound = field(default_factory=Wound)
 
     @classmethod
-    def of(cls, case: Case, nominal: mujoco.MjModel) -> JointReplay:
-        """Prepare the replay of a case.
+    def of(cls, case: Case, nominal: mujoco.MjModel, findings: Findings | None = None) -> JointReplay:
+        """Prepare the replay of a case, with what was found in it.
 
         Raises:
             ModelError: Joints of the case are held or move as measured, which those of the user's file do not.
@@ -74,7 +77,8 @@ class JointReplay:
                 f"nominal.json has {names} held or moving as measured (\"joints\"), and in '{case.rig}' they would move freely, so the "
                 "judging records cannot be run in it; weld them there, or write the corrected model without --case"
             )
-        return cls(bound(case, nominal), ArticulatedModel.of(nominal, case.rig))
+        own, model = bound(case, nominal), ArticulatedModel.of(nominal, case.rig)
+        return cls(own, model, wound_trains(own, model, findings) if findings else Wound())
 
     def readings(
         self, applied: Applied, effects: Sequence[NamedEffect], only: Collection[str] = ()
@@ -103,8 +107,11 @@ class JointReplay:
             factor = 1.0 + wrong.get(joint.name, Encoder()).gain
             size = travel(self.case, joint, max(float(np.max(logged.noise[j])) for logged in raw))
             out = []
-            for record, motion, logged in zip(self.case.validation, motions, raw, strict=True):
-                error = self._error(applied, held, j, record, motion, wrong)
+            for r, (record, motion, logged) in enumerate(
+                zip(self.case.validation, motions, raw, strict=True)
+            ):
+                wound = {name: states[r] for name, states in self.wound.items()}
+                error = self._error(applied, held, j, record, motion, wrong, wound)
                 measured = logged.samples[j][:, 0]
                 first = judged_from(window_of(joint, record.step), len(record))
                 out.append(Reading(measured, measured - factor * error, size, first))
@@ -139,6 +146,7 @@ class JointReplay:
         record: CaseRecord,
         motion: JointMotion,
         wrong: Mapping[str, Encoder],
+        wound: Mapping[str, Array],
     ) -> Array:
         """Measured less simulated positions (n,) of joint `j`."""
         joint, step = self.model.joints[j], float(model.opt.timestep)
@@ -153,8 +161,9 @@ class JointReplay:
                 control[:, model.actuator(_holder(other.name)).id] = follow.command[:, i]
         firsts = list(range(0, len(record), every))
         begins = [int(np.floor(first * record.step / step + 1e-6)) for first in firsts]
+        trains = _trains(applied, model, self.model.joints, joint.name)
         windows = [
-            self._start(applied, model, j, motion, first, follow, b)
+            _wound_as(self._start(applied, model, j, motion, first, follow, b), trains, wound, first)
             for first, b in zip(firsts, begins, strict=True)
         ]
         length = int(np.ceil(min(every, len(record)) * record.step / step - 1e-9)) + 1
@@ -165,7 +174,7 @@ class JointReplay:
             control,
             length,
             rested=False,
-            trains=_trains(applied, model, self.model.joints, joint.name),
+            trains=[train for train in trains if train.joint not in wound],
         )
         out, reading = [], self._reading(applied, model, joint.name)
         for w, first in enumerate(firsts):
@@ -232,8 +241,16 @@ def _trains(applied: Applied, model: mujoco.MjModel, joints: Sequence[Joint], fr
         if train >= 0 and (joint.name == free or not on_link):
             own = model.joint(joint.name)
             motor = (int(own.qposadr[0]), int(own.dofadr[0])) if on_link else None
-            out.append(Train(int(model.jnt_qposadr[train]), int(model.jnt_dofadr[train]), motor))
+            out.append(Train(int(model.jnt_qposadr[train]), int(model.jnt_dofadr[train]), motor, joint.name))
     return out
+
+
+def _wound_as(start: Stretch, trains: Sequence[Train], wound: Mapping[str, Array], first: int) -> Stretch:
+    """A start of a window at sample `first`, its trains wound up as far as is known."""
+    for train in trains:
+        if train.joint in wound:
+            start.position[train.address], start.velocity[train.dof] = wound[train.joint][first]
+    return start
 
 
 def _wound(model: mujoco.MjModel, train: Train, weight: float) -> float:

@@ -75,11 +75,12 @@ class Stretch(NamedTuple):
 
 class Train(NamedTuple):
     """A train between a motor and its link: indices of its deflection's position and velocity, and of those of the motor, where the
-    encoder is on the link and shows their sum; None where it is on the motor."""
+    encoder is on the link and shows their sum; None where it is on the motor. `joint` is the motor's name."""
 
     address: int
     dof: int
     motor: tuple[int, int] | None
+    joint: str = ""
 
 
 def run(

@@ -173,7 +173,7 @@ def verify(
     """
     settings = settings or VerificationSettings()
     articulated = is_articulated(findings, case)
-    replay = replay_of(path, case, articulated=articulated)
+    replay = replay_of(path, case, articulated=articulated, findings=findings)
     nothing = Findings(())
 
     def errors(
@@ -207,9 +207,8 @@ def verify(
     out = replace(out, own_share=own)
     if _short(found) > settings.short:
         return _remedied(out, figures, settings, progress)
-    if out.worst.short >= -settings.short:
-        return out
-    return replace(out, less=_less(out, figures, settings))
+    least = min(found, key=lambda f: f.short)
+    return out if least.short >= -settings.short else replace(out, less=_less(out, least, figures, settings))
 
 
 _Figures = Callable[[RunOptions, Collection[str]], tuple[Figure, ...]]
@@ -224,13 +223,11 @@ def _short(found: Sequence[Figure]) -> float:
     return max(figure.short for figure in found)
 
 
-def _less(out: Verification, figures: _Figures, settings: VerificationSettings) -> str:
+def _less(out: Verification, least: Figure, figures: _Figures, settings: VerificationSettings) -> str:
     """Why a corrected model leaves less than the diagnosis says, in words: its step and integrator, if it leaves as much without them."""
-    worst = out.worst
-    (fine,) = figures(RunOptions(out.step / settings.converged, mujoco.mjtIntegrator.mjINT_RK4), (worst.dof,))
-    less = (
-        f"the corrected model leaves {-100.0 * worst.short:.0f} % less than the diagnosis says at your step"
-    )
+    (fine,) = figures(RunOptions(out.step / settings.converged, mujoco.mjtIntegrator.mjINT_RK4), (least.dof,))
+    place = "" if least is out.worst or not least.dof else f" of '{least.dof}'"
+    less = f"the corrected model leaves {-100.0 * least.short:.0f} % less{place} than the diagnosis says at your step"
     words = f"{less}, and {fine.after:.3g} converged"
     return (
         f"{words}: with your step and integrator it errs as the records do"
@@ -288,14 +285,14 @@ def _of_noise(best: Sequence[Figure], settings: VerificationSettings) -> str:
     return f", by less than noise alone leaves: {told}"
 
 
-def replay_of(path: str | Path, case: Case, *, articulated: bool) -> Replay:
-    """What runs the judging records of a case in a model.
+def replay_of(path: str | Path, case: Case, *, articulated: bool, findings: Findings | None = None) -> Replay:
+    """What runs the judging records of a case in a model, with what was found in it.
 
     Raises:
         ModelError: The case is one of a rig of the bench.
     """
     if articulated:
-        return JointReplay.of(case, specification(path).compile())
+        return JointReplay.of(case, specification(path).compile(), findings)
     if not case.rig.endswith(".xml"):
         raise ModelError(
             f"the case is one of the rig '{case.rig}' of the bench; its records are run with a model of your own only where that is the rig"
