@@ -39,6 +39,15 @@ def test_windows_in_a_row_are_one_run_where_encoders_show_what_it_shows(on_link)
     assert np.abs(np.concatenate(other[:, :each]) - whole[0][:steps]).max() > 0.01
 
 
+@pytest.mark.parametrize("on_link", [False, True])
+def test_a_train_is_wound_up_and_what_its_encoder_shows_stays(on_link):
+    position, velocity = np.array([0.5, 0.0]), np.array([2.0, 0.0])
+    Train(1, 1, (0, 0) if on_link else None).wind(position, velocity, 0.1, -0.3)
+    assert (position[1], velocity[1]) == (0.1, -0.3)
+    shown = (position.sum(), velocity.sum()) if on_link else (position[0], velocity[0])
+    assert shown == pytest.approx((0.5, 2.0))
+
+
 def test_windows_of_a_late_log_begin_as_late(tmp_path):
     folder = write_case(tmp_path, mjcf(servo=False), servo=False)
     late = round(0.04 * RATE)

@@ -46,16 +46,18 @@ JointHypothesis = tuple[PlacedOnJoint, ...]
 
 def placed_values(placed: PlacedOnJoint, eta: Array) -> dict[str, float]:
     """Physical values of an effect at its place; a stop's position is counted from the zero of the joint."""
-    values = placed.effect.values(eta, placed.scales)
-    if placed.effect.name == "one_sided_stop":
-        values["position"] += placed.scales.middle
-    return values
+    return {name: x + _zero(placed, name) for name, x in placed.effect.values(eta, placed.scales).items()}
 
 
 def placed_eta(placed: PlacedOnJoint, values: Mapping[str, float]) -> list[float]:
     """Free parameters of an effect from its physical values, the inverse of `placed_values`; the prior's mean where a value is not told."""
-    shift = {"position": placed.scales.middle} if placed.effect.name == "one_sided_stop" else {}
     return [
-        float(p.eta(values[p.name] - shift.get(p.name, 0.0), placed.scales)) if p.name in values else p.mean
+        float(p.eta(values[p.name] - _zero(placed, p.name), placed.scales)) if p.name in values else p.mean
         for p in placed.effect.parameters
     ]
+
+
+def _zero(placed: PlacedOnJoint, parameter: str) -> float:
+    """Where the joint's zero is from what a parameter of an effect is counted from."""
+    at_stop = placed.effect.name == "one_sided_stop" and parameter == "position"
+    return placed.scales.middle if at_stop else 0.0

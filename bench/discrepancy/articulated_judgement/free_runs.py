@@ -36,8 +36,8 @@ class FreeRuns:
     def errors(self, j: int, hypothesis: JointHypothesis, vector: Array, prepared: PreparedRecord) -> Array:
         """Logged less predicted positions (n,) of joint `j`, run without corrections from the measured states of its windows.
 
-        What no encoder tells at the start of a window, the winding of an elastic drive, is taken from the run that is corrected. They
-        are judged from `judged_from` on.
+        What no encoder tells at the start of a window, the winding of an elastic drive, is taken from the run that is corrected.
+        Samples before `judged_from` are left out.
         """
         record, motion = prepared.joints[j], prepared.motion
         every = record.window or len(record.position)

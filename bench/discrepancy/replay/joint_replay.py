@@ -225,10 +225,7 @@ class JointReplay:
         if trains:
             mujoco.mj_forward(model, data)
         for train in trains:
-            wound = _wound(model, train, float(data.qfrc_bias[train.dof]))
-            data.qpos[train.address] = -wound
-            if train.motor is not None:
-                data.qpos[train.motor[0]] += wound
+            train.wind(data.qpos, data.qvel, -_wound(model, train, float(data.qfrc_bias[train.dof])), 0.0)
         return Stretch(begin, np.array(data.qpos), np.array(data.qvel))
 
 
@@ -249,7 +246,7 @@ def _wound_as(start: Stretch, trains: Sequence[Train], wound: Mapping[str, Array
     """A start of a window at sample `first`, its trains wound up as far as is known."""
     for train in trains:
         if train.joint in wound:
-            start.position[train.address], start.velocity[train.dof] = wound[train.joint][first]
+            train.wind(start.position, start.velocity, *wound[train.joint][first])
     return start
 
 

@@ -82,6 +82,13 @@ class Train(NamedTuple):
     motor: tuple[int, int] | None
     joint: str = ""
 
+    def wind(self, position: Array, velocity: Array, deflection: float, rate: float) -> None:
+        """Wind it up as far in positions (nq,) and velocities (nv,), which are written to; what its encoder shows stays."""
+        if self.motor is not None:
+            position[self.motor[0]] += position[self.address] - deflection
+            velocity[self.motor[1]] += velocity[self.dof] - rate
+        position[self.address], velocity[self.dof] = deflection, rate
+
 
 def run(
     model: mujoco.MjModel,
@@ -159,10 +166,7 @@ def _take_over(
     mujoco.mj_setState(model, other, end, mujoco.mjtState.mjSTATE_FULLPHYSICS)
     data.act[laws] = other.act[laws]
     for train in trains:
-        if train.motor is not None:
-            data.qpos[train.motor[0]] += data.qpos[train.address] - other.qpos[train.address]
-            data.qvel[train.motor[1]] += data.qvel[train.dof] - other.qvel[train.dof]
-        data.qpos[train.address], data.qvel[train.dof] = other.qpos[train.address], other.qvel[train.dof]
+        train.wind(data.qpos, data.qvel, other.qpos[train.address], other.qvel[train.dof])
 
 
 def _stepped(model: mujoco.MjModel, hook: Hook, start: Array, control: Array) -> Array:

@@ -267,22 +267,21 @@ def _remedied(
         words = f"the corrected model misses the diagnosis by {short:.0f} %, and neither a smaller step nor RK4 brings it nearer"
     else:
         worst = next(f for f in best if f.dof == out.worst.dof)
-        rest = (
-            ""
-            if _short(best) <= settings.short
-            else f", still {100.0 * _short(best):.0f} % off{_of_noise(best, settings)}"
-        )
-        words = f"the corrected model misses the diagnosis by {short:.0f} % at your step; {label} gives {worst.after:.3g}{rest}"
+        words = f"the corrected model misses the diagnosis by {short:.0f} % at your step; {label} gives {worst.after:.3g}"
+        words += _rest(best, settings)
     return replace(out, remedy=words, better=best if label else ())
 
 
-def _of_noise(best: Sequence[Figure], settings: VerificationSettings) -> str:
-    """That what is still off leaves no more than noise alone does, in words; empty where it leaves more."""
+def _rest(best: Sequence[Figure], settings: VerificationSettings) -> str:
+    """What the best setting still misses, in words, and whether noise alone leaves as much; empty where it misses nothing."""
     off = [figure for figure in best if figure.short > settings.short]
-    if any(figure.after > figure.floor for figure in off):
+    if not off:
         return ""
+    still = f", still {100.0 * _short(off):.0f} % off"
+    if any(figure.after > figure.floor for figure in off):
+        return still
     told = ", ".join(f"{figure.after:.3g} of {figure.floor:.3g} ({figure.dof})" for figure in off)
-    return f", by less than noise alone leaves: {told}"
+    return f"{still}, by less than noise alone leaves: {told}"
 
 
 def replay_of(path: str | Path, case: Case, *, articulated: bool, findings: Findings | None = None) -> Replay:

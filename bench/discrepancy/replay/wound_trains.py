@@ -1,7 +1,7 @@
 """How far elastic drives are wound up along the judging records: what no encoder shows where a window begins.
 
-The diagnosis has it from a run that the encoder corrects at every sample. A free run forgets its own guess slowly, and one through a play
-never does, so applied models begin their windows with the same.
+The diagnosis has it from a run that the encoder corrects at every sample, and judges by windows that begin with it. So do applied models:
+what the free run before a window left of it is off by that run's own error, most where a play is open.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ Wound = dict[str, list[Array]]
 
 
 def wound_trains(case: Case, model: ArticulatedModel, findings: Findings) -> Wound:
-    """Deflections of the trains of elastic drives with the encoder at the motor, as found.
+    """Deflections of the trains of elastic drives, as found.
 
     Args:
         case: The case, its channels bound to joints and actuators.
@@ -37,18 +37,22 @@ def wound_trains(case: Case, model: ArticulatedModel, findings: Findings) -> Wou
     problem = problem.settled(hypothesis, vector)
     motions, out = problem.motions(hypothesis, vector), Wound()
     for placed in hypothesis:
-        if not placed.effect.train or motions[0].joints[placed.joint].on_link:
-            continue
-        states = [problem.innovations(placed.joint, hypothesis, vector, one)[1] for one in motions]
-        if all(np.isfinite(one).all() for one in states):
-            out[problem.joints[placed.joint].name] = [one[:, 2:] - one[:, :2] for one in states]
+        if placed.effect.train:
+            runs = [problem.innovations(placed.joint, hypothesis, vector, one) for one in motions]
+            if all(np.isfinite(innovations).all() for innovations, _ in runs):
+                name = problem.joints[placed.joint].name
+                out[name] = [states[:, 2:] - states[:, :2] for _, states in runs]
     return out
 
 
 def _fit(problem: ArticulatedProblem, findings: Findings) -> tuple[JointHypothesis, Array]:
     """Hypothesis and vector of what was found, as far as the catalogue of a problem has it."""
     moved = {estimate.name: estimate.shift_in_std for estimate in findings.nominal}
-    vector = [moved.get(f"{entry.kind}:{entry.target}", 0.0) for entry in problem.nominal]
+    # what parts of one type have in common is told with each part
+    vector = [
+        moved.get(entry.name, 0.0) * float(np.hypot(entry.std, entry.together)) / entry.std
+        for entry in problem.nominal
+    ]
     known = {placed.key: placed for placed in placements(problem, CATALOGUE)}
     hypothesis = []
     for effect in findings.effects:
