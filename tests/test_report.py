@@ -10,7 +10,7 @@ import pytest
 from browser import CHROMIUM, browser, shown_whole
 
 from bench.cli.verdict_text import verdict_summary
-from bench.discrepancy.report.answers import answers, next_steps
+from bench.discrepancy.report.answers import Files, answers, next_steps
 from bench.discrepancy.report.interactive import (
     SETTINGS,
     correlation_plot,
@@ -53,7 +53,7 @@ VERDICT = Verdict(
     complete=True,
 )  # fmt: skip
 TOLD = InSimulator("in your simulator (elbow): 0.145 -> 0.0057 (diagnosis: 0.00551)", {})
-OPTIONS = "--model arm/arm.xml --case arm"
+FILES = Files("--model arm/arm.xml --case arm", "out/verdict.json")
 
 
 def runs() -> dict[str, Recording]:
@@ -69,7 +69,7 @@ def runs() -> dict[str, Recording]:
 def report() -> Page:
     """A report with every kind of figure."""
     shown = with_applied(runs(), TOLD._replace(record={"elbow": 1.02 * runs()["measured"]["elbow"]}))
-    page = opened("arm", VERDICT, shown, model=OPTIONS, settings=DEFAULT.judgement, applied=TOLD)
+    page = opened("arm", VERDICT, shown, files=FILES, settings=DEFAULT.judgement, applied=TOLD)
     section = page.section("Figures")
     section.plots([waterfall_plot(GAP), histories(shown, ["elbow", "shoulder"], errors=True)], "discrepancy")
     section.plots([loop(shown, "elbow", "shoulder"), loop(shown, "shoulder", "elbow")], "loops")
@@ -99,12 +99,12 @@ def test_a_report_is_drawn_whole_at_every_width_and_in_both_schemes(tmp_path):
 
 def test_page_and_console_give_the_same_answers():
     text = report().to_html()
-    table = verdict_summary(VERDICT, OPTIONS)[1]
+    table = verdict_summary(VERDICT, FILES)[1]
     told = [str(cell) for cell in table.columns[1].cells]
     assert told[: len(answers(VERDICT))] == [a.answer for a in answers(VERDICT)]
     for found in answers(VERDICT):
         assert f"<dt>{found.question}</dt><dd>{found.answer}</dd>" in text
-    assert f"jointbench apply verdict.json {OPTIONS} -o corrected.xml" in text
+    assert f"jointbench apply {FILES.verdict} {FILES.model} -o corrected.xml" in text
     assert dict(answers(VERDICT))["How far"].startswith(
         "0.145 → 0.00551 (NRMSE of elbow; noise alone 0.0051)"
     )
@@ -115,10 +115,10 @@ def test_answers_of_unknown_and_of_none_name_no_effect():
     told = dict(answers(unknown))
     assert told["Where"] == "elbow, elbow_q (90 %, 1 to 5 Hz)"
     assert told["Which"] == "none of the catalogue; nearest: coulomb_friction (elbow)"
-    assert next_steps(unknown, OPTIONS)[0].command.endswith("--nearest")
+    assert next_steps(unknown, FILES)[0].command.endswith("--nearest")
     none = replace(VERDICT, verdict="none", named=(), locations=())
     assert dict(answers(none))["Which"] == "no effect is missing"
-    assert not any(step.command for step in next_steps(none, OPTIONS))
+    assert not any(step.command for step in next_steps(none, FILES))
 
 
 def test_a_diverged_run_in_the_users_simulator_is_not_drawn():

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis
     from bench.discrepancy.case.case import Case
     from bench.discrepancy.diagnosis import Diagnosis
+    from bench.discrepancy.report.answers import Files
 
 
 @dataclass
@@ -89,14 +90,14 @@ class Diagnose:
             )
         elif len(self.cases) == 1:
             from bench.discrepancy import read_case
-            from bench.discrepancy.report.answers import model_options
+            from bench.discrepancy.report.answers import Files
 
             with _stages(self.progress) as stage:
                 case = read_case(self.cases[0])
                 found = _diagnosed(self, case, stage)
-                own = model_options(case)
-                document, written, problem = self._results(found, stage, (), own)
-            self._told(found, document, written, problem, own)
+                files = Files.of(case, self._verdict)
+                document, written, problem = self._results(found, stage, (), files)
+            self._told(found, document, written, problem, files)
         elif self.cases and not logs:
             from bench.cli.fleet import diagnose_fleet
 
@@ -106,6 +107,11 @@ class Diagnose:
                 "give one case folder, several (a fleet), or logs and the MJCF they are held against, as in: "
                 "jointbench diagnose run.csv model.xml"
             )
+
+    @property
+    def _verdict(self) -> str:
+        """The file of the verdict; empty where none is written."""
+        return "" if self.json in (None, PRINTED) else str(self.json)
 
     def _of_logs_alone(self) -> list[str]:
         """Options that came and say something of logs."""
@@ -117,6 +123,7 @@ class Diagnose:
     def _of_logs(self, logs: list[Path], models: list[Path]) -> None:
         from bench.discrepancy.intake.asking import case_from
         from bench.discrepancy.intake.assumptions import Assumptions
+        from bench.discrepancy.report.answers import Files
         from bench.errors import ParameterError
 
         if len(models) != 1:
@@ -139,21 +146,21 @@ class Diagnose:
             for line in made.assumed:
                 told.print(f"assumed: {line}", markup=False, highlight=False)
             found = _diagnosed(self, case, stage)
-            own = f"--model {models[0]}"
-            document, written, problem = self._results(found, stage, made.assumed, own)
-        self._told(found, document, written, problem, own)
+            files = Files(f"--model {models[0]}", self._verdict)
+            document, written, problem = self._results(found, stage, made.assumed, files)
+        self._told(found, document, written, problem, files)
 
     def _results(
         self,
         found: Diagnosis | ArticulatedDiagnosis,
         stage: Callable[[str], None],
         assumed: tuple[str, ...],
-        model: str,
+        files: Files,
     ) -> tuple[dict[str, Any], list[Path], Exception | None]:
         """The verdict as a document, and its files written."""
         document = found.verdict.to_json()
         document["warnings"] = [*document["warnings"], *(f"assumed: {line}" for line in assumed)]
-        return document, *self._written(found, document, stage, model)
+        return document, *self._written(found, document, stage, files)
 
     def _told(
         self,
@@ -161,12 +168,12 @@ class Diagnose:
         document: dict[str, Any],
         written: list[Path],
         problem: Exception | None,
-        model: str,
+        files: Files,
     ) -> None:
         if self.json == PRINTED:
             emit(document)
         else:
-            for part in verdict_summary(found.verdict, model):
+            for part in verdict_summary(found.verdict, files):
                 Console().print(part, markup=False, highlight=False)
             for path in written:
                 print(f"written: {path}")
@@ -182,7 +189,7 @@ class Diagnose:
         diagnosis: Diagnosis | ArticulatedDiagnosis,
         document: dict[str, Any],
         stage: Callable[[str], None],
-        model: str,
+        files: Files,
     ) -> tuple[list[Path], Exception | None]:
         """The files written, moved into place together; where one fails, the verdict alone, and what failed."""
         from bench.files import OutputError, together, write_text
@@ -200,7 +207,7 @@ class Diagnose:
                     stage("the judging records in your simulator, with what is named")
                     applied = in_simulator(diagnosis.verdict, diagnosis.case)
                     stage(f"writing {self.html}")
-                    write_report(diagnosis, self.html, applied=applied, model=model)
+                    write_report(diagnosis, self.html, applied=applied, files=files)
                 if self.rrd is not None:
                     from bench.discrepancy.report.rerun_recording import write_rerun
 

@@ -162,26 +162,41 @@ class NextStep(NamedTuple):
     command: str = ""
 
 
-def model_options(case: Case) -> str:
-    """Options of `jointbench apply` that name the case and its model; empty where the rig is one of the bench."""
-    folder = Path(case.folder or ".")
-    return f"--model {folder / case.rig} --case {folder}" if case.rig.endswith(".xml") else ""
+class Files(NamedTuple):
+    """What the commands that come next name.
+
+    Attributes:
+        model: Options of `jointbench apply` that name the user's own MJCF; empty where the rig is one of the bench.
+        verdict: File of the verdict; empty where none was written.
+    """
+
+    model: str = ""
+    verdict: str = ""
+
+    @classmethod
+    def of(cls, case: Case, verdict: str = "") -> Files:
+        """The case's own folder and model."""
+        folder = Path(case.folder or ".")
+        own = f"--model {folder / case.rig} --case {folder}" if case.rig.endswith(".xml") else ""
+        return cls(own, verdict)
 
 
-def next_steps(verdict: Verdict, model: str = "") -> tuple[NextStep, ...]:
+def next_steps(verdict: Verdict, files: Files) -> tuple[NextStep, ...]:
     """What to do next, the most useful first.
 
     Args:
         verdict: The verdict.
-        model: As of `model_options`.
+        files: What the commands name.
     """
     steps = []
+    file = files.verdict or "verdict.json"
+    unwritten = "" if files.verdict else f" (--json {file} writes the verdict)"
     if verdict.named or verdict.nearest:
         nearest = "" if verdict.named else " --nearest"
         text = "Put it into your model" if verdict.named else "Put what comes nearest into your model"
-        if model:
-            command = f"jointbench apply verdict.json {model} -o corrected.xml{nearest}"
-            steps.append(NextStep(f"{text} and run the judging records there:", command))
+        if files.model:
+            command = f"jointbench apply {file} {files.model} -o corrected.xml{nearest}"
+            steps.append(NextStep(f"{text} and run the judging records there{unwritten}:", command))
         elif verdict.named:
             steps.append(NextStep("Put it into your model; the end of the report (--html) writes how."))
     if any(p.kind == "simulator" for p in verdict.locations):
@@ -195,10 +210,11 @@ def next_steps(verdict: Verdict, model: str = "") -> tuple[NextStep, ...]:
             )
         )
         if proposal.get("closed_loop"):
-            command = "jointbench excite verdict.json --method planner -o next.csv"
+            command = f"jointbench excite {file} --method planner -o next.csv"
             steps.append(
                 NextStep(
-                    "Or have a planner shape the force while it measures, which decides sooner:", command
+                    f"Or have a planner shape the force while it measures, which decides sooner{unwritten}:",
+                    command,
                 )
             )
     elif proposal.get("reason"):

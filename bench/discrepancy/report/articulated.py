@@ -19,7 +19,7 @@ from bench.discrepancy.articulated_judgement.free_runs import FreeRuns
 from bench.discrepancy.articulated_judgement.torque_error import TorqueProblem
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.judgement.shares import closed_words
-from bench.discrepancy.report.answers import level
+from bench.discrepancy.report.answers import Files, level
 from bench.discrepancy.report.ghost import with_ghost
 from bench.discrepancy.report.interactive import histories, matrix_plot
 from bench.discrepancy.report.opening import add_next_test, add_ranking, opened, with_applied
@@ -107,19 +107,19 @@ def judged_torques(diagnosis: ArticulatedDiagnosis) -> dict[str, Recording]:
 
 
 def articulated_page(
-    diagnosis: ArticulatedDiagnosis, applied: InSimulator | None = None, model: str = ""
+    diagnosis: ArticulatedDiagnosis, files: Files, applied: InSimulator | None = None
 ) -> Page:
     """Build the report.
 
     Args:
         diagnosis: The diagnosis.
+        files: What the commands that come next name.
         applied: What was named in the user's own simulator, to be drawn beside it.
-        model: Options of `jointbench apply` that name the user's own MJCF.
     """
     by_torque = isinstance(diagnosis.problem, TorqueProblem)
     runs = judged_torques(diagnosis) if by_torque else with_applied(simulated_joints(diagnosis), applied)
     out = opened(
-        diagnosis.case.name, diagnosis.verdict, runs, model=model,
+        diagnosis.case.name, diagnosis.verdict, runs, files=files,
         settings=diagnosis.problem.settings.judgement, applied=applied,
     )  # fmt: skip
     _how_far(out, diagnosis, runs)

@@ -14,7 +14,7 @@ import numpy as np
 from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis
 from bench.discrepancy.diagnosis import Diagnosis
 from bench.discrepancy.judgement.shares import closed_words
-from bench.discrepancy.report.answers import level, model_options
+from bench.discrepancy.report.answers import Files, level
 from bench.discrepancy.report.articulated import articulated_page
 from bench.discrepancy.report.interactive import correlation_plot, histories, waterfall_plot
 from bench.discrepancy.report.locations import location_section
@@ -27,23 +27,25 @@ from bench.recording import Recording
 
 
 def page(
-    diagnosis: Diagnosis | ArticulatedDiagnosis, applied: InSimulator | None = None, model: str | None = None
+    diagnosis: Diagnosis | ArticulatedDiagnosis,
+    applied: InSimulator | None = None,
+    files: Files | None = None,
 ) -> Page:
     """Build the report of a diagnosis.
 
     Args:
         diagnosis: The diagnosis.
         applied: What was named in the user's own simulator, to be drawn beside it.
-        model: Options of `jointbench apply` that name the user's own MJCF; those of the case folder where None.
+        files: What the commands that come next name; the case folder's where None.
     """
-    model = model_options(diagnosis.case) if model is None else model
+    files = files or Files.of(diagnosis.case)
     if isinstance(diagnosis, ArticulatedDiagnosis):
-        return articulated_page(diagnosis, applied, model)
+        return articulated_page(diagnosis, files, applied)
     verdict, case = diagnosis.verdict, diagnosis.case
     runs = variants(diagnosis)
     shown = with_applied(judged(diagnosis, runs), applied)
     out = opened(
-        case.name, verdict, shown, model=model, settings=diagnosis.problem.settings.judgement, applied=applied
+        case.name, verdict, shown, files=files, settings=diagnosis.problem.settings.judgement, applied=applied
     )
     _gap_section(out, diagnosis, shown)
     location_section(out, diagnosis, runs)
@@ -60,7 +62,7 @@ def write_report(
     path: str | Path,
     *,
     applied: InSimulator | None = None,
-    model: str | None = None,
+    files: Files | None = None,
 ) -> None:
     """Write the report of a diagnosis as one HTML file.
 
@@ -68,12 +70,12 @@ def write_report(
         diagnosis: The diagnosis.
         path: The file, written whole or not at all.
         applied: As of `page`.
-        model: As of `page`.
+        files: As of `page`.
 
     Raises:
         OutputError: The file cannot be written.
     """
-    page(diagnosis, applied, model).write(path)
+    page(diagnosis, applied, files).write(path)
 
 
 def _gap_section(out: Page, diagnosis: Diagnosis, shown: Mapping[str, Recording]) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from bench.discrepancy.judgement.validation_discrepancy import DIVERGED_GAP
-from bench.discrepancy.report.answers import answers, next_steps
+from bench.discrepancy.report.answers import Files, answers, next_steps
 from bench.discrepancy.report.interactive import histories, ranking_plot
 from bench.discrepancy.report.simulated_records import APPLIED
 from bench.discrepancy.settings import JudgementSettings
@@ -36,7 +36,7 @@ def opened(
     verdict: Verdict,
     runs: Mapping[str, Recording],
     *,
-    model: str,
+    files: Files,
     settings: JudgementSettings,
     applied: InSimulator | None,
 ) -> Page:
@@ -46,7 +46,7 @@ def opened(
         name: Of the case.
         verdict: The verdict.
         runs: The first judging record by judged coordinate: measured, before, after, and applied.
-        model: Options of `jointbench apply` that name the user's own MJCF; empty where the rig is one of the bench.
+        files: What the commands that come next name.
         settings: Those that it was judged with.
         applied: What came of it in the user's simulator.
     """
@@ -60,7 +60,7 @@ def opened(
         [histories(runs, [dof], window=window(runs, dof), errors=errors)],
         f"Judging record, {what}, where the nominal model misses it most; no fit has seen it. Drag to zoom; a double click shows all.",
     )
-    for step in next_steps(verdict, model):
+    for step in next_steps(verdict, files):
         section.text(step.text)
         if step.command:
             section.code(step.command)
