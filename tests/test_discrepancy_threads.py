@@ -1,12 +1,17 @@
-"""Work shared out over threads, within other such work too."""
+"""Work shared out over threads, within other such work too; what threads keep, and what they evaluate."""
 
 import threading
 import time
 
+import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 
 from bench.discrepancy.numerics import threads
+from bench.discrepancy.numerics.kept import Kept
 from bench.discrepancy.numerics.threads import THREADS, in_threads
+from bench.discrepancy.numerics.uniform_spline import uniform_spline
+from bench.errors import ParameterError
 
 
 def test_results_come_in_the_order_of_the_items_at_any_depth():
@@ -68,3 +73,49 @@ def test_several_callers_share_the_threads():
     for caller in callers:
         caller.join()
     assert found == {name: [x * name for x in range(50)] for name in range(4)}
+
+
+def test_what_is_kept_is_made_once_whoever_asks_and_waits_for_no_other():
+    kept, made, slow, other = Kept[int](2), [], threading.Event(), threading.Event()
+
+    def make() -> int:
+        made.append(threading.get_ident())
+        slow.wait(timeout=60)
+        return 9
+
+    found: list[int] = []
+    asking = [threading.Thread(target=lambda: found.append(kept.get("slow", make))) for _ in range(3)]
+    for thread in asking:
+        thread.start()
+    # one that is not being made is had meanwhile
+    free = threading.Thread(target=lambda: (kept.get("quick", lambda: 1), other.set()))
+    free.start()
+    assert other.wait(timeout=60)
+    slow.set()
+    for thread in asking:
+        thread.join()
+    assert found == [9, 9, 9]
+    assert len(made) == 1
+
+
+def test_of_what_is_kept_the_last_few_stay():
+    kept = Kept[int](2)
+    assert [kept.get(key, lambda key=key: key) for key in (1, 2, 1, 3)] == [1, 2, 1, 3]
+    assert kept.get(1, lambda: -1) == 1
+    assert kept.get(2, lambda: -1) == -1
+
+
+@pytest.mark.parametrize("n", [4, 5, 300])
+def test_a_spline_of_equal_steps_is_that_of_scipy(n):
+    samples, step = np.random.default_rng(n).normal(size=(n, 3)), 0.02
+    at = np.linspace(-step, n * step, 57)
+    exact = CubicSpline(step * np.arange(n), samples, axis=0)(at)
+    np.testing.assert_allclose(uniform_spline(samples, step, at), exact.T, atol=1e-11 * np.abs(exact).max())
+    np.testing.assert_allclose(
+        uniform_spline(samples[:, 0], step, at), exact[:, 0], atol=1e-11 * np.abs(exact).max()
+    )
+
+
+def test_a_spline_through_three_samples_is_refused():
+    with pytest.raises(ParameterError, match="4 at least"):
+        uniform_spline(np.zeros(3), 1.0, np.zeros(1))

@@ -9,10 +9,8 @@ another at which something else is missing.
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass
-from threading import Lock
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +19,7 @@ from bench.arrays import Array
 from bench.discrepancy.articulated_effects.hypothesis import JointHypothesis
 from bench.discrepancy.articulated_search.misfit import Octaves
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
+from bench.discrepancy.numerics.kept import Kept
 from bench.discrepancy.numerics.least_squares import Prior, minimise
 from bench.discrepancy.numerics.threads import in_threads
 
@@ -135,22 +134,13 @@ class _Runs:
     def __init__(self, problem: ArticulatedProblem, hypothesis: JointHypothesis) -> None:
         self.problem, self.hypothesis = problem, hypothesis
         self.entries = [problem.entries(j, hypothesis) for j in range(len(problem.joints))]
-        self.kept: list[OrderedDict[bytes, Array]] = [OrderedDict() for _ in problem.joints]
-        self.lock = Lock()
+        self.kept = [Kept[Array](problem.settings.articulated.kept_runs) for _ in problem.joints]
 
     def residual(self, j: int, vector: Array) -> Array:
         """Residual of joint `j`, not to be written to."""
-        key, kept = vector[self.entries[j]].tobytes(), self.kept[j]
-        with self.lock:
-            if key in kept:
-                kept.move_to_end(key)
-                return kept[key]
-        new = self.problem.residual(j, self.hypothesis, vector)
-        with self.lock:
-            kept[key] = new
-            if len(kept) > self.problem.settings.articulated.kept_runs:
-                kept.popitem(last=False)
-        return new
+        return self.kept[j].get(
+            vector[self.entries[j]].tobytes(), lambda: self.problem.residual(j, self.hypothesis, vector)
+        )
 
 
 def linearised(

@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from threading import Lock
 from typing import Self
 
 import numpy as np
@@ -34,6 +33,7 @@ from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.multibody.nominal_parameters import Nominal, base_slots, move, nominal_parameters
 from bench.discrepancy.multibody.records import PreparedRecord, corrected, prepare, settled
 from bench.discrepancy.numerics.deadline import NEVER, Deadline
+from bench.discrepancy.numerics.kept import Kept
 from bench.discrepancy.settings import DEFAULT, DiagnosisSettings
 
 
@@ -58,11 +58,11 @@ class ArticulatedProblem:
     deadline: Deadline = NEVER
     softness: float = 0.0
     nominal: tuple[Nominal, ...] = field(init=False)
-    _corrected: dict[tuple, tuple[PreparedRecord, ...]] = field(init=False, default_factory=dict)
-    _correcting: Lock = field(init=False, default_factory=Lock)
+    _corrected: Kept[tuple[PreparedRecord, ...]] = field(init=False)
 
     def __post_init__(self) -> None:
         self.nominal = nominal_parameters(self.case, self.model)
+        self._corrected = Kept(self.settings.articulated.kept_motions)
 
     @classmethod
     def of(
@@ -157,15 +157,12 @@ class ArticulatedProblem:
             return self.records
         # whether a servo acts on a wrong reading changes its runs and not the motion
         key = tuple(sorted((name, encoder._replace(in_loop=0.0)) for name, encoder in wrong.items()))
-        with self._correcting:
-            if key not in self._corrected:
-                while len(self._corrected) >= self.settings.articulated.kept_motions:
-                    self._corrected.pop(next(iter(self._corrected)))
-                self._corrected[key] = tuple(
-                    corrected(self.case, self.model, r, dict(key), settings=self.settings)
-                    for r in self.records
-                )
-            found = self._corrected[key]
+        found = self._corrected.get(
+            key,
+            lambda: tuple(
+                corrected(self.case, self.model, r, dict(key), settings=self.settings) for r in self.records
+            ),
+        )
         if not any(encoder.in_loop for encoder in wrong.values()):
             return found
         return tuple(r.read_by(wrong) for r in found)

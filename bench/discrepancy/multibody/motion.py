@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from bench.arrays import Array
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.motion.kalman_smoother import Smoother, resting, smoother_of
 from bench.discrepancy.multibody.encoders import TRUE, Encoder, encoders_of
 from bench.discrepancy.multibody.model import ArticulatedModel, Dynamics
+from bench.discrepancy.numerics.uniform_spline import uniform_spline
 from bench.discrepancy.settings import ArticulatedSettings, MotionSettings
 
 
@@ -60,7 +60,7 @@ def motion_of(
         else:
             smooth = smoother.smooth(true)
             if wrong.delay:
-                smooth = CubicSpline(clock, smooth, axis=0)(np.minimum(clock + wrong.delay, clock[-1]))
+                smooth = uniform_spline(smooth, record.step, np.minimum(clock + wrong.delay, clock[-1])).T
             out[:, :, j] = smooth.T
         samples.append(true)
         smoothers.append(smoother)
@@ -73,11 +73,12 @@ Moving = tuple[CaseRecord, JointMotion]
 
 
 class JointClock(NamedTuple):
-    """Samples of a record, and the middles of the integration steps between them."""
+    """Samples of a record, `step` apart, and the middles of the integration steps between them."""
 
     samples: Array
     middles: Array
     n_sub: int
+    step: float
 
     def later(self, delay: float) -> JointClock:
         """The middles of steps that lie `delay` [s] earlier, from the first sample on."""
@@ -85,7 +86,7 @@ class JointClock(NamedTuple):
 
     def between(self, samples: Array) -> Array:
         """Values (n, n_joints) at the samples, at the middles (n_joints, n_steps)."""
-        return np.ascontiguousarray(CubicSpline(self.samples, samples, axis=0)(self.middles).T)
+        return uniform_spline(samples, self.step, self.middles)
 
 
 def clock_of(record: CaseRecord, *, settings: ArticulatedSettings) -> JointClock:
@@ -93,7 +94,9 @@ def clock_of(record: CaseRecord, *, settings: ArticulatedSettings) -> JointClock
     n_sub = max(1, int(np.ceil(record.step / settings.longest_step - 1e-9)))
     middles = (np.arange((len(record) - 1) * n_sub) + 0.5) * (record.step / n_sub)
     samples = np.arange(len(record)) * record.step
-    return JointClock(np.asarray(samples, dtype=np.float64), np.asarray(middles, dtype=np.float64), n_sub)
+    return JointClock(
+        np.asarray(samples, dtype=np.float64), np.asarray(middles, dtype=np.float64), n_sub, record.step
+    )
 
 
 class Coefficients(NamedTuple):

@@ -11,7 +11,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfiltfilt
 
 from bench.arrays import Array
@@ -24,6 +23,7 @@ from bench.discrepancy.multibody.joint_record import JointRecord
 from bench.discrepancy.multibody.model import ArticulatedModel, Dynamics
 from bench.discrepancy.multibody.motion import Coefficients, JointClock, JointMotion, clock_of, motion_of
 from bench.discrepancy.multibody.noise import torque_noise
+from bench.discrepancy.numerics.uniform_spline import uniform_spline
 from bench.discrepancy.settings import DEFAULT, ArticulatedSettings, DiagnosisSettings
 
 
@@ -229,5 +229,5 @@ def _between(case: Case, samples: Array, clock: JointClock) -> Array:
     if case.load_interpolation == "zero_order_hold":
         return samples[np.searchsorted(clock.samples, clock.middles, side="right") - 1]
     if case.load_interpolation == "band_limited":
-        return np.asarray(CubicSpline(clock.samples, samples)(clock.middles), dtype=np.float64)
+        return uniform_spline(samples, clock.step, clock.middles)
     return np.interp(clock.middles, clock.samples, samples)
