@@ -169,6 +169,56 @@ def linearised(
     ), residual
 
 
+class _Fitting:
+    """Fits of one hypothesis with one scale after the other, each of which begins with what the last one knows.
+
+    Args:
+        problem: As of `fit`.
+        hypothesis: As of `fit`.
+        others: As of `fit`.
+    """
+
+    def __init__(
+        self, problem: ArticulatedProblem, hypothesis: JointHypothesis, others: Others | None
+    ) -> None:
+        self.problem, self.hypothesis, self.others = problem, hypothesis, others
+        n_joints = len(problem.joints)
+        new = hypothesis[len(others.base.hypothesis) :] if others else hypothesis
+        self.active = problem.reached(new) if others and new else tuple(range(n_joints))
+        self.passive = [j for j in range(n_joints) if j not in self.active]
+        self.free = free_entries(problem, hypothesis, self.active if self.passive else None)
+        self.runs = _Runs(problem, hypothesis)
+        self.jacobian: Array | None = None
+
+    def _units(self, scale: Array) -> list[Array]:
+        """Scale (n,) of the residuals of each active joint."""
+        return [scale[j][self.problem.octaves.index[j]] for j in self.active]
+
+    def fit(self, start: Array, scale: Array, iterations: int, limit: float = np.inf) -> ArticulatedFit:
+        """Fit with a scale (n_joints, n_octaves); the first fit from any start or several, the next from where the last one ended."""
+        problem, others, shared = self.problem, self.others, list(self.problem.shared)
+        settings, units = problem.settings.articulated, self._units(scale)
+
+        def residual_at(vector: Array) -> Array:
+            parts = in_threads(
+                lambda k: self.runs.residual(self.active[k], vector) / units[k], range(len(units))
+            )
+            for j in self.passive:
+                assert others is not None
+                parts.append(others.factors[j] @ vector[shared] - others.targets[j])
+            return np.concatenate(parts)
+
+        mean, std, low, high = problem.prior(self.hypothesis)
+        reach = np.where(self.free < len(problem.nominal), settings.nominal_reach, settings.effect_reach)
+        every = np.concatenate([*units, np.ones(len(shared) * len(self.passive))])
+        known = None if self.jacobian is None else self.jacobian / every[:, None]
+        found = minimise(
+            residual_at, start, prior=Prior(mean, std, low, high), free=self.free, reach=reach, iterations=iterations, limit=limit,
+            deadline=problem.deadline, settings=problem.settings.numerics, known=known)  # fmt: skip
+        self.jacobian = None if found.jacobian is None else found.jacobian * every[:, None]
+        return _summary(self, found.vector, found.curvature)
+
+
 def fit(
     problem: ArticulatedProblem,
     hypothesis: JointHypothesis,
@@ -190,31 +240,7 @@ def fit(
         others: What is known of the joints that the hypothesis does not change beyond its base's; they are all run where None.
         limit: Cost that has to be within sight.
     """
-    settings = problem.settings.articulated
-    starts = np.atleast_2d(start)
-    n_joints = len(problem.joints)
-    new = hypothesis[len(others.base.hypothesis) :] if others else hypothesis
-    active = problem.reached(new) if others and new else tuple(range(n_joints))
-    passive = [j for j in range(n_joints) if j not in active]
-    shared = list(problem.shared)
-
-    runs = _Runs(problem, hypothesis)
-    units = [scale[j][problem.octaves.index[j]] for j in range(n_joints)]
-
-    def residual_at(vector: Array) -> Array:
-        parts = in_threads(lambda j: runs.residual(j, vector) / units[j], active)
-        for j in passive:
-            assert others is not None
-            parts.append(others.factors[j] @ vector[shared] - others.targets[j])
-        return np.concatenate(parts)
-
-    mean, std, low, high = problem.prior(hypothesis)
-    free = free_entries(problem, hypothesis, active if passive else None)
-    reach = np.where(free < len(problem.nominal), settings.nominal_reach, settings.effect_reach)
-    found = minimise(
-        residual_at, starts, prior=Prior(mean, std, low, high), free=free, reach=reach, iterations=iterations, limit=limit,
-        deadline=problem.deadline, settings=problem.settings.numerics)  # fmt: skip
-    return _summary(problem, hypothesis, found.vector, found.curvature, free, active, others)
+    return _Fitting(problem, hypothesis, others).fit(start, scale, iterations, limit)
 
 
 def refitted(
@@ -225,6 +251,7 @@ def refitted(
     scale: Array,
     others: Others | None = None,
     least: float = -np.inf,
+    most: int | None = None,
 ) -> ArticulatedFit:
     """Fit a hypothesis again and again, each time with the scale that the last fit left, until it leaves the scale that it was given.
 
@@ -239,19 +266,19 @@ def refitted(
         scale: (n_joints, n_octaves) of the residuals at the start.
         others: As of `fit`.
         least: Log posterior short of which it is fitted once.
+        most: Fits, at most; the search's own number where None.
 
     References:
         D. R. Hunter and K. Lange, A tutorial on MM algorithms, The American Statistician 58 (2004) 30-37.
     """
     settings = problem.settings.articulated.search
-    found = fit(problem, hypothesis, start, scale=scale, iterations=settings.iterations, others=others)
-    for _ in range(settings.refits - 1):
+    fitting = _Fitting(problem, hypothesis, others)
+    found = fitting.fit(start, scale, settings.iterations)
+    for _ in range((most or settings.refits) - 1):
         if found.log_posterior < least or np.allclose(found.scale, scale, rtol=settings.rescaled):
             break
         scale = found.scale
-        found = fit(
-            problem, hypothesis, found.vector, scale=scale, iterations=settings.iterations, others=others
-        )
+        found = fitting.fit(found.vector, scale, settings.iterations)
     return found
 
 
@@ -274,20 +301,13 @@ def free_entries(
     return np.array(out, dtype=np.int64)
 
 
-def _summary(
-    problem: ArticulatedProblem,
-    hypothesis: JointHypothesis,
-    vector: Array,
-    curvature: Array,
-    free: NDArray[np.int64],
-    active: Sequence[int],
-    others: Others | None,
-) -> ArticulatedFit:
+def _summary(fitting: _Fitting, vector: Array, curvature: Array) -> ArticulatedFit:
+    problem, hypothesis, others, free = fitting.problem, fitting.hypothesis, fitting.others, fitting.free
     octaves = problem.octaves
     chi2 = np.zeros_like(octaves.count)
     for j in range(len(problem.joints)):
-        if j in active or others is None:
-            chi2[j] = octaves.power(j, problem.residual(j, hypothesis, vector))
+        if j in fitting.active or others is None:
+            chi2[j] = octaves.power(j, fitting.runs.residual(j, vector))
         else:
             # what the other joints lose by bodies that suit this one
             shared = list(problem.shared)

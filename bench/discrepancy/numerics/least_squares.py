@@ -47,6 +47,7 @@ class Minimum(NamedTuple):
         cost: Squared residuals plus prior misfit; infinite where nothing finite was found.
         curvature: (n_free, n_free) of the cost in units of the prior's standard deviations, halved; the prior included.
         settled: Whether nothing more was to be gained.
+        jacobian: (n_residuals, n_free) by prior standard deviations, where it was taken at the vector or a negligible step from it.
     """
 
     vector: Array
@@ -54,6 +55,7 @@ class Minimum(NamedTuple):
     cost: float
     curvature: Array
     settled: bool
+    jacobian: Array | None = None
 
 
 class _State(NamedTuple):
@@ -110,6 +112,7 @@ def minimise(
     deadline: Deadline = NEVER,
     settings: NumericsSettings = DEFAULT.numerics,
     near: Callable[[Array], Callable[[Array], Array]] | None = None,
+    known: Array | None = None,
 ) -> Minimum:
     """Minimise squared residuals plus the misfit of a Gaussian prior.
 
@@ -126,6 +129,7 @@ def minimise(
         deadline: When the iteration ends where it is, once it has the curvature there.
         settings: `NumericsSettings` of the diagnosis.
         near: Vector to cheaper residuals of vectors near it, for differences; `residual_at` itself where None.
+        known: Jacobian (n, n_free) by prior standard deviations at a single start, where it is known.
     """
     own = Prior(prior.mean[free], prior.std[free], prior.low[free], prior.high[free])
     task = _Task(residual_at, free, *own, reach, tolerance, limit, deadline, settings, near)
@@ -136,8 +140,8 @@ def minimise(
     finely: Array | None = None
     coarse = ends = steps = 0
     while True:
-        found = _descend(task, state, settings.differences[coarse], range(steps, iterations))
-        state, steps = found.state, found.steps
+        found = _descend(task, state, settings.differences[coarse], range(steps, iterations), known)
+        known, state, steps = None, found.state, found.steps
         ends = int(found.ended) * (1 if found.progressed else 1 + ends)
         if not found.ended or ends == len(settings.differences) or not exact or task.excess(state) > 0.0:
             break
@@ -147,10 +151,17 @@ def minimise(
         jacobian = finely if found.ended and not found.progressed else None
     if jacobian is None or (exact and not found.fresh and task.excess(state) <= 0.0):
         anew = _jacobian(task, state, settings.differences[0])
-        jacobian = jacobian if anew is None else anew
+        jacobian, here = (jacobian, False) if anew is None else (anew, True)
+    else:
+        here = found.fresh
     curvature = None if jacobian is None else _squared(jacobian)
     return Minimum(
-        state.vector, state.residual, state.cost, identity if curvature is None else curvature, found.ended
+        state.vector,
+        state.residual,
+        state.cost,
+        identity if curvature is None else curvature,
+        found.ended,
+        jacobian if here else None,
     )
 
 
@@ -174,10 +185,9 @@ class _Descent(NamedTuple):
     steps: int
 
 
-def _descend(task: _Task, state: _State, difference: float, steps: range) -> _Descent:
-    """Take Levenberg and Marquardt's steps, of the given numbers at most, with one size of differences."""
-    jacobian: Array | None = None
-    fresh = progressed = False
+def _descend(task: _Task, state: _State, difference: float, steps: range, jacobian: Array | None) -> _Descent:
+    """Take Levenberg and Marquardt's steps, of the given numbers at most, with one size of differences, from a known Jacobian, if any."""
+    fresh, progressed = jacobian is not None, False
     damping = task.settings.damping
     for step in steps:
         if jacobian is None:
