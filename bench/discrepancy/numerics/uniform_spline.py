@@ -27,15 +27,12 @@ def uniform_spline(samples: Array, step: float, at: Array) -> Array:
     Raises:
         ParameterError: There are less than four samples.
     """
-    if len(samples) < LEAST:
-        raise ParameterError(f"{len(samples)} samples came; a cubic spline takes {LEAST} at least")
+    if len(samples) < 4:  # the first two pieces are one, and the last two
+        raise ParameterError(f"{len(samples)} samples came; a cubic spline takes 4 at least")
     out = np.asarray(
         _interpolated(np.ascontiguousarray(np.atleast_2d(samples.T), dtype=np.float64), at / step)
     )
     return out[0] if samples.ndim == 1 else out
-
-
-LEAST = 4
 
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
