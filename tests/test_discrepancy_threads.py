@@ -8,7 +8,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from bench.discrepancy.numerics import threads
-from bench.discrepancy.numerics.kept import Kept
+from bench.discrepancy.numerics.made_once import MadeOnce
 from bench.discrepancy.numerics.threads import THREADS, in_threads
 from bench.discrepancy.numerics.uniform_spline import uniform_spline
 from bench.errors import ParameterError
@@ -76,7 +76,7 @@ def test_several_callers_share_the_threads():
 
 
 def test_what_is_kept_is_made_once_whoever_asks_and_waits_for_no_other():
-    kept, made, slow, other = Kept[int](2), [], threading.Event(), threading.Event()
+    kept, made, slow, other = MadeOnce[int](2), [], threading.Event(), threading.Event()
 
     def make() -> int:
         made.append(threading.get_ident())
@@ -99,7 +99,7 @@ def test_what_is_kept_is_made_once_whoever_asks_and_waits_for_no_other():
 
 
 def test_of_what_is_kept_the_last_few_stay():
-    kept = Kept[int](2)
+    kept = MadeOnce[int](2)
     assert [kept.get(key, lambda key=key: key) for key in (1, 2, 1, 3)] == [1, 2, 1, 3]
     assert kept.get(1, lambda: -1) == 1
     assert kept.get(2, lambda: -1) == -1

@@ -19,8 +19,8 @@ from bench.arrays import Array
 from bench.discrepancy.articulated_effects.hypothesis import JointHypothesis
 from bench.discrepancy.articulated_search.misfit import Octaves
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
-from bench.discrepancy.numerics.kept import Kept
 from bench.discrepancy.numerics.least_squares import Prior, minimise
+from bench.discrepancy.numerics.made_once import MadeOnce
 from bench.discrepancy.numerics.threads import in_threads
 
 
@@ -134,7 +134,7 @@ class _Runs:
     def __init__(self, problem: ArticulatedProblem, hypothesis: JointHypothesis) -> None:
         self.problem, self.hypothesis = problem, hypothesis
         self.entries = [problem.entries(j, hypothesis) for j in range(len(problem.joints))]
-        self.kept = [Kept[Array](problem.settings.articulated.kept_runs) for _ in problem.joints]
+        self.kept = [MadeOnce[Array](problem.settings.articulated.kept_runs) for _ in problem.joints]
 
     def residual(self, j: int, vector: Array) -> Array:
         """Residual of joint `j`, not to be written to."""
@@ -251,7 +251,6 @@ def refitted(
     scale: Array,
     others: Others | None = None,
     least: float = -np.inf,
-    most: int | None = None,
 ) -> ArticulatedFit:
     """Fit a hypothesis again and again, each time with the scale that the last fit left, until it leaves the scale that it was given.
 
@@ -266,7 +265,6 @@ def refitted(
         scale: (n_joints, n_octaves) of the residuals at the start.
         others: As of `fit`.
         least: Log posterior short of which it is fitted once.
-        most: Fits, at most; the search's own number where None.
 
     References:
         D. R. Hunter and K. Lange, A tutorial on MM algorithms, The American Statistician 58 (2004) 30-37.
@@ -274,7 +272,7 @@ def refitted(
     settings = problem.settings.articulated.search
     fitting = _Fitting(problem, hypothesis, others)
     found = fitting.fit(start, scale, settings.iterations)
-    for _ in range((most or settings.refits) - 1):
+    for _ in range(settings.refits - 1):
         if found.log_posterior < least or np.allclose(found.scale, scale, rtol=settings.rescaled):
             break
         scale = found.scale

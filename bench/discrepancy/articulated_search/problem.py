@@ -33,7 +33,7 @@ from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.multibody.nominal_parameters import Nominal, base_slots, move, nominal_parameters
 from bench.discrepancy.multibody.records import PreparedRecord, corrected, prepare, settled
 from bench.discrepancy.numerics.deadline import NEVER, Deadline
-from bench.discrepancy.numerics.kept import Kept
+from bench.discrepancy.numerics.made_once import MadeOnce
 from bench.discrepancy.settings import DEFAULT, DiagnosisSettings
 
 
@@ -58,11 +58,11 @@ class ArticulatedProblem:
     deadline: Deadline = NEVER
     softness: float = 0.0
     nominal: tuple[Nominal, ...] = field(init=False)
-    _corrected: Kept[tuple[PreparedRecord, ...]] = field(init=False)
+    _corrected: MadeOnce[tuple[PreparedRecord, ...]] = field(init=False)
 
     def __post_init__(self) -> None:
         self.nominal = nominal_parameters(self.case, self.model)
-        self._corrected = Kept(self.settings.articulated.kept_motions)
+        self._corrected = MadeOnce(self.settings.articulated.kept_motions)
 
     @classmethod
     def of(

@@ -86,10 +86,9 @@ def best_of(
                 break
             others = Others.of(soft, ground)
             nearby = _plays(soft, ground, first, settings)
-            most = _fits_in(soft, problem)
             first = in_threads(
-                lambda f, soft=soft, ground=ground, others=others, nearby=nearby, most=most: _again(
-                    soft, ground, others, f, nearby.get(f.hypothesis[-1].key, ()), most=most
+                lambda f, soft=soft, ground=ground, others=others, nearby=nearby: _again(
+                    soft, ground, others, f, nearby.get(f.hypothesis[-1].key, ())
                 ),
                 first,
             )
@@ -104,31 +103,19 @@ def best_of(
         progress("fits")
         # where runs forget, other log posteriors hold
         short_of = least if soft is problem else -np.inf
-        first = _fits(
-            soft,
-            ground,
-            by_effect(points, settings.starts),
-            settings,
-            gained,
-            short_of,
-            _fits_in(soft, problem),
-        )
-    others = Others.of(problem, base)
+        first = _fits(soft, ground, by_effect(points, settings.starts), settings, gained, short_of)
     first = [f for f in first if sound(problem, f)] or first
     finalists = sorted(first, key=lambda f: -f.log_posterior)[: settings.finalists]
-    again = in_threads(lambda one: _again(problem, base, others, one, least=least), finalists)
-    fits = in_threads(lambda f: _where_settled(problem, f), [f for f in again if sound(problem, f)])
+    if grounds[-1][0] is not problem:
+        others = Others.of(problem, base)
+        finalists = in_threads(lambda f: _again(problem, base, others, f, least=least), finalists)
+    fits = in_threads(lambda f: _where_settled(problem, f), [f for f in finalists if sound(problem, f)])
     if not fits:
         return Round(None, fits, corrected)
     best = _simplest(problem, fits)
     settled = problem.settled(best.hypothesis, best.vector)
     whole = refitted(settled, best.hypothesis, best.vector, scale=best.scale, least=least)
     return Round(whole, [*(f for f in fits if f is not best), whole], corrected)
-
-
-def _fits_in(soft: ArticulatedProblem, problem: ArticulatedProblem) -> int | None:
-    """Fits of a hypothesis in a softened problem, at most: one where it is on its way to the problem itself, which decides."""
-    return None if soft is problem else 1
 
 
 def _simplest(problem: ArticulatedProblem, fits: Sequence[ArticulatedFit]) -> ArticulatedFit:
@@ -216,7 +203,6 @@ def _again(
     found: ArticulatedFit,
     starts: Sequence[Array] = (),
     least: float = -np.inf,
-    most: int | None = None,
 ) -> ArticulatedFit:
     """A fit once more in another problem, on the joints that its last effect changes; the other joints as a fit there has them.
 
@@ -230,8 +216,8 @@ def _again(
         vector[own] = base.vector[own]
     scale = scale_of(problem, replace(found, vector=vector))
     return refitted(
-        problem, found.hypothesis, np.vstack([vector, *starts]), scale=scale, others=others, least=least, most=most,
-    )  # fmt: skip
+        problem, found.hypothesis, np.vstack([vector, *starts]), scale=scale, others=others, least=least
+    )
 
 
 def _beside(
@@ -315,7 +301,6 @@ def _fits(
     settings: SearchSettings,
     gained: float,
     least: float,
-    most: int | None,
 ) -> list[ArticulatedFit]:
     """Fits of the most promising effects on top of a fit, on the joints that they change."""
     others = Others.of(problem, base)
@@ -350,9 +335,7 @@ def _fits(
             starts,
         )
         new = max(tried, key=lambda f: f.log_posterior)
-        new = refitted(
-            problem, hypothesis, new.vector, scale=new.scale, others=others, least=least, most=most
-        )
+        new = refitted(problem, hypothesis, new.vector, scale=new.scale, others=others, least=least)
         new = _beside(problem, new, others, settings)
         out.append(new)
         gained = max(gained, 2.0 * (new.log_posterior - base.log_posterior))

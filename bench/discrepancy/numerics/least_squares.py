@@ -47,7 +47,7 @@ class Minimum(NamedTuple):
         cost: Squared residuals plus prior misfit; infinite where nothing finite was found.
         curvature: (n_free, n_free) of the cost in units of the prior's standard deviations, halved; the prior included.
         settled: Whether nothing more was to be gained.
-        jacobian: (n_residuals, n_free) by prior standard deviations, where it was taken at the vector or a negligible step from it.
+        jacobian: (n_residuals, n_free) by prior standard deviations, where it was taken at the vector.
     """
 
     vector: Array
@@ -137,7 +137,7 @@ def minimise(
     identity = np.eye(len(free))
     if not np.isfinite(state.cost):
         return Minimum(state.vector, state.residual, np.inf, identity, False)
-    finely: Array | None = None
+    finely: tuple[Array | None, Array | None] = None, None
     coarse = ends = steps = 0
     while True:
         found = _descend(task, state, settings.differences[coarse], range(steps, iterations), known)
@@ -145,15 +145,13 @@ def minimise(
         ends = int(found.ended) * (1 if found.progressed else 1 + ends)
         if not found.ended or ends == len(settings.differences) or not exact or task.excess(state) > 0.0:
             break
-        finely, coarse = (None if coarse else found.jacobian), 1 - coarse
-    jacobian = found.jacobian
+        finely, coarse = ((None, None) if coarse else (found.jacobian, found.at)), 1 - coarse
+    jacobian, at = found.jacobian, found.at
     if coarse:  # columns of fine differences at the same place, where there are any
-        jacobian = finely if found.ended and not found.progressed else None
-    if jacobian is None or (exact and not found.fresh and task.excess(state) <= 0.0):
+        jacobian, at = finely if found.ended and not found.progressed else (None, None)
+    if jacobian is None or (exact and found.at is None and task.excess(state) <= 0.0):
         anew = _jacobian(task, state, settings.differences[0])
-        jacobian, here = (jacobian, False) if anew is None else (anew, True)
-    else:
-        here = found.fresh
+        jacobian, at = (jacobian, None) if anew is None else (anew, state.vector)
     curvature = None if jacobian is None else _squared(jacobian)
     return Minimum(
         state.vector,
@@ -161,7 +159,7 @@ def minimise(
         state.cost,
         identity if curvature is None else curvature,
         found.ended,
-        jacobian if here else None,
+        jacobian if at is state.vector else None,
     )
 
 
@@ -171,7 +169,7 @@ class _Descent(NamedTuple):
     Attributes:
         state: Where they ended.
         jacobian: The last one, if any.
-        fresh: Whether that was taken at the last step.
+        at: Where that was taken; None where it was carried along since.
         ended: Whether nothing more was to be gained with it.
         progressed: Whether anything was.
         steps: Number of steps so far.
@@ -179,7 +177,7 @@ class _Descent(NamedTuple):
 
     state: _State
     jacobian: Array | None
-    fresh: bool
+    at: Array | None
     ended: bool
     progressed: bool
     steps: int
@@ -187,16 +185,17 @@ class _Descent(NamedTuple):
 
 def _descend(task: _Task, state: _State, difference: float, steps: range, jacobian: Array | None) -> _Descent:
     """Take Levenberg and Marquardt's steps, of the given numbers at most, with one size of differences, from a known Jacobian, if any."""
-    fresh, progressed = jacobian is not None, False
+    at = None if jacobian is None else state.vector
+    progressed = False
     damping = task.settings.damping
     for step in steps:
         if jacobian is None:
-            jacobian, fresh = _jacobian(task, state, difference), True
+            jacobian, at = _jacobian(task, state, difference), state.vector
             if jacobian is None:
                 break
         if not task.deadline.allows("the last steps of fits"):
-            return _Descent(state, jacobian, fresh, False, progressed, step + 1)
-        normal = _squared(jacobian)
+            return _Descent(state, jacobian, at, False, progressed, step + 1)
+        normal, fresh = _squared(jacobian), at is not None
         if normal is None:
             if fresh:
                 break
@@ -212,7 +211,7 @@ def _descend(task: _Task, state: _State, difference: float, steps: range, jacobi
             step >= task.settings.patience and state.cost - task.settings.optimism * promise > task.limit
         )
         if ended or hopeless:
-            return _Descent(state, jacobian, fresh, ended, progressed, step + 1)
+            return _Descent(state, jacobian, at, ended, progressed, step + 1)
         moved, damping = _step(
             task,
             state,
@@ -223,7 +222,7 @@ def _descend(task: _Task, state: _State, difference: float, steps: range, jacobi
         )
         if moved is None:
             if fresh:
-                return _Descent(state, jacobian, fresh, True, progressed, step + 1)
+                return _Descent(state, jacobian, at, True, progressed, step + 1)
             jacobian = None
             continue
         move = (moved.vector - state.vector)[task.free] / task.std
@@ -232,13 +231,13 @@ def _descend(task: _Task, state: _State, difference: float, steps: range, jacobi
         surprise = moved.residual - state.residual - jacobian @ move
         state = moved
         if fresh and gained < negligible:
-            return _Descent(state, jacobian, fresh, True, progressed, step + 1)
+            return _Descent(state, jacobian, at, True, progressed, step + 1)
         progressed = progressed or gained >= negligible
         if gained < max(task.settings.faithful * predicted, negligible):
             jacobian = None
         else:
-            jacobian, fresh = jacobian + np.outer(surprise, move / (move @ move)), False
-    return _Descent(state, jacobian, fresh, False, progressed, steps.stop)
+            jacobian, at = jacobian + np.outer(surprise, move / (move @ move)), None
+    return _Descent(state, jacobian, at, False, progressed, steps.stop)
 
 
 def _squared(jacobian: Array) -> Array | None:

@@ -10,14 +10,14 @@ from typing import Generic, TypeVar
 _Value = TypeVar("_Value")
 
 
-class Kept(Generic[_Value]):
+class MadeOnce(Generic[_Value]):
     """Values by key. Who asks for one that is being made waits for it, and for no other.
 
     Args:
         most: Values kept, those that were asked for last.
 
     Examples:
-        >>> squares = Kept[int](2)
+        >>> squares = MadeOnce[int](2)
         >>> squares.get(3, lambda: 9), squares.get(3, lambda: 10)
         (9, 9)
     """
