@@ -54,6 +54,7 @@ def inverse_address() -> int:
 
 
 @native.quiet()
+@native.untimed()
 def along(model: mujoco.MjModel, q: Array, v: Array, a: Array) -> tuple[Array, Array]:
     """Torques and diagonals of the mass matrix (n, n_joints) along the motion (n, n_joints) of a model of hinges and slides."""
     data = mujoco.MjData(model)
