@@ -11,9 +11,8 @@ from __future__ import annotations
 import json
 import sys
 import time
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 import tyro
 from rich.console import Console
@@ -26,7 +25,7 @@ from checkout import commit  # noqa: E402
 from bench.discrepancy import diagnose_folder  # noqa: E402
 from bench.discrepancy.blind.background_score import BackgroundScore, score_backgrounds  # noqa: E402
 from bench.errors import BenchError  # noqa: E402
-from bench.files import write_text  # noqa: E402
+from bench.files import json_values, write_text  # noqa: E402
 
 
 @dataclass
@@ -75,22 +74,10 @@ def main() -> int:
         )
     score = score_backgrounds(results, args.answers)
     if args.json:
-        print(json.dumps(_document(score), indent=1))
+        print(json.dumps(json_values(asdict(score)), indent=1))
     else:
         _tell(console, score)
     return 0
-
-
-def _document(score: BackgroundScore) -> dict[str, Any]:
-    """A score in JSON values."""
-    return {
-        "shares": {what: share._asdict() for what, share in score.shares.items()},
-        "calibration": score.calibration,
-        "calibration_interval": score.interval,
-        "scatter": score.scatter,
-        "reliability": score.reliability,
-        "wrong": score.wrong,
-    }
 
 
 def _tell(console: Console, score: BackgroundScore) -> None:

@@ -113,6 +113,47 @@ CAPABILITIES: Sequence[Capability] = (
         data="../trials-background",
     ),
     Capability(
+        "sealed_background",
+        "Diagnosis of own sealed cases whose truth holds a background besides",
+        (
+            *("jointbench", "blind", "score", "out/sealed-background/results"),
+            *("out/sealed-background/answers", "--json"),
+        ),
+        lambda told: background(told["background"]),
+        before=(
+            (
+                *(
+                    "jointbench",
+                    "blind",
+                    "make",
+                    "out/sealed-background/cases",
+                    "out/sealed-background/answers",
+                ),
+                *(
+                    "--n",
+                    "200",
+                    "--seed",
+                    SEALED_SEED,
+                    "--background",
+                    "--no-detectability",
+                    "--workers",
+                    "2",
+                ),
+            ),
+            (
+                *(
+                    "jointbench",
+                    "blind",
+                    "run",
+                    "out/sealed-background/cases",
+                    "out/sealed-background/results",
+                ),
+                *("--workers", "2", "--again"),
+            ),
+        ),
+        hours=True,
+    ),
+    Capability(
         "arms",
         "Diagnosis of arms, legs and servos of others",
         ("jointbench", "blind", "score", "out/arms", "{data}/../trials-arms/answers", "--json"),

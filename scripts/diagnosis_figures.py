@@ -179,7 +179,7 @@ def background(told: Any) -> Figures:
         )
         for what, share in told["shares"].items()
     ]
-    low, high = told["calibration_interval"]
+    low, high = told["interval"]
     figure = f"{told['calibration']:.3f} ({low:.3f} to {high:.3f}; {told['scatter']:.3f} if every probability were exact)"
     return [*rows, ("expected calibration error of names", figure, "≤ 0.05")]
 
