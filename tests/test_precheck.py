@@ -112,6 +112,11 @@ def test_sound_records_are_ready_and_graded(tmp_path, capsys):
     assert effects["cubic_stiffness"]["word"] == "identifiable"
     # what a nominal parameter can do as well keeps next to nothing of its own
     assert effects["cubic_stiffness"]["figure"] > 3.0 * effects["stiffness_error"]["figure"]
+    assert effects["stiffness_error"]["imitated"] > 0.9 > effects["cubic_stiffness"]["imitated"]
+    # at the console a line for each effect, and a mark on what nominal parameters imitate
+    assert main(["check", str(folder)]) == 0
+    (line,) = (line for line in capsys.readouterr().out.splitlines() if " stiffness_error " in line)
+    assert "~" in line
 
 
 def test_exit_status_says_what_was_found(tmp_path, capsys):

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import tyro
 from rich.console import Console
@@ -12,6 +14,10 @@ from rich.table import Table
 
 from bench.cli.console import emit
 from bench.cli.paths import PRINTED
+
+if TYPE_CHECKING:
+    from bench.discrepancy.precheck.checking import Checked
+    from bench.discrepancy.precheck.information import Told
 
 
 @dataclass
@@ -53,7 +59,7 @@ class Check:
             sys.exit(found.status)
 
 
-def _tell(found, case: Path) -> None:  # type: ignore[no-untyped-def]
+def _tell(found: Checked, case: Path) -> None:
     console = Console()
 
     def say(text: str) -> None:
@@ -64,10 +70,36 @@ def _tell(found, case: Path) -> None:  # type: ignore[no-untyped-def]
         say(f"- {doubt}")
     for note in found.notes:
         say(f"  {note}")
-    for title, entries in (("nominal parameters", found.parameters), ("effects", found.effects)):
-        if not entries:
-            continue
-        table = Table(title, "where", "with these records", "")
-        for one in sorted(entries, key=lambda e: ("identifiable", "weak", "not identifiable").index(e.word)):
-            table.add_row(one.name, one.where, one.word, one.text)
+    if found.parameters:
+        table = Table("nominal parameter", "with these records", "")
+        for one in sorted(found.parameters, key=lambda told: WORDS.index(told.word)):
+            table.add_row(one.name, one.word, one.text)
         console.print(table)
+    if found.effects:
+        console.print(_effects(found.effects))
+        say(
+            "Numbers: sigmas by which each shows where it changes a response by as much as matters; ~ where nominal parameters imitate it. "
+            "What is not identifiable takes larger or slower motions. All of it in words: --json"
+        )
+
+
+def _effects(effects: Sequence[Told]) -> Table:
+    """Effects by how well the records tell them, each with its places."""
+    table = Table("effect", *WORDS)
+    found: dict[str, list[Told]] = {}
+    for one in effects:
+        found.setdefault(one.name, []).append(one)
+    for name, mine in found.items():
+        cells = (", ".join(_short(one) for one in mine if one.word == word) for word in WORDS)
+        table.add_row(name, *cells)
+    return table
+
+
+def _short(one: Told) -> str:
+    """Place and sigmas of an effect, a mark where nominal parameters imitate it."""
+    sigmas = f"{one.figure:.1f}" if one.figure < 10.0 else f"{one.figure:.0f}"
+    return f"{one.where} {'~' if one.imitable else ''}{sigmas if one.figure else ''}".strip()
+
+
+WORDS = ("identifiable", "weak", "not identifiable")
+"""What is said of a parameter or an effect, the best first."""

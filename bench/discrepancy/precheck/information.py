@@ -44,6 +44,8 @@ class InformationSettings:
     """Points of a grid that are tried for one that changes anything."""
     near: float = 0.5
     """Part of the stated size that an amplitude has to come to, and over which it must not be as far, to stand for it."""
+    imitated: float = 0.9
+    """Part of an effect's change beyond which nominal parameters that make it as well are told of."""
 
 
 SETTINGS = InformationSettings()
@@ -58,6 +60,7 @@ class Told(NamedTuple):
         word: In a word.
         figure: Posterior over prior width of a parameter; square root of the chi-squared by which an effect shows, in sigmas.
         text: In words.
+        imitated: Part of an effect's change that nominal parameters make as well.
     """
 
     name: str
@@ -65,6 +68,12 @@ class Told(NamedTuple):
     word: Identifiability
     figure: float
     text: str
+    imitated: float = 0.0
+
+    @property
+    def imitable(self) -> bool:
+        """Whether nominal parameters could stand in for an effect."""
+        return self.imitated > SETTINGS.imitated
 
 
 def shortened(case: Case, seconds: float) -> Case:
@@ -157,7 +166,7 @@ def graded_parameter(name: str, width: float, spread: float, settings: CheckSett
     )
     sigma = spread * width
     text = {
-        "identifiable": f"known to ± {sigma:.3g} after these records",
+        "identifiable": f"known to ± {sigma:.3g}",
         "weak": f"± {sigma:.3g} instead of ± {spread:.3g}: excite it more, or for longer",
         "not identifiable": "these records say nothing of it: its stated uncertainty stays; leave it, or excite what it acts on",
     }[word]
@@ -189,9 +198,9 @@ def graded_effect(
         else "not identifiable"
     )
     text = f"{figure:.3g} sigmas at {100 * settings.matters:.0f} % of a response"
-    if imitated > 0.9:
+    if imitated > SETTINGS.imitated:
         text += f"; nominal parameters imitate {100 * imitated:.0f} % of it"
-    return Told(name, where, word, figure, text)
+    return Told(name, where, word, figure, text, imitated)
 
 
 def out_of_reach(name: str, where: str, settings: CheckSettings) -> Told:
