@@ -57,6 +57,11 @@ class Capability:
         return " && ".join(" ".join(command) for command in commands).replace("{data}", "FOLDER")
 
 
+def words(command: str) -> tuple[str, ...]:
+    """A command's words, none of which holds a space."""
+    return tuple(command.split())
+
+
 def _excitation_task(task: str, title: str) -> Capability:
     command = ("python", "scripts/evaluate_excitation.py", task, "--json", "-")
     return Capability(f"excitation_{task}", title, command, excitation, hours=True)
@@ -69,18 +74,18 @@ def _benchmark_group(name: str, title: str) -> Capability:
 SEALED_SEED = "20261208"
 """Of the sealed cases that are published: a new one for every set, so that nobody has looked at its cases before."""
 CAPABILITIES: Sequence[Capability] = (
-    Capability("demo", "The main job", ("jointbench", "demo", "--json"), demo),
+    Capability("demo", "The main job", words("jointbench demo --json"), demo),
     _benchmark_group("native", "Native callbacks"),
     Capability(
         "reproduce",
         "The dissertation ([reproduction.md](reproduction.md) has sources and reasons, [gallery.md](gallery.md) the figures)",
-        ("python", "scripts/make_gallery.py", "--fresh", "--json"),
+        words("python scripts/make_gallery.py --fresh --json"),
         reproduction,
     ),
     Capability(
         "monitoring",
         "A damper watched in service",
-        ("python", "scripts/monitor_damper.py", "--json"),
+        words("python scripts/monitor_damper.py --json"),
         monitoring,
     ),
     _benchmark_group("stream", "Least squares on line, against padasip"),
@@ -90,24 +95,23 @@ CAPABILITIES: Sequence[Capability] = (
     Capability(
         "trials",
         "Diagnosis of the development trials, made by integrators of others",
-        ("jointbench", "blind", "score", "out/trials", "{data}/../trials/answers", "--json"),
+        words("jointbench blind score out/trials {data}/../trials/answers --json"),
         sealed,
-        before=(("jointbench", "blind", "run", "{data}/../trials", "out/trials", "--again"),),
+        before=(words("jointbench blind run {data}/../trials out/trials --again"),),
         data="../trials",
     ),
     Capability(
         "sealed",
         "Diagnosis of own sealed cases ([blind_results.md](blind_results.md) has the bands)",
-        ("python", "scripts/sealed_cases.py", "--n", "300", "--struck", "0", "--seed", SEALED_SEED, "--json"),
+        words(f"python scripts/sealed_cases.py --n 300 --struck 0 --seed {SEALED_SEED} --json"),
         lambda told: sealed(told["score"]),
         hours=True,
     ),
     Capability(
         "background",
         "Diagnosis of cases of others whose truth holds a background besides",
-        (
-            *("python", "scripts/background_cases.py", "{data}/../trials-background"),
-            *("{data}/../trials-background/answers", "--json"),
+        words(
+            "python scripts/background_cases.py {data}/../trials-background {data}/../trials-background/answers --json"
         ),
         background,
         data="../trials-background",
@@ -115,40 +119,15 @@ CAPABILITIES: Sequence[Capability] = (
     Capability(
         "sealed_background",
         "Diagnosis of own sealed cases whose truth holds a background besides",
-        (
-            *("jointbench", "blind", "score", "out/sealed-background/results"),
-            *("out/sealed-background/answers", "--json"),
-        ),
+        words("jointbench blind score out/sealed-background/results out/sealed-background/answers --json"),
         lambda told: background(told["background"]),
         before=(
-            (
-                *(
-                    "jointbench",
-                    "blind",
-                    "make",
-                    "out/sealed-background/cases",
-                    "out/sealed-background/answers",
-                ),
-                *(
-                    "--n",
-                    "200",
-                    "--seed",
-                    SEALED_SEED,
-                    "--background",
-                    "--no-detectability",
-                    "--workers",
-                    "2",
-                ),
+            words(
+                "jointbench blind make out/sealed-background/cases out/sealed-background/answers --n 200 "
+                f"--seed {SEALED_SEED} --background --no-detectability --workers 2"
             ),
-            (
-                *(
-                    "jointbench",
-                    "blind",
-                    "run",
-                    "out/sealed-background/cases",
-                    "out/sealed-background/results",
-                ),
-                *("--workers", "2", "--again"),
+            words(
+                "jointbench blind run out/sealed-background/cases out/sealed-background/results --workers 2 --again"
             ),
         ),
         hours=True,
@@ -156,16 +135,16 @@ CAPABILITIES: Sequence[Capability] = (
     Capability(
         "arms",
         "Diagnosis of arms, legs and servos of others",
-        ("jointbench", "blind", "score", "out/arms", "{data}/../trials-arms/answers", "--json"),
+        words("jointbench blind score out/arms {data}/../trials-arms/answers --json"),
         arms,
-        before=(("jointbench", "blind", "run", "{data}/../trials-arms", "out/arms", "--again"),),
+        before=(words("jointbench blind run {data}/../trials-arms out/arms --again"),),
         data="../trials-arms",
         hours=True,
     ),
     Capability(
         "robots",
         "Public records of robots, diagnosed against their public models",
-        ("python", "scripts/robots.py", "--data", "{data}/robots", "--json"),
+        words("python scripts/robots.py --data {data}/robots --json"),
         robots,
         data="robots",
         hours=True,
@@ -173,20 +152,20 @@ CAPABILITIES: Sequence[Capability] = (
     Capability(
         "native_effects",
         "Effects that MJCF has attributes for: put in, diagnosed, applied",
-        ("python", "scripts/native_effects.py", "--json"),
+        words("python scripts/native_effects.py --json"),
         native_effects,
     ),
     Capability(
         "ten_minutes",
         "From a log to a corrected model",
-        ("python", "scripts/ten_minutes.py", "--robots", "{data}/robots", "--json"),
+        words("python scripts/ten_minutes.py --robots {data}/robots --json"),
         ten_minutes,
         data="robots",
     ),
     Capability(
         "applied",
         "Verdicts of the development trials, applied in plain MuJoCo",
-        ("python", "scripts/applied.py", "{data}/../trials", "out/applied", "--again", "--json"),
+        words("python scripts/applied.py {data}/../trials out/applied --again --json"),
         applied,
         data="../trials",
         hours=True,
@@ -194,75 +173,70 @@ CAPABILITIES: Sequence[Capability] = (
     Capability(
         "applied_arms",
         "Verdicts of arms, legs and desks of others, applied in plain MuJoCo",
-        (
-            *("python", "scripts/applied.py", "{data}/../trials-arms", "out/applied-arms"),
-            *("--only", "arm2", "leg3", "desk5"),
-            *("--verdicts", "out/arms", "--again", "--json"),
+        words(
+            "python scripts/applied.py {data}/../trials-arms out/applied-arms --only arm2 leg3 desk5 --verdicts out/arms --again --json"
         ),
         applied,
-        before=(("jointbench", "blind", "run", "{data}/../trials-arms", "out/arms"),),
+        before=(words("jointbench blind run {data}/../trials-arms out/arms"),),
         data="../trials-arms",
         hours=True,
     ),
     Capability(
         "localisation",
         "Where the missing force lies",
-        ("python", "scripts/localisation.py", "--json"),
+        words("python scripts/localisation.py --json"),
         localisation,
     ),
     Capability(
         "pendulum",
         "Diagnosis of a pendulum that swings far, gravity read off its MJCF",
-        ("python", "scripts/pendulum.py", "--json"),
+        words("python scripts/pendulum.py --json"),
         pendulum,
     ),
     Capability(
         "measured",
         "Diagnosis of measured records, the effect never named",
-        ("python", "scripts/diagnose_measured.py", "--data", "{data}", "--json"),
+        words("python scripts/diagnose_measured.py --data {data} --json"),
         measured,
         data=".",
     ),
     Capability(
         "measured_cases",
         "Measured records, graded by what was written down before",
-        ("python", "scripts/measured_cases.py", "--data", "{data}", "--json"),
+        words("python scripts/measured_cases.py --data {data} --json"),
         graded,
         data=".",
     ),
     Capability(
         "check",
         "Faults planted into records of a slide, and what `jointbench check` says",
-        ("python", "scripts/planted_faults.py", "--faults", "200", "--sound", "100"),
+        words("python scripts/planted_faults.py --faults 200 --sound 100"),
         planted,
     ),
     Capability(
         "check_arm",
         "The same, planted into logs of an arm",
-        ("python", "scripts/planted_faults.py", "--machine", "arm", "--faults", "80", "--sound", "40"),
+        words("python scripts/planted_faults.py --machine arm --faults 80 --sound 40"),
         planted,
     ),
     Capability(
         "formats",
         "The same case from records in other formats",
-        ("python", "scripts/same_formats.py", "out/formats", "--json"),
+        words("python scripts/same_formats.py out/formats --json"),
         formats,
-        before=(("python", "examples/mismatch/measure.py", "out/formats"),),
+        before=(words("python examples/mismatch/measure.py out/formats"),),
     ),
     Capability(
         "real_formats",
         "Files of laboratories and robots in eight formats, against the same as CSV",
-        ("python", "scripts/real_formats.py", "--data", "{data}", "--json"),
+        words("python scripts/real_formats.py --data {data} --json"),
         real_formats,
         data=".",
     ),
     Capability(
         "unstated",
         "The same where nothing is said of the acquisition",
-        (
-            *("python", "scripts/diagnose_measured.py", "--data", "{data}", "bouc_wen", "silverbox"),
-            *("--unstated", "--json"),
-        ),
+        words("python scripts/diagnose_measured.py --data {data} bouc_wen silverbox --unstated --json"),
         measured,
         data=".",
     ),
@@ -270,10 +244,7 @@ CAPABILITIES: Sequence[Capability] = (
     Capability(
         "peers",
         "The same on the development trials of one degree of freedom",
-        (
-            *("python", "scripts/benchmark.py", "diagnosis", "--data", "{data}/../trials"),
-            *("--work", "out/peers", "--json"),
-        ),
+        words("python scripts/benchmark.py diagnosis --data {data}/../trials --work out/peers --json"),
         benchmark,
         data="../trials",
         hours=True,
@@ -281,9 +252,8 @@ CAPABILITIES: Sequence[Capability] = (
     Capability(
         "peers_joint",
         "The same on the development trials of the joint, mujoco.sysid given ten times the diagnosis's time",
-        (
-            *("python", "scripts/benchmark.py", "diagnosis", "--data", "{data}/../trials"),
-            *("--rig", "joint", "--work", "out/peers_joint", "--json"),
+        words(
+            "python scripts/benchmark.py diagnosis --data {data}/../trials --rig joint --work out/peers_joint --json"
         ),
         benchmark,
         data="../trials",
@@ -292,14 +262,14 @@ CAPABILITIES: Sequence[Capability] = (
     Capability(
         "peers_arms",
         "mujoco.sysid on ten arms of others, given the diagnosis's time",
-        (*("python", "scripts/benchmark.py", "arms", "--data", "{data}/../trials-arms"), "--json"),
+        words("python scripts/benchmark.py arms --data {data}/../trials-arms --json"),
         benchmark,
         data="../trials-arms",
     ),
     Capability(
         "peers_so101",
         "mujoco.sysid on the public record of the SO-101, given the diagnosis's time",
-        (*("python", "scripts/benchmark.py", "arms", "--data", "{data}/robots"), "--json"),
+        words("python scripts/benchmark.py arms --data {data}/robots --json"),
         benchmark,
         data="robots",
     ),
@@ -313,57 +283,43 @@ CAPABILITIES: Sequence[Capability] = (
     Capability(
         "backgrounds_sdof",
         "Policy `sdof` on rigs with a background that no hypothesis holds",
-        ("python", "scripts/policy_experiment.py", "backgrounds", "sdof", "--no-planner", "--json", "-"),
+        words("python scripts/policy_experiment.py backgrounds sdof --no-planner --json -"),
         backgrounds,
         hours=True,
     ),
     Capability(
         "rewards",
         "Which reward of an excitation follows identification",
-        ("python", "scripts/policy_experiment.py", "rewards", "sdof", "--seed", "2006", "--json", "-"),
+        words("python scripts/policy_experiment.py rewards sdof --seed 2006 --json -"),
         rewards,
     ),
     _benchmark_group("campaign", "Campaigns"),
     Capability(
         "kills",
         "Campaigns killed and resumed",
-        ("python", "scripts/killed_campaigns.py", "--kills", "200", "--json"),
+        words("python scripts/killed_campaigns.py --kills 200 --json"),
         kills,
         hours=True,
     ),
     Capability(
         "training_sdof",
         "Training from scratch of the policy `sdof`",
-        ("python", "scripts/train_plans.py", "sdof", "--fresh", "--json"),
+        words("python scripts/train_plans.py sdof --fresh --json"),
         training_plans,
         hours=True,
     ),
     Capability(
         "training_joint",
         "Training from scratch of the policy `joint`",
-        (
-            *(
-                "python",
-                "scripts/train_plans.py",
-                "joint",
-                "--decisions",
-                "0.2",
-                "0.4",
-                "0.6",
-                "--rigs",
-                "6000",
-            ),
-            *("--fresh", "--json"),
-        ),
+        words("python scripts/train_plans.py joint --decisions 0.2 0.4 0.6 --rigs 6000 --fresh --json"),
         training_plans,
         hours=True,
     ),
     Capability(
         "training_rivals",
         "Training from scratch of the policy `rivals`",
-        (
-            *("python", "scripts/train_excitation.py", "rivals", "--memory", "64", "--steps", "9000000"),
-            *("--n-envs", "96", "--discount", "0.98", "--fresh", "--json"),
+        words(
+            "python scripts/train_excitation.py rivals --memory 64 --steps 9000000 --n-envs 96 --discount 0.98 --fresh --json"
         ),
         training,
         hours=True,
@@ -371,14 +327,14 @@ CAPABILITIES: Sequence[Capability] = (
     Capability(
         "memory_joint",
         "The joint with memory against its rivals ([memory-joint.md](memory-joint.md))",
-        ("python", "scripts/memory_joint.py", "--data", "{data}", "--fresh", "--json"),
+        words("python scripts/memory_joint.py --data {data} --fresh --json"),
         memory_joint,
         data="bouc_wen_benchmark",
     ),
     Capability(
         "bouc_wen",
         "Published Bouc-Wen benchmark, its own parameters",
-        ("python", "scripts/bouc_wen_benchmark.py", "{data}/bouc_wen_benchmark", "--json"),
+        words("python scripts/bouc_wen_benchmark.py {data}/bouc_wen_benchmark --json"),
         bouc_wen,
         data="bouc_wen_benchmark",
     ),

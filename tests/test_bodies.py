@@ -16,6 +16,7 @@ from bench.discrepancy.multibody.body_terms import body_terms
 from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.replay.verification import verify
 from bench.errors import BenchError, ModelError
+from bench.native.inverse import along
 from bench.rig.bodies import BODIES, body_value, set_body
 
 HEAVIER, FARTHER = 1.5, 0.02
@@ -144,3 +145,36 @@ def test_a_body_that_is_a_point_cannot_be_scaled_and_wrong_names_are_refused(tmp
     (folder / "nominal.json").write_text(text.replace("inertia:fore", "inertia:hand"))
     with pytest.raises(BenchError, match="fore"):
         diagnose(read_case(folder))
+
+
+SWINGING = """<mujoco><option {option}/><worldbody><body name="upper"><joint name="lift" axis="0 1 0" {joint}/>
+<geom type="capsule" fromto="0 0 0 .1 0 -.4" size=".04" mass="2"/><body name="fore" pos=".1 0 -.4" {body}><joint name="slide" type="slide"
+axis="1 0 0"/><geom type="box" size=".1 .05 .03" pos=".05 .02 0" mass="1"/></body></body></worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize(
+    ("option", "joint", "body"),
+    [
+        ("", "", ""),
+        ('density="900" viscosity="2"', "", ""),
+        ("", 'armature=".3"', ""),
+        ("", 'stiffness="3 0 20"', ""),
+        ("", 'damping="1"', ""),
+        ("", 'range="-.1 .1" limited="true"', ""),
+        ("", "", 'gravcomp=".7"'),
+    ],
+)
+def test_torques_along_a_motion_are_those_of_inverse_dynamics(option, joint, body):
+    model = mujoco.MjModel.from_xml_string(SWINGING.format(option=option, joint=joint, body=body))
+    if not joint.startswith("range"):
+        model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
+    q, v, a = np.random.default_rng(3).normal(size=(3, 20, 2))
+    torque, inertia = along(model, q, v, a)
+    data = mujoco.MjData(model)
+    for k in range(len(q)):
+        data.qpos[:], data.qvel[:], data.qacc[:] = q[k], v[k], a[k]
+        mujoco.mj_inverse(model, data)
+        np.testing.assert_allclose(torque[k], data.qfrc_inverse, rtol=1e-11, atol=1e-11)
+        whole = np.zeros((2, 2))
+        mujoco.mj_fullM(model, data, whole)
+        np.testing.assert_allclose(inertia[k], np.diag(whole), rtol=1e-11)

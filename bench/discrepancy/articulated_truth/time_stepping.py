@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from bench import native
 from bench.arrays import Array
-from bench.discrepancy.multibody.inverse import call, inverse_address
+from bench.native.inverse import address, call
 
 
 class Cell(IntEnum):
@@ -310,7 +310,7 @@ def march_bodies(
     n_sub = max(1, math.ceil(sample / TIME_STEPPING.longest))
     out = np.zeros((5, n, joints))
     _march(
-        inverse_address(), model._address, data._address,
+        address("mj_inverse"), model._address, data._address,
         (data.qpos, data.qvel, data.qacc, data.qfrc_inverse, data.M), _rows(model),
         np.ascontiguousarray(table), servo, (sample / n_sub, n_sub),
         tuple(np.ascontiguousarray(part, dtype=np.float64) for part in (reference, speed, forward)), reference[0].copy(), out,

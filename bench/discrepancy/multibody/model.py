@@ -17,9 +17,9 @@ import mujoco
 import numpy as np
 
 from bench.arrays import Array
-from bench.discrepancy.multibody.inverse import along
 from bench.discrepancy.multibody.joints import MOVING, Joint, Tie, body_name, joint_of, ties_of, with_moved
 from bench.errors import ModelError, UnknownNameError
+from bench.native.inverse import along
 from bench.rig import Rig
 from bench.rig.bodies import body_value, set_body, without_shortcuts
 from bench.rig.held_joints import MOTION
