@@ -98,6 +98,31 @@ def test_what_is_kept_is_made_once_whoever_asks_and_waits_for_no_other():
     assert len(made) == 1
 
 
+def test_who_asks_for_several_makes_those_that_nobody_else_is_making():
+    kept, begun, free = MadeOnce[int](4), threading.Event(), threading.Event()
+    made: list[tuple[str, int]] = []
+
+    def slowly(k: int) -> int:
+        made.append(("slowly", k))
+        begun.set()
+        free.wait(timeout=60)
+        return k
+
+    def at_once(k: int) -> int:
+        made.append(("at once", k))
+        free.set()
+        return k
+
+    found: list[list[int]] = []
+    slow = threading.Thread(target=lambda: found.append(kept.get_each("ab", slowly)))
+    slow.start()
+    assert begun.wait(timeout=60)
+    assert kept.get_each("ab", at_once) == [0, 1]
+    slow.join()
+    assert found == [[0, 1]]
+    assert made == [("slowly", 0), ("at once", 1)]
+
+
 def test_of_what_is_kept_the_last_few_stay():
     kept = MadeOnce[int](2)
     assert [kept.get(key, lambda key=key: key) for key in (1, 2, 1, 3)] == [1, 2, 1, 3]

@@ -58,11 +58,11 @@ class ArticulatedProblem:
     deadline: Deadline = NEVER
     softness: float = 0.0
     nominal: tuple[Nominal, ...] = field(init=False)
-    _corrected: MadeOnce[tuple[PreparedRecord, ...]] = field(init=False)
+    _corrected: MadeOnce[PreparedRecord] = field(init=False)
 
     def __post_init__(self) -> None:
         self.nominal = nominal_parameters(self.case, self.model)
-        self._corrected = MadeOnce(self.settings.articulated.kept_motions)
+        self._corrected = MadeOnce(self.settings.articulated.kept_motions * len(self.records))
 
     @classmethod
     def of(
@@ -157,14 +157,12 @@ class ArticulatedProblem:
             return self.records
         # whether a servo acts on a wrong reading changes its runs and not the motion
         key = tuple(sorted((name, encoder._replace(in_loop=0.0)) for name, encoder in wrong.items()))
-        found = self._corrected.get(
-            key,
-            lambda: tuple(
-                corrected(self.case, self.model, r, dict(key), settings=self.settings) for r in self.records
-            ),
+        found = self._corrected.get_each(
+            [(key, r) for r in range(len(self.records))],
+            lambda r: corrected(self.case, self.model, self.records[r], dict(key), settings=self.settings),
         )
         if not any(encoder.in_loop for encoder in wrong.values()):
-            return found
+            return tuple(found)
         return tuple(r.read_by(wrong) for r in found)
 
     def softened(self, level: float) -> ArticulatedProblem:

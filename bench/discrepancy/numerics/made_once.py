@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from threading import Lock
 from typing import Generic, TypeVar
 
@@ -33,15 +33,30 @@ class MadeOnce(Generic[_Value]):
             key: What it is asked for by.
             make: Makes it; hands no work to other threads, which might ask for it.
         """
+        return self.get_each([key], lambda _: make())[0]
+
+    def get_each(self, keys: Sequence[Hashable], make: Callable[[int], _Value]) -> list[_Value]:
+        """The values of several keys: those that nobody else is making are made here, and the others then waited for.
+
+        Args:
+            keys: What they are asked for by.
+            make: Takes the number of a key to its value; as of `get`.
+        """
         with self._lock:
-            entry = self._entries.setdefault(key, _Entry())
-            self._entries.move_to_end(key)
-            if len(self._entries) > self._most:
+            entries = [self._entries.setdefault(key, _Entry()) for key in keys]
+            for key in keys:
+                self._entries.move_to_end(key)
+            while len(self._entries) > self._most:
                 self._entries.popitem(last=False)
-        with entry.lock:
-            if not entry.made:
-                entry.made.append(make())
-            return entry.made[0]
+        for waiting in (False, True):
+            for k, entry in enumerate(entries):
+                if not entry.made and entry.lock.acquire(blocking=waiting):
+                    try:
+                        if not entry.made:
+                            entry.made.append(make(k))
+                    finally:
+                        entry.lock.release()
+        return [entry.made[0] for entry in entries]
 
 
 class _Entry(Generic[_Value]):
