@@ -17,7 +17,9 @@ from bench.discrepancy.fitting.map_fit import fit
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.model.rigs import structure_of
+from bench.discrepancy.response.windows import channels_of
 from bench.discrepancy.search.horizons import lengthen
+from bench.discrepancy.simulation.stick_slip import Motion
 
 STIFFNESS, CLEARANCE, FRICTION, HARD = 5000.0, 0.004, 1.0, 4.0
 """Stops three times as stiff as the spring, reached at a fifth of the stroke; and the load, in that of other planted cases."""
@@ -74,3 +76,12 @@ def test_what_is_explained_over_whole_records_is_left_as_it_is():
     before = dict(search.fits)
     lengthen(search, 1, candidates)
     assert search.fits == before
+
+
+@pytest.mark.filterwarnings("error")
+def test_channels_of_a_run_that_diverges_are_not_finite_and_nothing_is_said_of_it():
+    structure = structure_of(driven_hard(linear_motion))
+    # behind a sensor that does not see the coordinate that ran away
+    blind = replace(structure, observers=tuple(replace(o, row=0.0 * o.row) for o in structure.observers))
+    gone = Motion(*(np.full((3, len(structure.observers[0].row)), np.inf) for _ in range(3)))
+    assert not np.isfinite(channels_of(blind, gone)).any()

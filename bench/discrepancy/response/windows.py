@@ -55,5 +55,6 @@ def cut(
 
 
 def channels_of(structure: Structure, motion: Motion) -> Array:
-    """Channels (n, n_channels) of a motion."""
-    return np.column_stack([motion[o.order] @ o.row for o in structure.observers])
+    """Channels (n, n_channels) of a motion; not finite where it diverged."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        return np.column_stack([motion[o.order] @ o.row for o in structure.observers])
