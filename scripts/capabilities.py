@@ -123,7 +123,7 @@ CAPABILITIES: Sequence[Capability] = (
         lambda told: background(told["background"]),
         before=(
             words(
-                "jointbench blind make out/sealed-background/cases out/sealed-background/answers --n 200 "
+                "jointbench blind make out/sealed-background/cases out/sealed-background/answers --n 60 "
                 f"--seed {SEALED_SEED} --background --no-detectability --workers 2"
             ),
             words(
