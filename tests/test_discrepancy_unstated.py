@@ -222,7 +222,7 @@ def test_friction_is_named_plainly_where_no_noise_is_stated():
     assert [effect.name for effect in verdict.named] == ["coulomb_friction"]
 
 
-@pytest.mark.parametrize(("left", "told"), [(0.05, "closes 96.9 %"), (0.35, ""), (np.inf, "")])
+@pytest.mark.parametrize(("left", "told"), [(0.05, "closes 96.7 %"), (0.35, ""), (np.inf, "")])
 def test_unknown_says_how_far_the_nearest_explanation_goes(left, told):
     steps = (("nominal", 0.65), ("parameters only", 0.6), ("gap + cubic_stiffness", left), ("closure", 0.04))
     gap = Gap("a", 0.65, 0.6, 0.04, 0.031, 0.98, (0.9, 1.0), steps)

@@ -20,7 +20,7 @@ from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.numerics.deadline import NEVER, Deadline
 from bench.discrepancy.screening.score_test import lack_of_fit
-from bench.discrepancy.search.explanation import Explanation
+from bench.discrepancy.search.explanation import Explanation, nominal_alone
 from bench.discrepancy.settings import DiagnosisSettings
 from bench.discrepancy.verdict import Ranked, VerdictKind
 
@@ -149,6 +149,17 @@ def coarse_finding(
         notes=understated,
         coarse=True,
     )
+
+
+def _vetoed(known: Discrepancies, nearest: Explanation, nothing: Explanation) -> str:
+    """Why the judging records refuse an explanation."""
+    if known.harm(nearest, nothing) > 1.0:
+        return (
+            "but leaves more of the judging records than the nominal model with its parameters re-estimated"
+        )
+    if known.left(nearest, nothing) >= 1.0:
+        return "but does not shrink the discrepancy of the judging records"
+    return "but shrinks the discrepancy of the judging records by less than what is named has to"
 
 
 def _kind(problem: Problem, judged: Judged) -> VerdictKind:
@@ -305,7 +316,7 @@ def _words(
     fate = (
         evidence.likelier(rival.closure)
         if rival
-        else "but does not shrink the discrepancy of the judging records"
+        else _vetoed(judged.known, nearest, nominal_alone([entry.explanation for entry in judged.found]))
         if judged.vetoed
         else "but does not predict the records better than the nominal model does with its parameters re-estimated"
     )

@@ -58,7 +58,7 @@ def nearest(explanations: Sequence[Explanation]) -> Explanation:
 
 
 def closes(label: str, gap: Gap, *, settings: JudgementSettings = DEFAULT.judgement) -> str:
-    """How far the nearest explanation goes on the judging records; empty where that is not far.
+    """How far the nearest explanation goes on the judging records, beyond what re-estimated parameters do; empty where not far.
 
     Args:
         label: Its effects as they stand among the gap's steps.
@@ -66,12 +66,13 @@ def closes(label: str, gap: Gap, *, settings: JudgementSettings = DEFAULT.judgem
         settings: `JudgementSettings` of the diagnosis.
     """
     left = dict(gap.steps).get(label, math.inf)
-    share = closed_share(gap.before, left, gap.noise_floor, settings=settings)
-    if share < settings.mostly or gap.before <= settings.at_the_noise * gap.noise_floor:
+    before = min(gap.before, gap.parameters_only)
+    share = closed_share(before, left, gap.noise_floor, settings=settings)
+    if share < settings.mostly or before <= settings.at_the_noise * gap.noise_floor:
         return ""
     return (
-        f" On the judging records {label} closes {percent(share)} of the gap all the same: it is much of what is "
-        "missing, or much like it."
+        f" Of the gap of the judging records that re-estimated parameters leave, {label} closes {percent(share)} all the same: it is much "
+        "of what is missing, or much like it."
     )
 
 
