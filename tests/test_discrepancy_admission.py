@@ -14,7 +14,7 @@ from planted_cases import motion_with, planted_case
 from bench.discrepancy import Case, read_case
 from bench.discrepancy.case.rig_units import in_coherent_units
 from bench.discrepancy.checks.admission import admitted
-from bench.discrepancy.checks.bands import Bands, common_factor
+from bench.discrepancy.checks.bands import Bands, common_factor, compare_channels
 from bench.discrepancy.checks.load_limits import clipped_load
 from bench.discrepancy.checks.scales import suspicions
 from bench.discrepancy.judgement.shares import closed_words, percent, probability
@@ -435,3 +435,24 @@ def test_every_refusal_is_a_line(tmp_path):
         admitted(read_case(made(tmp_path, FEATURES["servo at its limit"])))
     assert "\n" not in str(told.value)
     assert "forcerange" in str(told.value)
+
+
+@pytest.mark.parametrize("true", [1.0, 9.80665])
+def test_hum_in_two_sensors_of_one_motion_hides_no_factor_and_makes_none(true):
+    rng, rate = np.random.default_rng(5), 500.0
+    clock = np.arange(5000) / rate
+    tones = np.linspace(1.0, 12.0, 40)
+    phases = rng.uniform(0.0, 2.0 * np.pi, len(tones))
+    waves = np.sin(2.0 * np.pi * np.outer(clock, tones) + phases)
+    x, a = waves @ tones**-2.0, -waves @ ((2.0 * np.pi) ** 2 * np.ones(len(tones)))
+    # in phase as far as one motion of 50 Hz would be, and far too large for one: differentiated twice it is most of the first signal
+    hum = np.sin(2.0 * np.pi * 50.0 * clock)
+    noise = (1e-4 * x.std(), 1e-4 * a.std())
+    pair = compare_channels(
+        x + 0.05 * x.std() * hum + noise[0] * rng.standard_normal(len(x)),
+        true * a - 0.05 * a.std() * hum + noise[1] * rng.standard_normal(len(x)),
+        orders=(0, 2), noise=noise, step=1.0 / rate,
+    )  # fmt: skip
+    assert pair is not None
+    assert pair.factor == pytest.approx(true, rel=0.05)
+    assert pair.sign > 0.9

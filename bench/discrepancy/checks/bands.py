@@ -106,7 +106,8 @@ def compare_channels(
     gain = found.cross[use] / found.first[use] / derivative
     # a delay turns the phase with frequency, so that the lowest ones tell the sign
     lowest = gain[: max(3, len(gain) // 4)]
-    factor = np.sqrt(np.sum(found.second[use]) / np.sum(found.first[use] * np.abs(derivative) ** 2))
+    # a unit is one factor at all frequencies; what one sensor picks up besides, mains hum say, is at a few
+    factor = np.sqrt(np.median(found.second[use] / (found.first[use] * np.abs(derivative) ** 2)))
     return Pair(float(factor), float(np.median(np.cos(np.angle(lowest)))))
 
 
