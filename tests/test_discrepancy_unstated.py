@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from bench.discrepancy import Case, CaseChannel, NominalParameter, diagnose, rec
 from bench.discrepancy.checks.initial_motion import with_starts_found
 from bench.discrepancy.effects.catalogue import CATALOGUE, effect_named
 from bench.discrepancy.fitting.map_fit import fit
+from bench.discrepancy.judgement.coarse_finding import refusal
 from bench.discrepancy.judgement.posterior import closes
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placements import placements
@@ -229,3 +231,12 @@ def test_unknown_says_how_far_the_nearest_explanation_goes(left, told):
     words = closes("gap + cubic_stiffness", gap)
     assert told in words
     assert bool(words) == bool(told)
+
+
+@pytest.mark.parametrize(
+    ("harm", "left", "told"),
+    [(1.3, 0.4, "leaves more"), (1.0, 1.0, "does not shrink"), (0.8, 0.6, "less than what is named has to")],
+)
+def test_unknown_says_why_the_judging_records_refuse_the_nearest(harm, left, told):
+    known = SimpleNamespace(harm=lambda nearest, nothing: harm, left=lambda nearest, nothing: left)
+    assert told in refusal(known, None, None)

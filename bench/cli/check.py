@@ -60,6 +60,9 @@ class Check:
 
 
 def _tell(found: Checked, case: Path) -> None:
+    from bench.discrepancy.precheck.information import WORDS
+    from bench.discrepancy.precheck.settings import CheckSettings
+
     console = Console()
 
     def say(text: str) -> None:
@@ -76,21 +79,21 @@ def _tell(found: Checked, case: Path) -> None:
             table.add_row(one.name, one.word, one.text)
         console.print(table)
     if found.effects:
-        console.print(_effects(found.effects))
+        console.print(_effects(found.effects, WORDS))
         say(
-            "Numbers: sigmas by which each shows where it changes a response by as much as matters; ~ where nominal parameters imitate it. "
-            "What is not identifiable takes larger or slower motions. All of it in words: --json"
+            f"Numbers: sigmas by which each shows where it changes a response by {100.0 * CheckSettings().matters:.0f} %; ~ where nominal "
+            "parameters imitate it. What is not identifiable takes larger or slower motions. All of it in words: --json"
         )
 
 
-def _effects(effects: Sequence[Told]) -> Table:
-    """Effects by how well the records tell them, each with its places."""
-    table = Table("effect", *WORDS)
+def _effects(effects: Sequence[Told], words: Sequence[str]) -> Table:
+    """Effects by how well the records tell them, in a column for each word, with their places."""
+    table = Table("effect", *words)
     found: dict[str, list[Told]] = {}
     for one in effects:
         found.setdefault(one.name, []).append(one)
     for name, mine in found.items():
-        cells = (", ".join(_short(one) for one in mine if one.word == word) for word in WORDS)
+        cells = (", ".join(_short(one) for one in mine if one.word == word) for word in words)
         table.add_row(name, *cells)
     return table
 
@@ -99,7 +102,3 @@ def _short(one: Told) -> str:
     """Place and sigmas of an effect, a mark where nominal parameters imitate it."""
     sigmas = f"{one.figure:.1f}" if one.figure < 10.0 else f"{one.figure:.0f}"
     return f"{one.where} {'~' if one.imitable else ''}{sigmas if one.figure else ''}".strip()
-
-
-WORDS = ("identifiable", "weak", "not identifiable")
-"""What is said of a parameter or an effect, the best first."""

@@ -190,14 +190,11 @@ class _Fitting:
         self.runs = _Runs(problem, hypothesis)
         self.jacobian: Array | None = None
 
-    def _units(self, scale: Array) -> list[Array]:
-        """Scale (n,) of the residuals of each active joint."""
-        return [scale[j][self.problem.octaves.index[j]] for j in self.active]
-
     def fit(self, start: Array, scale: Array, iterations: int, limit: float = np.inf) -> ArticulatedFit:
         """Fit with a scale (n_joints, n_octaves); the first fit from any start or several, the next from where the last one ended."""
         problem, others, shared = self.problem, self.others, list(self.problem.shared)
-        settings, units = problem.settings.articulated, self._units(scale)
+        settings = problem.settings.articulated
+        units = [scale[j][problem.octaves.index[j]] for j in self.active]
 
         def residual_at(vector: Array) -> Array:
             parts = in_threads(

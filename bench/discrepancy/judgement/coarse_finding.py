@@ -151,8 +151,14 @@ def coarse_finding(
     )
 
 
-def _vetoed(known: Discrepancies, nearest: Explanation, nothing: Explanation) -> str:
-    """Why the judging records refuse an explanation."""
+def refusal(known: Discrepancies, nearest: Explanation, nothing: Explanation) -> str:
+    """Why the judging records refuse an explanation, in words.
+
+    Args:
+        known: What explanations leave of the records.
+        nearest: The explanation.
+        nothing: The nominal model, its parameters re-estimated.
+    """
     if known.harm(nearest, nothing) > 1.0:
         return (
             "but leaves more of the judging records than the nominal model with its parameters re-estimated"
@@ -316,7 +322,7 @@ def _words(
     fate = (
         evidence.likelier(rival.closure)
         if rival
-        else _vetoed(judged.known, nearest, nominal_alone([entry.explanation for entry in judged.found]))
+        else refusal(judged.known, nearest, nominal_alone([entry.explanation for entry in judged.found]))
         if judged.vetoed
         else "but does not predict the records better than the nominal model does with its parameters re-estimated"
     )

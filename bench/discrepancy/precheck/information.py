@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -28,6 +28,8 @@ from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.precheck.settings import CheckSettings
 
 Identifiability = Literal["identifiable", "weak", "not identifiable"]
+WORDS: tuple[Identifiability, ...] = get_args(Identifiability)
+"""What is said of a parameter or an effect, the best first."""
 
 
 @dataclass(frozen=True)
