@@ -9,7 +9,6 @@ import pytest
 
 from bench.cli import main
 from bench.discrepancy import score_blind
-from bench.discrepancy.blind.background import ACTING, RECORDED, Background, draw_background
 from bench.discrepancy.blind.background_score import background_scored, background_summary
 from bench.discrepancy.blind.drawing import (
     DRAWING_SETTINGS,
@@ -18,6 +17,7 @@ from bench.discrepancy.blind.drawing import (
 )
 from bench.discrepancy.blind.proportions import calibration_error, calibration_scatter
 from bench.discrepancy.blind.score_report import tables
+from bench.discrepancy.truth.background import ACTING, RECORDED, Background, draw_background
 from bench.discrepancy.truth.background_settings import STATED, BackgroundSettings
 from bench.discrepancy.truth.foreign_memory import HIDDEN_RESONATOR
 from bench.discrepancy.truth.loads import RIGS_SETTINGS
@@ -50,7 +50,9 @@ def test_what_acts_on_a_rig_makes_the_wanted_part_of_the_discrepancy(rig):
     background = next(
         found
         for _ in range(20)
-        if (found := draw_background(bench, bare, rng, made.background, DRAWING_SETTINGS.bisections))
+        if (
+            found := draw_background(bench, bare, rng, made.background, DRAWING_SETTINGS.bisections, main=0.1)
+        )
         is not None
     )
     assert {e.recipe.name for e in background.acting} == {recipe.name for recipe in ACTING}
@@ -59,7 +61,7 @@ def test_what_acts_on_a_rig_makes_the_wanted_part_of_the_discrepancy(rig):
         max(bench.gaps(bench.responses([e], quick=True, judging=False), bare)) for e in background.acting
     ]
     # six parts, drawn between one half and the whole of the largest, whose squares add up to that of the wanted whole
-    assert np.hypot.reduce([*alone, *background.recorded.values()]) == pytest.approx(0.2 * plan.gap, rel=0.15)
+    assert np.hypot.reduce([*alone, *background.recorded.values()]) == pytest.approx(0.2 * 0.1, rel=0.15)
 
 
 @pytest.mark.parametrize("rig", RIGS)
@@ -89,7 +91,7 @@ def test_what_comes_into_the_records_has_its_size_and_leaves_other_channels_alon
 
 
 def test_a_background_is_put_beside_one_effect_or_none():
-    with pytest.raises(ParameterError, match="whose last two are zero"):
+    with pytest.raises(ParameterError, match="whose third is zero"):
         BlindOptions(background=BackgroundSettings())
     with pytest.raises(ParameterError, match="came as"):
         BackgroundSettings(share=(0.3, 0.05))

@@ -1,11 +1,14 @@
 """Scoring of cases whose truth holds small things besides the effect that was withheld: a background that no model has.
 
 A case is "main" (one effect and a background), "unstated" (one effect and no stated noise), "background" (only that) or "clean"
-(nothing, no stated noise), by its class or by the background that its answer tells. What counts as right:
+(nothing, no stated noise), by its class or by the background that its answer tells; "foreign beside" where the effect stands outside
+the catalogue. What counts as right:
 
 - main, unstated: the effect is named, or a set is declared that holds it; it closes the largest share; one other name at most; and
   where there is a background whose noise is stated, what is named is not said to be complete.
-- background, clean: nothing is named with certainty that does not shrink the discrepancy of the judging record.
+- foreign beside: unknown, or what is named is said not to be complete; nothing is named with certainty that does not shrink the
+  discrepancy of the judging record.
+- background, clean: the same of certain names.
 - all: what is named shrinks that discrepancy, no name of several makes it larger, every number is finite, and no nominal parameter lies
   beyond four of its stated standard deviations unsaid.
 """
@@ -31,9 +34,12 @@ from bench.discrepancy.blind.proportions import (
 )
 from bench.laws.registry import find_law
 
-CLASSES = ("main", "unstated", "background", "clean")
-BY_ANOTHER_NAME = {"hidden_resonator": "base_flexibility"}
-"""Things of a background whose force is, by derivation, that of an effect of the catalogue with nominal parameters re-estimated.
+CLASSES = ("main", "unstated", "background", "clean", "foreign beside")
+BY_ANOTHER_NAME = {
+    "hidden_resonator": ("base_flexibility",),
+    "hum": ("displacement_hum", "velocity_hum", "acceleration_hum", "force_hum"),
+}
+"""Things of a background that are effects of the catalogue: hum in readings, and what is one by derivation, beside nominal parameters.
 
 A resonator of mass m on k and c pulls with ``f = k (q - y) + c (v - y')``, ``m y'' = f``. Of a base flexibility
 ``-kappa (w + tau w')``, ``w'' + 2 zeta omega w' + omega^2 w = omega^2 (q + tau v)``; with ``omega^2 = k/m``, ``tau = c/k`` and
@@ -93,6 +99,8 @@ def background_class(answer: Mapping[str, Any]) -> str:
         return own
     if answer.get("background") is None:
         return ""
+    if own == "foreign":
+        return "foreign beside"
     if answer["background"]:
         return "main" if answer["effects"] else "background"
     return "unstated" if answer["effects"] else "clean"
@@ -152,7 +160,11 @@ def background_scored(answer: Mapping[str, Any], result: Mapping[str, Any]) -> I
     kind, named, gap = background_class(answer), result["named"], result.get("gap") or {}
     said = [effect["name"] for effect in named]
     pays = gap.get("after") is not None and gap["after"] < SETTINGS.pays * gap["before"]
-    if answer["effects"]:
+    if kind == "foreign beside":
+        open_ended = result["verdict"] == "unknown" or (named and not result.get("complete"))
+        yield "foreign beside a background: unknown, or said not to be complete", bool(open_ended)
+        yield "foreign beside a background: not none", result["verdict"] != "none"
+    elif answer["effects"]:
         true = answer["effects"][0]["name"]
         hit = _within_a_set(true, said, result)
         first = named[0]["name"] if named else ""
@@ -165,9 +177,9 @@ def background_scored(answer: Mapping[str, Any], result: Mapping[str, Any]) -> I
         covered = _covered(answer["effects"][0], named)
         if covered is not None:
             yield "95 % intervals of the main effect's parameters hold the truth", covered
-    else:
+    if kind in {"background", "clean", "foreign beside"}:
         sure = [effect for effect in named if effect["probability"] >= SETTINGS.certain]
-        allowed = kind == "background" and pays
+        allowed = kind != "clean" and pays
         yield (
             f"{kind}: no certain name that does not pay on the judging record",
             not sure or allowed,
@@ -192,7 +204,7 @@ def _numbers(document: Any) -> Iterator[float]:
 def _above_noise(answer: Mapping[str, Any]) -> bool:
     """Whether the noise is stated rightly and the background is larger than it is, so that what is left cannot be noise."""
     share = answer.get("background_share", answer.get("share")) or 0.0
-    gap = float(np.max(answer.get("gap_nrmse_identification") or 0.0))
+    gap = float(answer.get("main_gap") or np.max(answer.get("gap_nrmse_identification") or 0.0))
     return answer.get("noise_stated") == "true" and share * gap > float(answer.get("noise") or np.inf)
 
 
@@ -207,7 +219,8 @@ def _within_a_set(true: str, said: list[str], result: Mapping[str, Any]) -> bool
 def _stated(answer: Mapping[str, Any], result: Mapping[str, Any]) -> Iterable[tuple[float, bool]]:
     """Probability of every name, and whether it is right: the effect that was withheld, or what a thing of the background is."""
     true = {effect["name"] for effect in answer["effects"]}
-    true.update(BY_ANOTHER_NAME[name] for name in answer.get("background") or () if name in BY_ANOTHER_NAME)
+    for name in answer.get("background") or ():
+        true.update(BY_ANOTHER_NAME.get(name, ()))
     for effect in result["named"]:
         yield effect["probability"], effect["name"] in true
 

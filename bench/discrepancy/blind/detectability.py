@@ -1,4 +1,5 @@
-"""How well records can tell an effect at all: expected log odds at the truth, from the records without their noise.
+"""How well records can tell an effect at all: expected log odds at the truth, and what re-estimated parameters leave of its gap,
+from the records without their noise.
 
 Half the chi-squared that a wrong explanation leaves in noise-free records, its parameters fitted, is the log odds by which
 noisy ones are expected to refute it (up to the Occam factors, a few units). Two of them go into the answer of a
@@ -25,6 +26,7 @@ from bench.errors import BenchError
 if TYPE_CHECKING:
     from bench.discrepancy.fitting.map_fit import Fit
     from bench.discrepancy.fitting.starts import Point
+    from bench.discrepancy.likelihood.problem import Problem
     from bench.discrepancy.model.structure import Structure
 
 
@@ -62,6 +64,55 @@ def detectability(pure: Case, true: Mapping[str, float], truth: Mapping[str, str
         return _odds_of(pure, true, truth)
     except (BenchError, np.linalg.LinAlgError):
         return {}
+
+
+class Lasting(NamedTuple):
+    """What the nominal model leaves once it is re-estimated within its stated uncertainty.
+
+    Attributes:
+        gap: NRMSE of the records for identification, of the judged coordinate where it is largest.
+        log_odds: Expected log odds against that model.
+    """
+
+    gap: float
+    log_odds: float
+
+
+def lasting(pure: Case, true: Mapping[str, float]) -> Lasting:
+    """What of the gap of a case is left once its nominal model is re-estimated: what an effect makes that no parameter can.
+
+    Args:
+        pure: The case with its stated noise and next to none in the records.
+        true: True parameters by name.
+
+    Raises:
+        BenchError: The nominal model cannot be fitted.
+    """
+    from bench.discrepancy.judgement.validation_discrepancy import errors_by_block  # noqa: PLC0415
+    from bench.discrepancy.likelihood.problem import Problem  # noqa: PLC0415
+    from bench.discrepancy.model.rigs import structure_of  # noqa: PLC0415
+    from bench.discrepancy.search.explanation import Explanation  # noqa: PLC0415
+
+    structure = structure_of(pure)
+    problem = Problem(pure, structure, pure.identification)
+    nothing = _nothing(problem)
+    predict = Explanation(((problem, nothing),)).predict
+    power = errors_by_block(problem, pure.identification, predict, 1).sum(axis=1)
+    return Lasting(float(np.sqrt(power.max())), 0.5 * (nothing.cost - _cost_of(problem, true)))
+
+
+def _nothing(problem: Problem) -> Fit:
+    """The nominal model, its parameters fitted."""
+    from bench.discrepancy.fitting.map_fit import fit  # noqa: PLC0415
+
+    return fit(problem, (), start=np.zeros(len(problem.nominal)), iterations=SETTINGS.last)
+
+
+def _cost_of(problem: Problem, true: Mapping[str, float]) -> float:
+    """What the true parameters cost by the prior alone: noise-free records cost them nothing."""
+    names = problem.structure.parameters
+    away = [(true[name] - problem.nominal[i]) / problem.spread[i] for i, name in enumerate(names)]
+    return float(np.sum(np.square(away)))
 
 
 class _Group(NamedTuple):
@@ -111,11 +162,7 @@ def _group(pure: Case, structure: Structure, true: Mapping[str, float], truth: M
     from bench.discrepancy.screening.screen import Screen  # noqa: PLC0415
 
     problem = Problem(pure, structure, pure.identification)
-    away = [
-        (true[name] - problem.nominal[i]) / problem.spread[i] for i, name in enumerate(structure.parameters)
-    ]
-    cost = float(np.sum(np.square(away)))
-    nothing = fit(problem, (), start=np.zeros(len(problem.nominal)), iterations=SETTINGS.last)
+    cost, nothing = _cost_of(problem, true), _nothing(problem)
     own = {name for name, where in truth.items() if where in {p.name for p in structure.places}}
     coupling = len(structure.groups()) > 1
     screen = Screen(problem, placements(pure, structure, CATALOGUE))

@@ -5,7 +5,7 @@ until the gap of the identification records is the wanted one, and the draw is t
 record then shows less than half or more than twice of that, or where one of two effects hides behind the other.
 What the stated uncertainties of the nominal model explain is no gap and is thrown away too, since the right answer would be
 "none"; so are a foreign effect and a pair of effects that a single catalogued one explains, since "unknown" and two names would
-be wrong.
+be wrong. A background makes its part of what is left when the nominal model is re-estimated, for the same reason.
 Nothing else is thrown away for being hard to tell: how well a record can tell at all is computed beside the
 case instead (`bench.discrepancy.blind.detectability`) and stands in the answer.
 """
@@ -19,19 +19,19 @@ from typing import Any
 import numpy as np
 
 from bench.arrays import Array
-from bench.discrepancy.blind.background import draw_background
-from bench.discrepancy.blind.detectability import detectability
+from bench.discrepancy.blind.detectability import Lasting, detectability, lasting
 from bench.discrepancy.blind.handed_over import (
     HANDED_OVER_SETTINGS,
     hand_over,
 )
 from bench.discrepancy.case.case import Case
+from bench.discrepancy.truth.background import draw_background
 from bench.discrepancy.truth.ground_truth import ROWS, WithheldEffect
 from bench.discrepancy.truth.moreau_time_stepping import TrueMotion
 from bench.discrepancy.truth.recipe import Drawn, Recipe, Shape
 from bench.discrepancy.truth.rigs import Bench, BlindOptions, CasePlan, draw_bench, reach_of
 from bench.discrepancy.truth.withheld_effects import RECIPES
-from bench.errors import ParameterError, SimulationError
+from bench.errors import BenchError, ParameterError, SimulationError
 
 KINDS = ("none", "single", "double", "foreign")
 
@@ -169,7 +169,12 @@ def _attempt(
     case, pure = hand_over(name, bench, with_effects, rng)
     background = None
     if options.background is not None:
-        background = draw_background(bench, bare[:-1], rng, options.background, DRAWING_SETTINGS.bisections)
+        main = _main(pure, bench)
+        if main.log_odds < DRAWING_SETTINGS.expected:
+            return None
+        background = draw_background(
+            bench, bare[:-1], rng, options.background, DRAWING_SETTINGS.bisections, main=main.gap
+        )
         if background is None:
             return None
         runs = bench.run([*effects, *background.acting])
@@ -183,6 +188,20 @@ def _attempt(
         return None
     answer = _answer(bench, effects, runs, gaps, options) | {"detectability": odds}
     return case, answer | (background.answer() if background is not None else {})
+
+
+def _main(pure: Case, bench: Bench) -> Lasting:
+    """The main discrepancy, of which a background makes a part: what re-estimated parameters leave of that of the effect.
+
+    What the stated uncertainties explain is no gap (see above), and a background larger than what is left would be the main thing.
+    """
+    if not bench.plan.recipes:
+        return Lasting(bench.plan.gap, np.inf)
+    try:
+        left = lasting(pure, bench.truth.values)
+    except (BenchError, np.linalg.LinAlgError):  # as of `detectability`: no reason to leave the case out
+        return Lasting(bench.plan.gap, np.inf)
+    return left._replace(gap=min(left.gap, bench.plan.gap))
 
 
 def _stated(rig: str, placed: WithheldEffect) -> bool:

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from bench.arrays import Array
-from bench.discrepancy.blind.background import Background
 from bench.discrepancy.case.case import Case, CaseChannel, NominalParameter, record_from_arrays
+from bench.discrepancy.truth.background import Background
 from bench.discrepancy.truth.ground_truth import (
     GROUND_TRUTH_SETTINGS,
     Truth,

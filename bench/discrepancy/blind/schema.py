@@ -110,6 +110,10 @@ class AnswerDocument(Document, _Open):
     """Whether the load is a command."""
     background: Listed[Name] | None = None
     """Small things that no model has besides; null where the case is not of that world."""
+    background_share: AnyNumber | None = None
+    """Their part of the main discrepancy."""
+    main_gap: AnyNumber | None = None
+    """Main discrepancy: what re-estimated nominal parameters leave of the effect's."""
     noise_stated: Literal["true", "small", "no"] = "true"
     """Whether the noise is stated, too small, or not at all."""
 

@@ -15,7 +15,8 @@ class BackgroundSettings:
     """What backgrounds are drawn from.
 
     Attributes:
-        share: Smallest and largest part of the main discrepancy (NRMSE), drawn log-uniformly.
+        share: Smallest and largest part of the main discrepancy (NRMSE: what re-estimated nominal parameters leave of it), drawn
+            log-uniformly.
         pieces: Fewest and most things in a background.
         noise: Probabilities of noise that is stated rightly, too small, and not at all.
         understated: Stated noise over the true one where it is too small.

@@ -20,7 +20,7 @@ class RigsSettings:
     """Bandwidth of the machine that prescribes a motion, as a multiple of the signal's central frequency."""
     ramp: float = 0.3
     """Seconds over which loads and motions set in [s]."""
-    background_shares: tuple[float, ...] = (0.25, 0.75, 0.0, 0.0)
+    background_shares: tuple[float, ...] = (0.2, 0.6, 0.0, 0.2)
     """Probabilities of none, single, double and foreign cases that have a background."""
 
 

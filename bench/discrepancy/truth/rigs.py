@@ -68,9 +68,9 @@ class BlindOptions:
             raise ParameterError(
                 "cases of robots have no background and strike nothing; leave both out, or make cases of other rigs"
             )
-        if self.background is not None and any(self.shares[2:]):
+        if self.background is not None and self.shares[2]:
             raise ParameterError(
-                "a background is put beside one effect or none: give shares (clean, single, double, foreign) whose last two are zero, as "
+                "a background is put beside one effect or none: give shares (clean, single, double, foreign) whose third is zero, as "
                 + " ".join(str(share) for share in RIGS_SETTINGS.background_shares)
             )
         for label, known, chosen in (

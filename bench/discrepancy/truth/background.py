@@ -35,6 +35,7 @@ class Background:
         acting: What acts on the joint.
         recorded: Names of what comes into the records only, to the part of a channel's standard deviation that it makes.
         share: Its part of the main discrepancy.
+        main: That discrepancy (NRMSE): what re-estimated parameters leave of the effect's; the wanted one where nothing is withheld.
         stated: What is said of the noise, one of `STATED`.
         settings: What it was drawn from.
     """
@@ -42,6 +43,7 @@ class Background:
     acting: tuple[WithheldEffect, ...] = ()
     recorded: Mapping[str, float] = field(default_factory=dict)
     share: float = 0.0
+    main: float = 0.0
     stated: str = "true"
     settings: BackgroundSettings = field(default_factory=BackgroundSettings)
 
@@ -52,7 +54,8 @@ class Background:
     def answer(self) -> dict[str, Any]:
         """Its entries of an answer."""
         names = [placed.recipe.name for placed in self.acting] + list(self.recorded)
-        return {"background": names, "background_share": self.share, "noise_stated": self.stated}
+        told = {"background_share": self.share, "main_gap": self.main, "noise_stated": self.stated}
+        return {"background": names, **told}
 
     def recorded_in(
         self, clean: RecordArrays, *, judged: str, timed: Sequence[str], step: float, rng: np.random.Generator
@@ -123,7 +126,13 @@ GapOf = Callable[[Sequence[WithheldEffect]], float]
 
 
 def draw_background(
-    bench: Bench, bare: RecordArrays, rng: np.random.Generator, settings: BackgroundSettings, bisections: int
+    bench: Bench,
+    bare: RecordArrays,
+    rng: np.random.Generator,
+    settings: BackgroundSettings,
+    bisections: int,
+    *,
+    main: float,
 ) -> Background | None:
     """Draw a background of a wanted size; None where one of its parts cannot reach it.
 
@@ -133,15 +142,16 @@ def draw_background(
         rng: Source of randomness.
         settings: What to draw from.
         bisections: Halvings of the logarithm of a strength between e^-9 and e^2.
+        main: The main discrepancy (NRMSE), of which it makes a part.
     """
     if rng.random() < settings.bare:
-        return Background(stated="no", settings=settings)
+        return Background(main=main, stated="no", settings=settings)
     stated = str(rng.choice(STATED, p=settings.noise))
     share = between(rng, *settings.share)
     count = int(rng.integers(settings.pieces[0], settings.pieces[1] + 1))
     chosen = rng.permutation([*(recipe.name for recipe in ACTING), *RECORDED])[:count]
     sizes = rng.uniform(0.5, 1.0, count)
-    parts = dict(zip(chosen, share * bench.plan.gap * sizes / np.linalg.norm(sizes), strict=True))
+    parts = dict(zip(chosen, share * main * sizes / np.linalg.norm(sizes), strict=True))
 
     def gap(acting: Sequence[WithheldEffect]) -> float:
         return max(bench.gaps(bench.responses(acting, quick=True, judging=False), bare))
@@ -158,7 +168,7 @@ def draw_background(
             return None
         acting.append(placed)
     recorded = {name: float(parts[name]) for name in RECORDED if name in parts}
-    return Background(tuple(acting), recorded, share, stated, settings)
+    return Background(tuple(acting), recorded, share, main, stated, settings)
 
 
 def _sized(
