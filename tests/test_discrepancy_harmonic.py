@@ -9,7 +9,7 @@ import pytest
 from planted_cases import NOISE, SAMPLE_RATE, linear_motion, load, planted_case
 
 from bench.discrepancy import Case, diagnose, record_from_arrays
-from bench.discrepancy.unscreened.harmonic_force import lines_of
+from bench.discrepancy.unscreened.spectral_lines import lines_of
 from bench.laws import find_law
 
 N = 4000
@@ -84,6 +84,37 @@ def test_a_hum_that_no_channel_tells_is_named_with_its_frequency_and_force():
     assert found["phase_record_0"].value == pytest.approx(0.8, abs=0.05)
     # the phase of the judging record is its own; its force is that of the other one
     assert verdict.gap.after < 1.3 * verdict.gap.noise_floor < 0.3 * verdict.gap.before
+
+
+def humming(case: Case, channel: str, amplitude: float, frequency: float) -> Case:
+    """A planted case of which one channel picks up a line, of another phase in every record."""
+    rng = np.random.default_rng(9)
+
+    def hum(record):
+        values = dict(record.values)
+        values[channel] = values[channel] + harmonic(amplitude, frequency, 6.28 * rng.random())
+        return record_from_arrays(record.name, TIME, values)
+
+    records = [tuple(map(hum, part)) for part in (case.identification, case.validation)]
+    return replace(case, identification=records[0], validation=records[1])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("channel", "noises"), [("displacement", 40.0), ("acceleration", 20.0)])
+def test_mains_hum_in_one_of_two_channels_is_the_sensor_s_and_no_force(channel, noises):
+    case = humming(case_with(np.zeros(N), np.zeros(N)), channel, noises * NOISE[channel], 50.02)
+    verdict = diagnose(case).verdict
+    assert [effect.name for effect in verdict.named] == [f"{channel}_hum"]
+    found = verdict.named[0].parameters
+    assert abs(found["amplitude"].value - noises * NOISE[channel]) < 5 * found["amplitude"].std
+    assert found["frequency"].value == pytest.approx(50.02, abs=1e-3)
+    assert verdict.gap.after < 1.3 * verdict.gap.noise_floor
+
+
+@pytest.mark.slow
+def test_a_force_at_the_frequency_of_the_mains_is_one_where_two_channels_tell():
+    verdict = diagnose(case_with(harmonic(30.0, 50.0, 0.8), harmonic(30.0, 50.0, -2.1))).verdict
+    assert [effect.name for effect in verdict.named] == ["harmonic_force"]
 
 
 @pytest.mark.slow

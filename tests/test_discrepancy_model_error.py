@@ -14,8 +14,9 @@ from bench.discrepancy.effects.catalogue import effect_named
 from bench.discrepancy.fitting.fits import Search
 from bench.discrepancy.fitting.goodness_of_fit import complexity, leaves_much
 from bench.discrepancy.fitting.map_fit import fit
-from bench.discrepancy.judgement.coarse import Judged, bounded, judge, outside, without
+from bench.discrepancy.judgement.coarse import Judged, bounded, judge, without
 from bench.discrepancy.judgement.discrepancies import Discrepancies
+from bench.discrepancy.judgement.doubt import like_small_things, outside
 from bench.discrepancy.judgement.held_out import HeldOut, held_out, shares
 from bench.discrepancy.likelihood.model_error import (
     ModelInadequacy,
@@ -280,7 +281,7 @@ def test_a_family_is_as_likely_as_what_has_an_effect_of_it():
             found,
             False,
             False,
-            0.0,
+            {},
             problem.settings.judgement.coarse,
             known,
         )
@@ -318,6 +319,17 @@ def test_what_is_left_tells_how_likely_the_cause_stands_in_no_catalogue():
     assert outside(1.0) > 0.95
     parts = [outside(left) for left in np.linspace(0.0, 1.0, 20)]
     assert parts == sorted(parts)
+
+
+def test_what_is_small_may_be_one_of_the_small_things_of_every_rig():
+    sizes = np.linspace(0.05, 1.0, 20)
+    likeness = [like_small_things(size) for size in sizes]
+    assert likeness == sorted(likeness, reverse=True)
+    # what is smaller than the error of a right model is no likelier an effect for that
+    assert like_small_things(0.01) == likeness[0]
+    # an effect of a fifth of the response is named as surely as before
+    assert outside(0.0, besides=like_small_things(0.2)) == outside(0.0)
+    assert outside(0.0, besides=likeness[0]) > 5.0 * outside(0.0)
 
 
 def test_a_law_of_many_parameters_takes_more_to_be_described_than_two_of_one_each():

@@ -18,7 +18,7 @@ from bench.discrepancy.articulated_judgement.judgement import (
 from bench.discrepancy.articulated_judgement.whiteness import Astray, Coloured
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
-from bench.discrepancy.judgement.coarse import outside
+from bench.discrepancy.judgement.doubt import outside
 from bench.discrepancy.multibody.inputs import input_of
 from bench.discrepancy.multibody.nominal_parameters import Nominal
 from bench.discrepancy.settings import ArticulatedJudgementSettings as JudgementSettings

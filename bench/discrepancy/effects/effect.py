@@ -188,6 +188,7 @@ class Effect:
             interpolated.
         quantity: For sensor effects the kind of channel ("position", "acceleration"); for inertia the parameter kind.
         pickup: The sensor adds a share of another measured channel: a load, or the response of the other axis.
+        added: Parameter values, the name of a record and its times (n,) to what the sensor adds to its channel; nothing where None.
         log_prior: Log prior odds against an effect of the README's list.
         rate_bound: Parameter values and scales to the fastest rate of the law [1/s]; the structure's own where None.
         variant: What tells it from the effect of the same name in the catalogue; empty for that one.
@@ -218,6 +219,7 @@ class Effect:
     exact: bool = False
     quantity: str = ""
     pickup: bool = False
+    added: Callable[[Values, str, Values], Values] | None = None
     log_prior: float = 0.0
     rate_bound: Callable[[Values, Scales], float] | None = None
     variant: str = ""

@@ -21,10 +21,19 @@ from bench.laws.linear import LINEAR
 
 TIMED = "timed_force"
 HARMONIC = "harmonic_force"
+HUM = "hum"
+"""What the name of mains hum in the reading of a sensor ends with."""
 FOLLOWED = "scheduled_"
 """What the name of an effect whose force follows a channel begins with."""
 DIFFERS = "record_dependent_"
 """What the name of an effect whose force differs from record to record begins with."""
+PICKED_UP = (
+    ("displacement", "position"),
+    ("velocity", "velocity"),
+    ("acceleration", "acceleration"),
+    ("force", "force"),
+)
+"""Channels that may pick up mains hum, and the scale of each."""
 SENSITIVITY = FreeParameter("sensitivity", signed=True, mean=1.0, std=0.5, bounds=(-4.0, 6.0))
 AMPLITUDE = FreeParameter("force", "force", mean=math.log(0.2), std=1.5, bounds=(-9.0, 5.0))
 FORCE = FreeParameter("force", "force", signed=True, std=2.0, bounds=(-50.0, 50.0))
@@ -98,6 +107,19 @@ def read_off(forces: Iterable[Effect]) -> tuple[Effect, ...]:
             (AMPLITUDE,),
             "f = -F cos(2 pi nu t + phi), nu of its own",
             log_prior=EFFECT_SETTINGS.rare,
+        ),
+        *(
+            Effect(
+                f"{channel}_{HUM}",
+                "sensor",
+                "read off",
+                (FreeParameter("amplitude", scale, mean=math.log(0.02), std=1.5, bounds=(-12.0, 2.0)),),
+                "A cos(2 pi nu t + phi) on the reading, nu that of the mains or a multiple",
+                exact=True,
+                quantity=scale,
+                log_prior=EFFECT_SETTINGS.rare,
+            )
+            for channel, scale in PICKED_UP
         ),
         *differing,
         *scheduled,

@@ -10,7 +10,7 @@ References:
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,12 +19,13 @@ from bench.discrepancy.case.case import Case
 from bench.discrepancy.fitting.goodness_of_fit import complexity, key_of, log_prior_of
 from bench.discrepancy.fitting.map_fit import fit
 from bench.discrepancy.judgement.discrepancies import Discrepancies
+from bench.discrepancy.judgement.doubt import like_small_things, outside
 from bench.discrepancy.judgement.held_out import HeldOut, held_out, shares
 from bench.discrepancy.judgement.steady import diverges, steadied
 from bench.discrepancy.judgement.varied_size import differs_in_vain, steadier
 from bench.discrepancy.likelihood.problem import Array, Problem
 from bench.discrepancy.search.explanation import Explanation, nominal_alone
-from bench.discrepancy.settings import DEFAULT, CoarseSettings
+from bench.discrepancy.settings import CoarseSettings
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +41,7 @@ class Judged:
         vetoed: Whether the judging records refused what the others would have named.
         missing: Whether something is missing that no effect describes, although no noise is stated that would tell: the nominal model is
             off by more than sensors are calibrated to, and an effect was vetoed, or what it leaves is larger than the errors of models.
-        left: Part of the power of the judged discrepancy, beyond noise, that the chosen one leaves.
+        doubts: Probability, by name and place of each chosen effect, that what it closes is not its own.
         settings: Thresholds.
         known: What explanations leave of the records.
     """
@@ -52,14 +53,14 @@ class Judged:
     alike: tuple[HeldOut, ...]
     vetoed: bool
     missing: bool
-    left: float
+    doubts: Mapping[tuple[str, str], float]
     settings: CoarseSettings
     known: Discrepancies
 
     @property
     def outside(self) -> float:
-        """Probability that no effect of the catalogue is the cause, by what is left; see `outside`."""
-        return outside(self.left, self.settings)
+        """Probability that no effect of the catalogue is the cause: that not even the surest of the chosen ones is."""
+        return min(self.doubts.values(), default=outside(1.0, self.settings))
 
     @property
     def agreed(self) -> float:
@@ -74,25 +75,6 @@ class Judged:
             for family in own
         ]
         return max(weights, default=0.0)
-
-
-def outside(
-    left: float, settings: CoarseSettings = DEFAULT.judgement.coarse, *, small: float | None = None
-) -> float:
-    """Probability that something outside the catalogue is the cause of a discrepancy of which an explanation leaves a part.
-
-    What stands outside leaves any part of the power beside the nearest effect, uniformly; the right effect leaves what small things
-    make, a part that falls off exponentially. Bayes' rule does the rest. Of a nominal model that stands alone, and of which no noise
-    is stated, the parts are those of the power of the response, and what small things make of it is the error of a right model.
-
-    Args:
-        left: Part of the power of the discrepancy that the explanation leaves.
-        settings: Prior probability, and what small things leave.
-        small: What small things leave on average; that of the settings where None.
-    """
-    m = settings.background if small is None else small
-    odds = settings.outside / (1.0 - settings.outside) * m * float(np.exp(min(left, 1.0) / m))
-    return max(odds / (1.0 + odds), settings.unlike)
 
 
 def judge(
@@ -147,10 +129,22 @@ def judge(
         alike,
         vetoed,
         missing,
-        known.left(chosen.explanation, nothing.explanation),
+        _doubts(chosen.explanation, nothing.explanation, known),
         settings,
         known,
     )
+
+
+def _doubts(chosen: Explanation, nothing: Explanation, known: Discrepancies) -> dict[tuple[str, str], float]:
+    """Probability, for each effect of an explanation, that what it closes of the judging records is not its own."""
+    settings, error = chosen.settings.judgement.coarse, chosen.settings.likelihood.error
+    out = dict[tuple[str, str], float]()
+    for i, placed in enumerate(chosen.hypothesis):
+        size, left = known.part(chosen, nothing if len(chosen.hypothesis) == 1 else without(chosen, i))
+        doubt = outside(left, settings, besides=settings.besides * like_small_things(size, error))
+        key = placed.effect.name, placed.place.name
+        out[key] = min(out.get(key, 1.0), doubt)
+    return out
 
 
 def _finalists(
@@ -309,6 +303,12 @@ def without(explanation: Explanation, index: int) -> Explanation:
         explanation: Fitted.
         index: Of the effect in its hypothesis.
     """
+    if index not in explanation.smaller:
+        explanation.smaller[index] = _without(explanation, index)
+    return explanation.smaller[index]
+
+
+def _without(explanation: Explanation, index: int) -> Explanation:
     parts = []
     for problem, fitted in explanation.parts:
         if not 0 <= index < len(fitted.hypothesis):

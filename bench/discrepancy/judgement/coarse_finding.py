@@ -254,10 +254,10 @@ NOISE_ALONE = (
 def _marginal(judged: Judged) -> dict[tuple[str, str], float]:
     """Probability that each (name, place) belongs to the truth."""
     total: dict[tuple[str, str], float] = {}
-    outside = judged.settings.outside if judged.vetoed else judged.outside
+    others = judged.settings.outside if judged.vetoed else judged.outside
     for weight, entry in zip(judged.weights, judged.found, strict=True):
         for key in dict.fromkeys((p.effect.name, p.place.name) for p in entry.explanation.hypothesis):
-            total[key] = total.get(key, 0.0) + (1.0 - outside) * float(weight)
+            total[key] = total.get(key, 0.0) + (1.0 - judged.doubts.get(key, others)) * float(weight)
     return total
 
 

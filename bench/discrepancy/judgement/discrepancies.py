@@ -87,16 +87,23 @@ class Discrepancies:
         bar = np.maximum(before, settings.about_noise * self._floor) * settings.unchanged
         return float(np.max(np.where(after < DIVERGED_GAP, after / np.maximum(bar, 1e-300), np.inf)))
 
-    def left(self, explanation: Explanation, nothing: Explanation) -> float:
-        """Part of the power of the judging records' discrepancy, beyond noise, that an explanation leaves where it is largest.
+    def left(self, explanation: Explanation, rest: Explanation) -> float:
+        """Part of the power of the judging records' discrepancy, beyond noise, that an explanation leaves beside a part of it."""
+        return self.part(explanation, rest)[1]
 
-        Of a nominal model that is worse than no motion at all, the part is that of the response.
+    def part(self, explanation: Explanation, rest: Explanation) -> tuple[float, float]:
+        """What an explanation closes that a part of it does not: its size, an NRMSE, and the part of the power that is left.
+
+        Of the judging records, beyond noise, on the coordinate where it closes most: what is left on others, by other causes, says
+        nothing against it. Of a nominal model that is worse than no motion at all, the part is that of the response.
         """
-        before, after = self._judged(nothing, explanation)
+        before, after = self._judged(rest, explanation)
         before = np.minimum(before, self.as_stated)
         before, after = self._beyond(_at_rest(before)), self._beyond(after)
-        widest = int(np.argmax(before))
-        return float(min((after[widest] / max(before[widest], 1e-300)) ** 2, 1.0))
+        closed = before**2 - after**2
+        here = int(np.argmax(closed))
+        left = min((after[here] / max(before[here], 1e-300)) ** 2, 1.0)
+        return float(np.sqrt(max(closed[here], 0.0))), float(left)
 
     def beyond_noise(self, explanation: Explanation) -> float:
         """Largest NRMSE of an explanation on the judging records, the noise taken off."""

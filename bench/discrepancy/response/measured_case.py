@@ -240,8 +240,12 @@ class MeasuredCase:
     def picked_up(
         self, hypothesis: Hypothesis, etas: list[Array], channels: Array, record: CaseRecord
     ) -> Array:
-        """Channels (n, n_channels) with what they pick up from other measured channels; changed in place."""
+        """Channels (n, n_channels) with what they pick up from other measured channels and the mains; changed in place."""
         for placed, eta in zip(hypothesis, etas, strict=True):
+            if placed.effect.added is not None:
+                values = placed.effect.values(eta, self.scales_of(placed))
+                added = placed.effect.added(values, record.name, record.time)
+                channels[:, self.structure.channels.index(placed.target)] += added
             if placed.effect.pickup:
                 share = placed.effect.values(eta, self.scales_of(placed))[0]
                 channels[:, self.structure.channels.index(placed.channel)] += (

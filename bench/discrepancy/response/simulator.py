@@ -159,7 +159,7 @@ class Simulator(MeasuredCase):
             if not np.isfinite(driven).all():
                 return np.full_like(force, np.nan)
             force += driven @ elements.rows
-        return self.sensed(hypothesis, etas, force, record.step)
+        return self.picked_up(hypothesis, etas, self.sensed(hypothesis, etas, force, record.step), record)
 
     def elements(
         self, hypothesis: Hypothesis, etas: list[Array], record: CaseRecord

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 from bench.discrepancy.case.case import CaseRecord
@@ -23,9 +23,11 @@ class Explanation:
 
     Attributes:
         parts: One (problem, fit) for every group of degrees of freedom.
+        smaller: By index of an effect, it without that one, fitted again: kept by whoever made it.
     """
 
     parts: tuple[tuple[Problem, Fit], ...]
+    smaller: dict[int, Explanation] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def hypothesis(self) -> Hypothesis:

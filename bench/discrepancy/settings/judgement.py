@@ -45,6 +45,11 @@ class CoarseSettings:
         "Share of effects that no catalogue holds among what explains records about as well as one of the catalogue does.",
         "Convention.",
     )
+    besides: float = setting(
+        1.0,
+        "The same of small things that every rig has besides, over effects, before the size of what is explained is known.",
+        "Small things besides are no rarer than an effect.",
+    )
     unlike: float = setting(
         0.03,
         "The same among what is named and leaves next to nothing, at least.",

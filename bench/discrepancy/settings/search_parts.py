@@ -178,6 +178,15 @@ class HarmonicForceSettings:
         "Bounds of the frequency, in resolutions of the record, about the line.",
         "Its phase would turn by more than four times over the record.",
     )
+    mains: tuple[float, ...] = setting(
+        (50.0, 60.0), "Frequencies of the mains.", "Those of public grids.", unit="Hz"
+    )
+    mains_tolerance: float = setting(
+        0.01, "Relative distance from them within which a line is one of the mains.", "EN 50160: 1 %."
+    )
+    multiples: int = setting(
+        6, "Multiples of them that are looked at.", "Rectifiers of three phases have lines up to the sixth."
+    )
 
 
 @dataclass(frozen=True)

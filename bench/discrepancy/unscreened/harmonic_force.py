@@ -7,51 +7,38 @@ frequency where it differs between records, as the speed of a rotor does; its fo
 square of the speed. Otherwise force and frequency are what the records for identification say.
 
 Lines at multiples of the frequency of a harmonic load are left to the load: a nonlinear force makes them.
-
-References:
-    B. G. Quinn & E. J. Hannan, The Estimation and Tracking of Frequency, Cambridge University Press 2001, ch. 3 (maximum of the
-    periodogram).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
-from scipy.optimize import minimize_scalar
 
 from bench.arrays import Array
 from bench.discrepancy.case.case import CaseRecord
 from bench.discrepancy.effects.catalogue import effect_named
-from bench.discrepancy.effects.effect import Effect, FreeParameter, Scales, Values
+from bench.discrepancy.effects.effect import Effect, Scales, Values
 from bench.discrepancy.effects.read_off import AMPLITUDE, HARMONIC
 from bench.discrepancy.fitting.fits import Search, converge
 from bench.discrepancy.fitting.goodness_of_fit import consistent
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.model.structure import Place
-from bench.discrepancy.settings import DEFAULT
-from bench.discrepancy.settings.search_parts import HarmonicForceSettings
 from bench.discrepancy.unscreened.missing_force import missing_force
+from bench.discrepancy.unscreened.spectral_lines import (
+    SpectralLine,
+    common_lines,
+    frequency_parameter,
+    frequency_prior,
+    lines_of,
+    part,
+    phase_parameters,
+    resolution_of,
+)
 from bench.laws.harmonic_force import HARMONIC_FORCE
-
-
-class SpectralLine(NamedTuple):
-    """A harmonic part of a signal, ``amplitude cos(2 pi frequency t + phase)``.
-
-    Attributes:
-        frequency: [Hz].
-        amplitude: In the unit of the signal.
-        phase: At time zero of the record's clock [rad].
-    """
-
-    frequency: float
-    amplitude: float
-    phase: float
 
 
 def with_harmonic_force(search: Search, size: int = 1) -> None:
@@ -90,103 +77,12 @@ def _begun(problem: Problem, place: Place, lines: Mapping[str, SpectralLine]) ->
     return placed, np.array(eta)
 
 
-def lines_of(
-    time: Array,
-    signal: Array,
-    loads: Sequence[Array] = (),
-    *,
-    settings: HarmonicForceSettings = DEFAULT.search.harmonic,
-) -> list[SpectralLine]:
-    """The lines in the spectrum of a signal that stand out of what lies about them, the largest first.
-
-    Args:
-        time: (n,), uniform.
-        signal: (n,) the signal.
-        loads: (n,) each: where they are harmonic, their own lines and multiples of these do not count.
-        settings: `HarmonicForceSettings` of the diagnosis.
-    """
-    resolution = 1.0 / (len(signal) * float(time[1] - time[0]))
-    loaded = [frequency for load in loads for frequency in _harmonics(time, load, settings)]
-
-    def by_a_load(frequency: float) -> bool:
-        multiples = [max(round(frequency / own), 1) * own for own in loaded]
-        return any(abs(frequency - multiple) < settings.lobe * resolution for multiple in multiples)
-
-    free = [
-        _part(time, signal, frequency)
-        for frequency, _ in _lines(time, signal, settings)
-        if not by_a_load(frequency)
-    ]
-    return sorted(free, key=lambda line: -line.amplitude)
-
-
-def _lines(time: Array, signal: Array, settings: HarmonicForceSettings) -> list[tuple[float, float]]:
-    """Frequency [Hz] and power of every line of a signal."""
-    centred = (signal - signal.mean()) * np.hanning(len(signal))
-    resolution = 1.0 / (len(signal) * float(time[1] - time[0]))
-    height, power = _heights(centred, settings)
-    least = math.log(len(height) / settings.false_alarm) / math.log(2.0)
-    peaks = [
-        i
-        for i in np.flatnonzero(height > least)
-        if power[i] == power[max(i - settings.lobe, 0) : i + settings.lobe + 1].max()
-    ]
-
-    def refined(peak: int) -> float:
-        found = minimize_scalar(
-            lambda frequency: -abs(np.exp(-2j * math.pi * frequency * time) @ centred),
-            bounds=((peak - 1) * resolution, (peak + 1) * resolution),
-            method="bounded",
-            options={"xatol": 1e-4 * resolution},
-        )
-        return float(found.x)
-
-    return [(refined(int(peak)), float(power[peak])) for peak in peaks]
-
-
-def _harmonics(time: Array, load: Array, settings: HarmonicForceSettings) -> list[float]:
-    """Frequencies of the lines of a load that is made of them for the most part; none of any other."""
-    lines = _lines(time, load, settings)
-    held = sum(_part(time, load, frequency).amplitude ** 2 / 2.0 for frequency, _ in lines)
-    return [frequency for frequency, _ in lines] if held > settings.harmonic * float(np.var(load)) else []
-
-
-def _part(time: Array, signal: Array, frequency: float) -> SpectralLine:
-    """The harmonic part (least squares) of a signal at a frequency."""
-    angle = 2.0 * math.pi * frequency * time
-    basis = np.column_stack([np.cos(angle), -np.sin(angle), np.ones(len(time))])
-    c, s, _ = np.linalg.lstsq(basis, signal, rcond=None)[0]
-    return SpectralLine(frequency, float(np.hypot(c, s)), float(np.arctan2(s, c)))
-
-
-def _heights(windowed: Array, settings: HarmonicForceSettings) -> tuple[Array, Array]:
-    """Power of every bin over the larger of the medians of its neighbours on both sides, and that power itself."""
-    power = np.abs(np.fft.rfft(windowed)) ** 2
-    n, far = len(power), settings.neighbours + settings.lobe
-    if n <= far:
-        return np.zeros(n), power
-    medians = np.median(sliding_window_view(np.pad(power, far, mode="reflect"), settings.neighbours), axis=1)
-    about = np.maximum(medians[:n], medians[far + settings.lobe + 1 :][:n])
-    height = power / np.maximum(about, np.finfo(float).tiny)
-    height[: settings.lobe] = 0.0  # a mean or a drift is no line
-    return height, power
-
-
 def _lines_at(problem: Problem, place: Place) -> list[dict[str, SpectralLine]]:
     """Lines at a place, one for each record for identification: the largest that all have at one frequency, and the largest of each."""
     found = {r.name: _lines_in(problem, r, missing_force(problem, r, place)) for r in problem.records}
     if not all(found.values()):
         return []
-    resolution = max(1.0 / (len(record) * record.step) for record in problem.records)
-    groups = []
-    for line in next(iter(found.values())):
-        nearest = {
-            name: min(lines, key=lambda own: abs(own.frequency - line.frequency))
-            for name, lines in found.items()
-        }
-        if all(abs(own.frequency - line.frequency) < resolution for own in nearest.values()):
-            groups.append(nearest)
-    common = sorted(groups, key=lambda group: -sum(own.amplitude**2 for own in group.values()))[:1]
+    common = common_lines(found, max(resolution_of(record) for record in problem.records))[:1]
     largest = {name: lines[0] for name, lines in found.items()}
     return [*common, largest] if largest not in common else common
 
@@ -202,24 +98,16 @@ def _effect(problem: Problem, place: Place, lines: Mapping[str, SpectralLine]) -
     """The effect with the lines that were found, of one frequency where the records agree on it."""
     settings = problem.settings.search.harmonic
     records = {record.name: record for record in problem.records}
-    resolution = {name: 1.0 / (len(record.time) * record.step) for name, record in records.items()}
+    resolution = {name: resolution_of(record) for name, record in records.items()}
     told = [line.frequency for line in lines.values()]
     one = max(told) - min(told) < max(resolution.values())
     own = ["frequency"] if one else [f"frequency_{name}" for name in lines]
-    frequencies = []
-    for parameter, name in zip(own, lines, strict=False):
-        middle = float(np.mean(told)) if one else lines[name].frequency
-        spread = resolution[name] / middle
-        ends = (math.log(middle) - settings.drawn * spread, math.log(middle) + settings.drawn * spread)
-        frequencies.append(
-            FreeParameter(parameter, mean=math.log(middle), std=spread, bounds=ends, unit="Hz")
-        )
-    phases = [
-        FreeParameter(
-            f"phase_{name}", signed=True, std=math.pi, bounds=(-3.0 * math.pi, 3.0 * math.pi), unit="rad"
-        )
-        for name in lines
+    middles = [float(np.mean(told))] if one else told
+    frequencies = [
+        frequency_parameter(parameter, middle, resolution[name], settings)
+        for parameter, middle, name in zip(own, middles, lines, strict=False)
     ]
+    phases = phase_parameters(list(lines))
     judging = {}
     for record in problem.case.validation:
         lacking = missing_force(problem, record, place)
@@ -234,7 +122,7 @@ def _effect(problem: Problem, place: Place, lines: Mapping[str, SpectralLine]) -
         elif record in judging:
             time, lacking, own_lines = judging[record]
             frequency = first if one or not own_lines else own_lines[0].frequency
-            phase = _part(time, lacking, frequency).phase
+            phase = part(time, lacking, frequency).phase
         else:
             frequency, phase = first, 0.0
         return np.array([force * (frequency / first) ** 2, frequency, phase])
@@ -246,6 +134,5 @@ def _effect(problem: Problem, place: Place, lines: Mapping[str, SpectralLine]) -
     return replace(
         known, site="joint", parameters=(AMPLITUDE, *frequencies, *phases), law=HARMONIC_FORCE, theta=theta,
         of_record=of_record, rate_bound=lambda values, scales: 2.0 * math.pi * float(np.max(values[1 : 1 + count])),
-        # one of so many frequencies was chosen
-        log_prior=known.log_prior - count * math.log(tried / len(records)),
+        log_prior=known.log_prior + sum(frequency_prior(f, tried / len(records), settings) for f in middles),
     )  # fmt: skip
