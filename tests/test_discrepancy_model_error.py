@@ -16,7 +16,7 @@ from bench.discrepancy.fitting.goodness_of_fit import complexity, leaves_much
 from bench.discrepancy.fitting.map_fit import fit
 from bench.discrepancy.judgement.coarse import Judged, bounded, judge, without
 from bench.discrepancy.judgement.discrepancies import Discrepancies
-from bench.discrepancy.judgement.doubt import like_small_things, outside
+from bench.discrepancy.judgement.doubt import like_small_things, outside, stands_outside
 from bench.discrepancy.judgement.held_out import HeldOut, held_out, shares
 from bench.discrepancy.likelihood.model_error import (
     ModelInadequacy,
@@ -330,6 +330,7 @@ def test_what_is_small_may_be_one_of_the_small_things_of_every_rig():
     # an effect of a fifth of the response is named as surely as before
     assert outside(0.0, besides=like_small_things(0.2)) == outside(0.0)
     assert outside(0.0, besides=likeness[0]) > 5.0 * outside(0.0)
+    assert [stands_outside(size) for size in (0.02, 0.1, 0.15, 0.5)] == [False, False, True, True]
 
 
 def test_a_law_of_many_parameters_takes_more_to_be_described_than_two_of_one_each():

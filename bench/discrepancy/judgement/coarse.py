@@ -19,7 +19,7 @@ from bench.discrepancy.case.case import Case
 from bench.discrepancy.fitting.goodness_of_fit import complexity, key_of, log_prior_of
 from bench.discrepancy.fitting.map_fit import fit
 from bench.discrepancy.judgement.discrepancies import Discrepancies
-from bench.discrepancy.judgement.doubt import like_small_things, outside
+from bench.discrepancy.judgement.doubt import like_small_things, outside, stands_outside
 from bench.discrepancy.judgement.held_out import HeldOut, held_out, shares
 from bench.discrepancy.judgement.steady import diverges, steadied
 from bench.discrepancy.judgement.varied_size import differs_in_vain, steadier
@@ -117,8 +117,7 @@ def judge(
     # a nominal model is as right as a model can be within two standard deviations of what sensors are calibrated to
     error = problem.settings.likelihood.error
     off = float(np.max(known.of(nothing.explanation, judging=True))) > 2.0 * error.least
-    power = known.beyond_noise(nothing.explanation) ** 2
-    wrong = outside(power, settings, small=error.crude**2) > 0.5  # likelier than not
+    wrong = stands_outside(known.beyond_noise(nothing.explanation), settings, error)
     missing = chosen is nothing and not problem.noise_stated and off and (vetoed or wrong)
     preferred = [other for other in found if known.prefers(other.explanation, chosen.explanation)]
     return Judged(

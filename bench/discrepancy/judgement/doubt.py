@@ -15,22 +15,19 @@ def outside(
     left: float,
     settings: CoarseSettings = DEFAULT.judgement.coarse,
     *,
-    small: float | None = None,
     besides: float = 0.0,
 ) -> float:
     """Probability that something outside the catalogue is the cause of a discrepancy of which an explanation leaves a part.
 
     What stands outside leaves any part of the power beside the nearest effect, uniformly; the right effect leaves what small things
-    make, a part that falls off exponentially. Bayes' rule does the rest. Of a nominal model that stands alone, and of which no noise
-    is stated, the parts are those of the power of the response, and what small things make of it is the error of a right model.
+    make, a part that falls off exponentially. Bayes' rule does the rest.
 
     Args:
         left: Part of the power of the discrepancy that the explanation leaves.
         settings: Prior probability, and what small things leave.
-        small: What small things leave on average; that of the settings where None.
         besides: Prior odds that the discrepancy is one that small things make, see `like_small_things`.
     """
-    m = settings.background if small is None else small
+    m = settings.background
     prior = settings.outside / (1.0 - settings.outside) + besides
     odds = prior * m * float(np.exp(min(left, 1.0) / m))
     return max(odds / (1.0 + odds), settings.unlike)
@@ -48,3 +45,18 @@ def like_small_things(size: float, error: ErrorSettings = DEFAULT.likelihood.err
     """
     power = max(size / error.crude, 1.0) ** 2
     return float(power * np.exp(-power) * 2.0 * np.log(1.0 / error.least))
+
+
+def stands_outside(
+    size: float,
+    settings: CoarseSettings = DEFAULT.judgement.coarse,
+    error: ErrorSettings = DEFAULT.likelihood.error,
+) -> bool:
+    """Whether what a nominal model leaves, and no effect predicts, is likelier something that no catalogue holds than small things.
+
+    Args:
+        size: What it leaves, as a part of the response (RMS).
+        settings: Prior probabilities.
+        error: Size and least size of the error of a right model.
+    """
+    return settings.outside / (1.0 - settings.outside) > settings.besides * like_small_things(size, error)

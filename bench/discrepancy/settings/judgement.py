@@ -46,9 +46,12 @@ class CoarseSettings:
         "Convention.",
     )
     besides: float = setting(
-        1.0,
-        "The same of small things that every rig has besides, over effects, before the size of what is explained is known.",
-        "Small things besides are no rarer than an effect.",
+        0.3,
+        "Odds that what is named is one of the small things that every rig has besides, before its size is known.",
+        (
+            "Of 50 names of single effects that no other came near, in 140 own cases with a background, this makes right and wrong ones "
+            "likeliest; the likelihood is flat from 0.2 to 0.5."
+        ),
     )
     unlike: float = setting(
         0.03,
