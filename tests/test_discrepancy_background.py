@@ -6,10 +6,12 @@ import json
 
 import numpy as np
 import pytest
+from planted_cases import DAMPING, MASS, NOISE, STIFFNESS, linear_motion, motion_with, planted_case
 
 from bench.cli import main
 from bench.discrepancy import score_blind
 from bench.discrepancy.blind.background_score import background_scored, background_summary
+from bench.discrepancy.blind.detectability import lasting
 from bench.discrepancy.blind.drawing import (
     DRAWING_SETTINGS,
     draw_case,
@@ -70,9 +72,28 @@ def test_a_case_tells_no_one_of_its_background_and_its_answer_does(rig):
     assert answer["background"]
     assert 0.05 <= answer["background_share"] <= 0.3
     assert answer["noise_stated"] in STATED
-    assert answer["class"] in {"none", "single"}
+    assert answer["class"] in {"none", "single", "foreign"}
+    assert answer["main_gap"] > 0.0
+    if answer["effects"]:  # what parameters leave, which the wanted gap bounds
+        assert answer["main_gap"] <= answer["wanted_gap"]
     stated = {c.noise_std for c in case.channels if c.role == "response"}
     assert (stated == {None}) == (answer["noise_stated"] == "no")
+
+
+def test_what_parameters_take_up_is_no_main_discrepancy():
+    true = {"mass": MASS, "stiffness": STIFFNESS, "damping": DAMPING}
+    # next to no noise in the records, as in the pure case of a maker
+    stated = {name: 100.0 * level for name, level in NOISE.items()}
+    softer = planted_case(lambda f: linear_motion(f, stiffness=0.96 * STIFFNESS), noise=stated)
+    taken = lasting(softer, true)
+    assert taken.gap < 0.02
+    assert taken.log_odds < DRAWING_SETTINGS.expected
+    sticking = planted_case(
+        lambda f: motion_with(f, lambda x, v, z: (2.0 * np.tanh(v / 0.003), [])), noise=stated
+    )
+    left = lasting(sticking, true)
+    assert left.gap > 0.05
+    assert left.log_odds > DRAWING_SETTINGS.expected
 
 
 def test_what_comes_into_the_records_has_its_size_and_leaves_other_channels_alone():
@@ -161,6 +182,12 @@ MAIN = "main effect named or in a declared set"
          {"background: no certain name that does not pay on the judging record", "names shrink the judged discrepancy"}),
         (result("effect", [("gap", 0.95)]), answer([], [], stated="no"),
          {"clean: no certain name that does not pay on the judging record"}),
+        (result("unknown", []), answer(["hertz_contact"], ["hum"], kind="foreign"), set()),
+        (result("effect", [("gap", 0.95)]), answer(["hertz_contact"], ["hum"], kind="foreign"), set()),  # not said to be all
+        (result("effect", [("gap", 0.95)], complete=True), answer(["hertz_contact"], ["hum"], kind="foreign"),
+         {"foreign beside a background: unknown, or said not to be complete"}),
+        (result("none", []), answer(["hertz_contact"], ["hum"], kind="foreign"),
+         {"foreign beside a background: unknown, or said not to be complete", "foreign beside a background: not none"}),
     ],
 )  # fmt: skip
 def test_what_counts_as_right_beside_a_background(said, truth, missed):
