@@ -288,6 +288,12 @@ def test_a_family_is_as_likely_as_what_has_an_effect_of_it():
         assert told.agreed == pytest.approx(agreed)
 
 
+def test_factors_of_a_response_are_one_kind():
+    factors = ("mass_error", "force_gain_error", "acceleration_gain_error", "displacement_gain_error")
+    assert {effect_named(name).kind for name in factors} == {"factor"}
+    assert effect_named("cubic_stiffness").kind == effect_named("gap").kind == "stiffness"
+
+
 def test_what_a_free_force_would_still_take_is_told():
     cubic = planted_case(lambda f: motion_with(f, lambda x, v, z: (2e5 * x**3, [])), n=1500)
     for case, kind in ((cubic, "displacement"), (planted_case(n=1500), "")):

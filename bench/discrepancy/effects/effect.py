@@ -186,6 +186,7 @@ class Effect:
         tells: Parameter values and scales to whether they are more than the clocks of any log are uncertain by; of other effects None.
         exact: A free run with it is as exact as one of the nominal model: a number is wrong, and nothing is smoothed, switched or
             interpolated.
+        factor: It scales the response to a load, as others of these do: a wrong inertia, the gain of a load or of a sensor.
         quantity: For sensor effects the kind of channel ("position", "acceleration"); for inertia the parameter kind.
         pickup: The sensor adds a share of another measured channel: a load, or the response of the other axis.
         added: Parameter values, the name of a record and its times (n,) to what the sensor adds to its channel; nothing where None.
@@ -217,6 +218,7 @@ class Effect:
     logged: bool = False
     tells: Callable[[Values, Scales], bool] | None = None
     exact: bool = False
+    factor: bool = False
     quantity: str = ""
     pickup: bool = False
     added: Callable[[Values, str, Values], Values] | None = None
@@ -232,6 +234,11 @@ class Effect:
     def on(self, interpolation: str) -> Effect:
         """What it is on loads that run so between samples, see `Case.load_interpolation`."""
         return (self.held_as if interpolation == "zero_order_hold" else None) or self
+
+    @property
+    def kind(self) -> str:
+        """What kind of thing it is: its family, but one kind for all factors, which may be told apart by priors alone."""
+        return "factor" if self.factor else self.family
 
     @property
     def sticks(self) -> bool:

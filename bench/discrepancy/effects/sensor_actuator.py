@@ -84,6 +84,7 @@ def _sensor_gain_error(channel: str, quantity: str, symbol: str, log_prior: floa
         f"(1 + e) {symbol}",
         signal=signals.gain,
         exact=True,
+        factor=True,
         quantity=quantity,
         log_prior=log_prior,
     )
@@ -139,6 +140,7 @@ CHANNELS: tuple[Effect, ...] = (
         "m = m_nominal (1 + e)",
         quantity="mass",
         exact=True,
+        factor=True,
     ),
     Effect(
         "stiffness_error",
@@ -220,6 +222,7 @@ CHANNELS: tuple[Effect, ...] = (
         "F = (1 + e) command",
         signal=signals.gain,
         exact=True,
+        factor=True,
     ),
     Effect(
         "actuator_saturation",

@@ -64,17 +64,21 @@ class Judged:
 
     @property
     def agreed(self) -> float:
-        """Probability of the likeliest family among those of what was chosen, as if one of the explanations were true."""
-        own = {p.effect.family for p in self.chosen.explanation.hypothesis}
+        """Probability of the likeliest kind among those of what was chosen, as if one of the explanations were true."""
         weights = [
             sum(
                 float(weight)
                 for weight, entry in zip(self.weights, self.found, strict=True)
-                if family in {p.effect.family for p in entry.explanation.hypothesis}
+                if kind in kinds_of(entry.explanation)
             )
-            for family in own
+            for kind in kinds_of(self.chosen.explanation)
         ]
         return max(weights, default=0.0)
+
+
+def kinds_of(explanation: Explanation) -> set[str]:
+    """Kinds of the effects of an explanation."""
+    return {placed.effect.kind for placed in explanation.hypothesis}
 
 
 def judge(

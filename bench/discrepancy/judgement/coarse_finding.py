@@ -11,7 +11,7 @@ from bench.discrepancy.case.case import Case
 from bench.discrepancy.fitting.goodness_of_fit import consistent, names
 from bench.discrepancy.fitting.map_fit import fit
 from bench.discrepancy.judgement import posterior as evidence
-from bench.discrepancy.judgement.coarse import Judged, judge
+from bench.discrepancy.judgement.coarse import Judged, judge, kinds_of
 from bench.discrepancy.judgement.discrepancies import Discrepancies
 from bench.discrepancy.judgement.finding import Finding
 from bench.discrepancy.judgement.nonparametric_rival import Rival, likelier_force
@@ -281,12 +281,12 @@ def _sets(judged: Judged) -> tuple[tuple[str, ...], ...]:
 
 
 def _other_kinds(judged: Judged) -> list[str]:
-    """Explanations of other families that do as well, in words."""
-    own = {p.effect.family for p in judged.chosen.explanation.hypothesis}
+    """Explanations of other kinds that do as well, in words."""
+    own = kinds_of(judged.chosen.explanation)
     others = [
         names(entry.explanation.hypothesis)
         for entry in judged.alike
-        if entry.explanation.hypothesis and {p.effect.family for p in entry.explanation.hypothesis} != own
+        if entry.explanation.hypothesis and kinds_of(entry.explanation) != own
     ]
     return list(dict.fromkeys(others))
 
