@@ -77,7 +77,7 @@ SENSOR = {
     "bias": "The channel is off by a constant.",
     "offset": "The channel is off by a constant. Where a servo acts on it, the joint is.",
     "drift": "The channel runs away along the record.",
-    "hum": "A line at the frequency of the mains, or a multiple of it, in this channel alone.",
+    "hum": "A line in the spectrum of this channel alone, most often at the frequency of the mains or a multiple of it.",
     "clipping": "The channel has plateaus at its extremes.",
     "crosstalk": "The channel holds a share of another channel.",
     "polarity": "The channel has the opposite sign of all others.",

@@ -22,7 +22,7 @@ from bench.laws.linear import LINEAR
 TIMED = "timed_force"
 HARMONIC = "harmonic_force"
 HUM = "hum"
-"""What the name of mains hum in the reading of a sensor ends with."""
+"""What the name of hum in the reading of a sensor ends with."""
 FOLLOWED = "scheduled_"
 """What the name of an effect whose force follows a channel begins with."""
 DIFFERS = "record_dependent_"
@@ -33,7 +33,7 @@ PICKED_UP = (
     ("acceleration", "acceleration"),
     ("force", "force"),
 )
-"""Channels that may pick up mains hum, and the scale of each."""
+"""Channels that may pick up hum, and the scale of each."""
 SENSITIVITY = FreeParameter("sensitivity", signed=True, mean=1.0, std=0.5, bounds=(-4.0, 6.0))
 AMPLITUDE = FreeParameter("force", "force", mean=math.log(0.2), std=1.5, bounds=(-9.0, 5.0))
 FORCE = FreeParameter("force", "force", signed=True, std=2.0, bounds=(-50.0, 50.0))
@@ -114,7 +114,7 @@ def read_off(forces: Iterable[Effect]) -> tuple[Effect, ...]:
                 "sensor",
                 "read off",
                 (FreeParameter("amplitude", scale, mean=math.log(0.02), std=1.5, bounds=(-12.0, 2.0)),),
-                "A cos(2 pi nu t + phi) on the reading, nu that of the mains or a multiple",
+                "A cos(2 pi nu t + phi) on the reading, nu that of the mains most often",
                 exact=True,
                 quantity=scale,
                 log_prior=EFFECT_SETTINGS.rare,

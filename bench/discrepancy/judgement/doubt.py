@@ -1,7 +1,7 @@
 """Whether what an effect closes is its own, or that of something else: by how much it leaves, and by how little it is.
 
-No catalogue holds everything, and every rig has small things besides: a hidden resonator, mains hum, a stiffness that warms. Either may
-be closed in part by a law that is not theirs.
+No catalogue holds everything, and every rig has small things besides: a hidden resonator, hum in a reading, a stiffness that warms.
+Either may be closed in part by a law that is not theirs.
 """
 
 from __future__ import annotations

@@ -240,7 +240,7 @@ class MeasuredCase:
     def picked_up(
         self, hypothesis: Hypothesis, etas: list[Array], channels: Array, record: CaseRecord
     ) -> Array:
-        """Channels (n, n_channels) with what they pick up from other measured channels and the mains; changed in place."""
+        """Channels (n, n_channels) with what they pick up: other measured channels, hum; changed in place."""
         for placed, eta in zip(hypothesis, etas, strict=True):
             if placed.effect.added is not None:
                 values = placed.effect.values(eta, self.scales_of(placed))

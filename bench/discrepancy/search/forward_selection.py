@@ -34,8 +34,8 @@ from bench.discrepancy.search.horizons import lengthen
 from bench.discrepancy.search.rivals import challenge, reduce_best, simplify
 from bench.discrepancy.unscreened.analogue_lag import with_analogue_lag
 from bench.discrepancy.unscreened.harmonic_force import with_harmonic_force
-from bench.discrepancy.unscreened.mains_hum import with_mains_hum
 from bench.discrepancy.unscreened.scheduled import with_schedules
+from bench.discrepancy.unscreened.sensor_hum import with_hum
 from bench.discrepancy.unscreened.soft_friction import soften, stand_in
 from bench.discrepancy.unscreened.timed_force import with_timed_force
 
@@ -90,7 +90,7 @@ def attribute(
         _with_variants(search, size + 1)
         if HARMONIC in _read_off(candidates):
             with_harmonic_force(search, size + 1)
-        with_mains_hum(search, _read_off(candidates), size + 1)
+        with_hum(search, _read_off(candidates), size + 1)
         lengthen(search, size + 1, candidates)
         reduce_best(search)
     best = search.ranked()[0]
@@ -135,7 +135,7 @@ def _single(
             with_timed_force(search)
         if HARMONIC in asked:
             with_harmonic_force(search)
-        with_mains_hum(search, asked)
+        with_hum(search, asked)
         with_schedules(search, asked)
 
 

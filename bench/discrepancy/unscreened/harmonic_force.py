@@ -31,6 +31,7 @@ from bench.discrepancy.unscreened.missing_force import missing_force
 from bench.discrepancy.unscreened.spectral_lines import (
     SpectralLine,
     common_lines,
+    frequencies_of,
     frequency_parameter,
     frequency_prior,
     lines_of,
@@ -112,7 +113,7 @@ def _effect(problem: Problem, place: Place, lines: Mapping[str, SpectralLine]) -
     for record in problem.case.validation:
         lacking = missing_force(problem, record, place)
         judging[record.name] = (record.time, lacking, _lines_in(problem, record, lacking))
-    order, count, tried = list(lines), len(frequencies), sum(len(r.time) // 2 for r in records.values())
+    order, count, tried = list(lines), len(frequencies), frequencies_of(problem.records)
 
     def of_record(values: Values, record: str) -> Values:
         force, first = values[0], values[1]
@@ -134,5 +135,5 @@ def _effect(problem: Problem, place: Place, lines: Mapping[str, SpectralLine]) -
     return replace(
         known, site="joint", parameters=(AMPLITUDE, *frequencies, *phases), law=HARMONIC_FORCE, theta=theta,
         of_record=of_record, rate_bound=lambda values, scales: 2.0 * math.pi * float(np.max(values[1 : 1 + count])),
-        log_prior=known.log_prior + sum(frequency_prior(f, tried / len(records), settings) for f in middles),
+        log_prior=known.log_prior + sum(frequency_prior(f, tried, settings) for f in middles),
     )  # fmt: skip

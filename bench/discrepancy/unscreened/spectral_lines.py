@@ -130,6 +130,11 @@ def resolution_of(record: CaseRecord) -> float:
     return 1.0 / (len(record) * record.step)
 
 
+def frequencies_of(records: Sequence[CaseRecord]) -> float:
+    """Number of frequencies that a record tells apart, on average."""
+    return sum(len(record) // 2 for record in records) / len(records)
+
+
 def common_lines(
     found: Mapping[str, Sequence[SpectralLine]], resolution: float
 ) -> list[dict[str, SpectralLine]]:

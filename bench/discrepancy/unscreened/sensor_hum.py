@@ -1,8 +1,9 @@
-"""Mains hum in the reading of a sensor, found as a line at the frequency of the mains in what a fit leaves of its channel.
+"""Hum in the reading of a sensor, found as a line in the spectrum of what a fit leaves of its channel.
 
-A sensor picks it up on its way to the logger: no force makes it, and no other channel tells of it. A force of the same frequency moves the
-rig, and all channels say so in the same way; where one channel is all there is, both explain it, and what each takes of amplitude
-decides between them. Its phase is a property of a record, read off the judging ones; its amplitude is what the others say.
+A sensor picks it up on its way to the logger, from the mains most often: no force makes it, and no other channel tells of it. A force of
+the same frequency moves the rig, and all channels say so in the same way; where one channel is all there is, both explain it, and what
+each takes of amplitude decides between them. Its phase is a property of a record, read off the judging ones; its amplitude is what the
+others say.
 """
 
 from __future__ import annotations
@@ -27,17 +28,18 @@ from bench.discrepancy.model.structure import Place
 from bench.discrepancy.unscreened.spectral_lines import (
     SpectralLine,
     common_lines,
+    frequencies_of,
     frequency_parameter,
+    frequency_prior,
     lines_of,
-    of_the_mains,
     part,
     phase_parameters,
     resolution_of,
 )
 
 
-def with_mains_hum(search: Search, names: set[str], size: int = 1) -> None:
-    """Fit mains hum in the channel where it takes most away, where a channel has any and nothing explains the records yet.
+def with_hum(search: Search, names: set[str], size: int = 1) -> None:
+    """Fit hum in the channel where it takes most away, where a channel has any and nothing explains the records yet.
 
     Args:
         search: Fits so far; the new one is added.
@@ -77,18 +79,17 @@ def _left(problem: Problem, base: Fit, record: CaseRecord) -> Array:
 
 
 def _lines_in(problem: Problem, left: Mapping[str, Array]) -> dict[str, SpectralLine]:
-    """The strongest line of the mains that all records for identification have, by record; none where they share none."""
+    """The strongest line that all records for identification have, by record; none where they share none."""
     settings, found = problem.settings.search.harmonic, {}
     for record in problem.records:
         loads = [record.values[name] for name in problem.structure.loads if name in record.values]
-        lines = lines_of(record.time, left[record.name], loads, settings=settings)
-        found[record.name] = [line for line in lines if of_the_mains(line.frequency, settings)]
+        found[record.name] = lines_of(record.time, left[record.name], loads, settings=settings)
     common = common_lines(found, max(resolution_of(record) for record in problem.records))
     return common[0] if common else {}
 
 
 def _name_in(problem: Problem, channel: str) -> str:
-    """Name of mains hum in a channel."""
+    """Name of hum in a channel."""
     if problem.driven:
         return f"force_{HUM}"
     order = next(o.order for o in problem.structure.observers if o.channel == channel)
@@ -129,6 +130,5 @@ def _effect(
             *phase_parameters(order),
         ),
         added=added,
-        # one of so many frequencies was chosen
-        log_prior=known.log_prior - math.log(len(settings.mains) * settings.multiples),
+        log_prior=known.log_prior + frequency_prior(middle, frequencies_of(problem.records), settings),
     )
