@@ -158,6 +158,7 @@ def real_formats(told: Any) -> Figures:
 
 BACKGROUND_LIMITS = {
     "main effect named or in a declared set": "≥ 90 %",
+    "the same, of effects that leave more than noise does when parameters are re-estimated": "≥ 90 %",
     "and first": "≥ 85 %",
     "not none": "100 %",
     "one other name at most": "≥ 95 %",

@@ -186,6 +186,7 @@ MAIN = "main effect named or in a declared set"
         (result("effect", [("gap", 0.95)]), answer(["hertz_contact"], ["hum"], kind="foreign"), set()),  # not said to be all
         (result("effect", [("gap", 0.95)], complete=True), answer(["hertz_contact"], ["hum"], kind="foreign"),
          {"foreign beside a background: unknown, or said not to be complete"}),
+        (result("effect", [("base_flexibility", 0.95)], complete=True), answer(["hidden_resonator"], ["hum"], kind="foreign"), set()),
         (result("none", []), answer(["hertz_contact"], ["hum"], kind="foreign"),
          {"foreign beside a background: unknown, or said not to be complete", "foreign beside a background: not none"}),
     ],
@@ -207,6 +208,14 @@ def test_an_interval_is_held_against_the_parameter_that_the_law_has(rate, held):
         dict(background_scored(truth, said))["95 % intervals of the main effect's parameters hold the truth"]
         is held
     )
+
+
+@pytest.mark.parametrize(("left", "counted"), [(0.05, True), (0.004, False)])
+def test_effects_that_parameters_take_up_are_counted_apart(left, counted):
+    told = dict(background_scored(answer(["gap"], ["hum"]) | {"main_gap": left}, result("unknown", [])))
+    line = "the same, of effects that leave more than noise does when parameters are re-estimated"
+    assert told[MAIN] is False
+    assert (line in told) is counted
 
 
 def test_both_worlds_have_figures_of_their_own(tmp_path):

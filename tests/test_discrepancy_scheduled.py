@@ -9,11 +9,11 @@ from bench.discrepancy import Case, CaseChannel, NominalParameter, diagnose, rec
 from bench.discrepancy.effects.catalogue import effect_named
 from bench.discrepancy.effects.friction_limits import coulomb_limit
 from bench.discrepancy.fitting.map_fit import fit
-from bench.discrepancy.judgement.varied_size import differs_in_vain
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.search.explanation import Explanation
+from bench.discrepancy.search.varied_size import differs_in_vain
 from bench.discrepancy.settings import DEFAULT
 from bench.discrepancy.simulation.prescribed_response import driven_force
 from bench.discrepancy.simulation.stick_slip import Elements, StructureMatrices, free_run

@@ -6,8 +6,8 @@ the catalogue. What counts as right:
 
 - main, unstated: the effect is named, or a set is declared that holds it; it closes the largest share; one other name at most; and
   where there is a background whose noise is stated, what is named is not said to be complete.
-- foreign beside: unknown, or what is named is said not to be complete; nothing is named with certainty that does not shrink the
-  discrepancy of the judging record.
+- foreign beside: unknown, or what is named is said not to be complete, or is it (`BY_ANOTHER_NAME`); nothing is named with certainty
+  that does not shrink the discrepancy of the judging record.
 - background, clean: the same of certain names.
 - all: what is named shrinks that discrepancy, no name of several makes it larger, every number is finite, and no nominal parameter lies
   beyond four of its stated standard deviations unsaid.
@@ -161,14 +161,18 @@ def background_scored(answer: Mapping[str, Any], result: Mapping[str, Any]) -> I
     said = [effect["name"] for effect in named]
     pays = gap.get("after") is not None and gap["after"] < SETTINGS.pays * gap["before"]
     if kind == "foreign beside":
+        known = BY_ANOTHER_NAME.get(answer["effects"][0]["name"], ())
         open_ended = result["verdict"] == "unknown" or (named and not result.get("complete"))
-        yield "foreign beside a background: unknown, or said not to be complete", bool(open_ended)
+        right = open_ended or (said and set(said) <= set(known))
+        yield "foreign beside a background: unknown, or said not to be complete", bool(right)
         yield "foreign beside a background: not none", result["verdict"] != "none"
     elif answer["effects"]:
         true = answer["effects"][0]["name"]
         hit = _within_a_set(true, said, result)
         first = named[0]["name"] if named else ""
         yield "main effect named or in a declared set", hit
+        if answer.get("main_gap") is not None and answer["main_gap"] > float(answer.get("noise") or np.inf):
+            yield "the same, of effects that leave more than noise does when parameters are re-estimated", hit
         yield "and first", hit and (first == true or any(true in s for s in _sets(result)))
         yield "not none", result["verdict"] != "none"
         yield "one other name at most", len([name for name in said if name != true]) <= 1

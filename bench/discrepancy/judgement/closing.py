@@ -14,7 +14,7 @@ import numpy as np
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.fitting.goodness_of_fit import key_of
 from bench.discrepancy.judgement.coarse import without
-from bench.discrepancy.judgement.validation_discrepancy import gaps
+from bench.discrepancy.judgement.validation_discrepancy import part_closed
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.search.explanation import Explanation, nominal_alone
 from bench.discrepancy.settings import JudgementSettings
@@ -43,14 +43,8 @@ def with_closed(
     for i, (effect, placed) in enumerate(zip(named, best.hypothesis, strict=True)):
         rest = known.get(key_of(tuple(p for p in best.hypothesis if p is not placed)))
         rest = rest or (nothing if len(best.hypothesis) == 1 else without(best, i))
-        found = gaps(
-            case,
-            problem,
-            stages=[("without", rest.predict), ("", rest.predict), ("with", best.predict)],
-            rng=rng,
-        )
-        most = max(found, key=lambda gap: gap.before - gap.after)
-        out.append(replace(effect, closed=most.closed, closed_ci95=most.closed_ci95))
+        part = part_closed(case, problem, nothing.predict, rest.predict, best.predict, rng)
+        out.append(replace(effect, closed=part.share, closed_ci95=part.ci95))
     return tuple(sorted(out, key=lambda effect: -effect.closed))
 
 

@@ -21,10 +21,10 @@ from bench.discrepancy.fitting.map_fit import fit
 from bench.discrepancy.judgement.discrepancies import Discrepancies
 from bench.discrepancy.judgement.doubt import like_small_things, outside, stands_outside
 from bench.discrepancy.judgement.held_out import HeldOut, held_out, shares
-from bench.discrepancy.judgement.steady import diverges, steadied
-from bench.discrepancy.judgement.varied_size import differs_in_vain, steadier
 from bench.discrepancy.likelihood.problem import Array, Problem
 from bench.discrepancy.search.explanation import Explanation, nominal_alone
+from bench.discrepancy.search.steady import diverges, steadied
+from bench.discrepancy.search.varied_size import differs_in_vain, steadier
 from bench.discrepancy.settings import CoarseSettings
 
 

@@ -25,7 +25,6 @@ from bench.discrepancy.judgement.coarse_finding import (
 from bench.discrepancy.judgement.finding import Finding
 from bench.discrepancy.judgement.nonparametric_rival import Rival, likelier_force
 from bench.discrepancy.judgement.predictive_check import contradicted
-from bench.discrepancy.judgement.varied_size import differs_in_vain
 from bench.discrepancy.likelihood.model_error import ModelInadequacy
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.rigs import structure_of
@@ -33,6 +32,7 @@ from bench.discrepancy.numerics.deadline import NEVER, Deadline
 from bench.discrepancy.search.explain import explain
 from bench.discrepancy.search.explanation import Explanation
 from bench.discrepancy.search.load_interpolation import promising_readings
+from bench.discrepancy.search.varied_size import differs_in_vain
 from bench.discrepancy.settings import DEFAULT, DiagnosisSettings
 from bench.progress import Tell
 

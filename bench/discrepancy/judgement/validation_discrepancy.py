@@ -8,7 +8,8 @@ Records that start in motion, and windows of records that would drift, begin at 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -83,13 +84,14 @@ def gaps(
         whole = np.concatenate(measured)
         values = [nrmse(whole, np.concatenate(stage)) for stage in simulated]
         floor = noise_level(problem, channels, case.validation, final) / max(float(np.std(whole)), 1e-300)
+        settings = problem.settings.judgement
         interval = _bootstrap(
             measured,
-            simulated[0],
-            simulated[-1],
+            (simulated[0], simulated[-1]),
             floor * float(np.std(whole)),
             rng,
-            settings=problem.settings.judgement,
+            lambda *levels, settings=settings: closed_share(*levels, settings=settings),
+            settings=settings,
         )
         out.append(
             Gap(
@@ -98,7 +100,7 @@ def gaps(
                 parameters_only=values[1],
                 after=values[-1],
                 noise_floor=floor,
-                closed=closed_share(values[0], values[-1], floor, settings=problem.settings.judgement),
+                closed=closed_share(values[0], values[-1], floor, settings=settings),
                 closed_ci95=interval,
                 steps=tuple((label, value) for (label, _), value in zip(stages, values, strict=True)),
                 dof=name,
@@ -147,6 +149,58 @@ def closed_share(
     if before <= settings.at_the_noise * floor:
         return 1.0
     return (before - after) / (before - floor)
+
+
+class ClosedPart(NamedTuple):
+    """What a part of an explanation closes of the judging records.
+
+    Attributes:
+        share: Of the whole discrepancy.
+        ci95: Its block-bootstrap interval.
+        size: NRMSE that comes back without it.
+    """
+
+    share: float
+    ci95: tuple[float, float]
+    size: float
+
+
+def part_closed(
+    case: Case,
+    problem: Problem,
+    nothing: Prediction,
+    rest: Prediction,
+    best: Prediction,
+    rng: np.random.Generator,
+) -> ClosedPart:
+    """What lies between two predictions, as a part of the discrepancy of the nominal model; on the coordinate where it is largest.
+
+    Args:
+        case: The case.
+        problem: Its problem on all degrees of freedom, for the noise.
+        nothing: The nominal model, its parameters re-estimated.
+        rest: An explanation without one of its effects, the others fitted again.
+        best: The explanation.
+        rng: For the bootstrap.
+    """
+    settings, found = problem.settings.judgement, []
+    runs = [[predict(record) for record in case.validation] for predict in (nothing, rest, best)]
+
+    def share(whole: float, without: float, left: float, floor: float) -> float:
+        if whole <= settings.at_the_noise * floor:
+            return 1.0
+        return min((without - left) / (whole - floor), 1.0)
+
+    for _, channels in coordinates(problem.structure):
+        measured = [_combine(record.values, channels) for record in case.validation]
+        simulated = [[_combine(run, channels) for run in own] for own in runs]
+        together = np.concatenate(measured)
+        whole, without, left = (nrmse(together, np.concatenate(own)) for own in simulated)
+        noise = noise_level(problem, channels, case.validation)
+        value = share(whole, without, left, noise / max(float(np.std(together)), 1e-300))
+        interval = _bootstrap(measured, simulated, noise, rng, share, settings=settings)
+        found.append(ClosedPart(value, interval, without - left))
+    return max(found, key=lambda part: part.size)
 
 
 def noise_level(
@@ -213,36 +267,35 @@ def _combine(values: Mapping[str, Array], channels: Sequence[tuple[str, float]])
 
 def _bootstrap(
     measured: Sequence[Array],
-    before: Sequence[Array],
-    after: Sequence[Array],
+    runs: Sequence[Sequence[Array]],
     noise: float,
     rng: np.random.Generator,
+    share: Callable[..., float],
     *,
     settings: JudgementSettings,
 ) -> tuple[float, float]:
-    """95 % interval of the closed share, blocks of the judging records drawn with replacement."""
+    """95 % interval of a share of the NRMSE of several runs and that of noise alone, blocks of the judging records drawn with replacement.
+
+    Args:
+        measured: By record.
+        runs: By run and record.
+        noise: RMS that noise alone leaves.
+        rng: For the draws.
+        share: NRMSE of every run, and of the noise, to the share.
+        settings: `JudgementSettings` of the diagnosis.
+    """
+    if not all(np.isfinite(own).all() for run in runs for own in run):
+        return (0.0, 1.0)
     rows = []
-    for m, b, a in zip(measured, before, after, strict=True):
-        if not (np.isfinite(b).all() and np.isfinite(a).all()):
-            return (0.0, 1.0)
+    for m, *found in zip(measured, *runs, strict=True):
         centred = m - m.mean()
         for block in np.array_split(np.arange(len(m)), settings.blocks):
-            rows.append(
-                [
-                    np.sum((b - m)[block] ** 2),
-                    np.sum((a - m)[block] ** 2),
-                    np.sum(centred[block] ** 2),
-                    len(block),
-                ]
-            )
+            errors = [np.sum((own - m)[block] ** 2) for own in found]
+            rows.append([*errors, noise**2 * len(block), np.sum(centred[block] ** 2)])
     table = np.array(rows)
     draws = table[rng.integers(len(table), size=(1000, len(table)))].sum(axis=1)
-    power = draws[:, 2]
-    shares = [
-        closed_share(*np.sqrt([x[0] / p, x[1] / p, noise**2 * x[3] / p]), settings=settings)
-        for x, p in zip(draws, np.maximum(power, 1e-300), strict=True)
-    ]
-    low, high = np.percentile(shares, [2.5, 97.5])
+    levels = np.sqrt(draws[:, :-1] / np.maximum(draws[:, -1:], 1e-300))
+    low, high = np.percentile([share(*own) for own in levels], [2.5, 97.5])
     return float(low), float(high)
 
 
