@@ -149,7 +149,7 @@ class SoftFrictionSettings:
 
 @dataclass(frozen=True)
 class HarmonicForceSettings:
-    """A harmonic force of a frequency of its own: its line in the spectrum of what the records lack."""
+    """A harmonic force of a frequency of its own, and hum in a reading: lines in the spectrum of what the records lack."""
 
     false_alarm: float = setting(
         0.01,

@@ -27,7 +27,7 @@ from bench.discrepancy.fitting.goodness_of_fit import consistent
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.model.structure import Place
-from bench.discrepancy.unscreened.missing_force import missing_force
+from bench.discrepancy.unscreened.missing_force import driving, missing_force
 from bench.discrepancy.unscreened.spectral_lines import (
     SpectralLine,
     common_lines,
@@ -90,9 +90,7 @@ def _lines_at(problem: Problem, place: Place) -> list[dict[str, SpectralLine]]:
 
 def _lines_in(problem: Problem, record: CaseRecord, lacking: Array) -> list[SpectralLine]:
     """Lines of the force (n,) that a record lacks, but for those that its loads, or the motion prescribed, make."""
-    drives = problem.structure.channels if problem.driven else problem.structure.loads
-    loads = [record.values[name] for name in drives if name in record.values]
-    return lines_of(record.time, lacking, loads, settings=problem.settings.search.harmonic)
+    return lines_of(record.time, lacking, driving(problem, record), settings=problem.settings.search.harmonic)
 
 
 def _effect(problem: Problem, place: Place, lines: Mapping[str, SpectralLine]) -> Effect:

@@ -21,3 +21,10 @@ def missing_force(simulator: Simulator, record: CaseRecord, place: Place) -> Arr
     loads = np.column_stack([record.values[name] for name in simulator.structure.loads])
     left = motion.acceleration @ linear.mass.T + held - loads @ simulator.structure.inputs.T
     return np.asarray(np.linalg.lstsq(place.rows.T, left.T, rcond=None)[0][0], dtype=np.float64)
+
+
+def driving(simulator: Simulator, record: CaseRecord) -> list[Array]:
+    """What drives a record (n,) each: its loads; where the motion is prescribed, the force, which follows it."""
+    structure = simulator.structure
+    names = structure.channels if simulator.driven else structure.loads
+    return [record.values[name] for name in names if name in record.values]

@@ -25,6 +25,7 @@ from bench.discrepancy.fitting.map_fit import Fit
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.model.structure import Place
+from bench.discrepancy.unscreened.missing_force import driving
 from bench.discrepancy.unscreened.spectral_lines import (
     SpectralLine,
     common_lines,
@@ -82,8 +83,8 @@ def _lines_in(problem: Problem, left: Mapping[str, Array]) -> dict[str, Spectral
     """The strongest line that all records for identification have, by record; none where they share none."""
     settings, found = problem.settings.search.harmonic, {}
     for record in problem.records:
-        loads = [record.values[name] for name in problem.structure.loads if name in record.values]
-        found[record.name] = lines_of(record.time, left[record.name], loads, settings=settings)
+        drives = driving(problem, record)
+        found[record.name] = lines_of(record.time, left[record.name], drives, settings=settings)
     common = common_lines(found, max(resolution_of(record) for record in problem.records))
     return common[0] if common else {}
 
