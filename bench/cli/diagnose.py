@@ -64,8 +64,9 @@ class Diagnose:
     """Largest number of effects named together; of a robot, at one joint."""
     anyway: bool = False
     """Go on where a unit, a sign or a part of the model stands against the diagnosis; what it was becomes a note."""
-    budget: float = float("inf")
-    """Seconds after which no further stage of the search is begun; the verdict is then the best one so far and says what was not tried."""
+    budget: float | None = None
+    """Seconds after which no further stage of the search is begun; the verdict is then the best one so far and says what was not tried.
+    Ten minutes where none are given; inf for no end."""
     check: bool = True
     """Look at the records first, as `jointbench check` does, and say at once what is doubtful."""
     settings: Path | None = None
@@ -235,7 +236,7 @@ class Diagnose:
 
         if self.most < 1:
             raise ParameterError(f"--most is {self.most}; at least one effect has to be allowed")
-        if not self.budget > 0.0:
+        if self.budget is not None and not self.budget > 0.0:
             raise ParameterError(f"--budget is {self.budget:g} s; give more than zero")
         check_targets(self.json, self.html, self.rrd, self.next_test, force=self.force)
 

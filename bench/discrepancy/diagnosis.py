@@ -84,7 +84,7 @@ def diagnose(
     anyway: bool = False,
     rng: np.random.Generator | None = None,
     progress: Tell = lambda text: None,
-    budget: float = math.inf,
+    budget: float | None = None,
     settings: DiagnosisSettings = DEFAULT,
 ) -> Diagnosis | ArticulatedDiagnosis:
     """Diagnose a case; one of an articulated MJCF by `diagnose_articulated`, with the catalogue of joints, drives and encoders.
@@ -98,7 +98,7 @@ def diagnose(
         rng: For the bootstrap intervals; a fixed seed where None.
         progress: Called with a line of text at every stage.
         budget: Seconds after which nothing further is screened or fitted and fits end where they are; the verdict is then the best one
-            so far, and its warnings say what was not tried.
+            so far, and its warnings say what was not tried. Those of the settings where None; `math.inf` for no end.
         settings: Thresholds, see docs/thresholds.md.
 
     Raises:
@@ -107,6 +107,7 @@ def diagnose(
         UnitError: A unit does not fit the model, or a channel is off by a factor or a sign that no missing force makes.
         ModelError: The model holds what a nominal simulation cannot, and the records reach it.
     """
+    deadline = Deadline(settings.budget if budget is None else budget)
     if applies(case, settings=settings.articulated):
         with threadpool_limits(1, user_api="blas"):
             return diagnose_articulated(
@@ -115,7 +116,7 @@ def diagnose(
                 most=most,
                 anyway=anyway,
                 rng=rng,
-                deadline=Deadline(budget),
+                deadline=deadline,
                 settings=settings,
                 progress=progress,
             )
@@ -125,7 +126,7 @@ def diagnose(
         if name not in known and name not in {effect.name for effect in ARTICULATED}:
             raise UnknownNameError("effect", name, known)
     chosen = [effect for effect in catalogue if effect.name not in exclude]
-    how = How(chosen, most, progress, Deadline(budget), settings)
+    how = How(chosen, most, progress, deadline, settings)
     # fits run in threads of their own; threads of BLAS within them would only get in each other's way
     with threadpool_limits(1, user_api="blas"):
         found = _diagnose(case, how, rng, anyway)

@@ -41,7 +41,7 @@ class DiagnosisOptions(NamedTuple):
     exclude: tuple[str, ...] = ()
     most: int = 3
     anyway: bool = False
-    budget: float = float("inf")
+    budget: float | None = None
 
 
 def diagnose_one(folder: str, options: DiagnosisOptions) -> dict[str, Any]:

@@ -36,6 +36,12 @@ class DiagnosisSettings:
         "Seed of draws and bootstraps where no generator is given.",
         "A diagnosis repeats exactly; any other number serves as well.",
     )
+    budget: float = setting(
+        600.0,
+        "Seconds after which no further stage of a search is begun, where `--budget` does not say.",
+        "From a log to a corrected model it is to take ten minutes; few cases take more than two.",
+        unit="s",
+    )
     case: CaseSettings = field(default_factory=CaseSettings)
     model: ModelSettings = field(default_factory=ModelSettings)
     simulation: SimulationSettings = field(default_factory=SimulationSettings)
