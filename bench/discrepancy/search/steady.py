@@ -35,7 +35,7 @@ def steadied(
         rng: For the draws.
     """
     found: list[tuple[float, Explanation]] = []
-    for _ in range(explanation.settings.search.steady_draws):
+    for _ in range(explanation.settings.judgement.steady_draws):
         parts = tuple((problem, _drawn(problem, fitted, rng)) for problem, fitted in explanation.parts)
         drawn = Explanation(parts)
         cost = sum(fitted.cost for _, fitted in parts)
