@@ -66,7 +66,7 @@ class Diagnose:
     """Go on where a unit, a sign or a part of the model stands against the diagnosis; what it was becomes a note."""
     budget: float | None = None
     """Seconds after which no further stage of the search is begun; the verdict is then the best one so far and says what was not tried.
-    Ten minutes where none are given; inf for no end."""
+    Those of the settings where none are given, ten minutes; inf for no end."""
     check: bool = True
     """Look at the records first, as `jointbench check` does, and say at once what is doubtful."""
     settings: Path | None = None

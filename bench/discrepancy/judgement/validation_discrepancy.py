@@ -187,9 +187,7 @@ def part_closed(
     runs = [[predict(record) for record in case.validation] for predict in (nothing, rest, best)]
 
     def share(whole: float, without: float, left: float, floor: float) -> float:
-        if whole <= settings.at_the_noise * floor:
-            return 1.0
-        return min((without - left) / (whole - floor), 1.0)
+        return min(closed_share(whole, whole - without + left, floor, settings=settings), 1.0)
 
     for _, channels in coordinates(problem.structure):
         measured = [_combine(record.values, channels) for record in case.validation]

@@ -18,7 +18,6 @@ from dataclasses import replace
 import numpy as np
 
 from bench.arrays import Array
-from bench.discrepancy.case.case import CaseRecord
 from bench.discrepancy.effects.catalogue import effect_named
 from bench.discrepancy.effects.effect import Effect, Scales, Values
 from bench.discrepancy.effects.read_off import AMPLITUDE, HARMONIC
@@ -27,14 +26,13 @@ from bench.discrepancy.fitting.goodness_of_fit import consistent
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.model.structure import Place
-from bench.discrepancy.unscreened.missing_force import driving, missing_force
+from bench.discrepancy.unscreened.missing_force import free_lines, missing_force
 from bench.discrepancy.unscreened.spectral_lines import (
     SpectralLine,
     common_lines,
     frequencies_of,
     frequency_parameter,
     frequency_prior,
-    lines_of,
     part,
     phase_parameters,
     resolution_of,
@@ -80,17 +78,12 @@ def _begun(problem: Problem, place: Place, lines: Mapping[str, SpectralLine]) ->
 
 def _lines_at(problem: Problem, place: Place) -> list[dict[str, SpectralLine]]:
     """Lines at a place, one for each record for identification: the largest that all have at one frequency, and the largest of each."""
-    found = {r.name: _lines_in(problem, r, missing_force(problem, r, place)) for r in problem.records}
+    found = {r.name: free_lines(problem, r, missing_force(problem, r, place)) for r in problem.records}
     if not all(found.values()):
         return []
     common = common_lines(found, max(resolution_of(record) for record in problem.records))[:1]
     largest = {name: lines[0] for name, lines in found.items()}
     return [*common, largest] if largest not in common else common
-
-
-def _lines_in(problem: Problem, record: CaseRecord, lacking: Array) -> list[SpectralLine]:
-    """Lines of the force (n,) that a record lacks, but for those that its loads, or the motion prescribed, make."""
-    return lines_of(record.time, lacking, driving(problem, record), settings=problem.settings.search.harmonic)
 
 
 def _effect(problem: Problem, place: Place, lines: Mapping[str, SpectralLine]) -> Effect:
@@ -110,7 +103,7 @@ def _effect(problem: Problem, place: Place, lines: Mapping[str, SpectralLine]) -
     judging = {}
     for record in problem.case.validation:
         lacking = missing_force(problem, record, place)
-        judging[record.name] = (record.time, lacking, _lines_in(problem, record, lacking))
+        judging[record.name] = (record.time, lacking, free_lines(problem, record, lacking))
     order, count, tried = list(lines), len(frequencies), frequencies_of(problem.records)
 
     def of_record(values: Values, record: str) -> Values:

@@ -9,6 +9,7 @@ from bench.discrepancy.case.case import CaseRecord
 from bench.discrepancy.model.nominal_elements import own_force
 from bench.discrepancy.model.structure import Place
 from bench.discrepancy.response.simulator import Simulator
+from bench.discrepancy.unscreened.spectral_lines import SpectralLine, lines_of
 
 
 def missing_force(simulator: Simulator, record: CaseRecord, place: Place) -> Array:
@@ -23,8 +24,9 @@ def missing_force(simulator: Simulator, record: CaseRecord, place: Place) -> Arr
     return np.asarray(np.linalg.lstsq(place.rows.T, left.T, rcond=None)[0][0], dtype=np.float64)
 
 
-def driving(simulator: Simulator, record: CaseRecord) -> list[Array]:
-    """What drives a record (n,) each: its loads; where the motion is prescribed, the force, which follows it."""
+def free_lines(simulator: Simulator, record: CaseRecord, signal: Array) -> list[SpectralLine]:
+    """Lines in the spectrum of a signal (n,) of a record, but for those of its loads, or of a prescribed motion; the largest first."""
     structure = simulator.structure
     names = structure.channels if simulator.driven else structure.loads
-    return [record.values[name] for name in names if name in record.values]
+    drives = [record.values[name] for name in names if name in record.values]
+    return lines_of(record.time, signal, drives, settings=simulator.settings.search.harmonic)

@@ -25,14 +25,13 @@ from bench.discrepancy.fitting.map_fit import Fit
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.model.structure import Place
-from bench.discrepancy.unscreened.missing_force import driving
+from bench.discrepancy.unscreened.missing_force import free_lines
 from bench.discrepancy.unscreened.spectral_lines import (
     SpectralLine,
     common_lines,
     frequencies_of,
     frequency_parameter,
     frequency_prior,
-    lines_of,
     part,
     phase_parameters,
     resolution_of,
@@ -81,10 +80,7 @@ def _left(problem: Problem, base: Fit, record: CaseRecord) -> Array:
 
 def _lines_in(problem: Problem, left: Mapping[str, Array]) -> dict[str, SpectralLine]:
     """The strongest line that all records for identification have, by record; none where they share none."""
-    settings, found = problem.settings.search.harmonic, {}
-    for record in problem.records:
-        drives = driving(problem, record)
-        found[record.name] = lines_of(record.time, left[record.name], drives, settings=settings)
+    found = {record.name: free_lines(problem, record, left[record.name]) for record in problem.records}
     common = common_lines(found, max(resolution_of(record) for record in problem.records))
     return common[0] if common else {}
 
