@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 
 from bench.discrepancy.case.case import Case, CaseChannel, NominalParameter, record_from_arrays
 from bench.discrepancy.checks.data_quality import notes
@@ -33,15 +34,24 @@ def strokes(first: float, second: float) -> np.ndarray:
     return 0.01 * np.convolve(np.sin(turning), np.hanning(201) / np.hanning(201).sum(), mode="same")
 
 
-def case(rng: np.random.Generator, *, friction: float = 0.0, quadratic: float = 0.0) -> Case:
+def case(
+    rng: np.random.Generator,
+    *,
+    friction: float = 0.0,
+    quadratic: float = 0.0,
+    late: float = 0.0,
+    known: float = 1.0,
+) -> Case:
+    """A component on a machine; its force is logged `late` samples after the displacement, its parameters `known` times less well."""
     records = []
-    for name, x in (("identification", strokes(0.8, 0.3)), ("validation", strokes(1.1, 0.5))):
+    for name, measured in (("identification", strokes(0.8, 0.3)), ("validation", strokes(1.1, 0.5))):
+        x = CubicSpline(TIME, measured)(TIME - late * STEP)
         v = np.gradient(x, STEP)
         direction = np.sign(v)
         for k in range(1, len(v)):  # set-valued: at rest the force of the last slip is held
             direction[k] = np.sign(v[k]) if abs(v[k]) > 1e-9 else direction[k - 1]
         clean = {
-            "displacement": x,
+            "displacement": measured,
             "force": STIFFNESS * x + DAMPING * v + friction * direction + quadratic * v * np.abs(v),
         }
         noisy = {k: y + NOISE[k] * rng.standard_normal(len(y)) for k, y in clean.items()}
@@ -51,8 +61,8 @@ def case(rng: np.random.Generator, *, friction: float = 0.0, quadratic: float = 
         CaseChannel("force", "N", "response", NOISE["force"]),
     )
     parameters = (
-        NominalParameter("stiffness", 1.01 * STIFFNESS, 0.02 * STIFFNESS, "N/m"),
-        NominalParameter("damping", 0.97 * DAMPING, 0.05 * DAMPING, "N s/m"),
+        NominalParameter("stiffness", (1.0 + 0.01 * known) * STIFFNESS, 0.02 * known * STIFFNESS, "N/m"),
+        NominalParameter("damping", (1.0 - 0.03 * known) * DAMPING, 0.05 * known * DAMPING, "N s/m"),
     )
     return Case("machine", "damper", parameters, channels, (records[0],), (records[1],))
 
@@ -66,6 +76,22 @@ def test_dry_friction_is_found_through_dwells_and_noise(rng: np.random.Generator
         abs(estimate.value - FRICTION) < 5.0 * estimate.std
     )  # 5 sigma: the noise of the motion is counted to first order
     assert verdict.gap.closed > 0.8
+
+
+@pytest.mark.parametrize("late", [2.0, -1.5])
+def test_delay_between_force_and_motion_is_told_beside_friction(
+    rng: np.random.Generator, late: float
+) -> None:
+    """Of two transducers one is logged later; parameters that are known well do not take it up."""
+    verdict = diagnose(case(rng, friction=FRICTION, late=late, known=0.02)).verdict
+    delay = next(effect for effect in verdict.named if effect.name != "coulomb_friction")
+    assert len(verdict.named) == 2
+    expected = ("force_delay", "force") if late > 0.0 else ("displacement_delay", "displacement")
+    assert (delay.name, delay.channel) == expected
+    told = delay.parameters["delay"]
+    assert (
+        abs(told.value - abs(late) * STEP) < 5.0 * told.std
+    )  # the noise of the motion is counted to first order
 
 
 def test_noise_of_the_motion_is_counted_as_a_law_found_passes_it_on(rng: np.random.Generator) -> None:

@@ -182,6 +182,7 @@ class Effect:
         signal: For actuator and sensor effects, the operation on a channel.
         between_samples: That operation moves samples in time, and needs what the channel does between them.
         held_as: What it is on samples that are held until the next, whose operation gives the means over these; itself where None.
+        later: Of a delay where a motion is prescribed, whether the force that responds is logged later (1) or earlier (-1) by it.
         logged: For actuator effects, what was logged is wrong rather than what follows a command: a measured load has it, too.
         tells: Parameter values and scales to whether they are more than the clocks of any log are uncertain by; of other effects None.
         exact: A free run with it is as exact as one of the nominal model: a number is wrong, and nothing is smoothed, switched or
@@ -214,6 +215,7 @@ class Effect:
     affine: bool = False
     signal: Callable[[Values, Values, float], Values] | None = None
     held_as: Effect | None = None
+    later: float = 0.0
     between_samples: bool = False
     logged: bool = False
     tells: Callable[[Values, Scales], bool] | None = None

@@ -8,6 +8,7 @@ import numpy as np
 
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.effects.effect import Effect
+from bench.discrepancy.effects.where_prescribed import where_prescribed
 from bench.discrepancy.model.placement import FROM, Placed
 from bench.discrepancy.model.structure import Place, Structure
 
@@ -25,6 +26,8 @@ OTHER_AXIS = {
 def placements(case: Case, structure: Structure, catalogue: Iterable[Effect]) -> list[Placed]:
     """Return every effect of a catalogue at every place of a structure where it can sit."""
     out: list[Placed] = []
+    if case.rig == "damper":
+        catalogue = where_prescribed(catalogue)
     for effect in catalogue:
         for place in structure.places:
             if effect.site == "joint" and len(place.rows) == effect.n_coordinates:
@@ -44,6 +47,8 @@ def _targets(case: Case, effect: Effect, structure: Structure, place: Place) -> 
         ]
         return [name for name in names if name in structure.parameters]
     dofs = np.abs(place.rows).sum(axis=0) > 0
+    if effect.later:
+        return list(structure.loads if effect.later < 0.0 else structure.channels)
     if effect.site == "actuator":
         loads = [name for name in structure.loads if effect.logged or case.channel(name).role == "command"]
         return [n for n in loads if np.abs(structure.inputs[dofs, structure.loads.index(n)]).sum() > 0]
@@ -58,8 +63,6 @@ def _targets(case: Case, effect: Effect, structure: Structure, place: Place) -> 
 
 def _pickups(case: Case, structure: Structure, channels: Sequence[str]) -> list[str]:
     """Cross-talk into response channels: from the loads on their structure, and from the same sensor's other axis."""
-    if case.rig == "damper":  # what the force channel picks up from the displacement is a stiffness
-        return []
     out = []
     for channel in channels:
         kind, _, number = channel.rpartition("_")

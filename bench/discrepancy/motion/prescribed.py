@@ -8,6 +8,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
+from scipy.interpolate import CubicHermiteSpline
 
 from bench.arrays import Array
 from bench.discrepancy.case.case import Case, CaseRecord
@@ -58,6 +59,25 @@ def prescribed_motion(
     return Prescribed(motion, tuple(noisy))
 
 
+def earlier(motion: Motion, time: float, step: float) -> Motion:
+    """A motion (n, n_dof) as it was some time before its samples; at the ends of the record it is held.
+
+    Args:
+        motion: Sampled.
+        time: How long before [s]; negative for later.
+        step: Time between samples [s].
+    """
+    clock = step * np.arange(len(motion.position))
+    then = np.clip(clock - time, clock[0], clock[-1])
+    position = CubicHermiteSpline(clock, motion.position, motion.velocity)(then)
+    # straight lines between its samples: a velocity that is held at zero where the machine dwells stays there
+    rates = (
+        np.column_stack([np.interp(then, clock, column) for column in samples.T])
+        for samples in (motion.velocity, motion.acceleration)
+    )
+    return Motion(position, *rates)
+
+
 def decided(prescribed: Prescribed, *, settings: MotionSettings = DEFAULT.motion) -> Array | None:
     """Samples (n,) of a prescribed motion whose direction the noise leaves in no doubt, as ones and zeros.
 
@@ -74,6 +94,10 @@ def decided(prescribed: Prescribed, *, settings: MotionSettings = DEFAULT.motion
     usual = float(np.sqrt(np.mean(error**2)))
     sure = np.abs(motion.velocity[:, 0]) > settings.doubt * usual
     sure = ndimage.binary_erosion(sure, iterations=2, border_value=1)
+    back = np.flatnonzero(motion.velocity[1:, 0] * motion.velocity[:-1, 0] < 0.0)
+    sure[back] = sure[back + 1] = (
+        False  # however fast it turns: by which of the two, the clocks of two channels do not tell
+    )
     sure[_edges(error, settings=settings)] = False
     sure[: remembering(motion.position[:, 0], settings.memory)] = False
     return np.asarray(sure, dtype=np.float64) if sure.mean() > 1.0 - settings.most_in_doubt else None

@@ -14,6 +14,7 @@ from bench.arrays import Array
 from bench.discrepancy.case.case import CaseRecord
 from bench.discrepancy.model.nominal_elements import with_own_forces
 from bench.discrepancy.model.placement import Hypothesis
+from bench.discrepancy.motion.prescribed import earlier
 from bench.discrepancy.response.driving_loads import Actuated, driving_loads, fewest_steps, run_in
 from bench.discrepancy.response.force_laws import ActingLaw, assembled
 from bench.discrepancy.response.initial_states import in_motion
@@ -138,7 +139,7 @@ class Simulator(MeasuredCase):
         self, hypothesis: Hypothesis, etas: list[Array], values: Array, record: CaseRecord
     ) -> Array:
         """Force (n, 1) of the component along the prescribed motion of a record."""
-        motion = self.motion_of(record)
+        motion = self._answered(hypothesis, etas, record)
         linear = self.structure.at(values)
         force = motion.position @ linear.stiffness + motion.velocity @ linear.damping
         elements, fastest = self.elements(hypothesis, etas, record)
@@ -160,6 +161,16 @@ class Simulator(MeasuredCase):
                 return np.full_like(force, np.nan)
             force += driven @ elements.rows
         return self.picked_up(hypothesis, etas, self.sensed(hypothesis, etas, force, record.step), record)
+
+    def _answered(self, hypothesis: Hypothesis, etas: list[Array], record: CaseRecord) -> Motion:
+        """The prescribed motion that the component answers to at the samples of its force, by the delays of a hypothesis."""
+        motion = self.motion_of(record)
+        late = sum(
+            placed.effect.later * float(placed.effect.values(eta, self.scales_of(placed))[0])
+            for placed, eta in zip(hypothesis, etas, strict=True)
+            if placed.effect.later
+        )
+        return earlier(motion, late, record.step) if late else motion
 
     def elements(
         self, hypothesis: Hypothesis, etas: list[Array], record: CaseRecord
