@@ -49,107 +49,99 @@ from bench.laws.memory_layout import FIRST, MemoryLayout
 
 @kernel
 def force(t, q, v, z, theta, f):  # noqa: PLR0912, PLR0915  (one C function: a kernel calls no other)
-    """Sum of potential, damping, slip and Maxwell forces along all directions."""
+    """Sum of potential, damping, slip and Maxwell forces, one direction after the other: terms stand in the order of theirs."""
     n = int(theta[0])
     width = n + 3
+    n_directions, n_maxwell = int(theta[1]), int(theta[11])
     cells, knots, speeds = int(theta[3]), int(theta[5]), int(theta[7])
     n_slips, parts = int(theta[8]), int(theta[9])
-    index = FIRST + int(theta[1]) * width
-    n_potentials, n_gated, n_speed, n_maxwell = int(theta[2]), int(theta[4]), int(theta[6]), int(theta[11])
-    at = index + n_potentials + 2 * n_gated + n_speed + n_slips + n_maxwell
-    for _ in range(n_potentials):
-        row = FIRST + int(theta[index]) * width
+    # places of the directions of the next term of each kind, and of its parameters
+    potential = FIRST + n_directions * width
+    gated = potential + int(theta[2])
+    speed = gated + 2 * int(theta[4])
+    slip = speed + int(theta[6])
+    maxwell = slip + n_slips
+    k = maxwell + n_maxwell
+    c = k + (gated - potential) * cells
+    d = c + int(theta[4]) * knots
+    e = d + (slip - speed) * speeds
+    stride = 2 + parts + max(int(theta[10]) - 1, 0)
+    m = e + n_slips * stride
+    share = 1.0 / cells
+    gates, rates, slips, maxwells, end = gated, speed, slip, maxwell, k
+    state = 0
+    for direction in range(n_directions):
+        row = FIRST + direction * width
         s = 0.0
-        for o in range(n):
-            s += theta[row + o] * q[o]
-        low = theta[row + n]
-        span = theta[row + n + 1] - low
-        size, density = span / cells, cells / span
-        # cells that hold s and 0; the first and the last reach to infinity
-        there = int(min(max((s - low) * density, 0.0), cells - 1.0))
-        here = int(min(max(-low * density, 0.0), cells - 1.0))
-        if there == here:
-            total = theta[at + here] * s
-        elif there > here:
-            total = theta[at + here] * (low + (here + 1) * size) + theta[at + there] * (
-                s - low - there * size
-            )
-            for b in range(here + 1, there):
-                total += theta[at + b] * size
-        else:
-            total = theta[at + here] * (low + here * size) + theta[at + there] * (
-                s - low - (there + 1) * size
-            )
-            for b in range(there + 1, here):
-                total -= theta[at + b] * size
-        for o in range(n):
-            f[o] += theta[row + o] * total
-        at += cells
-        index += 1
-    rate = 0.0
-    total = 0.0
-    for i in range(n_gated):
-        row = FIRST + int(theta[index]) * width
-        gate = FIRST + int(theta[index + 1]) * width
-        s = 0.0
-        for o in range(n):
-            s += theta[gate + o] * q[o]
-        if i == 0 or theta[index] != theta[index - 2]:
-            rate = 0.0
-            for o in range(n):
-                rate += theta[row + o] * v[o]
-        low = theta[gate + n]
-        x = min(max((s - low) / (theta[gate + n + 1] - low) * (knots - 1.0), 0.0), knots - 1.0)
-        b = min(int(x), knots - 2)
-        total += theta[at + b] + (x - b) * (theta[at + b + 1] - theta[at + b])
-        # what damps along one direction does so together
-        if i == n_gated - 1 or theta[index + 2] != theta[index]:
-            total *= rate
-            for o in range(n):
-                f[o] += theta[row + o] * total
-            total = 0.0
-        at += knots
-        index += 2
-    for _ in range(n_speed):
-        row = FIRST + int(theta[index]) * width
         rate = 0.0
         for o in range(n):
+            s += theta[row + o] * q[o]
             rate += theta[row + o] * v[o]
-        x = min(abs(rate) / theta[row + n + 2] * (speeds - 1.0), speeds - 1.0)
-        b = min(int(x), speeds - 2)
-        push = (theta[at + b] + (x - b) * (theta[at + b + 1] - theta[at + b])) * rate
+        low = theta[row + n]
+        span = theta[row + n + 1] - low
+        density = 1.0 / span
+        size = span * share
+        total = 0.0
+        while potential < gates and theta[potential] == direction:
+            # cells that hold s and 0; the first and the last reach to infinity
+            there = int(min(max((s - low) * density * cells, 0.0), cells - 1.0))
+            here = int(min(max(-low * density * cells, 0.0), cells - 1.0))
+            if there == here:
+                total += theta[k + here] * s
+            elif there > here:
+                total += theta[k + here] * (low + (here + 1) * size)
+                total += theta[k + there] * (s - low - there * size)
+                for b in range(here + 1, there):
+                    total += theta[k + b] * size
+            else:
+                total += theta[k + here] * (low + here * size)
+                total += theta[k + there] * (s - low - (there + 1) * size)
+                for b in range(there + 1, here):
+                    total -= theta[k + b] * size
+            k += cells
+            potential += 1
+        damping = 0.0
+        while gated < rates and theta[gated] == direction:
+            x = (s - low) * density
+            if theta[gated + 1] != direction:
+                gate = FIRST + int(theta[gated + 1]) * width
+                x = -theta[gate + n]
+                for o in range(n):
+                    x += theta[gate + o] * q[o]
+                x /= theta[gate + n + 1] - theta[gate + n]
+            x = min(max(x * (knots - 1.0), 0.0), knots - 1.0)
+            b = min(int(x), knots - 2)
+            damping += theta[c + b] + (x - b) * (theta[c + b + 1] - theta[c + b])
+            c += knots
+            gated += 2
+        while speed < slips and theta[speed] == direction:
+            x = min(abs(rate) / theta[row + n + 2] * (speeds - 1.0), speeds - 1.0)
+            b = min(int(x), speeds - 2)
+            damping += theta[d + b] + (x - b) * (theta[d + b + 1] - theta[d + b])
+            d += speeds
+            speed += 1
+        total += damping * rate
+        while slip < maxwells and theta[slip] == direction:
+            r = theta[e]
+            if parts == 1:  # most joints' sliders
+                total += theta[e + 2] * (min(max(z[state], -r), r) + r - 2.0 * r * theta[e + 1])
+            else:
+                x = (min(max(z[state], -r), r) / r + 1.0) * 0.5 * parts
+                whole = 0.0
+                below = 0.0
+                for b in range(parts):
+                    whole += theta[e + 2 + b]
+                    below += theta[e + 2 + b] * min(max(x - b, 0.0), 1.0)
+                total += 2.0 * r / parts * (below - theta[e + 1] * whole)
+            e += stride
+            slip += 1
+            state += 1
+        while maxwell < end and theta[maxwell] == direction:
+            total += theta[m] * z[n_slips + maxwell - maxwells]
+            m += 2
+            maxwell += 1
         for o in range(n):
-            f[o] += theta[row + o] * push
-        at += speeds
-        index += 1
-    stride = 2 + parts + max(int(theta[10]) - 1, 0)
-    total = 0.0
-    for i in range(n_slips):
-        r = theta[at]
-        if parts == 1:  # most joints' sliders
-            total += theta[at + 2] * (min(max(z[i], -r), r) + r - 2.0 * r * theta[at + 1])
-        else:
-            x = (min(max(z[i], -r), r) / r + 1.0) * 0.5 * parts
-            whole = 0.0
-            below = 0.0
-            for b in range(parts):
-                whole += theta[at + 2 + b]
-                below += theta[at + 2 + b] * min(max(x - b, 0.0), 1.0)
-            total += 2.0 * r / parts * (below - theta[at + 1] * whole)
-        # neighbours along one direction push together
-        if i == n_slips - 1 or theta[index + 1] != theta[index]:
-            row = FIRST + int(theta[index]) * width
-            for o in range(n):
-                f[o] += theta[row + o] * total
-            total = 0.0
-        at += stride
-        index += 1
-    for i in range(n_maxwell):
-        row = FIRST + int(theta[index]) * width
-        for o in range(n):
-            f[o] += theta[row + o] * theta[at] * z[n_slips + i]
-        at += 2
-        index += 1
+            f[o] += theta[row + o] * total
 
 
 @kernel
@@ -174,21 +166,23 @@ def rate(t, q, v, z, theta, zdot):  # noqa: PLR0912  (one C function: a kernel c
                 rate += theta[row + o] * v[o]
         slip = 0.0
         if z[i] * rate > 0.0:
-            x = abs(z[i]) / theta[at]
+            e, r = abs(z[i]), theta[at]
             if profile == 0:
-                u = (x - 1.0 + transition) / transition
+                u = e - (1.0 - transition) * r
                 if u > 0.0:
+                    u /= transition * r
                     slip = min(u * u, 2.0)  # beyond 1 it leads back into the range
-            elif x >= 1.0:
+            elif e >= r:
                 slip = 1.0
             else:
-                g = min(int(x * profile), profile - 1)
+                x = e / r * profile
+                g = min(int(x), profile - 1)
                 left = theta[at + 1 + parts + g] if g > 0 else 0.0
                 right = theta[at + 2 + parts + g] if g < profile - 1 else 1.0
-                slip = left + (x * profile - g) * (right - left)
-            if slip > 0.0 and x < 1.0:
+                slip = left + (x - g) * (right - left)
+            if slip > 0.0 and e < r:
                 # where zero force is not at e = 0, slip begins only once the force resists: it must not give out energy
-                y = (z[i] / theta[at] + 1.0) * 0.5 * parts
+                y = (z[i] / r + 1.0) * 0.5 * parts
                 sigma = 0.0
                 for b in range(parts):
                     sigma += theta[at + 2 + b] * (min(max(y - b, 0.0), 1.0) - theta[at + 1])
