@@ -16,6 +16,7 @@ from bench.discrepancy.fitting.goodness_of_fit import consistent
 from bench.discrepancy.fitting.map_fit import fit
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Placed
+from bench.discrepancy.model.placements import placements
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.motion.prescribed import decided, held, prescribed_motion, remembering
 from bench.errors import RecordingError
@@ -78,20 +79,33 @@ def test_dry_friction_is_found_through_dwells_and_noise(rng: np.random.Generator
     assert verdict.gap.closed > 0.8
 
 
-@pytest.mark.parametrize("late", [2.0, -1.5])
-def test_delay_between_force_and_motion_is_told_beside_friction(
-    rng: np.random.Generator, late: float
-) -> None:
+def test_delay_between_force_and_motion_is_told_beside_friction(rng: np.random.Generator) -> None:
     """Of two transducers one is logged later; parameters that are known well do not take it up."""
-    verdict = diagnose(case(rng, friction=FRICTION, late=late, known=0.02)).verdict
+    verdict = diagnose(case(rng, friction=FRICTION, late=2.0, known=0.02)).verdict
     delay = next(effect for effect in verdict.named if effect.name != "coulomb_friction")
     assert len(verdict.named) == 2
-    expected = ("force_delay", "force") if late > 0.0 else ("displacement_delay", "displacement")
-    assert (delay.name, delay.channel) == expected
+    assert (delay.name, delay.channel) == ("force_delay", "force")
     told = delay.parameters["delay"]
-    assert (
-        abs(told.value - abs(late) * STEP) < 5.0 * told.std
-    )  # the noise of the motion is counted to first order
+    assert abs(told.value - 2.0 * STEP) < 5.0 * told.std  # the noise of the motion is counted to first order
+
+
+@pytest.mark.parametrize("late", [0.6, -0.6])
+def test_parts_of_a_sample_are_measured_though_friction_turns_within_one(
+    rng: np.random.Generator, late: float
+) -> None:
+    known = case(rng, friction=FRICTION, late=late, known=0.02)
+    problem = Problem(known, structure_of(known), known.identification)
+    catalogue = [effect_named(name) for name in ("coulomb_friction", "force_delay", "displacement_delay")]
+    friction, *delays = placements(known, problem.structure, catalogue)
+    late_force, late_motion = (
+        fit(problem, (friction, delay), start=np.array([0.0, 0.0, 0.0, np.log(STEP)]), iterations=30)
+        for delay in delays
+    )
+    right, wrong = (late_force, late_motion) if late > 0.0 else (late_motion, late_force)
+    assert right.chi2 < wrong.chi2
+    assert right.reduced == pytest.approx(1.0, abs=0.05)
+    # the logarithm of the delay, and 5 sigma for the same reason
+    assert abs(right.vector[-1] - np.log(abs(late) * STEP)) < 5.0 * np.sqrt(right.covariance[-1, -1])
 
 
 def test_noise_of_the_motion_is_counted_as_a_law_found_passes_it_on(rng: np.random.Generator) -> None:
