@@ -128,9 +128,12 @@ def effects_told(
     case: Case, problem: Problem, parameters: Array, settings: CheckSettings, only: Collection[str] = ()
 ) -> list[Told]:
     """How well the records tell each effect of the catalogue, or some of them, at the size that would matter."""
-    chosen = [e for e in CATALOGUE if e.site != "record" and not e.rare and e.variant == ""]
-    chosen = [e for e in chosen if not only or e.name in only]
-    placed = [p for p in placements(case, problem.structure, chosen) if not p.source]
+    known = [e for e in CATALOGUE if e.site != "record" and e.variant == ""]
+    placed = [
+        p
+        for p in placements(case, problem.structure, known)
+        if not p.source and not p.effect.rare and (not only or p.effect.name in only)
+    ]
     rest = problem.residual((), np.zeros(len(problem.nominal)))
     gram = parameters.T @ parameters + np.eye(parameters.shape[1])
     inner = np.asarray(np.linalg.inv(gram), dtype=np.float64)

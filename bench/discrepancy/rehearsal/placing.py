@@ -94,7 +94,7 @@ def _of_structure(case: Case) -> list[EffectSite]:
     structural = Problem(told, structure_of(told), told.identification)
     settings = CheckSettings()
     # what sits in a record or follows a clock of its own is nothing that a model can hold
-    chosen = [e for e in CATALOGUE if e.site != "record" and not e.rare and e.variant == ""]
+    chosen = [e for e in CATALOGUE if e.site != "record" and e.variant == ""]
 
     def site(placed) -> EffectSite:  # type: ignore[no-untyped-def]
         def at(size: float) -> NamedEffect | None:
@@ -107,7 +107,8 @@ def _of_structure(case: Case) -> list[EffectSite]:
         where = placed.place.site or placed.place.name or placed.target
         return EffectSite(placed.effect.name, where, frozenset({where, placed.place.name, placed.target}), at)
 
-    return [site(p) for p in placements(told, structural.structure, chosen) if not p.source]
+    placed = placements(told, structural.structure, chosen)
+    return [site(p) for p in placed if not p.source and not p.effect.rare]
 
 
 def _of_joints(case: Case) -> list[EffectSite]:
