@@ -5,8 +5,7 @@
     python scripts/small_things.py out/small/results out/small/answers
 
 Of verdicts that name one effect which no other comes near, and whose noise does not explain all, the likelihood of what came true is told
-over the odds: a name is right with the probability that `bench.discrepancy.judgement.doubt` gives it. Of verdicts that name several and
-leave nothing but noise, those beside the first are counted that close no more than the error of a right model, and how many are right.
+over the odds: a name is right with the probability that `bench.discrepancy.judgement.doubt` gives it.
 """
 
 from __future__ import annotations
@@ -25,7 +24,6 @@ from rich.table import Table
 
 from bench.discrepancy.blind.background_score import BY_ANOTHER_NAME
 from bench.discrepancy.judgement.doubt import like_small_things, outside
-from bench.discrepancy.settings import DEFAULT
 
 ODDS = (0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0, 1.5, 2.0)
 NEAR = 0.05
@@ -68,35 +66,11 @@ def names_in(results: Path, answers: Path) -> Iterator[Name]:
             continue
         if len(ranked) > 1 and ranked[1] > NEAR * ranked[0]:
             continue
+        true = {effect["name"] for effect in answer["effects"]}
+        for name in answer.get("background") or ():
+            true.update(BY_ANOTHER_NAME.get(name, ()))
         size, left = max((_closed(gap) for gap in result["gaps"]), key=lambda part: part[0])
-        yield Name(size, left, result["named"][0]["name"] in _true(answer))
-
-
-def further_in(results: Path, answers: Path) -> tuple[int, int]:
-    """Names beside the one that closes most, of verdicts that leave nothing but noise, which close no more than the error of a right
-    model; and how many of them are right."""
-    count = right = 0
-    for path in sorted(answers.glob("*.json")):
-        if not (results / path.name).exists():
-            continue
-        answer, result = json.loads(path.read_text()), json.loads((results / path.name).read_text())
-        if not result["complete"]:
-            continue
-        gap, true = result["gap"], _true(answer)
-        before = min(gap["before"], gap["parameters_only"])
-        for name in sorted(result["named"], key=lambda name: -name["closed"])[1:]:
-            left = 1.0 - min(max(name["closed"], 0.0), 1.0)
-            if before * math.sqrt(1.0 - left**2) < DEFAULT.likelihood.error.crude:
-                count, right = count + 1, right + (name["name"] in true)
-    return count, right
-
-
-def _true(answer: dict[str, Any]) -> set[str]:
-    """Names that are right: those of the withheld effects, and of things in the background."""
-    true = {effect["name"] for effect in answer["effects"]}
-    for name in answer.get("background") or ():
-        true.update(BY_ANOTHER_NAME.get(name, ()))
-    return true
+        yield Name(size, left, result["named"][0]["name"] in true)
 
 
 def _closed(gap: dict[str, Any]) -> tuple[float, float]:
@@ -119,18 +93,14 @@ def main() -> int:
     args = tyro.cli(Args, description=__doc__)
     names = list(names_in(args.results, args.answers))
     told = {odds: log_likelihood(names, odds) for odds in ODDS}
-    further, borne_out = further_in(args.results, args.answers)
     if args.json:
         rows = [{"odds": odds, "log_likelihood": value} for odds, value in told.items()]
-        counted = {"names": len(names), "right": sum(n.right for n in names)}
-        print(json.dumps({**counted, "further": further, "further_right": borne_out, "rows": rows}))
+        print(json.dumps({"names": len(names), "right": sum(n.right for n in names), "rows": rows}))
         return 0
     table = Table("odds", "log likelihood", title=f"{len(names)} names, {sum(n.right for n in names)} right")
     for odds, value in told.items():
         table.add_row(f"{odds:g}", f"{value:.2f}")
-    console = Console()
-    console.print(table)
-    console.print(f"further small names where noise explains the rest: {further}, {borne_out} right")
+    Console().print(table)
     return 0
 
 

@@ -1,12 +1,9 @@
-"""Which explanations count as indistinguishable, and how sure what is named is."""
+"""Which explanations count as indistinguishable."""
 
 from types import SimpleNamespace
 
 import numpy as np
-import pytest
-from planted_cases import motion_with, planted_case
 
-from bench.discrepancy.diagnosis import diagnose
 from bench.discrepancy.effects.catalogue import effect_named
 from bench.discrepancy.judgement.posterior import indistinguishable
 from bench.discrepancy.model.placement import Placed
@@ -50,16 +47,3 @@ def test_where_the_number_of_effects_cannot_be_told_whole_explanations_stand_in_
 
 def test_the_nominal_model_alone_stands_in_no_set():
     assert indistinguishable([explanation(-10.0), explanation(-11.0, "gap")]) == ()
-
-
-def test_small_effect_beside_a_large_one_is_less_sure():
-    """Noise tells that something is there; as small as it is, it may be one of the things that every rig has besides."""
-    case = planted_case(lambda f: motion_with(f, lambda x, v, z: (1e6 * x**3 + 0.3 * v * abs(v), [])), n=1500)
-    verdict = diagnose(case).verdict
-    assert verdict.complete
-    large, small = sorted(verdict.named, key=lambda effect: -effect.closed)
-    assert (large.name, small.name) == ("cubic_stiffness", "quadratic_damping")
-    assert large.probability > 0.9
-    odds = DEFAULT.judgement.coarse.besides
-    assert small.probability == pytest.approx(large.probability / (1.0 + odds), rel=0.05)
-    assert {entry.name: entry.probability for entry in verdict.ranking}[small.name] == small.probability

@@ -134,23 +134,19 @@ def _judge_unscaled(explanations: Sequence[Explanation]) -> tuple[VerdictKind, d
     return ("effect" if explained > explanations[0].settings.judgement.mostly else "unknown"), probabilities
 
 
-def marginal(
-    explanations: Sequence[Explanation], doubts: Mapping[tuple[str, str], float] | None = None
-) -> dict[tuple[str, str], float]:
-    """Probability that each (name, place) belongs to the truth, where some are doubted: less what is not theirs by such a probability."""
+def marginal(explanations: Sequence[Explanation]) -> dict[tuple[str, str], float]:
+    """Probability that each (name, place) belongs to the truth."""
     total: dict[tuple[str, str], float] = {}
     known = 1.0 - explanations[0].settings.judgement.outside if explanations[0].scaled else 1.0
     for share, explanation in zip(weights(explanations), explanations, strict=True):
         for key in dict.fromkeys((p.effect.name, p.place.name) for p in explanation.hypothesis):
             total[key] = total.get(key, 0.0) + known * float(share)
-    return {key: value * (1.0 - (doubts or {}).get(key, 0.0)) for key, value in total.items()}
+    return total
 
 
-def ranking(
-    explanations: Sequence[Explanation], doubts: Mapping[tuple[str, str], float] | None = None
-) -> tuple[Ranked, ...]:
-    """Effects by decreasing probability; for the doubts, see `marginal`."""
-    ordered = sorted(marginal(explanations, doubts).items(), key=lambda item: -item[1])
+def ranking(explanations: Sequence[Explanation]) -> tuple[Ranked, ...]:
+    """Effects by decreasing probability."""
+    ordered = sorted(marginal(explanations).items(), key=lambda item: -item[1])
     return tuple(Ranked(name, where, probability) for (name, where), probability in ordered)
 
 
@@ -185,11 +181,9 @@ def _behind(explanations: Sequence[Explanation], other: Explanation) -> float:
     return float(np.log(max(shares[0], 1e-300)) - np.log(max(shares[1], 1e-300)))
 
 
-def named(
-    explanations: Sequence[Explanation], doubts: Mapping[tuple[str, str], float] | None = None
-) -> tuple[NamedEffect, ...]:
-    """Effects of the best explanation with their parameters; for the doubts, see `marginal`."""
-    return effects_of(explanations[0], marginal(explanations, doubts))
+def named(explanations: Sequence[Explanation]) -> tuple[NamedEffect, ...]:
+    """Effects of the best explanation with their parameters."""
+    return effects_of(explanations[0], marginal(explanations))
 
 
 BY_THE_CLOCK = ("s", "Hz")

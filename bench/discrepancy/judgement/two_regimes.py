@@ -18,12 +18,10 @@ from bench.discrepancy.checks.initial_motion import with_starts_found
 from bench.discrepancy.effects.effect import Effect
 from bench.discrepancy.fitting.goodness_of_fit import names
 from bench.discrepancy.judgement import posterior as evidence
-from bench.discrepancy.judgement.coarse import without
 from bench.discrepancy.judgement.coarse_finding import (
     coarse_explanations,
     coarse_finding,
 )
-from bench.discrepancy.judgement.discrepancies import Discrepancies
 from bench.discrepancy.judgement.finding import Finding
 from bench.discrepancy.judgement.nonparametric_rival import Rival, likelier_force
 from bench.discrepancy.judgement.predictive_check import contradicted
@@ -125,7 +123,6 @@ def _sharp(case: Case, explanations: list[Explanation], how: How, rng: np.random
         doubt = _doubt(case, problem, best, rival, rng)
     if doubt:
         kind, probabilities = "unknown", evidence.outside_the_catalogue(how.settings.judgement)
-    further = _further_doubts(case, problem, best) if kind == "effect" and len(best.hypothesis) > 1 else {}
     words = evidence.plain_words(kind, explanations, doubt=doubt)
     if rival is not None and not doubt and rival.explanation.consistent:
         words += evidence.enough(rival.closure)
@@ -133,34 +130,13 @@ def _sharp(case: Case, explanations: list[Explanation], how: How, rng: np.random
         kind=kind,
         probabilities=probabilities,
         explanations=tuple(explanations),
-        named=evidence.named(explanations, further) if kind == "effect" else (),
-        ranking=evidence.ranking(explanations, further),
+        named=evidence.named(explanations) if kind == "effect" else (),
+        ranking=evidence.ranking(explanations),
         indistinguishable=evidence.indistinguishable(explanations),
         words=words,
         rival=rival,
         doubt=doubt,
     )
-
-
-def _further_doubts(case: Case, problem: Problem, best: Explanation) -> dict[tuple[str, str], float]:
-    """Probability, for effects beside the one that closes most, that they are small things which every rig has besides.
-
-    Noise that explains what several effects leave says that something is there, not that the catalogue holds it. Of those that close no
-    more of the judging records than the error of a right model, as many are small things as the odds `besides` say.
-
-    Args:
-        case: The case.
-        problem: Its problem on all degrees of freedom.
-        best: An explanation that leaves nothing but noise.
-    """
-    settings, known = best.settings, Discrepancies(case, problem)
-    sizes = [known.part(best, without(best, i))[0] for i in range(len(best.hypothesis))]
-    odds = settings.judgement.coarse.besides
-    return {
-        (placed.effect.name, placed.place.name): odds / (1.0 + odds)
-        for i, (placed, size) in enumerate(zip(best.hypothesis, sizes, strict=True))
-        if size < settings.likelihood.error.crude and i != int(np.argmax(sizes))
-    }
 
 
 def _explained(
