@@ -5,10 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 
 from bench.discrepancy.effects.catalogue import effect_named
+from bench.discrepancy.judgement.closing import as_borne_out
 from bench.discrepancy.judgement.posterior import indistinguishable
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.model.structure import Place
 from bench.discrepancy.settings import DEFAULT
+from bench.discrepancy.verdict import NamedEffect, Ranked
 
 AXIAL = Place("axial", np.eye(1), "m", "N")
 
@@ -47,3 +49,22 @@ def test_where_the_number_of_effects_cannot_be_told_whole_explanations_stand_in_
 
 def test_the_nominal_model_alone_stands_in_no_set():
     assert indistinguishable([explanation(-10.0), explanation(-11.0, "gap")]) == ()
+
+
+def test_further_effect_that_closes_nothing_for_sure_is_no_surer_than_even():
+    def effect(name, closed, *ends):
+        return NamedEffect(name, "piston", 0.99, {}, closed=closed, closed_ci95=ends)
+
+    named = [
+        effect("bouc_wen_hysteresis", 0.97, 0.96, 1.0),
+        effect("cubic_stiffness", 0.01, 0.004, 0.02),
+        effect("acceleration_hum", 0.0, 0.0, 0.0),  # of a channel that is not judged
+        effect("load_dependent_friction", -2e-4, -2e-3, 3e-3),
+    ]
+    ranking = [Ranked(e.name, e.where, e.probability) for e in reversed(named)]
+    kept, ranked = as_borne_out(named, ranking)
+    assert [e.name for e in kept] == [e.name for e in named]
+    assert [e.probability for e in kept] == [0.99, 0.99, 0.99, 0.5]
+    assert (ranked[-1].name, ranked[-1].probability) == ("load_dependent_friction", 0.5)
+    alone = as_borne_out([effect("gap", -0.1, -0.2, 0.1)], [])[0]
+    assert alone[0].probability == 0.99  # what is named at all is judged as a whole

@@ -33,7 +33,7 @@ from bench.discrepancy.effects.effect import Effect
 from bench.discrepancy.fitting.goodness_of_fit import names
 from bench.discrepancy.fitting.initial_state_fit import start_warnings
 from bench.discrepancy.judgement import posterior as evidence
-from bench.discrepancy.judgement.closing import complete, nominal_estimates, with_closed
+from bench.discrepancy.judgement.closing import as_borne_out, complete, nominal_estimates, with_closed
 from bench.discrepancy.judgement.finding import Finding
 from bench.discrepancy.judgement.run_on import rest_of_records
 from bench.discrepancy.judgement.stages import shrunk
@@ -197,8 +197,11 @@ def _diagnose(case: Case, how: How, rng: np.random.Generator, anyway: bool) -> D
         unknown=kind == "unknown",
     )
     named = with_closed(case, problem, finding.named, explanations, rng) if finding.named else ()
+    ranking = finding.ranking
+    if named and not finding.coarse:
+        named, ranking = as_borne_out(named, ranking)
     near = _nearest(case, problem, finding, closest, found, rng) if kind == "unknown" else {}
-    ranked = (*(Ranked(e.name, e.where, e.probability) for e in seen), *finding.ranking)
+    ranked = (*(Ranked(e.name, e.where, e.probability) for e in seen), *ranking)
     stated, sharp, nominal = problem.noise_stated, not finding.coarse, nominal_estimates(final)
     judged = complete(found, sharp=sharp, stated=stated, settings=how.settings.judgement)
     verdict = Verdict(

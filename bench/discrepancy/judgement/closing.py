@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -18,7 +19,9 @@ from bench.discrepancy.judgement.validation_discrepancy import part_closed
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.search.explanation import Explanation, nominal_alone
 from bench.discrepancy.settings import JudgementSettings
-from bench.discrepancy.verdict import Gap, NamedEffect, NominalEstimate
+from bench.discrepancy.verdict import Gap, NamedEffect, NominalEstimate, Ranked
+
+Probable = TypeVar("Probable", NamedEffect, Ranked)
 
 
 def with_closed(
@@ -46,6 +49,30 @@ def with_closed(
         part = part_closed(case, problem, nothing.predict, rest.predict, best.predict, rng)
         out.append(replace(effect, closed=part.share, closed_ci95=part.ci95))
     return tuple(sorted(out, key=lambda effect: -effect.closed))
+
+
+def as_borne_out(
+    named: Sequence[NamedEffect], ranking: Sequence[Ranked]
+) -> tuple[tuple[NamedEffect, ...], tuple[Ranked, ...]]:
+    """Named effects and a ranking, in which what closes nothing of the judging records for sure is no surer than even.
+
+    Noise that explains what several effects leave says that there is something behind each of them, but not that the catalogue holds it.
+    A share whose interval reaches zero does not say so either. The effect that closes most is as sure as it was, and so is what no judged
+    coordinate shows: a sensor beside them.
+
+    Args:
+        named: Effects with their shares, the one that closes most first.
+        ranking: Effects by decreasing probability.
+    """
+    first, *further = named
+    in_doubt = {(e.name, e.where) for e in further if e.closed_ci95[0] <= 0.0 != e.closed}
+
+    def even(entry: Probable) -> Probable:
+        doubted = (entry.name, entry.where) in in_doubt
+        return replace(entry, probability=min(entry.probability, 0.5)) if doubted else entry
+
+    ordered = sorted(map(even, ranking), key=lambda entry: -entry.probability)
+    return (first, *map(even, further)), tuple(ordered)
 
 
 def nominal_estimates(explanation: Explanation) -> tuple[NominalEstimate, ...]:
