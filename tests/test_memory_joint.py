@@ -94,6 +94,17 @@ def test_force_is_the_slope_of_the_stored_energy_and_the_layout_is_found_by_its_
         )
 
 
+def test_terms_out_of_the_order_of_their_directions_are_refused() -> None:
+    layout = _layout(0)
+    for kind, places in {
+        "potentials": (1, 0, 2),
+        "slips": (0, 1, 0, 1, 2),
+        "gated": ((1, 0), (0, 1), (2, 2)),
+    }.items():
+        with pytest.raises(ParameterError, match="in the order of its directions"):
+            replace(layout, **{kind: places})
+
+
 @pytest.mark.parametrize("profile", [0, 4])
 def test_drawn_weights_take_in_all_work_that_they_do_not_hold(profile: int) -> None:
     layout = _layout(profile)

@@ -35,7 +35,7 @@ class Direction(NamedTuple):
 
 @dataclass(frozen=True)
 class MemoryLayout:
-    """What a joint with memory consists of: directions, and the terms along each.
+    """What a joint with memory consists of: directions, and the terms along each, every kind in the order of the directions.
 
     Attributes:
         n_joints: Number of coordinates.
@@ -94,6 +94,12 @@ class MemoryLayout:
         if not self.directions or any(not 0 <= i < len(self.directions) for i in used):
             raise ParameterError(
                 f"terms along the directions {sorted(set(used))} came with {len(self.directions)} directions"
+            )
+        along = (self.potentials, [i for i, _ in self.gated], self.speeds, self.slips, self.maxwells)
+        if any(list(places) != sorted(places) for places in along):
+            raise ParameterError(
+                f"terms along the directions {[list(places) for places in along]} came; every kind in the order of its directions "
+                "is expected"
             )
         sizes = (self.cells - 1, self.knots - 2, self.speed_knots - 2, self.parts - 1, self.profile)
         if min(sizes) < 0 or not 1e-3 <= self.transition <= 1.0:

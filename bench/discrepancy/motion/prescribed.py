@@ -94,10 +94,9 @@ def decided(prescribed: Prescribed, *, settings: MotionSettings = DEFAULT.motion
     usual = float(np.sqrt(np.mean(error**2)))
     sure = np.abs(motion.velocity[:, 0]) > settings.doubt * usual
     sure = ndimage.binary_erosion(sure, iterations=2, border_value=1)
+    # however fast it turns: by which of two samples, the clocks of two channels do not tell
     back = np.flatnonzero(motion.velocity[1:, 0] * motion.velocity[:-1, 0] < 0.0)
-    sure[back] = sure[back + 1] = (
-        False  # however fast it turns: by which of the two, the clocks of two channels do not tell
-    )
+    sure[back] = sure[back + 1] = False
     sure[_edges(error, settings=settings)] = False
     sure[: remembering(motion.position[:, 0], settings.memory)] = False
     return np.asarray(sure, dtype=np.float64) if sure.mean() > 1.0 - settings.most_in_doubt else None
