@@ -22,7 +22,7 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
-from bench.discrepancy.blind.background_score import BY_ANOTHER_NAME
+from bench.discrepancy.blind.background_score import right_names
 from bench.discrepancy.judgement.doubt import like_small_things, outside
 
 ODDS = (0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0, 1.5, 2.0)
@@ -66,11 +66,8 @@ def names_in(results: Path, answers: Path) -> Iterator[Name]:
             continue
         if len(ranked) > 1 and ranked[1] > NEAR * ranked[0]:
             continue
-        true = {effect["name"] for effect in answer["effects"]}
-        for name in answer.get("background") or ():
-            true.update(BY_ANOTHER_NAME.get(name, ()))
         size, left = max((_closed(gap) for gap in result["gaps"]), key=lambda part: part[0])
-        yield Name(size, left, result["named"][0]["name"] in true)
+        yield Name(size, left, result["named"][0]["name"] in right_names(answer))
 
 
 def _closed(gap: dict[str, Any]) -> tuple[float, float]:

@@ -61,14 +61,14 @@ def force(t, q, v, z, theta, f):  # noqa: PLR0912, PLR0915  (one C function: a k
     speed = gated + 2 * int(theta[4])
     slip = speed + int(theta[6])
     maxwell = slip + n_slips
-    k = maxwell + n_maxwell
-    c = k + (gated - potential) * cells
-    d = c + int(theta[4]) * knots
-    e = d + (slip - speed) * speeds
+    at_cell = maxwell + n_maxwell
+    at_gate = at_cell + (gated - potential) * cells
+    at_speed = at_gate + int(theta[4]) * knots
+    at_slip = at_speed + (slip - speed) * speeds
     stride = 2 + parts + max(int(theta[10]) - 1, 0)
-    m = e + n_slips * stride
+    at_maxwell = at_slip + n_slips * stride
     share = 1.0 / cells
-    gates, rates, slips, maxwells, end = gated, speed, slip, maxwell, k
+    gates, rates, slips, maxwells, end = gated, speed, slip, maxwell, at_cell
     state = 0
     for direction in range(n_directions):
         row = FIRST + direction * width
@@ -87,18 +87,18 @@ def force(t, q, v, z, theta, f):  # noqa: PLR0912, PLR0915  (one C function: a k
             there = int(min(max((s - low) * density * cells, 0.0), cells - 1.0))
             here = int(min(max(-low * density * cells, 0.0), cells - 1.0))
             if there == here:
-                total += theta[k + here] * s
+                total += theta[at_cell + here] * s
             elif there > here:
-                total += theta[k + here] * (low + (here + 1) * size)
-                total += theta[k + there] * (s - low - there * size)
+                total += theta[at_cell + here] * (low + (here + 1) * size)
+                total += theta[at_cell + there] * (s - low - there * size)
                 for b in range(here + 1, there):
-                    total += theta[k + b] * size
+                    total += theta[at_cell + b] * size
             else:
-                total += theta[k + here] * (low + here * size)
-                total += theta[k + there] * (s - low - (there + 1) * size)
+                total += theta[at_cell + here] * (low + here * size)
+                total += theta[at_cell + there] * (s - low - (there + 1) * size)
                 for b in range(there + 1, here):
-                    total -= theta[k + b] * size
-            k += cells
+                    total -= theta[at_cell + b] * size
+            at_cell += cells
             potential += 1
         damping = 0.0
         while gated < rates and theta[gated] == direction:
@@ -111,34 +111,34 @@ def force(t, q, v, z, theta, f):  # noqa: PLR0912, PLR0915  (one C function: a k
                 x /= theta[gate + n + 1] - theta[gate + n]
             x = min(max(x * (knots - 1.0), 0.0), knots - 1.0)
             b = min(int(x), knots - 2)
-            damping += theta[c + b] + (x - b) * (theta[c + b + 1] - theta[c + b])
-            c += knots
+            damping += theta[at_gate + b] + (x - b) * (theta[at_gate + b + 1] - theta[at_gate + b])
+            at_gate += knots
             gated += 2
         while speed < slips and theta[speed] == direction:
             x = min(abs(rate) / theta[row + n + 2] * (speeds - 1.0), speeds - 1.0)
             b = min(int(x), speeds - 2)
-            damping += theta[d + b] + (x - b) * (theta[d + b + 1] - theta[d + b])
-            d += speeds
+            damping += theta[at_speed + b] + (x - b) * (theta[at_speed + b + 1] - theta[at_speed + b])
+            at_speed += speeds
             speed += 1
         total += damping * rate
         while slip < maxwells and theta[slip] == direction:
-            r = theta[e]
+            r = theta[at_slip]
             if parts == 1:  # most joints' sliders
-                total += theta[e + 2] * (min(max(z[state], -r), r) + r - 2.0 * r * theta[e + 1])
+                total += theta[at_slip + 2] * (min(max(z[state], -r), r) + r - 2.0 * r * theta[at_slip + 1])
             else:
                 x = (min(max(z[state], -r), r) / r + 1.0) * 0.5 * parts
                 whole = 0.0
                 below = 0.0
                 for b in range(parts):
-                    whole += theta[e + 2 + b]
-                    below += theta[e + 2 + b] * min(max(x - b, 0.0), 1.0)
-                total += 2.0 * r / parts * (below - theta[e + 1] * whole)
-            e += stride
+                    whole += theta[at_slip + 2 + b]
+                    below += theta[at_slip + 2 + b] * min(max(x - b, 0.0), 1.0)
+                total += 2.0 * r / parts * (below - theta[at_slip + 1] * whole)
+            at_slip += stride
             slip += 1
             state += 1
         while maxwell < end and theta[maxwell] == direction:
-            total += theta[m] * z[n_slips + maxwell - maxwells]
-            m += 2
+            total += theta[at_maxwell] * z[n_slips + maxwell - maxwells]
+            at_maxwell += 2
             maxwell += 1
         for o in range(n):
             f[o] += theta[row + o] * total

@@ -60,12 +60,12 @@ def rows(progress: Progress) -> list[Row]:
             )
             ratios = seconds["without"] / seconds["with"]
             interval = bootstrap((ratios,), np.median, rng=np.random.default_rng(0)).confidence_interval
-            size = (
+            note = (
                 f"{interval.low:.3f} to {interval.high:.3f}; "
                 f"{model.report.n_parameters} parameters, {model.report.n_states} states"
             )
             quantity = f"step rate over that without callbacks, laboratory rig, {integrator}"
             found.append(
-                Row("speed", label, quantity, float(np.median(ratios)), "1", LIMIT, least=True, note=size)
+                Row("speed", label, quantity, float(np.median(ratios)), "1", LIMIT, least=True, note=note)
             )
     return found

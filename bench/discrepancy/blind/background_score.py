@@ -150,6 +150,12 @@ def background_summary(cases: Iterable[tuple[str, Mapping[str, Any], Mapping[str
     )
 
 
+def right_names(answer: Mapping[str, Any]) -> set[str]:
+    """Names that are right of a case: those of the effects that were withheld, and of what the things of its background are."""
+    besides = (BY_ANOTHER_NAME.get(name, ()) for name in answer.get("background") or ())
+    return {effect["name"] for effect in answer["effects"]}.union(*besides)
+
+
 def background_right(answer: Mapping[str, Any], result: Mapping[str, Any]) -> bool:
     """Whether all that is scored of a case is right."""
     return all(hit for _, hit in background_scored(answer, result))
@@ -222,9 +228,7 @@ def _within_a_set(true: str, said: list[str], result: Mapping[str, Any]) -> bool
 
 def _stated(answer: Mapping[str, Any], result: Mapping[str, Any]) -> Iterable[tuple[float, bool]]:
     """Probability of every name, and whether it is right: the effect that was withheld, or what a thing of the background is."""
-    true = {effect["name"] for effect in answer["effects"]}
-    for name in answer.get("background") or ():
-        true.update(BY_ANOTHER_NAME.get(name, ()))
+    true = right_names(answer)
     for effect in result["named"]:
         yield effect["probability"], effect["name"] in true
 

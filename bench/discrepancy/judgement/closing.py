@@ -65,7 +65,7 @@ def as_borne_out(
         ranking: Effects by decreasing probability.
     """
     first, *further = named
-    in_doubt = {(e.name, e.where) for e in further if e.closed_ci95[0] <= 0.0 != e.closed}
+    in_doubt = {(e.name, e.where) for e in further if e.closed != 0.0 and e.closed_ci95[0] <= 0.0}
 
     def even(entry: Probable) -> Probable:
         doubted = (entry.name, entry.where) in in_doubt
