@@ -33,8 +33,10 @@ from robot_records.picture import draw, trace  # noqa: E402
 from robot_records.robots import ROBOTS  # noqa: E402
 
 from bench.discrepancy import read_case  # noqa: E402
+from bench.discrepancy.application.applying import Findings  # noqa: E402
 from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis, diagnose_articulated  # noqa: E402
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem  # noqa: E402
+from bench.discrepancy.replay.verification import replay_of, together  # noqa: E402
 from bench.errors import BenchError, UnknownNameError  # noqa: E402
 from bench.files import json_values, write_text  # noqa: E402
 
@@ -71,6 +73,7 @@ class Row:
         known: What is published.
         nominal: Nominal parameters as re-estimated.
         trace: What is drawn, see `robot_records.picture.trace`.
+        together: Joint to before and after while all joints are free at once; empty where the model is refused by `jointbench apply`.
         further: Joint to the RMS errors [rad, m] of free runs of records that nothing was learned from, as stated and with what is named, a
             pair for every record.
     """
@@ -88,6 +91,7 @@ class Row:
     known: str
     nominal: dict[str, float] = field(default_factory=dict)
     trace: dict[str, Any] = field(default_factory=dict)
+    together: dict[str, tuple[float, float]] = field(default_factory=dict)
     further: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
 
 
@@ -105,6 +109,7 @@ def row_of(name: str, data: Path) -> Row:
                 name, str(error), {}, {}, nan, nan, nan, {}, False, time.process_time() - began, records.known
             )
         verdict = found.verdict
+        whole = _together(found, Path(folder))
         further = _further(records, found) if records.further else {}
     labels = [f"{e.name} ({e.where})" for e in verdict.named]
     return Row(
@@ -112,8 +117,20 @@ def row_of(name: str, data: Path) -> Row:
         {label: {k: float(x.value) for k, x in e.parameters.items()} for label, e in zip(labels, verdict.named, strict=True)},
         verdict.gap.before, verdict.gap.after, verdict.gap.noise_floor,
         {g.dof: (g.before, g.after, g.noise_floor) for g in verdict.gaps}, verdict.complete, time.process_time() - began,
-        records.known, {one.name: one.value for one in verdict.nominal}, trace(found), further,
+        records.known, {one.name: one.value for one in verdict.nominal}, trace(found), whole, further,
     )  # fmt: skip
+
+
+def _together(found: ArticulatedDiagnosis, folder: Path) -> dict[str, tuple[float, float]]:
+    """All joints at once in plain MuJoCo, see `Row.together`."""
+    case, findings = read_case(folder), Findings(found.verdict.named, found.verdict.nominal)
+    path = folder / case.rig
+    try:
+        replay = replay_of(path, case, articulated=True, findings=findings)
+        runs = together(path, findings, case, replay)
+    except BenchError:
+        return {}
+    return {run.dof: (run.before, run.after) for run in runs}
 
 
 def _further(records: Records, found: ArticulatedDiagnosis) -> dict[str, list[tuple[float, float]]]:

@@ -467,6 +467,7 @@ def test_what_counts_as_right(tmp_path):
     assert score.struck_right == pytest.approx(2 / 3)
     assert score.sets_hold_truth == 1.0
     assert score.median_seconds == 2.0
+    assert set(score.seconds.values()) == {(2.0, 2.0)}
     assert score.confusion["gap"] == {"gap": 2, "cubic_stiffness + gap": 1, "failed": 1}
     assert len(score.wrong) == 10
     assert json.loads(json.dumps(score.to_json()))["shares"]["exact"]["n"] == 6

@@ -5,12 +5,12 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 import pytest
-from test_articulated import FINE, RATE, mjcf, write_case
+from test_articulated import FINE, LIMIT, RATE, mjcf, write_case
 
 from bench.discrepancy import read_case
 from bench.discrepancy.application.applying import Findings, apply
 from bench.discrepancy.replay.running import Stretch, Train, run
-from bench.discrepancy.replay.verification import replay_of, root_mean_square
+from bench.discrepancy.replay.verification import replay_of, root_mean_square, together
 from bench.discrepancy.verdict import Estimate, NamedEffect
 
 TRAIN = """<mujoco><option timestep="0.001" gravity="0 0 0"/><worldbody>
@@ -65,6 +65,22 @@ def test_windows_of_a_late_log_begin_as_late(tmp_path):
 
     delay = NamedEffect("position_delay", "elbow", 1.0, {"delay_s": Estimate(late / RATE, 1e-4, "s")})
     assert left(delay) < 0.1 * left()
+
+
+def test_joints_that_are_free_at_once_pass_on_what_one_of_them_lacks(tmp_path):
+    folder = write_case(tmp_path, mjcf(servo=False, friction=LIMIT), servo=False)
+    case, path = read_case(folder), folder / "model.xml"
+    replay = replay_of(path, case, articulated=True)
+    nothing, friction = (
+        Findings(()),
+        Findings((NamedEffect("coulomb_friction", "elbow", 1.0, {"limit": Estimate(LIMIT, 0.01, "N m")}),)),
+    )
+    runs = {run.dof: run for run in together(path, friction, case, replay)}
+    alone = replay.errors(apply(path, nothing, case=case, linear=False), ())
+    assert set(runs) == set(alone) == {"shoulder", "elbow"}
+    # beside the elbow's measured motion the shoulder feels nothing of what the elbow lacks
+    assert runs["shoulder"].before > 5.0 * root_mean_square(alone["shoulder"])
+    assert all(run.after < 0.1 * run.before for run in runs.values())
 
 
 def test_a_train_that_carries_others_begins_wound_up_by_what_it_carries(tmp_path):

@@ -111,7 +111,9 @@ class Apply:
         if worth is None:
             say("not run: give the case folder (--case) to see what it is worth in your simulator")
         else:
-            for line in filter(None, (worth.line, worth.remedy, worth.less, worth.simulator_line)):
+            for line in filter(
+                None, (worth.line, worth.remedy, worth.less, worth.simulator_line, worth.together_line)
+            ):
                 say(line)
         if self.json is not None:
             text = json.dumps(json_values(document), indent=1, ensure_ascii=False, allow_nan=False)

@@ -77,6 +77,11 @@ def tables(score: BlindScore) -> list[CaptionedTable]:
             figures.append((label, _percent(share), str(share.n), REQUIRED.get(name, "")))
         elif share is None and not (isinstance(value, float) and math.isnan(value)):
             figures.append((label, f"{value:.3g}", "", REQUIRED.get(name, "")))
+    figures += [
+        (f"time of a diagnosis, {rig}, median and 90th percentile [s]", f"{median:.3g}, {p90:.3g}", "", "")
+        for rig, (median, p90) in score.seconds.items()
+        if len(score.seconds) > 1
+    ]
     out = [
         CaptionedTable(
             f"Figures over {score.n} cases",

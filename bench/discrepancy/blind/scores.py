@@ -68,6 +68,7 @@ class BlindScore:
         p90_ratio: Its 90th percentile.
         p90_ratio_catalogued: The same over cases of catalogued effects.
         median_seconds, p90_seconds: The same of the time of a diagnosis [s].
+        seconds: Rig to that median and percentile of its cases.
         failed: Number of diagnoses that ended in an error.
         shares: The shares above with their numbers of cases and intervals.
         bands: Dimension to band to the share of right cases.
@@ -101,6 +102,7 @@ class BlindScore:
     median_seconds: float
     p90_seconds: float
     failed: int
+    seconds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     shares: Mapping[str, Share] = field(default_factory=dict)
     bands: Mapping[str, Mapping[str, Share]] = field(default_factory=dict)
     reliability: tuple[tuple[float, float, int], ...] = ()

@@ -1,23 +1,20 @@
-"""Judging records of an articulated case run in the user's own model, in the metric of its verdict: one joint free at a time.
+"""Judging records of an articulated case run in the user's own model: one joint free at a time, as its verdict judges, or all at once.
 
-The other joints follow the measured motion: they get an armature so large that nothing moves them but a servo of their own, which is fed
-position, velocity and acceleration. All of it is plain MuJoCo.
+Joints that are not free follow the measured motion (`replay.as_measured`). All of it is plain MuJoCo.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Any
+from dataclasses import dataclass, field
 
 import mujoco
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from bench.arrays import Array
 from bench.discrepancy.application.applying import Applied, Findings
 from bench.discrepancy.application.forces import values_of
-from bench.discrepancy.application.target import PREFIX, as_mujoco
+from bench.discrepancy.application.target import PREFIX
 from bench.discrepancy.articulated_effects.catalogue import CATALOGUE
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.multibody.channels import bound
@@ -28,6 +25,7 @@ from bench.discrepancy.multibody.joints import Joint
 from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.multibody.motion import JointMotion, motion_of
 from bench.discrepancy.numerics.threads import in_threads
+from bench.discrepancy.replay.as_measured import Followed, followed, held, holder
 from bench.discrepancy.replay.running import Reading, Stretch, Train, controls, coordinate_at, hook_of, run
 from bench.discrepancy.replay.wound_trains import Wound, wound_trains
 from bench.discrepancy.settings import DEFAULT
@@ -39,12 +37,8 @@ from bench.errors import ModelError
 class JointReplaySettings:
     """Numbers of `bench.discrepancy.replay.joint_replay`."""
 
-    heavy: float = 1e6
-    """Armature of a joint that follows the measured motion, over its inertia: what it still feels of the others."""
     far_off: float = 1e3
     """Error that stands for a run that diverged."""
-    servo_rate: float = 0.2
-    """Its servo's frequency [rad] a step: far below the limit of two of an explicit step."""
 
 
 SETTINGS = JointReplaySettings()
@@ -81,7 +75,12 @@ class JointReplay:
         return cls(own, model, wound_trains(own, model, findings) if findings else Wound())
 
     def readings(
-        self, applied: Applied, effects: Sequence[NamedEffect], only: Collection[str] = ()
+        self,
+        applied: Applied,
+        effects: Sequence[NamedEffect],
+        only: Collection[str] = (),
+        *,
+        together: bool = False,
     ) -> dict[str, list[Reading]]:
         """Position of every joint in every judging record, measured and simulated.
 
@@ -89,6 +88,7 @@ class JointReplay:
             applied: The model they are run with.
             effects: Logs of wrong encoders are corrected first; what is simulated is the log.
             only: Joints; all of them where none is named.
+            together: Whether they are free at once, as where the model is used, rather than each beside the measured motion of the others.
         """
         wrong = encoders_wrong(effects)
         raw = [
@@ -100,32 +100,38 @@ class JointReplay:
             for record, like in zip(self.case.validation, raw, strict=True)
         ]
         reference = applied.compiled()
+        asked = [j for j, joint in enumerate(self.model.joints) if not only or joint.name in only]
 
-        def read(j: int) -> list[Reading]:
-            joint = self.model.joints[j]
-            held = _held(applied, joint.name, reference, [tie.name for tie in self.model.ties])
-            factor = 1.0 + wrong.get(joint.name, Encoder()).gain
-            size = travel(self.case, joint, max(float(np.max(logged.noise[j])) for logged in raw))
-            out = []
+        def read(free: Sequence[int]) -> dict[str, list[Reading]]:
+            names = [self.model.joints[j].name for j in free]
+            model = held(applied, names, reference, [tie.name for tie in self.model.ties])
+            out: dict[str, list[Reading]] = {name: [] for name in names}
             for r, (record, motion, logged) in enumerate(
                 zip(self.case.validation, motions, raw, strict=True)
             ):
                 wound = {name: states[r] for name, states in self.wound.items()}
-                error = self._error(applied, held, j, record, motion, wrong, wound)
-                measured = logged.samples[j][:, 0]
-                first = judged_from(window_of(joint, record.step), len(record))
-                out.append(Reading(measured, measured - factor * error, size, first))
+                errors = self._errors(applied, model, free, record, motion, wrong, wound)
+                for j, name, error in zip(free, names, errors, strict=True):
+                    noise = max(float(np.max(one.noise[j])) for one in raw)
+                    factor, measured = 1.0 + wrong.get(name, Encoder()).gain, logged.samples[j][:, 0]
+                    size, first = travel(self.case, self.model.joints[j], noise), self._window(free, record)
+                    out[name].append(
+                        Reading(measured, measured - factor * error, size, judged_from(first, len(record)))
+                    )
             return out
 
-        asked = [j for j, joint in enumerate(self.model.joints) if not only or joint.name in only]
-        return {
-            self.model.joints[j].name: found for j, found in zip(asked, in_threads(read, asked), strict=True)
-        }
+        found = in_threads(read, [asked] if together else [[j] for j in asked])
+        return {name: read for one in found for name, read in one.items()}
 
     def errors(
-        self, applied: Applied, effects: Sequence[NamedEffect], only: Collection[str] = ()
+        self,
+        applied: Applied,
+        effects: Sequence[NamedEffect],
+        only: Collection[str] = (),
+        *,
+        together: bool = False,
     ) -> dict[str, Array]:
-        """Simulated less measured positions over the travel of the joint, by joint, all judging records in a row; `only` as above."""
+        """Simulated less measured positions over the travel of the joint, by joint, all judging records in a row; arguments as above."""
         far = SETTINGS.far_off
         return {
             name: np.clip(
@@ -135,35 +141,41 @@ class JointReplay:
                 ),
                 -far, far,
             )
-            for name, found in self.readings(applied, effects, only).items()
+            for name, found in self.readings(applied, effects, only, together=together).items()
         }  # fmt: skip
 
-    def _error(
+    def _window(self, free: Sequence[int], record: CaseRecord) -> int:
+        """Samples of a run of some joints: the least of theirs, zero where servos hold them all."""
+        return min(filter(None, (window_of(self.model.joints[j], record.step) for j in free)), default=0)
+
+    def _errors(
         self,
         applied: Applied,
         model: mujoco.MjModel,
-        j: int,
+        free: Sequence[int],
         record: CaseRecord,
         motion: JointMotion,
         wrong: Mapping[str, Encoder],
         wound: Mapping[str, Array],
-    ) -> Array:
-        """Measured less simulated positions (n,) of joint `j`."""
-        joint, step = self.model.joints[j], float(model.opt.timestep)
-        every = window_of(joint, record.step) or len(record)
+    ) -> list[Array]:
+        """Measured less simulated positions (n,) of joints that are free at once."""
+        names, step = [self.model.joints[j].name for j in free], float(model.opt.timestep)
+        every = self._window(free, record) or len(record)
         steps = int(np.ceil((len(record) - 1) * record.step / step - 1e-9)) + 1
-        late = wrong.get(joint.name, Encoder()).delay
-        columns = self._columns(record, joint.name, late)
+        # one joint alone keeps the clock of its log, several that of their inputs
+        delays = [wrong.get(name, Encoder()).delay for name in names]
+        late = delays[0] if len(free) == 1 else 0.0
+        columns = self._columns(record, names[0], late)
         control = controls(record, columns, model, steps, self.case.load_interpolation)
-        follow = _followed(self.model.joints, motion, record, model, steps, late)
+        follow = followed(self.model.joints, motion, record, model, steps, late)
         for i, other in enumerate(self.model.joints):
-            if i != j:
-                control[:, model.actuator(_holder(other.name)).id] = follow.command[:, i]
+            if i not in free:
+                control[:, model.actuator(holder(other.name)).id] = follow.command[:, i]
         firsts = list(range(0, len(record), every))
         begins = [int(np.floor(first * record.step / step + 1e-6)) for first in firsts]
-        trains = _trains(applied, model, self.model.joints, joint.name)
+        trains = _trains(applied, model, self.model.joints, names)
         windows = [
-            _wound_as(self._start(applied, model, j, motion, first, follow, b), trains, wound, first)
+            _wound_as(self._start(trains, model, motion, first, follow, b), trains, wound, first)
             for first, b in zip(firsts, begins, strict=True)
         ]
         length = int(np.ceil(min(every, len(record)) * record.step / step - 1e-9)) + 1
@@ -176,12 +188,19 @@ class JointReplay:
             rested=False,
             trains=[train for train in trains if train.joint not in wound],
         )
-        out, reading = [], self._reading(applied, model, joint.name)
-        for w, first in enumerate(firsts):
-            count = min(every, len(record) - first)
-            times = np.asarray((first + np.arange(count)) * record.step - begins[w] * step, dtype=np.float64)
-            out.append(coordinate_at(position[w] @ reading, velocity[w] @ reading, step, times))
-        return motion.samples[j][:, 0] - np.concatenate(out)
+
+        def error(j: int, name: str, delay: float) -> Array:
+            out, reading = [], self._reading(applied, model, name)
+            for w, first in enumerate(firsts):
+                count = min(every, len(record) - first)
+                times = np.asarray(
+                    (first + np.arange(count)) * record.step - begins[w] * step, dtype=np.float64
+                )
+                seen = np.maximum(times - (delay - late), 0.0)
+                out.append(coordinate_at(position[w] @ reading, velocity[w] @ reading, step, seen))
+            return np.asarray(motion.samples[j][:, 0] - np.concatenate(out), dtype=np.float64)
+
+        return [error(*one) for one in zip(free, names, delays, strict=True)]
 
     def _columns(self, record: CaseRecord, joint: str, late: float) -> dict[str, Array]:
         clock = np.arange(len(record)) * record.step
@@ -202,12 +221,11 @@ class JointReplay:
 
     def _start(
         self,
-        applied: Applied,
+        trains: Sequence[Train],
         model: mujoco.MjModel,
-        j: int,
         motion: JointMotion,
         first: int,
-        follow: _Followed,
+        follow: Followed,
         begin: int,
     ) -> Stretch:
         """State at the first sample of a window: as measured; trains wound up by what their links weigh."""
@@ -221,7 +239,6 @@ class JointReplay:
             to, moved = model.joint(tie.to), model.joint(tie.name)
             data.qpos[moved.qposadr[0]] = tie.offset + tie.ratio * data.qpos[to.qposadr[0]]
             data.qvel[moved.dofadr[0]] = tie.ratio * data.qvel[to.dofadr[0]]
-        trains = _trains(applied, model, self.model.joints, self.model.joints[j].name)
         if trains:
             mujoco.mj_forward(model, data)
         for train in trains:
@@ -229,13 +246,15 @@ class JointReplay:
         return Stretch(begin, np.array(data.qpos), np.array(data.qvel))
 
 
-def _trains(applied: Applied, model: mujoco.MjModel, joints: Sequence[Joint], free: str) -> list[Train]:
-    """Trains that move freely: of the free joint, and of those whose motor follows what its encoder measured."""
+def _trains(
+    applied: Applied, model: mujoco.MjModel, joints: Sequence[Joint], free: Collection[str]
+) -> list[Train]:
+    """Trains that move freely: of the free joints, and of those whose motor follows what its encoder measured."""
     out = []
     for joint in joints:
         train = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, f"{PREFIX}{joint.name}_train")
         on_link = joint.name in applied.outputs
-        if train >= 0 and (joint.name == free or not on_link):
+        if train >= 0 and (joint.name in free or not on_link):
             own = model.joint(joint.name)
             motor = (int(own.qposadr[0]), int(own.dofadr[0])) if on_link else None
             out.append(Train(int(model.jnt_qposadr[train]), int(model.jnt_dofadr[train]), motor, joint.name))
@@ -273,75 +292,3 @@ def encoders_wrong(effects: Sequence[NamedEffect]) -> dict[str, Encoder]:
             new, old = entry.encoder(values_of(effect)), out.get(name, Encoder())
             out[name] = Encoder(*(a + b for a, b in zip(old, new, strict=True)))
     return out
-
-
-def _holder(joint: str) -> str:
-    return f"{PREFIX}{joint}_as_measured"
-
-
-def _held(applied: Applied, free: str, reference: mujoco.MjModel, moved: Sequence[str]) -> mujoco.MjModel:
-    """The model with all joints but one, what was added to that, and those that others move, following the measured motion."""
-    spec = applied.spec.copy()
-    step = float(spec.option.timestep)
-    data = mujoco.MjData(reference)
-    mujoco.mj_forward(reference, data)
-    full = np.zeros((reference.nv, reference.nv))
-    mujoco.mj_fullM(reference, data, full)
-    rate = SETTINGS.servo_rate / step
-    followed = {j.name for j in spec.joints if not j.name.startswith(PREFIX)} - {free, *moved}
-    followed |= {
-        f"{PREFIX}{name}_train" for name in applied.outputs if name != free
-    }  # its link is what was measured
-    for joint in [j for j in spec.joints if j.name in followed]:
-        inertia = SETTINGS.heavy * float(
-            full[reference.joint(joint.name).dofadr[0], reference.joint(joint.name).dofadr[0]]
-        )
-        joint.armature = inertia
-        joint.limited = mujoco.mjtLimited.mjLIMITED_FALSE
-        holder: Any = spec.add_actuator(
-            name=_holder(joint.name), target=joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINT
-        )
-        as_mujoco(holder)
-        holder.gaintype, holder.biastype = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_AFFINE
-        holder.gainprm[0] = inertia * rate**2
-        holder.biasprm[:3] = (0.0, -inertia * rate**2, -2.0 * inertia * rate)
-    model = replace(applied, spec=spec).compiled()
-    _reweigh(model, reference)
-    return model
-
-
-def _reweigh(model: mujoco.MjModel, reference: mujoco.MjModel) -> None:
-    """Give constraints the inertia that they have in the model as it is."""
-    for i in range(reference.njnt):
-        at = int(model.joint(reference.joint(i).name).dofadr[0])
-        model.dof_invweight0[at] = reference.dof_invweight0[reference.jnt_dofadr[i]]
-    for i in range(reference.ntendon):
-        model.tendon_invweight0[model.tendon(reference.tendon(i).name).id] = reference.tendon_invweight0[i]
-
-
-@dataclass(frozen=True, eq=False)
-class _Followed:
-    """Positions, velocities (steps, n_joints) at the steps, and the commands of the servos that follow them."""
-
-    position: Array
-    velocity: Array
-    command: Array
-
-
-def _followed(
-    joints: Sequence[Joint],
-    motion: JointMotion,
-    record: CaseRecord,
-    model: mujoco.MjModel,
-    steps: int,
-    late: float,
-) -> _Followed:
-    """The measured motion as a servo of `_held` takes it; of a joint whose log is late, the others as late."""
-    step = float(model.opt.timestep)
-    clock = np.arange(len(record)) * record.step
-    times = np.clip(np.arange(steps) * step - late, 0.0, clock[-1])
-    q, v, a = (
-        CubicSpline(clock, part)(times) for part in (motion.position, motion.velocity, motion.acceleration)
-    )
-    rate = SETTINGS.servo_rate / step
-    return _Followed(q, v, q + 2.0 * v / rate + a / rate**2)

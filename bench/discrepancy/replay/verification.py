@@ -73,6 +73,21 @@ class Figure:
 
 
 @dataclass(frozen=True)
+class WholeRun:
+    """One joint while all are free at once, as where the model is used.
+
+    Attributes:
+        dof: The joint.
+        before: NRMSE with the model as it came, from the measured states of windows where no servo holds it.
+        after: With the corrected one.
+    """
+
+    dof: str
+    before: float
+    after: float
+
+
+@dataclass(frozen=True)
 class Verification:
     """Before and after in the user's simulator.
 
@@ -85,6 +100,7 @@ class Verification:
         remedy: What setting would do, in words; empty where nothing is short.
         less: Why less is left than the diagnosis says, in words; empty where it is not.
         better: Figures of what is short and of the worst with that setting.
+        together: The same of all joints free at once; empty where there is one, or none.
     """
 
     step: float
@@ -94,6 +110,7 @@ class Verification:
     remedy: str = ""
     less: str = ""
     better: tuple[Figure, ...] = ()
+    together: tuple[WholeRun, ...] = ()
 
     @property
     def worst(self) -> Figure:
@@ -118,6 +135,14 @@ class Verification:
         place = f" ({f.dof})" if f.dof else ""
         return f"in your simulator{place}: {f.before:.3g} -> {f.after:.3g} (diagnosis: {f.diagnosis:.3g})"
 
+    @property
+    def together_line(self) -> str:
+        """What the worst joint does while all are free at once, in one line; empty where nothing was run so."""
+        if not self.together:
+            return ""
+        worst = max(self.together, key=lambda f: f.before)
+        return f"all joints free at once ({worst.dof}): {worst.before:.3g} -> {worst.after:.3g}"
+
     def to_json(self) -> dict[str, Any]:
         """As JSON values."""
         return {
@@ -129,6 +154,7 @@ class Verification:
             "remedy": self.remedy,
             "less": self.less,
             "better": [vars(f) for f in self.better],
+            "together": [vars(f) for f in self.together],
         }
 
 
@@ -200,7 +226,7 @@ def verify(
         raise ModelError(
             f"the verdict judges {', '.join(g.dof or 'one coordinate' for g in gaps)}, the case something else; give the verdict's case"
         )
-    out = Verification(step, INTEGRATORS[integrator], found)
+    out = Verification(step, INTEGRATORS[integrator], found, together=together(path, findings, case, replay))
     converged = RunOptions(step / settings.converged, mujoco.mjtIntegrator.mjINT_RK4, hard=True)
     widest = out.worst.dof
     own = root_mean_square(before[widest] - errors(nothing, converged, (widest,))[widest])
@@ -209,6 +235,26 @@ def verify(
         return _remedied(out, figures, settings, progress)
     least = min(found, key=lambda f: f.short)
     return out if least.short >= -settings.short else replace(out, less=_less(out, least, figures, settings))
+
+
+def together(path: str | Path, findings: Findings, case: Case, replay: Replay) -> tuple[WholeRun, ...]:
+    """Every joint before and after while all of them are free at once; empty where a case has one joint, or none.
+
+    Args:
+        path: The user's model.
+        findings: What was found.
+        case: The case of the verdict.
+        replay: Its judging records.
+    """
+    if not isinstance(replay, JointReplay) or len(replay.model.joints) < 2:
+        return ()
+    before, after = (
+        replay.errors(apply(path, what, case=case, linear=False), what.effects, together=True)
+        for what in (Findings(()), findings)
+    )
+    return tuple(
+        WholeRun(dof, root_mean_square(error), root_mean_square(after[dof])) for dof, error in before.items()
+    )
 
 
 _Figures = Callable[[RunOptions, Collection[str]], tuple[Figure, ...]]
