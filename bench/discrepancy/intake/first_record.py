@@ -14,6 +14,7 @@ from bench.discrepancy.replay.verification import (
     is_articulated,
     replay_of,
     root_mean_square,
+    together,
 )
 from bench.discrepancy.verdict import InSimulator, Verdict
 from bench.errors import BenchError
@@ -53,5 +54,6 @@ def in_simulator(verdict: Verdict, case: Case) -> InSimulator | None:
     if not figures:
         return None
     option = specification(path).option
-    told = Verification(float(option.timestep), INTEGRATORS[option.integrator], figures)
-    return InSimulator(told.line, record)
+    whole = together(path, findings, case, replay)
+    told = Verification(float(option.timestep), INTEGRATORS[option.integrator], figures, together=whole)
+    return InSimulator("; ".join(filter(None, (told.line, told.together_line))), record)
