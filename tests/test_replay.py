@@ -59,12 +59,13 @@ def test_windows_of_a_late_log_begin_as_late(tmp_path):
     case, path = read_case(folder), folder / "model.xml"
     replay = replay_of(path, case, articulated=True)
 
-    def left(*effects):
+    def left(*effects, **how):
         applied = apply(path, Findings(effects), case=case, linear=False)
-        return root_mean_square(replay.errors(applied, effects)["elbow"])
+        return root_mean_square(replay.errors(applied, effects, **how)["elbow"])
 
     delay = NamedEffect("position_delay", "elbow", 1.0, {"delay_s": Estimate(late / RATE, 1e-4, "s")})
     assert left(delay) < 0.1 * left()
+    assert left(delay, together=True) < 0.1 * left(together=True)
 
 
 def test_joints_that_are_free_at_once_pass_on_what_one_of_them_lacks(tmp_path):
