@@ -108,7 +108,7 @@ def row_of(name: str, data: Path) -> Row:
             return Row(
                 name, str(error), {}, {}, nan, nan, nan, {}, False, time.process_time() - began, records.known
             )
-        verdict = found.verdict
+        seconds, verdict = time.process_time() - began, found.verdict
         whole = _together(found, Path(folder))
         further = _further(records, found) if records.further else {}
     labels = [f"{e.name} ({e.where})" for e in verdict.named]
@@ -116,7 +116,7 @@ def row_of(name: str, data: Path) -> Row:
         name, verdict.verdict, dict(zip(labels, (float(e.closed) for e in verdict.named), strict=True)),
         {label: {k: float(x.value) for k, x in e.parameters.items()} for label, e in zip(labels, verdict.named, strict=True)},
         verdict.gap.before, verdict.gap.after, verdict.gap.noise_floor,
-        {g.dof: (g.before, g.after, g.noise_floor) for g in verdict.gaps}, verdict.complete, time.process_time() - began,
+        {g.dof: (g.before, g.after, g.noise_floor) for g in verdict.gaps}, verdict.complete, seconds,
         records.known, {one.name: one.value for one in verdict.nominal}, trace(found), whole, further,
     )  # fmt: skip
 

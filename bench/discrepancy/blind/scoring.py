@@ -156,9 +156,11 @@ def summary(scored: Sequence[Scored]) -> BlindScore:
     shares, hits, verdicts = _shares(scored), _effects_claimed(scored), _verdicts_claimed(scored)
     ratios = [r for s in scored for r in _ratios(s.result)]
     catalogued = [r for s in scored if s.kind in {"single", "double"} for r in _ratios(s.result)]
-    timed = [(s.bands["rig"], float(s.result["seconds"])) for s in every if s.result.get("seconds")]
-    seconds = {rig: [t for of, t in timed if of == rig] for rig, _ in sorted(timed)}
-    every_second = [t for _, t in timed]
+    by_rig: dict[str, list[float]] = defaultdict(list)
+    for s in every:
+        if s.result.get("seconds"):
+            by_rig[s.bands["rig"]].append(float(s.result["seconds"]))
+    seconds = [one for of in by_rig.values() for one in of]
     f1 = [f for s in scored for f in region_scores(s.result, s.answer)]
     return BlindScore(
         n=len(every),
@@ -170,9 +172,9 @@ def summary(scored: Sequence[Scored]) -> BlindScore:
         median_ratio=_quantile(ratios, 0.5),
         p90_ratio=_quantile(ratios, 0.9),
         p90_ratio_catalogued=_quantile(catalogued, 0.9),
-        median_seconds=_quantile(every_second, 0.5),
-        p90_seconds=_quantile(every_second, 0.9),
-        seconds={rig: (_quantile(of, 0.5), _quantile(of, 0.9)) for rig, of in seconds.items()},
+        median_seconds=_quantile(seconds, 0.5),
+        p90_seconds=_quantile(seconds, 0.9),
+        seconds={rig: (_quantile(of, 0.5), _quantile(of, 0.9)) for rig, of in sorted(by_rig.items())},
         failed=sum(s.verdict == "failed" for s in every),
         shares=shares,
         bands=by_band((s.bands, s.right) for s in every),
