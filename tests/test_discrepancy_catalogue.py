@@ -27,7 +27,7 @@ from scipy.signal import lsim
 from bench.discrepancy import diagnose
 from bench.discrepancy.case.channel_noise import quantisation_step, raised_noise
 from bench.discrepancy.effects.catalogue import CATALOGUE, effect_named
-from bench.discrepancy.effects.channel_operators import low_pass
+from bench.discrepancy.effects.channel_operators import high_pass, low_pass, second_order_low_pass
 from bench.discrepancy.effects.effect import unit_of
 from bench.laws import LAWS
 from bench.laws.evaluate import evaluate
@@ -149,13 +149,47 @@ SENSORS = (
     "displacement_crosstalk", "acceleration_crosstalk", "displacement_polarity", "acceleration_polarity",
     "displacement_gain_error", "acceleration_gain_error", "displacement_bias", "acceleration_bias",
     "displacement_clipping", "acceleration_clipping", "displacement_delay", "acceleration_delay",
-    "displacement_lag", "acceleration_lag",
+    "displacement_lag", "acceleration_lag", "displacement_filter", "acceleration_filter",
+    "displacement_high_pass", "acceleration_high_pass",
 )  # fmt: skip
 
 
 def filtered(x, tau):
     """What an amplifier with a low-pass of first order makes of a signal."""
     return lsim(([1.0], [tau, 1.0]), x, np.arange(len(x)) / SAMPLE_RATE)[1]
+
+
+def through(numerator, denominator, x):
+    """What an analogue filter makes of a signal."""
+    return lsim((numerator, denominator), x, np.arange(len(x)) / SAMPLE_RATE)[1]
+
+
+def butterworth(x, cutoff):
+    """What an anti-alias filter makes of a signal."""
+    w = 2.0 * np.pi * cutoff
+    return through([w * w], [1.0, math.sqrt(2.0) * w, w * w], x)
+
+
+def ac_coupled(x, corner):
+    """What a coupling that lets no constant through makes of a signal."""
+    return through([1.0, 0.0], [1.0, 2.0 * np.pi * corner], x)
+
+
+@pytest.mark.parametrize(
+    ("filter_of", "analogue", "frequency"),
+    [(second_order_low_pass, butterworth, 40.0), (high_pass, ac_coupled, 0.8)],
+)
+def test_filters_of_a_sensor_are_exact_between_samples(filter_of, analogue, frequency):
+    x = np.sin(np.arange(500) / 7.0)
+    np.testing.assert_allclose(
+        filter_of(x, np.array([frequency]), 1.0 / SAMPLE_RATE), analogue(x, frequency), atol=1e-9
+    )
+
+
+def test_a_low_pass_of_second_order_starts_at_the_first_sample_and_a_high_pass_lets_no_constant_through():
+    x, step = np.full(4000, 3.0), 1.0 / SAMPLE_RATE
+    np.testing.assert_allclose(second_order_low_pass(x, np.array([40.0]), step), x)
+    assert abs(high_pass(x, np.array([5.0]), step)[-1]) < 1e-6
 
 
 def test_a_low_pass_starts_at_the_first_sample_and_is_exact_between_samples():
@@ -171,6 +205,10 @@ def test_a_low_pass_starts_at_the_first_sample_and_is_exact_between_samples():
     [
         ("displacement_lag", lambda x, a, f: (filtered(x, 0.01), a)),
         ("acceleration_lag", lambda x, a, f: (x, filtered(a, 0.01))),
+        ("displacement_filter", lambda x, a, f: (butterworth(x, 8.0), a)),
+        ("acceleration_filter", lambda x, a, f: (x, butterworth(a, 30.0))),
+        ("displacement_high_pass", lambda x, a, f: (ac_coupled(x, 0.5), a)),
+        ("acceleration_high_pass", lambda x, a, f: (x, ac_coupled(a, 0.5))),
         ("displacement_crosstalk", lambda x, a, f: (x + 5e-5 * f, a)),
         ("acceleration_crosstalk", lambda x, a, f: (x, a + 0.05 * f)),
         ("displacement_polarity", lambda x, a, f: (-x, a)),

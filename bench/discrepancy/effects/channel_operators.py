@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
+from scipy.signal import cont2discrete, lfilter
 
 Samples = NDArray[np.float64]
 
@@ -97,6 +97,27 @@ def low_pass(x: Samples, values: Samples, step: float) -> Samples:
     mean = -np.expm1(-ratio) / ratio  # of the kept part over a sample
     rise = lfilter([1.0 - mean, mean - kept], [1.0, -kept], x - x[0])
     return np.asarray(x[0] + rise)
+
+
+def high_pass(x: Samples, values: Samples, step: float) -> Samples:
+    """Return the reading of `x` through an analogue high-pass of first order with a corner f [Hz].
+
+    Exact for lines between samples: ``y' + w y = x'``, w = 2 pi f. AC coupling, or a charge amplifier, has forgotten what was before the
+    record but for its mean, zero of a motion about rest.
+    """
+    time_constant = np.array([1.0 / (2.0 * np.pi * values[0])])
+    return x - low_pass(np.concatenate([[0.0], x]), time_constant, step)[1:]
+
+
+def second_order_low_pass(x: Samples, values: Samples, step: float) -> Samples:
+    """Return the reading of `x` through an analogue Butterworth low-pass of second order with a cutoff f [Hz].
+
+    Exact for lines between samples: ``y'' + sqrt(2) w y' + w^2 y = w^2 x``, w = 2 pi f. It begins at the first sample, as a sensor that
+    was on before the record.
+    """
+    w = 2.0 * np.pi * values[0]
+    b, a, _ = cont2discrete(([w * w], [1.0, np.sqrt(2.0) * w, w * w]), step, method="foh")
+    return np.asarray(x[0] + lfilter(np.ravel(b), a, x - x[0]))
 
 
 def gain(x: Samples, values: Samples, step: float) -> Samples:

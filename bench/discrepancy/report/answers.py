@@ -88,7 +88,9 @@ def _where(verdict: Verdict) -> str:
     gathered = [p for p in verdict.locations if p.kind != "simulator"]
     places = _distinct(_places(effect) for effect in verdict.named)
     if not places and verdict.verdict == "none":
-        return "nowhere: noise explains the residuals once the parameters are re-estimated"
+        if verdict.complete:
+            return "nowhere: noise explains the residuals once the parameters are re-estimated"
+        return "nowhere that an effect of the catalogue would close once the parameters are re-estimated"
     if not places:
         main = [p for i, p in enumerate(gathered) if i == 0 or p.share >= SETTINGS.worth_naming]
         places = [_place(p) for p in main[: SETTINGS.places]]
@@ -111,7 +113,7 @@ def _which(verdict: Verdict) -> str:
         parts = [f"{name}: {estimates(e)}" if e.parameters else name for name, e in told]
         own = "; ".join((*parts, *([f"and of less weight {by_name(others)}"] if others else [])))
     elif verdict.verdict == "none":
-        own = "no effect is missing"
+        own = "no effect is missing" if verdict.complete else "no effect of the catalogue"
     else:
         nearest = "; ".join(f"{e.name} ({_places(e)})" if _places(e) else e.name for e in verdict.nearest)
         own = f"none of the catalogue; nearest: {nearest}" if nearest else "none of the catalogue"
