@@ -11,13 +11,14 @@ from bench.cli import main
 from bench.discrepancy import Case, CaseChannel, NominalParameter, record_from_arrays
 from bench.discrepancy.effects.catalogue import effect_named
 from bench.discrepancy.fitting.map_fit import fit
+from bench.discrepancy.likelihood.model_error import crude_error
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.next_test import discriminating_excitation
 from bench.discrepancy.next_test.belief import Belief
 from bench.discrepancy.next_test.discriminating_excitation import propose, separate, told_apart
-from bench.discrepancy.next_test.distinguishability import why_none
+from bench.discrepancy.next_test.distinguishability import sensitivity, why_none
 from bench.discrepancy.next_test.feasible_excitations import limits_of, shapes
 from bench.discrepancy.next_test.outlook import outlook
 from bench.discrepancy.report.model_update import element_code, element_toml
@@ -111,6 +112,17 @@ def test_the_reason_names_what_the_motion_reached():
         problem, [Placed(effect_named("gap"), problem.structure.places[0])]
     )
     assert told_apart(problem, "unknown", (effect_named("gap"),)) == {}
+
+
+def test_what_would_have_shown_is_told_against_the_error_of_the_model_where_that_is_larger_than_noise():
+    problem, _, _ = small_motion()
+    error = crude_error(problem.case, problem.structure, problem.settings.likelihood.error)
+    rough = Problem(
+        problem.case, problem.structure, problem.case.identification, error=error, settings=problem.settings
+    )
+    cubic = [Placed(effect_named("cubic_stiffness"), problem.structure.places[0])]
+    (sharp,), (told,) = sensitivity(problem, cubic).values(), sensitivity(rough, cubic).values()
+    assert told > sharp
 
 
 @pytest.mark.slow

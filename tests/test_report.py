@@ -119,6 +119,9 @@ def test_answers_of_unknown_and_of_none_name_no_effect():
     none = replace(VERDICT, verdict="none", named=(), locations=())
     assert dict(answers(none))["Which"] == "no effect is missing"
     assert not any(step.command for step in next_steps(none, FILES))
+    rough = dict(answers(replace(none, complete=False)))
+    assert rough["Which"] == "no effect of the catalogue"
+    assert "noise" not in rough["Where"]
 
 
 def test_a_diverged_run_in_the_users_simulator_is_not_drawn():
