@@ -208,6 +208,13 @@ CAPABILITIES: Sequence[Capability] = (
         data=".",
     ),
     Capability(
+        "laboratory_like",
+        "Devices, sensors and structures that no law of the bench describes, graded likewise",
+        words("python scripts/measured_cases.py lab_ --cases out/laboratory-like --json"),
+        graded,
+        before=(words("python scripts/laboratory_like.py out/laboratory-like"),),
+    ),
+    Capability(
         "check",
         "Faults planted into records of a slide, and what `jointbench check` says",
         words("python scripts/planted_faults.py --faults 200 --sound 100"),

@@ -17,6 +17,7 @@ from bench.discrepancy.effects.friction_and_hysteresis import FRICTION_AND_HYSTE
 from bench.discrepancy.effects.rare_forces import RARER
 from bench.discrepancy.effects.read_off import read_off
 from bench.discrepancy.effects.sensor_actuator import CHANNELS
+from bench.discrepancy.effects.sensor_filters import SENSOR_FILTERS
 from bench.errors import UnknownNameError
 from bench.laws.constant_force import CONSTANT_FORCE
 from bench.laws.coupling import CROSS_STIFFNESS, GAP_COUPLING
@@ -227,7 +228,7 @@ FORCES: tuple[Effect, ...] = (
     ),
 )
 
-CATALOGUE: tuple[Effect, ...] = FORCES + RARER + CHANNELS + read_off(FORCES + RARER)
+CATALOGUE: tuple[Effect, ...] = FORCES + RARER + CHANNELS + SENSOR_FILTERS + read_off(FORCES + RARER)
 """Every effect: forces first, then parameters, actuators and sensors, and those that are read off the records."""
 
 

@@ -40,12 +40,6 @@ def _time(name: str, *grid: float) -> FreeParameter:
     return FreeParameter(name, mean=math.log(0.008), std=1.0, bounds=bounds, grid=log_grid(*grid), unit="s")
 
 
-def _corner(name: str, usual: float, *grid: float) -> FreeParameter:
-    """A corner frequency of a filter [Hz]: the usual one within a factor of seven with 95 %."""
-    bounds = (math.log(1e-3), math.log(1e5))
-    return FreeParameter(name, mean=math.log(usual), std=1.0, bounds=bounds, grid=log_grid(*grid), unit="Hz")
-
-
 def _beyond_jitter(values: Values, scales: Scales) -> bool:
     """Whether a delay, or a lag, which delays what is slow by its time constant, is more than the times of any log are uncertain by."""
     return bool(values[0] >= SETTINGS.jitter * scales.step)
@@ -78,36 +72,6 @@ def _sensor_lag(channel: str, quantity: str, symbol: str) -> Effect:
         tells=_beyond_jitter,
         quantity=quantity,
         log_prior=-1.0,
-    )
-
-
-def _sensor_filter(channel: str, quantity: str, symbol: str) -> Effect:
-    return Effect(
-        f"{channel}_filter",
-        "sensor",
-        "sensor",
-        (_corner("cutoff", 30.0, 10.0, 30.0, 100.0),),
-        f"y'' + sqrt(2) w y' + w^2 y = w^2 {symbol}, y what is read, w = 2 pi cutoff",
-        signal=signals.second_order_low_pass,
-        # it delays what is slow by sqrt(2) / w
-        tells=lambda values, scales: (
-            values[0] * SETTINGS.jitter * scales.step <= math.sqrt(2.0) / (2.0 * math.pi)
-        ),
-        quantity=quantity,
-        log_prior=EFFECT_SETTINGS.rare,
-    )
-
-
-def _sensor_high_pass(channel: str, quantity: str, symbol: str) -> Effect:
-    return Effect(
-        f"{channel}_high_pass",
-        "sensor",
-        "sensor",
-        (_corner("corner", 0.5, 0.1, 0.5, 2.0),),
-        f"y' + w y = {symbol}', y what is read, w = 2 pi corner",
-        signal=signals.high_pass,
-        quantity=quantity,
-        log_prior=EFFECT_SETTINGS.rare,
     )
 
 
@@ -310,11 +274,6 @@ CHANNELS: tuple[Effect, ...] = (
             log_prior=EFFECT_SETTINGS.rare,
         )
         for channel, quantity, symbol in POSITION_AND_ACCELERATION
-    ),
-    *(
-        made(channel, quantity, symbol)
-        for made in (_sensor_filter, _sensor_high_pass)
-        for channel, quantity, symbol in (*POSITION_AND_ACCELERATION, ("velocity", "velocity", "v"))
     ),
     *(
         Effect(

@@ -1,0 +1,1 @@
+"""Cases as a laboratory has them: how they are integrated and written down."""

@@ -1,0 +1,277 @@
+"""Write cases as a laboratory has them, whose physics is no law of the bench, and what is right of each.
+
+    python scripts/laboratory_like.py out/laboratory-like
+    python scripts/measured_cases.py lab_ --cases out/laboratory-like
+
+Rigs are integrated here, apart from the bench (Runge-Kutta of fourth order, ten steps a sample). What is missing is a device
+(a magnetorheological damper, a wire rope, rubber), a sensor as it was set up (AC coupled, filtered, clipped, bent), or what no
+catalogue holds (another mode, a floor that shakes). Names that end in ``_unstated`` say nothing of their noise.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import tyro
+from scipy.signal import butter, sosfilt
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT / "scripts"))
+
+from laboratory.made import STEP, Made, Rate, case_of, march, multisine, noisy, unstated  # noqa: E402
+
+from bench.arrays import Array  # noqa: E402
+from bench.discrepancy.blind.protocol import write_case  # noqa: E402
+from bench.files import write_text  # noqa: E402
+
+
+@dataclass(frozen=True)
+class Args:
+    """Write the cases and their acceptance.json."""
+
+    out: tyro.conf.Positional[Path]
+    """Folder for the cases."""
+    seed: int = 20261129
+    """Of the motions, the loads and the noise."""
+
+
+def prescribed(
+    rng: np.random.Generator,
+    name: str,
+    force: Callable[[Array, Array], Array],
+    parameters: Mapping[str, tuple[float, float, str]],
+    right: Sequence[Sequence[str]],
+    also: Sequence[str],
+    why: str,
+) -> Made:
+    """A component on a machine that prescribes a sine of 1 Hz and two random motions; its force from displacement and velocity."""
+    time = STEP * np.arange(round(12.0 / STEP))
+    sine = 0.01 * np.sin(2.0 * np.pi * time) * np.minimum(time, 1.0)
+    motions = [sine, *(multisine(rng, 12.0, 0.3, 4.0, 0.006) for _ in range(2))]
+    x = np.array(motions).T
+    pushed = force(x, np.gradient(x, STEP, axis=0))
+    noise = {"displacement": 2e-6, "force": 2.0}
+    records = [
+        noisy(rng, {"displacement": x[:, i], "force": pushed[:, i]}, noise) for i in range(len(motions))
+    ]
+    channels = {"displacement": ("m", "prescribed", 2e-6), "force": ("N", "response", 2.0)}
+    return Made(f"lab_{name}", case_of(name, "damper", parameters, channels, records), right, also, why)
+
+
+def hidden(rate: Rate, x: Array, v: Array) -> Array:
+    """A hidden state (n_samples, n_records), from zero, along a motion."""
+    return march(rate, np.zeros((1, x.shape[1])), np.stack([x, v], axis=1))[:, 0]
+
+
+def magnetorheological(x: Array, v: Array) -> Array:
+    """A Bouc-Wen element beside a dashpot and an accumulator, both behind a second dashpot (Spencer and others, 1997)."""
+    alpha, c0, c1, k0, k1 = 33e3, 3300.0, 50e3, 1100.0, 500.0
+
+    def behind(z: Array, y: Array, u: Array) -> Array:
+        return (alpha * z + c0 * u[1] + k0 * (u[0] - y)) / (c0 + c1)
+
+    def rate(s: Array, u: Array) -> Array:
+        slow = behind(s[0], s[1], u)
+        w = u[1] - slow
+        return np.array([-1.5e6 * (np.abs(w) * s[0] * np.abs(s[0]) + w * s[0] ** 2) + 90.0 * w, slow])
+
+    inputs = np.stack([x, v], axis=1)
+    states = march(rate, np.zeros((2, x.shape[1])), inputs)
+    slow = np.array([behind(s[0], s[1], u) for s, u in zip(states, inputs, strict=True)])
+    return c1 * slow + k1 * x
+
+
+def wire_rope(x: Array, v: Array) -> Array:
+    """Hysteresis that is stronger under tension, beside a spring that stiffens and is not symmetric."""
+    z = hidden(lambda s, u: u[1:2] - 96.0 * np.abs(u[1:2]) * s - 30.0 * u[1:2] * np.abs(s), x, v)
+    return 2.2e4 * x + 6e5 * x**2 + 4e7 * x**3 + 5.5e4 * z * np.exp(25.0 * x)
+
+
+def rubber(x: Array, v: Array) -> Array:
+    """Three relaxations and an element that yields, beside a spring."""
+    total = 1.5e5 * x
+    for stiffness, tau in ((3e4, 0.01), (3e4, 0.05), (3e4, 0.25)):
+        total = total + stiffness * hidden(lambda s, u, tau=tau: u[1:2] - s / tau, x, v)
+    return total + 8e4 * hidden(lambda s, u: u[1:2] - 500.0 * np.abs(u[1:2]) * s, x, v)
+
+
+def components(rng: np.random.Generator) -> list[Made]:
+    """Components on a machine."""
+    memory = (["bouc_wen_hysteresis"], ["presliding_friction"])
+    return [
+        prescribed(
+            rng, "mr_damper", magnetorheological, {"damping": (6000.0, 600.0, "N s/m"), "stiffness": (500.0, 100.0, "N/m")},
+            memory, ("damping_error", "stiffness_error"), "a magnetorheological damper; its nominal model is a dashpot",
+        ),
+        prescribed(
+            rng, "wire_rope", wire_rope, {"stiffness": (3e4, 3e3, "N/m"), "damping": (100.0, 50.0, "N s/m")},
+            (["bouc_wen_hysteresis", "quadratic_stiffness"],), ("cubic_stiffness", "stiffness_error"),
+            "a wire rope isolator: hysteresis, stronger under tension, and a spring that is not symmetric",
+        ),
+        prescribed(
+            rng, "rubber", rubber, {"stiffness": (2e5, 2e4, "N/m"), "damping": (800.0, 400.0, "N s/m")},
+            [["viscoelastic_relaxation", *group] for group in memory], ("stiffness_error", "damping_error"),
+            "a rubber mount: relaxations and an element that yields",
+        ),
+        prescribed(
+            rng, "hydraulic_damper", lambda x, v: 6e4 * v * np.abs(v) + 120.0 + 800.0 * x,
+            {"damping": (3000.0, 1000.0, "N s/m"), "stiffness": (800.0, 80.0, "N/m")},
+            (["quadratic_damping", "force_offset"],), ("damping_error",),
+            "an orifice with a gas spring; its nominal model has an equivalent dashpot",
+        ),
+    ]  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Oscillator:
+    """A carriage on a spring, of 2 kg, 2.4 N s/m and 1800 N/m, under three random loads, and what else is there.
+
+    Attributes:
+        name: Of the case.
+        right, also, why: See `Made`.
+        extra: A further force [N] from displacement, velocity and a hidden state.
+        memory: Rate of the hidden state from velocity and itself; none where None.
+        shaking: RMS of a force [N] that nobody measures, from 3 to 6 Hz.
+        softer: Stiffness [N/m] that is gone in each record.
+        read: What the sensors make of displacement and acceleration.
+        channels: Responses that were recorded.
+        mass: Stated mass [kg].
+    """
+
+    name: str
+    right: Sequence[Sequence[str]]
+    why: str
+    also: Sequence[str] = ()
+    extra: Callable[[Array, Array, Array], Array] = lambda x, v, z: np.zeros_like(x)
+    memory: Callable[[Array, Array], Array] | None = None
+    shaking: float = 0.0
+    softer: Sequence[float] = (0.0, 0.0, 0.0)
+    read: Callable[[Array, Array], tuple[Array, Array]] = lambda x, a: (x, a)
+    channels: Sequence[str] = ("displacement", "acceleration")
+    mass: float = 2.0
+
+    def made(self, rng: np.random.Generator) -> Made:
+        """Its case."""
+        loads = np.array([multisine(rng, 20.0, 0.5, 15.0, rms) for rms in (6.0, 12.0, 9.0)]).T
+        shaking = self.shaking * np.array([multisine(rng, 20.0, 3.0, 6.0, 1.0) for _ in range(3)]).T
+        inputs = np.stack([loads + shaking, np.broadcast_to(np.array(self.softer), loads.shape)], axis=1)
+
+        def rate(s: Array, u: Array) -> Array:
+            x, v, z = s
+            force = u[0] - 2.4 * v - (1800.0 - u[1]) * x - self.extra(x, v, z)
+            return np.array([v, force / 2.0, self.memory(v, z) if self.memory else np.zeros_like(z)])
+
+        states = march(rate, np.zeros((3, 3)), inputs)
+        acceleration = np.array([rate(s, u)[1] for s, u in zip(states, inputs, strict=True)])
+        return self._case(rng, loads, *self.read(states[:, 0], acceleration))
+
+    def _case(self, rng: np.random.Generator, load: Array, x: Array, a: Array) -> Made:
+        noise = {"force": 0.02, "displacement": 1e-5, "acceleration": 0.03}
+        units = {"force": "N", "displacement": "m", "acceleration": "m/s^2"}
+        records = [
+            noisy(rng, {"force": load[:, i], "displacement": x[:, i], "acceleration": a[:, i]}, noise)
+            for i in range(3)
+        ]
+        channels = {
+            c: (units[c], "measured" if c == "force" else "response", noise[c])
+            for c in ("force", *self.channels)
+        }
+        stated = {
+            "mass": (self.mass, 0.02, "kg"), "damping": (2.4, 0.5, "N s/m"), "stiffness": (1800.0, 40.0, "N/m"),
+        }  # fmt: skip
+        case = case_of(self.name, "sdof", stated, channels, records)
+        return Made(f"lab_{self.name}", case, self.right, self.also, self.why)
+
+
+def filtered(x: Array, kind: str, order: int, frequency: float) -> Array:
+    """What a filter makes of records (n_samples, n_records)."""
+    return np.asarray(sosfilt(butter(order, frequency, kind, fs=1.0 / STEP, output="sos"), x, axis=0))
+
+
+SENSOR = "nothing is missing from the mechanics: "
+OSCILLATORS = (
+    Oscillator(
+        "ac_coupled", [["acceleration_high_pass"]], SENSOR + "the accelerometer is AC coupled",
+        read=lambda x, a: (x, filtered(a, "high", 1, 0.8)), channels=("acceleration",),
+    ),
+    Oscillator(
+        "anti_alias_filter", [["displacement_filter"], ["displacement_delay"], ["displacement_lag"]],
+        SENSOR + "the displacement went through a low-pass of second order", read=lambda x, a: (filtered(x, "low", 2, 40.0), a),
+    ),
+    Oscillator(
+        "clipped", [["acceleration_clipping"]], SENSOR + "the accelerometer clips", read=lambda x, a: (x, np.clip(a, -12.0, 12.0)),
+    ),
+    Oscillator(
+        "bent_laser", [["displacement_gain_error"]], SENSOR + "the gain of the displacement grows with it",
+        read=lambda x, a: (x + 3.0 * x * np.abs(x), a),
+    ),
+    Oscillator("mass_of_load_cell", [["mass_error"]], "a mass beyond the load cell was left out", mass=1.6),
+    Oscillator(
+        "lap_joint", [["bouc_wen_hysteresis"]], "a joint that slips", extra=lambda x, v, z: 900.0 * z,
+        memory=lambda v, z: v - np.abs(v) * z * np.abs(z) ** 0.3 / 0.002**1.3,
+    ),
+    Oscillator(
+        "bearing_and_drag", [["coulomb_friction", "quadratic_damping"]], "a bearing's dry friction and drag of the air",
+        also=("damping_error", "power_law_damping"), extra=lambda x, v, z: 0.9 * np.tanh(v / 2e-4) + 0.25 * v * np.abs(v),
+    ),
+    Oscillator(
+        "warm_spring", [["record_dependent_stiffness"]], "a spring that is softer in each record", softer=(0.0, 60.0, 120.0),
+    ),
+    Oscillator("floor", [["timed_force"]], "a floor that shakes from 3 to 6 Hz: a force that no motion tells", shaking=2.5),
+)  # fmt: skip
+
+
+def second_mode(
+    rng: np.random.Generator, name: str, cubic: float, right: Sequence[Sequence[str]], why: str
+) -> Made:
+    """A quarter of the mass stands on a spring of its own; the nominal model has one mode."""
+    loads = np.array([multisine(rng, 20.0, 0.5, 40.0, rms) for rms in (8.0, 16.0, 12.0)]).T
+
+    def rate(s: Array, u: Array) -> Array:
+        between = 9000.0 * (s[2] - s[0]) + (s[3] - s[1])
+        force = u[0] - 1800.0 * s[0] - 2.4 * s[1] - cubic * s[0] ** 3
+        return np.array([s[1], (force + between) / 1.5, s[3], -between / 0.5])
+
+    inputs = loads[:, None, :]
+    states = march(rate, np.zeros((4, 3)), inputs)
+    a = np.array([rate(s, u)[1] for s, u in zip(states, inputs, strict=True)])
+    return Oscillator(name, right, why)._case(rng, loads, states[:, 0], a)
+
+
+def cases(seed: int) -> list[Made]:
+    """All cases."""
+    rng = np.random.default_rng(seed)
+    stated = [
+        *components(rng),
+        *(oscillator.made(rng) for oscillator in OSCILLATORS),
+        second_mode(rng, "second_mode", 0.0, [["base_flexibility"]], "a second mode near 25 Hz"),
+        second_mode(
+            rng, "second_mode_and_cubic", 2e6, [["cubic_stiffness"]], "a cubic spring, and a second mode near 25 Hz"
+        ),
+    ]  # fmt: skip
+    return [made for one in stated for made in (one, unstated(one))]
+
+
+def main() -> int:
+    """Write the cases, and last what is right of them."""
+    args = tyro.cli(Args, description=__doc__)
+    found = cases(args.seed)
+    for made in found:
+        write_case(made.case, args.out / made.name)
+    entries = {
+        made.name: {"right": [list(group) for group in made.right], "also": list(made.also), "why": made.why}
+        for made in found
+    }
+    told = {"written": "with the cases, from what was simulated", "cases": entries}
+    write_text(args.out / "acceptance.json", json.dumps(told, indent=1) + "\n")
+    print(f"{len(found)} cases in {args.out}")
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
