@@ -23,11 +23,12 @@ from scipy.signal import butter, sosfilt
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "scripts"))
 
-from laboratory.made import STEP, Made, Rate, case_of, march, multisine, noisy, unstated  # noqa: E402
+from laboratory.made import STEP, Made, Rate, case_of, march, noisy, unstated  # noqa: E402
 
 from bench.arrays import Array  # noqa: E402
 from bench.discrepancy.blind.protocol import write_case  # noqa: E402
 from bench.files import write_text  # noqa: E402
+from bench.signals import Multisine  # noqa: E402
 
 
 @dataclass(frozen=True)
@@ -38,6 +39,14 @@ class Args:
     """Folder for the cases."""
     seed: int = 20261129
     """Of the motions, the loads and the noise."""
+
+
+def multisines(
+    rng: np.random.Generator, seconds: float, low: float, high: float, rms: Sequence[float]
+) -> Array:
+    """Random motions or loads (n_samples, n_records) with all frequencies of a band."""
+    n = round(seconds / STEP)
+    return np.array([Multisine(band=(low, high), rms=one).sample(n, 1.0 / STEP, rng) for one in rms]).T
 
 
 def prescribed(
@@ -52,13 +61,10 @@ def prescribed(
     """A component on a machine that prescribes a sine of 1 Hz and two random motions; its force from displacement and velocity."""
     time = STEP * np.arange(round(12.0 / STEP))
     sine = 0.01 * np.sin(2.0 * np.pi * time) * np.minimum(time, 1.0)
-    motions = [sine, *(multisine(rng, 12.0, 0.3, 4.0, 0.006) for _ in range(2))]
-    x = np.array(motions).T
+    x = np.column_stack([sine, multisines(rng, 12.0, 0.3, 4.0, (0.006, 0.006))])
     pushed = force(x, np.gradient(x, STEP, axis=0))
     noise = {"displacement": 2e-6, "force": 2.0}
-    records = [
-        noisy(rng, {"displacement": x[:, i], "force": pushed[:, i]}, noise) for i in range(len(motions))
-    ]
+    records = [noisy(rng, {"displacement": x[:, i], "force": pushed[:, i]}, noise) for i in range(x.shape[1])]
     channels = {"displacement": ("m", "prescribed", 2e-6), "force": ("N", "response", 2.0)}
     return Made(f"lab_{name}", case_of(name, "damper", parameters, channels, records), right, also, why)
 
@@ -157,8 +163,8 @@ class Oscillator:
 
     def made(self, rng: np.random.Generator) -> Made:
         """Its case."""
-        loads = np.array([multisine(rng, 20.0, 0.5, 15.0, rms) for rms in (6.0, 12.0, 9.0)]).T
-        shaking = self.shaking * np.array([multisine(rng, 20.0, 3.0, 6.0, 1.0) for _ in range(3)]).T
+        loads = multisines(rng, 20.0, 0.5, 15.0, (6.0, 12.0, 9.0))
+        shaking = self.shaking * multisines(rng, 20.0, 3.0, 6.0, (1.0, 1.0, 1.0))
         inputs = np.stack([loads + shaking, np.broadcast_to(np.array(self.softer), loads.shape)], axis=1)
 
         def rate(s: Array, u: Array) -> Array:
@@ -168,9 +174,10 @@ class Oscillator:
 
         states = march(rate, np.zeros((3, 3)), inputs)
         acceleration = np.array([rate(s, u)[1] for s, u in zip(states, inputs, strict=True)])
-        return self._case(rng, loads, *self.read(states[:, 0], acceleration))
+        return self.recorded(rng, loads, *self.read(states[:, 0], acceleration))
 
-    def _case(self, rng: np.random.Generator, load: Array, x: Array, a: Array) -> Made:
+    def recorded(self, rng: np.random.Generator, load: Array, x: Array, a: Array) -> Made:
+        """The case of loads, displacements and accelerations (n_samples, 3)."""
         noise = {"force": 0.02, "displacement": 1e-5, "acceleration": 0.03}
         units = {"force": "N", "displacement": "m", "acceleration": "m/s^2"}
         records = [
@@ -230,7 +237,7 @@ def second_mode(
     rng: np.random.Generator, name: str, cubic: float, right: Sequence[Sequence[str]], why: str
 ) -> Made:
     """A quarter of the mass stands on a spring of its own; the nominal model has one mode."""
-    loads = np.array([multisine(rng, 20.0, 0.5, 40.0, rms) for rms in (8.0, 16.0, 12.0)]).T
+    loads = multisines(rng, 20.0, 0.5, 40.0, (8.0, 16.0, 12.0))
 
     def rate(s: Array, u: Array) -> Array:
         between = 9000.0 * (s[2] - s[0]) + (s[3] - s[1])
@@ -240,7 +247,7 @@ def second_mode(
     inputs = loads[:, None, :]
     states = march(rate, np.zeros((4, 3)), inputs)
     a = np.array([rate(s, u)[1] for s, u in zip(states, inputs, strict=True)])
-    return Oscillator(name, right, why)._case(rng, loads, states[:, 0], a)
+    return Oscillator(name, right, why).recorded(rng, loads, states[:, 0], a)
 
 
 def cases(seed: int) -> list[Made]:

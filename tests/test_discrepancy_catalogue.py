@@ -154,14 +154,14 @@ SENSORS = (
 )  # fmt: skip
 
 
-def filtered(x, tau):
-    """What an amplifier with a low-pass of first order makes of a signal."""
-    return lsim(([1.0], [tau, 1.0]), x, np.arange(len(x)) / SAMPLE_RATE)[1]
-
-
 def through(numerator, denominator, x):
     """What an analogue filter makes of a signal."""
     return lsim((numerator, denominator), x, np.arange(len(x)) / SAMPLE_RATE)[1]
+
+
+def filtered(x, tau):
+    """What an amplifier with a low-pass of first order makes of a signal."""
+    return through([1.0], [tau, 1.0], x)
 
 
 def butterworth(x, cutoff):

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
+from scipy.signal import lsim
 
 from bench.discrepancy.case.case import Case, CaseChannel, NominalParameter, record_from_arrays
 from bench.discrepancy.checks.data_quality import notes
@@ -234,3 +235,20 @@ def test_hysteresis_that_a_weak_spring_does_not_measure_is_found(rng: np.random.
     stiffness = effect.parameters["A"]
     assert abs(stiffness.value - A) < 3.0 * stiffness.std < A
     assert verdict.gap.closed > 0.9
+
+
+def test_a_charge_amplifier_that_forgets_what_is_slow_is_a_filter_of_the_force():
+    clean = case(np.random.default_rng(11))
+
+    def forgetful(record):
+        force = lsim(([1.0, 0.0], [1.0, 2.0 * np.pi * 0.5]), record.values["force"], TIME)[1]
+        return record_from_arrays(record.name, TIME, dict(record.values) | {"force": force})
+
+    amplified = replace(
+        clean,
+        identification=tuple(map(forgetful, clean.identification)),
+        validation=tuple(map(forgetful, clean.validation)),
+    )
+    verdict = diagnose(amplified).verdict
+    assert [e.name for e in verdict.named] == ["force_high_pass"]
+    assert verdict.named[0].parameters["corner"].value == pytest.approx(0.5, rel=0.02)

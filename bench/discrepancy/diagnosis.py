@@ -302,9 +302,12 @@ def _next_excitation(problem: Problem, finding: Finding, catalogue: Sequence[Eff
     """The next test: one that separates rivals, or what the records could have shown where they call for nothing."""
     if finding.kind == "effect":
         return separate(problem, finding.explanations)
-    weighed = finding.explanations[0].parts
     # by the error of the model where that, not noise, decides
-    return told_apart(weighed[0][0] if len(weighed) == 1 else problem, finding.kind, catalogue)
+    error = finding.explanations[0].parts[0][0].error
+    weighed = Problem(
+        problem.case, problem.structure, problem.case.identification, error=error, settings=problem.settings
+    )
+    return told_apart(weighed, finding.kind, catalogue)
 
 
 def _somewhere(problem: Problem, found: Sequence[_Placed]) -> tuple[_Placed, ...]:

@@ -57,15 +57,6 @@ def march(rate: Rate, start: Array, inputs: Array) -> Array:
     return np.array(out)
 
 
-def multisine(rng: np.random.Generator, seconds: float, low: float, high: float, rms: float) -> Array:
-    """Random phases at all frequencies of a band."""
-    n = round(seconds / STEP)
-    frequency = np.fft.rfftfreq(n, STEP)
-    inside = (frequency >= low) & (frequency <= high)
-    signal = np.fft.irfft(np.where(inside, np.exp(2j * np.pi * rng.random(len(frequency))), 0.0), n)
-    return np.asarray(rms * signal / np.std(signal))
-
-
 def noisy(rng: np.random.Generator, record: Mapping[str, Array], noise: Mapping[str, float]) -> Signals:
     """A record with white noise on each channel."""
     return {name: x + noise[name] * rng.standard_normal(len(x)) for name, x in record.items()}
