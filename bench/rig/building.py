@@ -158,9 +158,12 @@ def _is_marked(name: str, numbers: Sequence[float] | NDArray[np.float64]) -> boo
     return name.startswith(native.PREFIX) or (len(numbers) > 0 and numbers[0] == native.MAGIC)
 
 
-def _leave_out_drawings(spec: mujoco.MjSpec) -> None:
-    """Have MuJoCo keep what moves, collides or is sensed, and nothing that is only drawn: half the time of a step."""
-    spec.compiler.discardvisual = True
+def _leave_out_drawings(spec: mujoco.MjSpec, shapes: bool) -> None:
+    """Have MuJoCo keep what moves, collides or is sensed, and nothing that is only drawn: half the time of a step.
+
+    With `shapes`, geoms that are only drawn stay.
+    """
+    spec.compiler.discardvisual = not shapes
     spec.compiler.fusestatic = True
     sensed = {int(kind) for sensor in spec.sensors for kind in (sensor.objtype, sensor.reftype)}
     seen = [] if int(mujoco.mjtObj.mjOBJ_CAMERA) in sensed else list(spec.cameras)
@@ -192,17 +195,17 @@ def _add_state_actuator(spec: mujoco.MjSpec, element: Element, index: int) -> No
     actuator.biastype = mujoco.mjtBias.mjBIAS_NONE
 
 
-def build(rig: Buildable, *, drawings: bool = False) -> Built:
-    """Compile a rig, with or without what is only drawn; see `Rig.built` for what it raises."""
+def build(rig: Buildable, *, drawings: bool = False, shapes: bool = False) -> Built:
+    """Compile a rig, with or without what is only drawn, or the drawn geoms of it; see `Rig.built` for what it raises."""
     native.install()
     with native.quiet():
-        return _build(rig, drawings)
+        return _build(rig, drawings, shapes)
 
 
-def _build(rig: Buildable, drawings: bool) -> Built:
+def _build(rig: Buildable, drawings: bool, shapes: bool) -> Built:
     spec = specify(rig)
     if not drawings:
-        _leave_out_drawings(spec)
+        _leave_out_drawings(spec, shapes)
     own = tuple(actuator.name for actuator in spec.actuators if not actuator.name.startswith(native.PREFIX))
     for name in own:
         if not name:

@@ -122,6 +122,11 @@ class Rig:
         return self.built.model
 
     @cached_property
+    def shaped(self) -> mujoco.MjModel:
+        """The model that is simulated, with all shapes of its bodies, drawn ones as well."""
+        return build(self, shapes=True).model
+
+    @cached_property
     def scene(self) -> mujoco.MjModel:
         """The compiled model with everything that is drawn: same joints, actuators and sensors as `model`."""
         return build(self, drawings=True).model

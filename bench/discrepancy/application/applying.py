@@ -13,6 +13,7 @@ from scipy.optimize import least_squares
 
 from bench import native
 from bench.arrays import Array
+from bench.discrepancy.application.contact import surface_contact
 from bench.discrepancy.application.drives import DRIVES, LOGGED, logged
 from bench.discrepancy.application.forces import FORCES, element
 from bench.discrepancy.application.friction import FRICTION, harden
@@ -209,8 +210,8 @@ def apply(
     return Applied(spec, tuple(changes), target.outputs, str(Path(path).parent))
 
 
-AT_JOINTS = FORCES | FRICTION
-"""Effects at joints that have a form in MuJoCo other than a law."""
+AT_JOINTS = FORCES | FRICTION | {"surface_contact": surface_contact}
+"""Effects at joints, and at the end of a tree of bodies, that have a form in MuJoCo other than a law."""
 
 
 def _ordered(effects: Sequence[NamedEffect]) -> list[NamedEffect]:

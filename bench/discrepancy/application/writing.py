@@ -22,6 +22,7 @@ TAGS = {
     "joint": ("joint", "hinge", "slide"),
     "fixed": ("fixed", "spatial"),
     "body": ("body",),
+    "geom": ("geom",),
     "actuator": ("general", "motor", "position", "velocity", "damper", "intvelocity", "dcmotor", "cylinder"),
 }
 """Tags that an element of a kind may have in MJCF."""

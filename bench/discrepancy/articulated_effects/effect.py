@@ -17,7 +17,7 @@ from bench.discrepancy.articulated_effects.slot_setters import SlotValues, train
 from bench.discrepancy.effects.effect import FreeParameter
 from bench.discrepancy.multibody.encoders import Encoder
 
-JointSite = Literal["joint", "pair", "body", "actuator", "sensor"]
+JointSite = Literal["joint", "pair", "body", "end", "actuator", "sensor"]
 
 NUMBERS = frozenset({
     "mass_error", "com_error", "armature_error", "damping_error", "force_gain_error", "servo_gain_error", "position_gain_error",

@@ -17,20 +17,25 @@ class PlacedOnJoint:
         effect: The effect.
         where: Name of the joint, body or actuator.
         joint: Index of the joint whose runs it changes, or whose encoder it is; of the joint that carries the body.
-        scales: Scales of that joint.
-        partner: Index of the neighbour that shares it, if any.
+        scales: Scales of that joint; of an end of the tree those of its lowest point, against gravity and in forces.
+        others: Indices of further joints whose runs it changes: the neighbour that shares it, or all that raise the end of the tree.
     """
 
     effect: ArticulatedEffect
     where: str
     joint: int
     scales: JointScales
-    partner: int | None = None
+    others: tuple[int, ...] = ()
 
     @property
     def joints(self) -> tuple[int, ...]:
-        """The joint, and the neighbour that shares it."""
-        return (self.joint,) if self.partner is None else (self.joint, self.partner)
+        """The joint, and the others."""
+        return (self.joint, *self.others)
+
+    @property
+    def partner(self) -> int | None:
+        """Index of the neighbour that shares a drive with the joint, if any."""
+        return self.others[0] if self.effect.site == "pair" else None
 
     @property
     def key(self) -> tuple[str, str]:
@@ -58,6 +63,9 @@ def placed_eta(placed: PlacedOnJoint, values: Mapping[str, float]) -> list[float
 
 
 def _zero(placed: PlacedOnJoint, parameter: str) -> float:
-    """Where the joint's zero is from what a parameter of an effect is counted from."""
-    at_stop = placed.effect.name == "one_sided_stop" and parameter == "position"
-    return placed.scales.middle if at_stop else 0.0
+    """Where the zero of a coordinate is from what a parameter of an effect is counted from."""
+    from_middle = (placed.effect.name, parameter) in (
+        ("one_sided_stop", "position"),
+        ("surface_contact", "height"),
+    )
+    return placed.scales.middle if from_middle else 0.0

@@ -187,6 +187,37 @@ MECHANICAL_EFFECTS: tuple[ArticulatedEffect, ...] = (
         stop,
     ),
     ArticulatedEffect(
+        "surface_contact",
+        "stop",
+        "end",
+        (
+            FreeParameter(
+                "stiffness",
+                "force/position",
+                mean=math.log(100.0),
+                std=1.5,
+                bounds=(0.0, 10.0),
+                grid=log_grid(30.0, 300.0),
+                unit="N/m",
+            ),
+            FreeParameter(
+                "height",
+                "position",
+                signed=True,
+                mean=0.1,
+                std=0.2,
+                bounds=(-0.1, 1.0),
+                grid=(0.02, 0.05, 0.1, 0.2, 0.4),
+                unit="m",
+            ),
+            FreeParameter(
+                "damping", "force/velocity", mean=math.log(0.3), std=1.5, bounds=(-9.0, 5.0), unit="N s/m"
+            ),
+        ),
+        "f = k d + c d' upwards on the lowest point of the body, d = h - z > 0: a table, the floor",
+        written(SURFACE="stiffness", SURFACE_AT="height", SURFACE_DAMPING="damping"),
+    ),
+    ArticulatedEffect(
         "armature_error",
         "inertia",
         "joint",

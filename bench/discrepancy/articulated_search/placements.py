@@ -6,6 +6,7 @@ from collections.abc import Collection, Sequence
 
 from bench.discrepancy.articulated_effects.effect import ArticulatedEffect, JointScales
 from bench.discrepancy.articulated_effects.hypothesis import PlacedOnJoint
+from bench.discrepancy.articulated_search.ends import ends_within
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 
 AND = "+"
@@ -13,7 +14,7 @@ AND = "+"
 
 
 def placements(problem: ArticulatedProblem, catalogue: Sequence[ArticulatedEffect]) -> list[PlacedOnJoint]:
-    """Every effect at every place where it may sit: joints, neighbours, bodies, drives, encoders."""
+    """Every effect at every place where it may sit: joints, neighbours, bodies, ends of the tree, drives, encoders."""
     out = list[PlacedOnJoint]()
     for j in range(len(problem.joints)):
         scales = problem.scales(j)
@@ -33,17 +34,24 @@ def _at(
         return []
     if effect.needs == "velocity" and problem.records[0].joints[j].n_measured < 2:
         return []
+    if effect.site == "end":
+        return [
+            PlacedOnJoint(effect, end.body, j, end.scales, end.others)
+            for end in ends_within(problem)
+            if end.joint == j
+        ]
     if effect.site == "pair":
         near = problem.model.neighbours(j)
         later = [i for i, other in enumerate(problem.joints) if i > j and other.name in near]
         return [
-            PlacedOnJoint(effect, f"{joint.name}{AND}{problem.joints[i].name}", j, scales, i) for i in later
+            PlacedOnJoint(effect, f"{joint.name}{AND}{problem.joints[i].name}", j, scales, (i,))
+            for i in later
         ]
     names = {"joint": joint.name, "sensor": joint.name, "actuator": drive.name, "body": joint.body}
     return [PlacedOnJoint(effect, names[effect.site], j, scales)]
 
 
 def apart(candidates: Sequence[PlacedOnJoint], taken: Collection[PlacedOnJoint]) -> list[PlacedOnJoint]:
-    """Candidates without the pairs of joints one of which shares a drive already."""
-    shared = {j for placed in taken if placed.partner is not None for j in placed.joints}
-    return [c for c in candidates if c.partner is None or not shared & set(c.joints)]
+    """Candidates without those that several joints share and one of them shares already: a drive with a neighbour, a surface."""
+    shared = {(placed.effect.site, j) for placed in taken if placed.others for j in placed.joints}
+    return [c for c in candidates if not c.others or not shared & {(c.effect.site, j) for j in c.joints}]

@@ -132,7 +132,9 @@ class ArticulatedProblem:
         out: set[int] = set()
         for placed in hypothesis:
             site = placed.effect.site
-            out |= set(placed.joints if site in ("joint", "pair", "actuator") else range(len(self.joints)))
+            out |= set(
+                placed.joints if site in ("joint", "pair", "end", "actuator") else range(len(self.joints))
+            )
         return tuple(sorted(out))
 
     def entries(self, j: int, hypothesis: JointHypothesis) -> NDArray[np.int64]:
@@ -242,6 +244,7 @@ class ArticulatedProblem:
         return predict(
             p, (inertia, bias, record.slope, record.reference, record.load(bias, inertia)), record.servo_command, record.step,
             record.n_sub, (record.position, record.velocity), gain, starts, every, self.beside(j, hypothesis, record),
+            self.touch(j, hypothesis, record),
         )  # fmt: skip
 
     def beside(self, j: int, hypothesis: JointHypothesis, record: JointRecord) -> Array | None:
@@ -250,6 +253,13 @@ class ArticulatedProblem:
             if placed.partner is not None and j in placed.joints:
                 (other,) = (i for i in placed.joints if i != j)
                 return record.beside[self.joints[other].name]
+        return None
+
+    def touch(self, j: int, hypothesis: JointHypothesis, record: JointRecord) -> Array | None:
+        """Lowest point (3, n_steps) of the end of the tree that touches a surface in a hypothesis, as joint `j` moves it, if it does."""
+        for placed in hypothesis:
+            if placed.effect.site == "end" and j in placed.joints:
+                return record.touches[placed.where]
         return None
 
     def coefficients(

@@ -19,7 +19,7 @@ from bench.discrepancy.articulated_search.fitting import ArticulatedFit, free_en
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.numerics.threads import in_threads
 
-UNSCALED = ("actuator_saturation", "backlash", "joint_compliance", "one_sided_stop")
+UNSCALED = ("actuator_saturation", "backlash", "joint_compliance", "one_sided_stop", "surface_contact")
 """Effects whose first parameter is no amplitude of the force."""
 
 

@@ -15,6 +15,7 @@ import math
 from enum import IntEnum
 
 import numba
+import numpy as np
 
 
 class Slot(IntEnum):
@@ -67,9 +68,14 @@ class Slot(IntEnum):
     WEIGHED_RISE = 44  # part of what the link weighs at rest, and of the square of the actuator's torque
     DRIVEN_SQUARE = 45
     STALL = 46
+    SURFACE = 47  # a level surface that the end of the tree touches: stiffness, height, damping
+    SURFACE_AT = 48
+    SURFACE_DAMPING = 49
 
 
 SLOTS = len(Slot)
+NOWHERE = np.zeros((3, 0))
+"""The end of a tree that touches nothing, see `surface_force`."""
 
 
 inlined = numba.njit(cache=True, error_model="numpy", nogil=True, inline="always")
@@ -126,6 +132,22 @@ def stop_force(p, x, w):
     if p[22] > 0.0 and depth > 0.0:
         return -p[25] * max(p[22] * depth + p[24] * p[25] * w, 0.0)
     return 0.0
+
+
+@inlined
+def surface_force(p, touch, k, away, v):
+    """Force on the joint of a level surface that the end of the tree touches, and the stiffness and damping that it has; it only pushes.
+
+    `touch` is the lowest point of the end along the motion as measured, `away` what the joint is off that motion, `v` its velocity.
+    """
+    if p[47] <= 0.0:
+        return 0.0, 0.0, 0.0
+    lever = touch[1, k]
+    depth = p[48] - touch[0, k] - lever * away
+    force = p[47] * depth - p[49] * (touch[2, k] + lever * v)
+    if depth <= 0.0 or force <= 0.0:
+        return 0.0, 0.0, 0.0
+    return force * lever, p[47] * lever * lever, p[49] * lever * lever
 
 
 @inlined

@@ -78,6 +78,7 @@ class JointRecord:
         centres: The same (3, 2, n_steps) for a metre of its centre of mass along each axis.
         weights: Body to the change of bias (n_steps,) by its weight.
         beside: Neighbour in the tree to its velocity (n_steps,).
+        touches: End of the tree to its lowest point (3, n_steps): its height, by how much the joint raises it, and how fast the others do.
         sample: Time between samples [s].
         encoder: What is wrong with its encoder.
         weight: (n, n_measured) of the innovations, one where every reading tells something new, see `weight_of_readings`.
@@ -105,6 +106,7 @@ class JointRecord:
     centres: Mapping[str, Array]
     weights: Mapping[str, Array]
     beside: Mapping[str, Array]
+    touches: Mapping[str, Array]
     sample: float
     weight: Array
     encoder: Encoder = TRUE

@@ -28,6 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.discrepancy.multibody.joint_forces import (
+    NOWHERE,
     actuator_force,
     beyond_band,
     bristle_force_of,
@@ -38,6 +39,7 @@ from bench.discrepancy.multibody.joint_forces import (
     inlined,
     pair_friction,
     stop_force,
+    surface_force,
 )
 
 
@@ -101,7 +103,7 @@ def _set_anew(p, bias, start, on_link):
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
 def run(
-    p, mass, bias, slope, reference, load, beside, u, step, n_sub, y, v_measured, gain, starts, every, out, states
+    p, mass, bias, slope, reference, load, beside, touch, u, step, n_sub, y, v_measured, gain, starts, every, out, states
 ):  # fmt: skip
     """Predict the encoder of one joint sample by sample.
 
@@ -113,6 +115,7 @@ def run(
         reference: (n_steps,) the position at which it was taken.
         load: (n_steps,) torque that the gear carries (magnitude), for friction that grows with it.
         beside: (n_steps,) velocity of the neighbour with which the joint shares a drive.
+        touch: (3, n_steps) end of the tree that touches a surface, see `JointRecord.touches`; read where there is a surface alone.
         u: (n_steps,) input.
         step: Length of a step [s].
         n_sub: Steps a sample.
@@ -154,8 +157,7 @@ def run(
             ql += dq
             vl += dv
         for k in range(i * n_sub, (i + 1) * n_sub):
-            q += 0.5 * step * v
-            ql += 0.5 * step * vl
+            q, ql = q + 0.5 * step * v, ql + 0.5 * step * vl
             command = delayed_input(u, k, p[28] / step)
             target = command + (target - command) * half  # in the middle of the step, where the force acts
             force, implicit, lagged = actuator_force(p, target, q, v, lagged, keep)
@@ -164,20 +166,22 @@ def run(
             own = force + bristle_force + cogging_force(p, q)
             x, w = (ql, vl) if train else (q, v)
             weight = bias[k] + slope[k] * (x - reference[k])
-            rest = p[15] - weight - p[7] * (x - p[8]) + stop_force(p, x, w)
+            pushed, stiff, damped = surface_force(p, touch, k, x - reference[k], w)
+            rest = p[15] - weight - p[7] * (x - p[8]) + stop_force(p, x, w) + pushed
             limit = friction_limit(p, v, load[k], force, weight)
-            before, inertia, damping = v, (mass[k] + p[9]) / step, p[6] + p[14] * abs(v)
+            # what a surface is stiff and damps by counts as the inertia with which no step is too long for it
+            heavy = mass[k] + (0.25 * stiff * step + 0.5 * damped) * step
+            before, inertia, damping = v, (heavy + p[9]) / step, p[6] + p[14] * abs(v)
             if train:
                 rest -= pair_friction(p, w + p[42] * beside[k])
-                v, vl = _kick_train(p, mass[k], step, own, rest, damping, implicit, bristle, limit, q, v, ql, vl)  # fmt: skip
+                v, vl = _kick_train(p, heavy, step, own, rest, damping, implicit, bristle, limit, q, v, ql, vl)  # fmt: skip
             elif alone:
                 v = vl = _kick(inertia, own + rest, damping, implicit, bristle, limit, v)
             else:
                 shared = p[42] * beside[k]
                 v = vl = _kick_shared(p, inertia, own + rest, damping, implicit, bristle, limit, v, shared)
             z = bristles_slid(p, z, 0.5 * (before + v), step)
-            q += 0.5 * step * v
-            ql += 0.5 * step * vl
+            q, ql = q + 0.5 * step * v, ql + 0.5 * step * vl
 
 
 def predict(
@@ -191,6 +195,7 @@ def predict(
     starts: NDArray[np.float64],
     every: int | None = None,
     beside: NDArray[np.float64] | None = None,
+    touch: NDArray[np.float64] | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Run `run`; return innovations (n, 2) and states (n, 4). NaN where it diverged.
 
@@ -205,15 +210,17 @@ def predict(
         starts: (n_windows, 2) states at the beginning of every window, or (n_windows, 4), see `run`.
         every: Samples a window; one window where None.
         beside: Velocity (n_steps,) of the neighbour with which the joint shares a drive; at rest where None.
+        touch: End of the tree (3, n_steps) that touches a surface, where one does.
     """
     n = len(measured[0])
     out, states = np.empty((n, 2)), np.empty((n, 4))
     mass, bias, slope, reference, load = arrays
     position, velocity = measured
     beside = np.zeros(len(u)) if beside is None else beside
+    touch = NOWHERE if touch is None else touch
     at = np.full((len(np.atleast_2d(starts)), 4), np.nan)
     at[:, : np.shape(starts)[-1]] = starts
     run(
-        p, mass, bias, slope, reference, load, beside, u, step, n_sub, position, velocity, gain, at, every or n, out, states
+        p, mass, bias, slope, reference, load, beside, touch, u, step, n_sub, position, velocity, gain, at, every or n, out, states
     )  # fmt: skip
     return out, states

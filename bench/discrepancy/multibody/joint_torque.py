@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.discrepancy.multibody.joint_forces import (
+    NOWHERE,
     actuator_force,
     bristle_force_of,
     bristles_slid,
@@ -23,6 +24,7 @@ from bench.discrepancy.multibody.joint_forces import (
     friction_limit,
     pair_friction,
     stop_force,
+    surface_force,
 )
 
 
@@ -37,7 +39,7 @@ JOINT_TORQUE_LIMITS = JointTorqueLimits()
 
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
-def _missing(p, mass, bias, load, beside, u, step, motion, still, least, out):
+def _missing(p, mass, bias, load, beside, touch, u, step, motion, still, least, out):
     """Fill `out` (n_steps,), see `missing_torque`."""
     lagged, target, z = math.nan, u[0], 0.0
     keep = math.exp(-step / p[27]) if p[27] > 0.0 else 0.0
@@ -50,7 +52,9 @@ def _missing(p, mass, bias, load, beside, u, step, motion, still, least, out):
         target = command + (target - command) * half
         bristles, implicit = bristle_force_of(p, v, z)
         own = force + bristles - implicit * v + cogging_force(p, q)
-        rest = p[15] - bias[k] - p[7] * (q - p[8]) + stop_force(p, q, v)
+        rest = (
+            p[15] - bias[k] - p[7] * (q - p[8]) + stop_force(p, q, v) + surface_force(p, touch, k, 0.0, v)[0]
+        )
         rest -= pair_friction(p, v + p[42] * beside[k])
         free = own + rest - (p[6] + p[14] * abs(v)) * v - (mass[k] + p[9]) * a
         limit = friction_limit(p, v, load[k], force, bias[k])
@@ -72,6 +76,7 @@ def missing_torque(
     motion: NDArray[np.float64],
     still: float,
     beside: NDArray[np.float64] | None = None,
+    touch: NDArray[np.float64] | None = None,
 ) -> NDArray[np.float64]:
     """Torque (n_steps,) by which the drive exceeds what the motion takes.
 
@@ -83,11 +88,13 @@ def missing_torque(
         motion: (n_steps, 3) measured position, velocity, acceleration there.
         still: Speed below which a direction is not known.
         beside: Velocity (n_steps,) of the neighbour with which the joint shares a drive; at rest where None.
+        touch: End of the tree (3, n_steps) that touches a surface, where one does.
     """
     mass, bias, load = arrays
     beside = np.zeros(len(motion)) if beside is None else beside
+    touch = NOWHERE if touch is None else touch
     out = np.empty(len(motion))
     _missing(
-        p, mass, bias, load, beside, u, step, np.ascontiguousarray(motion), still, JOINT_TORQUE_LIMITS.least, out
+        p, mass, bias, load, beside, touch, u, step, np.ascontiguousarray(motion), still, JOINT_TORQUE_LIMITS.least, out
     )  # fmt: skip
     return out

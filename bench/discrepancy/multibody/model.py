@@ -107,7 +107,7 @@ class ArticulatedModel:
 
     def neighbours(self, j: int) -> tuple[str, ...]:
         """Joints next to joint `j` in the tree: that which carries it, and those that it carries."""
-        bodies = [_index(self.model, joint.body) for joint in self.joints]
+        bodies = [body_index(self.model, joint.body) for joint in self.joints]
         carriers = [self._carrier(body, bodies) for body in bodies]
         return tuple(
             other.name
@@ -129,7 +129,7 @@ class ArticulatedModel:
 
     def mass(self, body: str) -> float:
         """Mass of a body [kg]."""
-        return float(self.model.body_mass[_index(self.model, body)])
+        return float(self.model.body_mass[body_index(self.model, body)])
 
     def with_mass(self, body: str, mass: float) -> ArticulatedModel:
         """The model with another mass of a body, its centre of mass and inertia about it as they are."""
@@ -137,18 +137,18 @@ class ArticulatedModel:
 
     def body_value(self, kind: str, body: str) -> float:
         """A number of a body, see `bodies.body_value`."""
-        return body_value(self.model, _index(self.model, body), kind)
+        return body_value(self.model, body_index(self.model, body), kind)
 
     def with_body(self, kind: str, body: str, value: float) -> ArticulatedModel:
         """The model with another number of a body, see `bodies.set_body`, which also says what it raises."""
         out = self._copied()
-        set_body(out.model, _index(out.model, body), kind, value)
+        set_body(out.model, body_index(out.model, body), kind, value)
         return out
 
     def with_payload(self, body: str, mass: float, at: Array | None = None) -> ArticulatedModel:
         """The model with a point mass fixed to a body, at its tip where no position (3,) [m] in its frame is given."""
         out = self._copied()
-        i = _index(out.model, body)
+        i = body_index(out.model, body)
         _add_point(out.model, i, mass, self.tips[body] if at is None else at)
         return out
 
@@ -162,7 +162,7 @@ class ArticulatedModel:
     def with_centre(self, body: str, shift: Array) -> ArticulatedModel:
         """The model with the centre of mass of a body moved by `shift` (3,) [m] in the body's frame, the inertia about it kept."""
         out = self._copied()
-        out.model.body_ipos[_index(out.model, body)] += shift
+        out.model.body_ipos[body_index(out.model, body)] += shift
         return out
 
     def with_gravity_turned(self, turn: Array) -> ArticulatedModel:
@@ -229,7 +229,8 @@ class ArticulatedModel:
         return out
 
 
-def _index(model: mujoco.MjModel, body: str) -> int:
+def body_index(model: mujoco.MjModel, body: str) -> int:
+    """Index of a body by its name, see `body_name`."""
     return next(i for i in range(1, model.nbody) if body_name(model, i) == body)
 
 
@@ -272,7 +273,7 @@ def _bare(model: mujoco.MjModel) -> mujoco.MjModel:
 
 
 def _tip(model: mujoco.MjModel, body: str) -> Array:
-    i = _index(model, body)
+    i = body_index(model, body)
     for s in range(model.nsite):
         if int(model.site_bodyid[s]) == i and model.site(s).name.endswith("tip"):
             return np.array(model.site_pos[s])

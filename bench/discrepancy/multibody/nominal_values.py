@@ -19,7 +19,7 @@ LOCAL = ("damping", "frictionloss", "armature", "stiffness")
 
 
 def with_nominal_values(rig: Rig, parameters: Iterable[NominalParameter]) -> mujoco.MjModel:
-    """The compiled model of a rig with the values of nominal parameters in the place of its own.
+    """The compiled model of a rig, shapes of bodies included, with the values of nominal parameters in the place of its own.
 
     Args:
         rig: The user's model.
@@ -44,7 +44,7 @@ def with_nominal_values(rig: Rig, parameters: Iterable[NominalParameter]) -> muj
             raise UnknownNameError(
                 "parameter", parameter.name, [f"{k}:NAME" for k in (*BODIES, *LOCAL, *DRIVES)]
             )
-    model = copy.copy(rig.with_structure(**structure).model)
+    model = copy.copy(rig.with_structure(**structure).shaped)
     known = [body_name(model, i) for i in range(1, model.nbody)]
     for kind, name, value in bodies:
         if name not in known:
