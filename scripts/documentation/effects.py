@@ -24,6 +24,7 @@ LOOKS = {
     "backlash_friction": "A loop whose flanks are broken by a dead space: after a reversal the friction stays away for the length of the clearance, then builds up over the slip displacement.",
     "gap": "No force in the middle of the stroke, a spring at both ends. Resonances bend upwards with the amplitude and jump.",
     "one_sided_stop": "A spring on one side only: the mean of the motion moves away from it, even harmonics appear.",
+    "surface_contact": "An arm that presses on its table: several joints stay behind their targets at once, wherever its end comes down to one height, and nowhere else.",
     "asymmetric_gap": "As a gap, with two different walls: even harmonics besides the odd ones.",
     "cubic_stiffness": "Resonance bends upwards (or downwards) smoothly with the amplitude; odd harmonics.",
     "quadratic_stiffness": "The rest position under a load differs by its sign; even harmonics.",

@@ -16,8 +16,8 @@ from bench.figures.look import COLOURS, REFERENCE_COLOUR, save, style
 STEP = 1e-3
 
 
-INERTIA, MOTOR, WEIGHT = 0.07, 0.02, 2.0
-"""Of the servo's joint: all inertia, the motor's part of it [kg m^2], and the gravity torque of the level link [N m]."""
+INERTIA, MOTOR, WEIGHT, LENGTH = 0.07, 0.02, 2.0, 0.3
+"""Of the servo's joint: all inertia, the motor's part of it [kg m^2], the gravity torque of the level link [N m], and its length [m]."""
 
 SERVO = {
     Slot.GEAR: 1.0,
@@ -39,6 +39,7 @@ SERVOS: dict[str, dict[Slot, float]] = {
     "gravity_compensation": {Slot.OFFSET: 1.4},
     "joint_compliance": {**TRAIN, Slot.TRAIN_STIFFNESS: 12.0},
     "servo_gain_error": {Slot.KP: 6.0},
+    "surface_contact": {Slot.SURFACE: 2000.0, Slot.SURFACE_AT: -0.12, Slot.SURFACE_DAMPING: 20.0},
     "target_lag": {Slot.INPUT_LAG: 0.15},
 }
 """What an effect changes of the servo's joint, by its name."""
@@ -52,7 +53,9 @@ def follow(target: Array, change: dict[Slot, float], weight: float) -> Array:
         p[slot] = value
     none = np.zeros(n)
     arrays = np.full(n, INERTIA), np.full(n, weight), none, none, none
-    _, states = predict(p, arrays, target, STEP, 1, (none, np.zeros(0)), np.zeros((2, 2)), np.zeros((1, 2)))
+    tip = np.stack([none, np.full(n, LENGTH), none])
+    measured, still = (none, np.zeros(0)), np.zeros((2, 2))
+    _, states = predict(p, arrays, target, STEP, 1, measured, still, np.zeros((1, 2)), touch=tip)
     return states[:, 2]
 
 

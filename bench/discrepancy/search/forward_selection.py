@@ -31,7 +31,7 @@ from bench.discrepancy.screening.score_test import lack_of_fit
 from bench.discrepancy.screening.screen import Screen
 from bench.discrepancy.search.extension import contacts, extend
 from bench.discrepancy.search.horizons import lengthen
-from bench.discrepancy.search.rivals import challenge, reduce_best, simplify
+from bench.discrepancy.search.rivals import challenge, divide, reduce_best, simplify
 from bench.discrepancy.unscreened.analogue_lag import with_analogue_lag
 from bench.discrepancy.unscreened.harmonic_force import with_harmonic_force
 from bench.discrepancy.unscreened.scheduled import with_schedules
@@ -106,6 +106,8 @@ def attribute(
         _with_variants(search, len(search.ranked()[0].hypothesis))
         if problem.error is None:
             multistart(search)
+        else:
+            divide(search, screen, candidates)
     return search
 
 

@@ -20,6 +20,7 @@ from bench.discrepancy.screening.candidates import (
     tells_motion,
 )
 from bench.discrepancy.screening.screen import Screen
+from bench.discrepancy.search.extension import extend
 
 PLAINER = {"hysteresis": "friction", "damping": "friction"}
 """Families whose laws become those of another one at the limits of their parameters."""
@@ -122,6 +123,38 @@ def simplify(search: Search, candidates: Sequence[Placed]) -> None:
                     starts = np.array([np.append(vector, eta) for eta in other.effect.grid()])
                     tasks.setdefault(key, ((*rest, other), starts))
     converge(search, list(tasks.values()))
+
+
+def divide(search: Search, screen: Screen, candidates: Sequence[Placed]) -> None:
+    """Fit two laws of one parameter each, a simpler relative and what is missing beside it, in the place of one of three or more.
+
+    Where the error of the model decides, a law with a curve to bend may stand in for a sum of two that are as common: friction that falls
+    with the velocity for dry friction and drag. Nothing else asks for the two, since the one leaves no more than models do.
+
+    Args:
+        search: Fits so far; the new ones are added.
+        screen: Screening of the same problem.
+        candidates: Effects at their places.
+    """
+    best = search.ranked()[0]
+    plain = {p.key for p in candidates if _of_one_force(p.effect)}
+    bases: dict[frozenset, Fit] = {}
+    for i, placed in enumerate(best.hypothesis):
+        if sum(not p.fixed for p in placed.effect.parameters) < 3:
+            continue
+        rest, _ = _without(i, best, search.problem)
+        for other in (p for p in candidates if _of_one_force(p.effect) and _simpler(p, placed)):
+            key = key_of((*rest, other))
+            if key in search.fits and key not in bases:
+                bases[key] = search.fits[key]
+    if bases:
+        extend(search, screen, list(bases.values()), count=len(plain), among=plain)
+
+
+def _of_one_force(effect: Effect) -> bool:
+    """Whether an effect is a common force of one parameter, the same in every record and at every time."""
+    steady = not effect.variant and effect.of_record is None and effect.schedule is None
+    return effect.site == "joint" and len(effect.parameters) == 1 and steady and not effect.rare
 
 
 def _simpler(other: Placed, placed: Placed) -> bool:
