@@ -42,17 +42,18 @@ def so101(data: Path) -> Records:
     """The SO-101 with the gains of one of its public models; the jaw, whose record is no angle, is held.
 
     Of a hobby servo little is known: two public models of this arm have gains of 17.8 and 998 N m/rad. But all five are of one type;
-    small DC motors of one type differ by some ten percent.
+    small DC motors of one type differ by some ten percent. Of every motion that is learned from, some seconds find and the next judge.
     """
     folder = data / "so101"
     axes = [
         Axis(joint, f"position_{label}", f"command_{label}", 2e-4, TURN / 4096.0)
         for label, joint in SO101.items()
     ]
-    read = {name: short(table(folder / "motions" / f"{name}.parquet"), after=5.0) for name in SO101_FINDING}
+    learned = [table(folder / "motions" / f"{name}.parquet") for name in SO101_FINDING]
     return Records(
-        (folder / "model_joints_properties.xml").read_text(), axes, [read[n] for n in SO101_FINDING[:3]],
-        [read[n] for n in SO101_FINDING[3:]], 50.0, True, "friction against gravity, play of a degree, a zero that is off",
+        (folder / "model_joints_properties.xml").read_text(), axes, [short(one, after=5.0) for one in learned],
+        [short(one, after=5.0 + LONGEST) for one in learned], 50.0, True,
+        "friction against gravity, play of a degree, a zero that is off; its hand touches the table",
         {"mass": 0.1, "damping": 0.5, "armature": 0.5, "kp": 0.5}, held={"gripper": "hold"},
         further=[short(table(folder / "motions" / f"{n}.parquet"), 1e3, 5.0) for n in SO101_JUDGING],
         servos="STS3215", scatter=0.1,

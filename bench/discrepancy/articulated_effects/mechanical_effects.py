@@ -197,7 +197,6 @@ MECHANICAL_EFFECTS: tuple[ArticulatedEffect, ...] = (
                 mean=math.log(100.0),
                 std=1.5,
                 bounds=(0.0, 10.0),
-                grid=log_grid(30.0, 300.0),
                 unit="N/m",
             ),
             FreeParameter(
