@@ -11,9 +11,11 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
+from scipy.spatial import ConvexHull
 
 from bench.arrays import Array
 from bench.discrepancy.multibody.model import ArticulatedModel, body_index
+from bench.native.poses import poses_along
 
 SHAPES = {
     int(kind): kind
@@ -72,41 +74,42 @@ def touch_of(model: ArticulatedModel, body: str, position: Array) -> Touch:
     """The lowest point of a body along positions (n, n_moving)."""
     mj, up = model.model, upwards(model.model)
     assert up is not None
-    i, data = body_index(mj, body), mujoco.MjData(mj)
-    shapes, at, columns = shapes_of(mj, i), model.whole(position, 0), np.zeros((3, mj.nv))
-    unit = model.whole(np.eye(len(model.moving)), 1)
-    n = len(position)
-    height, rising = np.empty(n), np.empty((n, len(unit)))
-    for k in range(n):
-        data.qpos[:] = at[k]
-        mujoco.mj_kinematics(mj, data)
-        mujoco.mj_comPos(mj, data)
-        points = np.array([_lowest(mj, data, g, up) for g in shapes])
-        heights = points @ up
-        lowest = int(np.argmin(heights))
-        mujoco.mj_jac(mj, data, columns, None, points[lowest], i)
-        height[k], rising[k] = heights[lowest], unit @ (up @ columns)
-    return Touch(height, rising)
+    i = body_index(mj, body)
+    shapes = shapes_of(mj, i)
+    poses = poses_along(mj, i, shapes, model.whole(position, 0))
+    points = np.stack(
+        [_lowest(mj, g, poses.position[:, k], poses.turn[:, k], up) for k, g in enumerate(shapes)], axis=1
+    )
+    heights = points @ up
+    lowest, every = heights.argmin(axis=1), np.arange(len(position))
+    raised = poses.raised(points[every, lowest], up)
+    return Touch(heights[every, lowest], raised @ model.whole(np.eye(len(model.moving)), 1).T)
 
 
-def _lowest(model: mujoco.MjModel, data: mujoco.MjData, geom: int, up: Array) -> Array:
-    """The lowest point (3,) of a geom in the world: where its support function against `up` is taken."""
-    turn, size = data.geom_xmat[geom].reshape(3, 3), model.geom_size[geom]
-    down = -(turn.T @ up)
+def _lowest(model: mujoco.MjModel, geom: int, position: Array, turn: Array, up: Array) -> Array:
+    """The lowest points (n, 3) of a geom at positions (n, 3) and orientations (n, 3, 3), by its support function against `up`."""
+    size, down = model.geom_size[geom], -(up @ turn)
     kind = SHAPES[int(model.geom_type[geom])]
     if kind == mujoco.mjtGeom.mjGEOM_MESH:
         mesh = int(model.geom_dataid[geom])
         first, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
-        vertices = model.mesh_vert[first : first + count]
-        point = vertices[int(np.argmax(vertices @ down))].astype(np.float64)
+        vertices = model.mesh_vert[first : first + count].astype(np.float64)
+        point = _farthest(vertices, down)
     elif kind == mujoco.mjtGeom.mjGEOM_BOX:
         point = np.copysign(size, down)
     elif kind == mujoco.mjtGeom.mjGEOM_ELLIPSOID:
-        point = size**2 * down / np.linalg.norm(size * down)
+        point = size**2 * down / np.linalg.norm(size * down, axis=1, keepdims=True)
     elif kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
-        across = down[:2] / max(float(np.linalg.norm(down[:2])), 1e-12)
-        point = np.append(size[0] * across, np.copysign(size[1], down[2]))
+        across = down[:, :2] / np.maximum(np.linalg.norm(down[:, :2], axis=1, keepdims=True), 1e-12)
+        point = np.column_stack([size[0] * across, np.copysign(size[1], down[:, 2])])
     else:
         half = size[1] if kind == mujoco.mjtGeom.mjGEOM_CAPSULE else 0.0
-        point = size[0] * down + np.array([0.0, 0.0, np.copysign(half, down[2])])
-    return np.asarray(data.geom_xpos[geom] + turn @ point)
+        point = size[0] * down
+        point[:, 2] += np.copysign(half, down[:, 2])
+    return np.asarray(position + np.einsum("nij,nj->ni", turn, point))
+
+
+def _farthest(vertices: Array, down: Array) -> Array:
+    """The vertices (n, 3) that lie farthest along directions (n, 3), those of the hull, which are few; joggled, a sheet has one."""
+    corners = vertices[ConvexHull(vertices, qhull_options="QJ").vertices]
+    return np.asarray(corners[np.argmax(down @ corners.T, axis=1)])
