@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from planted_cases import motion_with, planted_case
 from scipy.optimize import least_squares
 
 from bench.discrepancy import BlindOptions
 from bench.discrepancy.blind.protocol import draw_case
 from bench.discrepancy.effects.catalogue import effect_named
+from bench.discrepancy.fitting.fits import converge
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placements import placements
 from bench.discrepancy.model.rigs import structure_of
@@ -20,6 +22,8 @@ from bench.discrepancy.screening.linear_amplitudes import (
     products,
 )
 from bench.discrepancy.screening.screen import Screen
+from bench.discrepancy.search.forward_selection import prepare
+from bench.discrepancy.search.rivals import divide
 from bench.discrepancy.simulation.linear_response import linear_run
 from bench.discrepancy.simulation.stick_slip import NO_ELEMENTS, StructureMatrices, free_run
 
@@ -187,3 +191,28 @@ def test_products_of_rounded_columns_are_summed_in_double_precision():
     assert found.dtype == np.float64
     # rounding of sums of 2e4 terms of order one; single precision would leave 1e-7 and more
     np.testing.assert_allclose(found, rough.astype(np.float64).T @ other, rtol=1e-12)
+
+
+def test_two_plain_laws_are_fitted_in_the_place_of_one_with_a_curve_to_bend():
+    """Dry friction and drag together are a friction that first falls and then rises: Stribeck's may stand in for them."""
+    case = planted_case(
+        lambda f: motion_with(f, lambda x, v, z: (1.5 * np.tanh(v / 1e-3) + 8.0 * v * abs(v), [])), n=1000
+    )
+    structure = structure_of(case)
+    problem = Problem(case, structure, case.identification)
+    names = ("stribeck_friction", "coulomb_friction", "quadratic_damping", "cubic_stiffness")
+    candidates = placements(case, structure, [effect_named(name) for name in names])
+    found, screen, _ = prepare(problem, candidates)
+    alone = [p for p in candidates if p.effect.name in ("stribeck_friction", "coulomb_friction")]
+    converge(found, [((p,), np.append(np.zeros(len(problem.nominal)), p.effect.grid()[0])) for p in alone])
+    best = found.ranked()[0]
+    assert [p.effect.name for p in best.hypothesis] == ["stribeck_friction"]
+    divide(found, screen, candidates)
+    pair = next(
+        f
+        for f in found.ranked(2)
+        if {p.effect.name for p in f.hypothesis} == {"coulomb_friction", "quadratic_damping"}
+    )
+    assert pair.cost < best.cost
+    # nothing else is asked for: a law of one parameter has no such stand-ins
+    assert all("coulomb_friction" in {p.effect.name for p in f.hypothesis} for f in found.ranked(2))
