@@ -8,12 +8,12 @@ import pytest
 from test_apply import effect
 
 from bench.discrepancy.application.applying import Findings, apply
+from bench.discrepancy.articulated.nominal_values import with_nominal_values
 from bench.discrepancy.case.case import NominalParameter
 from bench.discrepancy.multibody.joint_forces import Slot
 from bench.discrepancy.multibody.joint_run import predict
 from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.multibody.nominal_parameters import base_slots, move
-from bench.discrepancy.multibody.nominal_values import with_nominal_values
 from bench.discrepancy.verdict import NominalEstimate
 from bench.errors import ModelError
 from bench.rig import Rig

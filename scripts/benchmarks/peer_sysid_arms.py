@@ -18,6 +18,7 @@ from mujoco import sysid
 from robot_records.free_run_errors import errors_of, over_travel
 
 from bench.arrays import Array
+from bench.discrepancy.articulated.nominal_values import with_nominal_values
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.model.mjcf_file import rig_of
@@ -27,7 +28,6 @@ from bench.discrepancy.multibody.joint_record import JOINT_RECORD_SETTINGS
 from bench.discrepancy.multibody.joints import Joint, body_name
 from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.multibody.motion import JointMotion, motion_of
-from bench.discrepancy.multibody.nominal_values import with_nominal_values
 from bench.discrepancy.replay.running import controls
 from bench.discrepancy.settings import DEFAULT
 from bench.rig.actuators import set_drive

@@ -7,8 +7,8 @@ import numpy as np
 
 from bench.discrepancy.application.forces import values_of
 from bench.discrepancy.application.target import PREFIX, TARGET_SETTINGS, Change, Target
-from bench.discrepancy.multibody.touch import SHAPES, upwards
 from bench.discrepancy.verdict import NamedEffect
+from bench.rig.shapes import SHAPES, upwards
 
 
 def surface_contact(target: Target, effect: NamedEffect) -> Change:

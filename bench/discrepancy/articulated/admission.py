@@ -13,6 +13,7 @@ import numpy as np
 
 from bench.discrepancy.articulated.against_model import suspicions
 from bench.discrepancy.articulated.against_mujoco import ComparisonSettings, left_out
+from bench.discrepancy.articulated.nominal_values import with_nominal_values
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.case.unit_conversion import converted
 from bench.discrepancy.checks.load_limits import clipped_case
@@ -24,7 +25,6 @@ from bench.discrepancy.multibody.encoders import encoders_of
 from bench.discrepancy.multibody.inputs import input_of, loads_of
 from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.multibody.motion import motion_of
-from bench.discrepancy.multibody.nominal_values import with_nominal_values
 from bench.discrepancy.settings import (
     DEFAULT,
     DiagnosisSettings,

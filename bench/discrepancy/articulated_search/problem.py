@@ -257,10 +257,8 @@ class ArticulatedProblem:
 
     def touch(self, j: int, hypothesis: JointHypothesis, record: JointRecord) -> Array | None:
         """Lowest point (3, n_steps) of the end of the tree that touches a surface in a hypothesis, as joint `j` moves it, if it does."""
-        for placed in hypothesis:
-            if placed.effect.site == "end" and j in placed.joints:
-                return record.touches[placed.where]
-        return None
+        end = next((p.where for p in hypothesis if p.effect.site == "end" and j in p.joints), None)
+        return None if end is None else record.touches[end]
 
     def coefficients(
         self, record: JointRecord, hypothesis: JointHypothesis, vector: Array

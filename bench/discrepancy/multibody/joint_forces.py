@@ -15,7 +15,6 @@ import math
 from enum import IntEnum
 
 import numba
-import numpy as np
 
 
 class Slot(IntEnum):
@@ -74,8 +73,6 @@ class Slot(IntEnum):
 
 
 SLOTS = len(Slot)
-NOWHERE = np.zeros((3, 0))
-"""The end of a tree that touches nothing, see `surface_force`."""
 
 
 inlined = numba.njit(cache=True, error_model="numpy", nogil=True, inline="always")

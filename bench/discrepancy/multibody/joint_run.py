@@ -28,7 +28,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.discrepancy.multibody.joint_forces import (
-    NOWHERE,
     actuator_force,
     beyond_band,
     bristle_force_of,
@@ -217,7 +216,7 @@ def predict(
     mass, bias, slope, reference, load = arrays
     position, velocity = measured
     beside = np.zeros(len(u)) if beside is None else beside
-    touch = NOWHERE if touch is None else touch
+    touch = np.zeros((3, 0)) if touch is None else touch
     at = np.full((len(np.atleast_2d(starts)), 4), np.nan)
     at[:, : np.shape(starts)[-1]] = starts
     run(

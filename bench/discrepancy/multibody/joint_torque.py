@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.discrepancy.multibody.joint_forces import (
-    NOWHERE,
     actuator_force,
     bristle_force_of,
     bristles_slid,
@@ -92,7 +91,7 @@ def missing_torque(
     """
     mass, bias, load = arrays
     beside = np.zeros(len(motion)) if beside is None else beside
-    touch = NOWHERE if touch is None else touch
+    touch = np.zeros((3, 0)) if touch is None else touch
     out = np.empty(len(motion))
     _missing(
         p, mass, bias, load, beside, touch, u, step, np.ascontiguousarray(motion), still, JOINT_TORQUE_LIMITS.least, out
