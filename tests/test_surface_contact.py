@@ -178,7 +178,8 @@ def test_the_table_closes_in_plain_mujoco(pressed):
     applied = apply(path, findings_of(found.verdict), case=case)
     assert [change.form for change in applied.changes if change.what == "surface_contact"] == ["native"]
     assert (
-        applied.compiled().geom("added_surface").pos[2] == found.verdict.named[0].parameters["height"].value
+        applied.compiled().geom("added_fore_surface").pos[2]
+        == found.verdict.named[0].parameters["height"].value
     )
     worth = verify(path, findings_of(found.verdict), gaps_left(found.verdict), case)
     left = {figure.dof: figure for figure in worth.figures}

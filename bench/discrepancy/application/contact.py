@@ -24,8 +24,8 @@ def surface_contact(target: Target, effect: NamedEffect) -> Change:
     turn = np.zeros(4)
     mujoco.mju_quatZ2Vec(turn, up)
     plane = target.spec.worldbody.add_geom(
-        name=f"{PREFIX}surface", type=mujoco.mjtGeom.mjGEOM_PLANE, size=(1.0, 1.0, 0.01), pos=v["height"] * up, quat=turn, contype=0,
-        conaffinity=0, rgba=(0.6, 0.6, 0.6, 0.5),
+        name=f"{PREFIX}{effect.where}_surface", type=mujoco.mjtGeom.mjGEOM_PLANE, size=(1.0, 1.0, 0.01), pos=v["height"] * up, quat=turn,
+        contype=0, conaffinity=0, rgba=(0.6, 0.6, 0.6, 0.5),
     )  # fmt: skip
     shapes = [g for g in _shapes(body) if int(g.type) in SHAPES]
     pairs, impedance = [], TARGET_SETTINGS.spring_impedance
