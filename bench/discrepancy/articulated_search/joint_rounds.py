@@ -90,7 +90,7 @@ def _of_one_kind(
     `own` would have them make one each, and a choice among k that are as likely costs log k of log posterior.
     """
     for joints in sorted({p.joints for p in problem.nominal if p.of_type}):
-        if not own.keys() >= set(joints):
+        if not all(own.get(j) for j in joints):
             continue
         found: dict[str, dict[int, ArticulatedFit]] = {}
         for f in sorted(fits, key=lambda f: f.log_posterior):
