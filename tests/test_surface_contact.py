@@ -89,7 +89,7 @@ def test_the_lowest_point_is_that_of_mujocos_distance_to_a_plane(shape, gravity)
     for j in range(3):
         ahead, behind = (touch_of(model, "fore", q + s * 1e-6 * np.eye(3)[j]).height for s in (1.0, -1.0))
         # the point of a polyhedron jumps from corner to corner, its height does not
-        assert touch.rising[:, j] == pytest.approx((ahead - behind) / 2e-6, abs=1e-4)
+        assert touch.raised[:, j] == pytest.approx((ahead - behind) / 2e-6, abs=1e-4)
 
 
 def test_nothing_is_level_without_gravity_and_a_tree_ends_where_nothing_moves_on():

@@ -55,7 +55,7 @@ class JointScales(NamedTuple):
         input: RMS of the actuator's input, of a servo its position error.
         mass: Mass of the body.
         reach: Distance of the body's tip from its joint.
-        middle: Mean angle.
+        middle: Mean angle; of an end of the tree its lowest height.
     """
 
     force: float
@@ -83,6 +83,7 @@ class ArticulatedEffect:
         encoder: For sensors: values to what is wrong.
         servo: Only for servos (True), only for forces (False), or both (None).
         needs: Quantity that has to be measured ("velocity"), if any.
+        coordinate: Name of the parameter that is a coordinate of its place, free about `JointScales.middle`, if any.
         contains: Names of simpler effects that it is for some values of its parameters, and how their values are then its own.
     """
 
@@ -95,6 +96,7 @@ class ArticulatedEffect:
     encoder: Callable[[SlotValues], Encoder] | None = None
     servo: bool | None = None
     needs: str = ""
+    coordinate: str = ""
     contains: Mapping[str, Callable[[SlotValues], SlotValues]] = field(default_factory=dict)
 
     @property

@@ -64,8 +64,4 @@ def placed_eta(placed: PlacedOnJoint, values: Mapping[str, float]) -> list[float
 
 def _zero(placed: PlacedOnJoint, parameter: str) -> float:
     """Where the zero of a coordinate is from what a parameter of an effect is counted from."""
-    from_middle = (placed.effect.name, parameter) in (
-        ("one_sided_stop", "position"),
-        ("surface_contact", "height"),
-    )
-    return placed.scales.middle if from_middle else 0.0
+    return placed.scales.middle if parameter == placed.effect.coordinate else 0.0

@@ -185,6 +185,7 @@ MECHANICAL_EFFECTS: tuple[ArticulatedEffect, ...] = (
         ),
         "f = k d + c d', d = side (q - q0) > 0",
         stop,
+        coordinate="position",
     ),
     ArticulatedEffect(
         "surface_contact",
@@ -215,6 +216,7 @@ MECHANICAL_EFFECTS: tuple[ArticulatedEffect, ...] = (
         ),
         "f = k d + c d' upwards on the lowest point of the body, d = h - z > 0: a table, the floor",
         written(SURFACE="stiffness", SURFACE_AT="height", SURFACE_DAMPING="damping"),
+        coordinate="height",
     ),
     ArticulatedEffect(
         "armature_error",

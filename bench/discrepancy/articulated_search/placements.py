@@ -16,10 +16,13 @@ AND = "+"
 def placements(problem: ArticulatedProblem, catalogue: Sequence[ArticulatedEffect]) -> list[PlacedOnJoint]:
     """Every effect at every place where it may sit: joints, neighbours, bodies, ends of the tree, drives, encoders."""
     out = list[PlacedOnJoint]()
+    at_ends = [effect for effect in catalogue if effect.site == "end"]
     for j in range(len(problem.joints)):
         scales = problem.scales(j)
         for effect in catalogue:
-            out += _at(problem, effect, j, scales)
+            out += _at(problem, effect, j, scales) if effect.site != "end" else ()
+    for end in ends_within(problem) if at_ends else ():
+        out += [PlacedOnJoint(effect, end.body, end.joint, end.scales, end.others) for effect in at_ends]
     return out
 
 
@@ -34,12 +37,6 @@ def _at(
         return []
     if effect.needs == "velocity" and problem.records[0].joints[j].n_measured < 2:
         return []
-    if effect.site == "end":
-        return [
-            PlacedOnJoint(effect, end.body, j, end.scales, end.others)
-            for end in ends_within(problem)
-            if end.joint == j
-        ]
     if effect.site == "pair":
         near = problem.model.neighbours(j)
         later = [i for i, other in enumerate(problem.joints) if i > j and other.name in near]

@@ -9,7 +9,6 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
@@ -24,7 +23,7 @@ from bench.discrepancy.multibody.joint_record import JointRecord
 from bench.discrepancy.multibody.model import ArticulatedModel, Dynamics
 from bench.discrepancy.multibody.motion import Coefficients, JointClock, JointMotion, clock_of, motion_of
 from bench.discrepancy.multibody.noise import torque_noise
-from bench.discrepancy.multibody.touch import ends_of, touch_of
+from bench.discrepancy.multibody.touch import touches_along
 from bench.discrepancy.numerics.uniform_spline import uniform_spline
 from bench.discrepancy.settings import DEFAULT, ArticulatedSettings, DiagnosisSettings
 
@@ -78,7 +77,7 @@ def prepare(
     weights = {body: clock.between(model.weight(body, motion.position)) for body in model.bodies}
     slope, speeds = clock.between(model.slopes(*moved)), clock.between(motion.velocity)
     process = torque_noise(model, motion, clock, record.step)
-    ends = {b: _touch(model, b, motion, clock) for b in ends_of(model)}
+    touches = touches_along(model, motion, clock)
     joints = []
     for j, joint in enumerate(model.joints):
         drive, channel = joint.drive, input_of(case, joint)
@@ -91,7 +90,7 @@ def prepare(
             encoders_of(case, joint).channels[0].side, float(np.hypot(stated, process[j])),
             {b: terms.of_joint(j) for b, terms in bodies.items()}, {b: c[j] for b, c in payloads.items()},
             {b: np.ascontiguousarray(c[:, j]) for b, c in centres.items()}, {b: c[j] for b, c in weights.items()},
-            beside_of(model, j, speeds), touches_of(ends, j), record.step, np.ones((len(record), len(motion.noise[j]))),
+            beside_of(model, j, speeds), touches[j], record.step, np.ones((len(record), len(motion.noise[j]))),
         )  # fmt: skip
         joints.append(replace(raw, weight=weights_of(case, record, joint, raw.innovation)))
     return PreparedRecord(record, motion, tuple(joints))
@@ -199,29 +198,6 @@ def beside_of(model: ArticulatedModel, j: int, speeds: Array) -> dict[str, Array
     """Velocities (n_steps,) of the neighbours of joint `j`, from those of all (n_joints, n_steps)."""
     names = model.neighbours(j)
     return {name: speeds[i] for i, joint in enumerate(model.joints) if (name := joint.name) in names}
-
-
-class _End(NamedTuple):
-    """Height (n_steps,) of the lowest point of a body, how every joint raises it, and how fast every joint does (n_moving, n_steps)."""
-
-    height: Array
-    rising: Array
-    rates: Array
-
-
-def touches_of(ends: Mapping[str, _End], j: int) -> dict[str, Array]:
-    """Lowest points (3, n_steps) of ends of the tree as joint `j` raises them, see `JointRecord.touches`, from those of `_touch`."""
-    return {
-        body: np.stack([end.height, end.rising[j], end.rates.sum(axis=0) - end.rates[j]])
-        for body, end in ends.items()
-    }
-
-
-def _touch(model: ArticulatedModel, body: str, motion: JointMotion, clock: JointClock) -> _End:
-    """The lowest point of a body at the middle of every step."""
-    touch = touch_of(model, body, motion.position)
-    height = clock.between(touch.height[:, None])[0]
-    return _End(height, clock.between(touch.rising), clock.between(touch.rising * motion.velocity))
 
 
 def _measured(motion: JointMotion, j: int) -> tuple[Array, Array, Array, Array]:

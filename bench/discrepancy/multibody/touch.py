@@ -6,25 +6,12 @@ point by its lever times that angle.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from bench.arrays import Array
 from bench.discrepancy.multibody.model import ArticulatedModel, body_index
-from bench.rig.shapes import lowest_point, shapes_of, upwards
-
-
-class Touch(NamedTuple):
-    """The lowest point of a body along a motion.
-
-    Attributes:
-        height: (n,) above the origin, against gravity [m].
-        rising: (n, n_moving) by how much it rises with every joint [m/rad, or 1].
-    """
-
-    height: Array
-    rising: Array
+from bench.discrepancy.multibody.motion import JointClock, JointMotion
+from bench.rig.shapes import LowestPoint, lowest_point, shapes_of, upwards
 
 
 def ends_of(model: ArticulatedModel) -> tuple[str, ...]:
@@ -37,9 +24,21 @@ def ends_of(model: ArticulatedModel) -> tuple[str, ...]:
     return tuple(name for name, i in bodies if i not in carrying and shapes_of(mj, i))
 
 
-def touch_of(model: ArticulatedModel, body: str, position: Array) -> Touch:
-    """The lowest point of a body along positions (n, n_moving)."""
+def touch_of(model: ArticulatedModel, body: str, position: Array) -> LowestPoint:
+    """The lowest point of a body along positions (n, n_moving), raised by the joints (n, n_moving) with all that they move."""
     up, i = upwards(model.model), body_index(model.model, body)
     assert up is not None
     found = lowest_point(model.model, i, shapes_of(model.model, i), model.whole(position, 0), up)
-    return Touch(found.height, found.raised @ model.whole(np.eye(len(model.moving)), 1).T)
+    return found._replace(raised=found.raised @ model.whole(np.eye(len(model.moving)), 1).T)
+
+
+def touches_along(model: ArticulatedModel, motion: JointMotion, clock: JointClock) -> list[dict[str, Array]]:
+    """For every joint the ends of the tree by name, each with its lowest point (3, n_steps), see `JointRecord.touches`."""
+    out: list[dict[str, Array]] = [{} for _ in model.joints]
+    for body in ends_of(model):
+        point = touch_of(model, body, motion.position)
+        height, raised = clock.between(point.height[:, None])[0], clock.between(point.raised)
+        rates = clock.between(point.raised * motion.velocity)
+        for j, own in enumerate(out):
+            own[body] = np.stack([height, raised[j], rates.sum(axis=0) - rates[j]])
+    return out
