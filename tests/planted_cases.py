@@ -11,6 +11,7 @@ from bench.discrepancy import Case, CaseChannel, NominalParameter, record_from_a
 
 MASS, STIFFNESS, DAMPING = 2.0, 1800.0, 3.0
 BASE_MASS, BASE_STIFFNESS, BASE_DAMPING = 5.0, 15000.0, 15.0
+CARRIED_MASS, CARRIED_FREQUENCY, CARRIED_RATIO = 0.5, 9.0, 0.02
 SAMPLE_RATE = 500.0
 NOISE = {"force": 0.0, "displacement": 1e-4, "acceleration": 0.1}
 SUBSTEPS = 3
@@ -111,6 +112,24 @@ def base_motion(force):
     system = StateSpace(a, [[0.0], [1.0 / m], [0.0], [0.0]], np.eye(4), np.zeros((4, 1)))
     _, y, _ = lsim(system, force, np.arange(len(force)) / SAMPLE_RATE)
     return y[:, 0], (force - k * (y[:, 0] - y[:, 2]) - c * (y[:, 1] - y[:, 3])) / m
+
+
+def carried_motion(force):
+    """Motion of a mass of which a part stands on a spring of its own."""
+    k, c, m, mc = STIFFNESS, DAMPING, MASS - CARRIED_MASS, CARRIED_MASS
+    omega = 2.0 * math.pi * CARRIED_FREQUENCY
+    kc, cc = mc * omega**2, 2.0 * CARRIED_RATIO * omega * mc
+    a = np.array(
+        [
+            [0, 1, 0, 0],
+            [-(k + kc) / m, -(c + cc) / m, kc / m, cc / m],
+            [0, 0, 0, 1],
+            [kc / mc, cc / mc, -kc / mc, -cc / mc],
+        ]
+    )
+    system = StateSpace(a, [[0.0], [1.0 / m], [0.0], [0.0]], np.eye(4), np.zeros((4, 1)))
+    _, y, _ = lsim(system, force, np.arange(len(force)) / SAMPLE_RATE)
+    return y[:, 0], y @ a[1] + force / m
 
 
 def pinched(x, v, z):

@@ -182,6 +182,24 @@ def setting(kind, name, **values):
     return wrong
 
 
+def carrying(mass, frequency, ratio, joint="guide"):
+    """The pull of a mass on a spring, whose motion is integrated here."""
+    y, omega = np.zeros(2), 2.0 * math.pi * frequency
+
+    def before_step(model, data):
+        own = model.joint(joint)
+        dof = int(own.dofadr[0])
+        if data.time == 0.0:
+            y[:] = 0.0
+        r, p = y[0] - data.qpos[own.qposadr[0]], y[1] - data.qvel[dof]
+        pull = omega**2 * r + 2.0 * ratio * omega * p
+        data.qfrc_applied[dof] = mass * pull
+        y[1] -= model.opt.timestep * pull
+        y[0] += model.opt.timestep * y[1]
+
+    return before_step
+
+
 def pushed(force, joint="guide"):
     """A force by Python before every step of the truth."""
 
@@ -245,6 +263,9 @@ STAGE_EFFECTS = {
     ),
     "mass_error": (
         setting("body", "table", mass=2.5), None, effect("mass_error", channel="mass:table", relative_error=0.25)
+    ),
+    "carried_mass": (
+        setting("body", "table", mass=1.5), carrying(0.5, 6.0, 0.03), effect("carried_mass", theta=(0.5, 6.0, 0.03), share=0.25)
     ),
     "stribeck_friction": (
         friction("guide", 2.0),
@@ -572,6 +593,26 @@ def test_the_simulators_own_share_is_named(tmp_path):
     assert found.own_share > 0.03
     assert "your simulator's own share" in found.simulator_line
     assert found.remedy  # a model without what is missing is off by all of it: said, not hidden
+
+
+def test_a_body_is_divided_and_moves_as_heavily_as_before(tmp_path):
+    """About a hinge, too, whose axis does not pass through the centre of mass; and not where the body has too little itself."""
+    (tmp_path / "arm.xml").write_text(ARM)
+    found = effect("carried_mass", "elbow", theta=(0.004, 7.0, 0.02), share=0.2)
+    applied = apply(tmp_path / "arm.xml", Findings((found,)), linear=False)
+    nominal, divided = mujoco.MjModel.from_xml_string(ARM), applied.compiled()
+    spring = divided.joint("added_elbow_spring")
+    np.testing.assert_allclose(spring.stiffness[0], 0.004 * (2.0 * math.pi * 7.0) ** 2)
+    inertia = []
+    for model in (nominal, divided):
+        data, whole = mujoco.MjData(model), np.zeros((model.nv, model.nv))
+        mujoco.mj_forward(model, data)
+        mujoco.mj_fullM(model, data, whole)
+        inertia.append(whole)
+    np.testing.assert_allclose(inertia[1][:2, :2], inertia[0], rtol=1e-9)  # both parts together, as one
+    assert inertia[1][2, 2] == pytest.approx(0.004, rel=1e-6)  # the part that is carried, about the hinge
+    heavy = apply(tmp_path / "arm.xml", Findings((replace(found, theta=(1.0, 7.0, 0.02)),)), linear=False)
+    assert [change.form for change in heavy.changes] == ["none"]
 
 
 def test_a_verdict_that_names_nothing_is_not_applied(tmp_path, capsys):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,11 +11,15 @@ from planted_cases import (
     BASE_DAMPING,
     BASE_MASS,
     BASE_STIFFNESS,
+    CARRIED_FREQUENCY,
+    CARRIED_MASS,
+    CARRIED_RATIO,
     DAMPING,
     MASS,
     SAMPLE_RATE,
     STIFFNESS,
     base_motion,
+    carried_motion,
     degraded,
     linear_motion,
     load,
@@ -29,6 +34,10 @@ from bench.discrepancy.case.channel_noise import quantisation_step, raised_noise
 from bench.discrepancy.effects.catalogue import CATALOGUE, effect_named
 from bench.discrepancy.effects.channel_operators import high_pass, low_pass, second_order_low_pass
 from bench.discrepancy.effects.effect import unit_of
+from bench.discrepancy.model.placements import placements
+from bench.discrepancy.model.rigs import structure_of
+from bench.discrepancy.motion.observer import Observer
+from bench.discrepancy.settings import DiagnosisSettings
 from bench.laws import LAWS
 from bench.laws.evaluate import evaluate
 
@@ -120,6 +129,45 @@ def test_a_base_on_a_spring_is_named_with_its_frequency():
     assert estimate(verdict, "stiffness_loss") == pytest.approx(
         STIFFNESS**2 / (STIFFNESS + BASE_STIFFNESS), rel=0.3
     )
+
+
+@pytest.mark.slow
+def test_a_part_of_the_mass_on_a_spring_is_named_with_its_share():
+    verdict = named(
+        planted_case(carried_motion),
+        "carried_mass", "base_flexibility", "viscoelastic_relaxation", "mass_error", "stiffness_error", "acceleration_delay",
+    )  # fmt: skip
+    assert [e.name for e in verdict.named] == ["carried_mass"]
+    assert estimate(verdict, "share") == pytest.approx(CARRIED_MASS / MASS, rel=0.05)
+    assert estimate(verdict, "frequency") == pytest.approx(CARRIED_FREQUENCY, rel=0.01)
+    assert estimate(verdict, "damping_ratio") == pytest.approx(CARRIED_RATIO, rel=0.2)
+    assert verdict.gap.after < 1.05 * verdict.gap.noise_floor
+
+
+def test_the_law_of_a_carried_mass_is_the_difference_of_two_linear_systems():
+    """Along the exact motion: what the mass takes, less its share of a rigid one's inertia, is what the nominal model lacks."""
+    force = load(3, 3000)
+    x, a = carried_motion(force)
+    # trapezoidal integration of the exact acceleration, see below
+    v = np.concatenate([[0.0], np.cumsum(0.5 * (a[1:] + a[:-1]))]) / SAMPLE_RATE
+    law = LAWS["carried_mass"]
+    theta = law.theta(mass=CARRIED_MASS, frequency=CARRIED_FREQUENCY, damping_ratio=CARRIED_RATIO)
+    t = np.arange(len(force)) / SAMPLE_RATE
+    taken = np.ravel(evaluate(law, theta, t, x, v).force)
+    lacking = force - MASS * a - STIFFNESS * x - DAMPING * v
+    np.testing.assert_allclose(taken - CARRIED_MASS * a, lacking, atol=0.01 * np.abs(lacking).max())
+
+
+def test_a_carried_mass_is_looked_for_where_a_mass_moves_in_the_room():
+    effect = effect_named("carried_mass")
+    case = planted_case()
+    structure = structure_of(case, settings=DiagnosisSettings())
+    assert [p.place for p in placements(case, structure, [effect])] == list(structure.places)
+    base = Observer("base", 0, np.array([1.0]))
+    assert placements(case, replace(structure, prescribed=(base,)), [effect]) == []
+    (place,) = structure.places
+    relative = replace(structure, places=(replace(place, rows=0.5 * place.rows),))
+    assert placements(case, relative, [effect]) == []
 
 
 def test_the_law_of_a_flexible_base_is_the_difference_of_two_linear_systems():

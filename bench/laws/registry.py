@@ -23,6 +23,7 @@ from bench.laws.bouc_wen_variants import (
     GENERALISED_BOUC_WEN,
     generalised_bouc_wen_law,
 )
+from bench.laws.carried_mass import CARRIED_MASS
 from bench.laws.constant_force import CONSTANT_FORCE
 from bench.laws.coulomb import ASYMMETRIC_COULOMB, COULOMB
 from bench.laws.coupling import AXIAL_TORSIONAL_JOINT, CROSS_STIFFNESS, GAP_COUPLING, PRINTED_COUPLING
@@ -69,6 +70,7 @@ LAWS: Mapping[str, ForceLaw] = MappingProxyType(
             POWER_LAW_DAMPING,
             MAXWELL,
             BASE_FLEXIBILITY,
+            CARRIED_MASS,
             COULOMB,
             ASYMMETRIC_COULOMB,
             SOFT_COULOMB,

@@ -46,6 +46,7 @@ LOOKS = {
     "cross_stiffness": "A load of one axis moves the other, at once and in proportion.",
     "cogging": "A force that repeats along the stroke or turn, whatever the speed: in slow motion a ripple, in fast motion a tone that rises with it.",
     "base_flexibility": "Less stiffness, an additional resonance above the joint's own, and no friction.",
+    "carried_mass": "A second mode: an antiresonance at the frequency of the part that is carried, a resonance above it, at every amplitude alike; below them the whole mass.",
     "degrading_hysteresis": "Loops that lose strength or stiffness from cycle to cycle.",
     "pinching_hysteresis": "Loops with a waist: soft near the middle, stiff at the ends.",
     "mass_error": "Inertial forces are off in proportion to the acceleration; on an arm, gravity besides.",

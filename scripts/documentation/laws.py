@@ -28,6 +28,7 @@ NATIVE = {
     "coulomb": "`frictionloss` of a joint: soft friction, a constraint that creeps at rest. `solreffriction` and `solimpfriction` say how much.",
     "soft_coulomb": "`frictionloss` itself: creep velocity and lead time follow from `solreffriction` and `solimpfriction`.",
     "lugre": "The LuGre friction of a `dcmotor` actuator, on the motor's side.",
+    "carried_mass": "A child body with a joint on the same axis, of its own `stiffness` and `damping`.",
     "cogging": "The cogging torque of a `dcmotor` actuator.",
 }
 """What MuJoCo has of a law, by name; a law that is not here runs as the bench's native callback only."""
@@ -49,7 +50,8 @@ RELATIVES = {
     "quadratic_damping": ("power_law_damping", "linear_damping"),
     "power_law_damping": ("quadratic_damping", "coulomb"),
     "maxwell": ("linear", "base_flexibility"),
-    "base_flexibility": ("maxwell", "linear"),
+    "base_flexibility": ("carried_mass", "maxwell", "linear"),
+    "carried_mass": ("base_flexibility", "maxwell"),
     "coulomb": ("soft_coulomb", "stribeck", "jenkins"),
     "asymmetric_coulomb": ("coulomb", "constant_force"),
     "soft_coulomb": ("coulomb", "lugre"),

@@ -195,6 +195,48 @@ def _read_link(target: Target, joint: str, link: str) -> None:
             sensor.type, sensor.objtype, sensor.objname = kinds[sensor.type], mujoco.mjtObj.mjOBJ_TENDON, link
 
 
+def carried_mass(target: Target, effect: NamedEffect) -> Change:
+    """A part of a body on a spring of its own: a second body at the same place, which moves along the axis of the joint."""
+    carried, frequency, ratio = effect.theta
+    name = target.named(effect.where)
+    joint = target.spec.joint(name)
+    if joint is None:
+        return element(target, effect)
+    body = target.body(joint.parent.name)
+    whole = _moved_by(joint, body)
+    part = carried / whole
+    if part >= 1.0:
+        text = f"it carries {carried:.6g} of the {whole:.6g} that '{body.name}' has itself: divide the bodies behind it"
+        return Change(effect.name, name, "none", text)
+    rest = np.array(body.inertia)
+    second = body.add_body(name=f"{PREFIX}{name}_mass", explicitinertial=True)
+    second.ipos, second.iquat = body.ipos, body.iquat
+    second.mass, second.inertia = part * body.mass, part * rest
+    body.mass, body.inertia = (1.0 - part) * body.mass, (1.0 - part) * rest
+    spring = second.add_joint(name=f"{PREFIX}{name}_spring", type=joint.type, axis=joint.axis, pos=joint.pos)
+    as_mujoco(spring)
+    omega = 2.0 * math.pi * frequency
+    for attribute, value in (("stiffness", carried * omega**2), ("damping", 2.0 * ratio * omega * carried)):
+        setattr(spring, attribute, np.eye(1, np.size(getattr(spring, attribute)))[0] * value)
+    text = (
+        f"{100.0 * part:.3g} % of '{body.name}' is the body '{second.name}' now, on the joint '{spring.name}' of stiffness "
+        f"{carried * omega**2:.6g} and damping {2.0 * ratio * omega * carried:.6g}"
+    )
+    return Change(effect.name, name, "native", text, (("body", second.name), ("joint", spring.name)))
+
+
+def _moved_by(joint: Any, body: Any) -> float:
+    """Inertia of a body alone along the axis of its joint [kg or kg m^2]."""
+    if joint.type == mujoco.mjtJoint.mjJNT_SLIDE:
+        return float(body.mass)
+    axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
+    back, turned = np.zeros(4), np.zeros(3)
+    mujoco.mju_negQuat(back, body.iquat)
+    mujoco.mju_rotVecQuat(turned, axis, back)
+    arm = np.cross(axis, np.array(body.ipos) - np.array(joint.pos))
+    return float(turned**2 @ np.array(body.inertia) + body.mass * (arm @ arm))
+
+
 OF_A_RECORD = {
     "timed_force": "its windows are those of the first record, others have their own",
     "harmonic_force": "its phase is that of the first record, others have their own",
@@ -236,6 +278,7 @@ FORCES: dict[str, Callable[[Target, NamedEffect], Change]] = {
     "force_offset": force_offset,
     "armature_error": armature_error,
     "gravity_compensation": gravity_compensation,
+    "carried_mass": carried_mass,
     "gap": gap,
     "asymmetric_gap": gap,
     "one_sided_stop": one_sided_stop,

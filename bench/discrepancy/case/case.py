@@ -39,6 +39,9 @@ class CaseLimits:
 
 SETTINGS = CaseLimits()
 
+ORDERS = ("position", "velocity", "acceleration")
+"""Quantities of a motion, by order."""
+
 
 @dataclass(frozen=True)
 class NominalParameter:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.case.free_decay import is_free_decay, with_no_load
+from bench.discrepancy.case.mjcf_units import expected_units
 from bench.discrepancy.case.rig_units import in_coherent_units
 from bench.discrepancy.case.unit_conversion import converted
 from bench.discrepancy.checks.counting import counted_from_rest
@@ -20,7 +21,6 @@ from bench.discrepancy.checks.reference import actuators_of, reference_of
 from bench.discrepancy.checks.scales import suspicions
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.mjcf_file import rig_of
-from bench.discrepancy.model.mjcf_units import expected_units
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.settings import DEFAULT, DiagnosisSettings
 from bench.errors import ModelError, UnitError

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.discrepancy.case.case import Case, CaseChannel, CaseRecord
+from bench.discrepancy.case.case import ORDERS, Case, CaseChannel, CaseRecord
 from bench.discrepancy.case.channel_noise import noise_floor
 from bench.discrepancy.model.mjcf_prescribed import PrescribedChannel, acceleration_name, prescribed_channels
-from bench.discrepancy.motion.observer import ACCELERATION, ORDERS
+from bench.discrepancy.motion.observer import ACCELERATION
 from bench.discrepancy.motion.tracked import TrackedAcceleration, tracked_acceleration
 from bench.discrepancy.settings import MotionSettings
 from bench.rig import Rig

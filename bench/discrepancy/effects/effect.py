@@ -198,6 +198,8 @@ class Effect:
         of_record: Parameter values and the name of a record to the theta of `law` in that record; the same in all where None.
         schedule: Parameter values and a record to the schedule of its force there (`equations_of_motion.scale_at`); none where None.
         varies: Name of the effect that this one is with a size that follows something; empty for others.
+        carried: Parameter values and scales to the inertia that its law moves instead of the nominal model's own; None where it moves
+            none.
         in_place: It takes the place of the nominal model's own dry friction along its coordinate.
     """
 
@@ -230,6 +232,7 @@ class Effect:
     creeps: bool = False
     varies: str = ""
     in_place: bool = False
+    carried: Callable[[Values, Scales], float] | None = None
     of_record: Callable[[Values, str], Values] | None = None
     schedule: Callable[[Values, CaseRecord], Values] | None = None
 

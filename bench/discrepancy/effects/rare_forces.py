@@ -23,6 +23,7 @@ from bench.discrepancy.effects.effect import (
 )
 from bench.laws.base_flexibility import BASE_FLEXIBILITY
 from bench.laws.bouc_wen_variants import BOUC_WEN_DEGRADING, BOUC_WEN_PINCHING
+from bench.laws.carried_mass import CARRIED_MASS
 from bench.laws.damping import ASYMMETRIC_DAMPING
 from bench.laws.gap import ASYMMETRIC_GAP
 from bench.laws.stiffness import COGGING
@@ -54,6 +55,15 @@ def _cogging_theta(values: Values, scales: Scales) -> Values:
 def _base_theta(values: Values, scales: Scales) -> Values:
     lead = scales.damping / scales.stiffness if scales.stiffness > 0.0 else 0.0
     return np.append(values, lead)
+
+
+def _carried_mass(values: Values, scales: Scales) -> float:
+    """The mass on the spring: its share of what the nominal model moves along the coordinate."""
+    return float(values[0] / scales.mobility)
+
+
+def _carried_theta(values: Values, scales: Scales) -> Values:
+    return np.array([_carried_mass(values, scales), *values[1:]])
 
 
 def hysteretic_rate(values: Values, scales: Scales) -> float:
@@ -165,6 +175,30 @@ RARER: tuple[Effect, ...] = (
         law=BASE_FLEXIBILITY,
         theta=_base_theta,
         rate_bound=lambda values, scales: 2.0 * math.pi * values[1],
+        log_prior=EFFECT_SETTINGS.rare,
+    ),
+    Effect(
+        "carried_mass",
+        "stiffness",
+        "joint",
+        (
+            FreeParameter("share", mean=math.log(0.2), std=0.8, bounds=(math.log(0.005), math.log(0.9))),
+            FreeParameter(
+                "frequency",
+                "velocity/position",
+                mean=math.log(0.5),
+                std=0.9,
+                bounds=(math.log(0.03), math.log(10.0)),
+                grid=log_grid(0.15, 0.25, 0.4, 0.65, 1.0, 1.6),
+                unit="Hz",
+            ),
+            FreeParameter("damping_ratio", mean=math.log(0.03), std=0.8, bounds=(math.log(1e-3), 0.0)),
+        ),
+        "f = m_c (y'' - q''), y'' = omega^2 (q - y) + 2 zeta omega (v - y'), m_c = share m",
+        law=CARRIED_MASS,
+        theta=_carried_theta,
+        rate_bound=lambda values, scales: 2.0 * math.pi * values[1],
+        carried=_carried_mass,
         log_prior=EFFECT_SETTINGS.rare,
     ),
     Effect(

@@ -40,8 +40,13 @@ FORCE = FreeParameter("force", "force", signed=True, std=2.0, bounds=(-50.0, 50.
 
 
 def schedulable(effect: Effect) -> bool:
-    """Whether the force of an effect may follow a channel."""
-    return effect.site == "joint" and effect.n_coordinates == 1 and not effect.modulated
+    """Whether the force of an effect may follow a channel; an inertia that is carried does not."""
+    return (
+        effect.site == "joint"
+        and effect.n_coordinates == 1
+        and not effect.modulated
+        and effect.carried is None
+    )
 
 
 CHANGES: tuple[Effect, ...] = tuple(

@@ -48,7 +48,8 @@ def whitening_behind(
         )
     elif np.any(load_noise := simulator.load_noise_of(record)):
         omega = 2.0 * np.pi * np.arange(n_bins) / (fast_length(len(record)) * record.step)
-        linear = simulator.structure.at(simulator.split(*model)[0])
+        values, etas = simulator.split(*model)
+        linear = simulator.linear(model[0], etas, values)
         scaled = simulator.structure.transfer(linear, np.asarray(omega, dtype=np.float64)) * load_noise
         scaled = scaled * sensor_gains(simulator, record, model)[:, None]
         noise = noise + scaled @ np.conj(np.swapaxes(scaled, 1, 2))

@@ -8,10 +8,10 @@ import mujoco
 import numpy as np
 
 from bench.arrays import Array
-from bench.discrepancy.case.case import Case, CaseChannel
+from bench.discrepancy.case.case import ORDERS, Case, CaseChannel
 from bench.discrepancy.case.free_decay import NO_LOAD
 from bench.discrepancy.model.mjcf_prescribed import MOTION, loads_of_motion, prescribed_channels
-from bench.discrepancy.motion.observer import ORDERS, Observer
+from bench.discrepancy.motion.observer import Observer
 from bench.discrepancy.settings import ModelSettings
 from bench.errors import FileFormatError, ModelError, UnknownNameError
 from bench.identification.linear_rig import LinearRig

@@ -21,9 +21,9 @@ import numpy as np
 
 from bench import native
 from bench.arrays import Array
-from bench.discrepancy.case.case import Case, CaseChannel
+from bench.discrepancy.case.case import ORDERS, Case, CaseChannel
 from bench.discrepancy.model.structure import Structure
-from bench.discrepancy.motion.observer import ACCELERATION, ORDERS, Observer
+from bench.discrepancy.motion.observer import ACCELERATION, Observer
 from bench.discrepancy.settings import ModelSettings
 from bench.errors import FileFormatError, UnknownNameError
 from bench.rig import Rig

@@ -30,7 +30,11 @@ def placements(case: Case, structure: Structure, catalogue: Iterable[Effect]) ->
         catalogue = where_prescribed(catalogue)
     for effect in catalogue:
         for place in structure.places:
-            if effect.site == "joint" and len(place.rows) == effect.n_coordinates:
+            if (
+                effect.site == "joint"
+                and len(place.rows) == effect.n_coordinates
+                and _moves(structure, place, effect)
+            ):
                 out.append(Placed(effect, place))
             if len(place.rows) != 1:
                 continue
@@ -38,6 +42,21 @@ def placements(case: Case, structure: Structure, catalogue: Iterable[Effect]) ->
                 out.append(Placed(effect, place))
             out += [Placed(effect, place, target) for target in _targets(case, effect, structure, place)]
     return out
+
+
+def _moves(structure: Structure, place: Place, effect: Effect) -> bool:
+    """Whether a place is one for a force of an effect: a part of a mass that it moves is on the coordinate in the room of that mass."""
+    if effect.carried is None:
+        return True
+    row = place.rows[0]
+    masses = [
+        structure.mass[structure.parameters.index(name)]
+        for name in place.mass
+        if name in structure.parameters
+    ]
+    return not structure.prescribed and any(
+        np.allclose(m, np.max(np.abs(m)) * np.outer(row, row)) for m in masses
+    )
 
 
 def _targets(case: Case, effect: Effect, structure: Structure, place: Place) -> list[str]:

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-ORDERS = ("position", "velocity", "acceleration")
-"""Quantities that an observer may read, by order."""
 ACCELERATION = 2
 """Order of an observer that reads accelerations."""
 

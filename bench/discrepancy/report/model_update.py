@@ -173,6 +173,13 @@ class _Own(NamedTuple):
         return math.ceil(self.value / self.step) + 1
 
     @property
+    def spring(self) -> tuple[float, float]:
+        """Stiffness and damping of the spring under a mass that the joint carries."""
+        carried, frequency, ratio = self.effect.theta
+        omega = 2.0 * math.pi * frequency
+        return carried * omega**2, 2.0 * ratio * omega * carried
+
+    @property
     def moved(self) -> str:
         """The channel or nominal parameter that the effect acts on; the joint where it names none."""
         return self.effect.channel or self.joint
@@ -210,6 +217,12 @@ _NATIVE: dict[str, _Native] = {
     "damping_error": _Native(
         '<joint name="{0.joint}" damping="{0.damping:.6g}"/>',
         "A number of the model was wrong, nothing else.",
+    ),
+    "carried_mass": _Native(
+        '<body name="CARRIED"> <joint type="(as {0.joint})" axis="(as {0.joint})" stiffness="{0.spring[0]:.6g}" '
+        'damping="{0.spring[1]:.6g}"/> '
+        '<inertial mass="{0.effect.theta[0]:.6g}" … /> </body>',
+        "A child of the body that {0.joint} moves, which loses as much: jointbench apply divides it. Of a hinge the number is an inertia.",
     ),
     "mass_error": _Native(
         '<inertial mass="{0.factor:.6g} * (mass in the model)" … />',

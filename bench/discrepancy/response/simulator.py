@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from bench.arrays import Array
 from bench.discrepancy.case.case import CaseRecord
 from bench.discrepancy.model.nominal_elements import with_own_forces
-from bench.discrepancy.model.placement import Hypothesis
+from bench.discrepancy.model.placement import Hypothesis, Placed
 from bench.discrepancy.motion.prescribed import earlier
 from bench.discrepancy.response.driving_loads import Actuated, driving_loads, fewest_steps, run_in
 from bench.discrepancy.response.force_laws import ActingLaw, assembled
@@ -73,6 +73,22 @@ class Simulator(MeasuredCase):
                 values[i] *= 1.0 + placed.effect.values(etas[-1], self.scales_of(placed))[0]
         return values, etas
 
+    def linear(self, hypothesis: Hypothesis, etas: list[Array], values: Array) -> StructureMatrices:
+        """Matrices at nominal values (n_parameters,), less the inertia that effects of a hypothesis carry themselves."""
+        linear = self.structure.at(values)
+        for placed, eta in zip(hypothesis, etas, strict=True):
+            if carried := self.carried(placed, eta):
+                row = placed.place.rows[0]
+                linear = linear._replace(mass=linear.mass - carried * np.outer(row, row))
+        return linear
+
+    def carried(self, placed: Placed, eta: Array) -> float:
+        """Inertia along its coordinate that an effect moves instead of the nominal model; zero for most."""
+        if placed.effect.carried is None:
+            return 0.0
+        scales = self.scales_of(placed)
+        return placed.effect.carried(placed.effect.values(eta, scales), scales)
+
     def simulate(
         self,
         hypothesis: Hypothesis,
@@ -113,7 +129,7 @@ class Simulator(MeasuredCase):
         """Motion of a free run, of which `simulate` returns what is measured; the arguments are the same."""
         values, etas = self.split(hypothesis, vector)
         lead = self.lead_in(record)
-        linear = self.structure.at(values)
+        linear = self.linear(hypothesis, etas, values)
         elements, fastest = self.elements(hypothesis, etas, record)
         if own_forces:
             elements = self._with_own(elements, hypothesis, values)

@@ -190,6 +190,8 @@ def force_along_motion(simulator: Simulator, placed: Placed, eta: Array, index: 
         substeps=steps(record.step * rates, settings=simulator.settings.simulation),
         start_time=record.start,
     )
+    if carried := simulator.carried(placed, eta):
+        force[:, 0] -= carried * (motion.acceleration @ rows[0])
     if placed.effect.in_place:
         force[:, 0] -= own_friction(simulator.structure, simulator.nominal, motion, rows[0], record.step)
     return force @ rows

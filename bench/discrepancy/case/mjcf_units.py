@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import mujoco
 
-from bench.discrepancy.case.case import Case, CaseChannel
+from bench.discrepancy.case.case import ORDERS, Case, CaseChannel
 from bench.discrepancy.case.unit_conversion import Expectation
-from bench.discrepancy.motion.observer import ORDERS
 from bench.rig import Rig
 from bench.rig.actuators import commanded
 from bench.rig.bodies import AXES
