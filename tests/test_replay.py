@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import mujoco
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from bench.discrepancy.application.applying import Findings, apply
 from bench.discrepancy.replay.running import Stretch, Train, run
 from bench.discrepancy.replay.verification import replay_of, root_mean_square, together
 from bench.discrepancy.verdict import Estimate, NamedEffect
+from bench.rig.held_joints import weld
 
 TRAIN = """<mujoco><option timestep="0.001" gravity="0 0 0"/><worldbody>
   <body><joint name="motor" axis="0 0 1"/><inertial pos="0 0 0" mass="1" diaginertia="0.02 0.02 0.02"/>
@@ -81,6 +84,35 @@ def test_joints_that_are_free_at_once_pass_on_what_one_of_them_lacks(tmp_path):
     assert set(runs) == set(alone) == {"shoulder", "elbow"}
     # beside the elbow's measured motion the shoulder feels nothing of what the elbow lacks
     assert runs["shoulder"].before > 5.0 * root_mean_square(alone["shoulder"])
+    assert all(run.after < 0.1 * run.before for run in runs.values())
+
+
+JAW = """<body name="jaw" pos="0 0 -0.25"><joint name="jaw" type="hinge" axis="0 1 0"/>
+  <inertial pos="0.02 0 -0.08" mass="0.3" diaginertia="0.001 0.001 0.0002"/></body>"""
+
+
+def test_what_a_case_has_held_does_not_move_in_the_users_model_and_stays_a_joint_of_it(tmp_path):
+    """A jaw that was held at an angle while the arm moved: it would swing in the model as it is."""
+    wrong, nominal = (
+        mjcf(servo=False, friction=level).replace('<site name="fore_tip"', f'{JAW}<site name="fore_tip"')
+        for level in (LIMIT, 0.0)
+    )
+    truth = mujoco.MjSpec.from_string(wrong)
+    weld(truth, {"jaw": 0.9})
+    folder = write_case(tmp_path, truth.to_xml(), servo=False, nominal=nominal)
+    document = json.loads((folder / "nominal.json").read_text())
+    (folder / "nominal.json").write_text(json.dumps(document | {"joints": {"jaw": 0.9}}))
+    case, path = read_case(folder), folder / "model.xml"
+    found = Findings(
+        (NamedEffect("coulomb_friction", "elbow", 1.0, {"limit": Estimate(LIMIT, 0.01, "N m")}),)
+    )
+    corrected = apply(path, found, case=case, linear=False)
+    assert [joint.name for joint in corrected.spec.joints] == ["shoulder", "elbow", "jaw"]
+    runs = {
+        run.dof: run
+        for run in together(path, found, case, replay_of(path, case, articulated=True, findings=found))
+    }
+    assert set(runs) == {"shoulder", "elbow"}
     assert all(run.after < 0.1 * run.before for run in runs.values())
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -26,12 +27,17 @@ def with_held_joints(rig: Rig, joints: object) -> Rig:
         ModelError: A joint is no hinge and no slide.
         UnknownNameError: A joint is none of the model.
     """
-    held = {n: at for n, at in joints.items() if at != "follow"} if isinstance(joints, Mapping) else {}
-    if not held:
+    if not _held(joints):
         return rig
     spec = parse(rig.mjcf, rig.folder, rig.name)
+    weld(spec, joints)
+    return Rig(rig.name, spec.to_xml(), timestep=rig.timestep, folder=rig.folder)
+
+
+def weld(spec: mujoco.MjSpec, joints: object) -> None:
+    """Weld joints of a model in place; arguments and errors as of `with_held_joints`."""
     known = [joint.name for joint in spec.joints]
-    for name, at in held.items():
+    for name, at in _held(joints).items():
         if name not in known:
             raise UnknownNameError("joint that was held", name, known)
         joint = spec.joint(name)
@@ -48,7 +54,10 @@ def with_held_joints(rig: Rig, joints: object) -> Rig:
             objtype=mujoco.mjtObj.mjOBJ_BODY,
             objname=body.name,
         )
-    return Rig(rig.name, spec.to_xml(), timestep=rig.timestep, folder=rig.folder)
+
+
+def _held(joints: object) -> dict[str, Any]:
+    return {n: at for n, at in joints.items() if at != "follow"} if isinstance(joints, Mapping) else {}
 
 
 def _turned(body: mujoco.MjsBody, joint: mujoco.MjsJoint, at: float) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -24,6 +24,7 @@ from bench.discrepancy.verdict import NamedEffect, NominalEstimate
 from bench.errors import ModelError
 from bench.rig import Element, Rig
 from bench.rig.building import parse
+from bench.rig.held_joints import weld
 from bench.rig.mjcf_files import mjcf_text
 
 WRONG_NUMBERS = ("mass_error", "com_error", "stiffness_error", "damping_error")
@@ -70,6 +71,12 @@ class Applied:
         """Python that runs before every step."""
         return tuple(line for change in self.changes for line in change.lines)
 
+    def as_tested(self, case: Case) -> Applied:
+        """The model as the records of a case were taken with it: joints that it has held are welded, which the user's own are not."""
+        spec = self.spec.copy()
+        weld(spec, case.options.get("joints"))
+        return replace(self, spec=spec)
+
     @native.quiet()
     def compiled(self) -> mujoco.MjModel:
         """The model, with its laws as native callbacks where it has such."""
@@ -99,6 +106,13 @@ def specification(path: str | Path) -> mujoco.MjSpec:
         ModelError: MuJoCo does not read it, or it is beyond the limits of a model.
     """
     return parse(mjcf_text(path), str(Path(path).parent), f"'{path}'")
+
+
+def nominal_as_tested(spec: mujoco.MjSpec, case: Case | None) -> mujoco.MjModel:
+    """A model compiled, joints that a case has held welded."""
+    own = spec.copy()
+    weld(own, case.options.get("joints") if case else None)
+    return own.compile()
 
 
 @native.quiet()
@@ -197,7 +211,7 @@ def apply(
     places = case.options.get("places", ()) if case else ()
     named = tuple(str(p) for p in places) if isinstance(places, (list, tuple)) else ()
     sampling = case.identification[0].step if case else 0.0
-    rest = rest_of(nominal) if linear else {}
+    rest = rest_of(nominal_as_tested(spec, case)) if linear else {}
     target = Target(spec, nominal, rest, loads_of(case, nominal), named, sampling)
     known = {estimate.name for estimate in findings.nominal}
     changes = [nominal_parameter(target, estimate) for estimate in findings.nominal]

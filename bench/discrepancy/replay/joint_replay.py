@@ -30,7 +30,6 @@ from bench.discrepancy.replay.running import Reading, Stretch, Train, controls, 
 from bench.discrepancy.replay.wound_trains import Wound, wound_trains
 from bench.discrepancy.settings import DEFAULT
 from bench.discrepancy.verdict import NamedEffect
-from bench.errors import ModelError
 
 
 @dataclass(frozen=True)
@@ -60,19 +59,17 @@ class JointReplay:
 
     @classmethod
     def of(cls, case: Case, nominal: mujoco.MjModel, findings: Findings | None = None) -> JointReplay:
-        """Prepare the replay of a case, with what was found in it.
-
-        Raises:
-            ModelError: Joints of the case are held or move as measured, which those of the user's file do not.
-        """
-        if isinstance(tied := case.options.get("joints"), dict) and tied:
-            names = " and ".join(f"'{name}'" for name in sorted(tied))
-            raise ModelError(
-                f"nominal.json has {names} held or moving as measured (\"joints\"), and in '{case.rig}' they would move freely, so the "
-                "judging records cannot be run in it; weld them there, or write the corrected model without --case"
-            )
+        """Prepare the replay of a case in its model, joints that it has held welded, with what was found in it."""
         own, model = bound(case, nominal), ArticulatedModel.of(nominal, case.rig)
         return cls(own, model, wound_trains(own, model, findings) if findings else Wound())
+
+    @property
+    def driven(self) -> tuple[Joint, ...]:
+        """Joints but those that the case has move as measured, whatever moves them."""
+        tied = self.case.options.get("joints")
+        return tuple(
+            joint for joint in self.model.joints if not isinstance(tied, Mapping) or joint.name not in tied
+        )
 
     def readings(
         self,
@@ -87,7 +84,7 @@ class JointReplay:
         Args:
             applied: The model they are run with.
             effects: Logs of wrong encoders are corrected first; what is simulated is the log.
-            only: Joints; all of them where none is named.
+            only: Joints; all of them where none is named, but those that move as measured whatever moves them.
             together: Whether they are free at once, as where the model is used, rather than each beside the measured motion of the others.
         """
         wrong = encoders_wrong(effects)
@@ -99,8 +96,10 @@ class JointReplay:
             motion_of(self.case, self.model, record, wrong, like, settings=DEFAULT.motion) if wrong else like
             for record, like in zip(self.case.validation, raw, strict=True)
         ]
+        applied = applied.as_tested(self.case)
         reference = applied.compiled()
-        asked = [j for j, joint in enumerate(self.model.joints) if not only or joint.name in only]
+        judged = only or [joint.name for joint in self.driven]
+        asked = [j for j, joint in enumerate(self.model.joints) if joint.name in judged]
 
         def read(free: Sequence[int]) -> dict[str, list[Reading]]:
             names = [self.model.joints[j].name for j in free]
@@ -204,7 +203,7 @@ class JointReplay:
     def _columns(self, record: CaseRecord, joint: str, late: float) -> dict[str, Array]:
         clock = np.arange(len(record)) * record.step
         columns = {}
-        for other in self.model.joints:
+        for other in self.driven:
             for name, samples in inputs_of(self.case, other, record).items():
                 shifted = late and other.name == joint
                 columns[name] = np.interp(clock - late, clock, samples) if shifted else samples

@@ -63,8 +63,7 @@ class LinearReplay:
             applied: The model they are run with.
             effects: What is wrong with sensors is put onto their readings.
         """
-        model = applied.compiled()
-        player = _Player(self, applied, model)
+        player = _Player.of(self, applied)
         records = self.case.validation
         runs = [_read(effects, player.channels(_driven(effects, record)), record) for record in records]
         out = {}
@@ -94,7 +93,7 @@ class LinearReplay:
     ) -> dict[str, Array]:
         """What the response channels read (n,) when a model plays a record's loads; of wrong sensors what they say."""
         driven = _driven(effects, record)
-        return _read(effects, _Player(self, applied, applied.compiled()).channels(driven), record)
+        return _read(effects, _Player.of(self, applied).channels(driven), record)
 
 
 def _sum(values: Mapping[str, Array], channels: Sequence[tuple[str, float]]) -> Array:
@@ -125,6 +124,11 @@ def _driven(effects: Sequence[NamedEffect], record: CaseRecord) -> CaseRecord:
 
 class _Player:
     """Runs records with one model."""
+
+    @classmethod
+    def of(cls, replay: LinearReplay, applied: Applied) -> _Player:
+        tested = applied.as_tested(replay.case)
+        return cls(replay, tested, tested.compiled())
 
     def __init__(self, replay: LinearReplay, applied: Applied, model: mujoco.MjModel) -> None:
         self.replay, self.model, self.hook = replay, model, hook_of(applied)
