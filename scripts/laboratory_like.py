@@ -23,12 +23,13 @@ from scipy.signal import butter, sosfilt
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "scripts"))
 
-from laboratory.made import STEP, Made, Rate, case_of, march, noisy, unstated  # noqa: E402
+from laboratory.made import STEP, Made, Rate, case_of, march, multisines, noisy, unstated  # noqa: E402
+from laboratory.oscillator import Oscillator  # noqa: E402
+from laboratory.structures import structures  # noqa: E402
 
 from bench.arrays import Array  # noqa: E402
 from bench.discrepancy.blind.protocol import write_case  # noqa: E402
 from bench.files import write_text  # noqa: E402
-from bench.signals import Multisine  # noqa: E402
 
 
 @dataclass(frozen=True)
@@ -39,14 +40,6 @@ class Args:
     """Folder for the cases."""
     seed: int = 20261129
     """Of the motions, the loads and the noise."""
-
-
-def multisines(
-    rng: np.random.Generator, seconds: float, low: float, high: float, rms: Sequence[float]
-) -> Array:
-    """Random motions or loads (n_samples, n_records) with all frequencies of a band."""
-    n = round(seconds / STEP)
-    return np.array([Multisine(band=(low, high), rms=one).sample(n, 1.0 / STEP, rng) for one in rms]).T
 
 
 def prescribed(
@@ -133,68 +126,6 @@ def components(rng: np.random.Generator) -> list[Made]:
     ]  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Oscillator:
-    """A carriage on a spring, of 2 kg, 2.4 N s/m and 1800 N/m, under three random loads, and what else is there.
-
-    Attributes:
-        name: Of the case.
-        right, also, why: See `Made`.
-        extra: A further force [N] from displacement, velocity and a hidden state.
-        memory: Rate of the hidden state from velocity and itself; none where None.
-        shaking: RMS of a force [N] that nobody measures, from 3 to 6 Hz.
-        softer: Stiffness [N/m] that is gone in each record.
-        read: What the sensors make of displacement and acceleration.
-        channels: Responses that were recorded.
-        mass: Stated mass [kg].
-    """
-
-    name: str
-    right: Sequence[Sequence[str]]
-    why: str
-    also: Sequence[str] = ()
-    extra: Callable[[Array, Array, Array], Array] = lambda x, v, z: np.zeros_like(x)
-    memory: Callable[[Array, Array], Array] | None = None
-    shaking: float = 0.0
-    softer: Sequence[float] = (0.0, 0.0, 0.0)
-    read: Callable[[Array, Array], tuple[Array, Array]] = lambda x, a: (x, a)
-    channels: Sequence[str] = ("displacement", "acceleration")
-    mass: float = 2.0
-
-    def made(self, rng: np.random.Generator) -> Made:
-        """Its case."""
-        loads = multisines(rng, 20.0, 0.5, 15.0, (6.0, 12.0, 9.0))
-        shaking = self.shaking * multisines(rng, 20.0, 3.0, 6.0, (1.0, 1.0, 1.0))
-        inputs = np.stack([loads + shaking, np.broadcast_to(np.array(self.softer), loads.shape)], axis=1)
-
-        def rate(s: Array, u: Array) -> Array:
-            x, v, z = s
-            force = u[0] - 2.4 * v - (1800.0 - u[1]) * x - self.extra(x, v, z)
-            return np.array([v, force / 2.0, self.memory(v, z) if self.memory else np.zeros_like(z)])
-
-        states = march(rate, np.zeros((3, 3)), inputs)
-        acceleration = np.array([rate(s, u)[1] for s, u in zip(states, inputs, strict=True)])
-        return self.recorded(rng, loads, *self.read(states[:, 0], acceleration))
-
-    def recorded(self, rng: np.random.Generator, load: Array, x: Array, a: Array) -> Made:
-        """The case of loads, displacements and accelerations (n_samples, 3)."""
-        noise = {"force": 0.02, "displacement": 1e-5, "acceleration": 0.03}
-        units = {"force": "N", "displacement": "m", "acceleration": "m/s^2"}
-        records = [
-            noisy(rng, {"force": load[:, i], "displacement": x[:, i], "acceleration": a[:, i]}, noise)
-            for i in range(3)
-        ]
-        channels = {
-            c: (units[c], "measured" if c == "force" else "response", noise[c])
-            for c in ("force", *self.channels)
-        }
-        stated = {
-            "mass": (self.mass, 0.02, "kg"), "damping": (2.4, 0.5, "N s/m"), "stiffness": (1800.0, 40.0, "N/m"),
-        }  # fmt: skip
-        case = case_of(self.name, "sdof", stated, channels, records)
-        return Made(f"lab_{self.name}", case, self.right, self.also, self.why)
-
-
 def filtered(x: Array, kind: str, order: int, frequency: float) -> Array:
     """What a filter makes of records (n_samples, n_records)."""
     return np.asarray(sosfilt(butter(order, frequency, kind, fs=1.0 / STEP, output="sos"), x, axis=0))
@@ -260,6 +191,7 @@ def cases(seed: int) -> list[Made]:
         second_mode(
             rng, "second_mode_and_cubic", 2e6, [["cubic_stiffness", "carried_mass"]], "a cubic spring, and a second mode near 25 Hz"
         ),
+        *structures(rng),
     ]  # fmt: skip
     return [made for one in stated for made in (one, unstated(one))]
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from bench.arrays import Array
 from bench.discrepancy import Case, CaseChannel, NominalParameter, record_from_arrays
+from bench.signals import Multisine
 
 STEP = 1.0 / 500.0
 """Time between samples [s]."""
@@ -55,6 +56,14 @@ def march(rate: Rate, start: Array, inputs: Array) -> Array:
             state = state + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
         out.append(state)
     return np.array(out)
+
+
+def multisines(
+    rng: np.random.Generator, seconds: float, low: float, high: float, rms: Sequence[float]
+) -> Array:
+    """Random motions or loads (n_samples, n_records) with all frequencies of a band."""
+    n = round(seconds / STEP)
+    return np.array([Multisine(band=(low, high), rms=one).sample(n, 1.0 / STEP, rng) for one in rms]).T
 
 
 def noisy(rng: np.random.Generator, record: Mapping[str, Array], noise: Mapping[str, float]) -> Signals:
